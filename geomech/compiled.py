@@ -196,14 +196,14 @@ class _CacheFile(IndexDataCacheFile):
     def _load_index(self) -> dict:
         try:
             return super()._load_index()
-        except Exception as error:  # noqa: BLE001 (whatever unpickling a damaged file leads to)
+        except Exception as error:
             self._drop(Path(self._index_path), error)
             return {}
 
     def load(self, key):
         try:
             return super().load(key)
-        except Exception as error:  # noqa: BLE001
+        except Exception as error:
             self._drop(Path(self._data_path(self._load_index()[key])), error)
             return None
 

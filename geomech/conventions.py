@@ -1,4 +1,4 @@
-"""Signs, frames, component order and units: said once, here, and tested in ``tests/test_conventions.py``.
+"""Signs, frames, component order and units of the whole package; ``tests/test_conventions.py`` tests them.
 
 Units
     SI throughout: m, kg, s, N, Pa; the third dimension is 1 m thick, so a force is N per metre of thickness.
@@ -66,12 +66,12 @@ def traction(stress: np.ndarray, normal: np.ndarray) -> np.ndarray:
 
 
 def rotate_stress(stress: np.ndarray, angle: np.ndarray | float) -> np.ndarray:
-    """Turn the material that carries ``stress`` (..., 3) by ``angle`` (rad), R σ Rᵀ: the co-rotated stress."""
+    """Rotate ``stress`` (..., 3) with its material by ``angle`` (rad): R σ Rᵀ."""
     return turned_stress(np.asarray(stress, dtype=float), np.cos(angle), np.sin(angle))
 
 
 def turned_stress(stress: np.ndarray, c: np.ndarray | float, s: np.ndarray | float) -> np.ndarray:
-    """``stress`` (..., 3) turned by the angle of cosine ``c`` and sine ``s``, as `rotate_stress` does."""
+    """R σ Rᵀ of ``stress`` (..., 3) by the rotation with cosine ``c`` and sine ``s``, as `rotate_stress`."""
     xx, yy, xy = stress[..., 0], stress[..., 1], stress[..., 2]
     return np.stack(
         [

@@ -61,6 +61,7 @@ class Allowed:
 
 
 def name_of(kind: type) -> str:
+    """The name that stands for a ``kind`` of object."""
     return f"{kind.__module__}:{kind.__qualname__}"
 
 

@@ -81,5 +81,5 @@ def test_what_a_run_has_not_got_is_said(opened, tmp_path):
         opened.mesh(cycle=1, time=1.0)
     with pytest.raises(FileNotFoundError, match=f"there are runs in {opened.folder}"):
         geomech.open_run(opened.folder.parent)
-    with pytest.raises(FileNotFoundError, match="history.csv is missing"):
+    with pytest.raises(FileNotFoundError, match=r"history.csv is missing"):
         geomech.open_run(tmp_path)

@@ -392,7 +392,7 @@ def test_another_scene_or_version_is_refused(write, tmp_path, monkeypatch):
     copy = out / "scene.toml"
     kept = copy.read_text()
     copy.write_text(kept.replace("20.0", "25.0"))
-    with pytest.raises(NotResumable, match="was 20.0, is now 25.0"):
+    with pytest.raises(NotResumable, match=r"was 20.0, is now 25.0"):
         resume(out)
     copy.write_text(kept)
     known = checkpoint_file.identity()
@@ -403,7 +403,7 @@ def test_another_scene_or_version_is_refused(write, tmp_path, monkeypatch):
     monkeypatch.setattr(checkpoint_file, "identity", lambda: known)
     history = (out / "history.csv").read_bytes()
     (out / "history.csv").write_bytes(history[:-5])
-    with pytest.raises(NotResumable, match="history.csv ends before its row 3"):
+    with pytest.raises(NotResumable, match=r"history.csv ends before its row 3"):
         resume(out, quiet=True)
     (out / "history.csv").write_bytes(history)
     assert resume(out, quiet=True)["end"] == "end of the scene"

@@ -40,7 +40,7 @@ def test_the_scene_as_it_stands_runs_into_the_folder_itself(ran, tmp_path):
 
 
 def test_an_error_in_the_last_is_found_before_the_first_is_run(ran, tmp_path):
-    with pytest.raises(SceneError, match="no such variant|variant"):
+    with pytest.raises(SceneError, match=r"no such variant|variant"):
         list(watched_runs(FOLDER, tmp_path, object, [None, "nowhere"]))
     assert not ran
 

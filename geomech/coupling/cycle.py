@@ -15,7 +15,7 @@ from __future__ import annotations
 import logging
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -36,6 +36,9 @@ from .load_transfer.unbounded_rock import out_of_sight, solved_pass
 from .monitoring.collapse import collapse_in_situ, lost, relax, unheld
 from .monitoring.energy_check import BendingWatch, BudgetWatch, GrowthWatch
 from .monitoring.mechanism import Mechanism
+
+if TYPE_CHECKING:
+    from ..ddm.growth.tip_advance import Growth
 
 log = logging.getLogger(__name__)
 
@@ -68,6 +71,40 @@ class UnderWay:
     whole: float = 0.0
 
 
+@dataclass
+class _LoadStep:
+    """A load step, pass by pass: what `UnderWay` keeps of it, the number of the present ``growth_pass``, the ``most``
+    passes that it may take, and whether a stop event has happened (``stops``)."""
+
+    dt: float
+    load_time: float | None
+    until: float | None
+    whole: float
+    pending: tuple[Event, ...]
+    growth_pass: int
+    most: int
+    stops: bool
+
+
+@dataclass(frozen=True, eq=False)
+class _Grown:
+    """The ``growth`` in a pass (None: nothing grows), its ``events``, the blocks that are ``cut``, whether it ``ends`` its
+    load step, and whether passes that follow begin where it has left the blocks (``rests``)."""
+
+    growth: Growth | None
+    events: tuple[Event, ...]
+    cut: Sequence[int]
+    ends: bool
+    rests: bool
+
+
+class _EnergyBalance(NamedTuple):
+    """The ``budget`` after a pass, and its ``statistics``."""
+
+    budget: dda.EnergyBudget
+    statistics: dict[str, float]
+
+
 class Coupling:
     """The load steps of one coupled problem: what there is ``now``, and how long the next step is to be.
 
@@ -81,7 +118,7 @@ class Coupling:
             self.now = CrackedBlocks(problem)
         self.length = dda.StepLength(problem.dda)
         self.static = problem.dda.dynamic_factor == 0.0
-        if problem.endless is not None and (not self.static or problem.dda.equilibrium):
+        if self.endless and (not self.static or problem.dda.equilibrium):
             raise ValueError('rock without an end is for static runs: dynamic_factor = 0 and equilibrium ""')
         self.events: EventSteps | None = None
         if problem.run.stepping == "events":
@@ -118,6 +155,21 @@ class Coupling:
         self.problem, self.now.problem = (
             replace(each, title=problem.title, run=problem.run) for each in (self.problem, self.now.problem)
         )
+
+    @property
+    def endless(self) -> bool:
+        """Whether the rock has no end."""
+        return self.problem.endless is not None
+
+    @property
+    def enough(self) -> float:
+        """The part of its toughness from which a tip grows: off one by what events are found to."""
+        return 1.0 if self.events is None else 1.0 - SETTLED
+
+    @property
+    def together(self) -> float:
+        """The part of its toughness from which a tip grows with another."""
+        return 1.0 if self.events is None else 1.0 - TOGETHER
 
     @property
     def stops_next(self) -> bool:
@@ -157,147 +209,178 @@ class Coupling:
 
     def _load_step(self):
         """All passes at one load. Returns True when a stop event happened."""
-        now, growing, endless = self.now, self.problem.growth, self.problem.endless is not None
-        static = self.static
-        # Near enough to the toughness to grow, and to grow with another.
-        enough, together = (1.0, 1.0) if self.events is None else (1.0 - SETTLED, 1.0 - TOGETHER)
+        now, step = self.now, self._begin()
+        if step.growth_pass == 0 and self.static and self.problem.dda.equilibrium == "loads":
+            step.load_time = now.state.time + until_next_event(now.problem.loads, now.state.time, step.dt)
+            collapse = relax(now, step.load_time)
+            if collapse:
+                now.number += 1
+                now.state = replace(now.state, time=step.load_time)
+                yield self._still(collapse)
+                return True
+        for growth_pass in range(step.growth_pass, step.most + 1):
+            step.growth_pass = growth_pass
+            now.number += 1
+            # What cracks have cut off rock without an end is held by nothing.
+            found = None if self.endless and not now.bodies else self._solved(step)
+            if found is None:
+                yield self._still(step.pending, growth_pass)
+                return True
+            grown = self._grown(step, found)
+            energies = self._energy_balance(step, found, grown)
+            yield record(
+                now, found.result.state, found.tips, found.solutions, grown.events, growth_pass, energies.statistics,
+                found.left_out,
+            )  # fmt: skip
+            if grown.ends:
+                self._end(step, found, grown, energies)
+                return step.stops
+            if grown.rests:
+                now.take_step(found.result.state, energies.budget)
+            step.pending = take_growth(now, grown.growth, found.result.state, found.solutions)
+            self.under_way = UnderWay(
+                step.dt, step.load_time, grown.events, step.pending, growth_pass + 1, step.until, step.whole
+            )
+            self.between()
+        raise AssertionError("unreachable: the last pass takes no growth")
+
+    def _begin(self) -> _LoadStep:
+        """The next load step, or the one under way, with the pass that it goes on with."""
+        now, growing = self.now, self.problem.growth
         begun, self.under_way = self.under_way, None
         if begun is None:
             now.load_step += 1
             self.began = now.state.time
             dt = min(self.length.dt, self.problem.run.end_time - now.state.time)
             begun, self._brought = UnderWay(dt, None, (), self._brought + self._excavated(), 0), ()
-        dt, load_time, pending, stops = begun.dt, begun.load_time, begun.pending, self._stops(begun.told)
-        until, whole = begun.until, begun.whole
-        if begun.next_pass == 0 and static and self.problem.dda.equilibrium == "loads":
-            load_time = now.state.time + until_next_event(now.problem.loads, now.state.time, dt)
-            collapse = relax(now, load_time)
-            if collapse:
-                now.number += 1
-                now.state = replace(now.state, time=load_time)
-                yield self._still(collapse)
-                return True
-        most = max(growing.max_passes, MOST_PASSES) if static and growing.max_passes else growing.max_passes
-        for growth_pass in range(begun.next_pass, most + 1):
-            now.number += 1
-            if endless and not now.bodies:
-                # Cracks have cut a piece off, which nothing holds.
-                yield self._still(pending, growth_pass)
-                return True
-            try:
-                if self.events is not None and growth_pass == 0:
-                    found = self.events.first_pass(now, self.problem.run.end_time)
-                    dt = found.result.dt
-                else:
-                    found = solved_pass(now, dt, load_time) if until is None else self._until(until)
-            except dda.NotConverged as failure:
-                if not (stops or self._stops(pending)):
-                    raise
-                # What ended the run has happened; that its pieces find no rest does not undo it.
-                log.warning("cycle %d shows the blocks before they moved on: %s", now.number, failure)
-                now.state = now.state if load_time is None else replace(now.state, time=load_time)
-                yield self._still(pending, growth_pass)
-                return True
-            result, solutions = found.result, found.solutions
-            if not endless:
-                strain = self.range.check(now.motion(result.state), now.blocks, result.state.time)
-                if now.bodies:
-                    self.balance.check(now.loads, now.blocks, strain, result.state.time)
-            if static:
-                # The passes of a step share its load, also when one of them has to take a shorter step.
-                load_time = result.state.time
-            elif until is None:
-                until, whole = result.state.time, result.dt
-            tips = found.tips
-            may_grow = growth_pass < most
-            if self.follows and not self.events.reached:
-                may_grow = False  # on the way to a lower load
-            events = pending + self.changes.events(now, found)
-            stops = stops or self._stops(events)
-            growth = None
-            if may_grow and not stops:
-                longest = np.inf if self.tips is None else self.tips.may_go(tips, now.blocks, whole, now.loads)
-                growth = growth_of_tips(now, tips, enough, together, longest)
-            if growth is not None and endless:
-                gone = out_of_sight(now, growth, result.state)
-                growth, events, stops = None if gone else growth, events + gone, stops or bool(gone)
-            if growth is None and may_grow and not stops and growing.initiation:
-                growth, born = births(now, solutions, result.state, enough)
-                events += born
-            if growth is None and static and not stops:
-                # Not before growth has ended: a block that hangs by a thread is strained beyond measure until it parts.
-                collapse = lost(now, result.state)
-                told = collapse or unheld(now, result, self.mechanism)
-                events, stops = events + told, bool(collapse) or self._stops(told)
-            if growth is not None:
-                tips["grown"] = growth.grown
-                if self.tips is not None:
-                    self.tips.went(tips)
-                events += initiations(now, tips, result.state)
-                stops = self._stops(events)
-            # Blocks part where the pass has left them, in equilibrium with what their faces bear.
-            cut = () if endless else part_here(now, growth, result.state)
-            parts = len(cut) > 0
-            ends = growth is None or self.follows or (parts and not static)
-            rests = parts or (not ends and most > growing.max_passes and (growth_pass + 1) % growing.max_passes == 0)
-            # What is dug out takes what it stores along.
-            dug = result.state.removed is not now.state.removed
-            budget = (now.budget.cut() if dug else now.budget).after(
-                result.energy, result.state.time, growing=static and growth_pass > 0
-            )
-            statistics = {**result.statistics, **budget.statistics(), **found.statistics}
-            gone_by = result.state.time - self.began
-            if abs(gone_by - result.dt) > 1e-9 * result.dt:
-                # Of an event step that is shorter than its inertia asks for, or goes back; of the last part of a pass.
-                statistics["dt"] = gone_by
-            if (now.bodies or now.crack_energy.under_way) and not endless:
-                now.crack_energy.passed(tips, now.blocks, now.problem.materials, *self._felt())
-                if ends or rests:
-                    self._count_at_cracks(result.state, budget, cut)
-                statistics |= now.crack_energy.statistics()
-            statistics["budget_residual"] = budget.left_over(now.crack_energy.residual, now.crack_energy.uneven)
-            self.energy.check(statistics["budget_residual"], result.state.time)
-            cracks = now.crack_energy
-            if ends and not static:
-                self.bending.check(cracks.toughness, cracks.fracture + cracks.parting, result.state.time)
-            overlap = None if result.overlap is None else Overlap(*result.overlap)
-            self.overlaps.check(budget, overlap, now.blocks.names, result.state.time)
-            if ends or parts:
-                self.unstable.check(budget, result.state.time)
-            if self.tips is not None and (len(tips) or found.left_out):
-                statistics["fastest_tip"] = self.tips.speed.fastest(whole)
-            yield record(now, result.state, tips, solutions, events, growth_pass, statistics, found.left_out)
-            if ends:
-                if growth_pass == most and not stops and self._grow_on(tips, enough, whole):
-                    log.warning(
-                        "cycle %d: tips still grow after %d passes at one load; going on to the next load",
-                        now.number,
-                        growth_pass,
-                    )
-                self.under_way = None
-                self.length.after(result, dt)
-                if self.tips is not None:
-                    self.tips.end(tips, now.blocks, whole, now.loads)
-                now.take_step(result.state, budget)
-                if growth is not None:
-                    if self.events is not None:
-                        self.events.grown()
-                    self._brought = take_growth(now, growth, result.state, solutions)
-                elif self.events is not None:
-                    self.events.after(now, found)
-                return stops
-            if rests:
-                now.take_step(result.state, budget)
-            pending = take_growth(now, growth, result.state, solutions)
-            self.under_way = UnderWay(dt, load_time, events, pending, growth_pass + 1, until, whole)
-            self.between()
-        raise AssertionError("unreachable: the last pass takes no growth")
+        most = max(growing.max_passes, MOST_PASSES) if self.static and growing.max_passes else growing.max_passes
+        stops = self._stops(begun.told)
+        return _LoadStep(
+            begun.dt, begun.load_time, begun.until, begun.whole, begun.pending, begun.next_pass, most, stops
+        )
 
-    def _grow_on(self, tips: np.ndarray, enough: float, whole: float) -> bool:
-        """Whether any of ``tips`` after the last pass of a load step has ``enough`` of its toughness, and may go on."""
+    def _solved(self, step: _LoadStep) -> Balance | None:
+        """The pass; None where what has ended the run leaves blocks that find no rest."""
         now = self.now
-        longest = np.inf if self.tips is None else self.tips.may_go(tips, now.blocks, whole, now.loads)
-        return bool(np.any((tips["k_eq"] >= enough * toughness(now, tips)) & (longest > 0)))
+        try:
+            if self.events is not None and step.growth_pass == 0:
+                found = self.events.first_pass(now, self.problem.run.end_time)
+                step.dt = found.result.dt
+            else:
+                found = solved_pass(now, step.dt, step.load_time) if step.until is None else self._until(step.until)
+        except dda.NotConverged as failure:
+            if not (step.stops or self._stops(step.pending)):
+                raise
+            # What ended the run has happened; that its pieces find no rest does not undo it.
+            log.warning("cycle %d shows the blocks before they moved on: %s", now.number, failure)
+            now.state = now.state if step.load_time is None else replace(now.state, time=step.load_time)
+            return None
+        result = found.result
+        if not self.endless:
+            strain = self.range.check(now.motion(result.state), now.blocks, result.state.time)
+            if now.bodies:
+                self.balance.check(now.loads, now.blocks, strain, result.state.time)
+        if self.static:
+            # The passes of a step share its load, also when one of them has to take a shorter step.
+            step.load_time = result.state.time
+        elif step.until is None:
+            step.until, step.whole = result.state.time, result.dt
+        return found
+
+    def _grown(self, step: _LoadStep, found: Balance) -> _Grown:
+        """What grows in the pass ``found``, and the events in it; sets whether the step ``stops``."""
+        now, state, growing = self.now, found.result.state, self.problem.growth
+        events = step.pending + self.changes.events(now, found)
+        step.stops = step.stops or self._stops(events)
+        # With control "toughness" nothing grows on the way to a lower load.
+        may_grow = step.growth_pass < step.most and (not self.follows or self.events.reached)
+        growth = None
+        if may_grow and not step.stops:
+            longest = self._longest(step, found.tips)
+            growth = growth_of_tips(now, found.tips, self.enough, self.together, longest)
+        if growth is not None and self.endless:
+            gone = out_of_sight(now, growth, state)
+            growth, events, step.stops = None if gone else growth, events + gone, step.stops or bool(gone)
+        if growth is None and may_grow and not step.stops and growing.initiation:
+            growth, born = births(now, found.solutions, state, self.enough)
+            events += born
+        if growth is None and self.static and not step.stops:
+            # Not before growth has ended: a block that hangs by a thread is strained beyond measure until it parts.
+            collapse = lost(now, state)
+            told = collapse or unheld(now, found.result, self.mechanism)
+            events, step.stops = events + told, bool(collapse) or self._stops(told)
+        if growth is not None:
+            found.tips["grown"] = growth.grown
+            if self.tips is not None:
+                self.tips.went(found.tips)
+            events += initiations(now, found.tips, state)
+            step.stops = self._stops(events)
+        # Blocks part where the pass has left them, in equilibrium with what their faces bear.
+        cut = () if self.endless else part_here(now, growth, state)
+        parts = len(cut) > 0
+        ends = growth is None or self.follows or (parts and not self.static)
+        many = step.most > growing.max_passes and (step.growth_pass + 1) % growing.max_passes == 0
+        return _Grown(growth, events, cut, ends, rests=parts or (not ends and many))
+
+    def _energy_balance(self, step: _LoadStep, found: Balance, grown: _Grown) -> _EnergyBalance:
+        """The energy budget after the pass, checked, and the pass's statistics."""
+        now, result, cracks = self.now, found.result, self.now.crack_energy
+        # What is dug out takes what it stores along.
+        dug = result.state.removed is not now.state.removed
+        budget = (now.budget.cut() if dug else now.budget).after(
+            result.energy, result.state.time, growing=self.static and step.growth_pass > 0
+        )
+        statistics = {**result.statistics, **budget.statistics(), **found.statistics}
+        gone_by = result.state.time - self.began
+        if abs(gone_by - result.dt) > 1e-9 * result.dt:
+            # Of an event step that is shorter than its inertia asks for, or goes back; of the last part of a pass.
+            statistics["dt"] = gone_by
+        if (now.bodies or cracks.under_way) and not self.endless:
+            cracks.passed(found.tips, now.blocks, now.problem.materials, *self._felt())
+            if grown.ends or grown.rests:
+                self._count_at_cracks(result.state, budget, grown.cut)
+            statistics |= cracks.statistics()
+        statistics["budget_residual"] = budget.left_over(cracks.residual, cracks.uneven)
+        self.energy.check(statistics["budget_residual"], result.state.time)
+        if grown.ends and not self.static:
+            self.bending.check(cracks.toughness, cracks.fracture + cracks.parting, result.state.time)
+        overlap = None if result.overlap is None else Overlap(*result.overlap)
+        self.overlaps.check(budget, overlap, now.blocks.names, result.state.time)
+        if grown.ends or len(grown.cut):
+            self.unstable.check(budget, result.state.time)
+        if self.tips is not None and (len(found.tips) or found.left_out):
+            statistics["fastest_tip"] = self.tips.speed.fastest(step.whole)
+        return _EnergyBalance(budget, statistics)
+
+    def _end(self, step: _LoadStep, found: Balance, grown: _Grown, energies: _EnergyBalance) -> None:
+        """Take the step as its last pass has left it."""
+        now, result = self.now, found.result
+        if step.growth_pass == step.most and not step.stops and self._grow_on(step, found.tips):
+            log.warning(
+                "cycle %d: tips still grow after %d passes at one load; going on to the next load",
+                now.number,
+                step.growth_pass,
+            )
+        self.under_way = None
+        self.length.after(result, step.dt)
+        if self.tips is not None:
+            self.tips.end(found.tips, now.blocks, step.whole, now.loads)
+        now.take_step(result.state, energies.budget)
+        if grown.growth is not None:
+            if self.events is not None:
+                self.events.grown()
+            self._brought = take_growth(now, grown.growth, result.state, found.solutions)
+        elif self.events is not None:
+            self.events.after(now, found)
+
+    def _longest(self, step: _LoadStep, tips: np.ndarray) -> np.ndarray | float:
+        """How far ``tips`` may go in the step, m: as far as they like at rest."""
+        return np.inf if self.tips is None else self.tips.may_go(tips, self.now.blocks, step.whole, self.now.loads)
+
+    def _grow_on(self, step: _LoadStep, tips: np.ndarray) -> bool:
+        """Whether any of ``tips`` after the last pass of a load step has enough of its toughness, and may go on."""
+        longest = self._longest(step, tips)
+        return bool(np.any((tips["k_eq"] >= self.enough * toughness(self.now, tips)) & (longest > 0)))
 
     def _until(self, until: float) -> Balance:
         """A pass of a dynamic step of which another has ended at the time ``until``. Its tips have grown for all of

@@ -89,6 +89,39 @@ def balanced(now: CrackedBlocks, dt: float, load_time: float | None) -> Balance:
     )
 
 
+@dataclass
+class _Chase:
+    """Blocks whose forces and strain chase each other in the passes of a step of which ``asked`` s were asked for: those
+    that have (``blocks``) since it was last tried as long as that (``tried_whole``), and in the last passes (``lately``);
+    ``doubt`` is by how much the strain that was assumed was off where a pass has cut the step short."""
+
+    static: bool
+    asked: float
+    blocks: set[int] = field(default_factory=set)
+    lately: set[int] = field(default_factory=set)
+    tried_whole: bool = False
+    doubt: float = 0.0
+
+    def agreed(self, now: CrackedBlocks, dt: float) -> tuple[bool, set[int]]:
+        """Whether a pass of ``dt`` s in which blocks and cracks agree is the last one; if not, which blocks are to take
+        their mean stress alone, and the step is to be tried as long as it was asked for."""
+        # In a step that has been cut short by a chase blocks agree as their inertia holds them: that is no rest.
+        give_way = _softest(now, self.blocks) if self.static and dt != self.asked and self.tried_whole else set()
+        if not self.static or dt == self.asked or ((self.tried_whole or self.doubt < CERTAIN) and not give_way):
+            return True, set()
+        # What cut a static step short may have been a strain that the first passes assumed.
+        self.tried_whole, self.blocks = True, set()
+        return False, give_way
+
+    def goes_on(self, now: CrackedBlocks, attempt: int, differences: np.ndarray) -> set[int]:
+        """Which blocks are to take their mean stress alone after the pass number ``attempt``, in which they differ from
+        their cracks by ``differences`` (n_cracked,)."""
+        chasing = set(np.array(list(now.bodies), int)[differences > NO_ANSWER].tolist())
+        self.blocks |= chasing
+        self.lately = self.lately | chasing if attempt >= PATIENCE // 2 else set()
+        return _softest(now, self.lately) if attempt + 1 == PATIENCE else set()
+
+
 def _passes(now: CrackedBlocks, dt: float, load_time: float | None, soft_ones_hang: bool) -> tuple[Balance, np.ndarray]:
     """Passes of a step of at most ``dt`` s, and by how much every cracked block still differs from its cracks (relative
     strain)."""
@@ -98,17 +131,13 @@ def _passes(now: CrackedBlocks, dt: float, load_time: float | None, soft_ones_ha
     else:
         settling.forget()  # what contacts did a step ago, in motion they need not do again
     tolerance = COMPLIANCE_TOLERANCE if static else DYNAMIC_TOLERANCE
-    asked = dt
     response = _expected(now, now.state.time + dt if load_time is None else load_time) if static else now.response
-    result, iterations, tried_whole, chased, lately, doubt = None, 0, False, set(), set(), 0.0
+    result, iterations, chase = None, 0, _Chase(static, dt)
     left: list[float] = []
     for attempt in range(COMING_TOGETHER if static else COMPLIANCE_PASSES):
-        with now.timed("dda"):
-            result = now.system.step(now.state, now.problem.loads, dt, response, load_time, result)
-            # Passes that took steps of unlike lengths, and so in statics bore unlike loads, would never agree.
-            cut, dt = result.dt < dt, min(dt, result.dt)
-            if load_time is not None and result.state.time != load_time:
-                result = replace(result, state=replace(result.state, time=load_time))
+        result = _step(now, dt, load_time, response, result)
+        # Passes that took steps of unlike lengths, and so in statics bore unlike loads, would never agree.
+        cut, dt = result.dt < dt, min(dt, result.dt)
         iterations += result.statistics["open_close_iterations"]
         now.acted = result.statistics
         if not now.bodies:
@@ -123,41 +152,49 @@ def _passes(now: CrackedBlocks, dt: float, load_time: float | None, soft_ones_ha
         if solved:
             _solve_bodies(now, result)
         response, differences, answer = _take_response(now, result.state, settling, tolerance)
-        mismatch = float(differences.max())
-        doubt = max(doubt, mismatch) if cut else doubt
-        left.append(mismatch)
-        if mismatch < tolerance:
+        left.append(float(differences.max()))
+        chase.doubt = max(chase.doubt, left[-1]) if cut else chase.doubt
+        if left[-1] < tolerance:
             if static:
                 _remember(now, answer)
-            # In a step that has been cut short by a chase blocks agree as their inertia holds them: that is no rest.
-            give_way = _softest(now, chased) if static and dt != asked and tried_whole else set()
-            if not static or dt == asked or ((tried_whole or doubt < CERTAIN) and not give_way):
+            done, give_way = chase.agreed(now, dt)
+            if done:
                 break
-            # What cut a static step short may have been a strain that the first passes assumed.
-            dt, tried_whole, chased = asked, True, set()
+            dt = chase.asked
         else:
-            chasing = set(np.array(list(now.bodies), int)[differences > NO_ANSWER].tolist())
-            chased |= chasing
-            lately = lately | chasing if attempt >= PATIENCE // 2 else set()
-            give_way = _softest(now, lately) if attempt + 1 == PATIENCE else set()
+            give_way = chase.goes_on(now, attempt, differences)
         if attempt + 1 >= COMPLIANCE_PASSES and not left[-1] < 0.5 * left[-3]:
             break
         for block in sorted(give_way):
             now.by_mean_stress.add(block)
         if give_way:
             # What has cut the step short may have been the chase.
-            dt = asked
+            dt = chase.asked
             settling.forget()
-    left_out: dict = {}
-    if not solved:
-        left_out = _solve_what_may_grow(now, result)
-    imbalance = max(load.imbalance for load in now.loads.values())
+    left_out = {} if solved else _solve_what_may_grow(now, result)
     statistics = {
         "open_close_iterations": iterations,
         "compliance_passes": attempt + 1,
-        "compliance_mismatch": mismatch,
-        "traction_imbalance": imbalance,
+        "compliance_mismatch": left[-1],
+        "traction_imbalance": max(load.imbalance for load in now.loads.values()),
     }
+    return _with_tips(now, result, statistics, left_out), differences
+
+
+def _step(
+    now: CrackedBlocks, dt: float, load_time: float | None, response: dda.CrackResponse, before: StepResult | None
+) -> StepResult:
+    """A step of the blocks, which assume this ``response`` of their cracks; ``before``: that of the pass before."""
+    with now.timed("dda"):
+        result = now.system.step(now.state, now.problem.loads, dt, response, load_time, before)
+        if load_time is not None and result.state.time != load_time:
+            result = replace(result, state=replace(result.state, time=load_time))
+    return result
+
+
+def _with_tips(now: CrackedBlocks, result: StepResult, statistics: dict[str, float], left_out: dict) -> Balance:
+    """What the last pass has come to, with the tips of its cracks; bodies that were ``left_out`` are solved as well where
+    something grows."""
     tips = _judged(now)
     if left_out and (tips["k_eq"] >= toughness(now, tips)).any():
         # Where something grows all of it is looked at: the step is taken again with what has grown.
@@ -165,9 +202,9 @@ def _passes(now: CrackedBlocks, dt: float, load_time: float | None, soft_ones_ha
         left_out, tips = {}, _judged(now)
     for body in left_out.values():
         body.work.solutions_left_out += 1
-    if not static:
+    if not now.system.scheme.static:
         now.cannot_grow.solved(now, tips, toughness(now, tips))
-    return Balance(result, now.solutions, tips, statistics, left_out), differences
+    return Balance(result, now.solutions, tips, statistics, left_out)
 
 
 def _softest(now: CrackedBlocks, chasing: set[int]) -> set[int]:

@@ -125,15 +125,7 @@ class Body:
         self.mesh: Mesh = mesh(self.loops, cracks, settings, marked, previous.mesh if same else None, half_plane)
         self.boundary: ElementSet = self.mesh.boundary
         self.faces: ElementSet = self.mesh.cracks
-        if self.outlined and same:
-            self.area, self.centroid, self._second = previous.area, previous.centroid, previous._second
-            self._reach, self.hole_moments = previous._reach, previous.hole_moments
-        elif self.outlined:
-            self.area, self.centroid, self._second = area_moments(self.loops)
-            self._reach = float(np.ptp(self.loops[0], axis=0).max())
-            self.hole_moments = [area_moments([hole[::-1]])[:2] for hole in self.loops[1:]]
-        else:
-            self.area, self.centroid = np.inf, np.zeros(2) if half_plane is None else np.array(half_plane.point)
+        self._measure(previous if same else None)
         self._factored_after_all = previous is not None and previous._factored_after_all
         solver = "dense" if self._factored_after_all else settings.solver
         holds = Holds(self.boundary, self.supports, self.support_segments, self._extent) if self.supports else None
@@ -153,6 +145,21 @@ class Body:
         #: Where faces stand on bases, and how unit tractions move them by the states of the cracks (`rigid_bases`).
         self.on_bases: dict[bytes, object] = {}
         self._assemble(previous, holds, many)
+
+    def _measure(self, same: Body | None) -> None:
+        """Area, centroid and moments of the rock, and of the holes in it; those of a body with the ``same`` outlines."""
+        if self.outlined and same is not None:
+            self.area, self.centroid, self._second = same.area, same.centroid, same._second
+            self._reach, self.hole_moments = same._reach, same.hole_moments
+        elif self.outlined:
+            self.area, self.centroid, self._second = area_moments(self.loops)
+            self._reach = float(np.ptp(self.loops[0], axis=0).max())
+            self.hole_moments = [area_moments([hole[::-1]])[:2] for hole in self.loops[1:]]
+        else:
+            self.area, self.centroid = (
+                np.inf,
+                np.zeros(2) if self.half_plane is None else np.array(self.half_plane.point),
+            )
 
     @property
     def nu(self) -> float:

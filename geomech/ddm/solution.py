@@ -14,6 +14,7 @@ from .crack_contact.face_contact import FaceAnswer
 from .crack_contact.face_laws import FaceStates, Released
 from .crack_contact.frictional_contact import stored_by_fillings
 from .kernels import shape_functions
+from .kernels.full_plane import Elements, Kernel
 from .loads.load_vectors import Applied, apply
 from .loads.reactions import Reactions, reactions
 from .mesh.edge_location import OFF, onto_boundary, sides_for
@@ -310,7 +311,8 @@ class Solution:
         nu, net = body.nu, sum((p.force for p in self._applied.kelvin), np.zeros(2))
 
         def add(start, end, kind, density, tol, force, side=1.0):
-            add_fields(where, start, end, kind, density, nu, tol, side, force, stress, shift, body.half_plane)
+            elements, kernel = Elements(start, end, kind), Kernel(nu, tol, side, force)
+            add_fields(where, elements, density, kernel, stress, shift, body.half_plane)
             if force:
                 constant, carried = _kelvin_constant(start, end, density, nu)
                 shift[:] += constant

@@ -1,4 +1,4 @@
-"""Plain arrays that the solvers share: blocks, cracks, materials, joint laws, loads, the state of a run."""
+"""Records that all solvers share: blocks, cracks, materials, joint laws, loads, settings, and the state of a run."""
 
 from .blocks.block_arrays import Blocks
 from .blocks.block_motion import Motion

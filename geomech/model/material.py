@@ -1,4 +1,4 @@
-"""Elastic, brittle rock: one material of the scene."""
+"""Isotropic linear elastic rock with fracture toughnesses: constants and what follows from them."""
 
 from __future__ import annotations
 
@@ -10,14 +10,20 @@ import numpy as np
 
 @dataclass(frozen=True)
 class Material:
-    """An isotropic linear elastic material with fracture toughnesses, and a strength where it is still whole.
+    """Isotropic linear elastic rock, its fracture toughnesses, and the strength of the intact rock.
 
-    ``density`` kg/m³, ``youngs_modulus`` Pa, ``k_ic`` Pa √m (infinite: cracks in it do not grow), ``plane`` either
-    "strain" or "stress". ``k_iic`` Pa √m is the toughness against growth in shear, asked for by the F-criterion alone;
-    ``tensile_strength`` Pa, ``cohesion`` Pa and ``friction_angle`` rad (Mohr–Coulomb) are those of intact rock, asked
-    for where cracks may be born. Blocks of a ``rigid`` material move as if they were stiffer than all others, by three
-    unknowns; its Young's modulus sets the springs of their contacts only. What is infinite does not fail. Raises
-    ValueError, naming the material, on constants that no elastic solid has.
+    youngs_modulus    Pa; of a ``rigid`` material it sets only the stiffness of contact springs
+    poissons_ratio    in (−1, ½)
+    density           kg/m³
+    k_ic              mode I toughness, Pa √m; infinite: cracks do not grow
+    k_iic             toughness against growth in shear, Pa √m; used by the F-criterion alone
+    plane             "strain" or "stress"
+    rigid             True: blocks do not strain and have three unknowns instead of six
+    tensile_strength  Pa, of intact rock, for crack initiation; infinite: no tensile failure
+    cohesion          Pa, of intact rock (Mohr–Coulomb), for crack initiation; infinite: no shear failure
+    friction_angle    rad, of intact rock
+
+    Raises ValueError that names the material for constants that no elastic solid has.
     """
 
     name: str
@@ -63,7 +69,7 @@ class Material:
 
     @property
     def effective_poissons_ratio(self) -> float:
-        """The ν that makes plane-strain formulas hold: ν itself, or ν/(1+ν) in plane stress."""
+        """ν for plane-strain formulas: ν itself in plane strain, ν/(1+ν) in plane stress."""
         nu = self.poissons_ratio
         return nu if self.plane == "strain" else nu / (1 + nu)
 
@@ -74,13 +80,14 @@ class Material:
 
     @property
     def pressure_wave_speed(self) -> float:
-        """c_p = √((λ + 2μ)/ρ), m/s, in plane stress with λ of the plate; infinite without mass."""
+        """Speed of P-waves c_p = √((λ + 2μ)/ρ), m/s; in plane stress λ is that of a plate. Infinite for density 0."""
         return math.sqrt(self.stiffness()[0, 0] / self.density) if self.density else math.inf
 
     @property
     def rayleigh_speed(self) -> float:
-        """c_R, m/s, that of Rayleigh's surface wave: c_s (0.87 + 1.12 ν)/(1 + ν) (Viktorov 1967), half a per cent off
-        at most for ν from 0; infinite without mass."""
+        """Speed of Rayleigh waves c_R = c_s (0.87 + 1.12 ν)/(1 + ν), m/s (Viktorov 1967); infinite for density 0.
+
+        The error is at most 0.5 % for ν ≥ 0."""
         if not self.density:
             return math.inf
         nu = self.effective_poissons_ratio
@@ -98,8 +105,7 @@ class Material:
         return np.array([[1 - nu, -nu, 0.0], [-nu, 1 - nu, 0.0], [0.0, 0.0, 2.0]]) / (2 * mu)
 
     def out_of_plane_stress(self, stress: np.ndarray) -> np.ndarray:
-        """σzz (...,) that goes with in-plane ``stress`` (..., 3): ν(σxx + σyy) in plane strain, zero in plane
-        stress."""
+        """σzz (...,) Pa from in-plane ``stress`` (..., 3) Pa: ν(σxx + σyy) in plane strain, 0 in plane stress."""
         stress = np.asarray(stress, dtype=float)
         nu = self.poissons_ratio if self.plane == "strain" else 0.0
         return nu * (stress[..., 0] + stress[..., 1])

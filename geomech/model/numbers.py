@@ -1,21 +1,24 @@
-"""Which numbers a setting or a constant may be: a table beside each class says it, and is held against it once, when
-an object is made."""
+"""Admissible ranges of settings and constants: one table per class, checked when an object is made."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 
 @dataclass(frozen=True)
 class Number:
-    """The numbers from ``least`` to ``most``; without ``closed`` the least itself is none of them. ``unit`` is told.
+    """A range of numbers from ``least`` to ``most``; nan is never in it.
 
-    ``infinite``: +∞ is one too, and means that there is no limit. ``whole``: whole ones only. ``optional``: None says
-    that nothing is given. nan is never one.
+    closed    True: ``least`` belongs to the range
+    unit      for messages
+    infinite  True: +∞ is admissible and means "no limit"
+    whole     True: integers only
+    optional  True: None is admissible and means "not given"
     """
 
     least: float = 0.0
@@ -34,12 +37,12 @@ class Number:
         if self.whole and not isinstance(value, (int, np.integer)):
             return False
         if math.isinf(value):
-            return self.infinite and value > 0
-        return self.least <= value <= self.most and (self.closed or value > self.least)
+            return self.infinite and bool(value > 0)
+        return bool(self.least <= value <= self.most and (self.closed or value > self.least))
 
     @property
     def wish(self) -> str:
-        """What to say of one that does not hold: "must be positive"."""
+        """The requirement as words for a message, such as "must be positive"."""
         if self.whole:
             return f"must be a whole number of at least {self.least:g}"
         if self.most < math.inf:
@@ -51,28 +54,29 @@ class Number:
         return f"must be {'at least' if self.closed else 'more than'} {self.least:g}"
 
 
-#: Kinds that come again and again.
+#: Ranges that several classes use.
 POSITIVE, NOT_NEGATIVE = Number(closed=False), Number()
 
 
 def refuse_numbers(of: object, table: Mapping[str, Number], who: str = "") -> None:
-    """Raises ValueError, naming ``who`` and the number, for the first of ``table`` that the attribute of ``of`` so
-    called is not."""
+    """Check the attributes of ``of`` that ``table`` names against their ranges.
+
+    Raises ValueError that names ``who``, the attribute and its value, for the first one outside its range."""
     for name, number in table.items():
         value = getattr(of, name)
         if number.holds(value):
             continue
         finite = isinstance(value, (float, np.floating)) and math.isinf(value) and value > 0 and number.most == math.inf
         wish = f"{number.wish} and finite" if finite else number.wish
-        raise ValueError(f"{f'{who}: ' if who else ''}{name} {wish}, got {told(value)} {number.unit}".rstrip())
+        raise ValueError(f"{f'{who}: ' if who else ''}{name} {wish}, got {as_text(value)} {number.unit}".rstrip())
 
 
-def told(value: object) -> str:
-    """``value`` as a person writes it: numpy's numbers without their type."""
+def as_text(value: object) -> str:
+    """``value`` as text for a message: NumPy scalars without their type."""
     return repr(value.item() if isinstance(value, np.generic) else value)
 
 
-def refuse_point(what: str, point: object) -> None:
-    """Raises ValueError, saying ``what`` it is, for a ``point`` that is not two finite coordinates."""
+def refuse_point(what: str, point: Any) -> None:
+    """Raise ValueError that begins with ``what`` unless ``point`` is two finite coordinates."""
     if np.shape(point) != (2,) or not np.isfinite(np.asarray(point, dtype=float)).all():
         raise ValueError(f"{what} needs two finite coordinates (x, y) in m, got {point!r}")

@@ -1,4 +1,4 @@
-"""A scene made ready for the solvers: what `geomech.scene.build` fills and `geomech.coupling` runs."""
+"""The complete problem for the solvers and its settings: `geomech.scene.build` makes it, `geomech.coupling` runs it."""
 
 from __future__ import annotations
 
@@ -20,36 +20,43 @@ from .unbounded_rock import EndlessRock
 
 @dataclass(frozen=True)
 class DdaSettings:
-    """How blocks are moved (names and values of Shi 1988 where he has them).
+    """Settings of the block solver (names and values after Shi 1988 where he has them).
 
-    ``time_step`` s is that of every step, or with ``automatic_time_step`` the longest, by which steps then grow and
-    shrink as they prove easy or hard (`dda.StepLength`). ``normal_penalty`` and ``shear_penalty`` are contact spring
-    stiffnesses, N/m per metre of thickness (Pa); None picks them from the blocks' stiffness. With ``springs`` "resolved"
-    those that are picked are in motion no stiffer than ``time_step`` resolves, 100 m/dt² (m of the lighter block) and at
-    least E'/2, once the blocks bear what was put on them at the start: faces keep their forces then and sink in no further,
-    and what opens and closes by micrometres takes no iterations (bonds and joints with a stiffness of their own stay as
-    they are). ``contact`` "augmented"
-    adds multipliers to these springs until closed contacts gape and sticking ones give by less than
-    ``penetration_tolerance`` times √area of the smallest block, whatever the penalty. ``corner_rounding`` is the length
-    over which two corners that meet are rounded, in sizes (√area) of the smaller block, at most a quarter of the
-    shortest edge there: corners that overlap by less slide over each other, by more they hold (Itasca's UDEC advises
-    a hundredth of an edge). ``dynamic_factor`` multiplies the
-    velocity carried from step to step: 0 is static, 1 fully dynamic. ``newmark`` is (β, γ) of the time scheme: (½, 1)
-    is Shi's, (¼, ½) the trapezoidal rule, which has no dissipation; in between it has some; 2β ≥ γ ≥ ½, β ≤ γ − ¼. With γ > ½ it
-    is of first order (of second for what only falls and turns, if γ = 2β). ``spectral_radius`` ϱ of 0 to 1 puts the
-    α-scheme of Wood, Bossak & Zienkiewicz in its place, of second order, which damps by ϱ a step what the step does not
-    resolve; near 1 blocks that bounce may gain energy. ``damping`` is the fraction of critical damping of a block's own lowest vibration, and of its contacts'
-    (dynamic steps only): below about 0.3 a block that should stick may flutter on its friction and creep, waves that
-    cross many blocks want less; ``rayleigh_mass`` 1/s and ``rayleigh_stiffness``
-    s damp blocks by α M + β K besides (`rayleigh_coefficients` finds them). ``max_displacement_ratio`` bounds the
-    largest displacement in a step, in units of half the diagonal of the domain, however it lies: how finely a motion is
-    to be followed. What contacts need is looked after besides: two blocks near each other move against each other by a
-    tenth of √(√A √A′) in a step, and turn by 0.15, A and A′ their areas, and a step in which anything goes into or through
-    a block is made again (`dda.step_control.relative_motion`, `dda.step_control.continuous_collision`). ``equilibrium`` says when a run seeks
-    static equilibrium (`dda.statics.pseudo_time_equilibrium`): "" never, "start" before it begins, "loads" at every load of a static run
-    too; ``unbalanced_tolerance`` is its unbalanced force over the mean force. ``contact_solver`` holds what the open–close
-    iteration is tuned by; no scene sets it. Raises ValueError naming the setting
-    that is none of its numbers (`_DDA_NUMBERS`) or words.
+    time_step            s; of every step, or the longest one with ``automatic_time_step``
+    automatic_time_step  True: steps shrink and grow with the open–close iterations they take
+                         (`dda.step_control.adaptive_time_step`)
+    normal_penalty, shear_penalty   contact spring stiffness, N/m per metre of thickness (Pa); None: from the stiffness
+                         of the blocks (`dda.joint_laws.penalty_springs`)
+    springs              "stiff", or "resolved": in motion, penalty springs are no stiffer than the time step resolves,
+                         100 m/dt² (m the mass of the lighter block), and at least E'/2. This begins once the blocks
+                         bear the initial loads: faces then keep their forces and penetrate no further, and micrometre
+                         openings cost no iterations. Bonds and joints with a stiffness of their own keep theirs
+    contact              "penalty", or "augmented": multipliers are added to the springs until closed contacts
+                         penetrate, and sticking ones slip, by less than ``penetration_tolerance`` times √area of the
+                         smallest block, whatever the penalty
+    corner_rounding      length over which two corners that meet are rounded, in units of √area of the smaller block, at
+                         most a quarter of the shortest edge there. Corners that overlap by less slide over each other,
+                         others hold (the UDEC manual advises a hundredth of an edge)
+    dynamic_factor       factor on the velocity carried from step to step: 0 static, 1 fully dynamic
+    newmark              (β, γ) of Newmark's scheme with 2β ≥ γ ≥ ½ and β ≤ γ − ¼: (½, 1) is Shi's, (¼, ½) the
+                         trapezoidal rule, which does not dissipate. γ > ½ dissipates and is of first order (of second
+                         for free flight and rotation if γ = 2β)
+    spectral_radius      ϱ in [0, 1]: the second-order α-scheme of Wood, Bossak & Zienkiewicz instead of Newmark's. It
+                         damps what the step does not resolve by ϱ per step; near 1, bouncing blocks may gain energy
+    damping              fraction of critical damping of each block's lowest vibration and of its contacts, in dynamic
+                         steps. Below about 0.3 a block that should stick may flutter and creep; waves across many
+                         blocks need less
+    rayleigh_mass, rayleigh_stiffness   1/s and s: damping α M + β K besides (`rayleigh_coefficients`)
+    max_displacement_ratio   largest displacement in a step over half the diagonal of the domain. Contacts have limits
+                         of their own: two near blocks of areas A, A′ move relative to each other by at most a tenth of
+                         (A A′)^¼ and rotate by at most 0.15 rad per step (`dda.step_control.relative_motion`), and a
+                         step in which a vertex passes into or through a block is repeated
+                         (`dda.step_control.continuous_collision`)
+    equilibrium          "" never; "start": static equilibrium before the run; "loads": also at every load of a static
+                         run (`dda.statics.pseudo_time_equilibrium`)
+    unbalanced_tolerance out-of-balance force over the mean force at that equilibrium
+
+    Raises ValueError that names a setting outside its range (`_DDA_NUMBERS`) or words.
     """
 
     time_step: float = 1.0
@@ -94,9 +101,9 @@ class DdaSettings:
             )
 
 
-#: Corners rounded over more than this part of a block's size are no corners any more.
+#: Largest corner rounding, in units of the block's size √area.
 LARGEST_CORNER = 0.25
-#: What the numbers of `DdaSettings` may be.
+#: Admissible numbers of `DdaSettings`.
 _DDA_NUMBERS = {
     "time_step": Number(closed=False, unit="s"),
     "dynamic_factor": Number(most=1.0),
@@ -115,24 +122,29 @@ _DDA_NUMBERS = {
 }
 
 
-#: Highest polynomial order of an element. K of a straight crack of four elements is right to 1e-12 there; from then on
-#: the round-off of monomials on [−1, 1] grows 2.4 times an order, more than the order gains (16: 1e-11, 20: 1e-10).
+#: Highest polynomial order of an element. K of a straight crack of four elements has an error of 1e-12 there. Beyond,
+#: round-off of monomials on [−1, 1] grows by 2.4 per order, faster than the error falls (16: 1e-11, 20: 1e-10).
 HIGHEST_ORDER = 12
 NODE_FAMILIES, SOLVERS = ("chebyshev", "gauss", "equal"), ("auto", "dense", "compressed")
 
 
 @dataclass(frozen=True)
 class DdmSettings:
-    """How cracked blocks are meshed: ``order`` p of the elements, 0 to 12 (beyond, round-off grows faster than the
-    error falls), family of collocation ``nodes`` ("chebyshev", "gauss" or "equal"), elements of a straight crack, of a
-    boundary side; and how they are solved: ``solver`` "dense" (factored), "compressed" (iterated) or "auto", by the
-    number of unknowns. Raises ValueError naming the setting that cannot be.
+    """Settings of the crack solver: mesh and solution of one elastic body.
 
-    Kinks get more than the ``grading_layers``, by their angle: 2 leave an error of 5e-4 in K, every one more halves it.
+    order            p of the elements, 0 to 12
+    nodes            collocation nodes: "chebyshev", "gauss" or "equal"
+    elements_per_crack, elements_per_side   elements of a straight crack, and of a side of the boundary
+    grading_ratio    ratio of neighbouring elements at kinks, junctions, corners and mouths
+    grading_layers   layers of that grading. Kinks get more, by their angle: 2 layers leave an error of 5e-4 in K, each
+                     further layer halves it
+    solver           "dense" (factored), "compressed" (iterative), or "auto" by the number of unknowns
+    target_error     relative error of K that is wanted: order, elements and grading follow from it, and solutions are
+                     compared with finer meshes until they meet it; None: the settings above
+    grading_error    error of K for which each corner, kink, junction and mouth gets its layers, in place of
+                     ``grading_layers`` everywhere; None: ``grading_layers``
 
-    With ``target_error``, the relative error of K that is asked for, order, elements and grading follow from it
-    instead, and solutions are compared with those of finer meshes until they meet it. With ``grading_error`` each corner, kink, junction and mouth gets the layers that this error of K needs
-    there, in place of ``grading_layers`` everywhere.
+    Raises ValueError that names the setting.
     """
 
     order: int = 4
@@ -169,26 +181,29 @@ class DdmSettings:
 
 @dataclass(frozen=True)
 class GrowthSettings:
-    """When and how far tips go. ``increment`` m, longest advance in a cycle; ``min_increment`` m, shortest.
+    """Settings of crack growth.
 
-    ``initiation`` says where cracks may be born besides: "" nowhere, "surface" on outlines, holes and crack faces,
-    "everywhere" inside the rock too. ``initiation_distance`` m averages the stress there over a distance into the rock
-    (0: the stress at the point), ``initiation_spacing`` m is the least distance between births (0: five increments).
-    ``speed_limit`` is the part of the Rayleigh speed above which no tip runs in a dynamic run: 0.4, for cracks in rock
-    and glass stay below half of it (Ravi-Chandar & Knauss 1984).
-    Where a tip is nearer to another crack than ``approach_steps`` increments, all tips of the block take shorter ones,
-    so many to what is left (0: they do not).
-    ``trial_kink`` m: the criterion "f" tries kinks of this length in all directions, faces in contact (0: kinks of no
-    length, on which nothing presses).
+    increment, min_increment   longest and shortest advance of a tip in a cycle, m
+    criterion          a name of `ddm.fracture.criteria.CRITERIA`
+    initiation         where cracks may start in intact rock: "" nowhere, "surface" on outlines, holes and crack faces,
+                       "everywhere" inside the rock too
+    initiation_distance   m, distance into the rock over which the stress is averaged (0: stress at the point)
+    initiation_spacing    m, least distance between new cracks (0: five increments)
+    speed_limit        largest tip speed over the Rayleigh speed in dynamic runs: 0.4, because cracks in rock and glass
+                       stay below half of it (Ravi-Chandar & Knauss 1984)
+    approach_steps     a tip nearer to another crack than this many increments shortens the steps of its block to
+                       distance/``approach_steps`` (0: no shortening)
+    trial_kink         m, length of the kinks that criterion "f" tries in all directions with contact of their faces
+                       (0: infinitesimal kinks without contact)
     """
 
     criterion: str = "mts"
     increment: float = 1e-3
     min_increment: float = 1e-4
-    join_distance: float = 0.5  # in units of the increment: nearer than that to a crack or surface, a tip joins it …
-    join_length: float | None = None  # … or m; loads at which cracks join and cut through then have a limit
-    max_passes: int = 200  # growth passes of a load step; a static load then waits for tips that still run
-    correct: bool = True  # predict a step, look how it would go on, and bend it (second order in the increment)
+    join_distance: float = 0.5  # in units of the increment: a tip nearer than that to a crack or surface joins it
+    join_length: float | None = None  # the same in m: coalescence loads then converge as the increment shrinks
+    max_passes: int = 200  # growth passes per load step; a static load then waits for tips that still grow
+    correct: bool = True  # predictor–corrector paths, of second order in the increment
     initiation: str = ""
     initiation_distance: float = 0.0
     initiation_spacing: float = 0.0
@@ -210,27 +225,30 @@ class GrowthSettings:
             raise ValueError(f"join_length must be a length, got {self.join_length!r} m")
 
 
-#: Kinds of events that contacts and crack faces make: one opens, none touches any more, one closes, one slips, none
-#: sticks any more, one sticks again, one loses its bond.
+#: Kinds of events of contacts and crack faces: one opens, the last one opens, one closes, one slips, the last sticking
+#: one slips, one sticks again, one loses its bond.
 CHANGES = ("opening", "parting", "closure", "slip", "sliding", "stick", "debonding")
-#: Kinds of events that may end a run, of which `RunSettings.stop_at` names some.
+#: Kinds of events that `RunSettings.stop_at` may name.
 STOPS = ("initiation", "birth", "coalescence", "self", "daylighting", "split", "mechanism", *CHANGES)
 
 
 @dataclass(frozen=True)
 class RunSettings:
-    """Load stepping. The scene ends at ``end_time`` s or at the first event whose kind is in ``stop_at``; steps to
-    "events" also at a mechanism, after which no load has an equilibrium that they could look for.
+    """Load stepping, and when a run ends: at ``end_time`` s or at the first event of a kind in ``stop_at``.
 
-    ``stepping`` "fixed": steps of `DdaSettings.time_step`; "events": static steps that end where a tip has just reached
-    its toughness or, as ``events`` says, a contact or a crack face changes its state, otherwise as long as blocks may
-    move in one, or ``longest_step`` s. ``control`` "load": loads and imposed motion rise with time; "toughness" (with
-    "events"): they are those at which the most driven tip has K_eq = K_Ic, more or less than before. What ``events``
-    names is told of by other steps as well, when they end; None: all of it by steps to events, nothing by others.
-    ``boundary_stress`` says how contact forces load cracked blocks: "contacts" spread over faces, "bases" so, and on
-    fixed and guided blocks as on a rigid base, "springs" at points, "kelvin-springs" at points of the infinite plane.
-    Without ``skip`` every body is made anew and every answer worked out anew in every pass, though nothing about it has
-    changed: the same results, for comparison.
+    Steps to "events" also end a run at a mechanism, beyond which no load has an equilibrium.
+
+    stepping         "fixed": steps of `DdaSettings.time_step`. "events": static steps that end where a tip reaches its
+                     toughness or, as ``events`` says, a contact or crack face changes its state; otherwise as long as
+                     the displacement limit or ``longest_step`` s allow
+    control          "load": loads and prescribed motion follow time. "toughness" (with "events"): they are scaled so
+                     that the most driven tip has K_eq = K_Ic
+    events           kinds of state changes that steps end at, or report when steps are fixed; None: all with "events",
+                     none with "fixed"
+    boundary_stress  how contact forces load a cracked block: "contacts" as pressures over faces; "bases" likewise, and
+                     on fixed and guided blocks as on a rigid base; "springs" as point forces; "kelvin-springs" as point
+                     forces of the infinite plane
+    skip             False: every body and solution is recomputed in every pass, for comparison; results are the same
     """
 
     end_time: float = 1.0
@@ -243,20 +261,22 @@ class RunSettings:
     skip: bool = True
 
 
-#: The ``load_edge`` of a problem whose weight leads.
+#: The ``load_edge`` of a problem whose leading load is the weight.
 WEIGHT = "gravity"
 
 
 @dataclass(frozen=True, eq=False)
 class Problem:
-    """Everything a run needs. ``joint_of`` maps a pair of edge names to the law of contacts between such edges, the
-    cracks' ``law`` counts in ``face_laws``.
+    """Everything that a run needs.
 
-    ``load_edge`` names the edges whose traction is the scene's leading load (normal component, positive in
-    compression), or what it takes to move their block, or is `WEIGHT`; ``in_situ`` is the stress that the blocks have,
-    at rest, before the run; ``gauge`` is a pair of points (reference coordinates) and the blocks that carry them, whose
-    approach over their distance is the axial strain. ``endless``: the only block, which is fixed, is a piece of rock
-    without an end. ``velocity`` (n_blocks, 2), m/s, is that of the blocks as the first step begins, None: at rest.
+    joint_of   pair of edge names → index in ``joints``; `joint_index` resolves it
+    face_laws  laws of crack faces; the cracks' ``law`` counts in them
+    load_edge  name of the edges whose normal traction, or the force that moves their block, is the leading load; or
+               `WEIGHT`
+    in_situ    stress of the blocks, at rest, before the run
+    gauge      two points (reference coordinates, m) and the blocks that carry them, for the axial strain
+    endless    not None: the only block, which is fixed, is a window on unbounded rock
+    velocity   (n_blocks, 2) m/s at the start; None: at rest
     """
 
     title: str
@@ -281,18 +301,18 @@ class Problem:
 
     @property
     def ends_at(self) -> tuple[str, ...]:
-        """The kinds of events that end the run: those of ``run.stop_at``, a split of rock without an end, which nothing
-        holds, and a mechanism where steps lead to events."""
+        """Kinds of events that end the run: those of ``run.stop_at``, a split of unbounded rock, and a mechanism when
+        steps end at events."""
         split = ("split",) if self.endless is not None else ()
         return (*self.run.stop_at, *split, *(("mechanism",) if self.run.stepping == "events" else ()))
 
     @property
     def inventory(self) -> str:
-        """What there is, for messages: "3 blocks, 1 crack"."""
+        """Numbers of blocks and cracks for messages: "3 blocks, 1 crack"."""
         return f"{counted(self.blocks.n_blocks, 'block')}, {counted(self.cracks.n_cracks, 'crack')}"
 
     def joint_index(self, edge_name: str, other_name: str) -> int:
-        """The joint law between two edges by their names: the pair's, else either name's alone, else the first law."""
+        """Index of the joint law between two named edges: that of the pair, else of either name, else 0."""
         a, b = sorted((edge_name, other_name))
         for key in ((a, b), ("", b), ("", a)):
             if key in self.joint_of:

@@ -1,4 +1,4 @@
-"""What changes while a scene runs, and the record that every coupling cycle leaves."""
+"""State of a run (motion, stress, contacts, crack tips) and the record of one coupling cycle."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from .joints.bolt import BOLT
 #: Contact and crack-face states.
 OPEN, STICK, SLIP = 0, 1, 2
 
-#: One row a contact. Forces are those on the block that owns ``vertex``; see ``geomech.conventions``.
+#: One row per contact. Forces act on the block that owns ``vertex``; signs: ``geomech.conventions``.
 CONTACT = np.dtype(
     [
         ("vertex", np.int64),  # the touching vertex
@@ -25,12 +25,12 @@ CONTACT = np.dtype(
         ("other", np.int64),  # owner of the edge
         ("state", np.int64),  # OPEN, STICK or SLIP
         ("position", np.float64),  # along the edge, 0 at its start and 1 at its end
-        ("point", np.float64, 2),  # where, current coordinates, m
-        ("normal", np.float64, 2),  # outward normal of the edge (of a rounded corner, see ``tilt``): the way it pushes
+        ("point", np.float64, 2),  # position, current coordinates, m
+        ("normal", np.float64, 2),  # outward normal of the edge (of a rounded corner: ``tilt``), in which it pushes
         # the vertex's block
         ("normal_force", np.float64),  # N/m, positive in compression
         ("shear_force", np.float64),  # N/m, along the edge's direction
-        ("gap", np.float64),  # m, from where the faces meet (beyond ``lift``), negative when penetrating
+        ("gap", np.float64),  # m, beyond ``lift``; negative when penetrating
         ("slip", np.float64),  # m, accumulated sliding along the edge's direction
         ("length", np.float64),  # tributary length, m
         ("law", np.int64),  # index of the joint law
@@ -39,17 +39,17 @@ CONTACT = np.dtype(
             np.int64,
         ),  # 1 while cohesion and tensile strength hold, 0 once they are lost, 2 after slip that wears cohesion, 3
         # cracked from the edge of its face: cohesion holds while it is pressed
-        ("wear", np.float64),  # m, length of the way it has slid, to and fro
-        ("lift", np.float64),  # m, faces forced apart by sliding; negative: a gap that the geometry has not
-        ("inset", np.bool_),  # a bond whose springs stand inside its face, as the bending of its blocks wants them
-        ("bare", np.float64),  # part of its face, from this corner on, that does not touch; −1 where that is not known
-        ("stretch", np.float64),  # m, motion along the edge while sticking that a multiplier has still to take back
-        ("tilt", np.float64),  # rad, of the normal against that of the edge, where two rounded corners meet; else 0
-        ("stiffness", np.float64),  # N/m, of the normal spring that bears the force; 0 where that is not known
+        ("wear", np.float64),  # m, accumulated sliding distance, both directions added
+        ("lift", np.float64),  # m, dilation by sliding; negative: a misfit gap that the geometry does not show
+        ("inset", np.bool_),  # bonded face whose springs stand inside the face, to give as its blocks would bend
+        ("bare", np.float64),  # share of the face, from this corner, that is out of contact; −1: not known
+        ("stretch", np.float64),  # m, tangential motion while sticking that the multiplier has yet to remove
+        ("tilt", np.float64),  # rad, from the edge's normal to this one, where two rounded corners meet; else 0
+        ("stiffness", np.float64),  # N/m, stiffness of the normal spring that carries the force; 0: not known
     ]
 )
 
-#: One row a crack tip.
+#: One row per crack tip.
 TIP = np.dtype(
     [
         ("node", np.int64),  # node of the crack network
@@ -60,9 +60,9 @@ TIP = np.dtype(
         ("direction", np.float64, 2),  # unit vector out of the crack
         ("k_i", np.float64),  # Pa √m
         ("k_ii", np.float64),
-        ("k_eq", np.float64),  # of the growth criterion
+        ("k_eq", np.float64),  # equivalent factor of the growth criterion
         ("angle", np.float64),  # growth angle from ``direction``, rad, counter-clockwise
-        ("grown", np.float64),  # m grown in this cycle, 0 when the tip stood
+        ("grown", np.float64),  # m, advance in this cycle; 0 when the tip did not grow
     ]
 )
 
@@ -76,13 +76,12 @@ class State:
     velocity      (n_blocks, 6)     rates of (u0, v0, r0, εx, εy, γxy) about the current centroid
     stress        (n_blocks, 3)     Pa, current axes
     rotation      (n_blocks,)       accumulated rotation, rad
-    crack_strain  (n_blocks, 3)     mean strain that the block's cracks carry, current axes
-    contacts      CONTACT rows      open ones that are near included
-    acceleration  (n_blocks, 6)     of the unknowns, as a time scheme that needs it has left it; None: begin anew
-    bolts         BOLT rows         one a bolt of the loads, empty before there are any
-    imposed       (k,)              what motion the loads have imposed so far: of the base, of blocks, of points; empty
-                  before
-    removed       (n_blocks,)       True: excavated; None before anything is
+    crack_strain  (n_blocks, 3)     mean strain due to opening and slip of the block's cracks, current axes
+    contacts      CONTACT rows      nearby open ones included
+    acceleration  (n_blocks, 6)     of the unknowns, where the time scheme keeps one; None: none is known
+    bolts         BOLT rows         one per bolt of the loads; empty before the first step
+    imposed       (k,)              prescribed displacement of base, blocks and points; empty before step 1
+    removed       (n_blocks,)       True: excavated; None: no block is
     """
 
     time: float
@@ -111,7 +110,7 @@ class State:
         )
 
     def refuse_misfit(self, blocks: Blocks) -> None:
-        """Raises ValueError for arrays that are not those of ``blocks``, or not finite."""
+        """Raise ValueError for arrays that do not fit ``blocks`` in shape, or are not finite."""
         n = blocks.n_blocks
         wanted = {"vertices": (blocks.n_vertices, 2), "velocity": (n, 6), "stress": (n, 3), "rotation": (n,),
                   "crack_strain": (n, 3)}  # fmt: skip
@@ -128,8 +127,8 @@ class State:
 
 @dataclass(frozen=True)
 class Event:
-    """Something that happened: ``kind`` is initiation, coalescence, daylighting, split, arrest, failure …, or one of
-    `CHANGES` (of `model.problem`)."""
+    """An event of a run: ``kind`` is initiation, coalescence, daylighting, split, arrest, failure, …, or one of
+    `CHANGES` (`model.problem`)."""
 
     kind: str
     cycle: int
@@ -141,7 +140,7 @@ class Event:
 
 @dataclass(frozen=True, eq=False)
 class CrackFaces:
-    """Opening and slip along every crack, sampled element by element (they jump between elements).
+    """Opening, slip and tractions along all cracks, sampled element by element (values jump between elements).
 
     segment   (n_elements,)             row in the crack network
     points    (n_elements, n, 2)        sampling points, reference coordinates, from start to end
@@ -160,18 +159,20 @@ class CrackFaces:
 
 
 class Shortened(NamedTuple):
-    """Steps that were shortened: ``why``, the names of the ``blocks`` that were the reason (none, one or two), how often
-    (``count``), and what to set."""
+    """Time steps that were shortened for one reason.
+
+    ``why``; the names of the ``blocks`` that caused it (up to two); how often (``count``); the setting to change."""
 
     why: str
     blocks: tuple[str, ...]
-    count: int
+    count: int  # type: ignore[assignment]  # tuple.count is of no use here
     way_out: str
 
 
 class Skip(NamedTuple):
-    """Work that was asked for ``kept`` times more than it was ``done``, since what it had given before still held;
-    ``seconds``: what it took where it was done (0: not known)."""
+    """Work avoided by reusing results that were still valid: ``done`` times computed, ``kept`` times reused.
+
+    ``seconds``: time spent on what was computed (0: not known)."""
 
     kept: int
     done: int = 0
@@ -179,28 +180,28 @@ class Skip(NamedTuple):
 
     @property
     def saved(self) -> float | None:
-        """About so many seconds, by the mean of what was done; None where nothing was."""
+        """Estimated seconds saved, from the mean time of what was computed; None where nothing was."""
         return self.kept * self.seconds / self.done if self.done > 0 else None
 
 
 @dataclass(frozen=True, eq=False)
 class Cycle:
-    """One coupling cycle, complete: what observers (writers, progress, pictures) see.
+    """Complete record of one coupling cycle, as observers (writers, progress, pictures) receive it.
 
-    number      0, 1, 2 …, one a cycle
+    number      0, 1, 2, …
     load_step   the load step it belongs to; ``growth_pass`` counts the passes at that step's load
     load        the scene's leading load at ``state.time``: for a specimen the axial stress, Pa, positive in
                 compression
-    strain      axial strain that goes with it, positive when shortening; nan where the scene names no axis
+    strain      axial strain between the gauge points, positive in shortening; nan without a gauge
     tips        TIP rows of all blocks
     faces       the crack faces, or None when no block holds a crack
     bodies      block index → solved elastic body with ``fields(points)``: stress (n, 3) and displacement (n, 2)
                 in reference coordinates, for interior fields; ``residual``, ``condition``, ``tips`` and ``tip_errors``
     monitors    name → displacement (2,) of the monitor point, m
     statistics  numbers of the step: open_close_iterations, dt, kinetic_energy, elastic_energy, worst_penetration …
-    work        what the crack solver has done so far: assemblies, factorisations, back-substitutions, contact solves
-    skips       what was not done so far since nothing had changed, by name
-    shortened   blocks that have shortened most steps so far
+    work        counts of the crack solver so far: assemblies, factorisations, back-substitutions, contact solves
+    skips       work avoided so far because nothing had changed, by name
+    shortened   blocks that have caused most shortened steps so far
     seconds     wall time spent so far in each phase of the solvers (not reproducible, so not in any series)
     """
 
@@ -225,5 +226,5 @@ class Cycle:
 
     @cached_property
     def motion(self) -> Motion:
-        """Of all blocks, from their reference positions to `state`."""
+        """Motion of all blocks from their reference positions to `state`."""
         return Motion.of(self.blocks, self.state.vertices)

@@ -1,4 +1,5 @@
-"""Rock without an end: the infinite plane or a half-plane, of which the one block of a problem is what is seen."""
+"""Unbounded rock: an infinite plane or half-plane under remote stress and fluid pressure; its one block is a window on
+it."""
 
 from __future__ import annotations
 
@@ -11,16 +12,19 @@ from .blocks.polygon import distance_to_edges
 from .cracks.crack_arrays import Cracks
 from .loads.history import History
 
-#: A crack opens into a hole that its end is this near to, in units of the hole's size.
+#: A crack ends on a hole when its end is nearer than this, in units of the hole's size.
 _MOUTH = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
 class Fluid:
-    """Of a pressure, Pa, as a ``history`` (1,) that stands in all ``cracks``, in all ``holes``, or in both.
+    """A fluid pressure in cracks, in holes, or in both.
 
-    Of the cracks it stands in those called ``names`` alone where such are given; ``connected``: also in the cracks that
-    are connected with them, or open into a hole that it fills, now or later.
+    history    pressure, Pa, one column
+    cracks     True: it fills cracks, all of them or those of ``names``
+    holes      True: it fills all holes
+    names      names of the cracks that it fills; empty: all
+    connected  True: it also fills cracks that are, or become, connected with those or with a hole that it fills
     """
 
     history: History
@@ -34,7 +38,9 @@ class Fluid:
         return self.cracks and not self.names
 
     def wets(self, cracks: Cracks, group: np.ndarray, at_hole: np.ndarray) -> np.ndarray:
-        """(n_segments,) where it stands; ``group`` and ``at_hole`` as of `EndlessRock.crack_pressure_at`."""
+        """(n_segments,) bool, True where the fluid stands.
+
+        ``group`` (n_segments,): number of the connected network; ``at_hole`` (n_segments,) bool: ends on a hole."""
         if self.in_all_cracks:
             return np.ones(cracks.n_segments, bool)
         own = np.isin(np.array(cracks.names, dtype=object), self.names if self.cracks else ())[cracks.crack]
@@ -45,11 +51,11 @@ class Fluid:
 
 @dataclass(frozen=True, eq=False)
 class EndlessRock:
-    """What the one block of a problem is a piece of, and what acts there; its outline bears and loads nothing.
+    """Unbounded rock and its loads. The outline of the problem's one block carries no traction and bounds nothing.
 
-    surface  a point (x, y) of the free surface and the unit direction out of the rock; None: the infinite plane
-    remote   stresses (3,) Pa far away, tension positive, that add up
-    fluids   pressures that add up
+    surface  a point (x, y) on the free surface, m, and its unit outward normal; None: infinite plane
+    remote   histories of remote stress (3,), Pa, tension positive; their sum acts
+    fluids   fluid pressures; they add up where several stand
     """
 
     surface: tuple[tuple[float, float], tuple[float, float]] | None = None
@@ -58,19 +64,21 @@ class EndlessRock:
 
     @property
     def histories(self) -> list[History]:
-        """All functions of time that act."""
+        """All functions of time among the loads."""
         return [*self.remote, *(fluid.history for fluid in self.fluids)]
 
     def stress_at(self, time: float) -> np.ndarray:
-        """(3,) Pa far away."""
+        """(3,) remote stress at ``time`` s, Pa."""
         return sum((history.at(time) for history in self.remote), np.zeros(3))
 
     def hole_pressure_at(self, time: float) -> float:
-        """Pa in all holes."""
+        """Pressure in all holes at ``time`` s, Pa."""
         return float(sum(fluid.history.at(time)[0] for fluid in self.fluids if fluid.holes))
 
     def crack_pressure_at(self, time: float, cracks: Cracks, holes: Sequence[np.ndarray]) -> np.ndarray | float:
-        """Pa in all ``cracks``, or (n_segments,) where it is not the same in each; ``holes`` (n, 2) are outlines."""
+        """Pressure in ``cracks`` at ``time`` s, Pa: a number, or (n_segments,) where it differs between cracks.
+
+        ``holes``: outlines (n, 2), m."""
         everywhere = sum(fluid.history.at(time)[0] for fluid in self.fluids if fluid.in_all_cracks)
         some = [fluid for fluid in self.fluids if not fluid.in_all_cracks and (fluid.cracks or fluid.connected)]
         if not some:
@@ -82,8 +90,10 @@ class EndlessRock:
         return pressure
 
     def load_at(self, time: float) -> float:
-        """What leads, Pa: the largest pressure of a fluid where there is one, else of the stresses far away that change
-        (of all where none does) the principal stress that is larger in size, positive in compression."""
+        """The leading load at ``time`` s, Pa.
+
+        The largest fluid pressure, where there are fluids. Otherwise the principal remote stress of largest size,
+        positive in compression, of the remote stresses that vary (of all where none varies)."""
         if self.fluids:
             everywhere = sum(fluid.history.at(time)[0] for fluid in self.fluids if fluid.in_all_cracks)
             named = [fluid.history.at(time)[0] for fluid in self.fluids if fluid.cracks and fluid.names]
@@ -95,7 +105,7 @@ class EndlessRock:
 
 
 def connected_cracks(cracks: Cracks) -> np.ndarray:
-    """(n_segments,) the same number for all segments that hang together."""
+    """(n_segments,) int: number of the connected network that each segment belongs to."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
 
@@ -105,7 +115,7 @@ def connected_cracks(cracks: Cracks) -> np.ndarray:
 
 
 def _open_into(cracks: Cracks, holes: Sequence[np.ndarray]) -> np.ndarray:
-    """(n_segments,) True for those that end on one of the ``holes``."""
+    """(n_segments,) bool: True for segments that end on one of the ``holes``."""
     mouth = np.zeros(len(cracks.nodes), bool)
     for node in np.flatnonzero(cracks.surface).tolist():
         mouth[node] = any(

@@ -69,7 +69,7 @@ class Group:
         for observer in self._started:
             try:
                 observer.on_end(summary, error)
-            except Exception as failure:  # noqa: BLE001 (raised below, once all have ended)
+            except Exception as failure:
                 _log.exception("%s failed at the end of the run", type(observer).__name__)
                 first = first or failure
         self._started = []

@@ -1,0 +1,1 @@
+"""Closed forms, published values and second methods that results are compared with."""

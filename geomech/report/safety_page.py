@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -59,7 +59,7 @@ class SafetyReport:
     problem: Problem
     found: FactorOfSafety
     reduced: list[str] | None = None
-    divide: PartialFactors = PartialFactors()
+    divide: PartialFactors = field(default_factory=PartialFactors)
     along: list[str] | None = None
     cracks: tuple[str, ...] = ()
     tolerance: float = 2e-3

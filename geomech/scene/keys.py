@@ -68,6 +68,7 @@ def keys_of(table: type[BaseModel]) -> list[str]:
 
 
 def field_of(table: type[BaseModel], key: str | int) -> FieldInfo | None:
+    """The field of a ``table`` with this key; None where it has none."""
     return next((f for name, f in table.model_fields.items() if key in (name, f.alias)), None)
 
 

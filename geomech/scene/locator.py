@@ -54,7 +54,8 @@ class _Scanner:
     """One pass over a valid document. It follows structure only; values were read and checked by tomllib."""
 
     def __init__(self, text: str) -> None:
-        self.text, self.at, self.lines = text, 0, {}
+        self.text, self.at = text, 0
+        self.lines: dict[Path, int] = {}
         self.counts: dict[Path, int] = {}
         self.table: Path = ()
         self.line, self.counted = 1, 0
@@ -127,6 +128,7 @@ class _Scanner:
                 keys.append(key)
             else:
                 found = _BARE.match(self.text, self.at)
+                assert found is not None, "the document is valid"
                 keys.append(found.group())
                 self.at = found.end()
             self._skip()
@@ -159,7 +161,9 @@ class _Scanner:
                     self.at += 1
             self.at += 1
         else:
-            self.at = _SCALAR.match(self.text, self.at).end()
+            found = _SCALAR.match(self.text, self.at)
+            assert found is not None, "the document is valid"
+            self.at = found.end()
 
     def _string(self) -> None:
         quote = self.text[self.at]

@@ -75,7 +75,7 @@ def _fault(item: dict[str, Any], place: Callable[[Path], str]) -> Fault:
     path: Path = tuple(item["loc"])
     kind, given, context = item["type"], item.get("input"), item.get("ctx", {})
     # Members of a union and keys of a map add parts that stand nowhere in the file.
-    while path and path[-1] in ("float", "str", "[key]") or (path and str(path[-1]).startswith("constrained-")):
+    while (path and path[-1] in ("float", "str", "[key]")) or (path and str(path[-1]).startswith("constrained-")):
         path = path[:-1]
     table = table_at(path[:-1]) if path else None
     field = field_of(table, path[-1]) if table else None
@@ -128,7 +128,7 @@ def _hint(given: str, what: str) -> str:
         return f'write an array, ["{given}"]: '
     if "number" in what and re.fullmatch(DECIMAL_COMMA, given.strip()):
         return f"write a decimal point, {given.strip().replace(',', '.')}: "
-    if "number" in what and _is_number(given) or what == "true or false" and given.strip() in ("true", "false"):
+    if ("number" in what and _is_number(given)) or (what == "true or false" and given.strip() in ("true", "false")):
         return "remove the quotes: "
     if what == "true or false" and given.strip().lower() in ("true", "false"):
         return f"write {given.strip().lower()}, in lower case and without quotes: "

@@ -121,7 +121,7 @@ def _mesh(loops, cracks: Cracks, size: float, tip_size: float, reach: float):
             mesh.clear()
             try:
                 mesh.generate(2)
-            except Exception:  # noqa: BLE001, S112 (Gmsh raises nothing narrower; the next algorithm is the answer)
+            except Exception:
                 continue
             nodes, coordinates, _ = mesh.getNodes()
             number = np.full(int(nodes.max()) + 1, -1)

@@ -22,7 +22,7 @@ def test_tighter_passes_are_more_and_nearer_to_the_answer(monkeypatch):
     before = load_pass.COMPLIANCE_TOLERANCE, load_pass.NO_ANSWER
     monkeypatch.setattr(pass_tolerance, "TOLERANCES", (1e3, before[0], 1e-8))
     once, usual, tight = pass_tolerance.points()
-    assert (load_pass.COMPLIANCE_TOLERANCE, load_pass.NO_ANSWER) == before
+    assert before == (load_pass.COMPLIANCE_TOLERANCE, load_pass.NO_ANSWER)
     assert once.passes == pass_tolerance.STEPS < usual.passes < tight.passes
     assert once.method == pass_tolerance.ONE_PASS and tight.method == pass_tolerance.METHOD
     assert once.error > 10 * usual.error > 10 * tight.error

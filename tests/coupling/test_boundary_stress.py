@@ -9,7 +9,7 @@ import pytest
 from geomech import ddm
 from geomech.bench.accuracy import boundary_stress
 from geomech.coupling import cycles
-from geomech.coupling.load_transfer.boundary_tractions import boundary_load
+from geomech.coupling.load_transfer.boundary_tractions import BoundaryForces, boundary_load
 from geomech.dda import EDGE_FORCE, POINT_FORCE
 from geomech.ddm.kernels.point_forces import KelvinLoad
 from geomech.model import CONTACT, SLIP, Blocks, Motion
@@ -57,9 +57,8 @@ def test_springs_keep_force_and_moment(route, block):
     rows["point"], rows["normal"] = [[0.25, 1.0], [1.0, 1.0]], [[0.0, 1.0], [0.0, -1.0]]
     rows["normal_force"], rows["shear_force"] = [2.0, 3.0], [0.5, 0.25]
     none = np.empty(0, EDGE_FORCE), np.empty(0, POINT_FORCE)
-    load = boundary_load(
-        block, blocks, blocks.vertices, Motion.of(blocks, blocks.vertices), 0.0, rows, *none, route=route
-    )
+    forces = BoundaryForces(blocks.vertices, Motion.of(blocks, blocks.vertices), rows, *none, route=route)
+    load = boundary_load(block, blocks, forces)
     assert load.kelvin == (route == "kelvin-springs") and not len(load.segments)
     sense = 1.0 if block == 1 else -1.0
     found = dict(zip(map(tuple, load.points.tolist()), load.forces.tolist()))

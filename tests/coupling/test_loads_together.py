@@ -36,12 +36,11 @@ def same(a, b):
 
 def test_loads_do_not_depend_on_what_else_is_asked_for(asked):
     """To the bit: a block's pieces, body force, even stress and imbalance are its own."""
-    numbers, *rest = asked
-    together = boundary_tractions.boundary_loads(numbers, *rest)
-    per_block = (4, 8, 10, 11, 12, 15)  # positions of rotation, density, acceleration, spin, reaction, overstress
+    numbers, blocks, forces, inertia = asked
+    together = boundary_tractions.boundary_loads(*asked)
     for k in range(len(numbers)):
-        own = [of[k : k + 1] if at in per_block and of is not None else of for at, of in enumerate(asked)][1:]
-        same(together[k], boundary_tractions.boundary_loads(numbers[k : k + 1], *own)[0])
+        own = numbers[k : k + 1], blocks, forces, inertia.only(k)
+        same(together[k], boundary_tractions.boundary_loads(*own)[0])
 
 
 def test_what_finds_no_room_is_found_again(asked, monkeypatch):

@@ -59,12 +59,7 @@ def specimen(cells: list[np.ndarray], glue: JointLaw = GLUE, **settings) -> dda.
     """``cells`` of a specimen of `WIDTH` × `HEIGHT` on a smooth floor, its sides named; the glue is that between cells."""
 
     def name(a, b):
-        for sign, at, axis, side in (
-            (0, 0.0, 0, "left"),
-            (0, WIDTH, 0, "right"),
-            (1, 0.0, 1, "bottom"),
-            (1, HEIGHT, 1, "top"),
-        ):
+        for at, axis, side in ((0.0, 0, "left"), (WIDTH, 0, "right"), (0.0, 1, "bottom"), (HEIGHT, 1, "top")):
             if a[axis] == b[axis] == at:
                 return side
         return ""

@@ -280,7 +280,7 @@ def test_the_largest_displacement_of_a_step_is_bounded():
 def test_refusals_say_what_is_wrong(platens):
     blocks, materials = platens
     system = dda.BlockSystem(blocks, materials)
-    with pytest.raises(ValueError, match="no edge has that name.*load:top"):
+    with pytest.raises(ValueError, match=r"no edge has that name.*load:top"):
         system.step(
             State.at_rest(blocks), Loads(edge_tractions=(EdgeTraction("topp", History.constant([0.0, 1.0])),)), 1.0
         )
@@ -303,7 +303,7 @@ def test_failure_names_the_reason_and_the_contact():
         blocks, [Material("rock", 10e9, 0.25, density=2600.0)], [JointLaw("j", friction_angle=0.1)], settings=settings
     )
     loads = Loads(gravity=GRAVITY, point_loads=(PointLoad(1, (0.5, 0.1), History.constant([1e5, 0.0])),))
-    with pytest.raises(dda.NotConverged, match="2 cuts.*open-close.*'box' on 'ground'"):
+    with pytest.raises(dda.NotConverged, match=r"2 cuts.*open-close.*'box' on 'ground'"):
         system.step(State.at_rest(blocks), loads, 1.0)
 
 

@@ -53,7 +53,7 @@ def test_a_run_that_begins_at_equilibrium_moves_nothing():
 
 
 def test_a_run_that_has_no_equilibrium_to_begin_from_says_who_moves():
-    with pytest.raises(dda.NotConverged, match="t = 0 s: no equilibrium: .*'block'"):
+    with pytest.raises(dda.NotConverged, match=r"t = 0 s: no equilibrium: .*'block'"):
         list(dda.run(on_incline(35.0), [ROCK], [JOINT], WEIGHT, replace(MOVING, equilibrium="start"), 0.05))
 
 
@@ -91,15 +91,14 @@ def test_dashpots_that_statics_do_not_know_are_told(caplog, settings, told):
 def test_an_excavation_takes_its_energy_along(caplog):
     blocks = Blocks.from_polygons([BASE, SQUARE, SQUARE + [0.0, 1.0]], fixed=[True, False, False])
     loads = replace(WEIGHT, excavations=(Excavation(0.02, blocks=(2,)),))
-    for state in dda.run(blocks, [ROCK], [JOINT], loads, MOVING, 0.1):
-        pass
+    *_, state = dda.run(blocks, [ROCK], [JOINT], loads, MOVING, 0.1)
     assert state.removed.tolist() == [False, False, True] and not caplog.records
 
 
 def test_what_is_crushed_is_told_and_ends_the_run(caplog):
     """At seven times the speed of sound a block went through its base, flat, and nothing was said."""
     blocks = on_incline(0.0, 0.1)
-    with pytest.raises(dda.NotConverged, match="block is strained by .* no linear elastic body"):
+    with pytest.raises(dda.NotConverged, match=r"block is strained by .* no linear elastic body"):
         list(dda.run(blocks, [ROCK], [JOINT], Loads(), MOVING, 0.01, state=thrown(blocks, 0.0, -1e4)))
     # Told of beyond 1 %, before the step in which it is strained by a quarter.
     assert re.search(r"block is strained by \d\.\d+ %, beyond the elastic range", caplog.text)

@@ -17,8 +17,7 @@ from geomech.model import OPEN, Bolt, JointLaw, State
 @pytest.mark.parametrize(
     "n, law, most",
     [
-        # Without correctors 49 iterations; with them, but not centred again, the path ends early: one that follows rounded laws takes
-        # 107.
+        # Without correctors of the central path 49 iterations.
         (1000, {}, 35),
         # Bonds that break round by round: 412 and 495 where the path lets them yield and knows of none that holds.
         (200, {"cohesion": 20e3}, 170),

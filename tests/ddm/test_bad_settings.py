@@ -47,7 +47,7 @@ def test_a_mouth_needs_a_boundary():
 
 
 def test_orders_beyond_the_highest_are_refused_with_the_reason():
-    with pytest.raises(ValueError, match="at most 12, got 13 .beyond, round-off grows faster"):
+    with pytest.raises(ValueError, match=r"at most 12, got 13 .beyond, round-off grows faster"):
         DdmSettings(order=13)
 
 
@@ -55,7 +55,7 @@ def test_orders_beyond_the_highest_are_refused_with_the_reason():
 def test_cracks_do_not_grow_in_a_material_without_toughness(control):
     """They came to rest, or the load was raised without end."""
     crack = Cracks.from_polylines([np.array([[-0.3, 0.0], [0.3, 0.0]])])
-    with pytest.raises(ValueError, match="'rock' has no fracture toughness.*k_ic, Pa √m"):
+    with pytest.raises(ValueError, match=r"'rock' has no fracture toughness.*k_ic, Pa √m"):
         ddm.propagate([], crack, Material("rock", 17e9, 0.21), ddm.BodyLoad(remote_stress=[0, 1e6, 0]), control=control)
 
 

@@ -53,7 +53,7 @@ def test_reuse_agrees_with_a_fresh_body():
         for name in ("k_i", "k_ii"):
             scale = np.abs(np.concatenate([fresh.tips["k_i"], fresh.tips["k_ii"]])).max()
             assert np.abs(kept.tips[name] - fresh.tips[name]).max() < 1e-12 * scale
-        if 0 < n and not mouth:
+        if n > 0 and not mouth:
             assert body.counts["elements_new"] < 20
         if n in (1, 2, 3) or mouth:
             p = np.array([[0.5, 0.4], [-0.8, 0.1]])
@@ -148,7 +148,7 @@ def test_a_crack_pulled_open_or_pressed_shut():
 
 def test_out_of_equilibrium_is_refused_with_its_size():
     load = ddm.BodyLoad(segments=[[[-1, -1], [1, -1]]], tractions=[[[0, 5.0]] * 2])
-    with pytest.raises(ddm.OutOfEquilibrium, match="force .0, 10. N/m") as caught:
+    with pytest.raises(ddm.OutOfEquilibrium, match=r"force .0, 10. N/m") as caught:
         ddm.Body([SQUARE], NONE, ROCK).solve(load)
     assert caught.value.relative == pytest.approx(1.0) and caught.value.moment == pytest.approx(0.0)
     shear = ddm.BodyLoad(segments=[[[-1, -1], [1, -1]], [[1, 1], [-1, 1]]], tractions=[[[-1.0, 0]] * 2, [[1.0, 0]] * 2])
@@ -165,7 +165,7 @@ def test_loads_may_run_against_the_edge_and_stand_a_little_off():
     load = pressed(1.0)
     turned = ddm.BodyLoad(load.segments[:, ::-1] * (1 + 1e-8), load.tractions[:, ::-1])
     assert np.allclose(body.solve(turned).tips["k_i"], a, rtol=1e-7)
-    with pytest.raises(ValueError, match="load segment 0 lies .* off the boundary"):
+    with pytest.raises(ValueError, match=r"load segment 0 lies .* off the boundary"):
         body.solve(ddm.BodyLoad(load.segments * 0.9, load.tractions))
 
 

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from geomech.ddm.kernels import shape_functions
+from geomech.ddm.kernels.full_plane import Elements, Kernel
 from geomech.ddm.system import influence_matrix as matrices
 from geomech.ddm.system.influence_matrix import ElementSet, add_fields, influence, line_influence
 
@@ -116,7 +117,8 @@ def test_fields_of_one_element(kind, order, force):
         density[0, component, k] = 1.0
         stress, shift = np.zeros((len(where), 3)), np.zeros((len(where), 2))
         ends = np.array([[0.0, 0.0]]), np.array([[2.0, 0.0]])
-        add_fields(where, *ends, np.array([kind]), density, NU, 0.0, 1.0, force, stress, shift)
+        elements = Elements(*ends, np.array([kind]))
+        add_fields(where, elements, density, Kernel(NU, 0.0, 1.0, force), stress, shift)
         got[:, k, component] = np.hstack([stress, shift])
     with mp.workdps(400):
         ref = np.array([printed(kind, order, mp.mpf(x) - 1, mp.mpf(y), force) for x, y in where])
@@ -140,7 +142,8 @@ def test_fields_on_either_face(kind, side):
         density = np.zeros((1, 2, 5))
         density[0, component, k] = 1.0
         stress, shift = np.zeros((5, 3)), np.zeros((5, 2))
-        add_fields(where, *ends, np.array([kind]), density, NU, 1e-12, side, False, stress, shift)
+        elements = Elements(*ends, np.array([kind]))
+        add_fields(where, elements, density, Kernel(NU, 1e-12, side, False), stress, shift)
         for got, part in ((stress, slice(0, 3)), (shift, slice(3, 5))):
             expected = ref[:, k, component, part]
             scale = np.abs(expected).max(axis=1, keepdims=True)
@@ -168,7 +171,8 @@ def test_matrices_are_the_stress_of_the_fields(order, force):
     nodes = targets.nodes.reshape(-1, 2)
     stress, shift = np.zeros((len(nodes), 3)), np.zeros((len(nodes), 2))
     density = sources.densities(values)
-    add_fields(nodes, sources.start, sources.end, sources.kind, density, NU, 1e-9, 1.0, force, stress, shift)
+    elements = Elements(sources.start, sources.end, sources.kind)
+    add_fields(nodes, elements, density, Kernel(NU, 1e-9, 1.0, force), stress, shift)
     xx, yy, xy = stress.reshape(targets.n, targets.per, 3).transpose(2, 0, 1)
     t, n = targets.tangent[:, None], targets.normal[:, None]
     pull = np.stack([xx * n[..., 0] + xy * n[..., 1], xy * n[..., 0] + yy * n[..., 1]], axis=-1)
@@ -202,9 +206,8 @@ def test_a_field_at_a_point_does_not_depend_on_other_points(monkeypatch):
 
     def at(chosen):
         stress, shift = np.zeros((len(chosen), 3)), np.zeros((len(chosen), 2))
-        add_fields(
-            where[chosen], sources.start, sources.end, sources.kind, density, NU, 1e-9, 1.0, False, stress, shift
-        )
+        elements = Elements(sources.start, sources.end, sources.kind)
+        add_fields(where[chosen], elements, density, Kernel(NU, 1e-9, 1.0, False), stress, shift)
         return np.hstack([stress, shift])
 
     whole = at(np.arange(700))

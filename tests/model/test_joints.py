@@ -43,5 +43,5 @@ def test_a_law_is_straight_until_something_bends_it():
 
 
 def test_crack_faces_refuse_laws_they_cannot_follow():
-    with pytest.raises(ValueError, match="joint 'rough'.*without them"):
+    with pytest.raises(ValueError, match=r"joint 'rough'.*without them"):
         all_smooth([JointLaw("plain", 0.5), JointLaw("rough", 0.5, roughness=Roughness(10.0, 1e8))])

@@ -16,10 +16,8 @@ def test_stiffness_follows_from_three_dimensional_elasticity(plane):
     rock = Material(**GOOD, plane=plane)
     e, nu = rock.youngs_modulus, rock.poissons_ratio
     full = np.array([[1, -nu, -nu], [-nu, 1, -nu], [-nu, -nu, 1]]) / e
-    if plane == "strain":
-        normal = full[:2, :2] - np.outer(full[:2, 2], full[2, :2]) / full[2, 2]
-    else:
-        normal = full[:2, :2]
+    across = np.outer(full[:2, 2], full[2, :2]) / full[2, 2]
+    normal = full[:2, :2] - across if plane == "strain" else full[:2, :2]
     compliance = np.zeros((3, 3))
     compliance[:2, :2] = normal
     compliance[2, 2] = 2 * (1 + nu) / e

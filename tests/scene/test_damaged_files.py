@@ -165,7 +165,7 @@ def test_an_advance_below_round_off_is_refused(tmp_path, key, value):
 def test_geojson_of_another_shape_is_refused(tmp_path, text):
     path = tmp_path / "traces.geojson"
     path.write_text(text)
-    with pytest.raises(FieldFileError, match="traces.geojson"):
+    with pytest.raises(FieldFileError, match=r"traces.geojson"):
         read_field_file(path)
 
 

@@ -135,7 +135,7 @@ def test_an_arch_falls_apart_into_its_voussoirs(tmp_path, seed, kind):
             surface = occ.addPlaneSurface([occ.addCurveLoop(loop)])
             occ.synchronize()
             gmsh.model.setEntityName(2, surface, "arch")
-            for k, line in enumerate(joints):
+            for line in joints:
                 curve = occ.addLine(*(occ.addPoint(x, y, 0) for x, y in line.tolist()))
                 occ.synchronize()
                 gmsh.model.setEntityName(1, curve, "joint:bed")

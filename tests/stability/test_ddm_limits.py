@@ -115,7 +115,7 @@ def test_thinner_slivers_are_refused():
         lines([[-0.4, 0], [0.4, 0]], [[-0.4, 1e-4], [0.4, 1e-4]]),
     ):
         with pytest.raises(
-            ValueError, match="too thin a piece of rock between them, about .* m: it would take more than"
+            ValueError, match=r"too thin a piece of rock between them, about .* m: it would take more than"
         ):
             ddm.Body([SQUARE], cracks, ROCK)
 
@@ -172,7 +172,7 @@ def test_sharp_folds(caplog):
         solution = ddm.Body([], folded(degrees), ROCK).solve(MIXED)
         error = off(solution, factors(ddm.solve_to([], folded(degrees), ROCK, MIXED, 1e-4)))
         assert error < tolerance and error < 2 * said(solution)
-    with pytest.raises(ValueError, match="'crack 0': folds back on itself at .* by more than 170°"):
+    with pytest.raises(ValueError, match=r"'crack 0': folds back on itself at .* by more than 170°"):
         ddm.Body([], folded(171), ROCK)
 
 
@@ -218,7 +218,7 @@ def test_what_is_no_crack_in_a_body_is_refused_by_name(reason):
 def test_cracks_whose_coordinates_do_not_resolve_them_are_refused():
     """2 mm at 1e9 m, where coordinates have steps of 1.2e-7 m: K was off by 3.5e-3."""
     cracks = lines([[1e9, 0], [1e9 + 2e-3, 1e-3]])
-    with pytest.raises(ValueError, match="'crack 0': .* too short for coordinates that large.* from an origin near"):
+    with pytest.raises(ValueError, match=r"'crack 0': .* too short for coordinates that large.* from an origin near"):
         ddm.Body([], cracks, ROCK)
 
 

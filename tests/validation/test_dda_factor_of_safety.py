@@ -171,7 +171,7 @@ def test_what_cannot_fail_or_stand_is_told():
     assert level.upper == np.inf and "above 64" in level.table()
     with pytest.raises(ValueError, match="no friction, cohesion"):
         dda.factor_of_safety(blocks, [ROCK], [JointLaw("smooth")], WEIGHT)
-    with pytest.raises(ValueError, match="no joint 'bed'.*'joint'"):
+    with pytest.raises(ValueError, match=r"no joint 'bed'.*'joint'"):
         dda.factor_of_safety(blocks, [ROCK], [law], WEIGHT, reduce=["bed"])
     with pytest.raises(ValueError, match="all blocks are fixed"):
         dda.factor_of_safety(Blocks.from_polygons([rectangle(0, 0, 1, 1)], fixed=[True]), [ROCK], [law], WEIGHT)

@@ -452,9 +452,9 @@ def test_what_a_half_plane_refuses():
         body(slot((0, -1), (0, 0)))
     with pytest.raises(ValueError, match="off the boundary"):
         body(slot((0, -0.1), (0, -1), mouth=True))
-    with pytest.raises(ValueError, match="along the boundary|less than 3°"):
+    with pytest.raises(ValueError, match=r"along the boundary|less than 3°"):
         body(slot((0, 0), (1, -0.01), mouth=True))
-    with pytest.raises(ValueError, match="too thin a piece of rock between them, about .* m: it would take more than"):
+    with pytest.raises(ValueError, match=r"too thin a piece of rock between them, about .* m: it would take more than"):
         body(slot((-0.5, -1e-4), (0.5, -1e-4)))
     with pytest.raises(ValueError, match="hole 1: reaches the free surface"):
         body(crack, holes=[circle(16, (0, -5.0), 5.5)])

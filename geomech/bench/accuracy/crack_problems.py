@@ -84,6 +84,7 @@ def rectangle(half_width: float, half_height: float) -> np.ndarray:
 
 
 def griffith() -> CrackProblem:
+    """A crack across a tension in the infinite plane (Griffith)."""
     exact = np.array([[fracture.griffith(1.0, 1.0), 0.0]] * 2)
     return CrackProblem("Griffith crack", [np.array([[-1.0, 0.0], [1.0, 0.0]])], (0.0, 1.0, 0.0), reference=exact)
 
@@ -110,6 +111,7 @@ def arc_of_tangents(segments: int) -> CrackProblem:
 
 
 def edge_crack() -> CrackProblem:
+    """A crack from the side of a strip in tension."""
     return CrackProblem(
         "edge crack in a strip", [np.array([[-0.5, 0.0], [0.0, 0.0]])], (0.0, 1.0, 0.0), rectangle(0.5, 1.5),
         [(True, False)],
@@ -118,10 +120,12 @@ def edge_crack() -> CrackProblem:
 
 
 def specimen() -> CrackProblem:
+    """The specimen with two cracks of Haeri et al. (2014), φ = 0, in compression."""
     return CrackProblem("two-crack specimen", two_cracks.crack_ends(0), (0.0, -1.0, 0.0), rectangle(0.03, 0.06))
 
 
 def random_cracks() -> CrackProblem:
+    """Fifty cracks that do not touch, in the infinite plane."""
     return CrackProblem("50 random cracks", crack_arrays.random_cracks(50), (0.3, 1.0, 0.2))
 
 

@@ -78,6 +78,7 @@ def rows(quick: bool, own: bool = False) -> Iterator[tuple[str, str, int, Run, t
 
 
 def problem() -> CrackProblem:
+    """Two offset cracks that grow towards each other from the sides of a plate in tension."""
     (left, _), (right, _) = rectangle(0.03, 0.06)[:2]
     lines = [
         np.array([[left, -OFFSET], [left + LENGTH, -OFFSET]]),

@@ -38,10 +38,12 @@ def errors() -> dict[str, float]:
 
 
 def by_name(found: list[Passes]) -> dict[str, float]:
+    """Errors of K by the name of the tolerance."""
     return {f"K by a tolerance of {p.size:g}": p.error for p in found}
 
 
 def points() -> list[Passes]:
+    """Errors and costs of runs, one a tolerance of passes."""
     # The first run may compile, and is what the others are held against.
     exact, _, _ = _run(EXACT)
     out = []

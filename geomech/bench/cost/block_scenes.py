@@ -88,6 +88,7 @@ def incline(angle: float) -> Blocks:
 
 
 def settings(dt: float, dynamic: bool = True) -> DdaSettings:
+    """Those of the scenes: steps of ``dt`` s, in motion or at rest."""
     return DdaSettings(time_step=dt, dynamic_factor=1.0 if dynamic else 0.0)
 
 

@@ -71,6 +71,7 @@ NETWORKS: dict[str, Callable[[int, np.random.Generator], list[Joint]]] = {
 
 
 def cost(network: str, n: int, repeats: int) -> Cost:
+    """What making ``n`` traces of a ``network`` and cutting rock by them costs, the least of ``repeats``."""
     making, cutting = [], []
     for _ in range(repeats):
         began = time.process_time()

@@ -14,6 +14,7 @@ import numpy as np
 
 from ...ddm import HalfPlane
 from ...ddm.kernels import shape_functions
+from ...ddm.kernels.full_plane import Elements, Kernel
 from ...ddm.system import influence_matrix as matrices
 from ...ddm.system.influence_matrix import ElementSet, add_fields, influence
 from ..figures import Measured
@@ -72,8 +73,8 @@ def _fields(repeats: int) -> Iterator[tuple[str, float]]:
         for n in (50, 20000):
             points = 3 * rng.standard_normal((n, 2))
             stress, shift = np.zeros((n, 3)), np.zeros((n, 2))
-            ends = elements.start, elements.end, elements.kind
-            work = partial(add_fields, points, *ends, density, 0.25, 1e-9, 1.0, force, stress, shift)
+            sources = Elements(elements.start, elements.end, elements.kind)
+            work = partial(add_fields, points, sources, density, Kernel(0.25, 1e-9, 1.0, force), stress, shift)
             yield f"stress and displacement at {n} points from {name}", _least(work, repeats) / (n * elements.n)
         work = partial(work, half_plane=HalfPlane((0.0, 20.0)))
         yield f"the same from {name} below a free surface", _least(work, repeats) / (n * elements.n)

@@ -31,6 +31,8 @@ DOMAIN, OVERLAP, AGGREGATE = 1000, 2, 30
 
 @dataclass(frozen=True)
 class Iterated:
+    """One method's solution of a step: iterations, seconds, and how far it is off."""
+
     method: str
     iterations: int
     seconds: float

@@ -23,6 +23,7 @@ Row = tuple[str, int, int, float, Callable[[], Solution]]
 
 
 def rows() -> Iterator[Row]:
+    """K of a crack below a free surface by each method, from coarse to fine."""
     for method, sizes, solve in ((IN_KERNELS, DIGITS, _half_plane), (AS_BLOCK, SIZES, _block)):
         for size in sizes:
             again = partial(solve, size)

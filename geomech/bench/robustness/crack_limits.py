@@ -42,6 +42,8 @@ PULL = np.array([0.0, 1e6, 0.0])
 
 
 def maps(quick: bool) -> Iterator[Map]:
+    """All maps of the crack solver; every second value of each axis where ``quick``."""
+
     def some(*values: float) -> tuple[float, ...]:
         return values[::2] if quick else values
 
@@ -86,18 +88,21 @@ def _in_plane(lines, stress: np.ndarray, order: int = 4, aperture: float = math.
 
 
 def collinear(gap: float, order: float) -> Outcome:
+    """K of two collinear cracks so far apart."""
     solution = _in_plane([[[-1 - gap / 2, 0], [-gap / 2, 0]], [[gap / 2, 0], [1 + gap / 2, 0]]], PULL, int(order))
     inner, outer = fracture.collinear_pair(PULL[1], gap / 2, 1 + gap / 2)
     return _outcome(solution, np.array([[outer, 0], [inner, 0], [inner, 0], [outer, 0]]))
 
 
 def kink(degrees: float, length: float) -> Outcome:
+    """K of a crack with a kink of this angle, degrees, and length."""
     angle = math.radians(degrees)
     solution = _in_plane([[[-2, 0], [0, 0], [2 * length * math.cos(angle), 2 * length * math.sin(angle)]]], MIXED)
     return _outcome(solution, branched.kinked(2.0, 2 * length, angle, MIXED))
 
 
 def sliver(depth: float, order: float) -> Outcome:
+    """K of a crack so deep below a side."""
     far = 20.0
     block = rectangle(-far, -2 * far, far, 0)
     cracks = Cracks.from_polylines([np.array([[-1, -depth], [1, -depth]])], aperture=math.inf)
@@ -107,6 +112,7 @@ def sliver(depth: float, order: float) -> Outcome:
 
 
 def edge_crack(ratio: float, order: float) -> Outcome:
+    """K of an edge crack of this ratio of a strip's width."""
     width, half = 1.0, 3.0
     block = rectangle(0, -half, width, half)
     cracks = Cracks.from_polylines([np.array([[0, 0], [ratio, 0]])], aperture=math.inf, surface=[(True, False)])
@@ -122,6 +128,7 @@ def _pulled(block: np.ndarray, stress: float) -> ddm.BodyLoad:
 
 
 def far(offset: float, half: float) -> Outcome:
+    """K of a crack so far from the origin of coordinates, and of this half length."""
     angle = math.radians(30)
     way = half * np.array([math.cos(angle), math.sin(angle)])
     solution = _in_plane([np.array([-way, way]) + [offset, -offset]], MIXED)
@@ -129,6 +136,7 @@ def far(offset: float, half: float) -> Outcome:
 
 
 def rubbing(friction: float, dip: float) -> Outcome:
+    """K of a closed crack with this friction and dip, degrees, in compression."""
     stress, angle = np.array([-0.2e6, -1e6, 0.0]), math.radians(dip)
     way = np.array([math.cos(angle), math.sin(angle)])
     law = JointLaw("faces", friction_angle=math.radians(friction))
@@ -141,6 +149,7 @@ def rubbing(friction: float, dip: float) -> Outcome:
 
 
 def growing(increment: float, order: float) -> Outcome:
+    """The load at which a crack has grown by steps of this increment."""
     half, toughness = 1.0, 1e6
     rock = Material("rock", 17e9, 0.21, k_ic=toughness)
     cracks = Cracks.from_polylines([np.array([[-half, 0], [half, 0]])], aperture=math.inf)

@@ -28,6 +28,8 @@ QUANTITIES = {**OF_CRACKS, **OF_BLOCKS}
 
 @dataclass(frozen=True)
 class Cell:
+    """One cell of a map: what it was asked for, what it came to, and how long that took."""
+
     map: str
     row: str
     column: str
@@ -88,6 +90,7 @@ class _Warnings(logging.Handler):
 
 
 def table(grid: Map, cells: Sequence[Cell]) -> Iterator[str]:
+    """The lines of a map as text."""
     yield f"{grid.title}: {grid.measure} (right below {grid.bound:g}); {grid.row_name} down, {grid.column_name} across"
     yield " " * 10 + "".join(f"{value:>11g}" for value in grid.columns)
     for k, row in enumerate(grid.rows):

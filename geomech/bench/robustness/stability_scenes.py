@@ -37,10 +37,12 @@ class Outcome:
 
 
 def rectangle(x0: float, y0: float, x1: float, y1: float) -> np.ndarray:
+    """(4, 2) corners, counter-clockwise."""
     return np.array([[x0, y0], [x1, y0], [x1, y1], [x0, y1]], dtype=float)
 
 
 def turned(polygon: np.ndarray, angle: float) -> np.ndarray:
+    """A ``polygon`` turned about the origin by an ``angle``, rad."""
     c, s = math.cos(angle), math.sin(angle)
     return polygon @ np.array([[c, s], [-s, c]])
 
@@ -146,6 +148,7 @@ def incline(friction: float, most: int, penalty: float, dt: float) -> Outcome:
 
 
 def small(most: int, side: float, dt: float) -> Outcome:
+    """The way that a square with this side slides down a slope."""
     slope = math.radians(30)
     polygons = [turned(p, slope) for p in (rectangle(-60, -10, 60, 0), rectangle(4, 0, 4 + side, side))]
     system = _system(polygons, [True, False], 15.0, dynamic_factor=1.0)
@@ -155,6 +158,7 @@ def small(most: int, side: float, dt: float) -> Outcome:
 
 
 def far(most: int, offset: float, dt: float) -> Outcome:
+    """The same so far from the origin of coordinates, against the way at it."""
     watch, way = _slide_from(offset, dt, most)
     return watch.outcome(abs(way / _slide_from(0.0, dt, most)[1] - 1))
 
@@ -189,6 +193,7 @@ def _weights_off(system: dda.BlockSystem, total: np.ndarray, gravity: float = GR
 
 
 def column(stiffness: float, density: float) -> Outcome:
+    """The weight that a column of two unlike blocks brings to the ground."""
     light, heavy = (
         Material("below", 10e9, 0.25, density=2600.0),
         Material("above", 10e9 * stiffness, 0.25, density=2600.0 * density),
@@ -202,6 +207,7 @@ def column(stiffness: float, density: float) -> Outcome:
 
 
 def sliver(aspect: float, wedge: float) -> Outcome:
+    """The weight of slender blocks, or needles point to point (``wedge``)."""
     h = 1.0 / aspect
     if wedge:
         # Two needles point to point make a level layer.
@@ -215,6 +221,7 @@ def sliver(aspect: float, wedge: float) -> Outcome:
 
 
 def grid_of_squares(side: float, bond: float) -> Outcome:
+    """The weight of a wall of squares, held by a ``bond``."""
     n = int(side)
     squares = []
     for row in range(n):
@@ -228,6 +235,7 @@ def grid_of_squares(side: float, bond: float) -> Outcome:
 
 
 def start(most: int, gap: float, dt: float) -> Outcome:
+    """A block that is let go above the ground with this gap."""
     polygons = [rectangle(-1, -1, 2, 0), rectangle(0, gap, 1, 1 + gap)]
     system = _system(polygons, [True, False], 30.0, dynamic_factor=1.0, max_displacement_ratio=0.05)
     watch = _Watch(system)
@@ -237,6 +245,7 @@ def start(most: int, gap: float, dt: float) -> Outcome:
 
 
 def impact(speed: float, dt: float) -> Outcome:
+    """Two blocks that meet at this speed: momentum and energy."""
     polygons = [rectangle(0, 0, 1, 1), rectangle(1.001, 0, 2.001, 1)]
     system = _system(polygons, [False, False], 30.0, dynamic_factor=1.0, max_displacement_ratio=0.05)
     state = State.at_rest(system.blocks)

@@ -59,7 +59,7 @@ def limited(run: Callable[[Heard], Iterable], seconds: float) -> Ended:
                 number += 1
     except TimeUp as up:
         verdict, message = LONG, str(up)
-    except Exception as error:  # noqa: BLE001 (any but those known is what is looked for)
+    except Exception as error:
         up = time_up(error)
         if up is not None:
             # It came within a compiled function, which makes another error of it.

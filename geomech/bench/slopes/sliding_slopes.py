@@ -120,7 +120,8 @@ def _run(problem: Problem, dt: float, threshold: float, seconds: float) -> _Run:
             joint_index=problem.joint_index,
             watch=lambda result: iterations.append(result.statistics["open_close_iterations"]),
         )  # fmt: skip
-        for last in states:
+        for state in states:
+            last = state
             yield
 
     ended = limited(run, seconds)

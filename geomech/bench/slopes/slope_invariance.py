@@ -246,7 +246,8 @@ class _Compared:
 
         def run(heard: Heard) -> Iterator[None]:
             nonlocal last
-            for last in cycles(problem):
+            for cycle in cycles(problem):
+                last = cycle
                 yield
 
         ended = limited(run, self.seconds)
@@ -366,8 +367,8 @@ def table(every: Sequence[Invariance]) -> Measured:
     for each in every:
         moved_shares = [*each.moved, math.nan, math.nan, math.nan][:3]
         work = each.work[-1] if each.work else math.nan
-        worst = [_worst_of(each, lambda name: name == f"{what}, dt") for what in ("share", "work")]
-        worst += [_worst_of(each, lambda name: name.endswith(end)) for end in (", friction", ", smooth")]
+        worst = [_worst_of(each, lambda name, what=what: name == f"{what}, dt") for what in ("share", "work")]
+        worst += [_worst_of(each, lambda name, end=end: name.endswith(end)) for end in (", friction", ", smooth")]
         lines.append(
             f"{each.seed:4d}  {each.verdict:8s}{each.blocks:6d}    "
             + "".join(f"{share:8.4f}" for share in moved_shares)

@@ -11,6 +11,7 @@ from ..verb import DONE, FAILED, BadInput, Verbs, add_verb, check_writable
 
 
 def declare(verbs: Verbs) -> None:
+    """The verb's arguments."""
     bench = add_verb(
         verbs, "bench", _bench, "measure what things cost and how right they are (run it in the project's folder)",
         "geomech bench startup\ngeomech bench --quick --out before.json\ngeomech bench --quick --against before.json",

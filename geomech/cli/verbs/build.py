@@ -13,6 +13,7 @@ from ..verb import DONE, BadInput, Verbs, add_verb, check_folder, check_writable
 
 
 def declare(verbs: Verbs) -> None:
+    """The verb's arguments."""
     build = add_verb(
         verbs, "build", _build, "write the blocks that a scene is cut into, and a picture of them, before anything "
                                 "runs",

@@ -10,6 +10,7 @@ from ..verb import DONE, Verbs, add_verb
 
 
 def declare(verbs: Verbs) -> None:
+    """The verb's arguments."""
     check = add_verb(
         verbs, "check", _check, "read a scene, build its geometry and say every error in it at once",
         "geomech check pipelines/two_cracks\ngeomech check scene.toml --set growth.criterion=g",

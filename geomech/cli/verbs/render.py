@@ -13,6 +13,7 @@ LEAST_WIDTH = 64
 
 
 def declare(verbs: Verbs) -> None:
+    """The verb's arguments."""
     render = add_verb(
         verbs, "render", _render, "draw a run: the last cycle as a picture, its growth as a movie, its curves",
         "geomech render outputs/two_cracks/phi_30 --component yy --no-gif",

@@ -12,6 +12,7 @@ from ..verb import DONE, Verbs, add_verb, check_writable
 
 
 def declare(verbs: Verbs) -> None:
+    """The verb's arguments."""
     report = add_verb(
         verbs, "report", _report, "tabulate what runs came to, and write a page with tables, curves and pictures",
         "geomech report outputs/two_cracks/phi_0\ngeomech report outputs/two_cracks\ngeomech report outputs/bench_ddm",

@@ -12,6 +12,7 @@ from .run import prepare_for_a_run
 
 
 def declare(verbs: Verbs) -> None:
+    """The verb's arguments."""
     resume = add_verb(
         verbs, "resume", _resume, "go on with a run that was interrupted, killed, or is to last longer, from its last "
                                   "checkpoint",

@@ -12,6 +12,7 @@ from ..verb import DONE, BadInput, Verbs, add_verb, check_folder
 
 
 def declare(verbs: Verbs) -> None:
+    """The verb's arguments."""
     run = add_verb(
         verbs, "run", _run, "run a scene, or a pipeline folder, and write its run folder",
         "geomech run pipelines/two_cracks --variant phi_30\n"

@@ -12,6 +12,7 @@ from ..verb import DONE, BadInput, Verbs, add_verb, check_writable
 
 
 def declare(verbs: Verbs) -> None:
+    """The verb's arguments."""
     safety = add_verb(
         verbs, "safety", _safety, "find by what factor the strength of joints may be divided before the blocks go",
         "geomech safety slope.toml\n"

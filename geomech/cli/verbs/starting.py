@@ -10,6 +10,7 @@ from ..verb import DONE, BadInput, Verbs, add_verb, check_writable
 
 
 def declare(verbs: Verbs) -> None:
+    """The verb's arguments."""
     listed = add_verb(
         verbs, "examples", _examples, "list the examples that came with geomech, or copy one here",
         "geomech examples\ngeomech examples copy two_cracks\ngeomech run two_cracks",

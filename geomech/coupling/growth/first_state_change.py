@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Callable
+from typing import NamedTuple
 
 import numpy as np
 
@@ -35,6 +36,20 @@ LOOKS = 12
 #: `MORE` times (of many contacts, `MUCH_MORE`) as much as before are taken together, after others nearer than `LESS`
 #: times as much.
 SHORT, MORE, MUCH_MORE, LESS = 1 / 8, 1.5, 3.0, 0.25
+
+
+class _Search(NamedTuple):
+    """A search for the first change: ``way`` is 1 where the load rises, −1 where it falls; times nearer than ``within`` s
+    are one, changes nearer than ``grain`` s to the last one are taken with it; ``approach`` as of `FirstChange.first`."""
+
+    way: int
+    within: float
+    grain: float
+    approach: Callable[[float], float]
+
+    def beyond(self, at: float) -> float:
+        """Just beyond a change that is expected ``at`` a time, s."""
+        return at + 0.25 * self.way * self.within
 
 
 class FirstChange:
@@ -77,30 +92,13 @@ class FirstChange:
                 return solve(high.time)
             return found if low[-1] in (self._seen, self._older) else solve(high.time)
         base, last = low[-1], found
-        way = 1 if high.time > start else -1
         within = (FOUND if len(high.key) <= MANY else ROUGHLY) * max(abs(start), abs(high.time))
-        grain = max(self._near, within)
+        search = _Search(1 if high.time > start else -1, within, max(self._near, within), approach)
+        way = search.way
         for look in range(LOOKS):
-            if abs(high.time - low[-1].time) <= within:
+            aim, at = self._next_look(look, search, changes, low, high)
+            if aim is None:
                 break
-            at = _first_of(changes, low, high)
-            if at is not None and abs(at - high.time) <= within:
-                break
-            far = at is None or way * (at - high.time) > 0 or look % 3 == 2
-            if far:
-                # Something happens in between; or what is left shrinks from one side only.
-                share, at = FIRST_LOOK if len(low) == 1 else 0.5, None
-                aim = low[-1].time + share * (high.time - low[-1].time)
-            else:
-                aim = at + 0.25 * way * within
-            if abs(aim - self._last) < grain and grain > within:
-                aim = self._last + way * grain
-                if way * (aim - high.time) >= 0:
-                    break
-            if not far:
-                part = approach(at)
-                if part != at:
-                    aim = part
             try:
                 last = solve(aim)
             except NotConverged as failure:
@@ -116,7 +114,7 @@ class FirstChange:
                 low = [each for each in low if way * (high.time - each.time) > 0]
                 if not low:
                     break
-            elif at is not None and aim != at + 0.25 * way * within:
+            elif at is not None and aim != search.beyond(at):
                 # Most of the way, or all that is taken together, and nothing has changed.
                 self.expected = at
                 return last
@@ -126,6 +124,31 @@ class FirstChange:
             found = solve(high.time)
         self._reach(high.time, most, within, MORE if len(high.key) <= MANY else MUCH_MORE)
         return found
+
+    def _next_look(
+        self, look: int, search: _Search, changes: list[Change], low: list[Watched], high: Watched
+    ) -> tuple[float | None, float | None]:
+        """Where to look next, s, and where the first of ``changes`` is expected (None: not told); None where the pass
+        ``high`` is where it comes about."""
+        way, within, grain = search.way, search.within, search.grain
+        if abs(high.time - low[-1].time) <= within:
+            return None, None
+        at = _first_of(changes, low, high)
+        if at is not None and abs(at - high.time) <= within:
+            return None, at
+        if at is None or way * (at - high.time) > 0 or look % 3 == 2:
+            # Something happens in between; or what is left shrinks from one side only.
+            share, at = FIRST_LOOK if len(low) == 1 else 0.5, None
+            aim = low[-1].time + share * (high.time - low[-1].time)
+        else:
+            aim = search.beyond(at)
+        if abs(aim - self._last) < grain and grain > within:
+            aim = self._last + way * grain
+            if way * (aim - high.time) >= 0:
+                return None, at
+        if at is not None and (part := search.approach(at)) != at:
+            aim = part
+        return aim, at
 
     def _before(self, now: CrackedBlocks, high: Watched, solve: Callable[[float], Balance]) -> list[Watched]:
         """Passes before ``high`` in which nothing has changed yet, the last one that with which its states are

@@ -31,6 +31,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -39,7 +40,7 @@ from ...model import CONTACT, Blocks, Motion
 from ..crack_compliance.added_compliance import stress_rotations, times
 from .contact_gathering import faces_and_lone, on_outline, touches_of
 from .face_traction import add_face, add_lone
-from .inertia_forces import balanced
+from .inertia_forces import BlockInertia, BlockShape, balanced
 from .piecewise_traction import Found, add_couple, add_edge_piece, add_point_load, add_row, line_of, outlines
 
 
@@ -72,106 +73,85 @@ class BoundaryLoad:
     hole_pressure: float = 0.0
 
 
+@dataclass(frozen=True, eq=False)
+class BoundaryForces:
+    """What acts on blocks from outside, any of them, on the geometry on which it is in equilibrium.
+
+    ``vertices`` (n_vertices, 2) and ``motion`` are that geometry; ``contacts`` CONTACT rows on it, ``edges`` EDGE_FORCE and
+    ``points`` POINT_FORCE rows; ``route``: "contacts", "bases", "springs" or "kelvin-springs"; ``keep_straight``
+    (n_blocks,) bool which blocks are bases; ``tensile_strength`` of the joint laws, Pa (None: none has any).
+    """
+
+    vertices: np.ndarray
+    motion: Motion
+    contacts: np.ndarray
+    edges: np.ndarray
+    points: np.ndarray
+    route: str = "contacts"
+    tensile_strength: Sequence[float] | None = None
+    keep_straight: np.ndarray | None = None
+
+    def holding(self) -> np.ndarray:
+        """(n_contacts,) bonds that may pull."""
+        if self.tensile_strength is None:
+            return np.zeros(len(self.contacts), bool)
+        strength = np.asarray(self.tensile_strength, dtype=float)
+        return (self.contacts["bonded"] == 1) & (strength[self.contacts["law"]] > 0)
+
+
 def boundary_load(
-    block: int,
-    blocks: Blocks,
-    vertices: np.ndarray,
-    motion: Motion,
-    rotation: float,
-    contacts: np.ndarray,
-    edge_forces: np.ndarray,
-    point_forces: np.ndarray,
-    density: float = 0.0,
-    gravity: np.ndarray | None = None,
-    acceleration: np.ndarray | None = None,
-    spin: float = 0.0,
-    reaction: np.ndarray | None = None,
-    route: str = "contacts",
-    tensile_strength: Sequence[float] | None = None,
-    overstress: np.ndarray | None = None,
-    keep_straight: np.ndarray | None = None,
+    block: int, blocks: Blocks, forces: BoundaryForces, inertia: BlockInertia | None = None
 ) -> BoundaryLoad:
-    """The load of one ``block``, as of `boundary_loads`."""
-    one = (None if of is None else np.asarray(of, dtype=float)[None] for of in (acceleration, reaction, overstress))
-    return boundary_loads(
-        np.array([block]), blocks, vertices, motion, np.array([rotation]), contacts, edge_forces, point_forces,
-        np.array([density]), gravity, next(one), np.array([spin]), next(one), route, tensile_strength, next(one),
-        keep_straight,
-    )[0]  # fmt: skip
+    """The load of one ``block``, as of `boundary_loads`; at rest and without weight where no ``inertia`` is given."""
+    inertia = BlockInertia(np.zeros(1), np.zeros(1), np.zeros(1)) if inertia is None else inertia
+    return boundary_loads(np.array([block]), blocks, forces, inertia)[0]
 
 
 def boundary_loads(
-    numbers: np.ndarray,
-    blocks: Blocks,
-    vertices: np.ndarray,
-    motion: Motion,
-    rotation: np.ndarray,
-    contacts: np.ndarray,
-    edge_forces: np.ndarray,
-    point_forces: np.ndarray,
-    density: np.ndarray,
-    gravity: np.ndarray | None,
-    acceleration: np.ndarray | None,
-    spin: np.ndarray,
-    reaction: np.ndarray | None = None,
-    route: str = "contacts",
-    tensile_strength: Sequence[float] | None = None,
-    overstress: np.ndarray | None = None,
-    keep_straight: np.ndarray | None = None,
+    numbers: np.ndarray, blocks: Blocks, forces: BoundaryForces, inertia: BlockInertia
 ) -> list[BoundaryLoad]:
-    """The loads of the blocks with these ``numbers`` (n,).
-
-    ``vertices`` and ``motion`` are the geometry on which the forces are in equilibrium; ``contacts`` CONTACT rows on
-    that geometry, ``edge_forces`` and ``point_forces`` EDGE_FORCE and POINT_FORCE rows (any block's); ``rotation`` (n,)
-    rad, ``density`` (n,), ``acceleration`` (n, 6) and ``spin`` (n,) rad/s the blocks' own; ``reaction`` (n, 6) N, N m, what
-    imposes their motion, which is spread over a block as its inertia is; ``route``: "contacts", "bases", "springs" or
-    "kelvin-springs"; ``keep_straight`` (n_blocks,) bool which blocks are bases; ``tensile_strength`` of the joint laws,
-    Pa (None: none has any); ``overstress`` (n, 3) what the forces balance beyond the stress of a block, Pa, current axes
-    (None: at rest).
-    """
+    """The loads of the blocks with these ``numbers`` (n,), of which ``inertia`` is."""
     numbers, n = np.asarray(numbers), len(numbers)
     moments = [blocks.area_moments(b) for b in numbers.tolist()]
-    area, centroid, second = (np.array(each, dtype=float) for each in zip(*moments))
-    holding = np.zeros(len(contacts), bool)
-    if tensile_strength is not None:
-        holding = (contacts["bonded"] == 1) & (np.asarray(tensile_strength, dtype=float)[contacts["law"]] > 0)
+    shape = BlockShape(*(np.array(each, dtype=float) for each in zip(*moments)))
+    rotation, motion, contacts = inertia.rotation, forces.motion, forces.contacts
     based = np.zeros(blocks.n_blocks, bool)
-    if route == "bases" and keep_straight is not None:
-        based = np.asarray(keep_straight, dtype=bool)
-    pair = np.stack([contacts["block"], contacts["other"]])
+    if forces.route == "bases" and forces.keep_straight is not None:
+        based = np.asarray(forces.keep_straight, dtype=bool)
     turn = np.stack([np.cos(rotation), np.sin(rotation)], axis=1)
-    given = (
-        numbers, outlines(blocks, vertices), blocks.vertex_start, area, motion.centre, motion.reference_centre,
-        motion.gradient, turn, np.ascontiguousarray(contacts).astype(CONTACT, copy=False), holding,
-        *_rows_of(pair, numbers), edge_forces, *_rows_of(edge_forces["block"][None], numbers), point_forces,
-        *_rows_of(point_forces["block"][None], numbers), based, route in ("springs", "kelvin-springs"),
+    asked = _Asked(numbers, shape.area, motion.centre, motion.reference_centre, motion.gradient, turn)
+    rows = np.ascontiguousarray(contacts).astype(CONTACT, copy=False)
+    acting = _Acting(
+        rows, forces.holding(), *_rows_of(np.stack([contacts["block"], contacts["other"]]), numbers),
+        forces.edges, *_rows_of(forces.edges["block"][None], numbers),
+        forces.points, *_rows_of(forces.points["block"][None], numbers),
+        based,
     )  # fmt: skip
-    pieces, inside, bases, ends, stretch = _with_room(given, 16 * len(contacts) + 16 * n + len(edge_forces))
-    zeros = np.zeros((n, 6))
-    body_force, gradient, even, imbalance = balanced(
-        pieces, inside, ends, area, centroid, second, np.asarray(density, dtype=float),
-        np.zeros(2) if gravity is None else np.asarray(gravity, dtype=float),
-        zeros if acceleration is None else acceleration, np.asarray(spin, dtype=float), turn,
-        zeros if reaction is None else reaction, stretch, motion.gradient[numbers], overstress is not None,
-    )  # fmt: skip
+    pointed = forces.route in ("springs", "kelvin-springs")
+    given = asked, outlines(blocks, forces.vertices), blocks.vertex_start, acting, pointed
+    found, ends, stretch = _with_room(given, 16 * len(contacts) + 16 * n + len(forces.edges))
+    strained = motion.gradient[numbers]
+    body_force, gradient, even, imbalance = balanced(found, ends, shape, inertia, turn, stretch, strained)
+    overstress = inertia.overstress
     remote = None if overstress is None else even - times(stress_rotations(-np.asarray(rotation)), overstress)
+    pieces, inside, bases = found.pieces, found.inside, found.bases
     segments, tractions = pieces.reshape(-1, 4, 2)[:, :2], pieces.reshape(-1, 4, 2)[:, 2:]
-    found = []
+    loads = []
     for k, ((a, i, j), (b, to_i, to_j)) in enumerate(zip(ends[:-1].tolist(), ends[1:].tolist())):
-        rows = tuple((np.arange(int(m) - a, int(o) - a), np.array([x, y])) for m, o, x, y in bases[j:to_j].tolist())
-        points, forces = (inside[i:to_i, :2], inside[i:to_i, 2:]) if to_i > i else (None, None)
-        found.append(
+        on = tuple((np.arange(int(m) - a, int(o) - a), np.array([x, y])) for m, o, x, y in bases[j:to_j].tolist())
+        at, pull = (inside[i:to_i, :2], inside[i:to_i, 2:]) if to_i > i else (None, None)
+        loads.append(
             BoundaryLoad(
                 np.ascontiguousarray(segments[a:b]), np.ascontiguousarray(tractions[a:b]), body_force[k], gradient[k],
-                centroid[k], float(imbalance[k]), None if remote is None else remote[k], points, forces,
-                route == "kelvin-springs", rows,
+                shape.centroid[k], float(imbalance[k]), None if remote is None else remote[k], at, pull,
+                forces.route == "kelvin-springs", on,
             )
         )  # fmt: skip
-    return found
+    return loads
 
 
-def _with_room(given: tuple, room: int) -> tuple[np.ndarray, ...]:
-    """What is ``found`` of the ``given``, and of each block, where there is ``room`` for so many pieces, or as much as is
+def _with_room(given: tuple, room: int) -> tuple[Found, np.ndarray, np.ndarray]:
+    """What is `Found` of the ``given``, and of each block, where there is ``room`` for so many pieces, or as much as is
     needed."""
     while True:
         found = Found(np.zeros(3, np.int64), np.empty((room, 8)), np.empty((room, 4)), np.empty((room, 4)))
@@ -179,7 +159,7 @@ def _with_room(given: tuple, room: int) -> tuple[np.ndarray, ...]:
         count = found.count.tolist()
         if max(count) <= room:
             rows = (each[:many] for each, many in zip((found.pieces, found.inside, found.bases), count))
-            return (*rows, ends, stretch)
+            return Found(found.count, *rows), ends, stretch
         room = 2 * max(count)
 
 
@@ -193,23 +173,51 @@ def _rows_of(owners: np.ndarray, numbers: np.ndarray) -> tuple[np.ndarray, np.nd
     return column[order], ends
 
 
+class _Asked(NamedTuple):
+    """The blocks whose loads are asked for: their ``numbers`` (n,), ``area`` (n,) m² and ``turn`` (n, 2), cosine and sine of
+    their rotation; and of all blocks how they have moved, as `Motion` has it."""
+
+    numbers: np.ndarray
+    area: np.ndarray
+    centre: np.ndarray
+    reference_centre: np.ndarray
+    gradient: np.ndarray
+    turn: np.ndarray
+
+
+class _Acting(NamedTuple):
+    """CONTACT rows and which of them may pull (``holding``), EDGE_FORCE and POINT_FORCE rows; of each kind the numbers of
+    those on the blocks asked for, one after the other, and where those of a block begin and end (n, 2); and which blocks
+    are bases, ``based`` (n_blocks,)."""
+
+    contacts: np.ndarray
+    holding: np.ndarray
+    contact_rows: np.ndarray
+    contact_ends: np.ndarray
+    edge_forces: np.ndarray
+    edge_rows: np.ndarray
+    edge_ends: np.ndarray
+    point_forces: np.ndarray
+    point_rows: np.ndarray
+    point_ends: np.ndarray
+    based: np.ndarray
+
+
 @kept(error_model="numpy", nogil=True)
-def _pieces(
-    found, numbers, of, vertex_start, area, centre, reference_centre, gradient, turn, contacts, holding, contact_rows,
-    contact_ends, edge_forces, edge_rows, edge_ends, point_forces, point_rows, point_ends, based, pointed,
-):  # fmt: skip
-    """Add to what is ``found`` the loads of the blocks with these ``numbers`` (n,), one after the other. Returned is how
-    much of each kind there is before each block, (n + 1, 3), and Σ r ⊗ f (n, 2, 2) of what shears stretch a block by
-    beyond what the pieces do."""
-    n = len(numbers)
+def _pieces(found, asked, of, vertex_start, acting, pointed):
+    """Add to what is ``found`` the loads of the blocks that are ``asked`` for, one after the other. Returned is how much of
+    each kind there is before each block, (n + 1, 3), and Σ r ⊗ f (n, 2, 2) of what shears stretch a block by beyond what
+    the pieces do."""
+    n = len(asked.numbers)
     ends, stretch = np.zeros((n + 1, 3), np.int64), np.zeros((n, 2, 2))
     for b in range(n):
-        block, couple = numbers[b], 0.0
-        c, s = turn[b, 0], turn[b, 1]
-        rows = contact_rows[contact_ends[b, 0] : contact_ends[b, 1]]
+        block, couple = asked.numbers[b], 0.0
+        c, s = asked.turn[b, 0], asked.turn[b, 1]
+        rows = acting.contact_rows[acting.contact_ends[b, 0] : acting.contact_ends[b, 1]]
         touches = touches_of(
-            block, contacts, rows, holding, centre[block], reference_centre[block], gradient[block], c, s
-        )
+            block, acting.contacts, rows, acting.holding, asked.centre[block], asked.reference_centre[block],
+            asked.gradient[block], c, s,
+        )  # fmt: skip
         if pointed:
             for k in range(len(rows)):
                 x, y = on_outline(of, touches, k)
@@ -223,7 +231,8 @@ def _pieces(
                 if first == len(rows):
                     continue  # all of it stands alone
                 start = sides[number, 0]
-                amount, lost = add_face(found, of, start, touches, face, number, based[touches.against[first]])
+                based = acting.based[touches.against[first]]
+                amount, lost = add_face(found, of, start, touches, face, number, based)
                 couple += lost
                 _, _, ax, ay, _ = line_of(of, start)
                 stretch[b, 0, 0] += amount * ax * ax
@@ -232,14 +241,14 @@ def _pieces(
                 stretch[b, 1, 1] += amount * ay * ay
             for k in lone:
                 couple += add_lone(found, of, touches, k)
-        for k in range(edge_ends[b, 0], edge_ends[b, 1]):
-            add_edge_piece(found, of, edge_forces[edge_rows[k]], c, s)
+        for k in range(acting.edge_ends[b, 0], acting.edge_ends[b, 1]):
+            add_edge_piece(found, of, acting.edge_forces[acting.edge_rows[k]], c, s)
         first, last = vertex_start[block], vertex_start[block + 1]
-        for k in range(point_ends[b, 0], point_ends[b, 1]):
-            row = point_forces[point_rows[k]]
+        for k in range(acting.point_ends[b, 0], acting.point_ends[b, 1]):
+            row = acting.point_forces[acting.point_rows[k]]
             fx, fy = c * row.force[0] + s * row.force[1], c * row.force[1] - s * row.force[0]
             couple += add_point_load(found, of, first, last, row.at[0], row.at[1], fx, fy)
-        add_couple(found, of, first, last, area[b], couple)
+        add_couple(found, of, first, last, asked.area[b], couple)
         for k in range(3):
             ends[b + 1, k] = found.count[k]
     return ends, stretch

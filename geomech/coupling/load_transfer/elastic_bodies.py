@@ -14,7 +14,8 @@ from ...ddm.crack_contact.face_laws import Released
 from ...model import TIP, Blocks, Cracks, Motion, Problem, State
 from ..parallel_map import side_by_side
 from . import boundary_tractions
-from .boundary_tractions import BoundaryLoad
+from .boundary_tractions import BoundaryForces, BoundaryLoad
+from .inertia_forces import BlockInertia
 
 if TYPE_CHECKING:
     from ...ddm import Body
@@ -119,25 +120,26 @@ def boundary_loads(
     if blocks.held is not None:
         keep_straight = keep_straight | blocks.held.any(axis=1)
     density = np.array([material.density for material in problem.materials])
-    loads = boundary_tractions.boundary_loads(
-        numbers,
-        blocks,
+    acting = BoundaryForces(
         result.vertices,
         motion,
-        state.rotation[numbers] + result.turn[numbers],
         beside_acting(result.contacts, blocks.n_blocks),
         forces.edges,
         forces.points,
-        density[blocks.material[numbers]],
-        forces.inertia.gravity,
-        result.acceleration[numbers],
-        problem.dda.dynamic_factor * state.velocity[numbers, 2],
-        None if forces.reaction is None else forces.reaction[numbers],
         problem.run.boundary_stress,
         [joint.tensile_strength for joint in problem.joints],
-        None if forces.overstress is None else forces.overstress[numbers],
         keep_straight,
     )
+    inertia = BlockInertia(
+        rotation=state.rotation[numbers] + result.turn[numbers],
+        density=density[blocks.material[numbers]],
+        spin=problem.dda.dynamic_factor * state.velocity[numbers, 2],
+        gravity=forces.inertia.gravity,
+        acceleration=result.acceleration[numbers],
+        reaction=None if forces.reaction is None else forces.reaction[numbers],
+        overstress=None if forces.overstress is None else forces.overstress[numbers],
+    )
+    loads = boundary_tractions.boundary_loads(numbers, blocks, acting, inertia)
     return dict(zip(bodies, loads))
 
 

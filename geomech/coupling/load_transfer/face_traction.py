@@ -3,6 +3,8 @@ has the kernel)."""
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 from .no_tension_pressure import NOTHING, linear, no_pull
 from .piecewise_traction import (
     SAME,
@@ -19,6 +21,19 @@ from .piecewise_traction import (
 
 #: A resultant nearer to an end of a face than this part of it presses there and nowhere else.
 AT_AN_END = 1e-2
+
+
+class _Spread(NamedTuple):
+    """Push N, its moment about the start of a side N m, and shear N along that, to be spread over it; (wx, wy) is the
+    traction with a unit of pressure; whether it may pull (``holds``), and shear is ``even``."""
+
+    total: float
+    moment: float
+    shear: float
+    wx: float
+    wy: float
+    holds: bool
+    even: bool
 
 
 @jit
@@ -79,7 +94,17 @@ def add_face(found, of, start, touches, face, number, based):
             add_base(found, of, start, near, far, p_near, p_far, wx, wy)
             add_row(found.count, found.bases, 2, begins, found.count[0], wx, wy)
             return stretched - slope * moment, 0.0
-    couple = 0.0
+    spread = _Spread(total, moment, shear, wx, wy, holds, even)
+    couple, stretched = _add_spread(found, of, start, touches, face, number, spread, stretched)
+    return stretched - slope * moment, couple
+
+
+@jit
+def _add_spread(found, of, start, touches, face, number, spread, stretched):
+    """Add the tractions of a face to what is ``found``: linear, or a triangle where that would pull. Returned are the
+    couple that forces lose beyond the end of an edge, and what is left to be ``stretched`` by beside even shear."""
+    sx, sy, ax, ay, length = line_of(of, start)
+    wx, wy, couple = spread.wx, spread.wy, 0.0
     lows = _ends(touches, face, number, sx, sy, ax, ay, length, -1)
     highs = _ends(touches, face, number, sx, sy, ax, ay, length, 1)
     for low, low_share in lows:
@@ -91,9 +116,9 @@ def add_face(found, of, start, touches, face, number, based):
             ends = min(max(on_grid(high, length), 0.0), length)
             if begins == ends:
                 begins, ends = max(low, 0.0), min(high, length)
-            over, force, about = ends - begins, share * total, share * (moment - begins * total)
+            over, force, about = ends - begins, share * spread.total, share * (spread.moment - begins * spread.total)
             pressure, at_begin, at_end = (linear(over, force, about), NOTHING), 0.0, 0.0
-            if not holds:
+            if not spread.holds:
                 pressure, at_begin, at_end = no_pull(over, force, about)
             for a, b, p_a, p_b in pressure:
                 if b > a:
@@ -102,11 +127,11 @@ def add_face(found, of, start, touches, face, number, based):
                 couple += _add_at_end(found, of, start, begins, at_begin * wx, at_begin * wy)
             if at_end != 0:
                 couple += _add_at_end(found, of, start, ends, at_end * wx, at_end * wy)
-            if even:
-                q = share * shear / over
+            if spread.even:
+                q = share * spread.shear / over
                 add_on_side(found, of, start, begins, ends, q * ax, q * ay, q * ax, q * ay)
-                stretched -= share * 0.5 * (begins + ends) * shear
-    return stretched - slope * moment, couple
+                stretched -= share * 0.5 * (begins + ends) * spread.shear
+    return couple, stretched
 
 
 @jit

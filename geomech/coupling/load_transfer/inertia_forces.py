@@ -3,34 +3,64 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from typing import NamedTuple
+
 import numpy as np
+
+from .piecewise_traction import Found
+
+
+class BlockShape(NamedTuple):
+    """Area (n,) m², ``centroid`` (n, 2) m and ``second`` moments of area about it (n, 2, 2) m⁴ of blocks, as drawn."""
+
+    area: np.ndarray
+    centroid: np.ndarray
+    second: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class BlockInertia:
+    """The turning of blocks (n,), and what their inertia takes of the forces on them.
+
+    ``rotation`` (n,) rad, ``density`` (n,) kg/m³, ``acceleration`` (n, 6; None: none) and ``spin`` (n,) rad/s the blocks'
+    own, ``gravity`` (2,) m/s² (None: none); ``reaction`` (n, 6) N, N m, what imposes their motion, which is spread over a
+    block as its inertia is; ``overstress`` (n, 3) what the forces balance beyond the stress of a block, Pa, current axes
+    (None: at rest).
+    """
+
+    rotation: np.ndarray
+    density: np.ndarray
+    spin: np.ndarray
+    gravity: np.ndarray | None = None
+    acceleration: np.ndarray | None = None
+    reaction: np.ndarray | None = None
+    overstress: np.ndarray | None = None
+
+    def only(self, k: int) -> BlockInertia:
+        """That of the block in the row ``k`` alone."""
+        row = slice(k, k + 1)
+        rows = (None if of is None else of[row] for of in (self.acceleration, self.reaction, self.overstress))
+        return BlockInertia(self.rotation[row], self.density[row], self.spin[row], self.gravity, *rows)
 
 
 def balanced(
-    pieces: np.ndarray,
-    inside: np.ndarray,
-    ends: np.ndarray,
-    area: np.ndarray,
-    centroid: np.ndarray,
-    second: np.ndarray,
-    density: np.ndarray,
-    gravity: np.ndarray,
-    acceleration: np.ndarray,
-    spin: np.ndarray,
-    turn: np.ndarray,
-    reaction: np.ndarray,
-    left_out: np.ndarray,
+    found: Found, ends: np.ndarray, shape: BlockShape, inertia: BlockInertia, turn: np.ndarray, left_out: np.ndarray,
     strained: np.ndarray,
-    moves: bool,
-) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Body force (n, 2) of blocks at their ``centroid`` (n, 2), its gradient (n, 2, 2), the even stress (n, 3) that the
-    strain's inertia is where the blocks are in motion (``moves``), and what the solver's own inertia does not balance,
-    relative to the forces' size (n,).
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:  # fmt: skip
+    """Body force (n, 2) of blocks of this ``shape`` at their centroids, its gradient (n, 2, 2), the even stress (n, 3) that
+    the strain's inertia is where the blocks are in motion (where there is an overstress), and what the solver's own
+    ``inertia`` does not balance, relative to the forces' size (n,).
 
-    ``pieces`` (m, 8) and ``inside`` (k, 4) as of `load_pieces.Found`, ``ends`` (n + 1, 3) how many of them there are before
-    each block; ``second`` (n, 2, 2) moments of area about the centroid; ``gravity`` (2,), ``acceleration`` (n, 6), ``turn``
-    (n, 2) cosine and sine of the blocks' rotation, ``reaction`` (n, 6) what imposes their motion, ``left_out`` (n, 2, 2)
-    Σ r ⊗ f of what the pieces miss, ``strained`` (n, 2, 2) the gradient of the blocks' motion."""
+    ``found``: the pieces and points of all blocks, ``ends`` (n + 1, 3) how many of them there are before each block;
+    ``turn`` (n, 2) cosine and sine of the blocks' rotation, ``left_out`` (n, 2, 2) Σ r ⊗ f of what the pieces miss,
+    ``strained`` (n, 2, 2) the gradient of the blocks' motion."""
+    area, centroid, second = shape
+    density, spin = np.asarray(inertia.density, dtype=float), np.asarray(inertia.spin, dtype=float)
+    gravity = np.zeros(2) if inertia.gravity is None else np.asarray(inertia.gravity, dtype=float)
+    zeros = np.zeros((len(area), 6))
+    acceleration = zeros if inertia.acceleration is None else inertia.acceleration
+    reaction = zeros if inertia.reaction is None else inertia.reaction
     c, s = turn.T
     a_x, a_y, angular, e_xx, e_yy, shear = acceleration.T
     b_xx = density * (spin**2 - c * c * e_xx - s * s * e_yy - s * c * shear)
@@ -40,10 +70,10 @@ def balanced(
     turn_back = _matrices(c, s, -s, c)
     carried = density[:, None] * (gravity - np.stack([a_x, a_y], axis=1)) + reaction[:, :2] / area[:, None]
     carried = (turn_back @ carried[..., None])[..., 0]
-    force, size, spread = _resultants(pieces, inside, ends, centroid)
+    force, size, spread = _resultants(found.pieces, found.inside, ends, centroid)
     gradient = whole = _with_torque(symmetric, spread, second)
     even = np.zeros((len(area), 3))
-    if moves:
+    if inertia.overstress is not None:
         centrifugal = (density * spin**2)[:, None, None] * np.eye(2)
         gradient = _with_torque(centrifugal, spread, second)
         left = second @ (whole - gradient).transpose(0, 2, 1) / area[:, None, None]

@@ -1,9 +1,11 @@
-"""The contacts of a step: found on the present geometry, given joint laws and springs, remembering the step before."""
+"""Contacts of a time step: detection on the current geometry, joint laws, springs, and history from the last step."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
+from typing import NamedTuple
 
 import numpy as np
 
@@ -17,8 +19,17 @@ from ..statics.sharp_toes import SHARP, ToeCorners, stand_off
 from ..step_control.relative_motion import Approach, Windows, widths
 from . import contact_records
 from .bonded_corners import held_by_glue
-from .entrance_edges import FACE, SMOOTHED, Corners, convex_corners, describe_contacts, find_contacts
-from .face_quadrature import FacePoints, give_by_bending
+from .entrance_edges import (
+    FACE,
+    SMOOTHED,
+    Corners,
+    Known,
+    Outlines,
+    convex_corners,
+    describe_contacts,
+    find_contacts,
+)
+from .face_quadrature import FaceForces, FacePoints, give_by_bending
 from .neighbour_search import NearPairs
 from .t_junctions import nodes_in_faces
 from .thin_walls import from_outside
@@ -40,6 +51,16 @@ _HAIR = 1e-4
 _TRANSITS, _STEPS = 4.0, 20
 #: Contacts are sought at this many times the depth to which the last step has let any penetrate, whatever the window.
 _DEEPER = 2.0
+
+
+class _Met(NamedTuple):
+    """What meets: rows of `find_contacts` (``table``), ``geometry`` and ``parent`` as of `describe_contacts`, and the joint
+    ``law`` of each, (n,)."""
+
+    table: np.ndarray
+    geometry: np.ndarray
+    parent: np.ndarray
+    law: np.ndarray
 
 
 class ContactFinder:
@@ -129,39 +150,17 @@ class ContactFinder:
         (vertex·n_vertices + edge), too. ``motion`` (n_vertices, 2) m is what vertices are expected to move by in the step:
         it says on which sides corners meet; corners that stay apart then, with ``margin`` m to spare, are left out."""
         old = np.ascontiguousarray(state.contacts)
-        old_vertex, old_edge, keys, old_normal, lift, gap = contact_records.names(old, len(vertices))
-        near = self._reaching(window, vertices, old, lift, gap)
-        rank = np.argsort(keys, kind="stable")
-        corners = Corners(
-            convex_corners(vertices, self._next, self._previous), self._rounding, self._longest, self._pressed(old),
-            np.zeros_like(vertices) if motion is None else motion, float(margin) + lift,
-        )  # fmt: skip
-        table, met = find_contacts(
-            vertices, self._next, self._previous, self._start, near.pairs, near.reach, keys[rank], corners
-        )
-        at = near.of_contacts(self._owner[table[:, 0]], self._owner[table[:, 1]], len(self._area))
-        geometry, mate, parent = describe_contacts(
-            table, met, vertices, self._next, self._previous, near.reach[at], old_vertex, old_edge, old_normal, rank
-        )
-        known = np.append((old["state"] != OPEN) | (old["lift"] < 0.0), False)[parent]
-        keep = self._from_outside(table, vertices, known, corners.pressed)
-        if not keep.all():
-            table, geometry, mate, parent = table[keep], geometry[keep], mate[keep], parent[keep]
-        law = self._laws(table[:, 1], mate)
-        if self._removed is not None:
-            law[self._removed[self._owner[table[:, :2]]].any(axis=1)] = _NEVER
-        if (law == _NEVER).any():
-            keep = law != _NEVER
-            table, geometry, parent, law = table[keep], geometry[keep], parent[keep], law[keep]
-        nodes, own = None, parent
+        met = self._meeting(old, vertices, window, motion, margin)
+        parent, geometry, law = met.parent, met.geometry, met.law
+        nodes = None
         if self._by_length.any():
             nodes = nodes_in_faces(
-                table[:, 0], table[:, 1], self._owner, self._flat, geometry, law, self._by_length[law]
+                met.table[:, 0], met.table[:, 1], self._owner, self._flat, geometry, law, self._by_length[law]
             )
         if nodes is not None:
             geometry[:, 4] = nodes.left(geometry[:, 4])
-            parent = nodes.heirs(own, np.ascontiguousarray(old["state"]))
-        block, other = self._owner[table[:, 0]], self._owner[table[:, 1]]
+            parent = nodes.heirs(met.parent, np.ascontiguousarray(old["state"]))
+        block, other = self._owner[met.table[:, 0]], self._owner[met.table[:, 1]]
         springs = self._springs(block, other, law, geometry[:, 4], state.time >= self._eased_from)
         remembered = self._remembered(old, parent, state.time, geometry, springs, self._stiff[law])
         eased = 0.0
@@ -169,24 +168,12 @@ class ContactFinder:
             eased = self._keep_forces(old, parent, geometry, springs, remembered, law)
         if self._table.curved.any():
             self._pass_on_wear(old, block, other, geometry, remembered)
-        # A step that rounding smooths is none, and a vertex that lies a hair behind a line which it has not touched brings
-        # no energy: there contacts begin without force.
-        hair = _HAIR * np.sqrt(np.minimum(self._area[block], self._area[other]))
-        smoothed = (table[:, 3] == SMOOTHED) | ((geometry[:, 3] > -hair) & (len(old) > 0))
-        smoothed &= (remembered["state"] == OPEN) & (remembered["bonded"] == 0) & (geometry[:, 3] < remembered["lift"])
-        remembered["lift"] = np.where(smoothed, geometry[:, 3], remembered["lift"])
-        # What has come up a ramp goes on from there as it is pressed.
-        up = np.flatnonzero((table[:, 3] == SMOOTHED) & (remembered["state"] != OPEN) & (parent >= 0))
-        up = up[old["tilt"][parent[up]] != 0.0] if len(up) else up
-        remembered["lift"][up] = np.minimum(0.0, geometry[up, 3] - old["gap"][parent[up]])
-        vertex, edge, corner = (column.copy() for column in table[:, :3].T)
-        if self.toes != SHARP:
-            off = stand_off(vertex, edge, corner, geometry, vertices, self._corners, self.toes)
-            remembered["lift"] = np.where(off >= 0.0, -off, remembered["lift"])
+        remembered["lift"] = self._lifts(old, parent, met, vertices, remembered)
+        vertex, edge, corner = (column.copy() for column in met.table[:, :3].T)
         keep = np.ones(len(vertex), bool)
         if nodes is not None:
             for name in ("normal", "shear") if len(old) else ():
-                borne = np.where(own >= 0, old[name + "_force"][own], 0.0)
+                borne = np.where(met.parent >= 0, old[name + "_force"][met.parent], 0.0)
                 remembered[name] = nodes.left(borne)
             keep[nodes.node] = False
         glued = None
@@ -201,9 +188,7 @@ class ContactFinder:
             corner, geometry = corner[keep], geometry[keep]
             springs = Springs(**{name: value[keep] for name, value in vars(springs).items()})
             remembered = {name: value[keep] for name, value in remembered.items()}
-        bonded, faces = remembered["bonded"], None
-        if bonded.any():
-            faces = BondedFaces.of(block, other, geometry, bonded)
+        bonded = remembered["bonded"]
         found = ContactSet(
             vertex=vertex,
             edge=edge,
@@ -216,48 +201,106 @@ class ContactFinder:
             geometry=np.ascontiguousarray(geometry),
             springs=springs,
             relies_on_glue=glued is not None,
-            faces=faces,
+            faces=BondedFaces.of(block, other, geometry, bonded) if bonded.any() else None,
             released=eased,
             **remembered,
         )
-        if lumped or not (self._stiff.any() or found.inset.any()):
+        return found if lumped else self._with_springs_in_faces(found, vertices, broken)
+
+    def _meeting(
+        self, old: np.ndarray, vertices: np.ndarray, window: float | Windows, motion: np.ndarray | None, margin: float
+    ) -> _Met:
+        """What meets, arguments as of `find`, ``old`` the CONTACT rows of the last step; without what cannot have come to
+        its edge from outside, and pairs of edges that have no joint law."""
+        names = contact_records.names(old, len(vertices))
+        near = self._reaching(window, vertices, old, names.lift, names.gap)
+        rank = np.argsort(names.keys, kind="stable")
+        corners = Corners(
+            convex_corners(vertices, self._next, self._previous), self._rounding, self._longest, self._pressed(old),
+            np.zeros_like(vertices) if motion is None else motion, float(margin) + names.lift,
+        )  # fmt: skip
+        outlines = Outlines(np.ascontiguousarray(vertices), self._next, self._previous, self._start)
+        table, met = find_contacts(outlines, near.pairs, near.reach, names.keys[rank], corners)
+        at = near.of_contacts(self._owner[table[:, 0]], self._owner[table[:, 1]], len(self._area))
+        before = Known(names.vertex, names.edge, names.normal, rank)
+        geometry, mate, parent = describe_contacts(table, met, outlines, near.reach[at], before)
+        known = np.append((old["state"] != OPEN) | (old["lift"] < 0.0), False)[parent]
+        keep = self._from_outside(table, vertices, known, corners.pressed)
+        if not keep.all():
+            table, geometry, mate, parent = table[keep], geometry[keep], mate[keep], parent[keep]
+        law = self._laws(table[:, 1], mate)
+        if self._removed is not None:
+            law[self._removed[self._owner[table[:, :2]]].any(axis=1)] = _NEVER
+        if (law == _NEVER).any():
+            keep = law != _NEVER
+            table, geometry, parent, law = table[keep], geometry[keep], parent[keep], law[keep]
+        return _Met(table, geometry, parent, law)
+
+    def _lifts(
+        self, old: np.ndarray, parent: np.ndarray, met: _Met, vertices: np.ndarray, remembered: dict[str, np.ndarray]
+    ) -> np.ndarray:
+        """(n,) m: the lifts of what has ``met``, so that nothing begins with a force that no work has brought; ``parent``
+        (n,) the rows of the ``old`` contacts that it continues, ``remembered`` what it keeps of these."""
+        table, geometry, lift, state = met.table, met.geometry, remembered["lift"], remembered["state"]
+        block, other = self._owner[table[:, 0]], self._owner[table[:, 1]]
+        # A step that rounding smooths is none, and a vertex that lies a hair behind a line which it has not touched brings
+        # no energy: there contacts begin without force.
+        hair = _HAIR * np.sqrt(np.minimum(self._area[block], self._area[other]))
+        smoothed = (table[:, 3] == SMOOTHED) | ((geometry[:, 3] > -hair) & (len(old) > 0))
+        smoothed &= (state == OPEN) & (remembered["bonded"] == 0) & (geometry[:, 3] < lift)
+        lift = np.where(smoothed, geometry[:, 3], lift)
+        # What has come up a ramp goes on from there as it is pressed.
+        up = np.flatnonzero((table[:, 3] == SMOOTHED) & (state != OPEN) & (parent >= 0))
+        up = up[old["tilt"][parent[up]] != 0.0] if len(up) else up
+        lift[up] = np.minimum(0.0, geometry[up, 3] - old["gap"][parent[up]])
+        if self.toes != SHARP:
+            vertex, edge, corner = (column.copy() for column in table[:, :3].T)
+            off = stand_off(vertex, edge, corner, geometry, vertices, self._corners, self.toes)
+            lift = np.where(off >= 0.0, -off, lift)
+        return lift
+
+    def _with_springs_in_faces(self, found: ContactSet, vertices: np.ndarray, broken: np.ndarray | None) -> ContactSet:
+        """The contacts ``found``, the springs of whole faces inside these; those of the bonds ``broken`` at the corners."""
+        if not (self._stiff.any() or found.inset.any()):
             return found
-        inside = found.inset & (bonded == 1)
+        inside = found.inset & (found.bonded == 1)
         if broken is not None:
-            inside = inside & ~np.isin(vertex * len(vertices) + edge, broken)
-
-        def softened(ends, length):
-            """Part of its length that the springs of a face are apart: they give by its rotation what its blocks would
-            bend; and the part of their stiffness that they have."""
-            across, point = found.geometry[ends[:, 0], 1:3], found.geometry[ends[:, 0], 5:7]
-            behind = [
-                give_by_bending(
-                    owner[ends[:, 0]], across, point, vertices, self._next, self._start, self._modulus, self._bends
-                )
-                for owner in (block, other)
-            ]
-            share = np.minimum(1.0, length / np.maximum(length, np.maximum(behind[0][:, 1], behind[1][:, 1])))
-            give = behind[0][:, 0] + behind[1][:, 0]
-            # One block between rigid ones bends to and fro, by a third of what either half would, if at all: they hold
-            # it.
-            give[self._rigid[block[ends[:, 0]]] | self._rigid[other[ends[:, 0]]]] = 0.0
-            own = 2.0 / (share * springs.normal[ends[:, 0]] * length**2)
-            return np.sqrt(own / np.maximum(own, give)), share
-
-        def placed(inside):
-            return FacePoints.of(
-                block, other, found.geometry, np.where(inside, 2, self._stiff[law]), found.normal, found.bare,
-                (bonded == 1) & (springs.tension > 0), least_face(block, other, self._area, self._fixed), softened,
-            )  # fmt: skip
-
-        points = placed(inside)
+            inside = inside & ~np.isin(found.vertex * len(vertices) + found.edge, broken)
+        points = self._face_points(found, vertices, inside)
         if inside.any() or found.inset.any():
             kept = np.zeros(len(found), bool)
             if points is not None:
                 kept[points.ends] = True
             out = found.inset & ~kept
-            found = _at_their_corners(found, placed(found.inset) if out.any() else None, out, inside & kept)
-        return replace(found, by_length=self._stiff_along[law]).placed(points)
+            stood = self._face_points(found, vertices, found.inset) if out.any() else None
+            found = _at_their_corners(found, stood, out, inside & kept)
+        return replace(found, by_length=self._stiff_along[found.law]).placed(points)
+
+    def _face_points(self, found: ContactSet, vertices: np.ndarray, inside: np.ndarray) -> FacePoints | None:
+        """Where springs stand in faces of the contacts ``found``, those of bonds where these are ``inside`` (n,)."""
+        borne = FaceForces(found.normal, found.bare, (found.bonded == 1) & (found.springs.tension > 0))
+        return FacePoints.of(
+            found.block, found.other, found.geometry, np.where(inside, 2, self._stiff[found.law]), borne,
+            least_face(found.block, found.other, self._area, self._fixed), partial(self._softened, found, vertices),
+        )  # fmt: skip
+
+    def _softened(
+        self, found: ContactSet, vertices: np.ndarray, ends: np.ndarray, length: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Part of its ``length`` (m,) that the springs of a face with these ``ends`` (m, 2) among the contacts ``found`` are
+        apart: they give by its rotation what its blocks would bend; and the part of their stiffness that they have."""
+        first = ends[:, 0]
+        across, point = found.geometry[first, 1:3], found.geometry[first, 5:7]
+        behind = [
+            give_by_bending(owner[first], across, point, vertices, self._next, self._start, self._modulus, self._bends)
+            for owner in (found.block, found.other)
+        ]
+        share = np.minimum(1.0, length / np.maximum(length, np.maximum(behind[0][:, 1], behind[1][:, 1])))
+        give = behind[0][:, 0] + behind[1][:, 0]
+        # One block between rigid ones bends to and fro, by a third of what either half would, if at all: they hold it.
+        give[self._rigid[found.block[first]] | self._rigid[found.other[first]]] = 0.0
+        own = 2.0 / (share * found.springs.normal[first] * length**2)
+        return np.sqrt(own / np.maximum(own, give)), share
 
     def _reaching(
         self, window: float | Windows, vertices: np.ndarray, old: np.ndarray, lift: float, gap: float

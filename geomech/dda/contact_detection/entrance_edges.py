@@ -1,15 +1,15 @@
-"""Which vertices may touch which edges of two blocks that are near each other: the entrance-edge rule.
+"""Entrance edges: which vertices may contact which edges of two blocks near each other (Shi 1988).
 
-A vertex meets the interior of an edge when its corner points away from the edge. Where two corners meet, the lines
-through which one can enter the other are the edges that have the other corner wholly on their outer side (Shi 1988,
-entrance lines). Parallel ones (flush faces with common corners) are one line, represented by whichever vertex lies
-within the other's edge, or where they lean to each other by the one whose own face leans away; where each lies within
-the other's, the two corners are the ends of a short common face, and both stand for the line. Corners meet only if
-neither is nearer to a neighbour of the other: on outlines with edges shorter than the window, as cracks leave them, all
-are in reach of all, and the lines of far ones are crossed by blocks that do not touch.
+A vertex contacts the interior of an edge when its corner points away from the edge. Where two corners meet, the
+entrance lines are the edges that have the other corner entirely on their outer side (Shi 1988). Parallel entrance lines
+(flush faces with coincident corners) count as one. It is represented by the vertex that lies within the other's edge,
+or, where the faces are inclined to each other, by the corner whose own face leans away. Where each corner lies within
+the other's edge, both are ends of a short common face, and both represent the line. Two corners meet only if neither is
+nearer to a neighbour of the other: on outlines with edges shorter than the window, as cracks leave them, all corners
+are within reach of all, and lines of distant ones are crossed by blocks that do not touch.
 
-Where two lines remain, the corners are rounded (`corner_rounding`), and one contact stands for both: where and in which
-direction the rounded corners first meet in the step.
+Where two entrance lines remain, the corners are rounded (`rounded_corners`), and one contact represents both: at the
+point and in the direction in which the rounded corners first meet in the step.
 """
 
 from __future__ import annotations
@@ -22,26 +22,26 @@ from ...compiled import kept, part
 from .neighbour_search import boxes
 from .rounded_corners import EASED, meeting, rounding_length
 
-# Corners and edges that interpenetrate by less than this angle (sine, about 3°) still count as touching face to face.
+# Faces inclined into each other by less than this angle (sine, about 3°) count as face-to-face contacts.
 _ANGLE = 0.05
-# A corner outside an edge whose neighbour is nearer to it may yet come first or as well where their face leans to the edge
-# by less than this (sine): what hits with one end of a face turns flat in the same step.
+# A corner outside an edge whose neighbour is nearer to it may yet come first or as well where their face leans to the
+# edge by less than this (sine): what hits with one end of a face turns flat in the same step.
 _TURN = 0.25
-# Two entrance lines nearer in direction than this are the same line.
+# Entrance lines whose directions differ by less than this are the same line.
 _PARALLEL = 0.0025
 # Of two corners on one line the one that the other's face does not lean past, by more than this (sine), stands for it.
 _LEAN = 0.01
 # Corners that lie within each other's edges by more than this part of them are the two ends of a common face.
 _ENDS = 1e-4
-# Corners are nearer to one than to another when their distances squared differ by more than this part.
+# A corner is nearer to one corner than to another when the squared distances differ by more than this part.
 _NEARER = 1e-2
 #: A vertex and a face; two corners; two corners that may overlap by a little.
 FACE, CORNERS, SMOOTHED = 0, 1, 2
 # Corners whose lines may come within the window of both are so many windows apart at most.
 _CORNERS = 1.5
-# Contacts are sought so many rounding lengths away at least.
+# Least search distance in rounding lengths.
 _ZONE = 2.0
-# Corners may come nearer by so many times the motion that is expected of them.
+# Corners may approach by this many times their expected motion.
 _HASTE = 2.0
 # cos of the angle between edges that count as mating faces, for tributary lengths.
 _MATING = 0.9986
@@ -49,7 +49,7 @@ _MATING = 0.9986
 
 @part(fastmath=False, error_model="numpy", nogil=True)
 def _dot_to(vertices, origin, target, nx, ny):
-    """Component along (nx, ny) of the unit vector from one vertex to another."""
+    """Component along (nx, ny) of the unit vector from vertex ``origin`` to vertex ``target``."""
     dx, dy = vertices[target, 0] - vertices[origin, 0], vertices[target, 1] - vertices[origin, 1]
     return (dx * nx + dy * ny) / np.sqrt(dx * dx + dy * dy)
 
@@ -84,7 +84,7 @@ def _may_turn_to(vertices, next_vertex, previous_vertex, vertex, nx, ny, gap, wi
 
 @part(fastmath=False, error_model="numpy", nogil=True)
 def _nearer(vertices, here, one, other):
-    """Whether vertex ``here`` is nearer to vertex ``one`` than to the ``other``."""
+    """True if vertex ``here`` is nearer to vertex ``one`` than to ``other``."""
     ax, ay = vertices[here, 0] - vertices[one, 0], vertices[here, 1] - vertices[one, 1]
     bx, by = vertices[here, 0] - vertices[other, 0], vertices[here, 1] - vertices[other, 1]
     return ax * ax + ay * ay < (bx * bx + by * by) * (1.0 - _NEARER)
@@ -99,7 +99,7 @@ def _by(vertices, v, w, window):
 
 @part(fastmath=False, error_model="numpy", nogil=True)
 def _meet(vertices, next_vertex, previous_vertex, v, w):
-    """Whether two corners are each other's: neither is nearer to a neighbour of the other along its outline."""
+    """True if corners ``v`` and ``w`` meet: neither is nearer to a neighbour of the other along its outline."""
     return not (
         _nearer(vertices, v, next_vertex[w], w)
         or _nearer(vertices, v, previous_vertex[w], w)
@@ -118,7 +118,7 @@ def _shallower(vertices, next_vertex, previous_vertex, vertex, gap, other):
 
 @part(fastmath=False, error_model="numpy", nogil=True)
 def _place(keys, key):
-    """Where ``key`` stands in the sorted ``keys``, −1 if nowhere."""
+    """Index of ``key`` in the sorted ``keys``, −1 if absent."""
     low, high = 0, keys.shape[0]
     while low < high:
         middle = (low + high) // 2
@@ -143,14 +143,14 @@ def _add(table, count, first, vertex, edge):
 
 
 class Corners(NamedTuple):
-    """What is known of corners before they are looked at.
+    """Data of corners for the contact search.
 
     convex    (n_vertices,)    bool
     rounding  (n_vertices,)    m, their rounding lengths
-    longest   (n_vertices,)    m, the longest that these may be
-    pressed   (n_blocks,)      m, how deep the faces of each block are pressed in
-    motion    (n_vertices, 2)  m, how far each vertex is expected to move in the step
-    margin                     m, by which corners may come nearer besides: pairs that then stay apart are left out
+    longest   (n_vertices,)    m, largest admissible rounding lengths
+    pressed   (n_blocks,)      m, penetration of each block's faces
+    motion    (n_vertices, 2)  m, expected motion of each vertex in the step
+    margin                     m, further approach that is allowed for: pairs that then stay apart are left out
     """
 
     convex: np.ndarray
@@ -162,7 +162,7 @@ class Corners(NamedTuple):
 
 
 def find_contacts(
-    vertices, next_vertex, previous_vertex, vertex_start, pairs, window, old_keys, corners
+    outlines: Outlines, pairs: np.ndarray, window: float | np.ndarray, old_keys: np.ndarray, corners: Corners
 ) -> tuple[np.ndarray, np.ndarray]:
     """All contacts of the ``pairs`` (k, 2) of blocks, the lower number first, that are nearer than ``window`` (m, of all or
     (k,) of each), pair by pair: a table (n, 4) of vertex, edge, the corner of the edge's block that the vertex meets where
@@ -170,18 +170,15 @@ def find_contacts(
     these may overlap by a step that rounding smooths; and (n, 3) the normal that pushes the vertex's block and the gap (m) of
     rounded corners.
 
-
     ``old_keys`` (sorted vertex·n_vertices + edge of the last step's contacts) settles which of two equivalent
     representations of a corner on a corner is kept, so that contacts do not change names on round-off; ``corners`` is a
     `Corners`.
     """
-    box = boxes(vertices, vertex_start[:-1])
+    box = boxes(outlines.vertices, outlines.vertex_start[:-1])
     room, windows = 32 + 8 * len(box), _each(window, len(pairs))
     while True:
         table, met = np.empty((room, 4), np.int64), np.zeros((room, 3))
-        count = _look_at(
-            table, met, box, pairs, vertices, next_vertex, previous_vertex, vertex_start, windows, old_keys, *corners
-        )
+        count = _look_at(_Rows(table, met), box, pairs, windows, outlines, old_keys, corners)
         if count >= 0:
             return table[:count], met[:count]
         room *= 2
@@ -199,188 +196,285 @@ def convex_corners(vertices, next_vertex, previous_vertex):
     return convex
 
 
+class Outlines(NamedTuple):
+    """The outlines of blocks: ``vertices`` (n_vertices, 2) m, the numbers of the ``next_vertex`` and the
+    ``previous_vertex`` of each (n_vertices,), and where those of a block begin, ``vertex_start`` (n_blocks + 1,)."""
+
+    vertices: np.ndarray
+    next_vertex: np.ndarray
+    previous_vertex: np.ndarray
+    vertex_start: np.ndarray
+
+
+class _Rows(NamedTuple):
+    """Room for the rows of `find_contacts`."""
+
+    table: np.ndarray
+    met: np.ndarray
+
+
+class _Lines(NamedTuple):
+    """The entrance lines of two corners, four at most: the ``vertex`` and the ``edge`` that stand for each, its ``twin``,
+    the line of the other end of the same face (−1: none), and ``shape`` (4, 7): normal that pushes the first block (2), gap,
+    distance outside the edge, edge length, distance inside, sine away from it."""
+
+    vertex: np.ndarray
+    edge: np.ndarray
+    twin: np.ndarray
+    shape: np.ndarray
+
+
+class _Near(NamedTuple):
+    """Two blocks ``a`` and ``b`` whose contacts are sought within a ``window`` m, and where: in the strip that both boxes
+    share, widened by what can be in reach."""
+
+    a: int
+    b: int
+    window: float
+    x_lo: float
+    x_hi: float
+    y_lo: float
+    y_hi: float
+
+
 @kept(fastmath=False, error_model="numpy", nogil=True)
-def _look_at(
-    table, met, box, pairs, vertices, next_vertex, previous_vertex, vertex_start, windows, old_keys, convex, rounding,
-    longest, pressed, motion, margin,
-):  # fmt: skip
-    """Fill ``table`` and ``met`` with the contacts of ``pairs`` within ``windows`` (k,) and return their number, or −1
-    when they have no room for them.
+def _look_at(rows, box, pairs, windows, outlines, old_keys, corners):
+    """Fill ``rows`` with the contacts of ``pairs`` within ``windows`` (k,) and return their number, or −1 when they have
+    no room for them.
 
     ``box`` (n_blocks, 4) is the blocks' least x, y and greatest x, y.
     """
-    n_vertices = vertices.shape[0]
-    count = 0
-    pick_vertex = np.empty(4, np.int64)
-    pick_edge = np.empty(4, np.int64)
-    pick = np.empty(
-        (4, 7)
-    )  # normal that pushes block i (2), gap, distance outside the edge, edge length, distance inside, sine away from it
-    twin = np.empty(4, np.int64)  # the other end of the same face
+    count, start = 0, outlines.vertex_start
+    lines = _Lines(np.empty(4, np.int64), np.empty(4, np.int64), np.empty(4, np.int64), np.empty((4, 7)))
     for pair in range(pairs.shape[0]):
         a, b = pairs[pair, 0], pairs[pair, 1]
         # Where corners are rounded their lines do not act by themselves.
         zone = rounding_length(
-            min(rounding[vertex_start[a]], rounding[vertex_start[b]]), np.inf, max(pressed[a], pressed[b])
-        )
+            min(corners.rounding[start[a]], corners.rounding[start[b]]), np.inf,
+            max(corners.pressed[a], corners.pressed[b]),
+        )  # fmt: skip
         window = max(windows[pair], _ZONE * zone)
         if box[a, 0] > box[b, 2] + window or box[b, 0] > box[a, 2] + window:
             continue
         if box[a, 1] > box[b, 3] + window or box[b, 1] > box[a, 3] + window:
             continue
-        first = count
-        # The strip both boxes share, widened: nothing outside it can be in reach.
         wide = _CORNERS * window
-        x_lo, x_hi = max(box[a, 0], box[b, 0]) - wide, min(box[a, 2], box[b, 2]) + wide
-        y_lo, y_hi = max(box[a, 1], box[b, 1]) - wide, min(box[a, 3], box[b, 3]) + wide
-        # 1. Corner to corner.
-        for v in range(vertex_start[a], vertex_start[a + 1]):
-            if not convex[v] or not (x_lo <= vertices[v, 0] <= x_hi and y_lo <= vertices[v, 1] <= y_hi):
-                continue
-            for w in range(vertex_start[b], vertex_start[b + 1]):
-                dx, dy = vertices[v, 0] - vertices[w, 0], vertices[v, 1] - vertices[w, 1]
-                if not convex[w] or not _by(vertices, v, w, window):
-                    continue
-                if not _meet(vertices, next_vertex, previous_vertex, v, w):
-                    continue
-                n_lines = 0
-                for c in range(4):
-                    # Vertices of the later block stand first: at an exact tie they own the contact.
-                    if c < 2:
-                        vertex, edge, sign = w, (v if c == 0 else previous_vertex[v]), -1.0
-                    else:
-                        vertex, edge, sign = v, (w if c == 2 else previous_vertex[w]), 1.0
-                    away, nx, ny, gap, along, length = _against(vertices, next_vertex, previous_vertex, vertex, edge)
-                    if away < -_ANGLE:
-                        continue
-                    nx, ny = sign * nx, sign * ny
-                    outside = max(0.0, -along, along - length)
-                    inside = min(along, length - along)
-                    same = -1
-                    for k in range(n_lines):
-                        if pick[k, 0] * nx + pick[k, 1] * ny > 1.0 - _PARALLEL:
-                            same = k
-                    if same >= 0 and twin[same] >= 0:
-                        continue
-                    if same >= 0 and min(inside, pick[same, 5]) > _ENDS * max(length, pick[same, 4]):
-                        k = n_lines
-                        n_lines += 1
-                        twin[k], twin[same] = same, k
-                    elif same >= 0:
-                        near = 1e-9 * max(length, pick[same, 4])
-                        better = outside < pick[same, 3] - near
-                        if abs(away - pick[same, 6]) > _LEAN:
-                            better = away > pick[same, 6]
-                        elif abs(outside - pick[same, 3]) <= near:
-                            better = (
-                                _place(old_keys, vertex * n_vertices + edge) >= 0
-                                and _place(old_keys, pick_vertex[same] * n_vertices + pick_edge[same]) < 0
-                            )
-                        if not better:
-                            continue
-                        k = same
-                    else:
-                        k = n_lines
-                        n_lines += 1
-                        twin[k] = -1
-                    pick_vertex[k], pick_edge[k] = vertex, edge
-                    pick[k, 0], pick[k, 1], pick[k, 2], pick[k, 3], pick[k, 4] = nx, ny, gap, outside, length
-                    pick[k, 5], pick[k, 6] = inside, away
-                # The line that is least crossed, and of those in other directions the one that is.
-                one, two = -1, -1
-                for k in range(n_lines):
-                    if one < 0 or pick[k, 2] > pick[one, 2]:
-                        one = k
-                for k in range(n_lines):
-                    if k != one and twin[k] != one and (two < 0 or pick[k, 2] > pick[two, 2]):
-                        two = k
-                if one < 0:
-                    continue
-                if count + 4 > table.shape[0]:
-                    return -1
-                line, length, reach = 1, 0.0, window
-                if two >= 0:
-                    length = rounding_length(
-                        min(rounding[v], rounding[w]), min(longest[v], longest[w]), max(pressed[a], pressed[b])
-                    )
-                    ux, uy = motion[v, 0] - motion[w, 0], motion[v, 1] - motion[w, 1]
-                    mx, my, gap, line = meeting(
-                        dx, dy, ux, uy, pick[one, 0], pick[one, 1], pick[one, 2], pick[two, 0], pick[two, 1],
-                        pick[two, 2], length,
-                    )  # fmt: skip
-                    reach = min(window, _HASTE * np.sqrt(ux * ux + uy * uy) + margin)
-                    if line == 0:
-                        if gap > reach or gap < -window:
-                            continue
-                        # It goes by the name of the line whose normal is nearer to its own.
-                        k = one
-                        if mx * pick[two, 0] + my * pick[two, 1] > mx * pick[one, 0] + my * pick[one, 1]:
-                            k = two
-                        row = _add(table, count, first, pick_vertex[k], pick_edge[k])
-                        if row < count:
-                            continue
-                        count += 1
-                        sign = 1.0 if pick_vertex[k] == v else -1.0
-                        table[row, 2], table[row, 3] = w if pick_vertex[k] == v else v, CORNERS
-                        met[row, 0], met[row, 1], met[row, 2] = sign * mx, sign * my, gap
-                        continue
-                met_on = one if line == 1 else two
-                kind = SMOOTHED if two >= 0 and pick[met_on, 2] > -EASED * length else CORNERS
-                for k in range(n_lines):
-                    if k != met_on and twin[k] != met_on:
-                        continue
-                    if pick[k, 2] > reach or pick[k, 2] < -window:
-                        continue
-                    row = _add(table, count, first, pick_vertex[k], pick_edge[k])
-                    if row == count:
-                        table[row, 3] = kind
-                        count += 1
-        # 2. Corner to edge, and corner into a re-entrant corner.
-        for role in range(2):
-            i, j = (a, b) if role == 0 else (b, a)
-            for v in range(vertex_start[i], vertex_start[i + 1]):
-                x, y = vertices[v, 0], vertices[v, 1]
-                if not convex[v] or not (x_lo <= x <= x_hi and y_lo <= y <= y_hi):
-                    continue
-                for edge in range(vertex_start[j], vertex_start[j + 1]):
-                    end = next_vertex[edge]
-                    if (
-                        min(vertices[edge, 0], vertices[end, 0]) > x + window
-                        or max(vertices[edge, 0], vertices[end, 0]) < x - window
-                        or min(vertices[edge, 1], vertices[end, 1]) > y + window
-                        or max(vertices[edge, 1], vertices[end, 1]) < y - window
-                    ):
-                        continue
-                    away, nx, ny, gap, along, length = _against(vertices, next_vertex, previous_vertex, v, edge)
-                    if abs(gap) > window or along < -window or along > length + window:
-                        continue
-                    if away < -_ANGLE:
-                        if gap <= 0.0 or along < 0.0 or along > length:
-                            continue
-                        if not _may_turn_to(vertices, next_vertex, previous_vertex, v, nx, ny, gap, window):
-                            continue
-                    # In a re-entrant corner a vertex may be past an edge's end by what it penetrates, not round the
-                    # next corner.
-                    if along < 0.0 and not convex[edge] and _nearer(vertices, v, previous_vertex[edge], edge):
-                        continue
-                    if along > length and not convex[end] and _nearer(vertices, v, next_vertex[end], end):
-                        continue
-                    # Corner to corner is done above, for corners that meet; of others the shallower edge is met within
-                    # its ends.
-                    if convex[edge] and (along <= window or _by(vertices, v, edge, window)):
-                        if along < 0.0 or _meet(vertices, next_vertex, previous_vertex, v, edge):
-                            continue
-                        if not _shallower(vertices, next_vertex, previous_vertex, v, gap, previous_vertex[edge]):
-                            continue
-                    if convex[end] and (along >= length - window or _by(vertices, v, end, window)):
-                        if along > length or _meet(vertices, next_vertex, previous_vertex, v, end):
-                            continue
-                        if not _shallower(vertices, next_vertex, previous_vertex, v, gap, end):
-                            continue
-                    if count == table.shape[0]:
-                        return -1
-                    count = max(count, _add(table, count, first, v, edge) + 1)
+        near = _Near(
+            a, b, window, max(box[a, 0], box[b, 0]) - wide, min(box[a, 2], box[b, 2]) + wide,
+            max(box[a, 1], box[b, 1]) - wide, min(box[a, 3], box[b, 3]) + wide,
+        )  # fmt: skip
+        first = count
+        count = _corners_on_corners(rows, lines, first, near, outlines, old_keys, corners)
+        if count >= 0:
+            count = _corners_on_edges(rows, first, count, near, outlines, corners.convex)
+        if count < 0:
+            return -1
     return count
+
+
+@part(fastmath=False, error_model="numpy", nogil=True)
+def _corners_on_corners(rows, lines, first, near, outlines, old_keys, corners):
+    """Add the contacts of corners that meet corners to ``rows`` that end at ``first``; how many rows there are then, −1
+    where they have no room."""
+    vertices, start, count = outlines.vertices, outlines.vertex_start, first
+    for v in range(start[near.a], start[near.a + 1]):
+        if not corners.convex[v] or not _in_strip(near, vertices[v, 0], vertices[v, 1]):
+            continue
+        for w in range(start[near.b], start[near.b + 1]):
+            if not corners.convex[w] or not _by(vertices, v, w, near.window):
+                continue
+            if not _meet(vertices, outlines.next_vertex, outlines.previous_vertex, v, w):
+                continue
+            n_lines = _entrance_lines(lines, outlines, old_keys, v, w)
+            if n_lines == 0:
+                continue
+            if count + 4 > rows.table.shape[0]:
+                return -1
+            count = _add_corners(rows, first, count, lines, n_lines, near, vertices, v, w, corners)
+    return count
+
+
+@part(fastmath=False, error_model="numpy", nogil=True)
+def _in_strip(near, x, y):
+    """Whether (x, y) may be in reach of both blocks."""
+    return near.x_lo <= x <= near.x_hi and near.y_lo <= y <= near.y_hi
+
+
+@part(fastmath=False, error_model="numpy", nogil=True)
+def _entrance_lines(lines, outlines, old_keys, v, w):
+    """Find the ``lines`` through which corner ``v`` can enter corner ``w``, and their number."""
+    vertices, next_vertex, previous_vertex = outlines.vertices, outlines.next_vertex, outlines.previous_vertex
+    n_lines, shape = 0, lines.shape
+    for c in range(4):
+        # Vertices of the later block stand first: at an exact tie they own the contact.
+        if c < 2:
+            vertex, edge, sign = w, (v if c == 0 else previous_vertex[v]), -1.0
+        else:
+            vertex, edge, sign = v, (w if c == 2 else previous_vertex[w]), 1.0
+        away, nx, ny, gap, along, length = _against(vertices, next_vertex, previous_vertex, vertex, edge)
+        if away < -_ANGLE:
+            continue
+        nx, ny = sign * nx, sign * ny
+        outside = max(0.0, -along, along - length)
+        inside = min(along, length - along)
+        same = -1
+        for k in range(n_lines):
+            if shape[k, 0] * nx + shape[k, 1] * ny > 1.0 - _PARALLEL:
+                same = k
+        if same >= 0 and lines.twin[same] >= 0:
+            continue
+        if same >= 0 and min(inside, shape[same, 5]) > _ENDS * max(length, shape[same, 4]):
+            k = n_lines
+            n_lines += 1
+            lines.twin[k], lines.twin[same] = same, k
+        elif same >= 0:
+            if not _stands_better(lines, same, old_keys, vertices.shape[0], vertex, edge, away, outside, length):
+                continue
+            k = same
+        else:
+            k = n_lines
+            n_lines += 1
+            lines.twin[k] = -1
+        lines.vertex[k], lines.edge[k] = vertex, edge
+        shape[k, 0], shape[k, 1], shape[k, 2], shape[k, 3], shape[k, 4] = nx, ny, gap, outside, length
+        shape[k, 5], shape[k, 6] = inside, away
+    return n_lines
+
+
+@part(fastmath=False, error_model="numpy", nogil=True)
+def _stands_better(lines, same, old_keys, n_vertices, vertex, edge, away, outside, length):
+    """Whether ``vertex`` and ``edge`` stand better for the line ``same`` than those that do."""
+    shape = lines.shape
+    near = 1e-9 * max(length, shape[same, 4])
+    if abs(away - shape[same, 6]) > _LEAN:
+        return away > shape[same, 6]
+    if abs(outside - shape[same, 3]) <= near:
+        return (
+            _place(old_keys, vertex * n_vertices + edge) >= 0
+            and _place(old_keys, lines.vertex[same] * n_vertices + lines.edge[same]) < 0
+        )
+    return outside < shape[same, 3] - near
+
+
+@part(fastmath=False, error_model="numpy", nogil=True)
+def _least_crossed(lines, n_lines):
+    """The line that is least crossed, and of those in other directions the one that is; −1 for none."""
+    one, two, shape = -1, -1, lines.shape
+    for k in range(n_lines):
+        if one < 0 or shape[k, 2] > shape[one, 2]:
+            one = k
+    for k in range(n_lines):
+        if k != one and lines.twin[k] != one and (two < 0 or shape[k, 2] > shape[two, 2]):
+            two = k
+    return one, two
+
+
+@part(fastmath=False, error_model="numpy", nogil=True)
+def _add_corners(rows, first, count, lines, n_lines, near, vertices, v, w, corners):
+    """Add the contacts of the corners ``v`` and ``w`` to ``rows``, of which those of the pair begin at ``first``; how many
+    rows there are then."""
+    table, met, window, shape = rows.table, rows.met, near.window, lines.shape
+    one, two = _least_crossed(lines, n_lines)
+    line, length, reach = 1, 0.0, window
+    if two >= 0:
+        length = rounding_length(
+            min(corners.rounding[v], corners.rounding[w]), min(corners.longest[v], corners.longest[w]),
+            max(corners.pressed[near.a], corners.pressed[near.b]),
+        )  # fmt: skip
+        dx, dy = vertices[v, 0] - vertices[w, 0], vertices[v, 1] - vertices[w, 1]
+        ux, uy = corners.motion[v, 0] - corners.motion[w, 0], corners.motion[v, 1] - corners.motion[w, 1]
+        mx, my, gap, line = meeting(
+            dx, dy, ux, uy, shape[one, 0], shape[one, 1], shape[one, 2], shape[two, 0], shape[two, 1], shape[two, 2],
+            length,
+        )  # fmt: skip
+        reach = min(window, _HASTE * np.sqrt(ux * ux + uy * uy) + corners.margin)
+        if line == 0:
+            if gap > reach or gap < -window:
+                return count
+            # It goes by the name of the line whose normal is nearer to its own.
+            k = one
+            if mx * shape[two, 0] + my * shape[two, 1] > mx * shape[one, 0] + my * shape[one, 1]:
+                k = two
+            row = _add(table, count, first, lines.vertex[k], lines.edge[k])
+            if row < count:
+                return count
+            sign = 1.0 if lines.vertex[k] == v else -1.0
+            table[row, 2], table[row, 3] = w if lines.vertex[k] == v else v, CORNERS
+            met[row, 0], met[row, 1], met[row, 2] = sign * mx, sign * my, gap
+            return count + 1
+    met_on = one if line == 1 else two
+    kind = SMOOTHED if two >= 0 and shape[met_on, 2] > -EASED * length else CORNERS
+    for k in range(n_lines):
+        if k != met_on and lines.twin[k] != met_on:
+            continue
+        if shape[k, 2] > reach or shape[k, 2] < -window:
+            continue
+        row = _add(table, count, first, lines.vertex[k], lines.edge[k])
+        if row == count:
+            table[row, 3] = kind
+            count += 1
+    return count
+
+
+@part(fastmath=False, error_model="numpy", nogil=True)
+def _corners_on_edges(rows, first, count, near, outlines, convex):
+    """Add the contacts of corners that meet edges or lie in re-entrant corners to ``rows``, of which those of the pair
+    begin at ``first``; how many rows there are then, −1 where they have no room."""
+    vertices, start = outlines.vertices, outlines.vertex_start
+    for role in range(2):
+        i, j = (near.a, near.b) if role == 0 else (near.b, near.a)
+        for v in range(start[i], start[i + 1]):
+            if not convex[v] or not _in_strip(near, vertices[v, 0], vertices[v, 1]):
+                continue
+            for edge in range(start[j], start[j + 1]):
+                if not _meets_edge(outlines, convex, near.window, v, edge):
+                    continue
+                if count == rows.table.shape[0]:
+                    return -1
+                count = max(count, _add(rows.table, count, first, v, edge) + 1)
+    return count
+
+
+@part(fastmath=False, error_model="numpy", nogil=True)
+def _meets_edge(outlines, convex, window, v, edge):
+    """Whether corner ``v`` meets this ``edge``, not one of the corners at its ends."""
+    vertices, next_vertex, previous_vertex = outlines.vertices, outlines.next_vertex, outlines.previous_vertex
+    x, y, end = vertices[v, 0], vertices[v, 1], next_vertex[edge]
+    if (
+        min(vertices[edge, 0], vertices[end, 0]) > x + window
+        or max(vertices[edge, 0], vertices[end, 0]) < x - window
+        or min(vertices[edge, 1], vertices[end, 1]) > y + window
+        or max(vertices[edge, 1], vertices[end, 1]) < y - window
+    ):
+        return False
+    away, nx, ny, gap, along, length = _against(vertices, next_vertex, previous_vertex, v, edge)
+    if abs(gap) > window or along < -window or along > length + window:
+        return False
+    if away < -_ANGLE:
+        if gap <= 0.0 or along < 0.0 or along > length:
+            return False
+        if not _may_turn_to(vertices, next_vertex, previous_vertex, v, nx, ny, gap, window):
+            return False
+    # In a re-entrant corner a vertex may be past an edge's end by what it penetrates, not round the next corner.
+    if along < 0.0 and not convex[edge] and _nearer(vertices, v, previous_vertex[edge], edge):
+        return False
+    if along > length and not convex[end] and _nearer(vertices, v, next_vertex[end], end):
+        return False
+    # Corner to corner is done apart, for corners that meet; of others the shallower edge is met within its ends.
+    at_start = convex[edge] and (along <= window or _by(vertices, v, edge, window))
+    if at_start and (along < 0.0 or not _is_met_beside(outlines, v, gap, edge, previous_vertex[edge])):
+        return False
+    at_end = convex[end] and (along >= length - window or _by(vertices, v, end, window))
+    return not at_end or (not along > length and _is_met_beside(outlines, v, gap, end, end))
+
+
+@part(fastmath=False, error_model="numpy", nogil=True)
+def _is_met_beside(outlines, v, gap, corner, other):
+    """Whether ``v`` meets an edge with this ``gap`` at its ``corner``: neither that nor the ``other`` edge there."""
+    vertices, next_vertex, previous_vertex = outlines.vertices, outlines.next_vertex, outlines.previous_vertex
+    if _meet(vertices, next_vertex, previous_vertex, v, corner):
+        return False
+    return _shallower(vertices, next_vertex, previous_vertex, v, gap, other)
 
 
 def _each(window, n: int) -> np.ndarray:
@@ -388,108 +482,137 @@ def _each(window, n: int) -> np.ndarray:
     return np.ascontiguousarray(np.broadcast_to(np.asarray(window, float), n))
 
 
+class Known(NamedTuple):
+    """The contacts of the last step (m,): ``vertex``, ``edge`` and ``normal`` (m, 2), and the ``order`` (m,) in which their
+    keys vertex·n_vertices + edge ascend."""
+
+    vertex: np.ndarray
+    edge: np.ndarray
+    normal: np.ndarray
+    order: np.ndarray
+
+
 def describe_contacts(
-    table, met, vertices, next_vertex, previous_vertex, window, old_vertex, old_edge, old_normal, old_order
+    table: np.ndarray, met: np.ndarray, outlines: Outlines, window: float | np.ndarray, known: Known
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Geometry of the rows of `find_contacts`, ``table`` and ``met``, and what they inherit; ``window`` m, of all or (n,)
-    of each.
+    """Geometry of the rows of `find_contacts`, ``table`` and ``met``, and what they inherit of those ``known``; ``window``
+    m, of all or (n,) of each.
 
     Returns (geometry, mate, parent): geometry (n, 7) = position, normal x, y, gap, tributary length, vertex x, y; mate
     (n,) the edge of the vertex's own block that faces the touched edge; parent (n,) the row of the last step's contacts
     whose force and slip it continues, −1 if new.
     The tributary length is half the overlap of the faces that meet there, 0 for a lone corner.
     """
-    return _describe(
-        table, met, vertices, next_vertex, previous_vertex, _each(window, len(table)), old_vertex, old_edge, old_normal,
-        old_order,
-    )  # fmt: skip
+    geometry, mate = _geometry(table, met, outlines)
+    return geometry, mate, _parents(table, geometry, outlines, _each(window, len(table)), known)
 
 
 @kept(fastmath=False, error_model="numpy", nogil=True)
-def _describe(
-    table, met, vertices, next_vertex, previous_vertex, window, old_vertex, old_edge, old_normal, old_order
-):  # fmt: skip
-    """As `describe_contacts`, each row with its own ``window`` (n,)."""
-    n, n_vertices = table.shape[0], vertices.shape[0]
+def _geometry(table, met, outlines):
+    """The first two of `describe_contacts`."""
+    vertices, next_vertex, previous_vertex = outlines.vertices, outlines.next_vertex, outlines.previous_vertex
+    n = table.shape[0]
     geometry = np.empty((n, 7))
     mate = np.empty(n, np.int64)
-    parent = np.full(n, -1, np.int64)
-    taken = np.zeros(old_vertex.shape[0], np.bool_)
-    keys = np.empty(old_vertex.shape[0], np.int64)
-    for k in range(keys.shape[0]):
-        keys[k] = old_vertex[old_order[k]] * n_vertices + old_edge[old_order[k]]
     for row in range(n):
         vertex, edge = table[row, 0], table[row, 1]
         _, nx, ny, gap, along, length = _against(vertices, next_vertex, previous_vertex, vertex, edge)
         geometry[row, 0] = along / length
         geometry[row, 1], geometry[row, 2], geometry[row, 3] = nx, ny, gap
         geometry[row, 5], geometry[row, 6] = vertices[vertex, 0], vertices[vertex, 1]
-        tributary, facing = 0.0, np.inf
-        mate[row] = vertex
-        for own in (vertex, previous_vertex[vertex]):
-            head = next_vertex[own]
-            sx, sy = vertices[head, 0] - vertices[own, 0], vertices[head, 1] - vertices[own, 1]
-            own_length = np.sqrt(sx * sx + sy * sy)
-            cosine = (sy * nx - sx * ny) / own_length
-            if cosine < facing:
-                facing = cosine
-                mate[row] = own
-            # As near to an end as this, the corner stands for the end, too, and faces the edges on both sides of a flat
-            # node.
-            ends = _ENDS * max(length, own_length)
-            for turn in range(3):
-                face = edge
-                if turn == 1:
-                    if along > ends:
-                        continue
-                    face = previous_vertex[edge]
-                elif turn == 2:
-                    if along < length - ends:
-                        continue
-                    face = next_vertex[edge]
-                far = next_vertex[face]
-                tx, ty = vertices[far, 0] - vertices[face, 0], vertices[far, 1] - vertices[face, 1]
-                face_length = np.sqrt(tx * tx + ty * ty)
-                tx, ty = tx / face_length, ty / face_length
-                if (sx * tx + sy * ty) / own_length > -_MATING or -ny * tx + nx * ty < _MATING:
-                    continue
-                s0 = (vertices[own, 0] - vertices[face, 0]) * tx + (vertices[own, 1] - vertices[face, 1]) * ty
-                s1 = (vertices[head, 0] - vertices[face, 0]) * tx + (vertices[head, 1] - vertices[face, 1]) * ty
-                tributary += 0.5 * max(0.0, min(face_length, max(s0, s1)) - max(0.0, min(s0, s1)))
-        geometry[row, 4] = tributary
+        geometry[row, 4], mate[row] = _tributary(outlines, vertex, edge, nx, ny, along, length)
         if table[row, 2] >= 0:
             # Rounded corners have no face in common.
             geometry[row, 4] = 0.0
             geometry[row, 1], geometry[row, 2], geometry[row, 3] = met[row, 0], met[row, 1], met[row, 2]
-        key = vertex * n_vertices + edge
-        at = _place(keys, key)
+    return geometry, mate
+
+
+@part(fastmath=False, error_model="numpy", nogil=True)
+def _tributary(outlines, vertex, edge, nx, ny, along, length):
+    """Half the overlap of the faces that meet where ``vertex`` touches an ``edge`` of the outward normal (nx, ny) and this
+    ``length`` so far ``along`` it, m; and the edge of the vertex's own block that faces it."""
+    vertices, next_vertex, previous_vertex = outlines.vertices, outlines.next_vertex, outlines.previous_vertex
+    tributary, facing, mate = 0.0, np.inf, vertex
+    for own in (vertex, previous_vertex[vertex]):
+        head = next_vertex[own]
+        sx, sy = vertices[head, 0] - vertices[own, 0], vertices[head, 1] - vertices[own, 1]
+        own_length = np.sqrt(sx * sx + sy * sy)
+        cosine = (sy * nx - sx * ny) / own_length
+        if cosine < facing:
+            facing = cosine
+            mate = own
+        # As near to an end as this, the corner stands for the end, too, and faces the edges on both sides of a flat
+        # node.
+        ends = _ENDS * max(length, own_length)
+        for turn in range(3):
+            face = edge
+            if turn == 1:
+                if along > ends:
+                    continue
+                face = previous_vertex[edge]
+            elif turn == 2:
+                if along < length - ends:
+                    continue
+                face = next_vertex[edge]
+            far = next_vertex[face]
+            tx, ty = vertices[far, 0] - vertices[face, 0], vertices[far, 1] - vertices[face, 1]
+            face_length = np.sqrt(tx * tx + ty * ty)
+            tx, ty = tx / face_length, ty / face_length
+            if (sx * tx + sy * ty) / own_length > -_MATING or -ny * tx + nx * ty < _MATING:
+                continue
+            s0 = (vertices[own, 0] - vertices[face, 0]) * tx + (vertices[own, 1] - vertices[face, 1]) * ty
+            s1 = (vertices[head, 0] - vertices[face, 0]) * tx + (vertices[head, 1] - vertices[face, 1]) * ty
+            tributary += 0.5 * max(0.0, min(face_length, max(s0, s1)) - max(0.0, min(s0, s1)))
+    return tributary, mate
+
+
+@kept(fastmath=False, error_model="numpy", nogil=True)
+def _parents(table, geometry, outlines, window, known):
+    """The last of `describe_contacts`, each row with its own ``window`` (n,)."""
+    vertices, next_vertex = outlines.vertices, outlines.next_vertex
+    n, n_vertices = table.shape[0], vertices.shape[0]
+    parent = np.full(n, -1, np.int64)
+    taken = np.zeros(known.vertex.shape[0], np.bool_)
+    keys = np.empty(known.vertex.shape[0], np.int64)
+    for k in range(keys.shape[0]):
+        keys[k] = known.vertex[known.order[k]] * n_vertices + known.edge[known.order[k]]
+    for row in range(n):
+        at = _place(keys, table[row, 0] * n_vertices + table[row, 1])
         if at >= 0:
-            parent[row] = old_order[at]
-            taken[old_order[at]] = True
+            parent[row] = known.order[at]
+            taken[known.order[at]] = True
     for row in range(n):
         if parent[row] >= 0 or keys.shape[0] == 0:
             continue
         vertex, edge = table[row, 0], table[row, 1]
-        nx, ny = geometry[row, 1], geometry[row, 2]
         for corner in (edge, next_vertex[edge]):
             dx, dy = vertices[vertex, 0] - vertices[corner, 0], vertices[vertex, 1] - vertices[corner, 1]
-            if dx * dx + dy * dy > (_CORNERS * window[row]) ** 2:
-                continue
-            for c in range(4):
-                # The same meeting under another name: the next edge round the corner, or the roles exchanged.
-                if c == 0:
-                    key, sign = vertex * n_vertices + corner, 1.0
-                elif c == 1:
-                    key, sign = vertex * n_vertices + previous_vertex[corner], 1.0
-                elif c == 2:
-                    key, sign = corner * n_vertices + vertex, -1.0
-                else:
-                    key, sign = corner * n_vertices + previous_vertex[vertex], -1.0
-                at = _place(keys, key)
-                if at < 0 or parent[row] >= 0:
-                    continue
-                old = old_order[at]
-                if not taken[old] and sign * (old_normal[old, 0] * nx + old_normal[old, 1] * ny) > 0.99:
-                    parent[row] = old
-                    taken[old] = True
-    return geometry, mate, parent
+            if dx * dx + dy * dy <= (_CORNERS * window[row]) ** 2 and parent[row] < 0:
+                nx, ny = geometry[row, 1], geometry[row, 2]
+                parent[row] = _renamed(keys, taken, known, outlines.previous_vertex, vertex, corner, nx, ny)
+    return parent
+
+
+@part(fastmath=False, error_model="numpy", nogil=True)
+def _renamed(keys, taken, known, previous_vertex, vertex, corner, nx, ny):
+    """The contact that is ``known`` of ``vertex`` at a ``corner``, with the normal (nx, ny), under another name: the next
+    edge round the corner, or the roles exchanged; −1 for none. It is ``taken`` then."""
+    n_vertices = previous_vertex.shape[0]
+    for c in range(4):
+        if c == 0:
+            key, sign = vertex * n_vertices + corner, 1.0
+        elif c == 1:
+            key, sign = vertex * n_vertices + previous_vertex[corner], 1.0
+        elif c == 2:
+            key, sign = corner * n_vertices + vertex, -1.0
+        else:
+            key, sign = corner * n_vertices + previous_vertex[vertex], -1.0
+        at = _place(keys, key)
+        if at < 0:
+            continue
+        old = known.order[at]
+        if not taken[old] and sign * (known.normal[old, 0] * nx + known.normal[old, 1] * ny) > 0.99:
+            taken[old] = True
+            return old
+    return -1

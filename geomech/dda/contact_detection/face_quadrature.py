@@ -1,39 +1,41 @@
-"""Where the springs of a joint face stand, so that it resists being turned as it resists being closed.
+"""Springs inside joint faces: their positions give a face the normal force and the moment of its linear gap.
 
-Blocks that strain evenly part along a straight line, the gap g(s) along their face. A joint of stiffness kₙ (Pa/m) that
-cannot pull presses by −kₙ g where g < 0, on the part c of the face's length ℓ:
+Blocks that strain uniformly part along a straight line, with the gap g(s) along their face. A joint of stiffness kₙ
+(Pa/m) without tension carries the pressure −kₙ g where g < 0, on the part c of the face length ℓ:
 
     N = −kₙ ∫ g ds,    M = −kₙ ∫ g s ds    over that part; c = ℓ or c = 3 (ℓ/2 − e), e = M/N (a triangle of pressure).
 
 Two springs kₙ c/2 at the Gauss points of the part give both exactly; at the ends of the face they would resist rotation
-by kₙ ℓ³/4 instead of kₙ ℓ³/12. Where the part ends follows from the gap at the end of the step: a step whose faces end
-elsewhere than was taken is done again (Newton's method; the pressure is zero there, so that N changes with the square
-of what is missed).
+with kₙ ℓ³/4 instead of kₙ ℓ³/12. The end of the part follows from the gap at the end of the step: a step whose faces
+end elsewhere than assumed is repeated (Newton's method; the pressure vanishes there, so that N changes with the square
+of the error).
 
-Bonds of blocks that have no stiffness of their own, and hold at their extreme fibre too, are held in the mean by the
-solver's springs. At the corners these would hold every rotation as well; but a block of one strain cannot bend, and
-what it would give under the moment on its face has to be given at the face. A beam of the block's depth that has its
-second moment I about its centroid across the face, and reaches from there by h to the face, would turn by
+Bonds without a joint stiffness, which carry tension to their extreme fibre, consist of the solver's penalty springs. At
+the corners of a face these would prevent every rotation; but a first-order block cannot bend, so the face must rotate
+as the block would bend under the moment on it. A beam of the block's depth, with the second moment I about the centroid
+across the face and the distance h from it to the face, rotates by
 
-    θ = M h / (E' I / 2h)        (of a rectangle M h / (E' ℓ³/12); Kawai 1978 has rigid blocks give so throughout),
+    θ = M h / (E' I / 2h)        (rectangle: M h / (E' ℓ³/12); Kawai 1978 gives rigid blocks this compliance
+    throughout),
 
-and so far inside their corners stand the two springs that give it. Along the face they stand in its middle, both: a
-block that bends is stretched along its faces by a strain that changes across it, its neighbours as they bend, and
-springs that held the faces at two places along each other would hold that. So bricks in courses, bricks laid in bond
-and cells of any shape glued together bend as a beam does, the better the more of them there are; otherwise they lock:
-between displacements that agree at the corners and are linear in every block, none bends. A triangle's three do not
-lock. Their springs are as stiff as a part ℓ/w of the solver's, w = √(12 I / A) the width of the block along the face:
-under one stress all faces of a block then give as much. Springs as stiff on a short face as on a long one would bear by
-what those beside them give, many times the stress of the rock, and break the bond under a part of what it holds.
+and the two springs stand as far inside the corners as gives this rotation. Tangentially both act at the middle of the
+face: a bending block is stretched along its faces by a strain that varies across it, as its neighbours are, and
+tangential springs at two places would prevent that. Bricks in courses, bricks in bond and bonded cells of any shape
+then bend as a beam does, the better the more of them there are. Otherwise they lock: displacements that agree at the
+corners and are linear in every block allow no bending. (Triangles, with three springs, do not lock.) The springs have
+the part ℓ/w of the penalty stiffness, with the width w = √(12 I / A) of the block along the face: under one stress all
+faces of a block then deform equally. Were short faces as stiff as long ones, they would carry many times the stress of
+the rock and fail at a fraction of the strength.
 
-Rows of CONTACT tell of forces at the corners, where contacts are found: the two that have the same resultant and
-moment, and bring the same stress. (What a state carries over of shear is that of the springs.)
+CONTACT rows hold forces at the corners, where contacts are found: the pair of corner forces with the same resultant and
+moment, which causes the same stress. (The shear force that a state carries over is that of the springs.)
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -49,6 +51,15 @@ _GAUSS = 1 / np.sqrt(3.0)
 _KNOWN = 1e-2
 #: Springs that are this much of their face apart are at its corners.
 _AT_CORNERS = 0.99
+
+
+class FaceForces(NamedTuple):
+    """What contacts (n,) have last borne: ``normal`` N, the part of the face from the corner on that was ``bare`` of touch,
+    and whether a bond ``holds`` that may pull."""
+
+    normal: np.ndarray
+    bare: np.ndarray
+    holds: np.ndarray
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,17 +99,14 @@ class FacePoints:
         other: np.ndarray,
         geometry: np.ndarray,
         stiff: np.ndarray,
-        normal: np.ndarray,
-        bare: np.ndarray,
-        holds: np.ndarray,
+        borne: FaceForces,
         least: np.ndarray,
         softened: Callable[[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]],
     ) -> FacePoints | None:
         """Faces among contacts (n,), ``stiff`` 1 where the law has a stiffness, 2 where a bond is to bend with its
-        blocks, 0 for neither, last known to press by ``normal`` N and to be ``bare`` of touch
-        from their corners on, ``holds`` a bond that may pull, ``least`` m of face
-        that the stiffness is at least that of; ``softened(ends, length)`` the ``apart`` and
-        ``share`` of bonds. None without any."""
+        blocks, 0 for neither, with what they have ``borne``; ``least`` m of face that the stiffness is at least that
+        of; ``softened(ends, length)`` the ``apart`` and ``share`` of bonds. None without any."""
+        holds = borne.holds
         some = np.flatnonzero((stiff > 0) & (geometry[:, 4] > 0))
         if len(some) < 2:
             return None
@@ -122,12 +130,12 @@ class FacePoints:
             ends, length, held, shortest, apart, share, glued = (
                 each[some] for each in (ends, length, held, shortest, apart, share, glued)
             )
-        part = _left(bare[ends], _pressed(normal[ends], held, shortest), held, shortest)
+        part = _left(borne.bare[ends], _pressed(borne.normal[ends], held, shortest), held, shortest)
         still, full = np.zeros_like(part), np.ones(len(part))
         return cls(ends, geometry, length, part, held, shortest, apart, glued, share, still, full)
 
     def pressed_by(self, normal: np.ndarray) -> FacePoints:
-        """The same faces on the parts that forces ``normal`` (n,) N at the corners press on."""
+        """The same faces, in contact on the parts that carry the corner forces ``normal`` (n,) N."""
         return replace(self, part=_pressed(normal[self.ends], self.held, self.shortest))
 
     def before(self, bare: np.ndarray, stiff_in_shear: np.ndarray) -> FacePoints:
@@ -138,9 +146,10 @@ class FacePoints:
         return replace(self, part=np.where(known[:, None], np.stack([first, 1 - second], axis=1), self.part))
 
     def passed_on(self, shear: np.ndarray, was: FacePoints) -> np.ndarray:
-        """(n,) N that these springs begin with, of the ``shear`` of springs where they ``was``: that of a stress which is
-        linear along that part, and goes on where both parts touch. It has the resultant and the moment of what goes on,
-        and its springs store no more than that did."""
+        """(n,) initial shear force of these springs, N, from the ``shear`` (n,) of the springs of the faces ``was``.
+
+        That shear is taken as a linear stress along the old part. It continues where old and new parts overlap, with
+        the resultant and moment of the overlap, and with no more stored energy."""
         out = shear.copy()
         if (was.part == self.part).all():
             return out
@@ -153,7 +162,7 @@ class FacePoints:
         moment = mean * (b**2 - a**2) / 2 + tilt * (b**3 - a**3) / 3
         first, second = (self.place.T - middle) / half
         on_low = (second * total - moment) / (second - first)
-        # A straight line through a stress that ends within the part swings to the other side beyond.
+        # A line fitted to a stress that ends within the part changes sign beyond.
         one_way = on_first * on_second >= 0
         on_low = np.where(one_way, np.clip(on_low, np.minimum(total, 0.0), np.maximum(total, 0.0)), on_low)
         moved = (was.part != self.part).any(axis=1)
@@ -161,7 +170,7 @@ class FacePoints:
         return out
 
     def but(self, others: FacePoints) -> FacePoints | None:
-        """These faces without those that ``others``, the same faces, have on other parts; None where none is left."""
+        """These faces without those whose part differs in ``others`` (the same faces); None if none remains."""
         kept = (self.part == others.part).all(axis=1)
         if not kept.any():
             return None
@@ -170,16 +179,16 @@ class FacePoints:
 
     @property
     def place(self) -> np.ndarray:
-        """(m, 2) where along the face the springs of its contacts stand, in parts of it."""
+        """(m, 2) positions of the springs along the face, from 0 to 1."""
         low, high = self.part[:, :1], self.part[:, 1:]
         return low + (high - low) * (0.5 + np.multiply.outer(self.apart, [-0.5, 0.5]))
 
     def geometry(self) -> np.ndarray:
-        """(n, 7) of the contacts, moved to where their springs stand."""
+        """(n, 7) geometry of the contacts, moved to their springs."""
         out = self.corners.copy()
         near, far = self.ends, self.ends[:, ::-1]
         vertex, across = self.corners[near, 5:7], self.corners[near, 1:3]
-        # The far end of the own face: the far vertex, or its foot on the own edge where that belongs to the other
+        # The far end of the face: the far vertex, or its foot on the face where that vertex belongs to the other
         # block.
         beyond = self.corners[far, 3]
         along = vertex[:, 1] - vertex[:, 0]
@@ -193,8 +202,9 @@ class FacePoints:
         return out
 
     def share_shear(self, vectors: np.ndarray, block: np.ndarray) -> None:
-        """Let both springs of faces that bend feel the motion along the middle of the face, in place: ``vectors`` (n, 2,
-        12) as `contact_vectors` has them, ``block`` (n,) that of the vertex."""
+        """Give both springs of bending faces the tangential motion at the middle of the face, in place.
+
+        ``vectors`` (n, 2, 12) as `contact_vectors`; ``block`` (n,) that of the vertex."""
         if not self.bends.any():
             return
         one, two = self.ends[self.bends].T
@@ -205,15 +215,16 @@ class FacePoints:
         vectors[one, 1], vectors[two, 1] = mean, np.where(swapped, np.roll(mean, 6, axis=1), mean)
 
     def along_faces(self, value: np.ndarray) -> np.ndarray:
-        """(n,) of motion along the edges, ``value`` (n,) at the corners, as the springs feel it."""
+        """(n,) tangential motion at the springs, from ``value`` (n,) at the corners."""
         out = self.between_corners(value)
         ends = self.ends[self.bends]
         out[ends] = out[ends].mean(axis=1, keepdims=True)
         return out
 
     def springs(self, lumped: Springs, stiff_in_shear: np.ndarray) -> Springs:
-        """The springs ``lumped`` at the corners, by the lengths that they have where they stand; ``stiff_in_shear``
-        (n,) those whose law has a shear stiffness."""
+        """Springs with the lengths of their parts, from the springs ``lumped`` at the corners.
+
+        ``stiff_in_shear`` (n,) bool: contacts whose law has a shear stiffness."""
         ratio = np.ones(len(self.corners))
         lengths = 0.5 * (self.part[:, 1] - self.part[:, 0]) * self.length
         ratio[self.ends] = lengths[:, None] / self.corners[self.ends, 4]
@@ -228,7 +239,7 @@ class FacePoints:
         )
 
     def on_bonded(self, faces: BondedFaces) -> BondedFaces:
-        """Bonded ``faces`` found at the corners, with the arms of where their springs stand."""
+        """Bonded ``faces`` found at the corners, with the lever arms of their springs."""
         arm = np.full(len(self.corners), np.nan)
         arm[faces.rows] = faces.arm
         first, second = arm[self.ends].T
@@ -236,7 +247,7 @@ class FacePoints:
         return replace(faces, arm=arm[faces.rows])
 
     def at_points(self, force: np.ndarray) -> np.ndarray:
-        """(n,) N: normal ``force`` of CONTACT rows, at the corners, as the springs carry it."""
+        """(n,) normal forces of the springs, N, from the ``force`` (n,) of CONTACT rows at the corners."""
         out, (first, second) = force.copy(), self.place.T
         at_first, at_second = force[self.ends].T
         out[self.ends[:, 0]] = (second * (at_first + at_second) - at_second) / (second - first)
@@ -244,8 +255,10 @@ class FacePoints:
         return out
 
     def at_corners(self, force: np.ndarray) -> np.ndarray:
-        """(n,) N at the corners: what has the resultant and the moment of the springs' normal ``force``; of their
-        shear, whose arms, the gaps, are linear along the face too, what stretches the blocks as much besides."""
+        """(n,) corner forces, N, with the resultant and moment of the springs' ``force`` (n,), normal or shear.
+
+        For shear forces, whose lever arms (the gaps) are also linear along the face, they stretch the blocks
+        equally."""
         out, (first, second) = force.copy(), self.place.T
         on_first, on_second = force[self.ends].T
         out[self.ends[:, 0]] = on_first * (1 - first) + on_second * (1 - second)
@@ -253,14 +266,14 @@ class FacePoints:
         return out
 
     def between_corners(self, value: np.ndarray) -> np.ndarray:
-        """(n,) at the springs, of the straight line through ``value`` (n,) at the corners."""
+        """(n,) linear interpolation of ``value`` (n,) from the corners to the springs."""
         out, place = value.copy(), self.place
         at_first, at_second = value[self.ends].T
         out[self.ends] = at_first[:, None] + place * (at_second - at_first)[:, None]
         return out
 
     def gap_at_corners(self, gap: np.ndarray) -> np.ndarray:
-        """(n,) m at the corners, of the straight line through the ``gap`` at the springs."""
+        """(n,) gaps at the corners, m: linear extrapolation of the ``gap`` (n,) at the springs."""
         out, (first, second) = gap.copy(), self.place.T
         at_first, at_second = gap[self.ends].T
         slope = (at_second - at_first) / (second - first)
@@ -268,20 +281,21 @@ class FacePoints:
         return out
 
     def better(self, gap: np.ndarray, state: np.ndarray, holds: np.ndarray) -> FacePoints | None:
-        """The faces with the parts that a step has left in contact, ``gap`` (n,) m and ``state`` (n,) of the springs,
-        ``holds`` (n,) bonds that may pull; None where these are the parts taken.
+        """The faces with the parts that are in contact at the end of a step; None where these are the assumed parts.
 
-        A part of which one spring has parted bears no moment, and its gaps tell nothing: the resultant acts beyond the
-        other, so that the part grows that way, or where it ends with the face is halved. None grows by more than its
-        length at either end, for on one that is too short the block turns too far. (A spring may be open and yet not
-        parted: its dashpot lets it go before.)
+        ``gap`` (n,) m and ``state`` (n,) of the springs; ``holds`` (n,) bool: bonds that may carry tension.
+
+        A part with one parted spring carries no moment, and its gaps give no length: the resultant acts beyond the
+        other spring, so that the part grows to that side, or is halved where the face ends there. A part grows by at
+        most its length at either end, because on a part that is too short the block rotates too far. (A spring may be
+        open and not parted: its dashpot releases it earlier.)
         """
         held = holds[self.ends].all(axis=1)
         part = _touching(self.gap_at_corners(gap)[self.ends], held, self.shortest, self.part)
         low, high = self.part.T
         length = high - low
         part = np.clip(part, (low - length)[:, None], (high + length)[:, None])
-        # One that has come over to the other side is sought in both.
+        # A part that has moved to the other side is sought on both.
         over = (part[:, 0] >= high) | (part[:, 1] <= low)
         part[over] = np.stack([np.minimum(part[:, 0], low), np.maximum(part[:, 1], high)], axis=1)[over]
         first, second = ((state[self.ends] != OPEN) | (gap[self.ends] <= 0)).T
@@ -290,7 +304,7 @@ class FacePoints:
         to_low = np.where(low > 0, [np.maximum(low - length, 0.0), high], [low, low + half])
         to_high = np.where(high < 1, [low, np.minimum(high + length, 1.0)], [high - half, high])
         part[lame] = np.where(first, to_low, to_high).T[lame]
-        # Neighbours that turn each other's block go back and forth together for ever: the way is halved at every turn.
+        # Faces that rotate the same block may alternate without end: the step is halved at every reversal.
         way = part - self.part
         stride = np.where((way * self.went).sum(axis=1) < 0, 0.5 * self.stride, self.stride)
         way *= stride[:, None]
@@ -305,8 +319,9 @@ class FacePoints:
 def give_by_bending(owner, across, point, vertices, following, start, modulus, bends):
     """(m, 2): what the block ``owner`` (m,) turns by (rad/(N m)) behind the face across the normal ``across`` (m, 2)
     through ``point`` (m, 2), h / (E' I / 2h) with its second moment I along the face and the distance h from its
-    centroid; and its width along the face, √(12 I / A) (m); 0 for blocks that do not bend. ``vertices`` (n, 2), the next of each ``following`` (n,), those of a block from ``start`` on,
-    its ``modulus`` Pa. (A face that is shorter than the block is wide turns the whole of that width.)"""
+    centroid; and its width along the face, √(12 I / A) (m); 0 for blocks that do not bend. ``vertices`` (n, 2), the
+    next of each ``following`` (n,), those of a block from ``start`` on, its ``modulus`` Pa. (A face that is shorter
+    than the block is wide turns the whole of that width.)"""
     out = np.zeros((owner.shape[0], 2))
     for f in range(owner.shape[0]):
         b = owner[f]
@@ -316,7 +331,7 @@ def give_by_bending(owner, across, point, vertices, following, start, modulus, b
         area = first = second = far = 0.0
         for v in range(start[b], start[b + 1]):
             w = following[v]
-            # Along the face and away from it.
+            # Along the face, and normal to it.
             s = (vertices[v, 1] - point[f, 1]) * nx - (vertices[v, 0] - point[f, 0]) * ny
             d = (vertices[v, 0] - point[f, 0]) * nx + (vertices[v, 1] - point[f, 1]) * ny
             r = (vertices[w, 1] - point[f, 1]) * nx - (vertices[w, 0] - point[f, 0]) * ny
@@ -333,7 +348,7 @@ def give_by_bending(owner, across, point, vertices, following, start, modulus, b
 
 
 def _touching(gap: np.ndarray, held: np.ndarray, shortest: np.ndarray, before: np.ndarray) -> np.ndarray:
-    """(m, 2) the part of each face in contact, by the ``gap`` (m, 2) at its ends; faces that are all open keep that
+    """(m, 2) part of each face in contact, from the ``gap`` (m, 2) at its ends, m; open faces keep the part
     ``before``."""
     first, second = gap.T
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -346,8 +361,8 @@ def _touching(gap: np.ndarray, held: np.ndarray, shortest: np.ndarray, before: n
 
 
 def _left(bare: np.ndarray, pressed: np.ndarray, held: np.ndarray, shortest: np.ndarray) -> np.ndarray:
-    """(m, 2) the part of each face that is left beside what is ``bare`` (m, 2) from its ends on, where something is; the
-    part ``pressed`` (m, 2) of all others."""
+    """(m, 2) the part of each face that is left beside what is ``bare`` (m, 2) from its ends on, where something is;
+    the part ``pressed`` (m, 2) of all others."""
     first, second = bare.T
     some = (first >= 0) & (second >= 0) & (first + second > 0) & (1 - first - second >= shortest * (1 - 1e-9)) & ~held
     return np.where(some[:, None], np.stack([first, 1 - second], axis=1), pressed)

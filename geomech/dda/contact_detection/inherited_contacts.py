@@ -1,8 +1,7 @@
-"""Contacts that begin a step with forces, gaps and slip told from elsewhere: faces that another model has held till
-now.
+"""Contacts that start a step with prescribed forces, gaps and slip, as new faces inherit them from a crack.
 
-A contact's normal force is that of its spring, N = kₙ (lift − gap), so a force at a given geometry is a lift, and a gap
-that the geometry does not show (faces that do not fit each other) a negative one.
+The normal force of a contact is that of its spring, N = kₙ (lift − gap). On a given geometry a prescribed force is
+therefore a lift, and a gap that the geometry does not show (faces that do not fit each other) a negative lift.
 """
 
 from __future__ import annotations
@@ -17,19 +16,19 @@ from ...model import CONTACT, OPEN, SLIP, STICK
 if TYPE_CHECKING:
     from ..open_close.contact_set import ContactSet
 
-#: A shear force nearer to its strength than this part of it is tried as sliding: edges have turned by strains since it
-#: was known.
+#: A contact starts as sliding when its shear force is within this part of its strength: edges have rotated by strains
+#: since the force was computed.
 _AT_STRENGTH = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
 class ToldContacts:
-    """What the contacts ``which`` (k,), rows of a `ContactSet`, begin with.
+    """Initial forces, gaps and slip of the contacts ``which`` (k,), rows of a `ContactSet`.
 
-    normal  (k,) N, positive in compression; 0: open, unless the contact is bonded, which may be pulled
+    normal  (k,) N, positive in compression; 0: open, unless the contact is bonded (which may carry tension)
     shear   (k,) N, along the edge's direction
-    gap     (k,) m, of those that are open
-    slip    (k,) m, sliding so far, along the edge's direction
+    gap     (k,) m, of open contacts
+    slip    (k,) m, accumulated sliding along the edge's direction
     """
 
     which: np.ndarray
@@ -40,9 +39,10 @@ class ToldContacts:
 
 
 def told_rows(found: ContactSet, told: ToldContacts, closure: np.ndarray, on_multiplier: np.ndarray) -> np.ndarray:
-    """CONTACT rows of ``found``, those that are ``told`` of with these forces on the geometry as it is; ``closure``
-    (n_laws,) m that each law tends to (infinite: straight), ``on_multiplier`` (n,) contacts whose normal force no
-    spring keeps."""
+    """CONTACT rows of ``found``, with the forces ``told`` on the current geometry.
+
+    ``closure`` (n_laws,) maximum closure of each law, m (infinite: linear); ``on_multiplier`` (n,) bool: contacts whose
+    normal force is a multiplier, not a spring force."""
     rows = np.zeros(len(found), CONTACT)
     for name in (
         "vertex", "edge", "block", "other", "law", "state", "bonded", "slip", "wear", "lift", "stretch", "inset", "bare",
@@ -56,7 +56,7 @@ def told_rows(found: ContactSet, told: ToldContacts, closure: np.ndarray, on_mul
     closed = (n > 0) | (found.bonded[at] > 0)
     strength = found.springs.peak[at] * n
     slides = closed & (found.bonded[at] == 0) & (np.abs(told.shear) >= (1 - _AT_STRENGTH) * strength)
-    # What slides without friction has no force to tell which way.
+    # A contact that slides without friction has no force that gives its direction.
     slides &= (told.shear != 0) | (strength == 0)
     pressed_in = np.where(on_multiplier[at], 0.0, _closed_by(n, found.springs.normal[at], closure[found.law[at]]))
     rows["state"][at] = np.where(closed, np.where(slides, SLIP, STICK), OPEN)
@@ -73,8 +73,10 @@ def told_rows(found: ContactSet, told: ToldContacts, closure: np.ndarray, on_mul
 def at_their_springs(
     rows: np.ndarray, placed: ContactSet, which: np.ndarray, closure: np.ndarray, on_multiplier: np.ndarray
 ) -> np.ndarray:
-    """The ``rows`` of `told_rows`, those ``which`` are told of in faces whose springs stand inside them (``placed``)
-    with the gaps at which these springs, and not ones at the corners, bear the resultant and the moment told."""
+    """The ``rows`` of `told_rows`, with gaps for faces whose springs stand inside the face (``placed``).
+
+    With these gaps the springs inside the face, not springs at its corners, carry the prescribed resultant and moment
+    of the contacts ``which``."""
     n_vertices = int(max(rows["vertex"].max(), rows["edge"].max(), placed.edge.max())) + 1
     keys, theirs = rows["vertex"] * n_vertices + rows["edge"], placed.vertex * n_vertices + placed.edge
     order = np.argsort(keys)
@@ -82,7 +84,7 @@ def at_their_springs(
     points = placed.points
     told = np.zeros(len(rows), bool)
     told[which] = True
-    # Where only one end is told of, the other keeps the gap that it had.
+    # Where only one end is prescribed, the other keeps its gap.
     ends = points.ends[(told[here[points.ends]] & (rows["state"][here[points.ends]] != OPEN)).all(axis=1)]
     force = points.at_points(rows["normal_force"][here])
     gap = points.gap_at_corners(
@@ -96,6 +98,6 @@ def at_their_springs(
 
 
 def _closed_by(force: np.ndarray, stiffness: np.ndarray, closure: np.ndarray) -> np.ndarray:
-    """(n,) m by which springs of ``stiffness`` N/m are closed under ``force`` N, straight or hyperbolic to
-    ``closure``."""
+    """(n,) closure of springs of ``stiffness`` N/m under ``force`` N, m: linear, or hyperbolic with maximum
+    ``closure`` m."""
     return force / (stiffness + force / closure)

@@ -1,4 +1,4 @@
-"""Blocks that overlap before they have moved: their contacts would throw them apart."""
+"""Initial overlap of blocks: detected and refused, because the contact springs would throw such blocks apart."""
 
 from __future__ import annotations
 
@@ -12,15 +12,15 @@ from .neighbour_search import boxes, near_pairs
 
 log = logging.getLogger(__name__)
 
-#: Blocks that overlap by more than this part of the smaller one's size, √area, are refused …
+#: Overlap over the size √area of the smaller block, above which it is refused,
 REFUSED = 1e-3
-#: … and by more than this part reported: the springs give back what they are pressed in by.
+#: and above which it is reported: the springs release the energy of the overlap.
 REPORTED = 1e-6
 
 
 @part(fastmath=False, error_model="numpy", nogil=True)
 def _depth_inside(x, y, vertices, next_vertex, first, last):
-    """How far (x, y) lies inside the polygon with the edges from ``first`` to ``last``; 0 outside. m."""
+    """Depth of (x, y) inside the polygon with the edges from ``first`` to ``last``, m; 0 outside."""
     winding = 0
     least = np.inf
     for e in range(first, last):
@@ -42,7 +42,7 @@ def _depth_inside(x, y, vertices, next_vertex, first, last):
 
 @part(fastmath=False, error_model="numpy", nogil=True)
 def _depth_crossing(vertices, next_vertex, e, f):
-    """Least distance of the ends of two edges from each other's line where they cross, else 0. m."""
+    """Least distance of the ends of two crossing edges from each other's line, m; 0 where they do not cross."""
     least = np.inf
     for turn in range(2):
         i, j = (e, f) if turn == 0 else (f, e)
@@ -59,19 +59,21 @@ def _depth_crossing(vertices, next_vertex, e, f):
 
 @kept(fastmath=False, error_model="numpy", nogil=True)
 def depth_of_pair(vertices, next_vertex, start, box, centroid, a, b):
-    """How deep the blocks ``a`` and ``b`` overlap, m; 0 if they do not. ``start`` (n_blocks + 1,) their first vertices,
-    ``box`` (n_blocks, 4) least x, y and greatest x, y, ``centroid`` (n_blocks, 2)."""
+    """Depth of the overlap of blocks ``a`` and ``b``, m; 0 without overlap.
+
+    ``start`` (n_blocks + 1,) first vertices; ``box`` (n_blocks, 4) min x, min y, max x, max y, m; ``centroid``
+    (n_blocks, 2) m."""
     if box[a, 0] >= box[b, 2] or box[b, 0] >= box[a, 2] or box[a, 1] >= box[b, 3] or box[b, 1] >= box[a, 3]:
         return 0.0
     depth = 0.0
     for turn in range(2):
         i, j = (a, b) if turn == 0 else (b, a)
-        # Blocks drawn twice have all corners on each other's outline.
+        # Coincident blocks have all corners on each other's outline.
         if _depth_inside(centroid[i, 0], centroid[i, 1], vertices, next_vertex, start[i], start[i + 1]) > 0.0:
             depth = max(
                 depth, _depth_inside(centroid[i, 0], centroid[i, 1], vertices, next_vertex, start[j], start[j + 1])
             )
-        # Corners, and middles of edges: those of blocks shifted along a common side alone lie inside.
+        # Corners and midpoints of edges: of blocks shifted along a common side only midpoints lie inside.
         for v in range(start[i], start[i + 1]):
             for share in (0.0, 0.5):
                 x = vertices[v, 0] + share * (vertices[next_vertex[v], 0] - vertices[v, 0])
@@ -87,8 +89,8 @@ def depth_of_pair(vertices, next_vertex, start, box, centroid, a, b):
 
 @kept(fastmath=False, error_model="numpy", nogil=True)
 def _worst_pair(vertices, next_vertex, start, box, pairs, centroid, size):
-    """(block, other, depth) of the one of the ``pairs`` (k, 2) that overlaps deepest relative to the smaller block's
-    size; (−1, −1, 0) for none."""
+    """(block, other, depth m) of the pair of ``pairs`` (k, 2) with the largest overlap over the smaller block's size;
+    (−1, −1, 0) for none."""
     worst_a, worst_b, worst, worst_share = -1, -1, 0.0, 0.0
     for k in range(len(pairs)):
         a, b = pairs[k]
@@ -100,8 +102,10 @@ def _worst_pair(vertices, next_vertex, start, box, pairs, centroid, size):
 
 
 def deepest_overlap(blocks: Blocks, vertices: np.ndarray, moments: np.ndarray) -> tuple[int, int, float, float]:
-    """The two blocks that overlap most at ``vertices`` (−1, −1 for none), by how much, m, and over the smaller one's
-    size, √area; ``moments`` (n_blocks, ≥ 3) with area and centroid first."""
+    """The pair of blocks with the largest relative overlap: (block, other, depth m, depth over √area of the smaller).
+
+    ``vertices`` (n_vertices, 2) m; ``moments`` (n_blocks, ≥ 3) with area and centroid first. Blocks are −1 without
+    overlap."""
     start = np.ascontiguousarray(blocks.vertex_start, np.int64)
     box = boxes(vertices, start[:-1])
     size = np.sqrt(moments[:, 0])
@@ -113,10 +117,10 @@ def deepest_overlap(blocks: Blocks, vertices: np.ndarray, moments: np.ndarray) -
 
 
 def refuse_overlap(blocks: Blocks, vertices: np.ndarray, moments: np.ndarray) -> None:
-    """Look for blocks that overlap at ``vertices``; ``moments`` as in `deepest_overlap`.
+    """Check for overlapping blocks at ``vertices``; ``moments`` as in `deepest_overlap`.
 
-    Raises ValueError naming the worst two when they overlap by more than `REFUSED` of the smaller one's size; what
-    exceeds `REPORTED` is logged.
+    Raises ValueError that names the worst pair when it overlaps by more than `REFUSED` of the smaller block's size;
+    logs a warning above `REPORTED`.
     """
     a, b, depth, share = deepest_overlap(blocks, vertices, moments)
     if share <= REPORTED:

@@ -1,7 +1,7 @@
-"""Pairs of blocks that may come into contact: found in strips, kept until something has moved far enough.
+"""Neighbour search: pairs of blocks that may come into contact, from strips of bounding boxes, reused while valid.
 
-Pairs are sought within more than the window of the contacts, and serve until a vertex has moved by half of what that is
-more (Verlet 1967). Which pairs are looked at so depends on the past; which contacts they give does not.
+Pairs are sought within the contact window plus a margin, and remain valid until a vertex has moved by half the margin
+(Verlet 1967). Which pairs are examined thus depends on the past; the contacts found do not.
 """
 
 from __future__ import annotations
@@ -13,14 +13,14 @@ import numpy as np
 from ...compiled import kept
 from ..counters import Work
 
-#: Pairs are sought within this many times the window of contacts: wide enough to last some steps of the largest motion
-#: allowed and many of the usual ones, and narrow beside a block.
+#: Reach of the search over the contact window: enough for some steps of the largest allowed motion and many usual ones,
+#: and small relative to a block.
 _REACH = 2.0
 
 
 @kept(fastmath=False, error_model="numpy", nogil=True)
 def _sweep_strips(box, fixed, reach, order, first, last, start, members, pairs):
-    """Number of pairs whose boxes are nearer than ``reach``, written to ``pairs`` as far as it has room.
+    """Number of pairs whose boxes are nearer than ``reach`` m; written to ``pairs`` as far as it has room.
 
     ``first`` and ``last`` are the strips of each block, ``members[start[s]:start[s + 1]]`` the blocks of strip s,
     filled here in the ``order`` of their least x. A pair counts in the lowest strip that both share.
@@ -51,12 +51,13 @@ def _sweep_strips(box, fixed, reach, order, first, last, start, members, pairs):
 
 
 def near_pairs(box: np.ndarray, fixed: np.ndarray, reach: float) -> np.ndarray:
-    """(k, 2) blocks, the lower number first, ascending, whose boxes (n, 4) (least x, y, greatest x, y; m) are nearer
-    than ``reach`` m; none of two ``fixed`` ones."""
+    """(k, 2) pairs of blocks, lower number first, ascending, whose boxes are nearer than ``reach`` m.
+
+    ``box`` (n, 4) min x, min y, max x, max y, m. Pairs of two ``fixed`` (n,) blocks are left out."""
     n = len(box)
     height = 2.0 * float(np.median(box[:, 3] - box[:, 1])) + reach
     low = float(box[:, 1].min())
-    # Strips as high as two blocks; no more of them than blocks, however far apart those lie.
+    # Strips twice as high as a block, and at most as many as blocks, however far apart these lie.
     height = max(height, (float(box[:, 3].max()) - low) / n)
     first = np.floor((box[:, 1] - reach - low) / height).astype(np.int64)
     last = np.floor((box[:, 3] + reach - low) / height).astype(np.int64)
@@ -78,8 +79,9 @@ def near_pairs(box: np.ndarray, fixed: np.ndarray, reach: float) -> np.ndarray:
 
 
 class NearPairs:
-    """Keeps the pairs of one system of blocks: ``vertex_start`` (n_blocks + 1,), ``fixed`` (n_blocks,). ``work`` counts
-    how often they were sought, and were not."""
+    """The neighbour list of one block system: ``vertex_start`` (n_blocks + 1,), ``fixed`` (n_blocks,).
+
+    ``work`` counts searches and reuses."""
 
     def __init__(self, vertex_start: np.ndarray, fixed: np.ndarray, work: Work | None = None) -> None:
         self._first, self._fixed = vertex_start[:-1], fixed
@@ -90,8 +92,8 @@ class NearPairs:
         self.work = work or Work()
 
     def of(self, vertices: np.ndarray, window: float) -> np.ndarray:
-        """All pairs that may be nearer than ``window`` m on ``vertices`` (n_vertices, 2), and some that are not; of one
-        block none is looked for."""
+        """(k, 2) all pairs nearer than ``window`` m at ``vertices`` (n_vertices, 2), and some others; none for a single
+        block."""
         if len(self._first) < 2:
             self.work.lone_searches += 1
             return np.zeros((0, 2), np.int64)
@@ -107,8 +109,10 @@ class NearPairs:
         return self._pairs
 
     def of_boxes(self, box: np.ndarray, more: np.ndarray) -> np.ndarray:
-        """All pairs whose boxes ``box`` (n_blocks, 4) meet, and some others: those that did when pairs were last sought,
-        with boxes wider by ``more`` (n_blocks,) m than they were then, as long as these hold the present ones."""
+        """(k, 2) all pairs whose boxes ``box`` (n_blocks, 4) meet, and some others.
+
+        Boxes are widened by ``more`` (n_blocks,) m when pairs are sought, and the pairs remain valid while the widened
+        boxes contain the current ones."""
         if len(self._first) < 2:
             self.work.lone_searches += 1
             return np.zeros((0, 2), np.int64)
@@ -125,13 +129,13 @@ class NearPairs:
 
 
 def boxes(vertices: np.ndarray, first: np.ndarray) -> np.ndarray:
-    """(n_blocks, 4) least x, y and greatest x, y of the blocks whose vertices begin at ``first``."""
+    """(n_blocks, 4) min x, min y, max x, max y of the blocks whose vertices begin at ``first``, m."""
     return _boxes(np.ascontiguousarray(vertices), np.ascontiguousarray(first, np.int64))
 
 
 @kept(fastmath=False, error_model="numpy", nogil=True)
 def _boxes(vertices, first):
-    """`boxes`, a tenth of the time of ufuncs that reduce at ``first``."""
+    """Compiled `boxes`: takes a tenth of the time of NumPy's reduceat."""
     n = first.shape[0]
     out = np.empty((n, 4))
     for b in range(n):
@@ -148,7 +152,7 @@ def _boxes(vertices, first):
 
 @kept(fastmath=False, error_model="numpy", nogil=True)
 def _hold(wide, box):
-    """Whether each of the boxes ``wide`` (n, 4) holds the one of ``box``."""
+    """True if each of the boxes ``wide`` (n, 4) contains that of ``box`` (n, 4)."""
     for b in range(box.shape[0]):
         if box[b, 0] < wide[b, 0] or box[b, 1] < wide[b, 1] or box[b, 2] > wide[b, 2] or box[b, 3] > wide[b, 3]:
             return False

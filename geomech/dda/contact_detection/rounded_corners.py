@@ -1,20 +1,19 @@
-"""Where two rounded corners meet: one contact with one normal for a pair of convex corners.
+"""Contact of two rounded corners: one contact point with one normal for a pair of convex corners.
 
-The corner v of one block touches the corner w of another where x = v − w lies in a wedge that two entrance lines with
-the normals n₁ and n₂ bound, {x·n₁ < 0 and x·n₂ < 0} (Shi 1988). A sharp wedge leaves open which of its lines holds two
-corners that overlap by micrometres: blocks that have settled by as little differently would hang on each other. Rounded
-by a circle that touches both lines at the rounding length ρ from its tip (radius R = ρ / tan(φ/2), φ the angle between
-n₁ and n₂; Itasca's UDEC rounds the corners of blocks so), the wedge has one outward normal everywhere, and that changes
-gradually:
+The corner v of one block touches the corner w of another where x = v − w lies in the wedge {x·n₁ < 0 and x·n₂ < 0}
+between two entrance lines with normals n₁ and n₂ (Shi 1988). In a sharp wedge it is undecided which line holds two
+corners that overlap by micrometres: blocks that have settled differently by as little would lock. Here the wedge is
+rounded by a circle that touches both lines at the rounding length ρ from its tip (radius R = ρ / tan(φ/2), φ the angle
+between n₁ and n₂; the UDEC code rounds block corners likewise). It then has one outward normal everywhere, which varies
+continuously:
 
     G(x) = |x − c| − R  where x − c lies between n₁ and n₂,  c = −R (n₁ + n₂) / (1 + cos φ);  else  x·n₁ or x·n₂.
 
-Corners that overlap by less than ρ in the one direction so slide over each other by a ramp, the lower the less they
-overlap; what overlaps by more than ρ is held by the side that was drawn.
+Corners that overlap by less than ρ slide over each other along a ramp, the lower the less they overlap. Larger overlaps
+are held by the side as drawn.
 
-The contact of a step acts along the normal at the place where x first comes to G = 0 on the path that the blocks'
-velocities foresee, or where it comes nearest. G is convex: the half-plane with that normal contains all of the rounded
-wedge, and nothing passes into it.
+The contact of a step has the normal at the point where x first reaches G = 0 on its extrapolated path, or comes nearest
+to it. G is convex: the half-plane with that normal contains the rounded wedge, so that nothing enters it.
 """
 
 from __future__ import annotations
@@ -23,25 +22,26 @@ import numpy as np
 
 from ...compiled import part
 
-#: A normal nearer to that of one line than this angle (cosine; 0.2 rad) is taken for it: a ramp as shallow has less than
-#: a fiftieth of the rounding length in height, and the step that it smooths is none of the drawing's.
+#: A normal within this angle (cosine; 0.2 rad) of that of one line is replaced by it: so shallow a ramp is lower than a
+#: fiftieth of the rounding length, and no step that was drawn.
 _ON_LINE = 0.98
-#: … which is this part of the rounding length, 1 − cos 0.2.
+#: Height of that ramp over the rounding length, 1 − cos 0.2.
 EASED = 0.02
-#: The rounding length is at least this many times as long as the faces of the two blocks are pressed in: a block on soft
-#: joints sinks in before it slides, and does not hang on the next one for it.
+#: Least rounding length over the penetration of the two blocks' faces: a block on soft joints penetrates before it
+#: slides, and must not lock on the next one.
 _PRESSED = 4.0
 
 
 @part(fastmath=False, error_model="numpy", nogil=True)
 def rounding_length(rounding, longest, pressed):
-    """m: of two corners with these lengths, at most the ``longest`` (m), of blocks that are ``pressed`` in so far (m)."""
+    """Common rounding length of two corners, m: of their lengths ``rounding``, at most ``longest``, for blocks with the
+    penetrations ``pressed``, all m."""
     return min(longest, max(rounding, _PRESSED * pressed))
 
 
 @part(fastmath=False, error_model="numpy", nogil=True)
 def _nearest(x, y, nx1, ny1, nx2, ny2, gap1, gap2, radius, cx, cy, way):
-    """G and its gradient at (x, y), and which line it is that of: 1, 2, or 0 for the arc."""
+    """G and its gradient at (x, y), and the line it belongs to: 1, 2, or 0 for the arc."""
     zx, zy = x - cx, y - cy
     past_first, past_second = way * (nx1 * zy - ny1 * zx), way * (zx * ny2 - zy * nx2)
     if past_first >= 0.0 and past_second >= 0.0:
@@ -55,10 +55,11 @@ def _nearest(x, y, nx1, ny1, nx2, ny2, gap1, gap2, radius, cx, cy, way):
 
 @part(fastmath=False, error_model="numpy", nogil=True)
 def meeting(x, y, dx, dy, nx1, ny1, gap1, nx2, ny2, gap2, length):
-    """Along which normal corners at x = (``x``, ``y``) m meet that move by (``dx``, ``dy``) m in a step.
+    """Contact normal and gap of two corners at x = (``x``, ``y``) m with the relative motion (``dx``, ``dy``) m in a
+    step.
 
     ``nx1`` … ``gap2``: unit normals of the two lines and x's distance from them; ``length``: the rounding length, m.
-    Returns the normal, the gap along it, m, and the line whose normal it is (1, 2, or 0 for none).
+    Returns the normal, the gap along it, m, and the line whose normal it is (1, 2, or 0 for neither).
     """
     cosine, sine = nx1 * nx2 + ny1 * ny2, nx1 * ny2 - ny1 * nx2
     way = 1.0 if sine >= 0.0 else -1.0
@@ -98,10 +99,7 @@ def meeting(x, y, dx, dy, nx1, ny1, gap1, nx2, ny2, gap2, length):
                 x + t * dx, y + t * dy, nx1, ny1, nx2, ny2, gap1 + t * rate1, gap2 + t * rate2, radius, cx, cy, way
             )
             # Of places in the wedge the first, before them all others the nearest.
-            if near <= tiny:
-                earlier = least > tiny or t < first
-            else:
-                earlier = near < least
+            earlier = (least > tiny or t < first) if near <= tiny else near < least
             if earlier:
                 least, first, mx, my, line = near, t, px, py, on
         gap = zx * mx + zy * my - radius

@@ -1,11 +1,12 @@
-"""Nodes inside a common face that are no corners: they bear nothing, the ends of the face do.
+"""T-junctions: contacts of flat vertices inside a common face, whose stiffness goes to the contacts at its ends.
 
-Where joints meet a block's side from beyond, cutting leaves nodes in it. Blocks of one strain keep their sides straight,
-so that a face presses as its two ends tell, wherever nodes lie between them. At first they lie at the corners of other
-blocks; when these slide, a corner goes on and the node stays behind, in the face. Contacts of both would bear its springs
-by their lengths: the node all of it before they part and next to nothing after, with a force that stretches what stiffness
-is left, while the corner comes to be pressed in at once. (A wall's node so brought half of the energy turned over from
-nowhere.) Stiffness times length alone makes this so: springs of contacts whose law has none are as stiff on any length.
+Where a joint ends on a block's side, cutting leaves a flat vertex in it. First-order blocks keep their sides straight,
+so that the two ends of a face determine its pressure, wherever vertices lie between them. At first such a vertex
+coincides with the corner of another block. When the blocks slide, the corner moves on and the vertex stays behind in
+the face. If contacts of both shared the stiffness by tributary length, the vertex would have all of it before and
+almost none after, with a force that stretches the remaining spring, while the corner would be pressed in suddenly. (In
+a wall one such vertex created half of the energy turned over.) This concerns stiffness per area times length alone:
+penalty springs do not depend on the length.
 """
 
 from __future__ import annotations
@@ -20,11 +21,11 @@ from ..joint_laws.bonds import ALIGNED, OFF_LINE, WITHOUT_GAPS
 
 
 class NodesInFaces(NamedTuple):
-    """Contacts (k,) of a table that nodes inside faces have.
+    """Contacts (k,) of flat vertices inside faces.
 
     node        (k,)    rows of the table
-    neighbours  (k, 2)  rows of the contacts on either side that bear in their place
-    share       (k, 2)  of what they bear: the lever's
+    neighbours  (k, 2)  rows of the contacts on either side, which take their stiffness
+    share       (k, 2)  of the stiffness that each neighbour takes, by the lever rule
     """
 
     node: np.ndarray
@@ -32,13 +33,15 @@ class NodesInFaces(NamedTuple):
     share: np.ndarray
 
     def left(self, borne: np.ndarray) -> np.ndarray:
-        """(n,) of contacts: what is ``borne`` (n,), tributary lengths or forces, with what the nodes have left to their
+        """(n,) ``borne`` (n,), tributary lengths or forces of all contacts, with the nodes' share moved to their
         neighbours."""
         return _left(borne, self.node, self.neighbours, self.share)
 
     def heirs(self, parent: np.ndarray, state: np.ndarray) -> np.ndarray:
-        """(n,) rows of the last step that contacts go on from: ``parent`` (n,), −1 for new ones, and where these come
-        beside a node whose contact was closed, or were open themselves, that one; ``state`` is of the last step's rows."""
+        """(n,) rows of the last step that contacts continue: ``parent`` (n,), −1 for new ones.
+
+        A contact that is new, or was open, next to a node whose contact was closed continues that one. ``state``: of
+        the last step's rows."""
         return _heirs(parent, state, self.node, self.neighbours)
 
 
@@ -46,7 +49,7 @@ class NodesInFaces(NamedTuple):
 def _left(borne, node, neighbours, share):
     out = borne.copy()
     for k in range(node.shape[0]):
-        # In this order: where another node lies between, it hands on what has been left to it.
+        # In this order: a node between passes on what it has received.
         for side in range(2):
             out[neighbours[k, side]] += share[k, side] * out[node[k]]
         out[node[k]] = 0.0
@@ -75,9 +78,10 @@ def nodes_in_faces(
     law: np.ndarray,
     by_length: np.ndarray,
 ) -> NodesInFaces | None:
-    """Those among contacts (n,), pair of blocks by pair, of ``vertex`` and ``edge``; ``owner`` and ``flat`` (n_vertices,)
-    (`Blocks.in_side`), ``geometry`` (n, 7) and ``law`` as in `ContactSet`, ``by_length`` (n,) contacts whose springs go by their
-    lengths. None without any."""
+    """T-junctions among contacts (n,) of ``vertex`` and ``edge``, ordered by pairs of blocks; None without any.
+
+    ``owner`` and ``flat`` (n_vertices,): block, and `Blocks.in_side`; ``geometry`` (n, 7) and ``law`` (n,) as in
+    `ContactSet`; ``by_length`` (n,) bool: contacts whose stiffness is proportional to their length."""
     mine = flat[vertex] & by_length & (geometry[:, 4] > 0)
     if not mine.any():
         return None
@@ -122,7 +126,7 @@ def _between(mine, vertex, edge, owner, geometry, law):
                 before, low = along, q
             elif along > 0.0 and along < after:
                 after, high = along, q
-        # A node's length is half the way between its neighbours: otherwise the face has a gap.
+        # A node's tributary length is half the distance between its neighbours; otherwise the face has a gap.
         if low < 0 or high < 0 or abs(length[r] - 0.5 * (after - before)) > WITHOUT_GAPS * (after - before):
             continue
         out[r] = True

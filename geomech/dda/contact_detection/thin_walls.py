@@ -1,14 +1,14 @@
-"""Contacts of a vertex with an edge from whose outside it cannot have come: those of the far side of a thin wall.
+"""Thin walls: rejects contacts of a vertex with the far side of a thin part of a block, −gap > T/2.
 
-The line of an edge has the whole half-plane behind it on its inner side, of which the block is only the nearest part. A
-vertex behind the line by the gap g < 0 presses on the edge where it is in the block by |g|; where it lies beyond the
-middle of the wall, of the thickness T below its foot on the edge,
+Behind the line of an edge lies a whole half-plane, of which the block is only the nearest part. A vertex at the gap g <
+0 penetrates the edge by |g| if it lies in the block. Where it lies beyond half the wall's thickness T, measured below
+its foot on the edge,
 
     −g > T / 2,
 
-it has come to the other side of the wall, or lies outside beyond that: of a corner's two faces it touches the one that
-it is before. (Two corners that meet have one contact, see `rounded_corners`.) A contact that was closed before, or begins to
-press behind its line (as the faces of a crack do that was open when it cut its block), is what it was.
+it has come through the other side, or lies outside beyond it. Of the two faces of a corner it touches the one that it
+is in front of. (Two corners that meet have one contact, see `rounded_corners`.) A contact that was closed before, or
+that starts behind its line, as on the faces of an open crack that splits its block, is accepted.
 """
 
 from __future__ import annotations
@@ -17,16 +17,18 @@ import numpy as np
 
 from ...compiled import kept, part
 
-#: A vertex is behind an edge by more than this part of the edge's length, or touches it.
+#: A vertex touches an edge, rather than lies behind it, within this part of the edge's length.
 _BEHIND = 1e-9
-#: What a wall is measured from is no part of its far side: nearer than this part of the depth there is none.
+#: The far side of a wall is farther than this part of the depth: nearer hits are the near side itself.
 _START = 1e-6
 
 
 @part(fastmath=False, error_model="numpy", nogil=True)
 def _thickness(vertices, next_vertex, edge, first, last, x, y, nx, ny, least):
-    """Of the block with the vertices from ``first`` to ``last``: how far it goes on from (x, y) on its ``edge`` against
-    the outward normal (nx, ny), by more than ``least`` m, and the edge where it ends."""
+    """Thickness of a block below the point (x, y) on its ``edge``, against the outward normal (nx, ny), m, and the edge
+    where it ends.
+
+    The block has the vertices from ``first`` to ``last``; hits nearer than ``least`` m are ignored."""
     thick, far = np.inf, -1
     for e in range(first, last):
         if e == edge:
@@ -49,7 +51,7 @@ def _thickness(vertices, next_vertex, edge, first, last, x, y, nx, ny, least):
 
 @part(fastmath=False, error_model="numpy", nogil=True)
 def _convex(vertices, next_vertex, previous_vertex, i):
-    """Whether the outline turns outwards at vertex ``i``, or not at all."""
+    """True if the corner at vertex ``i`` is convex or flat."""
     k, j = previous_vertex[i], next_vertex[i]
     ax, ay = vertices[i, 0] - vertices[k, 0], vertices[i, 1] - vertices[k, 1]
     bx, by = vertices[j, 0] - vertices[i, 0], vertices[j, 1] - vertices[i, 1]
@@ -58,10 +60,12 @@ def _convex(vertices, next_vertex, previous_vertex, i):
 
 @kept(fastmath=False, error_model="numpy", nogil=True)
 def from_outside(vertex, edge, gap, vertices, next_vertex, previous_vertex, start, owner, known, shallow):
-    """(n,) False for contacts of ``vertex`` with ``edge`` (n,) whose vertex is on the far side of the edge's block;
-    ``gap`` (n,) m, ``start`` (n_blocks + 1,) first vertices, ``owner`` (n_vertices,) blocks; ``known`` (n,)
-    are those that came from outside before. Of corners that meet both faces are kept, unless
-    the vertex lies before one and deeper than ``shallow`` (n,) m behind the other; −1 for what is no corner."""
+    """(n,) bool: False for contacts of ``vertex`` (n,) with ``edge`` (n,) whose vertex is on the far side of a thin
+    wall.
+
+    ``gap`` (n,) m; ``start`` (n_blocks + 1,) first vertices; ``owner`` (n_vertices,) blocks; ``known`` (n,) bool:
+    contacts that came from outside before; ``shallow`` (n,) m, −1 where no corners meet. Of corners that meet both
+    faces are kept, unless the vertex lies in front of one and deeper than ``shallow`` behind the other."""
     keep = np.ones(vertex.shape[0], np.bool_)
     for c in range(vertex.shape[0]):
         v, e = vertex[c], edge[c]
@@ -72,7 +76,7 @@ def from_outside(vertex, edge, gap, vertices, next_vertex, previous_vertex, star
             continue
         nx, ny = dy / length, -dx / length
         t = ((vertices[v, 0] - vertices[e, 0]) * dx + (vertices[v, 1] - vertices[e, 1]) * dy) / (length * length)
-        # Beyond a corner that points outwards the line stands for that: what lies behind it there is not this block.
+        # Beyond a convex corner the line stands for the corner: behind it there is not this block.
         if t <= 0.0 and _convex(vertices, next_vertex, previous_vertex, e):
             continue
         if t >= 1.0 and _convex(vertices, next_vertex, previous_vertex, f):
@@ -81,7 +85,7 @@ def from_outside(vertex, edge, gap, vertices, next_vertex, previous_vertex, star
         past = t <= 0.0 or t >= 1.0
         depth = -gap[c]
         if past:
-            # In a re-entrant corner it is in the block by both of its faces: as deep as it is from the corner.
+            # In a re-entrant corner it penetrates both faces: its depth is the distance from the corner.
             end = e if t <= 0.0 else f
             x, y = vertices[end, 0], vertices[end, 1]
             nx, ny = x - vertices[v, 0], y - vertices[v, 1]

@@ -1,4 +1,4 @@
-"""Unknowns that stay zero: those of guided platens, and the rigid motion of a lone block under loads in balance."""
+"""Constraints: unknowns fixed at zero, of guided platens, and of the rigid motion of a lone block in equilibrium."""
 
 from __future__ import annotations
 
@@ -6,17 +6,17 @@ import numpy as np
 
 from ...compiled import kept
 
-#: Loads on a lone block whose resultant is below this part of their size are in balance: it strains by less, and loads
-#: that balance on the undeformed block miss by about its strain on the deformed one.
+#: Loads on a lone block balance when their resultant, over the sum of their sizes, is below this. Loads that balance on
+#: the undeformed block are out of balance by about its strain on the deformed one, which is less.
 _BALANCE = 1e-2
 
 
 def balanced(load: np.ndarray, points: np.ndarray, edges: np.ndarray, weight: np.ndarray, moments: np.ndarray) -> bool:
-    """Whether a lone block's loads are in balance: generalised ``load`` (6,), POINT_FORCE and EDGE_FORCE rows,
-    ``weight`` (2,) N, a row of `block_moments`.
+    """True if the loads of a lone block are in equilibrium.
 
-    Such a block has no support, and pressed by forces that keep their direction it is not even stable: in statics its
-    rigid motion, which carries no force, is held.
+    ``load`` (6,) generalised, N and N m; ``points``, ``edges`` POINT_FORCE and EDGE_FORCE rows; ``weight`` (2,) N;
+    ``moments`` a row of `block_moments`. Such a block has no support, and under compression by forces of fixed
+    direction it is unstable. In statics its rigid motion, which carries no force, is therefore constrained.
     """
     size = sum(float(np.abs(rows["force"]).sum()) for rows in (points, edges))
     total = np.abs(load[:3] / [1.0, 1.0, np.sqrt(moments[0])])
@@ -24,7 +24,7 @@ def balanced(load: np.ndarray, points: np.ndarray, edges: np.ndarray, weight: np
 
 
 def with_rigid_motion(held: np.ndarray | None) -> np.ndarray:
-    """(1, 6) what is ``held`` of a lone block, and its rigid motion."""
+    """(1, 6) bool: the constrained unknowns ``held`` of a lone block, and its rigid motion."""
     out = np.zeros((1, 6), bool) if held is None else held.copy()
     out[0, :3] = True
     return out
@@ -32,7 +32,8 @@ def with_rigid_motion(held: np.ndarray | None) -> np.ndarray:
 
 @kept(fastmath=False, error_model="numpy", nogil=True)
 def hold(held, matrix, right, vectors, block, other, order):
-    """Take the unknowns ``held`` (n_blocks, 6) out of the equations, in place: their rows say that they are zero.
+    """Constrain the unknowns ``held`` (n_blocks, 6) bool to zero, in place: their rows and columns
+    become diagonal.
 
     ``matrix`` (n, 6, 6) and ``right`` (n, 6) as in `assembly`; ``vectors`` (n_contacts, 2, 12) of the contacts between
     ``block`` and ``other``; ``order`` (n_blocks,) the row of each block, −1 if fixed.

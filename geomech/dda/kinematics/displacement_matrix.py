@@ -1,4 +1,4 @@
-"""First-order displacement of a block: its unknowns, and points that follow them."""
+"""Displacement matrix T of a first-order block: u(x) = T(x − x₀) (u0, v0, r0, εx, εy, γxy) (Shi 1988)."""
 
 from __future__ import annotations
 
@@ -21,9 +21,10 @@ def displacement_matrix(points: np.ndarray, centroid: np.ndarray) -> np.ndarray:
 
 
 def material_weights(loop_vertices: np.ndarray, point: np.ndarray) -> np.ndarray:
-    """(n,) weights w with Σw = 1 and Σ wᵢ xᵢ = ``point``: the point then follows the block's affine motion exactly.
+    """(n,) weights w with Σ wᵢ = 1 and Σ wᵢ xᵢ = ``point``, for the vertices xᵢ (n, 2) of a block.
 
-    The weights of least norm, so that round-off of single vertices is averaged rather than amplified.
+    The weighted vertices follow the block's affine motion exactly. The weights have least norm, so that round-off of
+    single vertices is averaged, not amplified.
     """
     origin = loop_vertices.mean(axis=0)
     size = np.ptp(loop_vertices, axis=0).max()

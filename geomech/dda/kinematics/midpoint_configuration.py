@@ -1,20 +1,21 @@
-"""Where blocks are when the forces of a step act on them: in the middle of it.
+"""Midpoint configuration: the geometry on which the forces of a time step act.
 
 A step from x₀ to x₁ has the displacement d = ½ (v₀ + v₁) dt, so that v₁² − v₀² is twice the work of the mean
-acceleration on it. Forces that keep the arms and directions of the step's start do another work than that: turned by r
-in the step they miss r/2 of it, an error of first order in dt that stays. With the mean of both ends' arms,
+acceleration over d. Forces with the lever arms and directions of the start of the step do another work: after a
+rotation r in the step their direction is wrong by r/2, an error of first order in dt that accumulates. With the mean of
+both ends,
 
     x_m = ½ (x₀ + x₁),    n_m = R(r/2) n₀,    Δ(n·w) = n_m·Δw + Δn·w_m + O(r³),
 
-the motion that forces work on is that of the arc, up to the third order in r, and the angular momentum that two blocks
-pass to each other is the same about any point, Σ (c_m + x_m) × F = 0 (discrete gradients: Simo, Tarnow & Wong 1992;
-Gonzalez 2000). Where the step is to lead is taken from the velocity it begins with, which is right to the second order,
-and once more from its own motion where that went elsewhere (impacts).
+the motion that forces work on is the circular arc up to O(r³), and two blocks exchange the same angular momentum about
+any point, Σ (c_m + x_m) × F = 0 (discrete gradients: Simo, Tarnow & Wong 1992; Gonzalez 2000). The end of the step is
+predicted from its initial velocity, to second order, and corrected once from the computed motion where they differ
+(impacts).
 
-The α-scheme, whose forces are those of the end of a step, takes the end's geometry so; motion from there is that of the
-arc but for the second order in r, which is known as well as the geometry is (`ContactSet.arc`). Statics carry no
-velocity, and their forces act where the step begins. Strains, stress and inertia of blocks stay on the axes of the
-step's start throughout; generalised forces are turned back to these.
+The α-scheme has its forces at the end of the step and uses the geometry there. Motion from there agrees with the arc
+except for a known term of second order in r (`ContactSet.arc`). Static steps carry no velocity; their forces act on the
+geometry of the start. Strain, stress and inertia of blocks stay on the axes of the start of the step, to which
+generalised forces are rotated back.
 """
 
 from __future__ import annotations
@@ -29,8 +30,9 @@ from .displacement_matrix import displacement_matrix
 
 @kept(fastmath=False, error_model="numpy", nogil=True)
 def _affine(increment, part):
-    """(n_blocks, 6): displacement of the centroid and gradient, row by row, of ``part`` of the motion that `advance`
-    makes of ``increment`` (n_blocks, 6)."""
+    """(n_blocks, 6): centroid displacement (m) and displacement gradient, row by row, of ``part`` of a step's motion.
+
+    The motion is the one that `advance` makes of ``increment`` (n_blocks, 6)."""
     out = np.empty((increment.shape[0], 6))
     for b in range(increment.shape[0]):
         c, s, h = np.cos(increment[b, 2]), np.sin(increment[b, 2]), np.sin(0.5 * increment[b, 2])
@@ -43,7 +45,8 @@ def _affine(increment, part):
 
 
 def affine_motion(increment: np.ndarray) -> np.ndarray:
-    """(n_blocks, 6) displacement of each centroid and its gradient, row by row, that `advance` makes of ``increment``."""
+    """(n_blocks, 6) centroid displacement (m) and displacement gradient, row by row, of the motion that `advance` makes
+    of ``increment`` (n_blocks, 6)."""
     return _affine(increment, 1.0)
 
 
@@ -85,8 +88,10 @@ def _contacts(geometry, block, other, affine, centroid, turn, edge):
 
 @part(fastmath=False, error_model="numpy", nogil=True)
 def _to_start(xx, yy, xy, moment, affine, turn):
-    """What forces F at arms x, Σ x ⊗ F with this symmetric part and ``moment``, do to strains on the axes of the start:
-    the symmetric part of G⁻¹ (Σ x ⊗ F) R, arms and forces as the block's own, unturned and unstrained, has them."""
+    """Generalised strain forces on the axes of the start: the symmetric part of G⁻¹ (Σ x ⊗ F) R.
+
+    Σ x ⊗ F of forces F at arms x is given by its symmetric part and its ``moment``; G is the block's deformation
+    gradient, R its rotation."""
     c, s = np.cos(turn), np.sin(turn)
     up, low = xy + 0.5 * moment, xy - 0.5 * moment
     a, b, d, e = c * xx + s * up, c * up - s * xx, c * low + s * yy, c * yy - s * low
@@ -97,7 +102,7 @@ def _to_start(xx, yy, xy, moment, affine, turn):
 
 @kept(fastmath=False, error_model="numpy", nogil=True)
 def _strains_back(vectors, block, other, geometry, size, affine, turn):
-    """As `Middle.turn_back`; ``size`` (n_blocks,) m is √area."""
+    """As `Middle.turn_back`; ``size`` (n_blocks,) is √area, m."""
     for k in range(vectors.shape[0]):
         for side in range(2):
             b = block[k] if side == 0 else other[k]
@@ -115,7 +120,7 @@ def _strains_back(vectors, block, other, geometry, size, affine, turn):
 
 @kept(fastmath=False, error_model="numpy", nogil=True)
 def _rows_back(rows, owner, affine, turn):
-    """Bring the strain columns of ``rows`` (n, 6) of the blocks ``owner`` (n,) to the start, in place."""
+    """Rotate the strain columns of ``rows`` (n, 6) of the blocks ``owner`` (n,) to the axes of the start, in place."""
     for k in range(rows.shape[0]):
         b, v = owner[k], rows[k]
         v[3], v[4], v[5] = _to_start(v[3], v[4], v[5], v[2], affine[b], turn[b])
@@ -123,11 +128,11 @@ def _rows_back(rows, owner, affine, turn):
 
 @dataclass(frozen=True, eq=False)
 class Middle:
-    """The geometry on which the forces of a step act.
+    """The configuration on which the forces of a step act.
 
     vertices  (n_vertices, 2)  m
-    moments   (n_blocks, 6)    those of the step's start about centroids where they are now
-    turn      (n_blocks,)      rad since the start; None where this is the start itself
+    moments   (n_blocks, 6)    `block_moments` of the start of the step, with the centroids of this configuration
+    turn      (n_blocks,)      rotation since the start, rad; None: this is the configuration of the start
     """
 
     vertices: np.ndarray
@@ -140,8 +145,9 @@ class Middle:
     def of(
         cls, increment: np.ndarray | None, part: float, vertices: np.ndarray, owner: np.ndarray, moments: np.ndarray
     ) -> Middle:
-        """``part`` of the way of ``increment`` (n_blocks, 6) from ``vertices``, whose blocks are ``owner``
-        (n_vertices,) and have these ``moments``; None: the start."""
+        """The configuration after ``part`` (0 to 1) of ``increment`` (n_blocks, 6; None: the start).
+
+        ``vertices`` (n_vertices, 2) m and ``moments`` (n_blocks, 6) of the start; ``owner`` (n_vertices,) block."""
         if increment is None:
             return cls(vertices, moments)
         affine, start = _affine(increment, part), np.ascontiguousarray(moments[:, 1:3])
@@ -151,28 +157,31 @@ class Middle:
 
     @property
     def centroid(self) -> np.ndarray:
-        """(n_blocks, 2) m."""
+        """(n_blocks, 2) centroids, m."""
         return np.ascontiguousarray(self.moments[:, 1:3])
 
     def points(self, points: np.ndarray, owner: np.ndarray) -> np.ndarray:
-        """(n, 2) where material ``points`` (n, 2) of the blocks ``owner`` (n,) are, given where they were."""
+        """(n, 2) current position of material ``points`` (n, 2) of the blocks ``owner`` (n,), from that at the start,
+        m."""
         return points if self.turn is None else _moved(np.ascontiguousarray(points), owner, self.affine, self.start)
 
     def contacts(self, geometry: np.ndarray, block: np.ndarray, other: np.ndarray, along: np.ndarray) -> np.ndarray:
-        """(n, 7) of contacts, from their ``geometry`` at the start (as in `ContactSet`): the point goes with ``block``
-        (n,), the normal turns with ``other`` (n,), whose edges are ``along`` (n, 2) m."""
+        """(n, 7) geometry of contacts here, from their ``geometry`` (n, 7) at the start (as in `ContactSet`).
+
+        The point moves with ``block`` (n,), the normal rotates with ``other`` (n,), whose edges are ``along`` (n, 2)
+        m."""
         if self.turn is None:
             return geometry
         return _contacts(geometry, block, other, self.affine, self.start, self.turn, along)
 
     def turn_back(self, vectors: np.ndarray, block: np.ndarray, other: np.ndarray, geometry: np.ndarray) -> None:
-        """Bring `contact_vectors` (n, 2, 12) made of this ``geometry`` (n, 7) to the axes of strain, in place."""
+        """Rotate `contact_vectors` (n, 2, 12) of this ``geometry`` (n, 7) to the strain axes of the start, in place."""
         if self.turn is not None:
             size = np.sqrt(self.moments[:, 0])
             _strains_back(vectors, block, other, geometry, size, self.affine, self.turn)
 
     def loads_back(self, load: np.ndarray) -> np.ndarray:
-        """(n_blocks, 6) generalised forces ``load`` on this geometry, on the axes of strain."""
+        """(n_blocks, 6) generalised forces ``load`` on this configuration, on the strain axes of the start."""
         if self.turn is None or not load[:, 2:].any():
             return load
         out = load.copy()
@@ -180,8 +189,8 @@ class Middle:
         return out
 
     def displacement(self, points: np.ndarray, owner: np.ndarray | int) -> np.ndarray:
-        """T (..., 2, 6), as `displacement_matrix` gives it, of points (..., 2) on this geometry, which follow the
-        blocks ``owner`` (...), for strains on the axes of the start."""
+        """Displacement matrix T (..., 2, 6) at points (..., 2) of this configuration, for strains on the axes of the
+        start; ``owner`` (...) are the points' blocks."""
         matrix = displacement_matrix(points, self.moments[owner, 1:3])
         if self.turn is not None:
             each = np.repeat(np.ravel(owner), 2)

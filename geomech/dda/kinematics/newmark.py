@@ -1,32 +1,32 @@
-"""Time integration of the blocks' own motion: Newmark's family of schemes, damping, and the state after a step.
+"""Time integration of block motion: Newmark's schemes, the α-scheme, damping, and the state after a step.
 
-All forces, contacts included, act over a step with the weight θ = 2β at its end and 1 − θ at its start, and the unknown
-d is the displacement over the step (Newmark 1959, with d = v dt + ā dt²/2 and ā = (1−θ) a₀ + θ a₁):
+All forces, contact forces included, act over a step with the weight θ = 2β at its end and 1 − θ at its start. The
+unknown d is the displacement over the step (Newmark 1959, with d = v dt + ā dt²/2 and ā = (1−θ) a₀ + θ a₁):
 
     2M/dt² d = 2M v/dt + F(t₀ + θ dt) − A σ₀ − θ A (σ₁ − σ₀) − D d/dt + contacts
     v₁ = 2 d/dt − v₀ + κ dt (a₀ − ā),   κ = (θ − γ)/θ,   a₁ = (ā − (1−θ) a₀)/θ
 
-β = ½, γ = 1 is Shi's (1988) scheme, β = ¼, γ = ½ the trapezoidal rule. Where γ = 2β, between the two, no acceleration
-has to be kept, and the energy of a step with constant loads changes by −(θ−½) dᵀK d − dᵀD d/dt exactly (K: all linear
-springs, blocks' own included): it never grows. A contact counts at the start of a step only if it was closed there, and
-not at all if its weighted force would pull; met or left within a step it loses energy besides, after the idea of Kane,
-Repetto, Ortiz & Marsden (1999), that what comes and goes must act implicitly.
+β = ½, γ = 1 is Shi's (1988) scheme; β = ¼, γ = ½ is the trapezoidal rule. For γ = 2β, between the two, no acceleration
+is stored, and the energy of a step under constant loads changes by −(θ−½) dᵀK d − dᵀD d/dt exactly (K: all linear
+springs and the blocks' own stiffness): it never grows. A contact counts at the start of a step only if it was closed
+there, and not at all if its weighted force would be tensile. A contact that closes or opens within a step dissipates
+energy besides, after the idea of Kane, Repetto, Ortiz & Marsden (1999) that contact forces must act implicitly.
 
-With 2β > γ an acceleration is kept. What it remembers of a contact that has come, gone, or is stiffer than the step
-resolves tells of another force than acts, and is left out (`time_step`). In free flight it still exchanges energy with
-vibrations as dt changes: from β > γ − ¼ on, by more than γ damps, so that dropped blocks rise higher than they fell from
-(sixty times as high with β = γ = ½). Such choices are refused.
+For 2β > γ the acceleration is stored. The part of it that belongs to a contact which has closed, opened, or is stiffer
+than the step resolves is removed (`time_step`). In free flight the stored acceleration still exchanges energy with
+vibrations when dt changes; for β > γ − ¼ by more than γ dissipates, so that dropped blocks bounce higher than they fell
+from (sixty times as high for β = γ = ½). Such choices are refused.
 
-What γ > ½ damps, springs, stress and loads that change with time, is followed to the first order in dt, as Newmark's
-family is bound to be. Where blocks turn, forces act in the middle of the step (`midpoint_configuration`): γ = 2β follows that motion to
-the second order, whatever γ; any other choice leaves (γ − 2β) dt of the change of an acceleration that is kept in the
-velocity, v̇ = a + (γ − 2β) dt ȧ. Second order and damping together: the α-scheme.
+What γ > ½ dissipates (springs, stress, loads that vary) is integrated to first order in dt. Where blocks rotate, forces
+act on the midpoint configuration (`midpoint_configuration`): γ = 2β then follows the rotation to second order, for any
+γ; other choices leave the error v̇ = a + (γ − 2β) dt ȧ. The α-scheme has second order and dissipation together.
 
 The α-scheme of Wood, Bossak & Zienkiewicz (1981), (1−α) a₁ + α a₀ = M⁻¹ f₁ with all forces f₁ at the end of the step,
-damps what the step does not resolve and leaves the rest alone: with the constants of Chung & Hulbert (1993), α =
-(ϱ−1)/(ϱ+1), γ = ½−α, β = ¼(1−α)², it is of second order and every |λ| falls to the spectral radius ϱ as ω dt → ∞. It is
-the step above with (ā − c a₀)/w in place of ā and θ = 1, w = 1/(1+ϱ), c = 1−w. Contact forces are in a₀ too: a bounce
-may gain some energy. Damping forces follow the mean velocity d/dt of the step: they take dᵀD d/dt > 0 at any step.
+dissipates what the step does not resolve and leaves the rest alone. With the constants of Chung & Hulbert (1993), α =
+(ϱ−1)/(ϱ+1), γ = ½−α, β = ¼(1−α)², it is of second order, and every |λ| tends to the spectral radius ϱ as ω dt → ∞. It
+is the step above with (ā − c a₀)/w in place of ā and θ = 1, w = 1/(1+ϱ), c = 1−w. Contact forces are part of a₀: a
+bounce may gain some energy. Damping forces follow the mean velocity d/dt of the step and dissipate dᵀD d/dt > 0 for any
+step.
 """
 
 from __future__ import annotations
@@ -39,17 +39,22 @@ from ...compiled import kept, part
 from ...conventions import rotate_stress
 from ...model import DdaSettings
 
-#: Spring, relative to E', that holds the rigid motion of a block without mass; its force is as small beside the load.
+#: Stiffness over E' of the springs that restrain the rigid motion of a massless block; their force is as small.
 GROUND_RATIO = 1e-11
 
 
 @dataclass(frozen=True)
 class TimeScheme:
-    """Newmark's (1959) β and γ, as ``weight`` θ = 2β of the forces at the end of a step and ``memory`` κ = (2β−γ)/(2β)
-    of the acceleration at its start; ``end`` is 2β too, also in the ``alpha`` scheme, where θ = 1 and ``recall`` is c.
-    ``static``: nothing is carried from step to step, and all forces stand at its end. ``mass_damping`` 1/s and
-    ``stiffness_damping`` s are Rayleigh's, ``block_damping`` the fraction of critical damping of each block's own
-    vibration (and of its contacts')."""
+    """Coefficients of a time scheme, in the notation of this module.
+
+    weight             θ = 2β (1 in the α-scheme): weight of the forces at the end of a step
+    memory             κ = (2β−γ)/(2β): weight of the acceleration at its start
+    end                2β, in the α-scheme too
+    alpha, recall      True: the α-scheme, with ``recall`` c
+    static             True: no velocity is carried, all forces act at the end
+    mass_damping, stiffness_damping   Rayleigh's α, 1/s, and β, s
+    block_damping      fraction of critical damping of each block's lowest vibration and of its contacts
+    """
 
     weight: float = 1.0
     memory: float = 0.0
@@ -63,13 +68,12 @@ class TimeScheme:
 
     @property
     def place(self) -> float:
-        """At which part of the step its forces have their places and directions: the α-scheme's are those of its
-        end."""
+        """Part of the step (0 to 1) whose configuration the forces act on: 1 in the α-scheme."""
         return 1.0 if self.alpha else 0.5
 
     @property
     def keeps(self) -> bool:
-        """Whether an acceleration is kept from step to step."""
+        """True if the scheme stores an acceleration from step to step."""
         return self.alpha or self.memory != 0.0
 
     @classmethod
@@ -101,31 +105,37 @@ class TimeScheme:
         mass: np.ndarray,
         dt: float,
     ) -> np.ndarray:
-        """(n_blocks, 3) Pa by which the stress that the forces over a step balance is more than that of its end:
-        viscosity's, less what they weigh of its start. ``strain`` (n_blocks, 3) of the step, ``change`` (n_blocks, 3)
-        of stress without any, ``tangent`` and ``stiffness`` (n_blocks, 3, 3), ``mass`` (n_blocks,)."""
+        """(n_blocks, 3) stress that the forces of a step balance, minus the stress at its end, Pa.
+
+        The viscous stress, minus the share of the step's start. ``strain`` (n_blocks, 3) increment; ``change``
+        (n_blocks, 3) of stress at zero strain increment, Pa; ``tangent``, ``stiffness`` (n_blocks, 3, 3), Pa; ``mass``
+        (n_blocks,), kg/m; ``dt`` s."""
         drag = self.stiffness_damping + 2.0 * self.block_damping * np.sqrt(mass / (12.0 * stiffness[:, 0, 0]))
         by_strain = (tangent @ strain[..., None])[..., 0]
         return (drag / dt)[:, None] * by_strain - (1.0 - self.weight) * (change + by_strain)
 
     def begun(self, carried: np.ndarray, before: np.ndarray | None, dt: float) -> tuple[np.ndarray, float]:
-        """Velocity (n_blocks, 6) that a step begins with, and by how much inertia counts more, 1/w; with no
-        acceleration from ``before`` it is a step of Shi's."""
+        """Velocity (n_blocks, 6) at the start of a step, and the factor 1/w on inertia.
+
+        ``carried`` (n_blocks, 6) velocity; ``before`` (n_blocks, 6) stored acceleration, None: a step of Shi's
+        scheme."""
         if self.recall == 0.0 or before is None:
             return carried, 1.0
         return carried + 0.5 * self.recall * dt * before, 1.0 / (1.0 - self.recall)
 
     def ahead(self, before: np.ndarray | None, dt: float) -> float:
-        """s by which forces that are taken as a mean over a time ``dt`` must be later than the step: the α-scheme's are
-        those of the step's end, about which the mean is then taken; arguments as for `begun`."""
+        """Time shift (s) of forces that are averaged over ``dt``: the α-scheme averages about the end of the step.
+
+        Arguments as for `begun`."""
         return 0.5 * dt if self.alpha and before is not None else 0.0
 
     def corrected(
         self, velocity: np.ndarray, before: np.ndarray | None, mean: np.ndarray, turn: np.ndarray, dt: float
     ) -> tuple[np.ndarray, np.ndarray | None]:
-        """Velocity with what the acceleration ``before`` the step (None: that of the step) has to say, and the
-        acceleration after it; None where the scheme keeps none. All (n_blocks, 6); ``mean`` ā on the axes before the
-        step, ``turn`` (n_blocks,) rad the rotation over it, which ``velocity`` has made already."""
+        """Velocity with the term κ dt (a₀ − ā), and the acceleration a₁ to store (None: the scheme stores none).
+
+        All (n_blocks, 6). ``before`` a₀ (None: ā); ``mean`` ā on the axes of the start; ``turn`` (n_blocks,) rotation
+        in the step, rad; ``velocity`` is on the rotated axes already."""
         if not self.keeps:
             return velocity, None
         before = mean if before is None else before
@@ -134,7 +144,7 @@ class TimeScheme:
 
 
 def turned(rates: np.ndarray, angle: np.ndarray) -> np.ndarray:
-    """Rates (n, 6) of the unknowns with their strains on axes turned by ``angle`` (n,): the material turns."""
+    """Rates (n, 6) of the unknowns with strain rates rotated by ``angle`` (n,) rad, with the material."""
     out = rates.copy()
     half = np.array([1.0, 1.0, 0.5])
     out[:, 3:] = rotate_stress(rates[:, 3:] * half, angle) / half
@@ -143,7 +153,7 @@ def turned(rates: np.ndarray, angle: np.ndarray) -> np.ndarray:
 
 @part(fastmath=False, error_model="numpy", nogil=True)
 def _invert(first, second, out):
-    """(3, 3) inverse of the sum of two symmetric positive matrices, by cofactors."""
+    """Write the inverse of the sum of two symmetric positive definite (3, 3) matrices to ``out``, by cofactors."""
     a, b, c = first[0, 0] + second[0, 0], first[0, 1] + second[0, 1], first[0, 2] + second[0, 2]
     d, e, f = first[1, 1] + second[1, 1], first[1, 2] + second[1, 2], first[2, 2] + second[2, 2]
     out[0, 0], out[0, 1], out[0, 2] = d * f - e * e, c * e - b * f, b * e - c * d
@@ -155,38 +165,63 @@ def _invert(first, second, out):
             out[k, m] /= determinant
 
 
+@part(fastmath=False, error_model="numpy", nogil=True)
+def _tangent(b, stiffness, compliance, crack_given, crack_compliance, out):
+    """(3, 3) (C⁻¹ + S)⁻¹ of block ``b``, into ``out[b]``."""
+    soft = False
+    if crack_given:
+        for k in range(3):
+            for m in range(3):
+                soft = soft or crack_compliance[b, k, m] != 0.0
+    if soft:
+        _invert(compliance[b], crack_compliance[b], out[b])
+    else:
+        # By numbers: Numba takes seconds to compile the assignment of one array to another.
+        for k in range(3):
+            for m in range(3):
+                out[b, k, m] = stiffness[b, k, m]
+
+
+@part(fastmath=False, error_model="numpy", nogil=True)
+def _unit_mass(moments, mass):
+    """(6, 6) the mass matrix of a block of unit density with these ``moments`` (6,), in the unknowns of a step."""
+    area, xx, yy, xy = moments[0], moments[3], moments[4], moments[5]
+    mass[:] = 0.0
+    mass[0, 0] = mass[1, 1] = area
+    mass[2, 2] = (xx + yy) / area
+    mass[3, 3], mass[4, 4], mass[5, 5] = xx / area, yy / area, 0.25 * (xx + yy) / area
+    mass[2, 3] = mass[3, 2] = -xy / area
+    mass[2, 4] = mass[4, 2] = xy / area
+    mass[2, 5] = mass[5, 2] = 0.5 * (xx - yy) / area
+    mass[3, 5] = mass[5, 3] = mass[4, 5] = mass[5, 4] = 0.5 * xy / area
+
+
+@part(fastmath=False, error_model="numpy", nogil=True)
+def _rotated(c, s, xx, yy, xy):
+    """The components of a symmetric tensor turned by the angle of cosine ``c`` and sine ``s``."""
+    return (
+        c * c * xx + s * s * yy - 2 * s * c * xy,
+        s * s * xx + c * c * yy + 2 * s * c * xy,
+        (s * c * (xx - yy) + (c * c - s * s) * xy),
+    )
+
+
 @kept(fastmath=False, error_model="numpy", nogil=True)
 def assemble_blocks(
-    order,
-    moments,
-    density,
-    stiffness,
-    compliance,
-    carried,
-    stress,
-    crack_strain,
-    crack_given,
-    crack_compliance,
-    crack_offset,
-    gravity,
-    load,
-    dt,
-    heavier,
-    weight,
-    block_damping,
-    mass_damping,
-    stiffness_damping,
-    n,
-):
+    order, moments, density, stiffness, compliance, carried, stress, crack_strain, crack_given, crack_compliance,
+    crack_offset, gravity, load, dt, heavier, weight, block_damping, mass_damping, stiffness_damping, n,
+):  # fmt: skip
     """What blocks bring on their own: (matrix (n, 6, 6), right side (n, 6), tangent (n_blocks, 3, 3), stress0
     (n_blocks, 3)).
 
-    Inertia and elasticity as in the head of this file, with velocity ``carried``, ``heavier`` 1/w, ``weight`` θ and σ₁
-    = (C⁻¹ + S)⁻¹ (Δε + C⁻¹σ − offset + crack strain), which without Δε is σ unless cracks have grown, or their faces
-    have opened or closed: they do so over the step, and count as the rest does with θ; ∫ Tᵀρg; the strain rows' share
-    ρω²∫xx, ∫yy, ∫xy of a spinning block; the generalised forces ``load`` (n_blocks, 6) of whatever else acts; and damping: a viscous stress ∝ C Δε/dt
-    that gives a block's own vibration (taken as that of a square, ω² = 12 C₁₁/(ρ h²)) the part ``block_damping`` of
-    critical damping, and Rayleigh's two.
+    - inertia and elasticity as in this module's equation, with velocity ``carried``, factor ``heavier`` 1/w and
+      ``weight`` θ. The stress is σ₁ = (C⁻¹ + S)⁻¹ (Δε + C⁻¹σ − offset + crack strain), with the added compliance S of
+      cracks. For Δε = 0 it is σ, unless cracks have grown or their faces have opened or closed; that change acts over
+      the step with weight θ;
+    - body force ∫ Tᵀρg, and for the strain unknowns the centrifugal terms ρω²∫xx, ρω²∫yy, ρω²∫xy;
+    - generalised forces ``load`` (n_blocks, 6) of all other loads, N and N m;
+    - damping: a viscous stress ∝ C Δε/dt that gives a block's lowest vibration (taken as that of a square, ω² =
+      12 C₁₁/(ρ h²)) the fraction ``block_damping`` of critical damping, and Rayleigh damping.
     """
     inertia = 2.0 * heavier / (dt * dt) + mass_damping / dt
     n_blocks = order.shape[0]
@@ -197,18 +232,7 @@ def assemble_blocks(
     strain = np.empty(3)
     mass = np.empty((6, 6))
     for b in range(n_blocks):
-        soft = False
-        if crack_given:
-            for k in range(3):
-                for m in range(3):
-                    soft = soft or crack_compliance[b, k, m] != 0.0
-        if soft:
-            _invert(compliance[b], crack_compliance[b], tangent[b])
-        else:
-            # By numbers: Numba takes seconds to compile the assignment of one array to another.
-            for k in range(3):
-                for m in range(3):
-                    tangent[b, k, m] = stiffness[b, k, m]
+        _tangent(b, stiffness, compliance, crack_given, crack_compliance, tangent)
         for k in range(3):
             strain[k] = crack_strain[b, k] - crack_offset[b, k] if crack_given else 0.0
             for m in range(3):
@@ -223,14 +247,7 @@ def assemble_blocks(
         area, xx, yy, xy = moments[b, 0], moments[b, 3], moments[b, 4], moments[b, 5]
         h = np.sqrt(area)
         rho = density[b]
-        mass[:] = 0.0
-        mass[0, 0] = mass[1, 1] = area
-        mass[2, 2] = (xx + yy) / area
-        mass[3, 3], mass[4, 4], mass[5, 5] = xx / area, yy / area, 0.25 * (xx + yy) / area
-        mass[2, 3] = mass[3, 2] = -xy / area
-        mass[2, 4] = mass[4, 2] = xy / area
-        mass[2, 5] = mass[5, 2] = 0.5 * (xx - yy) / area
-        mass[3, 5] = mass[5, 3] = mass[4, 5] = mass[5, 4] = 0.5 * xy / area
+        _unit_mass(moments[b], mass)
         for k in range(6):
             for m in range(6):
                 matrix[row, k, m] = inertia * rho * mass[k, m]
@@ -256,28 +273,18 @@ def assemble_blocks(
 
 @kept(fastmath=False, error_model="numpy", nogil=True)
 def advance(
-    increment,
-    carried,
-    dt,
-    static,
-    vertices,
-    vertex_start,
-    moments,
-    tangent,
-    stress0,
-    compliance,
-    offset,
-    crack_given,
-    crack_strain,
-    turns,
-):
+    increment, carried, dt, static, vertices, vertex_start, moments, tangent, stress0, compliance, offset, crack_given,
+    crack_strain, turns,
+):  # fmt: skip
     """The state after a step from its displacement ``increment`` (n_blocks, 6) about the old centroids.
 
-    Vertices follow x' = c + d₀ + R(r)(I + ε)(x − c) with the exact rotation R, so a spinning block does not swell;
-    stress, strain rates and crack strain are turned by the same R. Stress before turning is ``tangent`` Δε +
-    ``stress0``. Velocity is 2d/dt − v, or the mean rate d/dt in a ``static`` step, which carries none. A block that
-    stretches as it spins turns faster or slower: what ``turns`` (n_blocks,) keeps its angular momentum.
-    Returns vertices, velocity, stress, crack strain, largest vertex displacement.
+    Vertices follow x' = c + d₀ + R(r)(I + ε)(x − c) with the exact rotation R, so that a spinning block does not swell.
+    Stress, strain rates and crack strain are rotated by the same R; before, the stress is ``tangent`` Δε + ``stress0``.
+    Velocity is 2d/dt − v, or the mean rate d/dt in a ``static`` step. Where ``turns`` (n_blocks,) is True, the angular
+    velocity is corrected so that a block which strains as it spins conserves angular momentum.
+
+    Returns vertices (n_vertices, 2) m, velocity (n_blocks, 6), stress (n_blocks, 3) Pa, crack strain (n_blocks, 3),
+    largest vertex displacement m.
     """
     n_blocks = increment.shape[0]
     new_vertices = np.empty_like(vertices)
@@ -307,13 +314,12 @@ def advance(
                 velocity[b, k] = increment[b, k] / dt
             else:
                 velocity[b, k] = 2.0 * increment[b, k] / dt - carried[b, k]
-        # Engineering shear rate: halve, turn, double.
+        # Engineering shear rate: halve, rotate, double.
         a, d, e = velocity[b, 3], velocity[b, 4], 0.5 * velocity[b, 5]
         spin, xx, yy, xy = velocity[b, 2], moments[b, 3], moments[b, 4], moments[b, 5]
         momentum = (xx + yy) * spin + xy * (d - a) + (xx - yy) * e
-        velocity[b, 3] = c * c * a + s * s * d - 2 * s * c * e
-        velocity[b, 4] = s * s * a + c * c * d + 2 * s * c * e
-        velocity[b, 5] = 2.0 * (s * c * (a - d) + (c * c - s * s) * e)
+        velocity[b, 3], velocity[b, 4], turned_shear = _rotated(c, s, a, d, e)
+        velocity[b, 5] = 2.0 * turned_shear
         if turns[b] and not static:
             # Second moments of the mass, F S Fᵀ with F = R(I + ε).
             fxx, fyy = 1.0 + axx, 1.0 + ayy
@@ -327,16 +333,14 @@ def advance(
             for m in range(3):
                 tensor[k] += tangent[b, k, m] * increment[b, 3 + m]
         a, d, e = tensor[0], tensor[1], tensor[2]
-        new_stress[b, 0] = c * c * a + s * s * d - 2 * s * c * e
-        new_stress[b, 1] = s * s * a + c * c * d + 2 * s * c * e
-        new_stress[b, 2] = s * c * (a - d) + (c * c - s * s) * e
+        new_stress[b, 0], new_stress[b, 1], turned_shear = _rotated(c, s, a, d, e)
+        new_stress[b, 2] = turned_shear
         for k in range(3):
             if crack_given:
                 tensor[k] = offset[b, k] + compliance[b, k, 0] * a + compliance[b, k, 1] * d + compliance[b, k, 2] * e
             else:
                 tensor[k] = crack_strain[b, k]
         a, d, e = tensor[0], tensor[1], 0.5 * tensor[2]
-        new_crack[b, 0] = c * c * a + s * s * d - 2 * s * c * e
-        new_crack[b, 1] = s * s * a + c * c * d + 2 * s * c * e
-        new_crack[b, 2] = 2.0 * (s * c * (a - d) + (c * c - s * s) * e)
+        new_crack[b, 0], new_crack[b, 1], turned_shear = _rotated(c, s, a, d, e)
+        new_crack[b, 2] = 2.0 * turned_shear
     return new_vertices, velocity, new_stress, new_crack, np.sqrt(largest)

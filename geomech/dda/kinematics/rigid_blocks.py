@@ -1,8 +1,7 @@
-"""Blocks that do not strain: three unknowns, and the mean stress that the forces on them make.
+"""Rigid blocks: three unknowns, and the mean stress that balances their forces, A σ̄ = Σ sym(F ⊗ x) + ∫ sym(b ⊗ x) dA.
 
-The strains of a rigid block are held at zero exactly. What its rows of the equations would have to carry for that is
-its mean stress, the virial of all forces on it: A σ̄ = Σ sym(F ⊗ x) + ∫ sym(b ⊗ x) dA about its centroid, with its
-inertia and the centrifugal force of its spin in b (Love 1927, §120).
+The strains of a rigid block are constrained to zero exactly. The constraint force is the mean stress, the virial of all
+forces F and body forces b (weight, inertia, centrifugal force) at arms x from the centroid (Love 1927, §120).
 """
 
 from __future__ import annotations
@@ -13,7 +12,7 @@ from ...conventions import rotate_stress
 
 
 def with_rigid(held: np.ndarray | None, rigid: np.ndarray) -> np.ndarray | None:
-    """(n_blocks, 6) what is ``held``, and the strains of ``rigid`` (n_blocks,) blocks; None when that is nothing."""
+    """(n_blocks, 6) bool: the constraints ``held`` and the strains of ``rigid`` (n_blocks,) blocks; None: none."""
     if not rigid.any():
         return held
     out = np.zeros((len(rigid), 6), bool) if held is None else held.copy()
@@ -32,9 +31,11 @@ def mean_stress(
     middle: np.ndarray,
     turn: np.ndarray,
 ) -> np.ndarray:
-    """(n, 3) Pa mean stress of ``blocks`` (n,) on axes turned by ``turn`` (n_blocks,) rad, from the forces of a step:
-    CONTACT rows, on a geometry turned by ``middle`` (n_blocks,) rad, generalised ``load`` (n_blocks, 6) N m,
-    ``acceleration`` (n_blocks, 6) and ``spin`` (n_blocks,) rad/s."""
+    """(n, 3) mean stress of ``blocks`` (n,), Pa, on axes rotated by ``turn`` (n_blocks,) rad.
+
+    ``contacts`` CONTACT rows on a configuration rotated by ``middle`` (n_blocks,) rad; ``load`` (n_blocks, 6)
+    generalised forces, N and N m; ``moments`` (n_blocks, 6); ``density`` (n_blocks,) kg/m³; ``acceleration`` (n_blocks,
+    6); ``spin`` (n_blocks,) rad/s."""
     n = contacts["normal"]
     force = contacts["normal_force"][:, None] * n
     force += contacts["shear_force"][:, None] * np.stack([-n[:, 1], n[:, 0]], axis=1)

@@ -1,4 +1,5 @@
-"""What the rounding of coordinates makes of contacts: springs are so stiff that they feel the last digits of a gap."""
+"""Round-off of coordinates and the contact forces it causes: springs are so stiff that the last digits of a gap
+count."""
 
 from __future__ import annotations
 
@@ -9,29 +10,29 @@ import numpy as np
 
 log = logging.getLogger(__name__)
 
-#: Coordinates, and gaps between them, are rounded to this part of the largest one.
+#: Round-off of coordinates and gaps over the largest coordinate.
 _ROUNDING = 5e-16
-#: What rounding leaves of one step the next goes on from: gaps of so many times the rounding decide nothing in motion
-#: where the forces they make are so small a part of the loads about them. (Walls and slopes of 1 000 to 40 000 blocks
-#: at rest have a contact in every third to every step that oversteps the rounding, by 1.3 times it at most, and the
-#: equations are solved once more for it.)
+#: In dynamic steps, gaps below this many times the round-off do not decide contact states, where their forces are below
+#: that part of the loads nearby. (In walls and slopes of 1 000 to 40 000 blocks at rest, one step in one to three has a
+#: contact that exceeds the round-off, by 1.3 times it at most, and costs one more solution.)
 _WANDERS, _NOTHING = 4.0, 1e-3
-#: A block is told whose contacts feel more than this part of its weight.
+#: Warn of a block whose contact forces from round-off exceed this part of its weight.
 _FELT = 1e-2
 
 
 def rounding_of(vertices: np.ndarray) -> float:
-    """m: the rounding of ``vertices`` (n, 2) m and of what is between them."""
+    """Round-off of the coordinates of ``vertices`` (n, 2) and of gaps between them, m."""
     return _ROUNDING * float(np.abs(vertices).max())
 
 
 def undecided_gaps(
     rounding: float, right: np.ndarray, order: np.ndarray, block: np.ndarray, other: np.ndarray, normal: np.ndarray
 ) -> np.ndarray:
-    """(n,) m: gaps that decide nothing about the states in motion of contacts between ``block`` and ``other`` (n,) with
-    springs ``normal`` (n,) N/m²: the ``rounding`` (m), and more of it where that is nothing beside what the blocks bear,
-    ``right`` (n_free, 6) N/m in their ``order`` (n_blocks,). (A pebble far from the origin would stick by what holds
-    a wall's bricks still.)"""
+    """(n,) gaps that do not decide contact states in dynamic steps, m.
+
+    The ``rounding`` (m), or a multiple of it where its force is negligible beside the loads of the blocks. Contacts
+    between ``block`` and ``other`` (n,) have springs ``normal`` (n,) N/m²; ``right`` (n_free, 6) are the blocks' loads,
+    N/m, in their ``order`` (n_blocks,). A multiple everywhere would make a pebble far from the origin stick."""
     load = np.append(np.abs(right).max(axis=1, initial=0.0), np.inf)
     least = np.minimum(load[order[block]], load[order[other]])
     return np.clip(_NOTHING * least / np.maximum(normal, 1e-300), rounding, _WANDERS * rounding)
@@ -40,9 +41,10 @@ def undecided_gaps(
 def tell_felt(
     rounding: float, weight: np.ndarray, block: np.ndarray, other: np.ndarray, normal: np.ndarray, names: Sequence[str]
 ) -> None:
-    """Warn of the block, by its name, that is lightest beside what the ``rounding`` makes of the springs of its
-    contacts; ``weight`` (n_blocks,) N/m, infinite for fixed blocks. Such a block may stand where it should just
-    slide."""
+    """Warn of the block whose weight is smallest relative to the contact forces that ``rounding`` (m) causes.
+
+    ``weight`` (n_blocks,) N/m, infinite for fixed blocks; ``normal`` (n,) N/m² of the contacts between ``block`` and
+    ``other`` (n,). Such a block may stick where it should just slide."""
     if not len(block):
         return
     least = np.minimum(weight[block], weight[other])

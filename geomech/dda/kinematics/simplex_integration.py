@@ -1,5 +1,4 @@
-"""Exact integrals over polygonal blocks: area, centroid and second moments from closed boundary sums; and how fast the
-unknowns about that centroid move a block's vertices."""
+"""Simplex integration: exact area, centroid, second moments and mass matrix of polygonal blocks (Shi 1988)."""
 
 from __future__ import annotations
 
@@ -45,8 +44,8 @@ def block_moments(vertices, next_vertex, vertex_start):
 
 @kept(fastmath=False, error_model="numpy", nogil=True)
 def fastest_vertex(rates, vertices, vertex_start, moments):
-    """The largest speed of a vertex, m/s, of blocks whose unknowns move at ``rates`` (n_blocks, 6); what stands is not
-    looked at."""
+    """Largest speed of a vertex, m/s, for blocks with ``rates`` (n_blocks, 6) of their unknowns; blocks at rest are
+    skipped."""
     largest = 0.0
     for b in range(rates.shape[0]):
         u, v, r, ex, ey, g = rates[b, 0], rates[b, 1], rates[b, 2], rates[b, 3], rates[b, 4], 0.5 * rates[b, 5]
@@ -60,7 +59,8 @@ def fastest_vertex(rates, vertices, vertex_start, moments):
 
 
 def mass_matrix(moments: np.ndarray, density: float) -> np.ndarray:
-    """(6, 6) ∫ρ TᵀT dA of one block, unknowns (u0, v0, r0, εx, εy, γxy); ``moments`` is a row of `block_moments`."""
+    """Mass matrix (6, 6) ∫ρ TᵀT dA of one block, unknowns (u0, v0, r0, εx, εy, γxy); ``moments``: a row of
+    `block_moments`, ``density`` kg/m³."""
     area, _, _, xx, yy, xy = moments
     mass = np.zeros((6, 6))
     mass[0, 0] = mass[1, 1] = area

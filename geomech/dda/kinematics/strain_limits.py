@@ -1,4 +1,4 @@
-"""Blocks strained beyond what linear elasticity can tell."""
+"""Limits of block strain: a warning beyond the range of linear elasticity, and the end of the run far beyond it."""
 
 from __future__ import annotations
 
@@ -11,22 +11,23 @@ from ..results import NotConverged
 
 log = logging.getLogger(__name__)
 
-#: Rock is elastic up to strains of some thousandths; a block whose strain reaches this part is told of …
+#: Strain beyond which a block is reported: rock is elastic up to strains of some thousandths.
 BEYOND = 1e-2
-#: … and one that reaches this part ends the run: it is no linear elastic body, and its cracks would be solved for on
-#: another body than the one that moves.
+#: Strain at which the run ends: the block is no linear elastic body any more, and its cracks are solved on the
+#: undeformed one.
 REFUSED = 0.25
 
 
 class ElasticRange:
-    """The largest strain of any block so far, ``told`` as it passes `BEYOND`, and again whenever it has doubled."""
+    """Largest strain of any block so far; a warning when it passes `BEYOND`, and each time it has doubled since."""
 
     def __init__(self) -> None:
         self.told = 0.5 * BEYOND
 
     def check(self, motion: Motion, blocks: Blocks, time: float) -> float:
-        """The largest strain; logs a warning that names the block, where it is large. Raises `NotConverged` beyond
-        `REFUSED`."""
+        """Return the largest strain; log a warning that names the block where it is large.
+
+        Raises `NotConverged` beyond `REFUSED`."""
         gradient = motion.gradient
         strain = 0.5 * np.abs(gradient.transpose(0, 2, 1) @ gradient - np.eye(2)).max(axis=(1, 2))
         strain[blocks.fixed] = 0.0

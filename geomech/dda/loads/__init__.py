@@ -1,1 +1,1 @@
-"""What acts on blocks besides contacts: forces, water, bolts, prescribed motion, viscous edges."""
+"""Loads on blocks: forces, water, bolts, prescribed motion, viscous boundaries."""

@@ -1,9 +1,8 @@
-"""Bolts in a step: springs between two blocks along their axis and across it, that yield, go slack and break.
+"""Bolts in a time step: axial springs and dowels between two blocks that yield, go slack and break.
 
-T = P + k (l − l₀ − lₚ) along the axis from the first to the second end (P pretension, l₀ the length at installation, lₚ
-what it yielded), between its limits; across it a dowel, and the stiffness T/l that a taut bolt has against turning. The
-states are found with the step, not after it: a bolt that would carry more than it can is given its limit and the step
-solved again.
+T = P + k (l − l₀ − lₚ) along the axis from the first to the second end (P pretension, l₀ length at installation, lₚ
+plastic elongation), within its limits; across the axis a dowel, and the geometric stiffness T/l of a taut bolt. States
+are found within the step: a bolt that would exceed its limit gets the limit force, and the step is solved again.
 """
 
 from __future__ import annotations
@@ -24,38 +23,38 @@ from .prescribed_motion import Pairs
 
 log = logging.getLogger(__name__)
 
-#: Forces within this part of a limit are at it.
+#: A force is at a limit when it differs by less than this part of it.
 _AT_LIMIT = 1e-9
-#: Elongations below this part of a bolt's length are round-off of its ends.
+#: Elongations below this part of a bolt's length are round-off.
 _ROUND_OFF = 1e-14
-#: So often the states of bolts may change in a step before it is cut.
+#: Changes of bolt states in a step before the step is shortened.
 ROUNDS = 25
 #: States along the axis (and, but for SLACK, across it).
 _ELASTIC, _YIELDS, _CRUSHED, _SLACK = 0, 1, -1, 2
 
 
 def check_bolts(bolts: Sequence[Bolt], fixed: np.ndarray) -> None:
-    """Raises ValueError naming a bolt that holds nothing that moves."""
+    """Raise ValueError that names a bolt without an end in a moving block."""
     for bolt in bolts:
         if fixed[bolt.block] and (bolt.other == GROUND or fixed[bolt.other]):
             raise ValueError(f"bolt {bolt.name!r} holds nothing: both its ends are fixed")
 
 
 def labels(bolts: Sequence[Bolt]) -> list[str]:
-    """A name a bolt, with its number where several share one."""
+    """One name per bolt, with its number where several share a name."""
     names = [bolt.name for bolt in bolts]
     return [name if names.count(name) == 1 else f"{name}[{k}]" for k, name in enumerate(names)]
 
 
 @dataclass(eq=False)
 class BoltSet:
-    """The bolts that act in a step, along the axes that they have at its start; arrays (n,).
+    """The bolts that act in a step, with their axes at its start; arrays (n,).
 
     number        rows in the loads' bolts
-    ends          (n, 2, 2)  m, where they act, in the step's middle
+    ends          (n, 2, 2)  m, on the midpoint configuration
     length        m
-    trial, dowel  N, what they would carry if nothing moved: axial (positive in tension), across
-    geometric     N/m, stiffness of a taut bolt against turning
+    trial, dowel  N, forces at zero motion: axial (positive in tension), across
+    geometric     N/m, geometric stiffness T/l of a taut bolt
     axial, across states
     """
 
@@ -87,8 +86,9 @@ class BoltSet:
         middle: Middle,
         removed: np.ndarray | None,
     ) -> tuple[BoltSet | None, np.ndarray]:
-        """The bolts that act from ``time`` on (None: none), and their BOLT rows with those newly installed;
-        ``point_at(block, at)`` is where points are as the step begins."""
+        """The bolts that act at ``time`` s (None: none), and all BOLT rows, newly installed bolts included.
+
+        ``point_at(block, at)``: current position of a material point at the start of the step, m."""
         memory = memory.copy() if len(memory) == len(bolts) else np.zeros(len(bolts), BOLT)
         ends = np.zeros((len(bolts), 2, 2))
         for k, bolt in enumerate(bolts):
@@ -122,7 +122,8 @@ class BoltSet:
                     h = np.sqrt(middle.moments[b, 0])
                     t = axes[k] @ middle.displacement(ends[k, side], b) / [1.0, 1.0, h, h, h, h]
                     vectors[k, :, 6 * side : 6 * side + 6] = sign * t
-        # A ground end has no unknowns: its half of the vectors is empty, and it may stand with the bolt's own block.
+        # A ground end has no unknowns: its half of the vectors is zero, and its block number may be the bolt's own
+        # block.
         pairs = Pairs(block, other, vectors, ends, axes, -1.0, np.zeros((len(own), 2)))
         k = column("stiffness")
         trial = column("pretension") + k * (length - rows["length"] - rows["plastic"])
@@ -139,12 +140,13 @@ class BoltSet:
         return bolt_set, memory
 
     def take_states(self, motion: np.ndarray) -> bool:
-        """Set the states that fit ``motion`` (n, 2) along and across; True when they were those already."""
+        """Set the states consistent with ``motion`` (n, 2) along and across, m; True if they were consistent
+        already."""
         force = self.trial + self.stiffness * motion[:, 0]
         slip = self.dowel - self.shear_stiffness * motion[:, 1]
         axial = np.where(force > self.most * (1 + _AT_LIMIT), _YIELDS, _ELASTIC)
         low = np.where(self.slack, _SLACK, _CRUSHED)
-        # A slack bolt and one without force are told apart by what is round-off of its length.
+        # A slack bolt and one without force differ by more than round-off of the length.
         slack = np.where(self.slack, _ROUND_OFF * self.stiffness * self.length, _AT_LIMIT * np.abs(self.least))
         axial = np.where(force < self.least - slack, low, axial)
         across = np.where(np.abs(slip) > self.strength * (1 + _AT_LIMIT), np.sign(slip).astype(int), 0)
@@ -153,10 +155,9 @@ class BoltSet:
         return same
 
     def springs(self) -> tuple[np.ndarray, np.ndarray]:
-        """((n, 2) stiffness N/m, (n, 2) forces at no motion N on the second block along and across) in the present
-        states.
+        """Stiffness (n, 2), N/m, and force at zero motion (n, 2), N, along and across, in the present states.
 
-        Forces are those that the pairs' vectors take to generalised ones: along, −T.
+        Forces act on the second block; with the pairs' vectors they give generalised forces. Along the axis: −T.
         """
         elastic = self.axial == _ELASTIC
         k = np.where(elastic, self.stiffness, 0.0)
@@ -167,12 +168,12 @@ class BoltSet:
         return np.stack([k, ks], axis=1), np.stack([-np.where(elastic, self.trial, limit), dowel], axis=1)
 
     def forces(self, motion: np.ndarray) -> np.ndarray:
-        """(n, 2) N on the second block after ``motion``."""
+        """(n, 2) forces on the second block after ``motion`` (n, 2) m, N."""
         k, at_rest = self.springs()
         return at_rest - k * motion
 
     def motion(self, unknowns: np.ndarray, order: np.ndarray) -> np.ndarray:
-        """(n, 2) m, elongation and relative motion across, of the solver's ``unknowns`` (n_free, 6)."""
+        """(n, 2) elongation and relative motion across the axis, m, from the solver's ``unknowns`` (n_free, 6)."""
         out = self.pairs.shift.copy()
         for side, owner in enumerate((self.pairs.block, self.pairs.other)):
             row = np.where(owner >= 0, order[owner], -1)
@@ -182,9 +183,10 @@ class BoltSet:
         return out
 
     def stiffen_turning(self, matrix: np.ndarray, order: np.ndarray, moments: np.ndarray) -> None:
-        """Add to ``matrix`` (n_free, 6, 6), in place, that a taut bolt turns the block it hangs on back: its force F at
-        the arm a from the centroid has the moment a × F − ϑ a·F after a turn ϑ. Found too late, it would swing ever
-        further."""
+        """Add the geometric stiffness of taut bolts against rotation to ``matrix`` (n_free, 6, 6), in place.
+
+        The force F at the arm a from the centroid has the moment a × F − ϑ a·F after a rotation ϑ. Without this term a
+        hanging block would swing with growing amplitude."""
         tension = np.clip(self.trial, 0.0, self.most)
         for side, owner in enumerate((self.pairs.block, self.pairs.other)):
             pull = (1.0, -1.0)[side] * tension[:, None] * self.pairs.axes[:, 0]
@@ -196,8 +198,8 @@ class BoltSet:
     def assemble(
         self, matrix: np.ndarray, right: np.ndarray, order: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """(matrix, right) with the bolts' diagonal blocks and forces, and the (n, 6, 6) blocks (first block,
-        second)."""
+        """``matrix`` (n_free, 6, 6) and ``right`` (n_free, 6) with the bolts' contributions, and their off-diagonal
+        blocks (n, 6, 6) between first and second block."""
         matrix, right = matrix.copy(), right.copy()
         k, at_rest = self.springs()
         push = at_rest - k * self.pairs.shift
@@ -211,15 +213,14 @@ class BoltSet:
         return matrix, right, stiff[:, :6, 6:]
 
     def remember(self, memory: np.ndarray, motion: np.ndarray, point_at) -> None:
-        """Write into the BOLT rows ``memory`` what the step did; ``point_at(block, at)`` is where points are after
-        it."""
+        """Update the BOLT rows ``memory`` for the finished step; ``point_at(block, at)``: positions after it, m."""
         forces = self.forces(motion)
         for row, k in enumerate(self.number):
             bolt, kept = self.bolts[k], memory[k]
             tension = -forces[row, 0]
             if self.axial[row] in (_YIELDS, _CRUSHED):
                 kept["plastic"] += (self.trial[row] + bolt.stiffness * motion[row, 0] - tension) / bolt.stiffness
-            # What turns with the bolt is its tension, not the dowel's memory.
+            # The tension rotates with the bolt; the dowel's history does not.
             dowel = self.dowel[row] - bolt.shear_stiffness * motion[row, 1]
             if self.across[row]:
                 limit = self.across[row] * bolt.shear_strength
@@ -233,8 +234,7 @@ class BoltSet:
                 kept["broken"] = True
 
     def point_rows(self, forces: np.ndarray) -> np.ndarray:
-        """POINT_FORCE rows of both ends of every bolt (those in the ground left out) under ``forces`` (n, 2) as in
-        `forces`."""
+        """POINT_FORCE rows of both ends of every bolt, without ends in the ground, under ``forces`` (n, 2) N."""
         rows = np.zeros(2 * len(self.number), POINT_FORCE)
         on_second = np.einsum("nk,nkd->nd", forces, self.pairs.axes)
         own = [self.bolts[k] for k in self.number]
@@ -246,5 +246,5 @@ class BoltSet:
         return rows[rows["block"] != GROUND]
 
     def unsettled(self) -> Unsettled:
-        """That its states do not agree with the motion, for the step to be cut."""
+        """Message that bolt states are inconsistent with the motion, so that the step is shortened."""
         return Unsettled(f"the states of bolts {[self.bolts[k].name for k in self.number]} did not settle")

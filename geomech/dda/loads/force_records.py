@@ -1,14 +1,14 @@
-"""What acts on blocks, as rows: forces at points, and tractions on pieces of edges."""
+"""Records of applied forces: POINT_FORCE rows, and EDGE_FORCE rows (linear tractions on pieces of edges)."""
 
 from __future__ import annotations
 
 import numpy as np
 
-#: One row a point force: where it acts (current coordinates, m), the material point (reference coordinates), N.
+#: One row per point force: position (current coordinates, m), material point (reference coordinates, m), force (N).
 POINT_FORCE = np.dtype([("block", np.int64), ("point", np.float64, 2), ("at", np.float64, 2), ("force", np.float64, 2)])
 
-#: One row a loaded piece of an edge: its ends (current coordinates, m), the traction at its start and at its end, per
-#: current length and linear between (Pa), and the total force (N).
+#: One row per loaded piece of an edge: its ends (current coordinates, m), tractions at start and end, linear between,
+#: per current length (Pa), and the total force (N).
 EDGE_FORCE = np.dtype(
     [
         ("block", np.int64),

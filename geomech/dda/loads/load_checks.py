@@ -1,5 +1,4 @@
-"""Loads on blocks or edges that are not there, at points that their block does not hold, or that could do nothing where
-they are: refused before a step."""
+"""Checks of loads before a step: blocks and edges exist, points lie in their blocks, and no load is without effect."""
 
 from __future__ import annotations
 
@@ -11,14 +10,14 @@ from ...model import GROUND, BaseMotion, Blocks, Loads, ViscousBoundary
 from ...model.blocks.polygon import distance_to_edges, winding_number
 from .bolts import labels
 
-#: A point belongs to a block when it is no further outside than this part of the block's size …
+#: A point belongs to a block when its distance outside is at most this part of the block's size,
 _OF_BLOCK = 1e-3
-#: … or this part of the whole drawing's: scenes take points for a block's that lie 1e-6 of it outside.
+#: or this part of the whole drawing's size: scenes accept points up to 1e-6 of it outside.
 _OF_DRAWING = 2e-6
 
 
 class StrayLoads:
-    """Looks at every load of given blocks once."""
+    """Checks every load on given blocks once."""
 
     def __init__(self, blocks: Blocks) -> None:
         self._blocks = blocks
@@ -27,8 +26,10 @@ class StrayLoads:
         self._reach = _OF_DRAWING * float(np.ptp(blocks.vertices, axis=0).max()) if blocks.n_vertices else 0.0
 
     def refuse(self, loads: Loads) -> None:
-        """Raises ValueError naming the load whose block is not there, or does not hold its point; for ground that
-        shakes no fixed block, and for dashpots on edges that no moving block has."""
+        """Check ``loads``.
+
+        Raises ValueError that names the load: its block does not exist or does not contain its point, base shaking has
+        no fixed block, or a viscous boundary has no edge of a moving block."""
         seen = (
             loads.point_loads, loads.point_motions, loads.block_motions, loads.bolts, loads.base,
             loads.viscous_boundaries,
@@ -84,7 +85,7 @@ class StrayLoads:
             )
 
     def _refuse_unshaken(self, base: BaseMotion) -> None:
-        """Ground shakes the fixed blocks: one that is not fixed would stay as it is without a word."""
+        """Raise ValueError for a base motion of blocks that are not fixed: it would have no effect on them."""
         if not self._blocks.fixed.any():
             raise ValueError("the ground shakes, but no block is fixed that would go with it: fix what others stand on")
         for block in base.blocks or ():

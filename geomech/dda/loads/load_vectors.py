@@ -1,4 +1,4 @@
-"""What acts on the blocks besides contacts: gravity, edge tractions, point loads, inertia."""
+"""Load vectors: generalised forces ∫ Tᵀ t ds + Σ Tᵀ F of tractions and point loads, and body forces ρ (g − a)."""
 
 from __future__ import annotations
 
@@ -16,9 +16,14 @@ from .water_pressure import pressed_edges, wet_pieces
 
 @dataclass(frozen=True, eq=False)
 class Inertia:
-    """What makes weight and inertia a body force: ``density`` (n_blocks,), ``gravity`` (2,), ``acceleration``
-    (n_blocks, 6) of the unknowns, ``spin`` (n_blocks,) the angular velocity ω of the centrifugal ρω²x, ``fixed``
-    (n_blocks,)."""
+    """Weight and inertia as a body force.
+
+    density       (n_blocks,)    kg/m³
+    gravity       (2,)           m/s²
+    acceleration  (n_blocks, 6)  of the unknowns
+    spin          (n_blocks,)    angular velocity ω of the centrifugal force ρω²x, rad/s
+    fixed         (n_blocks,)    bool
+    """
 
     density: np.ndarray
     gravity: np.ndarray
@@ -27,8 +32,8 @@ class Inertia:
     fixed: np.ndarray
 
     def body_forces(self) -> tuple[np.ndarray, np.ndarray]:
-        """Weight minus inertia as a linear field: (n_blocks, 2) at the centroid and its gradient (n_blocks, 2, 2),
-        N/m³, N/m⁴."""
+        """Weight minus inertia as a linear field: (n_blocks, 2) at the centroid, N/m³; gradient (n_blocks, 2, 2),
+        N/m⁴."""
         rho, a = self.density, np.where(self.fixed[:, None], 0.0, self.acceleration)
         gradient = np.empty((len(rho), 2, 2))
         centrifugal = np.where(self.fixed, 0.0, self.spin) ** 2
@@ -41,21 +46,19 @@ class Inertia:
 
 @dataclass(frozen=True, eq=False)
 class AppliedForces:
-    """All that acts on the blocks of one step besides contacts, on the geometry on which equilibrium was assembled.
+    """All forces on the blocks in one step except contact forces, on the geometry of the equilibrium equations.
 
     points                POINT_FORCE rows
     edges                 EDGE_FORCE rows
     centroid              (n_blocks, 2)     m
     area                  (n_blocks,)       m²
     body_force            (n_blocks, 2)     ρ(g − a) at the centroid, N/m³
-    body_force_gradient   (n_blocks, 2, 2)  ∂b/∂x: the rest of −ρ times the block's acceleration field, centrifugal
-                                            part included; b(x) = body_force + body_force_gradient (x − centroid)
-    reaction              (n_blocks, 6)     N, N m: what it takes to give moving blocks the motion that is imposed on
-                          their
-                                            unknowns, about their centroids; None where none is
-    overstress            (n_blocks, 3)     Pa, current axes: what the forces balance beyond the stress of the step's
-                          end
-                                            (`TimeScheme.overstress`); None at rest
+    body_force_gradient   (n_blocks, 2, 2)  ∂b/∂x of inertia, centrifugal force included:
+                                            b(x) = body_force + body_force_gradient (x − centroid)
+    reaction              (n_blocks, 6)     N, N m about the centroid: generalised forces that impose prescribed
+                                            motion on moving blocks; None: none is prescribed
+    overstress            (n_blocks, 3)     Pa, current axes: stress that the forces balance minus the stress at the end
+                                            of the step (`TimeScheme.overstress`); None at rest
     """
 
     points: np.ndarray
@@ -80,7 +83,7 @@ class AppliedForces:
 
 
 class LoadMap:
-    """Where the loads act on given blocks: edges by name, material points as weights of their block's vertices."""
+    """Positions of loads on given blocks: edges by name, material points as weights of their block's vertices."""
 
     def __init__(self, blocks: Blocks) -> None:
         self.blocks = blocks
@@ -91,13 +94,13 @@ class LoadMap:
         self._drained: np.ndarray | None = None
 
     def take_out(self, removed: np.ndarray | None, drained: np.ndarray | None) -> None:
-        """Load the blocks ``removed`` (n_blocks,) no more; where ``drained`` ones lay against others, there is no
-        water."""
+        """Remove the loads on the blocks ``removed`` (n_blocks,) bool, and water from faces that lay against
+        ``drained`` (n_blocks,) ones."""
         self._removed, self._drained, self._wet = removed, drained, None
 
     def edges(self, load: EdgeTraction) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Edges that ``load`` acts on, (n, 2) reference lengths times its profile at their two ends, and EDGE_FORCE
-        rows for them that know no more than block and edge. Raises ValueError when there are none."""
+        """Edges (n,) that ``load`` acts on, reference length times profile at their two ends (n, 2), m, and EDGE_FORCE
+        rows that have block and edge only. Raises ValueError when no edge has the load's name."""
         name, key = load.edge_name, (load.edge_name, load.profile)
         if key not in self._edges:
             edges = self.blocks.edges_that_exist(name, f"a traction acts on edges named {name!r}")
@@ -110,7 +113,7 @@ class LoadMap:
         return self._edges[key]
 
     def point(self, block: int, at: tuple[float, float], vertices: np.ndarray) -> np.ndarray:
-        """(2,) where the material point ``at`` (reference coordinates) of ``block`` is now."""
+        """(2,) current position of the material point ``at`` (reference coordinates) of ``block``, m."""
         first, last = self.blocks.vertex_start[block], self.blocks.vertex_start[block + 1]
         key = (block, tuple(at))
         if key not in self._points:
@@ -120,8 +123,9 @@ class LoadMap:
     def rows(
         self, loads: Loads, time: float, vertices: np.ndarray, rotation: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
-        """POINT_FORCE and EDGE_FORCE rows of ``loads`` at ``time`` on the current ``vertices`` of blocks that have
-        turned by ``rotation`` (n_blocks,) rad."""
+        """POINT_FORCE and EDGE_FORCE rows of ``loads`` at ``time`` s.
+
+        ``vertices`` (n_vertices, 2) current coordinates, m; ``rotation`` (n_blocks,) of the blocks, rad."""
         points = np.zeros(len(loads.point_loads), POINT_FORCE)
         for row, load in zip(points, loads.point_loads, strict=True):
             force = load.history.at(time)
@@ -151,7 +155,7 @@ class LoadMap:
         return points, edges
 
     def _wet_edges(self, water: WaterTable) -> tuple[np.ndarray, np.ndarray]:
-        """The pieces of edges of moving blocks that water may reach."""
+        """Pieces of edges of moving blocks that water can reach."""
         if self._wet is None or self._wet[0] is not water:
             known = self.blocks.edge_names
             for name in water.dry:
@@ -165,13 +169,14 @@ class LoadMap:
 
 
 def _turned(vector: np.ndarray, angle: np.ndarray) -> np.ndarray:
-    """(..., 2) ``vector`` (2,) turned by ``angle`` (...)."""
+    """(..., 2) ``vector`` (2,) rotated by ``angle`` (...) rad."""
     c, s = np.cos(angle), np.sin(angle)
     return np.stack([c * vector[0] - s * vector[1], s * vector[0] + c * vector[1]], axis=-1)
 
 
 def generalised(points: np.ndarray, edges: np.ndarray, centroid: np.ndarray) -> np.ndarray:
-    """(n_blocks, 6) ∫ Tᵀ t ds and Σ Tᵀ F of EDGE_FORCE and POINT_FORCE rows; N and N m."""
+    """(n_blocks, 6) generalised forces ∫ Tᵀ t ds + Σ Tᵀ F of EDGE_FORCE and POINT_FORCE rows about ``centroid``
+    (n_blocks, 2); N and N m."""
     out = np.zeros((len(centroid), 6))
     if len(points) or len(edges):
         _gather(
@@ -193,8 +198,10 @@ def _add(row, x, y, fx, fy):
 
 @kept(fastmath=False, error_model="numpy", nogil=True)
 def _gather(out, centroid, point_block, point, force, edge_block, start, end, traction):
-    """Add to ``out`` (n_blocks, 6) the generalised forces about ``centroid`` (n_blocks, 2) of forces at points, and of
-    linear tractions: ∫ t and ∫ x ⊗ t are those of the forces L (2t₀ + t₁)/6 and L (t₀ + 2t₁)/6 at the ends."""
+    """Add generalised forces about ``centroid`` (n_blocks, 2) of point forces and linear tractions to ``out``
+    (n_blocks, 6).
+
+    A linear traction has the ∫ t and ∫ x ⊗ t of the forces L (2t₀ + t₁)/6 and L (t₀ + 2t₁)/6 at its ends."""
     for i in range(len(point_block)):
         b = point_block[i]
         _add(out[b], point[i, 0] - centroid[b, 0], point[i, 1] - centroid[b, 1], force[i, 0], force[i, 1])

@@ -1,9 +1,8 @@
-"""Motion that is given in a step, of blocks, of points and of the base: what is known of the unknowns before they are
-solved for, exactly, and what it takes to impose it.
+"""Prescribed motion of blocks, points and the base in a time step, imposed exactly, and its reactions.
 
-A block whose motion is given in part, C d = δ with C (m, 6), changes to the unknowns z of d = Q z, where C = (Rᵀ 0) Qᵀ
-(the QR factors of Cᵀ): the first m of them are known, z₁ = R⁻ᵀ δ, and leave the equations as any prescribed unknown
-does. A fixed block has no unknowns: its contacts see it move as a shift of their gaps.
+A block with m linear conditions C d = δ, C (m, 6), changes to the unknowns z of d = Q z, where C = (Rᵀ 0) Qᵀ (QR
+factors of Cᵀ). The first m are known, z₁ = R⁻ᵀ δ, and are eliminated. A fixed block has no unknowns: its motion enters
+its contacts as a shift of their gaps.
 """
 
 from __future__ import annotations
@@ -16,14 +15,14 @@ from ...model import UNKNOWNS, BaseMotion, BlockMotion, Blocks, Loads, PointMoti
 from ..kinematics.midpoint_configuration import Middle
 from .force_records import POINT_FORCE
 
-#: Rows of C that are combinations of others to this relative size contradict or repeat one another.
+#: Rows of C are linearly dependent below this relative size: they contradict or repeat one another.
 _DEPENDENT = 1e-10
 
 
 @dataclass(eq=False)
 class _Given:
-    """What is given of one moving block: rows of C, their increments and rates at the end of the step, and which point
-    motion each comes from (−1: the block's own)."""
+    """Conditions on one moving block: rows of C, their increments, their rates at the end of the step, and the point
+    motion that each comes from (−1: a block motion)."""
 
     rows: list[np.ndarray]
     increment: list[float]
@@ -33,7 +32,7 @@ class _Given:
 
 @dataclass(eq=False)
 class _Changed:
-    """A moving block in its changed unknowns; its own equations and contacts as they were, for what holds it."""
+    """A moving block in the unknowns z; its original equations and contacts are kept for the reactions."""
 
     block: int
     basis: np.ndarray  # Q (6, 6)
@@ -48,10 +47,14 @@ class _Changed:
 
 @dataclass(eq=False)
 class Pairs:
-    """Two blocks each that feel one another, contacts or bolts: ``vectors`` (n, 2, 12) of their relative motion in two
-    directions, ``points`` (n, 2, 2) where it is that of the first and of the second block, ``axes`` (n, 2, 2) the
-    directions; the motion counts as that of the first less that of the second block, times ``sense``. ``shift`` (n, 2)
-    is what given motion adds to it."""
+    """Pairs of interacting blocks: contacts or bolts.
+
+    vectors  (n, 2, 12)  of the relative motion in two directions, over the unknowns of both blocks
+    points   (n, 2, 2)   where the motion is taken, on the first and on the second block, m
+    axes     (n, 2, 2)   the directions
+    sense                factor on (motion of the first block − motion of the second)
+    shift    (n, 2)      relative motion due to prescribed motion, m
+    """
 
     block: np.ndarray
     other: np.ndarray
@@ -63,13 +66,14 @@ class Pairs:
 
 
 class ImposedMotion:
-    """The motion that ``loads`` give from ``start`` to ``end`` (s), acting where blocks are in the ``middle`` of the
-    step.
+    """Motion that ``loads`` prescribe from ``start`` to ``end`` (s), on the midpoint configuration ``middle``.
 
-    ``totals`` (k,) is what they have imposed at ``end``, ``before`` the same at the start as an earlier step has left
-    it (else taken at ``start``): statics may seek equilibrium at one time in many steps. ``increment`` and ``rate``
-    (n_blocks, 6): of fixed blocks, zero elsewhere. Raises ValueError naming the block whose given motions contradict or
-    repeat one another, a fixed one whose point is moved, and one that is to be strained though fixed.
+    ``totals`` (k,) are the values at ``end``, ``before`` those at the start as the last step left them (None: the
+    values at ``start``): static equilibrium at one time may take many steps. ``increment`` and ``rate`` (n_blocks, 6)
+    are those of fixed blocks, zero elsewhere.
+
+    Raises ValueError that names a block with contradicting or repeated conditions, a fixed block with a point motion,
+    and a fixed block with prescribed strains.
     """
 
     def __init__(
@@ -136,7 +140,7 @@ class ImposedMotion:
             raise ValueError(f"a point of {self._name(b)} is to be moved, but the block is fixed: give its own motion")
         rows = motion.axes @ self._middle.displacement(acts, b)
         if motion.kind == "displacement":
-            # To where the point is to be, so that what the turn of a step leaves out is made up for in the next.
+            # Towards the total position, so that the next step corrects the second-order error of a rotation.
             by = motion.history.at(end) - motion.axes @ (now - np.asarray(motion.at, dtype=float))
         if motion.stiffness is not None:
             self._springs.append((number, b, rows, by))
@@ -155,12 +159,13 @@ class ImposedMotion:
         return repr(self.blocks.names[block]) if self.blocks.names else f"block {block}"
 
     def _scale(self, block: int) -> np.ndarray:
-        """(6,) the solver's unknowns over the motion's: lengths all of them."""
+        """(6,) scale of the solver's unknowns, which are all lengths, over d."""
         h = float(np.sqrt(self.moments[block, 0]))
         return np.array([1.0, 1.0, h, h, h, h])
 
-    def take_held(self, held: np.ndarray) -> np.ndarray:
-        """What remains of ``held`` (n_blocks, 6) when blocks with given motion take theirs as given zero."""
+    def without_prescribed(self, held: np.ndarray) -> np.ndarray:
+        """The constraints ``held`` (n_blocks, 6) without those of blocks with prescribed motion, which impose them as
+        zeros."""
         rest = held.copy()
         for b, given in self._given.items():
             taken = {int(row.argmax()) for row, source in zip(given.rows, given.source, strict=True) if source < 0}
@@ -173,8 +178,10 @@ class ImposedMotion:
     # -- before the step is solved -------------------------------------------------------------------------------------
 
     def impose(self, matrix: np.ndarray, right: np.ndarray, sets: list[Pairs], order: np.ndarray) -> None:
-        """Take what is given out of the equations, in place (`assembly`'s arrays): matrix, right side, and the vectors
-        of the pairs in ``sets``, whose shift is what the given motion alone makes of them."""
+        """Eliminate the prescribed unknowns, in place, from ``matrix``, ``right`` and the vectors of the pairs in
+        ``sets``.
+
+        Arrays as in `assembly`. The pairs' shift becomes the relative motion due to prescribed motion."""
         for number, b, rows, by in self._springs:
             rows, k = rows / self._scale(b), self._points[number].stiffness
             matrix[order[b]] += k * rows.T @ rows
@@ -187,7 +194,7 @@ class ImposedMotion:
             self._change(b, given, matrix, right, sets, order[b], size)
 
     def _of_base(self, pairs: Pairs) -> np.ndarray:
-        """(n, 2) relative motion that the fixed blocks' motion makes."""
+        """(n, 2) relative motion due to the motion of fixed blocks, m."""
         moved = np.zeros((len(pairs.block), 2))
         for k, (owner, sign) in enumerate(((pairs.block, 1.0), (pairs.other, -1.0))):
             arm = pairs.points[:, k] - self.moments[owner, 1:3]
@@ -224,7 +231,7 @@ class ImposedMotion:
     # -- after ---------------------------------------------------------------------------------------------------------
 
     def recover(self, unknowns: np.ndarray, order: np.ndarray) -> np.ndarray:
-        """(n, 6) the solver's ``unknowns`` (n, 6) with the given ones, as they were before `impose`."""
+        """(n, 6) ``unknowns`` in terms of d, prescribed ones included, from the solver's ``unknowns`` (n, 6)."""
         unknowns = unknowns.copy()
         for c in self._changed:
             z = unknowns[order[c.block]]
@@ -233,7 +240,7 @@ class ImposedMotion:
         return unknowns
 
     def free_part(self, unknowns: np.ndarray, order: np.ndarray) -> np.ndarray:
-        """(n, 6) the same of a change of the ``unknowns``, given ones standing still."""
+        """(n, 6) the same for a change of the ``unknowns``: prescribed ones do not change."""
         unknowns = unknowns.copy()
         for c in self._changed:
             z = unknowns[order[c.block]]
@@ -242,8 +249,8 @@ class ImposedMotion:
         return unknowns
 
     def correct_velocity(self, velocity: np.ndarray) -> None:
-        """Make the rates at the end of the step those that are given, in place: the integration's own swing about
-        them."""
+        """Set prescribed rates at the end of the step in ``velocity`` (n_blocks, 6), in place: the time scheme
+        oscillates about them."""
         velocity[self.fixed] = self.rate[self.fixed]
         for c in self._changed:
             scale = self._scale(c.block)
@@ -254,9 +261,10 @@ class ImposedMotion:
     def reactions(
         self, unknowns: np.ndarray, pushes: list[np.ndarray], order: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
-        """What it takes: (n_blocks, 6) generalised forces (N, N m) of the blocks' given unknowns, about their
-        centroids, and POINT_FORCE rows of the points that are moved. ``unknowns`` as `recover` gives them; ``pushes``
-        (n, 2) N the forces of each set of pairs."""
+        """Reactions: generalised forces (n_blocks, 6) of block motions about the centroids, N and N m, and POINT_FORCE
+        rows of point motions.
+
+        ``unknowns`` (n, 6) from `recover`; ``pushes``: forces (n, 2) of each set of pairs, N."""
         of_blocks = np.zeros((self.blocks.n_blocks, 6))
         at_points = np.zeros((len(self._points), 2))
         for number, b, rows, by in self._springs:

@@ -1,5 +1,4 @@
-"""What acts in a step beyond forces: motion that is given, and bolts, whose states are found together with the
-contacts'."""
+"""Prescribed motion and bolts in a time step: their states are found together with the contact states."""
 
 from __future__ import annotations
 
@@ -24,9 +23,10 @@ Settle = Callable[[Pattern, np.ndarray, np.ndarray, ContactSet, np.ndarray], Set
 
 
 def felt_gravity(loads: Loads, start: float, acting: float, dt: float, static: bool, ahead: float = 0.0) -> np.ndarray:
-    """(2,) m/s² gravity at the time ``acting``, less the acceleration of a base that the blocks are seen from: its mean
-    over the time ``dt`` from ``start`` + ``ahead``, that over the step (``ahead`` 0) so that velocities are exact, or
-    in statics its value at ``acting``."""
+    """Effective gravity (2,), m/s²: gravity at the time ``acting`` minus the acceleration of a moving base frame.
+
+    The base acceleration is averaged over ``dt`` from ``start`` + ``ahead`` (s): over the step for ``ahead`` 0, so that
+    velocities are exact. In statics it is the value at ``acting``."""
     gravity = loads.gravity.at(acting)
     if loads.base is None or loads.base.frame != "base":
         return gravity
@@ -37,7 +37,7 @@ def felt_gravity(loads: Loads, start: float, acting: float, dt: float, static: b
 
 
 class StepActions:
-    """Given motion and bolts of one attempt at a step, in the order in which the step goes."""
+    """Prescribed motion and bolts of one attempt at a step; methods in the order in which the step calls them."""
 
     def __init__(
         self, blocks: Blocks, fixed: np.ndarray, loads: Loads, state: State, load_map: LoadMap, middle: Middle,
@@ -61,7 +61,7 @@ class StepActions:
         if loads.bolts:
             check_bolts(loads.bolts, blocks.fixed)
             self.bolts, self.memory = BoltSet.of(loads.bolts, state.bolts, state.time, point_at, order, middle, removed)
-        #: (n_contacts,) m: what the fixed blocks' motion makes of the contacts' motion along their edges.
+        #: (n_contacts,) m: contacts' motion along their edges due to the motion of fixed blocks.
         self.along = np.zeros(0)
         self._motion = np.zeros((0 if self.bolts is None else len(self.bolts.number), 2))
 
@@ -70,7 +70,7 @@ class StepActions:
         cls, blocks: Blocks, fixed: np.ndarray, loads: Loads, state: State, load_map: LoadMap, middle: Middle,
         order: np.ndarray, removed: np.ndarray | None, end: float,
     ) -> StepActions | None:  # fmt: skip
-        """None where the loads are forces only."""
+        """The actions of a step; None where ``loads`` are forces only."""
         shaken = loads.base is not None and loads.base.frame == "ground"
         if not (shaken or loads.block_motions or loads.point_motions or loads.bolts):
             return None
@@ -85,12 +85,12 @@ class StepActions:
         return pairs.block, np.where(pairs.other == GROUND, pairs.block, pairs.other)
 
     def held(self, held: np.ndarray | None) -> np.ndarray | None:
-        """What of the unknowns ``held`` (n_blocks, 6) the step has to hold itself: not those of blocks whose motion is
-        given in part, which hold them with what is given."""
+        """The constraints of ``held`` (n_blocks, 6) that the step itself imposes: without those of blocks with
+        prescribed motion, which impose them together with it."""
         if held is None:
             return None
         if self.imposed is not None:
-            held = self.imposed.take_held(held)
+            held = self.imposed.without_prescribed(held)
         if self.bolts is not None:
             pairs = self.bolts.pairs
             for side, owner in enumerate((pairs.block, pairs.other)):
@@ -102,9 +102,11 @@ class StepActions:
         self, pattern: Pattern, matrix: np.ndarray, right: np.ndarray, vectors: np.ndarray, acting: np.ndarray,
         found: ContactSet, gap: np.ndarray, settle: Settle,
     ) -> tuple[Settled, np.ndarray]:  # fmt: skip
-        """Settled contacts and the solver's unknowns (n_free, 6), given ones among them. Changes matrix, right side and
-        vectors in place, to those of the equations that are solved; given motion adds to what contacts' gaps and
-        ``stretch`` begin with. ``acting`` (n, 7): the contacts' geometry where they act. Raises `Unsettled`."""
+        """Converged contacts, and the solver's unknowns (n_free, 6) with prescribed ones.
+
+        Changes ``matrix``, ``right`` and ``vectors`` in place to those of the solved equations. Prescribed motion is
+        added to the contacts' initial gaps and tangential motion. ``acting`` (n, 7): geometry of the contacts where
+        they act. Raises `Unsettled`."""
         if self.bolts is not None:
             self.bolts.stiffen_turning(matrix, self.order, self.moments)
         shift = np.zeros((len(found), 2))
@@ -143,7 +145,8 @@ class StepActions:
         raise self.bolts.unsettled()
 
     def _links(self, pattern: Pattern, across: np.ndarray) -> Links:
-        """The blocks ``across`` (n, 6, 6) between the two ends of every bolt, and their transposes."""
+        """Off-diagonal blocks ``across`` (n, 6, 6) between the two ends of every bolt, and their transposes, as
+        links."""
         pairs, n = self.bolts.pairs, len(self.bolts.number)
         row, column = self.order[pairs.block], np.where(pairs.other == GROUND, -1, self.order[pairs.other])
         both = np.flatnonzero((row >= 0) & (column >= 0))
@@ -161,16 +164,16 @@ class StepActions:
     # -- after ---------------------------------------------------------------------------------------------------------
 
     def bolt_forces(self) -> np.ndarray:
-        """(n, 2) N of the bolts that act, as their pairs' vectors take them to generalised ones."""
+        """(n, 2) forces of the acting bolts, N; with their pairs' vectors they give generalised forces."""
         return np.zeros((0, 2)) if self.bolts is None else self.bolts.forces(self._motion)
 
     @property
     def largest_bolt_force(self) -> float:
-        """N."""
+        """Largest bolt force, N."""
         return float(np.abs(self.bolt_forces()).max(initial=0.0))
 
     def with_bolt_forces(self, right: np.ndarray) -> np.ndarray:
-        """(n_free, 6) the right side that was solved with, and the bolts' forces on it."""
+        """(n_free, 6) the right side of the solved equations plus the bolts' forces."""
         if self.bolts is None:
             return right
         pairs, push = self.bolts.pairs, np.einsum("nk,nka->na", self.bolt_forces(), self.bolts.pairs.vectors)
@@ -180,8 +183,8 @@ class StepActions:
         return spare[:-1]
 
     def work_forces(self, reaction: np.ndarray | None, contacts: np.ndarray, centroid: np.ndarray) -> np.ndarray:
-        """(n_blocks, 6) N, N m whose work given motion does: ``reaction`` on moving blocks, on fixed ones what holds
-        them against their CONTACT rows."""
+        """(n_blocks, 6) forces that do the work of prescribed motion, N and N m: ``reaction`` on moving blocks, the
+        opposite of contact forces (CONTACT rows) on fixed ones."""
         out = np.zeros((self.blocks.n_blocks, 6)) if reaction is None else reaction.copy()
         if self.imposed is not None and self.imposed.moving_base:
             driven = self.imposed.increment.any(axis=1)
@@ -191,9 +194,8 @@ class StepActions:
     def acted(
         self, settled: Settled, unknowns: np.ndarray, contacts: np.ndarray, points: np.ndarray, new_vertices: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray | None, dict[str, float]]:
-        """(POINT_FORCE rows ``points`` with those of bolts and moved points, (n_blocks, 6) N and N m that it takes to
-        give moving blocks their motion (None without), statistics), and the bolts remember the step. ``contacts``
-        CONTACT rows."""
+        """(POINT_FORCE rows ``points`` plus those of bolts and point motions; reactions (n_blocks, 6) of block motions,
+        N and N m, None without; statistics). Updates the bolts' history. ``contacts``: CONTACT rows."""
         rows, reaction, statistics = [points], None, {}
         if self.imposed is not None:
             pushes = [
@@ -210,7 +212,7 @@ class StepActions:
             for label, row in zip(labels(self.loads.bolts), self.memory, strict=True):
                 statistics[f"bolt:{label}"] = float(row["force"])
         all_points = np.concatenate([part.astype(POINT_FORCE, copy=False) for part in rows])
-        for k, motion in enumerate(self.loads.point_motions):
+        for k in range(len(self.loads.point_motions)):
             fx, fy = at_points[k]["force"]
             statistics[f"reaction_x:point {k + 1}"], statistics[f"reaction_y:point {k + 1}"] = float(fx), float(fy)
         driven = [motion.block for motion in self.loads.block_motions]

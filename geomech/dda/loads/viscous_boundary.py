@@ -1,10 +1,9 @@
-"""Edges that let waves out: dashpots of the rock's own wave impedance all along them.
+"""Viscous boundaries: dashpots with the rock's wave impedance along edges, t = −ρ (c_p n⊗n + c_s s⊗s) v.
 
-A plane wave that travels with particle velocity v across an edge leaves the traction −ρ(c_p n⊗n + c_s s⊗s) v on it:
-dashpots of that strength take it up without an echo when it arrives straight on (Lysmer & Kuhlemeyer 1969), almost
-without at up to 60° from that. A wave that comes in with the particle velocity w is driven by twice its own stress,
-2ρ(c_p n⊗n + c_s s⊗s) w, one half for the wave and one against the dashpots (Joyner & Chen 1975). Velocity is the mean
-of the step, d/dt.
+A plane wave of particle velocity v puts the traction −ρ (c_p n⊗n + c_s s⊗s) v on an edge. Dashpots of that strength
+absorb it at normal incidence without reflection, and almost so up to 60° from it (Lysmer & Kuhlemeyer 1969). An
+incoming wave of particle velocity w is applied as twice its stress, 2ρ (c_p n⊗n + c_s s⊗s) w: one half drives the wave,
+one half the dashpots (Joyner & Chen 1975). The velocity is the mean of the step, d/dt.
 """
 
 from __future__ import annotations
@@ -24,8 +23,9 @@ _GAUSS = 0.5 + np.array([-0.5, 0.5]) / np.sqrt(3.0)
 
 @dataclass(frozen=True, eq=False)
 class QuietEdges:
-    """Dashpots on edges of moving blocks: ``edge`` and ``block`` (n,), ``ends`` (n, 2, 2) m, ``drag`` (n, 2, 2) Pa s/m
-    with traction = ``drag`` (2 ``incoming`` − velocity), ``incoming`` (n, 2) m/s."""
+    """Dashpots on edges of moving blocks: traction = ``drag`` (2 ``incoming`` − velocity).
+
+    ``edge``, ``block`` (n,); ``ends`` (n, 2, 2) m; ``drag`` (n, 2, 2) Pa s/m; ``incoming`` (n, 2) m/s."""
 
     edge: np.ndarray
     block: np.ndarray
@@ -44,8 +44,8 @@ class QuietEdges:
         stiffness: np.ndarray,
         fixed: np.ndarray,
     ) -> QuietEdges:
-        """Those that ``boundaries`` name, at ``time`` on the current ``vertices``; ``density`` (n_blocks,) kg/m³ and
-        ``stiffness`` (n_blocks, 3, 3) Pa; not those of ``fixed`` (n_blocks,) blocks."""
+        """Dashpots of ``boundaries`` at ``time`` s on the current ``vertices``, without edges of ``fixed`` (n_blocks,)
+        blocks; ``density`` (n_blocks,) kg/m³, ``stiffness`` (n_blocks, 3, 3) Pa."""
         edge, incoming = [], []
         for boundary in boundaries:
             named = blocks.edges_named(boundary.edge_name)
@@ -68,7 +68,7 @@ class QuietEdges:
 
     def assemble(self, matrix: np.ndarray, right: np.ndarray, order: np.ndarray, middle: Middle, dt: float) -> None:
         """Add the dashpots to the blocks' own ``matrix`` (n, 6, 6) and ``right`` (n, 6), scaled as in `assembly`;
-        ``middle`` is where they act."""
+        ``middle`` is the configuration on which they act."""
         along = self.ends[:, 1] - self.ends[:, 0]
         half = 0.5 * np.hypot(along[:, 0], along[:, 1])
         scale = np.ones((len(self.edge), 6))
@@ -81,7 +81,8 @@ class QuietEdges:
             np.add.at(right, rows, 2.0 * np.einsum("nij,nj->ni", weighed, self.incoming))
 
     def rows(self, increment: np.ndarray, middle: Middle, dt: float) -> np.ndarray:
-        """EDGE_FORCE rows of what acted in a step whose displacement was ``increment`` (n_blocks, 6)."""
+        """EDGE_FORCE rows of the dashpots' tractions in a step of ``dt`` s with the displacement ``increment``
+        (n_blocks, 6)."""
         out = np.zeros(len(self.edge), EDGE_FORCE)
         out["block"], out["edge"] = self.block, self.edge
         out["start"], out["end"] = self.ends[:, 0], self.ends[:, 1]

@@ -1,4 +1,4 @@
-"""Water pressure on the edges of blocks below a water table."""
+"""Water pressure on edges of blocks below a water table, p = γw · depth."""
 
 from __future__ import annotations
 
@@ -7,15 +7,16 @@ import numpy as np
 from ...model import Blocks, WaterTable
 from .force_records import EDGE_FORCE
 
-#: Faces of drained blocks, and the ground, lie against others within this part of the drawing's size.
+#: Faces lie against drained blocks, or on the ground, within this part of the drawing's size.
 _AGAINST = 1e-6
 
 
 def wet_pieces(
     blocks: Blocks, edges: np.ndarray, drained: np.ndarray | None, ground: np.ndarray | None = None
 ) -> tuple[np.ndarray, np.ndarray]:
-    """(edges (n,), spans (n, 2) from 0 to 1 along them) of ``edges`` without what lies against ``drained`` (n_blocks,)
-    blocks or on the ``ground`` (m, 2), in reference positions."""
+    """Wet pieces of ``edges``: (edges (n,), spans (n, 2) from 0 to 1 along them), in reference positions.
+
+    Parts that lie against ``drained`` (n_blocks,) blocks or on the ``ground`` (m, 2) are left out."""
     whole = np.tile([0.0, 1.0], (len(edges), 1))
     against = []
     if drained is not None and drained.any():
@@ -39,7 +40,7 @@ def wet_pieces(
             dry.setdefault(k, []).append((low[k], high[k]))
     kept, spans = [], []
     for k in range(len(edges)):
-        # Where one dry piece ends beside the next, or beside the edge's end, nothing wet is left between.
+        # Gaps of round-off between dry pieces, or at the edge's end, are not wet.
         at, gap = 0.0, near / np.sqrt(square[k]) if k in dry else 0.0
         for low, high in sorted(dry.get(k, [])):
             if low > at + gap:
@@ -60,11 +61,11 @@ def pressed_edges(
     vertices: np.ndarray,
     next_vertex: np.ndarray,
 ) -> np.ndarray:
-    """EDGE_FORCE rows of the water's pressure on the ``pieces`` (as from `wet_pieces`) of edges of the current
-    ``vertices``; ``owner`` (n_vertices,) and ``next_vertex`` as in `Blocks`.
+    """EDGE_FORCE rows of the water pressure on ``pieces`` (from `wet_pieces`) of edges at ``time`` s.
 
-    p = γw · depth below the line, linear along every piece of an edge that lies wet and between two of the line's
-    points. Around a block under a level table the pieces add up to γw times its wet area (Archimedes) to round-off.
+    ``vertices`` (n_vertices, 2) current, m; ``owner`` (n_vertices,) block; ``next_vertex`` as in `Blocks`. The pressure
+    γw · depth is linear along every wet piece between two points of the table. Around a block under a level table the
+    forces add up to γw times its wet area (Archimedes) to round-off.
     """
     line_x, line_y = water.line_at(time)
     edges, spans = pieces
@@ -73,7 +74,7 @@ def pressed_edges(
     low = np.minimum(start[:, 1], start[:, 1] + along[:, 1]) < line_y.max()
     edges, shares, start, along = edges[low], spans[low], start[low], along[low]
     if len(line_x) > 1:
-        # Where the edge passes a point of the line, the pressure along it has a kink.
+        # Below a point of the line, the pressure along the edge has a kink.
         with np.errstate(divide="ignore", invalid="ignore"):
             kinks = np.nan_to_num((line_x - start[:, :1]) / along[:, :1], nan=0.0, posinf=0.0, neginf=0.0)
         shares = np.sort(np.hstack([shares, np.clip(kinks, shares[:, :1], shares[:, 1:])]), axis=1)
@@ -100,7 +101,7 @@ def pressed_edges(
     rows["end"] = np.where(
         (s1 == 1.0)[:, None], vertices[next_vertex[rows["edge"]]], start[row] + s1[:, None] * along[row]
     )
-    # Inward: the edge's direction turned by +90°.
+    # Inward: the edge's direction rotated by +90°.
     length = np.hypot(along[row, 0], along[row, 1])
     inward = np.stack([-along[row, 1], along[row, 0]], axis=1) / length[:, None]
     rows["traction"][:, 0], rows["traction"][:, 1] = p0[:, None] * inward, p1[:, None] * inward

@@ -15,6 +15,8 @@ Contacts of the step hold what they are there to hold; what is found here went i
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from ...compiled import kept, part
@@ -138,110 +140,143 @@ def _crossed(vertices, next_vertex, start, a, b, pressed, least, length):
     return -1, -1, 0.0
 
 
+class Paths(NamedTuple):
+    """Outlines ``before`` and ``after`` a step (n_vertices, 2) m, the ``next_vertex`` of each (n_vertices,), and where those
+    of a block begin, ``vertex_start`` (n_blocks + 1,)."""
+
+    before: np.ndarray
+    after: np.ndarray
+    next_vertex: np.ndarray
+    vertex_start: np.ndarray
+
+
+class Allowed(NamedTuple):
+    """What is no crossing: ``pressed`` (n_vertices,) m is the deepest that contacts at a vertex are pressed in by, ``size``
+    (n_blocks,) √area and ``rounding`` (n_vertices,) the lengths over which corners are rounded, m."""
+
+    pressed: np.ndarray
+    size: np.ndarray
+    rounding: np.ndarray
+
+
+@part(fastmath=False, error_model="numpy", nogil=True)
+def _entered_by(paths, v, f, left, first, last):
+    """The edge by which vertex ``v`` has last come in before it ``left`` by the edge ``f`` (the part of the step), and
+    where along it; −1 for none."""
+    before, after, next_vertex = paths.before, paths.after, paths.next_vertex
+    x0, y0, x1, y1 = before[v, 0], before[v, 1], after[v, 0], after[v, 1]
+    entry, at, when = -1, 0.0, -1.0
+    for e in range(first, last):
+        h0, r0, _ = _seen(before, next_vertex, x0, y0, e)
+        h1, r1, _ = _seen(after, next_vertex, x1, y1, e)
+        if h0 < 0.0 or h1 >= 0.0 or e == f:
+            continue
+        t = h0 / (h0 - h1)
+        r = r0 + t * (r1 - r0)
+        if 0.0 <= r <= 1.0 and when < t <= left:
+            entry, at, when = e, r, t
+    return entry, at
+
+
+@part(fastmath=False, error_model="numpy", nogil=True)
+def _gone_through(paths, v, first, last, allowed, longest):
+    """The edge by which vertex ``v`` has come into the block with the vertices from ``first`` to ``last``, through which
+    it has gone, and how deep, m; −1 for none. It is none of what is ``allowed`` m deep, or cuts a corner of the
+    ``longest`` way round, m."""
+    before, after, next_vertex = paths.before, paths.after, paths.next_vertex
+    x0, y0, x1, y1 = before[v, 0], before[v, 1], after[v, 0], after[v, 1]
+    was, beside = np.inf, -1
+    for f in range(first, last):
+        g0, s0, _ = _seen(before, next_vertex, x0, y0, f)
+        if g0 >= -allowed:
+            continue
+        g1, s1, _ = _seen(after, next_vertex, x1, y1, f)
+        if g1 <= 0.0:
+            continue
+        left = g0 / (g0 - g1)
+        out = s0 + left * (s1 - s0)
+        if out < 0.0 or out > 1.0:
+            continue
+        if was == np.inf:
+            was, beside = _depth(x0, y0, before, next_vertex, first, last)
+        if was > 0.0 and was > allowed:
+            continue  # it lay deep in the block before: no way out is the wrong one
+        # By which edge it has come in: the last one before it left, or the one that it lay on.
+        entry, at = _entered_by(paths, v, f, left, first, last)
+        if entry < 0 and was > 0.0:
+            _, at, _ = _seen(before, next_vertex, x0, y0, beside)
+            entry, at = beside, min(1.0, max(0.0, at))
+        if entry >= 0 and _way(before, next_vertex, entry, at, f, out) > longest:
+            return entry, min(-g0, g1)
+    return -1, 0.0
+
+
+@part(fastmath=False, error_model="numpy", nogil=True)
+def _of_vertex(paths, box, allow, v, j, smaller):
+    """How vertex ``v`` has crossed the outline of block ``j`` (−1: not at all), by which edge, and how deep, m; ``smaller``
+    m is the size of the smaller block."""
+    before, after = paths.before, paths.after
+    first, last = paths.vertex_start[j], paths.vertex_start[j + 1]
+    x0, y0, x1, y1 = before[v, 0], before[v, 1], after[v, 0], after[v, 1]
+    if max(x0, x1) < box[j, 0] or min(x0, x1) > box[j, 2] or max(y0, y1) < box[j, 1] or min(y0, y1) > box[j, 3]:
+        return -1, -1, 0.0
+    least = _DEPTH * smaller
+    allowed = _PRESSED * allow.pressed[v] + least
+    now, near = _depth(x1, y1, after, paths.next_vertex, first, last)
+    if now > allowed:
+        allowed += ROUNDED_OVERLAP * _rounded_off(v, after, allow.rounding, first, last)
+    if now > allowed:
+        was, _ = _depth(x0, y0, before, paths.next_vertex, first, last)
+        return (INTO, near, now) if now > was + least else (-1, -1, 0.0)
+    longest = max(_CORNER * smaller, _CUT * allow.rounding[v])
+    edge, depth = _gone_through(paths, v, first, last, allowed, longest)
+    return (THROUGH, edge, depth) if edge >= 0 else (-1, -1, 0.0)
+
+
+@part(fastmath=False, error_model="numpy", nogil=True)
+def _tell(found, count, pair, vertex, edge, kind, depth):
+    """Write a crossing to the row ``count`` of ``found`` where it has room; how many there are then."""
+    if count < found.shape[0]:
+        found[count, 0], found[count, 1], found[count, 2] = pair, vertex, edge
+        found[count, 3], found[count, 4] = kind, depth
+    return count + 1
+
+
 @kept(fastmath=False, error_model="numpy", nogil=True)
-def _find(pairs, before, after, next_vertex, start, box, pressed, size, rounding, found):
+def _find(pairs, paths, box, allow, found):
     """Number of crossings of ``pairs``, the first of them in ``found`` (m, 6) as far as it has room."""
-    count = 0
+    count, start = 0, paths.vertex_start
     for k in range(pairs.shape[0]):
         a, b = pairs[k, 0], pairs[k, 1]
         if box[a, 0] > box[b, 2] or box[b, 0] > box[a, 2] or box[a, 1] > box[b, 3] or box[b, 1] > box[a, 3]:
             continue
-        smaller = min(size[a], size[b])
-        least = _DEPTH * smaller
+        smaller = min(allow.size[a], allow.size[b])
         known = count
         for role in range(2):
             i, j = (a, b) if role == 0 else (b, a)
-            first, last = start[j], start[j + 1]
             for v in range(start[i], start[i + 1]):
-                x0, y0, x1, y1 = before[v, 0], before[v, 1], after[v, 0], after[v, 1]
-                if max(x0, x1) < box[j, 0] or min(x0, x1) > box[j, 2]:
-                    continue
-                if max(y0, y1) < box[j, 1] or min(y0, y1) > box[j, 3]:
-                    continue
-                allowed = _PRESSED * pressed[v] + least
-                kind, edge, depth = -1, -1, 0.0
-                now, near = _depth(x1, y1, after, next_vertex, first, last)
-                was, beside = np.inf, -1
-                if now > allowed:
-                    allowed += ROUNDED_OVERLAP * _rounded_off(v, after, rounding, first, last)
-                if now > allowed:
-                    was, beside = _depth(x0, y0, before, next_vertex, first, last)
-                    if now > was + least:
-                        kind, edge, depth = INTO, near, now
-                if kind < 0 and now <= allowed:
-                    for f in range(first, last):
-                        g0, s0, _ = _seen(before, next_vertex, x0, y0, f)
-                        if g0 >= -allowed:
-                            continue
-                        g1, s1, _ = _seen(after, next_vertex, x1, y1, f)
-                        if g1 <= 0.0:
-                            continue
-                        left = g0 / (g0 - g1)
-                        out = s0 + left * (s1 - s0)
-                        if out < 0.0 or out > 1.0:
-                            continue
-                        if was == np.inf:
-                            was, beside = _depth(x0, y0, before, next_vertex, first, last)
-                        if was > 0.0 and was > allowed:
-                            continue  # it lay deep in the block before: no way out is the wrong one
-                        # By which edge it has come in: the last one before it left, or the one that it lay on.
-                        entry, at, when = -1, 0.0, -1.0
-                        for e in range(first, last):
-                            h0, r0, _ = _seen(before, next_vertex, x0, y0, e)
-                            h1, r1, _ = _seen(after, next_vertex, x1, y1, e)
-                            if h0 < 0.0 or h1 >= 0.0 or e == f:
-                                continue
-                            t = h0 / (h0 - h1)
-                            r = r0 + t * (r1 - r0)
-                            if 0.0 <= r <= 1.0 and when < t <= left:
-                                entry, at, when = e, r, t
-                        if entry < 0 and was > 0.0:
-                            _, at, _ = _seen(before, next_vertex, x0, y0, beside)
-                            entry, at = beside, min(1.0, max(0.0, at))
-                        if entry < 0:
-                            continue
-                        if _way(before, next_vertex, entry, at, f, out) > max(_CORNER * smaller, _CUT * rounding[v]):
-                            kind, edge, depth = THROUGH, entry, min(-g0, g1)
-                            break
+                kind, edge, depth = _of_vertex(paths, box, allow, v, j, smaller)
                 if kind >= 0:
-                    if count < found.shape[0]:
-                        found[count, 0], found[count, 1], found[count, 2] = k, v, edge
-                        found[count, 3], found[count, 4] = kind, depth
-                    count += 1
+                    count = _tell(found, count, k, v, edge, kind, depth)
         if count > known:
             continue
-        length = _TIPS * min(rounding[start[a]], rounding[start[b]])
-        vertex, edge, depth = _crossed(after, next_vertex, start, a, b, pressed, least, length)
-        if vertex >= 0 and _crossed(before, next_vertex, start, a, b, pressed, least, length)[0] < 0:
-            if count < found.shape[0]:
-                found[count, 0], found[count, 1], found[count, 2] = k, vertex, edge
-                found[count, 3], found[count, 4] = INTO, depth
-            count += 1
+        least, length = _DEPTH * smaller, _TIPS * min(allow.rounding[start[a]], allow.rounding[start[b]])
+        pressed, following = allow.pressed, paths.next_vertex
+        vertex, edge, depth = _crossed(paths.after, following, start, a, b, pressed, least, length)
+        if vertex >= 0 and _crossed(paths.before, following, start, a, b, pressed, least, length)[0] < 0:
+            count = _tell(found, count, k, vertex, edge, INTO, depth)
     return count
 
 
 def crossings(
-    before: np.ndarray,
-    after: np.ndarray,
-    next_vertex: np.ndarray,
-    vertex_start: np.ndarray,
-    pairs: np.ndarray,
-    box: np.ndarray,
-    pressed: np.ndarray,
-    size: np.ndarray,
-    rounding: np.ndarray,
+    paths: Paths, pairs: np.ndarray, box: np.ndarray, allow: Allowed
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Crossings of the ``pairs`` (k, 2) of blocks in a step from ``before`` to ``after`` (both (n_vertices, 2) m): pair,
-    vertex, the edge that it went in by, kind, and depth, m, (n,) each.
-
-    ``box`` (n_blocks, 4) holds each block before and after; ``pressed`` (n_vertices,) m is the deepest that contacts at
-    a vertex are pressed in by, ``size`` (n_blocks,) √area and ``rounding`` (n_vertices,) the lengths over which corners are
-    rounded, m.
-    """
+    """Crossings of the ``pairs`` (k, 2) of blocks in a step on these ``paths``: pair, vertex, the edge that it went in by,
+    kind, and depth, m, (n,) each. ``box`` (n_blocks, 4) holds each block before and after."""
     room = 64
     while True:
         found = np.empty((room, 6))
-        count = _find(pairs, before, after, next_vertex, vertex_start, box, pressed, size, rounding, found)
+        count = _find(pairs, paths, box, allow, found)
         if count <= room:
             break
         room = count

@@ -21,7 +21,7 @@ from ..contact_detection.neighbour_search import boxes
 from ..counters import Work
 from ..kinematics.midpoint_configuration import affine_motion
 from ..kinematics.simplex_integration import fastest_vertex
-from .continuous_collision import INTO, THROUGH, crossings
+from .continuous_collision import INTO, THROUGH, Allowed, Paths, crossings
 from .relative_motion import Windows
 
 if TYPE_CHECKING:
@@ -164,9 +164,11 @@ class StepLimits:
         pairs = self._finder.near_boxes(box)
         rows = result.contacts
         pressed = self._pressed(rows, len(before))
-        pair, vertex, edge, kind, depth = crossings(
-            before, after, self._next, self._start, pairs, box, pressed, self._size, self._finder.rounding
+        paths, allow = (
+            Paths(before, after, self._next, self._start),
+            Allowed(pressed, self._size, self._finder.rounding),
         )
+        pair, vertex, edge, kind, depth = crossings(paths, pairs, box, allow)
         if len(pair):
             real = self._finder.may_touch(vertex, edge)
             shallow = (kind == INTO) & (depth <= _MISFIT * self._size[pairs[pair]].min(axis=1))

@@ -19,6 +19,8 @@ that of its lane, whatever stands beside it, so it does not depend on what else 
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from ...compiled import kept, part
@@ -74,6 +76,26 @@ _B, _D, _STEP = 2 * WIDTH, 4 * WIDTH, 6 * WIDTH
 
 _jit = kept(fastmath=False, error_model="numpy", nogil=True)
 _part = part(fastmath=False, error_model="numpy", nogil=True)
+#: What stands in the kernel itself, so that its products and the sums behind them are fused as if written there.
+_inlined = part(fastmath=False, error_model="numpy", nogil=True, forceinline=True)
+
+
+class Elements(NamedTuple):
+    """Straight elements: ``start``, ``end`` (m, 2) m and ``kind`` (m,), see `shape_functions`."""
+
+    start: np.ndarray
+    end: np.ndarray
+    kind: np.ndarray
+
+
+class Kernel(NamedTuple):
+    """Of elements in rock of Poisson's ratio ``nu``: jumps, or line forces (``force``); a point within ``tol`` m of an
+    open one is on it, on the given ``side``."""
+
+    nu: float
+    tol: float
+    side: float
+    force: bool
 
 
 @_part
@@ -190,7 +212,7 @@ def moments(kind, xp, xm, y, order, table, a, b, d):
 
 
 @_part
-def _sort(points, first, n, start, end, e, tol, side, tile, chosen, count):
+def _sort(points, first, n, elements, e, tol, side, tile, chosen, count):
     """Points ``first`` … + n in the frame of element ``e``, lengths in half lengths c, sorted by distance.
 
     ``points`` x … y … flat, each padded to whole lanes; ``tile``: x + 1, x − 1, y (``_TILE`` each, a fourth is
@@ -200,7 +222,7 @@ def _sort(points, first, n, start, end, e, tol, side, tile, chosen, count):
     A point within ``tol`` of the open element is put on it, on the given side; one that meets an end is moved off by
     1e-14 along the normal, so that what is infinite there stays finite.
     """
-    sx, sy, ex, ey = start[e, 0], start[e, 1], end[e, 0], end[e, 1]
+    sx, sy, ex, ey = elements.start[e, 0], elements.start[e, 1], elements.end[e, 0], elements.end[e, 1]
     lx, ly = ex - sx, ey - sy
     length = np.sqrt(lx * lx + ly * ly)
     tx, ty = lx / length, ly / length
@@ -240,16 +262,39 @@ def _sort(points, first, n, start, end, e, tol, side, tile, chosen, count):
     return c, tx, ty
 
 
+@_part
+def _force_tractions(w, n1, factor, nu, y, turn, parts):
+    """Traction along the normal + i times that along the tangent, of line forces along and across an element, into
+    ``parts``: half the deviator (σyy − σxx)/2 + i shear, turned, and half the trace."""
+    for k in range(n1):
+        at = k * _STEP
+        a, b = -factor * load_complex(w, at), (-factor * y) * load_complex(w, at + _B)
+        along = -(times_i(b) + 2.0 * (1.0 - nu) * a)
+        store(parts, at, along * turn + re(a))
+        store(parts, at + _B, (b + (1.0 - 2.0 * nu) * times_i(a)) * turn - im(a))
+
+
+@_part
+def _jump_tractions(w, n1, f2, y, turn, parts):
+    """The same of jumps."""
+    f3 = f2 * y
+    for k in range(n1):
+        at = k * _STEP
+        b, d = f2 * load_complex(w, at + _B), (f3 * load_complex(w, at + _D)) * turn
+        store(parts, at, d - times_i(b) * turn - im(b))
+        store(parts, at + _B, times_i(d) - re(b))
+
+
 @_jit
-def tractions(points, tangents, per, first, last, start, end, kind, order, nu, tol, side, force, table, nodal, out):
+def tractions(points, tangents, per, first, last, elements, order, kernel, table, nodal, out):
     """Traction (along the tangent, along the normal left of it) at points from unit densities.
 
     ``points``, ``tangents`` flat (`lanes_of`), ``per`` of the points an element; those from ``first`` to ``last`` are
-    done. Sources: ``start``, ``end`` (m, 2), ``kind`` (m,). ``nodal`` (4, p+1, p+1) turns the monomials of each kind
+    done. Sources: `Elements`, which act as the `Kernel` says. ``nodal`` (4, p+1, p+1) turns the monomials of each kind
     into unknowns. ``out`` flat, (2(p+1)m, 2n): rows run element, component (along, normal), unknown; columns element,
-    component, node. ``force``: line forces instead of jumps.
+    component, node.
     """
-    n1 = order + 1
+    nu, n1 = kernel.nu, order + 1
     w = np.empty((MAX_ORDER + 1) * _STEP)
     parts = np.empty((MAX_ORDER + 1) * _STEP)
     tile = np.empty(4 * _TILE)
@@ -258,15 +303,15 @@ def tractions(points, tangents, per, first, last, start, end, kind, order, nu, t
     places = np.empty(_TILE, np.int64)
     lane_places = np.empty(WIDTH, np.int64)
     below = len(tangents) // 2
-    height = len(out) // (2 * n1 * len(start))
+    height = len(out) // (2 * n1 * len(elements.start))
     factor = 1.0 / (4.0 * np.pi * (1.0 - nu))
     for begin in range(first, last, _TILE):
         n = min(_TILE, last - begin)
         for i in range(n):
             places[i] = (begin + i) // per * per + begin + i
-        for e in range(len(start)):
-            c, tx, ty = _sort(points, begin, n, start, end, e, tol, side, tile, chosen, count)
-            source = kind[e]
+        for e in range(len(elements.start)):
+            c, tx, ty = _sort(points, begin, n, elements, e, kernel.tol, kernel.side, tile, chosen, count)
+            source = elements.kind[e]
             for distance in range(_CLASSES):
                 row = distance * _ROW
                 for batch in range(row, row + count[distance], WIDTH):
@@ -279,21 +324,10 @@ def tractions(points, tangents, per, first, last, start, end, kind, order, nu, t
                     turn = turn * turn
                     # Traction along the normal + i times that along the tangent, from what acts along and across the
                     # element: (half the deviator (σyy − σxx)/2 + i shear), turned, and half the trace.
-                    if force:
-                        for k in range(n1):
-                            at = k * _STEP
-                            a, b = -factor * load_complex(w, at), (-factor * y) * load_complex(w, at + _B)
-                            along = -(times_i(b) + 2.0 * (1.0 - nu) * a)
-                            store(parts, at, along * turn + re(a))
-                            store(parts, at + _B, (b + (1.0 - 2.0 * nu) * times_i(a)) * turn - im(a))
+                    if kernel.force:
+                        _force_tractions(w, n1, factor, nu, y, turn, parts)
                     else:
-                        f2 = factor / c
-                        f3 = f2 * y
-                        for k in range(n1):
-                            at = k * _STEP
-                            b, d = f2 * load_complex(w, at + _B), (f3 * load_complex(w, at + _D)) * turn
-                            store(parts, at, d - times_i(b) * turn - im(b))
-                            store(parts, at + _B, times_i(d) - re(b))
+                        _jump_tractions(w, n1, factor / c, y, turn, parts)
                     for k in range(WIDTH):
                         lane_places[k] = places[chosen[batch + k]]
                     for j in range(n1):
@@ -311,12 +345,120 @@ def tractions(points, tangents, per, first, last, start, end, kind, order, nu, t
                         scatter(out, at, lane_places, 0, im(normal))
 
 
+@_part
+def _fold(p, q, moments, n, folded_p, folded_q):
+    """The first ``n`` multipoles of an element with the monomial densities ``p`` and ``q`` (p+1,), of the ``moments`` of
+    its weight."""
+    for j in range(n):
+        folded_p[j] = 0.0
+        folded_q[j] = 0.0
+        for k in range(len(p)):
+            folded_p[j] += p[k] * moments[j + k]
+            folded_q[j] += q[k] * moments[j + k]
+
+
+@_inlined
+def _near_sums(kind, zp, zm, p, q, moments, force):
+    """The moments, their two derivatives and, for forces, logarithms, each summed with ``p`` and with ``q``: closed
+    form."""
+    nothing = splat(0.0)
+    zero = both(nothing, nothing)
+    ap, aq, bp, bq, dp, dq = zero, zero, zero, zero, zero, zero
+    log_p, log_q, log_r = nothing, nothing, nothing
+    z = 0.5 * (zp + zm)
+    if force:
+        log_r = 0.5 * log(norm(zm))
+    a, b, d = _first_moment(kind, zp, zm)
+    # log|ζ + 1|.
+    other = log_r + re(a)
+    for k in range(len(p)):
+        fp, fq = p[k], q[k]
+        ap = ap + fp * a
+        aq = aq + fq * a
+        bp = bp + fp * b
+        bq = bq + fq * b
+        dp = dp + fp * d
+        dq = dq + fq * d
+        d = 2.0 * b + z * d
+        b = a + z * b
+        a = z * a - moments[k]
+        if force:
+            # ∫ t^k log|ζ − t| dt by parts.
+            part = (re(a) + log_r + other) / (k + 1.0)
+            log_p = log_p + fp * part
+            log_q = log_q + fq * part
+            other = -other
+    return ap, aq, bp, bq, dp, dq, log_p, log_q
+
+
+@_inlined
+def _far_sums(zp, zm, last, folded_p, folded_q, force):
+    """The same by the multipoles up to the number ``last``."""
+    nothing = splat(0.0)
+    zero = both(nothing, nothing)
+    ap, aq, bp, bq, dp, dq, lp, lq = zero, zero, zero, zero, zero, zero, zero, zero
+    log_p, log_q, log_r = nothing, nothing, nothing
+    z = 0.5 * (zp + zm)
+    if force:
+        log_r = 0.5 * log(norm(z))
+    i = 1.0 / z
+    u, v = 2.0 * re(i), norm(i)
+    for j in range(last, -1, -1):
+        fp, fq = folded_p[j], folded_q[j]
+        if force and j > 0:
+            lp, lq = term(lp, u, v, fp / j), term(lq, u, v, fq / j)
+        ap, aq = term(ap, u, v, fp), term(aq, u, v, fq)
+        fp *= j + 1.0
+        fq *= j + 1.0
+        bp, bq = term(bp, u, v, fp), term(bq, u, v, fq)
+        dp, dq = term(dp, u, v, fp * (j + 2.0)), term(dq, u, v, fq * (j + 2.0))
+    if force:
+        log_p = folded_p[0] * log_r - re(value(lp, i) * i)
+        log_q = folded_q[0] * log_r - re(value(lq, i) * i)
+    lead = i
+    ap, aq = value(ap, i) * lead, value(aq, i) * lead
+    lead = -(lead * i)
+    bp, bq = value(bp, i) * lead, value(bq, i) * lead
+    lead = -(lead * i)
+    dp, dq = value(dp, i) * lead, value(dq, i) * lead
+    return ap, aq, bp, bq, dp, dq, log_p, log_q
+
+
+@_inlined
+def _of_forces(sums, y, c, nu, p, q, moments):
+    """Half the trace, half the deviator (σyy − σxx)/2 with i times the shear, and 2μ times the displacement, of line
+    forces."""
+    ap, aq, bp, bq, _, _, log_p, log_q = sums
+    half = re(ap) - im(aq)
+    deviator = y * (bq - times_i(bp)) - 2.0 * (1.0 - nu) * ap + (1.0 - 2.0 * nu) * times_i(aq)
+    sum_p, sum_q = 0.0, 0.0
+    for k in range(len(p)):
+        sum_p += p[k] * moments[k]
+        sum_q += q[k] * moments[k]
+    log_p = (3.0 - 4.0 * nu) * (log_p + np.log(c) * sum_p) - y * (im(ap) + re(aq))
+    log_q = (3.0 - 4.0 * nu) * (log_q + np.log(c) * sum_q) + y * (im(aq) - re(ap))
+    return half, deviator, c * both(log_p, log_q)
+
+
+@_inlined
+def _of_jumps(sums, y, c, nu):
+    """The same of jumps."""
+    ap, aq, bp, bq, dp, dq, _, _ = sums
+    half = -(im(bp) + re(bq)) / c
+    deviator = (y * (dp + times_i(dq)) - times_i(bp)) / c
+    moved = both(
+        y * (im(bq) - re(bp)) - 2.0 * (1.0 - nu) * im(ap) - (1.0 - 2.0 * nu) * re(aq),
+        y * (im(bp) + re(bq)) - 2.0 * (1.0 - nu) * im(aq) + (1.0 - 2.0 * nu) * re(ap),
+    )
+    return half, deviator, moved
+
+
 @_jit
-def fields(points, first, last, start, end, kind, order, density, nu, tol, side, force, table, out):
-    """Add stress (xx, yy, xy) and 2μ times displacement (x, y) of elements with monomial densities (m, 2, p+1), local
-    components, to ``out`` (5, n) at ``points`` (flat, `lanes_of`). Line forces (``force``) are on ordinary elements
-    only."""
-    n1 = order + 1
+def fields(points, first, last, elements, order, density, kernel, table, out):
+    """Add stress (xx, yy, xy) and 2μ times displacement (x, y) of `Elements` with monomial densities (m, 2, p+1), local
+    components, that act as the `Kernel` says, to ``out`` (5, n) at ``points`` (flat, `lanes_of`). Line forces are on
+    ordinary elements only."""
+    nu, force, n1 = kernel.nu, kernel.force, order + 1
     highest = order + 1 if force else order
     factor = 1.0 / (4.0 * np.pi * (1.0 - nu))
     if force:
@@ -327,28 +469,22 @@ def fields(points, first, last, start, end, kind, order, density, nu, tol, side,
     count = np.empty(_CLASSES, np.int64)
     p, q = np.empty(n1), np.empty(n1)
     folded_p, folded_q = np.empty(table.shape[1]), np.empty(table.shape[1])
-    nothing = splat(0.0)
-    zero = both(nothing, nothing)
+    ordinary = table[0]
     for begin in range(first, last, _TILE):
         n = min(_TILE, last - begin)
         for i in range(5 * _TILE):
             total[i] = 0.0
-        for e in range(len(start)):
-            c, tx, ty = _sort(points, begin, n, start, end, e, tol, side, tile, chosen, count)
-            source = kind[e]
+        for e in range(len(elements.start)):
+            c, tx, ty = _sort(points, begin, n, elements, e, kernel.tol, kernel.side, tile, chosen, count)
+            source, weights = elements.kind[e], table[elements.kind[e]]
             for k in range(n1):
                 p[k] = factor * density[e, 0, k]
                 q[k] = factor * density[e, 1, k]
-            # The element's own multipoles, as many as its nearest points by series ask for.
+            # As many multipoles as the element's nearest points by series ask for.
             nearest = 1
             while nearest < _CLASSES - 1 and count[nearest] == 0:
                 nearest += 1
-            for j in range(_TERMS[nearest - 1] + n1):
-                folded_p[j] = 0.0
-                folded_q[j] = 0.0
-                for k in range(n1):
-                    folded_p[j] += p[k] * table[source, j + k]
-                    folded_q[j] += q[k] * table[source, j + k]
+            _fold(p, q, weights, _TERMS[nearest - 1] + n1, folded_p, folded_q)
             along = both(splat(tx), splat(ty))
             turn = both(splat(tx), splat(-ty))
             turn = turn * turn
@@ -357,73 +493,14 @@ def fields(points, first, last, start, end, kind, order, density, nu, tol, side,
                 for batch in range(row, row + count[distance], WIDTH):
                     y = gather(tile, 2 * _TILE, chosen, batch)
                     zp, zm = both(gather(tile, 0, chosen, batch), y), both(gather(tile, _TILE, chosen, batch), y)
-                    z = 0.5 * (zp + zm)
-                    near = distance == 0 or (distance == 1 and highest <= 5)
-                    # The moments, their derivatives and logarithms, summed with p and with q.
-                    ap, aq, bp, bq, dp, dq, lp, lq = zero, zero, zero, zero, zero, zero, zero, zero
-                    log_p, log_q, log_r = nothing, nothing, nothing
-                    if force:
-                        log_r = 0.5 * log(norm(zm) if near else norm(z))
-                    if near:
-                        a, b, d = _first_moment(source, zp, zm)
-                        # log|ζ + 1|.
-                        other = log_r + re(a)
-                        for k in range(n1):
-                            fp, fq = p[k], q[k]
-                            ap = ap + fp * a
-                            aq = aq + fq * a
-                            bp = bp + fp * b
-                            bq = bq + fq * b
-                            dp = dp + fp * d
-                            dq = dq + fq * d
-                            d = 2.0 * b + z * d
-                            b = a + z * b
-                            a = z * a - table[source, k]
-                            if force:
-                                # ∫ t^k log|ζ − t| dt by parts.
-                                part = (re(a) + log_r + other) / (k + 1.0)
-                                log_p = log_p + fp * part
-                                log_q = log_q + fq * part
-                                other = -other
+                    if distance == 0 or (distance == 1 and highest <= 5):
+                        sums = _near_sums(source, zp, zm, p, q, weights, force)
                     else:
-                        i = 1.0 / z
-                        u, v = 2.0 * re(i), norm(i)
-                        for j in range(_TERMS[distance - 1] + order, -1, -1):
-                            fp, fq = folded_p[j], folded_q[j]
-                            if force and j > 0:
-                                lp, lq = term(lp, u, v, fp / j), term(lq, u, v, fq / j)
-                            ap, aq = term(ap, u, v, fp), term(aq, u, v, fq)
-                            fp *= j + 1.0
-                            fq *= j + 1.0
-                            bp, bq = term(bp, u, v, fp), term(bq, u, v, fq)
-                            dp, dq = term(dp, u, v, fp * (j + 2.0)), term(dq, u, v, fq * (j + 2.0))
-                        if force:
-                            log_p = folded_p[0] * log_r - re(value(lp, i) * i)
-                            log_q = folded_q[0] * log_r - re(value(lq, i) * i)
-                        lead = i
-                        ap, aq = value(ap, i) * lead, value(aq, i) * lead
-                        lead = -(lead * i)
-                        bp, bq = value(bp, i) * lead, value(bq, i) * lead
-                        lead = -(lead * i)
-                        dp, dq = value(dp, i) * lead, value(dq, i) * lead
-                    # Half the trace, half the deviator (σyy − σxx)/2 with i times the shear, and the displacement.
+                        sums = _far_sums(zp, zm, _TERMS[distance - 1] + order, folded_p, folded_q, force)
                     if force:
-                        half = re(ap) - im(aq)
-                        deviator = y * (bq - times_i(bp)) - 2.0 * (1.0 - nu) * ap + (1.0 - 2.0 * nu) * times_i(aq)
-                        sum_p, sum_q = 0.0, 0.0
-                        for k in range(n1):
-                            sum_p += p[k] * table[0, k]
-                            sum_q += q[k] * table[0, k]
-                        log_p = (3.0 - 4.0 * nu) * (log_p + np.log(c) * sum_p) - y * (im(ap) + re(aq))
-                        log_q = (3.0 - 4.0 * nu) * (log_q + np.log(c) * sum_q) + y * (im(aq) - re(ap))
-                        moved = c * both(log_p, log_q)
+                        half, deviator, moved = _of_forces(sums, y, c, nu, p, q, ordinary)
                     else:
-                        half = -(im(bp) + re(bq)) / c
-                        deviator = (y * (dp + times_i(dq)) - times_i(bp)) / c
-                        moved = both(
-                            y * (im(bq) - re(bp)) - 2.0 * (1.0 - nu) * im(ap) - (1.0 - 2.0 * nu) * re(aq),
-                            y * (im(bp) + re(bq)) - 2.0 * (1.0 - nu) * im(aq) + (1.0 - 2.0 * nu) * re(ap),
-                        )
+                        half, deviator, moved = _of_jumps(sums, y, c, nu)
                     deviator = deviator * turn
                     moved = moved * along
                     # Lanes that repeat a point write the same sum to the same place.

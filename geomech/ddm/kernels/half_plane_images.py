@@ -28,7 +28,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from .full_plane import _CLASSES, _ROW, _TERMS, _TILE, _first_moment, _jit, _part, _sort
+from .full_plane import _CLASSES, _ROW, _TERMS, _TILE, _first_moment, _inlined, _jit, _part, _sort
 from .shape_functions import MAX_ORDER
 from .simd import (
     WIDTH,
@@ -127,15 +127,56 @@ def _moments(kind, distance, zp, zm, highest, table, w):
             t = (t - 3.0 * d) * i
 
 
+@_part
+def _force_tractions(w, n1, g, kappa, eta, ty, conj, turn, lift, parts):
+    """Traction along the normal + i times that along the tangent, of line forces along and across an element, into
+    ``parts``."""
+    conj2 = conj * conj
+    conj3 = conj2 * conj
+    for k in range(n1):
+        at = k * _STEP
+        a, b = load_complex(w, at), load_complex(w, at + _B)
+        w1 = eta * b + ty * load_complex(w, at + _STEP + _B)
+        w2 = eta * load_complex(w, at + _D) + ty * load_complex(w, at + _STEP + _D)
+        ww, aa = 2.0 * (conj * w1), kappa * (conj2 * a)
+        p, q = 2.0 * (conj2 * w2), kappa * (conj3 * b)
+        half = times_i(ww) - aa
+        whole = g * (lift * (times_i(p) - q) - turn * (half - a))
+        store(parts, at, whole + (2.0 * g) * re(half))
+        half = times_i(aa) - ww
+        whole = g * (lift * (times_i(q) - p) - turn * (half - times_i(a)))
+        store(parts, at + _B, whole + (2.0 * g) * re(half))
+
+
+@_part
+def _jump_tractions(w, n1, g, eta, ty, conj, turn, lift, parts):
+    """The same of jumps."""
+    conj2 = conj * conj
+    conj3 = conj2 * conj
+    for k in range(n1):
+        at = k * _STEP
+        b, d = load_complex(w, at + _B), load_complex(w, at + _D)
+        w2 = eta * d + ty * load_complex(w, at + _STEP + _D)
+        w3 = eta * load_complex(w, at + _T) + ty * load_complex(w, at + _STEP + _T)
+        ib = 0.5 * times_i(b)
+        half = ib + conj * w2
+        bent = conj * (0.5 * times_i(d)) + conj2 * w3
+        whole = g * (lift * bent - turn * (half + ib))
+        store(parts, at, whole + (2.0 * g) * re(half))
+        half, bent = times_i(half) + conj2 * b, times_i(bent) + conj3 * d
+        whole = g * (lift * bent - turn * (half + times_i(ib)))
+        store(parts, at + _B, whole + (2.0 * g) * re(half))
+
+
 @_jit
-def tractions(points, tangents, per, first, last, start, end, kind, order, nu, tol, force, table, nodal, out):
-    """Add to ``out`` what the free surface y = 0 adds to `kernels.tractions`.
+def tractions(points, tangents, per, first, last, elements, order, kernel, table, nodal, out):
+    """Add to ``out`` what the free surface y = 0 adds to `full_plane.tractions`.
 
     ``points`` are the mirror images of the rock's, all else as there; everything in the frame of the surface. An
     element that lies on the surface, as forces may, has the rock on its left and the images of points on it on its
     right.
     """
-    n1 = order + 1
+    nu, n1 = kernel.nu, order + 1
     w, parts = np.empty(_ROOM), np.empty(_ROOM)
     tile = np.empty(4 * _TILE)
     chosen = np.empty(_CLASSES * _ROW, np.int64)
@@ -143,20 +184,18 @@ def tractions(points, tangents, per, first, last, start, end, kind, order, nu, t
     places = np.empty(_TILE, np.int64)
     lane_places = np.empty(WIDTH, np.int64)
     below, height_at = len(tangents) // 2, len(points) // 2
-    height = len(out) // (2 * n1 * len(start))
+    height = len(out) // (2 * n1 * len(elements.start))
     f = 1.0 / (4.0 * np.pi * (1.0 - nu))
     kappa = 3.0 - 4.0 * nu
     for begin in range(first, last, _TILE):
         n = min(_TILE, last - begin)
         for i in range(n):
             places[i] = (begin + i) // per * per + begin + i
-        for e in range(len(start)):
-            c, tx, ty = _sort(points, begin, n, start, end, e, tol, -1.0, tile, chosen, count)
-            eta = 0.5 * (start[e, 1] + end[e, 1]) / c
-            source = kind[e]
+        for e in range(len(elements.start)):
+            c, tx, ty = _sort(points, begin, n, elements, e, kernel.tol, -1.0, tile, chosen, count)
+            eta = 0.5 * (elements.start[e, 1] + elements.end[e, 1]) / c
+            source = elements.kind[e]
             conj = both(splat(tx), splat(-ty))
-            conj2 = conj * conj
-            conj3 = conj2 * conj
             for distance in range(_CLASSES):
                 row = distance * _ROW
                 for batch in range(row, row + count[distance], WIDTH):
@@ -168,36 +207,10 @@ def tractions(points, tangents, per, first, last, start, end, kind, order, nu, t
                     turn = turn * turn
                     # The point's own y is minus its image's; 2i y φ'' c.
                     lift = times_i(turn) * ((-2.0 / c) * gather(points, begin + height_at, chosen, batch))
-                    if force:
-                        g = 0.5 * f
-                        for k in range(n1):
-                            at = k * _STEP
-                            a, b = load_complex(w, at), load_complex(w, at + _B)
-                            w1 = eta * b + ty * load_complex(w, at + _STEP + _B)
-                            w2 = eta * load_complex(w, at + _D) + ty * load_complex(w, at + _STEP + _D)
-                            ww, aa = 2.0 * (conj * w1), kappa * (conj2 * a)
-                            p, q = 2.0 * (conj2 * w2), kappa * (conj3 * b)
-                            half = times_i(ww) - aa
-                            whole = g * (lift * (times_i(p) - q) - turn * (half - a))
-                            store(parts, at, whole + (2.0 * g) * re(half))
-                            half = times_i(aa) - ww
-                            whole = g * (lift * (times_i(q) - p) - turn * (half - times_i(a)))
-                            store(parts, at + _B, whole + (2.0 * g) * re(half))
+                    if kernel.force:
+                        _force_tractions(w, n1, 0.5 * f, kappa, eta, ty, conj, turn, lift, parts)
                     else:
-                        g = f / c
-                        for k in range(n1):
-                            at = k * _STEP
-                            b, d = load_complex(w, at + _B), load_complex(w, at + _D)
-                            w2 = eta * d + ty * load_complex(w, at + _STEP + _D)
-                            w3 = eta * load_complex(w, at + _T) + ty * load_complex(w, at + _STEP + _T)
-                            ib = 0.5 * times_i(b)
-                            half = ib + conj * w2
-                            bent = conj * (0.5 * times_i(d)) + conj2 * w3
-                            whole = g * (lift * bent - turn * (half + ib))
-                            store(parts, at, whole + (2.0 * g) * re(half))
-                            half, bent = times_i(half) + conj2 * b, times_i(bent) + conj3 * d
-                            whole = g * (lift * bent - turn * (half + times_i(ib)))
-                            store(parts, at + _B, whole + (2.0 * g) * re(half))
+                        _jump_tractions(w, n1, f / c, eta, ty, conj, turn, lift, parts)
                     for k in range(WIDTH):
                         lane_places[k] = places[chosen[batch + k]]
                     for j in range(n1):
@@ -214,10 +227,67 @@ def tractions(points, tangents, per, first, last, start, end, kind, order, nu, t
                         pile(out, at, lane_places, 0, -im(normal))
 
 
+@_inlined
+def _of_forces(w, density, half_f, kappa, eta, c, ty, own, conj, zm, moments):
+    """conj φ₁', conj φ₁'', conj φ̄₀', and the displacement but for what is with the depth, of line forces."""
+    conj2 = conj * conj
+    zero = both(splat(0.0), splat(0.0))
+    half, bent, back, moved = zero, zero, zero, zero
+    end_log = zm * own
+    end_log = both(0.5 * log(norm(end_log)) + np.log(c), angle(im(end_log), re(end_log)))
+    start_log = end_log + load_complex(w, 0)
+    for k in range(density.shape[1]):
+        at = k * _STEP
+        a, b = load_complex(w, at), load_complex(w, at + _B)
+        w0 = eta * a + ty * load_complex(w, at + _STEP)
+        w1 = eta * b + ty * load_complex(w, at + _STEP + _B)
+        w2 = eta * load_complex(w, at + _D) + ty * load_complex(w, at + _STEP + _D)
+        x, z = half_f * density[0, k], half_f * density[1, k]
+        # The force in its own frame and its conjugate.
+        q, q_bar = both(splat(x), splat(z)), both(splat(x), splat(-z))
+        half = half + 2.0 * times_i(conj * (q * w1)) - kappa * (conj2 * (q_bar * a))
+        bent = bent + 2.0 * times_i(conj2 * (q * w2)) - kappa * (conj2 * (conj * (q_bar * b)))
+        back = back - q * a
+        # conj ∫ t^k log(z − conj t) dt by parts.
+        logs = (load_complex(w, at + _STEP) + end_log + start_log) / (k + 1.0)
+        start_log = -start_log
+        turned = own * q
+        logs = both(re(logs), -im(logs))
+        w0 = both(re(w0), -im(w0))
+        # κ (q̄ (m + Q) − κ q L) − q conj L, in half lengths; conj(own q) is the global q̄.
+        flat = both(re(turned), -im(turned)) * (moments[k] - 2.0 * times_i(own * w0))
+        moved = moved + kappa * flat - kappa * kappa * (turned * logs)
+        moved = moved - turned * both(re(logs), -im(logs))
+    return half, bent / c, back, c * moved
+
+
+@_inlined
+def _of_jumps(w, density, f, kappa, eta, c, ty, own, conj):
+    """The same of jumps."""
+    conj2 = conj * conj
+    zero = both(splat(0.0), splat(0.0))
+    half, bent, back, moved = zero, zero, zero, zero
+    for k in range(density.shape[1]):
+        at = k * _STEP
+        a, b, d = load_complex(w, at), load_complex(w, at + _B), load_complex(w, at + _D)
+        w1 = eta * b + ty * load_complex(w, at + _STEP + _B)
+        w2 = eta * d + ty * load_complex(w, at + _STEP + _D)
+        w3 = eta * load_complex(w, at + _T) + ty * load_complex(w, at + _STEP + _T)
+        x, z = f * density[0, k], f * density[1, k]
+        # Slip + i opening, and i/2 of it.
+        jump, h = both(splat(x), splat(z)), both(splat(-0.5 * z), splat(0.5 * x))
+        half = half + h * b + jump * (conj * w2) + z * (conj2 * b)
+        bent = bent + conj * (h * d) + jump * (conj2 * w3) + z * (conj2 * (conj * d))
+        back = back + h * b
+        mirrored = (h * own + z * conj) * a - 2.0 * times_i(h * w1)
+        moved = moved + kappa * both(re(mirrored), -im(mirrored)) + h * (own * a)
+    return half / c, bent / (c * c), back / c, moved
+
+
 @_jit
-def fields(points, first, last, start, end, kind, order, density, nu, tol, force, table, out):
-    """Add to ``out`` (5, n) what the free surface y = 0 adds to `kernels.fields`; ``points`` are mirror images."""
-    n1 = order + 1
+def fields(points, first, last, elements, order, density, kernel, table, out):
+    """Add to ``out`` (5, n) what the free surface y = 0 adds to `full_plane.fields`; ``points`` are mirror images."""
+    nu = kernel.nu
     w = np.empty(_ROOM)
     tile = np.empty(4 * _TILE)
     total = np.empty(5 * _TILE)
@@ -226,17 +296,17 @@ def fields(points, first, last, start, end, kind, order, density, nu, tol, force
     height_at = len(points) // 2
     f = 1.0 / (4.0 * np.pi * (1.0 - nu))
     kappa = 3.0 - 4.0 * nu
-    zero = both(splat(0.0), splat(0.0))
+    ordinary = table[0]
     for begin in range(first, last, _TILE):
         n = min(_TILE, last - begin)
         for i in range(5 * _TILE):
             total[i] = 0.0
-        for e in range(len(start)):
-            c, tx, ty = _sort(points, begin, n, start, end, e, tol, -1.0, tile, chosen, count)
-            eta = 0.5 * (start[e, 1] + end[e, 1]) / c
-            source = kind[e]
+        for e in range(len(elements.start)):
+            c, tx, ty = _sort(points, begin, n, elements, e, kernel.tol, -1.0, tile, chosen, count)
+            eta = 0.5 * (elements.start[e, 1] + elements.end[e, 1]) / c
+            source = elements.kind[e]
             own, conj = both(splat(tx), splat(ty)), both(splat(tx), splat(-ty))
-            conj2 = conj * conj
+            of_element = density[e]
             for distance in range(_CLASSES):
                 row = distance * _ROW
                 for batch in range(row, row + count[distance], WIDTH):
@@ -245,52 +315,12 @@ def fields(points, first, last, start, end, kind, order, density, nu, tol, force
                     _moments(source, distance, zp, zm, order + 1, table, w)
                     # The point's own y is minus its image's.
                     depth = -gather(points, begin + height_at, chosen, batch)
-                    # conj φ₁', conj φ₁'', conj φ̄₀', and the displacement but for what is with the depth.
-                    half, bent, back, moved = zero, zero, zero, zero
-                    if force:
-                        end_log = zm * own
-                        end_log = both(0.5 * log(norm(end_log)) + np.log(c), angle(im(end_log), re(end_log)))
-                        start_log = end_log + load_complex(w, 0)
-                        for k in range(n1):
-                            at = k * _STEP
-                            a, b = load_complex(w, at), load_complex(w, at + _B)
-                            w0 = eta * a + ty * load_complex(w, at + _STEP)
-                            w1 = eta * b + ty * load_complex(w, at + _STEP + _B)
-                            w2 = eta * load_complex(w, at + _D) + ty * load_complex(w, at + _STEP + _D)
-                            x, z = 0.5 * f * density[e, 0, k], 0.5 * f * density[e, 1, k]
-                            # The force in its own frame and its conjugate.
-                            q, q_bar = both(splat(x), splat(z)), both(splat(x), splat(-z))
-                            half = half + 2.0 * times_i(conj * (q * w1)) - kappa * (conj2 * (q_bar * a))
-                            bent = bent + 2.0 * times_i(conj2 * (q * w2)) - kappa * (conj2 * (conj * (q_bar * b)))
-                            back = back - q * a
-                            # conj ∫ t^k log(z − conj t) dt by parts.
-                            logs = (load_complex(w, at + _STEP) + end_log + start_log) / (k + 1.0)
-                            start_log = -start_log
-                            turned = own * q
-                            logs = both(re(logs), -im(logs))
-                            w0 = both(re(w0), -im(w0))
-                            # κ (q̄ (m + Q) − κ q L) − q conj L, in half lengths; conj(own q) is the global q̄.
-                            flat = both(re(turned), -im(turned)) * (table[0, k] - 2.0 * times_i(own * w0))
-                            moved = moved + kappa * flat - kappa * kappa * (turned * logs)
-                            moved = moved - turned * both(re(logs), -im(logs))
-                        bent = bent / c
-                        moved = c * moved
+                    if kernel.force:
+                        half, bent, back, moved = _of_forces(
+                            w, of_element, 0.5 * f, kappa, eta, c, ty, own, conj, zm, ordinary
+                        )
                     else:
-                        for k in range(n1):
-                            at = k * _STEP
-                            a, b, d = load_complex(w, at), load_complex(w, at + _B), load_complex(w, at + _D)
-                            w1 = eta * b + ty * load_complex(w, at + _STEP + _B)
-                            w2 = eta * d + ty * load_complex(w, at + _STEP + _D)
-                            w3 = eta * load_complex(w, at + _T) + ty * load_complex(w, at + _STEP + _T)
-                            x, z = f * density[e, 0, k], f * density[e, 1, k]
-                            # Slip + i opening, and i/2 of it.
-                            jump, h = both(splat(x), splat(z)), both(splat(-0.5 * z), splat(0.5 * x))
-                            half = half + h * b + jump * (conj * w2) + z * (conj2 * b)
-                            bent = bent + conj * (h * d) + jump * (conj2 * w3) + z * (conj2 * (conj * d))
-                            back = back + h * b
-                            mirrored = (h * own + z * conj) * a - 2.0 * times_i(h * w1)
-                            moved = moved + kappa * both(re(mirrored), -im(mirrored)) + h * (own * a)
-                        half, back, bent = half / c, back / c, bent / (c * c)
+                        half, bent, back, moved = _of_jumps(w, of_element, f, kappa, eta, c, ty, own, conj)
                     moved = moved - 2.0 * times_i(depth * half)
                     deviator = 2.0 * times_i(depth * bent) - half - back
                     trace = 2.0 * re(half)

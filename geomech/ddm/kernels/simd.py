@@ -50,6 +50,8 @@ _C8 = ir.ArrayType(_F8, 2)
 
 
 class LanesType(types.Type):
+    """Numba's type of lanes: as many numbers as a register holds, or two such for complex ones."""
+
     pass
 
 
@@ -181,6 +183,7 @@ def _negate(context, builder, sig, args):
 
 @intrinsic
 def both(typing, x, y):
+    """x + i y of lanes x and y."""
     return complex_lanes(lanes, lanes), lambda context, builder, sig, args: _joined(builder, *args)
 
 
@@ -190,16 +193,20 @@ def _part(number: int):
 
 @intrinsic
 def re(typing, z):
+    """The real parts."""
     return lanes(complex_lanes), _part(0)
 
 
 @intrinsic
 def im(typing, z):
+    """The imaginary parts."""
     return lanes(complex_lanes), _part(1)
 
 
 @intrinsic
 def times_i(typing, z):
+    """i z."""
+
     def code(context, builder, sig, args):
         x, y = _split(builder, complex_lanes, args[0])
         return _joined(builder, builder.fneg(y), x)
@@ -209,6 +216,8 @@ def times_i(typing, z):
 
 @intrinsic
 def norm(typing, z):
+    """|z|²."""
+
     def code(context, builder, sig, args):
         return _Arithmetic(builder).norm(_split(builder, complex_lanes, args[0]))
 
@@ -266,16 +275,20 @@ def _loading(kind, parts: int):
 
 @intrinsic
 def load(typing, array, at):
+    """Lanes of an ``array`` from the place ``at`` on."""
     return _loading(lanes, 1)(typing, array, at)
 
 
 @intrinsic
 def load_complex(typing, array, at):
+    """Complex lanes: real parts, then imaginary ones."""
     return _loading(complex_lanes, 2)(typing, array, at)
 
 
 @intrinsic
 def store(typing, array, at, x):
+    """Write lanes, real or complex, to an ``array`` from the place ``at`` on."""
+
     def code(context, builder, sig, args):
         found = [half for half in _split(builder, sig.args[2], args[2]) if half is not None]
         for place, half in zip(_at(builder, args[1], len(found)), found):
@@ -296,6 +309,8 @@ def _addresses(context, builder, sig, array, at, places, first):
 
 @intrinsic
 def gather(typing, array, at, places, first):
+    """Lanes of an ``array`` behind ``at``, at the ``places`` from the ``first`` on."""
+
     def code(context, builder, sig, args):
         out = ir.Constant(_F8, ir.Undefined)
         for k, address in _addresses(context, builder, sig, *args):
@@ -307,6 +322,8 @@ def gather(typing, array, at, places, first):
 
 @intrinsic
 def scatter(typing, array, at, places, first, x):
+    """Write lanes there."""
+
     def code(context, builder, sig, args):
         for k, address in _addresses(context, builder, sig, *args[:4]):
             builder.store(builder.extract_element(args[4], k), address)
@@ -317,6 +334,8 @@ def scatter(typing, array, at, places, first, x):
 
 @intrinsic
 def pile(typing, array, at, places, first, x):
+    """Add lanes to what stands there."""
+
     def code(context, builder, sig, args):
         # Read first: lanes that stand for one place must all write the same.
         found = [(k, address, builder.load(address)) for k, address in _addresses(context, builder, sig, *args[:4])]
@@ -329,11 +348,14 @@ def pile(typing, array, at, places, first, x):
 
 @intrinsic
 def splat(typing, number):
+    """Lanes of one ``number``."""
     return lanes(types.float64), lambda context, builder, sig, args: _wide(builder, types.float64, args[0])
 
 
 @intrinsic
 def less(typing, a, b, x, y):
+    """x where a < b, else y."""
+
     def code(context, builder, sig, args):
         a, b, x, y = (_wide(builder, kind, value) for kind, value in zip(sig.args, args))
         return builder.select(builder.fcmp_ordered("<", a, b), x, y)
@@ -351,16 +373,19 @@ def _by_llvm(name: str, n: int):
 
 @intrinsic
 def root(typing, x):
+    """Square roots."""
     return lanes(lanes), _by_llvm("sqrt", 1)
 
 
 @intrinsic
 def size(typing, x):
+    """Absolute values."""
     return lanes(lanes), _by_llvm("fabs", 1)
 
 
 @intrinsic
 def signed(typing, x, s):
+    """Lanes of the size of ``x`` with the sign of ``s``."""
     return lanes(lanes, lanes), _by_llvm("copysign", 2)
 
 
@@ -390,6 +415,7 @@ _LN2_LOW = 1.90821492927058770002e-10
 
 @part(error_model="numpy")
 def log(x):
+    """Natural logarithms."""
     m, n = _parts(x)
     f = (m - 1.0) / (m + 1.0)
     u = f * f
@@ -405,6 +431,7 @@ def log(x):
 
 @part(error_model="numpy")
 def log1p(x):
+    """log(1 + x)."""
     whole = 1.0 + x
     return log(whole) + (x - (whole - 1.0)) / whole
 
@@ -414,6 +441,7 @@ _EIGHTH = math.tan(math.pi / 8)
 
 @part(error_model="numpy")
 def angle(y, x):
+    """atan2(y, x)."""
     ay, ax = size(y), size(x)
     low, high = less(ay, ax, ay, ax), less(ay, ax, ax, ay)
     # tan(θ − π/4) where tan θ is beyond tan π/8, so that |t| stays below that.

@@ -111,6 +111,25 @@ def check_cracks(cracks: Cracks, edges: np.ndarray, loops: list[np.ndarray], fre
         s = int(np.flatnonzero(~np.isfinite(segments).all(axis=(1, 2)))[0])
         raise ValueError(f"{name(s)}: a crack point is not finite")
     span = np.ptp(np.concatenate([edges.reshape(-1, 2), segments.reshape(-1, 2)]), axis=0).max()
+    _check_sizes(cracks, segments, span, name)
+    new = np.flatnonzero(fresh)
+    if not len(new):
+        return
+    if len(edges):
+        _check_ends(cracks, segments, new, edges, loops, span, name)
+        i, j = _boxes_meet(segments[new], edges, _SMALL * span)
+        if len(i):
+            _check_crossing(cracks, segments, new[i], edges[j], span, name)
+        _check_mouths(cracks, new, edges, span, name)
+    elif cracks.surface[cracks.segments[new]].any():
+        s = new[int(np.argmax(cracks.surface[cracks.segments[new]].any(axis=1)))]
+        raise ValueError(f"{name(s)}: has a mouth, but in the infinite plane there is no boundary for it to be on")
+    _check_pairs(cracks, segments, new, span, name)
+    _check_folds(cracks, new, name)
+
+
+def _check_sizes(cracks: Cracks, segments: np.ndarray, span: float, name) -> None:
+    """Lengths that coordinates can tell, and apertures that are none below zero."""
     if (cracks.lengths <= 1e-12 * span).any():
         raise ValueError(f"{name(int(np.argmin(cracks.lengths)))}: a crack segment has no length")
     if not (cracks.aperture >= 0).all():
@@ -123,35 +142,26 @@ def check_cracks(cracks: Cracks, edges: np.ndarray, loops: list[np.ndarray], fre
             f"{name(s)}: its segment of {cracks.lengths[s]:.3g} m at ({x:g}, {y:g}) is too short for coordinates that "
             f"large, which have steps of {digits[s] * cracks.lengths[s]:.1g} m: count them from an origin near the rock"
         )
-    new = np.flatnonzero(fresh)
-    if not len(new):
-        return
-    if len(edges):
-        mouth = cracks.surface[cracks.segments]
-        ends = segments[new].reshape(-1, 2)
-        distance = _to_segments(ends, edges).reshape(-1, 2)
-        rock = inside(loops, ends).reshape(-1, 2)
-        for k, s in enumerate(new):
-            for e in (0, 1):
-                x, y = segments[s, e]
-                if mouth[s, e]:
-                    if distance[k, e] > 1e-7 * span:
-                        raise ValueError(
-                            f"{name(s)}: its mouth ({x:g}, {y:g}) is {distance[k, e]:.3g} m off the boundary"
-                        )
-                elif distance[k, e] <= _SMALL * span:
-                    raise ValueError(f"{name(s)}: ({x:g}, {y:g}) lies on the boundary but is not marked as a mouth")
-                elif not rock[k, e]:
-                    raise ValueError(f"{name(s)}: ({x:g}, {y:g}) lies outside the rock")
-        i, j = _boxes_meet(segments[new], edges, _SMALL * span)
-        if len(i):
-            _check_crossing(cracks, segments, new[i], edges[j], span, name)
-        _check_mouths(cracks, new, edges, span, name)
-    elif cracks.surface[cracks.segments[new]].any():
-        s = new[int(np.argmax(cracks.surface[cracks.segments[new]].any(axis=1)))]
-        raise ValueError(f"{name(s)}: has a mouth, but in the infinite plane there is no boundary for it to be on")
-    _check_pairs(cracks, segments, new, span, name)
-    _check_folds(cracks, new, name)
+
+
+def _check_ends(
+    cracks: Cracks, segments: np.ndarray, new: np.ndarray, edges: np.ndarray, loops: list[np.ndarray], span: float, name
+) -> None:
+    """The ends of segments that are ``new`` (k,): on the boundary if they are mouths, else in the rock."""
+    mouth = cracks.surface[cracks.segments]
+    ends = segments[new].reshape(-1, 2)
+    distance = _to_segments(ends, edges).reshape(-1, 2)
+    rock = inside(loops, ends).reshape(-1, 2)
+    for k, s in enumerate(new):
+        for e in (0, 1):
+            x, y = segments[s, e]
+            if mouth[s, e]:
+                if distance[k, e] > 1e-7 * span:
+                    raise ValueError(f"{name(s)}: its mouth ({x:g}, {y:g}) is {distance[k, e]:.3g} m off the boundary")
+            elif distance[k, e] <= _SMALL * span:
+                raise ValueError(f"{name(s)}: ({x:g}, {y:g}) lies on the boundary but is not marked as a mouth")
+            elif not rock[k, e]:
+                raise ValueError(f"{name(s)}: ({x:g}, {y:g}) lies outside the rock")
 
 
 def _check_crossing(cracks: Cracks, segments: np.ndarray, at: np.ndarray, edges: np.ndarray, span: float, name) -> None:

@@ -28,22 +28,9 @@ def plainly_well(nodes, segments, surface, aperture, fresh, edges, n_rock, outli
     of its segments are new; ``edges`` (k, 2, 2) of all loops, of which the first ``n_rock`` bound the rock, with an
     outline among them if ``outlined``.
     """
-    low_x, low_y, high_x, high_y = np.inf, np.inf, -np.inf, -np.inf
-    for s in range(len(segments)):
-        if not aperture[s] >= 0:
-            return False
-        for e in range(2):
-            x, y = nodes[segments[s, e], 0], nodes[segments[s, e], 1]
-            if not (np.isfinite(x) and np.isfinite(y)):
-                return False
-            low_x, low_y, high_x, high_y = min(low_x, x), min(low_y, y), max(high_x, x), max(high_y, y)
-    for k in range(len(edges)):
-        for e in range(2):
-            x, y = edges[k, e, 0], edges[k, e, 1]
-            low_x, low_y, high_x, high_y = min(low_x, x), min(low_y, y), max(high_x, x), max(high_y, y)
-    span = max(high_x - low_x, high_y - low_y)
-    far = max(max(abs(low_x), abs(low_y)), max(abs(high_x), abs(high_y)))
-    near = CLEAR * span
+    span, far = _extent(nodes, segments, aperture, edges)
+    if not span >= 0.0:
+        return False
     for s in range(len(segments)):
         i, j = segments[s, 0], segments[s, 1]
         ax, ay, bx, by = nodes[i, 0], nodes[i, 1], nodes[j, 0], nodes[j, 1]
@@ -56,28 +43,60 @@ def plainly_well(nodes, segments, surface, aperture, fresh, edges, n_rock, outli
             return False
         if not (_in_rock(ax, ay, edges, n_rock, outlined) and _in_rock(bx, by, edges, n_rock, outlined)):
             return False
-        for k in range(len(edges)):
-            if not _apart(ax, ay, bx, by, edges[k, 0, 0], edges[k, 0, 1], edges[k, 1, 0], edges[k, 1, 1], near):
+        if not _clear(nodes, segments, s, edges, CLEAR * span):
+            return False
+    return True
+
+
+@_part
+def _extent(nodes, segments, aperture, edges):
+    """The larger side of the box of all segments and edges, and their largest coordinate; −1 where coordinates are not
+    finite, or an ``aperture`` is below zero."""
+    low_x, low_y, high_x, high_y = np.inf, np.inf, -np.inf, -np.inf
+    for s in range(len(segments)):
+        if not aperture[s] >= 0:
+            return -1.0, 0.0
+        for e in range(2):
+            x, y = nodes[segments[s, e], 0], nodes[segments[s, e], 1]
+            if not (np.isfinite(x) and np.isfinite(y)):
+                return -1.0, 0.0
+            low_x, low_y, high_x, high_y = min(low_x, x), min(low_y, y), max(high_x, x), max(high_y, y)
+    for k in range(len(edges)):
+        for e in range(2):
+            x, y = edges[k, e, 0], edges[k, e, 1]
+            low_x, low_y, high_x, high_y = min(low_x, x), min(low_y, y), max(high_x, x), max(high_y, y)
+    span = max(high_x - low_x, high_y - low_y)
+    return span, max(max(abs(low_x), abs(low_y)), max(abs(high_x), abs(high_y)))
+
+
+@_part
+def _clear(nodes, segments, s, edges, near):
+    """Whether segment ``s`` stays clear of all ``edges`` and other segments, by ``near`` m or, where they share a node, by
+    an angle."""
+    i, j = segments[s, 0], segments[s, 1]
+    ax, ay, bx, by = nodes[i, 0], nodes[i, 1], nodes[j, 0], nodes[j, 1]
+    for k in range(len(edges)):
+        if not _apart(ax, ay, bx, by, edges[k, 0, 0], edges[k, 0, 1], edges[k, 1, 0], edges[k, 1, 1], near):
+            return False
+    for r in range(len(segments)):
+        if r == s:
+            continue
+        p, q = segments[r, 0], segments[r, 1]
+        cx, cy, dx, dy = nodes[p, 0], nodes[p, 1], nodes[q, 0], nodes[q, 1]
+        if i != p and i != q and j != p and j != q:
+            if not _apart(ax, ay, bx, by, cx, cy, dx, dy, near):
                 return False
-        for r in range(len(segments)):
-            if r == s:
-                continue
-            p, q = segments[r, 0], segments[r, 1]
-            cx, cy, dx, dy = nodes[p, 0], nodes[p, 1], nodes[q, 0], nodes[q, 1]
-            if i != p and i != q and j != p and j != q:
-                if not _apart(ax, ay, bx, by, cx, cy, dx, dy, near):
-                    return False
-                continue
-            if (i == p and j == q) or (i == q and j == p):
-                return False
-            # From the node that they share.
-            ux, uy, vx, vy = bx - ax, by - ay, dx - cx, dy - cy
-            if j == p or j == q:
-                ux, uy = -ux, -uy
-            if q == i or q == j:
-                vx, vy = -vx, -vy
-            if ux * vx + uy * vy > SPREAD * math.hypot(ux, uy) * math.hypot(vx, vy):
-                return False
+            continue
+        if (i == p and j == q) or (i == q and j == p):
+            return False
+        # From the node that they share.
+        ux, uy, vx, vy = bx - ax, by - ay, dx - cx, dy - cy
+        if j in (p, q):
+            ux, uy = -ux, -uy
+        if q in (i, j):
+            vx, vy = -vx, -vy
+        if ux * vx + uy * vy > SPREAD * math.hypot(ux, uy) * math.hypot(vx, vy):
+            return False
     return True
 
 

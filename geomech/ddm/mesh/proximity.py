@@ -8,6 +8,8 @@ of it, at 3° 2e-7).
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from ...compiled import kept, part
@@ -50,52 +52,51 @@ def _distance_squared(px, py, ax, ay, bx, by):
     return x * x + y * y
 
 
-def crowding(
-    start, end, tip, source, meeting, n_edges, apart, across, chained, beside, span, at_node, at_boundary, images
-):
-    """(n,) the largest length / (allowed length) of each element over all others.
+class Candidates(NamedTuple):
+    """Elements that may be halved: ``start``, ``end`` (n, 2), the ``tip`` of each (0: none, 1 at its start, 2 at its end, 3
+    at both), and the number of its ``source``, the edge or crack segment that it lies on."""
 
-    Allowed is ``apart`` times the distance, ``across`` times it between two edges (sources below ``n_edges``),
-    ``chained`` times it where the two lie on one source or on two that meet, whose grading already ties sizes to
-    distances; there elements below the part ``at_node`` (``at_boundary`` at a surface: where one is an edge, or one
-    alone is of the images, sources from ``images`` on) of the shorter ``span`` (n_sources,) are left alone. ``meeting``
-    (n_sources, n_sources) is 0 for sources that do not meet, 1 for those that do, −sin of the angle between cracks
-    where that is acute: there `BESIDE` and ``beside`` times `GRADED` count. Elements that share an end are not
-    compared, but for the tip at the other end (``tip`` 1 at the start, 2 at the end, 3 both) of the neighbour.
+    start: np.ndarray
+    end: np.ndarray
+    tip: np.ndarray
+    source: np.ndarray
+
+
+class Sources(NamedTuple):
+    """Edges, ``n_edges`` of them, and crack segments: their ``span`` (n_sources,) m; what ``meeting`` (n_sources, n_sources)
+    says, 0 for two that do not meet, 1 for those that do, −sin of the angle between cracks where that is acute; those from
+    ``images`` on are behind a free surface. Where they meet, ``chained`` times the distance is allowed, at an acute angle
+    `BESIDE` times it, and ``beside`` times `GRADED`."""
+
+    n_edges: int
+    images: int
+    span: np.ndarray
+    meeting: np.ndarray
+    chained: float
+    beside: float
+
+
+def crowding(elements: Candidates, sources: Sources) -> np.ndarray:
+    """(n,) the largest length / (allowed length) of each of the ``elements`` over all others.
+
+    Allowed is `APART` times the distance, `ACROSS` times it between two edges, and what ``sources`` says where the two lie
+    on one source or on two that meet, whose grading already ties sizes to distances; there elements below the part
+    `AT_NODE` (`AT_BOUNDARY` at a surface: where one is an edge, or one alone is an image) of the shorter span are left
+    alone. Elements that share an end are not compared, but for the tip at the other end of the neighbour.
     """
-    middle = 0.5 * (start[:, 0] + end[:, 0])
+    start, end = elements.start, elements.end
     length = np.hypot(end[:, 0] - start[:, 0], end[:, 1] - start[:, 1])
     # Farther apart than this along x, two elements cannot matter to one another.
-    reach = (1.0 + 1.0 / min(apart, across)) * length.max() if len(start) else 0.0
-    sweep = np.argsort(middle, kind="stable")
-    return _crowding(
-        start,
-        end,
-        length,
-        tip,
-        source,
-        meeting,
-        n_edges,
-        apart,
-        across,
-        chained,
-        beside,
-        span,
-        at_node,
-        at_boundary,
-        images,
-        sweep,
-        1.000001 * reach,
-    )
+    reach = (1.0 + 1.0 / min(APART, ACROSS)) * length.max() if len(start) else 0.0
+    sweep = np.argsort(0.5 * (start[:, 0] + end[:, 0]), kind="stable")
+    return _crowding(elements, length, sources, sweep, 1.000001 * reach)
 
 
 @_jit
-def _crowding(
-    start, end, length, tip, source, meeting, n_edges, apart, across, chained, beside, span, at_node, at_boundary,
-    images,
-    sweep, reach,
-):  # fmt: skip
-    n, least_apart = len(start), min(apart, across)
+def _crowding(elements, length, sources, sweep, reach):
+    """See `crowding`; ``sweep`` is the order of the elements along x, ``reach`` m how far apart there they may matter."""
+    start, end = elements.start, elements.end
+    n, least_apart = len(start), min(APART, ACROSS)
     out = np.zeros(n)
     for m in range(n):
         i = sweep[m]
@@ -109,41 +110,55 @@ def _crowding(
             near = 0.5 * (length[i] + length[j]) + max(length[i], length[j]) / least_apart
             if (mx - qx) ** 2 + (my - qy) ** 2 > near * near:
                 continue
-            meet = meeting[source[i], source[j]]
-            allowed = apart
-            if meet != 0:
-                allowed = chained if meet > 0 else min(chained, BESIDE)
-            elif source[i] < n_edges and source[j] < n_edges:
-                allowed = across
-            shared = 0
-            for p in range(2):
-                for q in range(2):
-                    u, v = (start[i], start[j]) if p == 0 and q == 0 else (start[i], end[j])
-                    if p == 1:
-                        u, v = (end[i], start[j]) if q == 0 else (end[i], end[j])
-                    if u[0] == v[0] and u[1] == v[1]:
-                        shared += 1
-                        # The square root at the neighbour's far tip is the singularity to keep clear of.
-                        if (tip[j] == 1 and q == 1) or (tip[j] == 2 and q == 0):
-                            out[i] = max(out[i], length[i] / (apart * length[j]))
-                        if (tip[i] == 1 and p == 1) or (tip[i] == 2 and p == 0):
-                            out[j] = max(out[j], length[j] / (apart * length[i]))
-            if shared:
-                continue
-            ax, ay, bx, by = start[i, 0], start[i, 1], end[i, 0], end[i, 1]
-            cx, cy, dx, dy = start[j, 0], start[j, 1], end[j, 0], end[j, 1]
-            d = min(_distance_squared(ax, ay, cx, cy, dx, dy), _distance_squared(bx, by, cx, cy, dx, dy))
-            d = min(d, _distance_squared(cx, cy, ax, ay, bx, by), _distance_squared(dx, dy, ax, ay, bx, by))
-            d = np.sqrt(d)
-            d = max(d, 1e-300)
-            least = 0.0
-            if meet != 0:
-                at_side = source[i] < n_edges or source[j] < n_edges or (source[i] < images) != (source[j] < images)
-                least = (at_boundary if at_side else at_node) * min(span[source[i]], span[source[j]])
-            graded = beside * GRADED / -meet if meet < 0 else np.inf
-            for k in (i, j):
-                out[k] = max(out[k], length[k] / (d * (allowed if length[k] > least else graded)))
+            if not _share_an_end(elements, length, i, j, out):
+                _compare(elements, length, sources, i, j, out)
     return out
+
+
+@_part
+def _share_an_end(elements, length, i, j, out):
+    """Whether two elements do; each is then compared with the tip at the other's far end."""
+    start, end, tip = elements.start, elements.end, elements.tip
+    shared = False
+    for p in range(2):
+        for q in range(2):
+            u, v = (start[i], start[j]) if p == 0 and q == 0 else (start[i], end[j])
+            if p == 1:
+                u, v = (end[i], start[j]) if q == 0 else (end[i], end[j])
+            if u[0] == v[0] and u[1] == v[1]:
+                shared = True
+                # The square root at the neighbour's far tip is the singularity to keep clear of.
+                if (tip[j] == 1 and q == 1) or (tip[j] == 2 and q == 0):
+                    out[i] = max(out[i], length[i] / (APART * length[j]))
+                if (tip[i] == 1 and p == 1) or (tip[i] == 2 and p == 0):
+                    out[j] = max(out[j], length[j] / (APART * length[i]))
+    return shared
+
+
+@_part
+def _compare(elements, length, sources, i, j, out):
+    """Compare two elements that share no end."""
+    start, end, n_edges = elements.start, elements.end, sources.n_edges
+    one, other = elements.source[i], elements.source[j]
+    meet = sources.meeting[one, other]
+    allowed = APART
+    if meet != 0:
+        allowed = sources.chained if meet > 0 else min(sources.chained, BESIDE)
+    elif one < n_edges and other < n_edges:
+        allowed = ACROSS
+    ax, ay, bx, by = start[i, 0], start[i, 1], end[i, 0], end[i, 1]
+    cx, cy, dx, dy = start[j, 0], start[j, 1], end[j, 0], end[j, 1]
+    d = min(_distance_squared(ax, ay, cx, cy, dx, dy), _distance_squared(bx, by, cx, cy, dx, dy))
+    d = min(d, _distance_squared(cx, cy, ax, ay, bx, by), _distance_squared(dx, dy, ax, ay, bx, by))
+    d = np.sqrt(d)
+    d = max(d, 1e-300)
+    least = 0.0
+    if meet != 0:
+        at_side = one < n_edges or other < n_edges or (one < sources.images) != (other < sources.images)
+        least = (AT_BOUNDARY if at_side else AT_NODE) * min(sources.span[one], sources.span[other])
+    graded = sources.beside * GRADED / -meet if meet < 0 else np.inf
+    for k in (i, j):
+        out[k] = max(out[k], length[k] / (d * (allowed if length[k] > least else graded)))
 
 
 def keep_apart(start, end, kind, source, pieces, touching, n_edges, ratio, extent, unknowns, images=None):
@@ -163,14 +178,12 @@ def keep_apart(start, end, kind, source, pieces, touching, n_edges, ratio, exten
         beside, meeting = LOW if unknowns <= 6 else 1.0, _meeting(pieces, touching, n_edges, np.cos(ACUTE))
     span = np.hypot(*(pieces[:, 1] - pieces[:, 0]).T)
     images = len(pieces) if images is None else images
+    sources = Sources(n_edges, images, span, meeting, chained, float(beside))
     most = max(4 * len(start), MOST_UNKNOWNS // unknowns)
     while True:
         tip = np.where(kind == shape_functions.ORDINARY, 0, kind)
         start, end = np.ascontiguousarray(start), np.ascontiguousarray(end)
-        crowded = crowding(
-            start, end, tip, source, meeting, n_edges, APART, ACROSS, chained, beside, span, AT_NODE, AT_BOUNDARY,
-            images
-        )  # fmt: skip
+        crowded = crowding(Candidates(start, end, tip, source), sources)
         length = np.hypot(*(end - start).T)
         cut = (crowded > 1 + 1e-9) & (length > 2 * FLOOR * extent)
         if not cut.any():

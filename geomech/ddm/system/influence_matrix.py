@@ -8,10 +8,12 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 
 from ..kernels import full_plane, shape_functions
+from ..kernels.full_plane import Elements, Kernel
 from ..mesh.half_plane import HalfPlane
 
 #: Element–point pairs (some 30 ns each) below which another thread does not pay for itself.
@@ -183,39 +185,57 @@ def _to_nodal(family: str, order: int) -> np.ndarray:
     return np.stack([shape_functions.to_monomials(family, order, kind) for kind in range(4)])
 
 
+class _Points(NamedTuple):
+    """Where tractions are asked for: ``at`` (n per, 2) m, ``per`` of them an element, on lines of these ``tangents``
+    (n per, 2)."""
+
+    at: np.ndarray
+    tangents: np.ndarray
+    per: int
+
+    @classmethod
+    def of(cls, points: np.ndarray, tangents: np.ndarray) -> _Points:
+        """``points`` (n, per, 2) on elements of ``tangents`` (n, 2)."""
+        per = points.shape[1]
+        return cls(points.reshape(-1, 2), np.repeat(tangents, per, axis=0), per)
+
+
+def elements_of(start: np.ndarray, end: np.ndarray, kind: np.ndarray) -> Elements:
+    """Elements as the kernels read them."""
+    return Elements(np.ascontiguousarray(start), np.ascontiguousarray(end), np.ascontiguousarray(kind, dtype=np.int64))
+
+
 def influence(targets: ElementSet, sources: ElementSet, nu: float, tol: float) -> np.ndarray:
     """(targets.n_unknowns, sources.n_unknowns), column-major: traction (along, normal, left of the target) at the
     collocation points from unit nodal jumps times 2μ. An entry depends on its two elements alone, to the bit."""
-    return _between(targets, sources, nu, tol, 1.0, False)
+    return _between(targets, sources, Kernel(nu, tol, 1.0, False))
 
 
 def image_influence(targets: ElementSet, sources: ElementSet, nu: float, tol: float) -> np.ndarray:
     """What the free surface of their half-plane adds to `influence`."""
     nodal, out = _to_nodal(sources.family, sources.order), np.zeros((sources.n_unknowns, targets.n_unknowns))
     if out.size:
-        tangents = np.repeat(targets.tangent, targets.per, axis=0)
-        kind = np.ascontiguousarray(sources.kind, dtype=np.int64)
-        at = targets.nodes.reshape(-1, 2), tangents, targets.per
-        work = _images(
-            targets.half_plane, *at, sources.start, sources.end, kind, sources.order, nu, tol, False, nodal, out
-        )
-        _spread(len(tangents), len(tangents) * sources.n, work)
+        points, elements = _Points.of(targets.nodes, targets.tangent), elements_of(*_ends(sources))
+        work = _images(targets.half_plane, points, elements, sources.order, Kernel(nu, tol, 1.0, False), nodal, out)
+        _spread(len(points.at), len(points.at) * sources.n, work)
     return out.T
 
 
 def line_influence(targets: ElementSet, sources: ElementSet, nu: float, tol: float, side: float) -> np.ndarray:
     """As `influence`, from unit nodal line forces (per length) on ordinary ``sources``; points on one are seen from
     ``side`` of it."""
-    return _between(targets, sources, nu, tol, side, True)
+    return _between(targets, sources, Kernel(nu, tol, side, True))
 
 
-def _between(targets, sources, nu, tol, side, force):
+def _ends(elements: ElementSet) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    return elements.start, elements.end, elements.kind
+
+
+def _between(targets: ElementSet, sources: ElementSet, kernel: Kernel) -> np.ndarray:
     if not targets.n or not sources.n:
         return np.empty((targets.n_unknowns, sources.n_unknowns), order="F")
-    nodal = _to_nodal(sources.family, sources.order)
-    start, end, kind, order = sources.start, sources.end, sources.kind, sources.order
-    rock = targets.half_plane
-    return _tractions(targets.nodes, targets.tangent, start, end, kind, order, nu, tol, side, force, nodal, rock)
+    points, nodal = _Points.of(targets.nodes, targets.tangent), _to_nodal(sources.family, sources.order)
+    return _tractions(points, elements_of(*_ends(sources)), sources.order, kernel, nodal, targets.half_plane)
 
 
 def line_forces(
@@ -223,15 +243,17 @@ def line_forces(
 ) -> np.ndarray:
     """(targets.n_unknowns, m, 2, degree+1) traction from line forces t^k along (component 0) and across (1) straight
     segments, Kelvin's solution integrated in closed form; points on a segment are seen from ``side`` of it."""
-    return _line_forces(targets.nodes, targets.tangent, start, end, degree, nu, tol, side, targets.half_plane)
+    points, kernel = _Points.of(targets.nodes, targets.tangent), Kernel(nu, tol, side, True)
+    return _line_forces(points, start, end, degree, kernel, targets.half_plane)
 
 
-def _line_forces(points, tangents, start, end, degree, nu, tol, side, half_plane):
-    n, per = points.shape[:2]
+def _line_forces(
+    points: _Points, start: np.ndarray, end: np.ndarray, degree: int, kernel: Kernel, half_plane: HalfPlane | None
+) -> np.ndarray:
     kind, unit = np.zeros(len(start), np.int64), np.broadcast_to(np.eye(degree + 1), (4, degree + 1, degree + 1))
     unit = np.ascontiguousarray(unit)
-    out = _tractions(points, tangents, start, end, kind, degree, nu, tol, side, True, unit, half_plane)
-    return out.reshape(2 * n * per, len(start), 2, degree + 1)
+    out = _tractions(points, elements_of(start, end, kind), degree, kernel, unit, half_plane)
+    return out.reshape(2 * len(points.at), len(start), 2, degree + 1)
 
 
 #: A traction that ends within this part of half an element from the element's end is left to the nodes: there the
@@ -255,7 +277,7 @@ def project_jumps(unit: np.ndarray, targets: ElementSet, start, end, nu: float, 
     Sampled at nodes, a jump would be rounded to a node and the load's resultant with it (4 % in K_I in one case, 0.03 %
     so); with the moments kept, what is lost acts on no more than the element's own surroundings.
     """
-    t, n, c, rock = targets.tangent, targets.normal, 0.5 * targets.length, targets.half_plane
+    t, n, c, kernel = targets.tangent, targets.normal, 0.5 * targets.length, Kernel(nu, tol, side, True)
     middle = 0.5 * (targets.start + targets.end)
     rows = unit.reshape(targets.n, 2, targets.per, *unit.shape[1:])
     clustered, q = _clustered()
@@ -271,7 +293,8 @@ def project_jumps(unit: np.ndarray, targets: ElementSet, start, end, nu: float, 
             u = np.concatenate([lo + (hi - lo) * clustered for lo, hi in pairwise(cuts)])
             w = np.concatenate([(hi - lo) * q for lo, hi in pairwise(cuts)])
             points = (middle[e] + c[e] * u[:, None] * t[e])[None]
-            values = _line_forces(points, t[e : e + 1], a[None], b[None], unit.shape[3] - 1, nu, tol, side, rock)
+            at = _Points.of(points, t[e : e + 1])
+            values = _line_forces(at, a[None], b[None], unit.shape[3] - 1, kernel, targets.half_plane)
             values = values.reshape(2, len(u), 2, -1)
             legendre = np.polynomial.legendre.legvander(u, targets.order) * w[:, None] * (degrees + 0.5)
             rows[e, :, :, m] = np.einsum("jk,uk,cuxd->cjxd", at_nodes, legendre, values)
@@ -298,58 +321,60 @@ def project_total(
         u = np.concatenate([lo + (hi - lo) * clustered for lo, hi in pairwise(cuts)])
         w = np.concatenate([(hi - lo) * q for lo, hi in pairwise(cuts)])
         points = (0.5 * (targets.start[e] + targets.end[e]) + c * u[:, None] * targets.tangent[e])[None]
-        tangent, degree, rock = targets.tangent[e : e + 1], density.shape[2] - 1, targets.half_plane
-        unit = _line_forces(points, tangent, start, end, degree, nu, tol, side, rock)
+        at, kernel = _Points.of(points, targets.tangent[e : e + 1]), Kernel(nu, tol, side, True)
+        unit = _line_forces(at, start, end, density.shape[2] - 1, kernel, targets.half_plane)
         total = (unit.reshape(2 * len(u), -1) @ density.ravel()).reshape(2, len(u))
         legendre = np.polynomial.legendre.legvander(u, targets.order) * w[:, None] * (np.arange(targets.per) + 0.5)
         values[e] = total @ legendre @ at_nodes.T
 
 
-def _tractions(points, tangents, start, end, kind, order, nu, tol, side, force, nodal, half_plane=None):
-    """(2 n per, 2 (p+1) m), column-major, at ``points`` (n, per, 2) on elements of ``tangents`` (n, 2)."""
-    n, per = points.shape[:2]
-    out = np.empty((2 * (order + 1) * len(start), 2 * n * per))
+def _tractions(
+    points: _Points, elements: Elements, order: int, kernel: Kernel, nodal: np.ndarray, half_plane: HalfPlane | None
+) -> np.ndarray:
+    """(2 n per, 2 (p+1) m), column-major, at the ``points``."""
+    n, m = len(points.at), len(elements.start)
+    out = np.empty((2 * (order + 1) * m, 2 * n))
     if not out.size:
         return out.T
-    tangents = np.repeat(tangents, per, axis=0)
-    points = points.reshape(-1, 2)
-    at, along = full_plane.lanes_of(points), full_plane.lanes_of(tangents)
-    start, end = np.ascontiguousarray(start), np.ascontiguousarray(end)
-    kind = np.ascontiguousarray(kind, dtype=np.int64)
+    at, along = full_plane.lanes_of(points.at), full_plane.lanes_of(points.tangents)
     table, flat = shape_functions.moments(), out.reshape(-1)
 
     def work(first, last):
-        full_plane.tractions(
-            at, along, per, first, last, start, end, kind, order, nu, tol, side, force, table, nodal, flat
-        )
+        full_plane.tractions(at, along, points.per, first, last, elements, order, kernel, table, nodal, flat)
 
     if half_plane is not None:
         plane = work
-        images = _images(half_plane, points, tangents, per, start, end, kind, order, nu, tol, force, nodal, out)
+        images = _images(half_plane, points, elements, order, kernel, nodal, out)
 
         def work(first, last):
             plane(first, last)
             images(first, last)
 
-    _spread(n * per, n * per * len(start), work)
+    _spread(n, n * m, work)
     return out.T
 
 
-def _images(half_plane, points, tangents, per, start, end, kind, order, nu, tol, force, nodal, out):
+def _images(
+    half_plane: HalfPlane, points: _Points, elements: Elements, order: int, kernel: Kernel, nodal: np.ndarray,
+    out: np.ndarray,
+) -> Callable[[int, int], None]:  # fmt: skip
     """What adds to ``out`` the tractions at points ``first`` … ``last`` that the free surface makes."""
     from ..kernels import half_plane_images
 
-    at = full_plane.lanes_of(_mirrored(half_plane.frame(points)))
-    along = full_plane.lanes_of(half_plane.turned(tangents))
-    start, end = (np.ascontiguousarray(half_plane.frame(x)) for x in (start, end))
+    at = full_plane.lanes_of(_mirrored(half_plane.frame(points.at)))
+    along = full_plane.lanes_of(half_plane.turned(points.tangents))
+    framed = _framed(half_plane, elements)
     table, flat = shape_functions.moments(), out.reshape(-1)
 
     def work(first, last):
-        half_plane_images.tractions(
-            at, along, per, first, last, start, end, kind, order, nu, tol, force, table, nodal, flat
-        )
+        half_plane_images.tractions(at, along, points.per, first, last, framed, order, kernel, table, nodal, flat)
 
     return work
+
+
+def _framed(half_plane: HalfPlane, elements: Elements) -> Elements:
+    """The ``elements`` in the frame of the free surface."""
+    return elements_of(half_plane.frame(elements.start), half_plane.frame(elements.end), elements.kind)
 
 
 def _mirrored(in_frame: np.ndarray) -> np.ndarray:
@@ -358,21 +383,20 @@ def _mirrored(in_frame: np.ndarray) -> np.ndarray:
 
 
 def add_fields(
-    points, start, end, kind, density, nu, tol, side, force, stress, shift, half_plane: HalfPlane | None = None
-) -> None:
-    """Add the stress (n, 3) and 2μ times the displacement (n, 2) of elements with monomial ``density`` (m, 2, p+1)."""
-    if not len(points) or not len(start):
+    points: np.ndarray, elements: Elements, density: np.ndarray, kernel: Kernel, stress: np.ndarray, shift: np.ndarray,
+    half_plane: HalfPlane | None = None,
+) -> None:  # fmt: skip
+    """Add the stress (n, 3) and 2μ times the displacement (n, 2) of ``elements`` with monomial ``density`` (m, 2, p+1)."""
+    if not len(points) or not len(elements.start):
         return
-    flat = full_plane.lanes_of(points)
-    start, end = np.ascontiguousarray(start), np.ascontiguousarray(end)
-    kind = np.ascontiguousarray(kind, dtype=np.int64)
+    flat, elements = full_plane.lanes_of(points), elements_of(*elements)
     density = np.ascontiguousarray(density)
     order, table, out = density.shape[2] - 1, shape_functions.moments(), np.zeros((5, len(points)))
 
     def work(first, last):
-        full_plane.fields(flat, first, last, start, end, kind, order, density, nu, tol, side, force, table, out)
+        full_plane.fields(flat, first, last, elements, order, density, kernel, table, out)
 
-    _spread(len(points), len(points) * len(start), work)
+    _spread(len(points), len(points) * len(elements.start), work)
     stress += out[:3].T
     shift += out[3:].T
     if half_plane is None:
@@ -380,12 +404,12 @@ def add_fields(
     from ..kernels import half_plane_images
 
     images = full_plane.lanes_of(_mirrored(half_plane.frame(points)))
-    own, ends, out = half_plane.frame(start), half_plane.frame(end), np.zeros((5, len(points)))
+    framed, out = _framed(half_plane, elements), np.zeros((5, len(points)))
 
     def work(first, last):
-        half_plane_images.fields(images, first, last, own, ends, kind, order, density, nu, tol, force, table, out)
+        half_plane_images.fields(images, first, last, framed, order, density, kernel, table, out)
 
-    _spread(len(points), len(points) * len(start), work)
+    _spread(len(points), len(points) * len(elements.start), work)
     stress += half_plane.stress_of(out[:3].T)
     shift += out[3:].T @ half_plane.turn
 

@@ -1,4 +1,4 @@
-"""Blocks: polygons of rock, stored as flat arrays."""
+"""Polygonal blocks as flat arrays: vertices, loops, edges, and what follows from them."""
 
 from __future__ import annotations
 
@@ -11,17 +11,17 @@ import numpy as np
 from ...conventions import outward_normal_of
 from .polygon import (
     area_moments,
+    convex_and_simple,
     crossing_edges,
     crossing_loops,
     distance_to_edges,
-    plainly_simple,
     point_in_both,
     roundoff_of,
     signed_area,
     winding_number,
 )
 
-#: Edges lie in one line when the tangent of their angle is below this.
+#: Edges are collinear when the tangent of the angle between them is below this.
 STRAIGHT = 1e-6
 
 
@@ -38,11 +38,11 @@ class Blocks:
         block_loop    (n_blocks + 1,)   first loop of each block
         material      (n_blocks,)       index into the scene's materials
         fixed         (n_blocks,)       True: the block does not move
-        held          (n_blocks, 6)     True: that unknown (u0, v0, r0, εx, εy, γxy) of the block stays zero, as of a
-                                        guided platen; None when no unknown of a moving block is held
-        edge_name     (n_vertices,)     index into ``edge_names`` (0, the empty name: nothing said)
+        held          (n_blocks, 6)     True: that unknown (u0, v0, r0, εx, εy, γxy) of the block is constrained to
+                                        zero, as for a guided platen; None: no moving block is constrained
+        edge_name     (n_vertices,)     index into ``edge_names`` (0: the empty name, unnamed)
         edge_names    tuple of str      e.g. ("", "load:top", "joint:set1")
-        names         tuple of str      one name a block, for messages and files
+        names         tuple of str      one name per block, for messages and files
     """
 
     vertices: np.ndarray
@@ -66,11 +66,14 @@ class Blocks:
         edge_names: Sequence[Sequence[Sequence[str]]] | None = None,
         names: Sequence[str] | None = None,
     ) -> Blocks:
-        """Build from ``polygons[block][loop]`` = (n, 2) vertices without the closing repetition; a bare (n, 2) array
-        stands for a block without holes. ``edge_names[block][loop][edge]`` names edges. Loops are turned to the
-        house's sense. Raises ValueError naming the block for loops of fewer than three vertices, repeated vertices,
-        non-finite coordinates, edges that cross, no area, or holes that reach out of the outline or into one another,
-        and for lists that have not one entry a block."""
+        """Build from ``polygons[block][loop]`` = (n, 2) vertices, m, without repeating the first.
+
+        A bare (n, 2) array is a block without holes. ``edge_names[block][loop][edge]`` names edges. Outlines are made
+        counter-clockwise, holes clockwise.
+
+        Raises ValueError that names the block for loops of fewer than three vertices, repeated vertices, non-finite
+        coordinates, crossing edges, zero area, and holes that leave the outline or overlap; and for lists whose length
+        is not the number of blocks."""
         n_blocks = len(polygons)
         given = {"material": material, "fixed": fixed, "held": held, "edge_names": edge_names, "names": names}
         _refuse_lengths(n_blocks, given)
@@ -91,14 +94,14 @@ class Blocks:
         loop_start = np.concatenate([[0], np.cumsum([len(loop) for loop in loops])]).astype(int)
         if loops:
             with np.errstate(invalid="ignore"):
-                simple, turns_left = plainly_simple(np.concatenate(loops), loop_start)
-            for k in np.flatnonzero(~simple):
+                simple, turns_left = convex_and_simple(np.concatenate(loops), loop_start)
+            for k in np.flatnonzero(~simple).tolist():
                 _refuse_crooked(loops[k], names[owner[k]])
-            for k in np.flatnonzero(~outer):
+            for k in np.flatnonzero(~outer).tolist():
                 _refuse_stray(loops[block_loop[owner[k]]], loops[k], names[owner[k]])
-            for b in np.flatnonzero(np.diff(block_loop) > 2):
+            for b in np.flatnonzero(np.diff(block_loop) > 2).tolist():
                 _refuse_shared(loops[block_loop[b] + 1 : block_loop[b + 1]], names[b])
-            for k in np.flatnonzero(turns_left != outer):
+            for k in np.flatnonzero(turns_left != outer).tolist():
                 loops[k] = loops[k][::-1]
                 if labels is not None:
                     # Reversed, the edge that left vertex i arrives at it, so the labels shift by one.
@@ -162,7 +165,7 @@ class Blocks:
         return self._edges_by_name.get(name, np.empty(0, int))
 
     def edges_that_exist(self, name: str, what: str) -> np.ndarray:
-        """As `edges_named`; raises ValueError for ``what`` is said to be on them where there are none."""
+        """As `edges_named`; raises ValueError that begins with ``what`` when there are none."""
         edges = self.edges_named(name)
         if len(edges) == 0:
             known = ", ".join(repr(n) for n in self.edge_names if n) or "none"
@@ -180,8 +183,8 @@ class Blocks:
         return outward_normal_of(along / np.hypot(along[:, 0], along[:, 1])[:, None])
 
     def mean_vertices(self, vertices: np.ndarray) -> np.ndarray:
-        """(n_blocks, 2) the mean of each block's ``vertices``."""
-        # About each block's first vertex, or digits are lost far from the origin.
+        """(n_blocks, 2) mean of each block's ``vertices``, m."""
+        # Relative to each block's first vertex, to keep digits far from the origin.
         start = self.vertex_start[:-1]
         first = vertices[start]
         return first + np.add.reduceat(vertices - first[self.vertex_block], start, axis=0) / self._vertex_count
@@ -192,8 +195,10 @@ class Blocks:
 
     @cached_property
     def affine_fit(self) -> tuple[np.ndarray, np.ndarray]:
-        """(n_blocks, 2) the mean c of each block's reference vertices, and weights w (n_vertices, 2): the affine motion
-        that fits given vertices x best has the gradient Σ (x − mean x) ⊗ w."""
+        """(n_blocks, 2) mean of each block's reference vertices, m, and weights w (n_vertices, 2), 1/m.
+
+        The affine motion that fits current vertices x in the least-squares sense has the gradient Σ (x − mean x) ⊗
+        w."""
         centre, start = self.mean_vertices(self.vertices), self.vertex_start[:-1]
         arm = self.vertices - centre[self.vertex_block]
         moments = np.add.reduceat(arm[:, :, None] * arm[:, None, :], start, axis=0)
@@ -201,8 +206,9 @@ class Blocks:
 
     @cached_property
     def in_side(self) -> np.ndarray:
-        """(n_vertices,) the vertices at which a straight side goes on: a block's strain, which is the same all over it,
-        leaves straight sides straight."""
+        """(n_vertices,) bool: vertices inside a straight side, where the edges before and after are collinear.
+
+        The uniform strain of a block keeps straight sides straight."""
         along = self.vertices[self.next_vertex] - self.vertices
         before = along[self.previous_vertex]
         ahead = before[:, 0] * along[:, 0] + before[:, 1] * along[:, 1]
@@ -225,7 +231,7 @@ class Blocks:
 
     @cached_property
     def sides(self) -> dict[int, list[int]]:
-        """First edge of a straight side → the vertices along it, its two ends included."""
+        """First edge of each straight side → the vertices along it, both ends included."""
         following = self.next_vertex.tolist()
         sides = {}
         for start in sorted(set(self.side_start)):
@@ -237,8 +243,10 @@ class Blocks:
 
     @cached_property
     def side_chains(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-        """`side_start` and `sides` as arrays: (n_vertices,) the first edge of each edge's side; of each such edge, where
-        the vertices along its side begin, and where they end, in the last array."""
+        """`side_start` and `sides` as arrays.
+
+        (n_vertices,) first edge of each edge's side; (n_vertices,) twice, for such a first edge, where its vertices
+        begin and end in the last array; (n,) the vertices of all sides, side after side."""
         lengths = {start: len(side) for start, side in self.sides.items()}
         counts = np.array([lengths.get(edge, 0) for edge in range(self.n_vertices)], dtype=np.int64)
         last = np.cumsum(counts)
@@ -256,9 +264,9 @@ class Blocks:
         return self._area_moments[block]
 
     def areas(self, vertices: np.ndarray | None = None) -> np.ndarray:
-        """(n_blocks,) areas, m², holes taken out."""
+        """(n_blocks,) areas without holes, m²."""
         v = self.vertices if vertices is None else vertices
-        # The shoelace sum about each block's own first vertex keeps its digits far from the origin.
+        # The shoelace sum relative to each block's first vertex keeps its digits far from the origin.
         own = v - v[self.vertex_start[:-1]][self.vertex_block]
         w = own[self.next_vertex]
         return 0.5 * np.bincount(
@@ -348,7 +356,7 @@ def _refuse_stray(outline: np.ndarray, hole: np.ndarray, name: str) -> None:
 
 
 def _refuse_shared(holes: list[np.ndarray], name: str) -> None:
-    """What two holes share would be taken out of the block twice."""
+    """Raise ValueError for overlapping holes: their common area would be subtracted twice."""
     low, high = (np.array([extreme(hole, axis=0) for hole in holes]) for extreme in (np.min, np.max))
     for k, hole in enumerate(holes):
         near = ((low[:k] <= high[k]) & (high[:k] >= low[k])).all(axis=1)

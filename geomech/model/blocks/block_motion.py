@@ -1,4 +1,4 @@
-"""The motion of first-order blocks, recovered from their vertices: it is affine, so the vertices tell all of it."""
+"""Affine motion of first-order blocks, x = c + G (X − C), recovered from their vertices by least squares."""
 
 from __future__ import annotations
 

@@ -1,15 +1,16 @@
-"""Which blocks can be taken out of their neighbours, and which of them go: block theory in two dimensions.
+"""Key blocks by block theory in two dimensions: which blocks are removable, and which of them slide or fall.
 
-A block between fixed neighbours can move along s if s leads into none of the faces that touch it, s·n ≥ 0 for the
-normals n with which they push it. It is removable if there is such an s (its joint pyramid is not empty, and being a
-block it is finite: the theorem of Goodman & Shi 1985, Block theory, chapter 4). The resultant r of the forces on it
-says how it goes (their modes, chapter 9): it falls along r, or slides along the face that lets it go most nearly along
-r, held by that face's friction and cohesion, or it is pushed in.
+A block between fixed neighbours can move in a direction s if s·n ≥ 0 for the normals n with which the touching faces
+push it. It is removable if there is such an s: its joint pyramid is not empty, and the block is finite (Goodman & Shi
+1985, Block theory, chapter 4). The resultant r of its forces decides the mode (their chapter 9): the block falls along
+r, or slides along the face whose direction is nearest to r against that face's friction and cohesion, or r presses it
+in.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from typing import Any
 
 import numpy as np
 
@@ -18,7 +19,7 @@ from ..material import Material
 from ..state import OPEN, State
 from .block_arrays import Blocks
 
-#: Classes of blocks, by number.
+#: Classes of blocks.
 HELD, SAFE, FRICTION, SLIDES, FALLS, FIXED, UNKNOWN = 0, 1, 2, 3, 4, -1, -2
 CLASSES = {
     HELD: "held by its neighbours",
@@ -30,17 +31,17 @@ CLASSES = {
     UNKNOWN: "not known before contacts have been sought",
 }
 
-#: One row a block.
+#: One row per block.
 KEY_BLOCK = np.dtype(
     [
         ("kind", np.int64),  # HELD, SAFE, FRICTION, SLIDES, FALLS or FIXED
-        ("direction", np.float64),  # rad, the way it would go; nan where there is none
-        ("factor", np.float64),  # strength over what drives it along its one face; nan where it does not slide
+        ("direction", np.float64),  # rad, direction in which it would move; nan where there is none
+        ("factor", np.float64),  # shear strength over driving force on its face; nan where it does not slide
         (
             "displacement",
             np.float64,
-        ),  # m, of the mean of its vertices from where they were drawn, less the fixed rock's
-        ("speed", np.float64),  # m/s, of its centroid, against that of the fixed rock
+        ),  # m, of the mean of its vertices, relative to the fixed rock
+        ("speed", np.float64),  # m/s, of its centroid, relative to the fixed rock
         ("rank", np.int64),  # 0 the block that has moved farthest; fixed ones last
     ]
 )
@@ -54,9 +55,9 @@ _NEAR = 1e-3
 def key_blocks(
     blocks: Blocks, materials: Sequence[Material], joints: Sequence[JointLaw], state: State, gravity: np.ndarray
 ) -> np.ndarray:
-    """KEY_BLOCK rows of all ``blocks`` in ``state`` under ``gravity`` (2,) m/s², each between neighbours that stand.
+    """KEY_BLOCK rows of all ``blocks`` in ``state`` under ``gravity`` (2,) m/s², the neighbours of each taken as fixed.
 
-    Corners that only meet corners hold no block here: they let each other pass.
+    Corner-to-corner contacts do not restrain a block here.
     """
     joints = joints or (JointLaw("frictionless"),)
     out = np.zeros(blocks.n_blocks, KEY_BLOCK)
@@ -100,14 +101,15 @@ def key_blocks(
     return out
 
 
-def _principal(angle):
+def _principal(angle: Any) -> Any:
     """``angle`` in [−π, π)."""
     return (angle + np.pi) % (2 * np.pi) - np.pi
 
 
 def _spares(owner: np.ndarray, angle: np.ndarray) -> Iterator[tuple[int, float, float, float]]:
-    """Wherever a block's normals leave half a turn free, between parallel faces twice: block, the arc of its normals
-    from start to end (rad), what is free beyond the half turn."""
+    """Free half-planes of blocks: block, arc of its face normals from start to end (rad), free angle beyond π (rad).
+
+    A block between parallel faces has two."""
     if len(owner) == 0:
         return
     order = np.lexsort((angle, owner))
@@ -136,8 +138,7 @@ def _rank(out: np.ndarray, blocks: Blocks, state: State, fixed: np.ndarray) -> N
 
 
 def _faces(contacts: np.ndarray, size: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Of every touching pair and of both its blocks: block, angle of the normal that pushes it (rad), row in
-    ``contacts``."""
+    """For both blocks of every touching pair: block, angle of the normal that pushes it (rad), row in ``contacts``."""
     inside = (contacts["length"] > 0) | ((contacts["position"] > 1e-3) & (contacts["position"] < 1 - 1e-3))
     inside |= contacts["normal_force"] > 0
     near = _NEAR * np.minimum(size[contacts["block"]], size[contacts["other"]])
@@ -153,7 +154,7 @@ def _faces(contacts: np.ndarray, size: np.ndarray) -> tuple[np.ndarray, np.ndarr
 
 
 def _strength(rows: np.ndarray, joints: Sequence[JointLaw], press: float) -> float:
-    """N: ``press`` times the mean tan φ of a face's contacts, and the cohesion of those still bonded."""
+    """Shear strength of a face, N: ``press`` times the mean tan φ of its contacts, plus the cohesion of bonded ones."""
     if len(rows) == 0:
         return 0.0
     friction = np.array([joints[k].friction for k in rows["law"]])

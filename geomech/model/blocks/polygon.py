@@ -1,4 +1,5 @@
-"""Area integrals of polygons with holes, exact, by closed sums over their edges."""
+"""Polygons with holes: area integrals by closed sums over edges, and tests for crossings, overlaps and points
+inside."""
 
 from __future__ import annotations
 
@@ -7,14 +8,14 @@ import numpy as np
 
 def signed_area(loop: np.ndarray) -> float:
     """Area of ``loop`` (n, 2), m², positive counter-clockwise."""
-    # About its own first vertex: digits far from the origin.
+    # Relative to its first vertex, to keep digits far from the origin.
     own = loop - loop[0]
     here, following = own[:-1], own[1:]
     return 0.5 * float(np.sum(here[:, 0] * following[:, 1] - here[:, 1] * following[:, 0]))
 
 
 def polygon_moments(loops: list[np.ndarray], origin: np.ndarray) -> tuple[float, np.ndarray, np.ndarray]:
-    """Area, first moments (2,) and second moments (2, 2) about ``origin``, holes (clockwise) taken out."""
+    """Area m², first moments (2,) m³ and second moments (2, 2) m⁴ about ``origin``; clockwise loops are holes."""
     area, first, second = 0.0, np.zeros(2), np.zeros((2, 2))
     for loop in loops:
         p = loop - origin
@@ -33,7 +34,7 @@ def polygon_moments(loops: list[np.ndarray], origin: np.ndarray) -> tuple[float,
 
 def area_moments(loops: list[np.ndarray]) -> tuple[float, np.ndarray, np.ndarray]:
     """(area, centroid (2,), second moments about the centroid (2, 2): [[∫x², ∫xy], [∫xy, ∫y²]])."""
-    # About a vertex of its own first: digits far from the origin.
+    # Relative to its first vertex, to keep digits far from the origin.
     origin = loops[0][0]
     area, first, second = polygon_moments(loops, origin)
     centroid = first / area
@@ -41,7 +42,7 @@ def area_moments(loops: list[np.ndarray]) -> tuple[float, np.ndarray, np.ndarray
 
 
 def winding_number(loops: list[np.ndarray], point: np.ndarray) -> float:
-    """How often ``loops`` together wind about ``point``: 1 inside a polygon, 0 outside or in its holes."""
+    """Winding number of ``loops`` about ``point``: 1 inside the polygon, 0 outside and in holes."""
     total = 0.0
     for loop in loops:
         a = loop - point
@@ -51,17 +52,17 @@ def winding_number(loops: list[np.ndarray], point: np.ndarray) -> float:
 
 
 def distance_to_edges(point: np.ndarray, start: np.ndarray, end: np.ndarray) -> float:
-    """m from ``point`` (2,) to the nearest of the edges from ``start`` to ``end`` (both (n, 2))."""
+    """Distance from ``point`` (2,) to the nearest edge from ``start`` to ``end`` (both (n, 2)), m."""
     along, arm = end - start, point - start
     share = np.clip(np.sum(arm * along, axis=1) / np.sum(along * along, axis=1), 0.0, 1.0)
     return float(np.hypot(*(arm - share[:, None] * along).T).min())
 
 
-def plainly_simple(vertices: np.ndarray, start: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Which of many loops are convex, once round, with finite and distinct vertices, and which turn counter-clockwise.
+def convex_and_simple(vertices: np.ndarray, start: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Quick pre-check of many loops: (n_loops,) bool, convex and simple; (n_loops,) bool, counter-clockwise.
 
-    ``vertices`` (n, 2) of all loops, loop k from ``start[k]`` to ``start[k + 1]``. Two (n_loops,) arrays of bools; what
-    is not plainly simple may be so all the same.
+    ``vertices`` (n, 2) of all loops, loop k from ``start[k]`` to ``start[k + 1]``. A loop passes if it is convex, winds
+    once, and has finite and distinct vertices. One that does not pass may still be simple (`crossing_edges` decides).
     """
     first, count = start[:-1], np.diff(start)
     following = np.arange(1, len(vertices) + 1)
@@ -78,13 +79,13 @@ def plainly_simple(vertices: np.ndarray, start: np.ndarray) -> tuple[np.ndarray,
     short = np.minimum.reduceat(np.hypot(along[:, 0], along[:, 1]), first) <= 1e-12 * size
     area = np.add.reduceat(own[:, 0] * own[following, 1] - own[:, 1] * own[following, 0], first)
     one_way = np.minimum.reduceat(angle * np.repeat(np.sign(total), count), first) >= 0
-    # Comparisons with what is not finite are False.
+    # Comparisons with non-finite numbers are False.
     good = one_way & (np.abs(np.abs(total) - 2 * np.pi) < 1) & ~short & (np.abs(area) > 1e-12 * size**2)
     return good, area > 0
 
 
 def roundoff_of(*loops: np.ndarray) -> float:
-    """What is nearer than this touches, m: round-off of the coordinates of ``loops`` (n, 2), or 1e-12 of their size."""
+    """Distance below which ``loops`` (n, 2) touch, m: round-off of their coordinates, or 1e-12 of their size."""
     low, high = (
         np.min([loop.min(axis=0) for loop in loops], axis=0),
         np.max([loop.max(axis=0) for loop in loops], axis=0),
@@ -93,18 +94,17 @@ def roundoff_of(*loops: np.ndarray) -> float:
 
 
 def crossing_edges(loop: np.ndarray) -> tuple[int, int] | None:
-    """Two edges of ``loop`` (n, 2) that cross, or come within round-off of the coordinates (or 1e-12 of the loop's
-    size) away from a shared corner, the first found; None for a simple polygon.
+    """The first pair of edges of ``loop`` (n, 2) that cross or touch away from a shared corner; None: simple polygon.
 
-    Edge k leaves vertex k.
+    Edges touch within `roundoff_of`. Edge k leaves vertex k.
     """
     n = len(loop)
     p = loop - loop[0]
     along = np.roll(p, -1, axis=0) - p
     span = np.hypot(along[:, 0], along[:, 1])
     near = roundoff_of(loop)
-    # Of every vertex j from every edge i: on which side of its line, and how far from the edge itself. Edges that stand
-    # in one line with a gap between them meet nowhere, whatever round-off says of their sides.
+    # Of every vertex j from every edge i: the side of its line, and the distance from the edge itself. Collinear edges
+    # with a gap between them do not meet, whatever the signs of their round-off.
     arm = p[None, :] - p[:, None]
     side = along[:, None, 0] * arm[..., 1] - along[:, None, 1] * arm[..., 0]
     side = _sides(side, along[:, None], near)
@@ -113,7 +113,7 @@ def crossing_edges(loop: np.ndarray) -> tuple[int, int] | None:
     through = side * np.roll(side, -1, axis=1) < 0
     ends = touch | np.roll(touch, -1, axis=1)
     meet = (through & through.T) | ends | ends.T
-    # Neighbours share a corner; they fold back on one another where the far end of one lies on the other.
+    # Neighbours share a corner; they fold back where the far end of one lies on the other.
     here = np.arange(n)
     following = (here + 1) % n
     back = touch[here, (here + 2) % n] | touch[following, here]
@@ -123,13 +123,12 @@ def crossing_edges(loop: np.ndarray) -> tuple[int, int] | None:
 
 
 def crossing_loops(one: np.ndarray, other: np.ndarray) -> np.ndarray | None:
-    """(2,) where edges of two loops (n, 2) and (m, 2) pass through one another, the first found; None where they only
-    touch, or are apart."""
+    """The first point (2,) where edges of two loops (n, 2) and (m, 2) cross; None where they touch or are apart."""
     origin = one[0]
     p, q = one - origin, other - origin
     a, b = np.roll(p, -1, axis=0) - p, np.roll(q, -1, axis=0) - q
     near = roundoff_of(one, other)
-    # Ends of every edge from the line of every edge of the other: on different sides of both where they cross.
+    # Two edges cross where the ends of each lie on different sides of the other's line.
     arm = q[None, :] - p[:, None]
     of_other = _sides(a[:, None, 0] * arm[..., 1] - a[:, None, 1] * arm[..., 0], a[:, None], near)
     of_one = _sides(-(b[None, :, 0] * arm[..., 1] - b[None, :, 1] * arm[..., 0]), b[None, :], near)
@@ -142,13 +141,12 @@ def crossing_loops(one: np.ndarray, other: np.ndarray) -> np.ndarray | None:
 
 
 def _sides(area: np.ndarray, along: np.ndarray, near: float) -> np.ndarray:
-    """−1, 0 within ``near`` of the line, or 1."""
+    """Side of a line: −1, 1, or 0 within the distance ``near``, m."""
     return np.where(np.abs(area) <= near * np.hypot(along[..., 0], along[..., 1]), 0.0, np.sign(area))
 
 
 def point_in_both(one: np.ndarray, other: np.ndarray) -> np.ndarray | None:
-    """(2,) a point inside both of two loops that do not cross, beside the middle of an edge of one of them; None where
-    they are apart or only touch."""
+    """A point (2,) inside both of two loops that do not cross, near the midpoint of an edge; None: no overlap."""
     for loop, against in ((one, other), (other, one)):
         along = np.roll(loop, -1, axis=0) - loop
         inwards = np.stack([-along[:, 1], along[:, 0]], axis=1) * np.sign(signed_area(loop))

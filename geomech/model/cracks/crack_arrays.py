@@ -1,4 +1,4 @@
-"""Cracks: a network of straight segments inside blocks."""
+"""The crack network: straight segments inside blocks, as a planar graph."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
-#: Points nearer to one another than this part of the network's extent are one node, where nodes are joined.
+#: With ``join``, points nearer to each other than this, over the extent of the network, are one node.
 SAME_POINT = 1e-9
 
 
@@ -17,15 +17,14 @@ class Cracks:
     """Cracks as a planar graph in the reference coordinates of their blocks.
 
         nodes         (n_nodes, 2)      m
-        segments      (n_segments, 2)   node indices, start and end; a crack's segments follow one another
+        segments      (n_segments, 2)   node indices, start and end; the segments of a crack are consecutive
         crack         (n_segments,)     the crack each segment belongs to, from 0
         block         (n_segments,)     the block it lies in
         birth_cycle   (n_segments,)     0 for what the scene drew, else the cycle in which it grew
         aperture      (n_segments,)     initial aperture, m: 0 is a closed crack, inf a slot that never closes
         surface       (n_nodes,)        True where a node lies on its block's boundary (a crack mouth)
-        names         tuple of str      one name a crack
-        law           (n_segments,)     the law of its faces, an index among those given to who solves; zeros if left
-                      out
+        names         tuple of str      one name per crack
+        law           (n_segments,)     index of the law of its faces among the solver's ``face_laws``; default zeros
 
     A node that ends one segment only and is not on the surface is a *tip*. A node shared by three or more segments,
     or by two cracks, is a junction.
@@ -39,7 +38,7 @@ class Cracks:
     aperture: np.ndarray
     surface: np.ndarray
     names: tuple[str, ...] = ()
-    law: np.ndarray | None = None
+    law: np.ndarray = None  # type: ignore[assignment]  # never none once it is made
 
     def __post_init__(self) -> None:
         if self.law is None:
@@ -57,12 +56,14 @@ class Cracks:
         law: Sequence[int] | int = 0,
         join: bool = False,
     ) -> Cracks:
-        """One crack a polyline (n, 2). ``surface`` says, crack by crack, which end is a mouth.
+        """One crack per polyline (n, 2), m.
 
-        ``join``: points that coincide, of one crack or of several, are one node, so that cracks meet, cross and branch
-        there, and a line that ends where it began is a ring. Without it no node is shared; and where lines cross
-        between their points none is made (scenes are noded by whoever reads them). Raises ValueError naming the
-        crack."""
+        block, aperture, law  of each crack, or one for all
+        surface               per crack, which of its two ends is a mouth
+        join                  True: coincident points, of one crack or several, become one node, so that cracks meet,
+                              cross and branch there. Crossings between points are not noded
+
+        Raises ValueError that names the crack for fewer than two points, non-finite points and zero-length segments."""
         n = len(polylines)
         names = tuple(names) if names is not None else tuple(f"crack {k}" for k in range(n))
         blocks = np.broadcast_to(np.asarray(block, dtype=int), (n,))
@@ -88,22 +89,22 @@ class Cracks:
                 ends[0], ends[-1] = surface[k]
             mouth.append(ends)
             first += len(line)
-        crack = np.concatenate(crack) if n else np.empty(0, int)
+        of_crack = np.concatenate(crack) if n else np.empty(0, int)
         if join and n:
-            nodes, segments, mouth = _joined(np.concatenate(nodes), np.concatenate(segments), np.concatenate(mouth))
-            for s in np.flatnonzero(segments[:, 0] == segments[:, 1])[:1]:
-                raise ValueError(f"{names[crack[s]]}: a crack segment has no length beside the network's extent")
-            nodes, segments, mouth = [nodes], [segments], [mouth]
+            points, pairs, ends = _joined(np.concatenate(nodes), np.concatenate(segments), np.concatenate(mouth))
+            for s in np.flatnonzero(pairs[:, 0] == pairs[:, 1])[:1]:
+                raise ValueError(f"{names[of_crack[s]]}: a crack segment has no length beside the network's extent")
+            nodes, segments, mouth = [points], [pairs], [ends]
         return cls(
             nodes=np.concatenate(nodes) if n else np.empty((0, 2)),
             segments=np.concatenate(segments) if n else np.empty((0, 2), int),
-            crack=crack,
-            block=blocks[crack] if n else np.empty(0, int),
-            birth_cycle=np.zeros(len(crack), int),
-            aperture=apertures[crack] if n else np.empty(0),
+            crack=of_crack,
+            block=blocks[of_crack] if n else np.empty(0, int),
+            birth_cycle=np.zeros(len(of_crack), int),
+            aperture=apertures[of_crack] if n else np.empty(0),
             surface=np.concatenate(mouth) if n else np.empty(0, bool),
             names=names,
-            law=laws[crack] if n else np.empty(0, int),
+            law=laws[of_crack] if n else np.empty(0, int),
         )
 
     @property
@@ -116,12 +117,12 @@ class Cracks:
 
     @cached_property
     def lengths(self) -> np.ndarray:
-        """(n_segments,) m."""
+        """(n_segments,) lengths of the segments, m."""
         return np.hypot(*(self.nodes[self.segments[:, 1]] - self.nodes[self.segments[:, 0]]).T)
 
     @cached_property
     def valence(self) -> np.ndarray:
-        """(n_nodes,) how many segments end at each node."""
+        """(n_nodes,) number of segments that end at each node."""
         return np.bincount(self.segments.ravel(), minlength=len(self.nodes))
 
     @cached_property
@@ -151,7 +152,7 @@ class Cracks:
 
 
 def _joined(nodes: np.ndarray, segments: np.ndarray, mouth: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """The network with nodes that coincide made one, the first of them; a mouth if one of them is."""
+    """Merge coincident nodes into the first of them; the result is a mouth if one of them is."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
     from scipy.spatial import cKDTree

@@ -1,7 +1,7 @@
-"""All cracks of a run, those too that blocks have been cut along.
+"""All cracks of a run, including those along which blocks were split.
 
-Where cracks cut a block in two, the segments between the parts are no cracks any more but faces of blocks, called
-"crack:NAME". Coordinates of the reference are the same to the last bit.
+Where cracks split a block, the segments between the parts become block faces with the edge name "crack:NAME". Their
+reference coordinates are those of the segments, bit for bit.
 """
 
 from __future__ import annotations
@@ -14,15 +14,16 @@ from ..blocks.block_arrays import Blocks
 from ..state import Cycle
 from .crack_arrays import Cracks
 
-#: What is nearer than this part of a segment's length to it lies on it.
+#: A point lies on a segment when it is nearer than this, over the segment's length.
 _ON = 1e-9
 _WALL = "crack:"
 
 
 def whole_network(cycle: Cycle, before: Cracks) -> Cracks:
-    """The cracks of ``cycle`` and the faces that cracks have left on its blocks, with nodes shared between them (faces
-    have block −1). A face
-    is as old as the crack of ``before``, all there were a cycle earlier, that it lies on; else it grew in that cycle."""
+    """The cracks of ``cycle`` and the block faces that cracks have left, with shared nodes (faces have block −1).
+
+    ``before``: the whole network one cycle earlier. A face has the birth cycle of the segment of ``before`` that it
+    lies on; otherwise it grew in that cycle."""
     ends, names = _walls(cycle.blocks)
     if not len(ends):
         return cycle.cracks
@@ -47,7 +48,7 @@ def whole_network(cycle: Cycle, before: Cracks) -> Cracks:
 
 
 def _walls(blocks: Blocks) -> tuple[np.ndarray, list[str]]:
-    """(n, 2, 2) ends, m, of the faces that cracks have left, each once, and the names of their cracks."""
+    """(n, 2, 2) ends of the faces that cracks have left, m, each once, and the names of their cracks."""
     found: dict[tuple, str] = {}
     for edge, name in enumerate(blocks.edge_names[k] for k in blocks.edge_name):
         if name.startswith(_WALL):
@@ -57,7 +58,7 @@ def _walls(blocks: Blocks) -> tuple[np.ndarray, list[str]]:
 
 
 def _birth(segment: np.ndarray, before: Cracks, number: int) -> int:
-    """The cycle in which ``segment`` (2, 2) grew: that of the segment of ``before`` that holds it, or ``number``."""
+    """Birth cycle of ``segment`` (2, 2): that of the segment of ``before`` that contains it, else ``number``."""
     start, end = before.nodes[before.segments].swapaxes(0, 1)
     along = end - start
     size = np.hypot(*along.T)

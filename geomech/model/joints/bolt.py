@@ -1,4 +1,4 @@
-"""Bolts and anchors between two points of the blocks, and what they remember."""
+"""Bolts and anchors between two material points of blocks, and their history variables."""
 
 from __future__ import annotations
 
@@ -6,24 +6,25 @@ import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from ..blocks.block_arrays import Blocks
 from ..blocks.polygon import winding_number
-from ..numbers import POSITIVE, Number, refuse_numbers, refuse_point, told
+from ..numbers import POSITIVE, Number, as_text, refuse_numbers, refuse_point
 
-#: The far end of an anchor that is held by the ground itself.
+#: Block number of an anchor's far end that is fixed in the ground.
 GROUND = -1
 
-#: What a bolt remembers, one row a bolt.
+#: History variables of bolts, one row per bolt.
 BOLT = np.dtype(
     [
         ("installed", np.bool_),
         ("broken", np.bool_),
         ("length", np.float64),  # at installation, m
         ("plastic", np.float64),  # elongation by yielding, m
-        ("slid", np.float64),  # dowel displacement beyond the dowel's elastic one, m
+        ("slid", np.float64),  # plastic displacement of the dowel, m
         ("force", np.float64),  # N/m, positive in tension
         ("shear_force", np.float64),  # N/m of the dowel, on the second block along the bolt's axis turned by +90°
     ]
@@ -35,14 +36,14 @@ class Bolt:
     """A bolt between the material points ``start`` of ``block`` and ``end`` of ``other`` (GROUND, −1: a point at rest).
 
     stiffness        EA/L, N/m per metre of thickness (a row of bolts at spacing s: EA/(L s))
-    pretension       N/m, force at ``installation`` (s); the bolt is not there before
-    yield_force      N/m: from there on it yields, perfectly plastic, and keeps what it yielded
-    breaking_strain  elongation over length at which it breaks for good
+    pretension       N/m, force at ``installation`` (s); before, the bolt does not act
+    yield_force      N/m; beyond, it yields (perfectly plastic) and keeps the plastic elongation
+    breaking_strain  elongation over length at which it breaks
     shear_stiffness  N/m, dowel action: resistance across its axis, up to ``shear_strength`` N/m (perfectly plastic)
-    compression      True: it also takes compression, down to −yield_force (a grouted bar); else it goes slack
+    compression      True: it carries compression to −yield_force (a grouted bar); False: it goes slack
 
-    Raises ValueError naming the bolt for a stiffness or strength that is not positive, a pretension beyond the yield
-    force, ends that are one point.
+    Raises ValueError that names the bolt for a stiffness or strength that is not positive, a pretension beyond the
+    yield force, and coincident ends.
     """
 
     block: int
@@ -75,7 +76,7 @@ class Bolt:
             raise ValueError(f"bolt {self.name!r}: both ends are in one block, which it cannot hold")
 
 
-#: What the numbers of `Bolt` may be.
+#: Admissible numbers of `Bolt`.
 _NUMBERS = {
     "stiffness": Number(closed=False, unit="N/m"),
     "yield_force": Number(closed=False, unit="N/m", infinite=True),
@@ -88,7 +89,7 @@ _NUMBERS = {
 
 
 class CrossesNoJoint(ValueError):
-    """A grouted bar in one block alone, where it can do nothing."""
+    """A grouted bar lies in one block, crosses no joint, and has no effect."""
 
 
 def grouted_bolt(
@@ -101,25 +102,27 @@ def grouted_bolt(
     name: str = "bolt",
     **properties: float | bool,
 ) -> tuple[Bolt, ...]:
-    """A fully grouted bar from ``start`` to ``end`` as short bolts, one where it crosses from a block into the next.
+    """A fully grouted bar from ``start`` to ``end`` (m) as short bolts, one at each joint that it crosses.
 
-    Grouted all along, a bar in blocky rock works where joints open or slide, over a short *active length* about the
-    joint (m, of the order of a few diameters to half a metre; local reinforcement, Lorig 1985): each crossing becomes a
-    `Bolt` of stiffness ``axial_stiffness`` (EA, N per metre of thickness) over ``active_length``, its ends half that
-    length into the two blocks (less where a block is thinner). ``properties`` as for `Bolt`; it takes compression too
-    unless told otherwise. Raises CrossesNoJoint when the bar does not, and
-    ValueError naming it for a stiffness or length that is not positive.
+    A bar grouted all along is strained where joints open or slide, over a short *active length* (a few diameters to
+    half a metre; local reinforcement, Lorig 1985). Each crossing becomes a `Bolt` of stiffness ``axial_stiffness`` (EA,
+    N per metre of thickness) over ``active_length`` (m), its ends half that length inside the two blocks (less in a
+    thinner block). ``properties`` as for `Bolt`; ``compression`` is True by default.
+
+    Raises CrossesNoJoint where the bar crosses no joint, and ValueError that names the bar for a stiffness or length
+    that is not positive.
     """
     for what, value, unit in (("axial_stiffness", axial_stiffness, "N"), ("active_length", active_length, "m")):
         if not POSITIVE.holds(value):
-            raise ValueError(f"bolt {name!r}: {what} must be positive and finite, got {told(value)} {unit}")
+            raise ValueError(f"bolt {name!r}: {what} must be positive and finite, got {as_text(value)} {unit}")
     refuse_point(f"bolt {name!r}: its start", start)
     refuse_point(f"bolt {name!r}: its end", end)
     a, b = np.asarray(start, dtype=float), np.asarray(end, dtype=float)
     length = float(np.hypot(*(b - a)))
     pieces = _pieces(blocks, a, b)
     along = (b - a) / length
-    bolts = []
+    bolts: list[Bolt] = []
+    options: dict[str, Any] = {"compression": True, **properties}
     for (one, s0, s1), (two, s2, s3) in itertools.pairwise(pieces):
         before, after = min(active_length / 2, s1 - s0), min(active_length / 2, s3 - s2)
         points = (a + (s1 - before) * along).tolist(), (a + (s2 + after) * along).tolist()
@@ -131,7 +134,7 @@ def grouted_bolt(
                 tuple(points[1]),
                 stiffness=axial_stiffness / (before + after),
                 name=f"{name}/{len(bolts) + 1}",
-                **{"compression": True, **properties},
+                **options,
             )
         )
     if not bolts:
@@ -140,8 +143,8 @@ def grouted_bolt(
 
 
 def _pieces(blocks: Blocks, a: np.ndarray, b: np.ndarray) -> list[tuple[int, float, float]]:
-    """The blocks that the line from ``a`` to ``b`` passes, in order, each with the distances from ``a`` where it enters
-    and leaves."""
+    """Blocks along the line from ``a`` to ``b``, in order, each with the distances from ``a`` where the line enters
+    and leaves it, m."""
     along = b - a
     length = float(np.hypot(*along))
     p, q = blocks.vertices, blocks.vertices[blocks.next_vertex]
@@ -168,7 +171,7 @@ def _pieces(blocks: Blocks, a: np.ndarray, b: np.ndarray) -> list[tuple[int, flo
 
 
 def _near(blocks: Blocks, point: np.ndarray) -> Sequence[int]:
-    """Blocks whose box holds ``point``."""
+    """Blocks whose bounding box contains ``point``."""
     first = blocks.vertex_start[:-1]
     low, high = np.minimum.reduceat(blocks.vertices, first), np.maximum.reduceat(blocks.vertices, first)
     return np.flatnonzero(((low <= point) & (point <= high)).all(axis=1)).tolist()

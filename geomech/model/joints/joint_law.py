@@ -1,4 +1,4 @@
-"""Joints: what holds two block faces together."""
+"""Strength and stiffness of joints: Coulomb friction, cohesion, tension; softening, dilation, roughness, closure."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from ..numbers import Number, refuse_numbers
 
-#: Barton & Choubey (1977) do not let the angle of their strength grow beyond this where the normal stress vanishes.
+#: Largest total friction angle of a rough joint at low normal stress (Barton & Choubey 1977), rad.
 STEEPEST = math.radians(70.0)
 
 
@@ -20,7 +20,7 @@ class Roughness:
     length            length of the joint's blocks in place, m, to which both are corrected; None: no correction
     from_peak_slip    the shear stiffness is the peak strength over the slip of the peak, at the present normal stress
                       (Barton & Choubey 1977); otherwise the law's stiffness or the solver's springs hold up to the peak
-    reduction         the strength, whole and residual, is divided by this (a trial factor of safety); dilation is not
+    reduction         divisor of the strength, peak and residual (a trial factor of safety); dilation is not divided
 
     Sources: Barton & Choubey (1977), Rock Mechanics 10, 1-54 (strength, 70° limit, stiffness); Barton & Bandis (1982),
     23rd US Symp. Rock Mech. (size, slip of the peak); Barton, Bandis & Bakhtar (1985), Int. J. Rock Mech. 22, 121-140
@@ -73,20 +73,20 @@ class Roughness:
 
 @dataclass(frozen=True)
 class JointLaw:
-    """Strength and stiffness of a joint; strengths are Pa (times a contact's tributary length), angles rad. A bonded
-    face fails as one, in tension at its extreme fibre, in shear by c ℓ + N tan φ of all of it.
+    """Strength and stiffness of a joint. Strengths are Pa, times a contact's tributary length; angles rad.
 
-    friction_angle, cohesion    of the joint before it has slipped (its peak); with ``roughness`` the angle is φr
-    tensile_strength            lost with the cohesion's peak when either fails
-    residual_friction_angle     after slip (None: as before), residual_cohesion likewise
-    softening_slip              m of slip over which tan φ and cohesion fall in a straight line to the residual; 0: at
-                                once
-    dilation_angle              sliding lifts the faces by tan ψ times the slip, up to ``dilation_slip`` m from the
+    A contact sticks up to |τ| = c + σ tan φ. A bonded face fails as a whole: in tension at its extreme fibre, in
+    shear at c ℓ + N tan φ.
+
+    friction_angle, cohesion    peak values, before slip; with ``roughness`` the angle is the residual φr
+    tensile_strength            lost, as the peak cohesion is, at the first tensile or shear failure
+    residual_friction_angle, residual_cohesion   after slip (angle None: as before)
+    softening_slip              m of slip over which tan φ and cohesion fall linearly to their residuals; 0: at once
+    dilation_angle              ψ: sliding opens the faces by tan ψ times the slip, up to ``dilation_slip`` m from the
                                 start
-    roughness                   curved strength of Barton and Bandis, with its own dilation and its own decay
-    normal_stiffness, shear_stiffness   Pa/m, or None for the solver's penalty springs; a face with a normal stiffness
-                                        resists
-                                rotation as a bed of springs that cannot pull
+    roughness                   strength curve of Barton and Bandis with its own dilation and decay; None: straight
+    normal_stiffness, shear_stiffness   Pa/m; None: the solver's penalty springs. A face with a normal stiffness resists
+                                rotation as an elastic bed without tension does
     max_closure                 m: hyperbolic closure σ = kₙ δ/(1 − δ/Vm) of Bandis, Lumsden & Barton (1983), Int. J.
                                 Rock Mech. 20, 249-268, with ``normal_stiffness`` the initial one; None: straight
 
@@ -151,7 +151,7 @@ class JointLaw:
 
     @property
     def friction(self) -> float:
-        """tan φ, of the peak."""
+        """tan φ before slip (peak); of a rough joint tan φr over its strength reduction."""
         return math.tan(self.friction_angle) / (1.0 if self.roughness is None else self.roughness.reduction)
 
     @property
@@ -161,8 +161,7 @@ class JointLaw:
 
     @property
     def straight(self) -> bool:
-        """Whether friction is one angle, and the faces neither lift nor stiffen: all that is asked of the law is a
-        line."""
+        """True for one straight Coulomb line with constant stiffness: no softening, dilation, roughness or closure."""
         return (
             self.residual_friction == self.friction
             and not self.residual_cohesion
@@ -173,7 +172,7 @@ class JointLaw:
         )
 
 
-#: What the numbers of `JointLaw` may be, but for its angles.
+#: Admissible numbers of `JointLaw`, without its angles.
 _NUMBERS = {
     "cohesion": Number(unit="Pa", infinite=True),
     "tensile_strength": Number(unit="Pa", infinite=True),

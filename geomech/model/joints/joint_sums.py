@@ -1,4 +1,4 @@
-"""What every joint carries and how far it has opened and slipped: contacts added up by joint; reactions of supports."""
+"""Sums of contacts by joint (forces, opening, slip, mobilised strength), and reactions of supports."""
 
 from __future__ import annotations
 
@@ -10,29 +10,30 @@ from ..blocks.block_arrays import Blocks
 from ..state import OPEN, SLIP, STICK
 from .joint_law import JointLaw
 
-#: One row a joint.
+#: One row per joint.
 JOINT_SUM = np.dtype(
     [
         ("contacts", np.int64),
-        ("length", np.float64),  # m, of the faces that touch or are near: tributary lengths
+        ("length", np.float64),  # m, sum of tributary lengths of faces that touch or are near
         ("open_length", np.float64),  # m of it
         ("sliding_length", np.float64),
-        ("mean_opening", np.float64),  # m, over the length; closed parts count as 0
+        ("mean_opening", np.float64),  # m, mean over the length; closed parts count as 0
         ("max_opening", np.float64),
         ("max_penetration", np.float64),
-        ("mean_slip", np.float64),  # m, of its size, over the length
+        ("mean_slip", np.float64),  # m, mean of |slip| over the length
         ("max_slip", np.float64),
         ("normal_force", np.float64),  # N/m, sum, positive in compression
         ("shear_force", np.float64),  # N/m, sum of sizes
-        ("mobilised", np.float64),  # |S| over what friction and cohesion hold, whole joint; 0 where it carries nothing
-        ("bonded_length", np.float64),  # m whose cohesion and tensile strength hold
+        ("mobilised", np.float64),  # Σ|S| over the joint's shear strength; 0 where it carries nothing
+        ("bonded_length", np.float64),  # m with intact cohesion and tensile strength
     ]
 )
 
 
 def joint_names(blocks: Blocks, contacts: np.ndarray, joints: Sequence[JointLaw]) -> np.ndarray:
-    """(n_contacts,) str: the joint of every contact. It goes by the name of the edge that is touched, else by that of
-    an edge at the vertex, else by its law (without any, all contacts are frictionless)."""
+    """(n_contacts,) str: name of the joint of every contact.
+
+    The name of the touched edge, else of an edge at the vertex, else of the joint law ("frictionless" without laws)."""
     joints = joints or (JointLaw("frictionless"),)
     edge = np.asarray(blocks.edge_name)
     name = edge[contacts["edge"]]
@@ -50,10 +51,10 @@ def joint_sums(blocks: Blocks, contacts: np.ndarray, joints: Sequence[JointLaw])
     names, joint = np.unique(joint_names(blocks, contacts, joints).astype(str), return_inverse=True)
     out = np.zeros(len(names), JOINT_SUM)
 
-    def total(values) -> np.ndarray:
+    def total(values: np.ndarray) -> np.ndarray:
         return np.bincount(joint, values, len(names))
 
-    def largest(values) -> np.ndarray:
+    def largest(values: np.ndarray) -> np.ndarray:
         most = np.zeros(len(names))
         np.maximum.at(most, joint, values)
         return most
@@ -82,8 +83,10 @@ def joint_sums(blocks: Blocks, contacts: np.ndarray, joints: Sequence[JointLaw])
 
 
 def reactions(blocks: Blocks, contacts: np.ndarray) -> dict[int, np.ndarray]:
-    """Block → (force x, force y, moment about the mean of its reference vertices) that all contacts put on it, N and N
-    m per metre, for every block that is fixed or guided: what it must be held with is the opposite."""
+    """Resultant of all contacts on every fixed or guided block: block → (force x, force y, moment).
+
+    N and N m per metre of thickness; the moment is about the mean of the block's reference vertices. The support's
+    reaction is the opposite."""
     supports = np.asarray(blocks.fixed, dtype=bool).copy()
     if blocks.held is not None:
         supports |= blocks.held.any(axis=1)

@@ -1,1 +1,1 @@
-"""Loads and given motion as functions of time."""
+"""Loads and prescribed motion as functions of time."""

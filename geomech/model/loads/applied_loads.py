@@ -1,4 +1,4 @@
-"""Loads as functions of time, named after the edges and blocks they act on."""
+"""Applied loads as functions of time: tractions on edges, point loads, water, viscous boundaries, excavations."""
 
 from __future__ import annotations
 
@@ -24,8 +24,9 @@ def _refuse_columns(what: str, history: History, wanted: int = 2) -> None:
 
 @dataclass(frozen=True, eq=False)
 class LinearProfile:
-    """A factor that runs linearly from ``factors[0]`` at ``start`` to ``factors[1]`` at ``end`` (reference coordinates,
-    m), and on beyond them; across the line between them it is constant."""
+    """A factor that varies linearly along the line from ``start`` to ``end`` (reference coordinates, m) and beyond.
+
+    It is ``factors[0]`` at ``start``, ``factors[1]`` at ``end``, and constant across the line."""
 
     start: tuple[float, float]
     end: tuple[float, float]
@@ -39,7 +40,7 @@ class LinearProfile:
             raise ValueError(f"a linear profile needs two different points, got {self.start} twice")
 
     def at(self, points: np.ndarray) -> np.ndarray:
-        """(...,) the factor at ``points`` (..., 2)."""
+        """(...,) the factor at ``points`` (..., 2), m."""
         start, along = np.asarray(self.start, dtype=float), np.subtract(self.end, self.start).astype(float)
         share = (points - start) @ along / (along @ along)
         return self.factors[0] + share * (self.factors[1] - self.factors[0])
@@ -47,11 +48,11 @@ class LinearProfile:
 
 @dataclass(frozen=True, eq=False)
 class EdgeTraction:
-    """A traction (N/m², x and y components, per unit of *reference* length) on every edge called ``edge_name``.
+    """A traction on every edge called ``edge_name``: x and y components, Pa, per unit of *reference* length.
 
-    It keeps its direction and, because it is counted per reference length, its total force as the block deforms. With
-    ``follower`` it turns with the block instead, as the pressure of a fluid or a jack that stands on it. ``profile``
-    multiplies it along the edges; any linear distribution is the sum of two such tractions.
+    Its direction is fixed; its total force does not change as the block deforms. With ``follower`` it rotates with the
+    block, as a jack does. ``profile`` multiplies it along the edges; any linear distribution is the sum of two such
+    tractions.
     """
 
     edge_name: str
@@ -65,8 +66,9 @@ class EdgeTraction:
 
 @dataclass(frozen=True, eq=False)
 class PointLoad:
-    """A force (N per metre of thickness) on ``block`` at the material point ``at`` (reference coordinates); with
-    ``follower`` it turns with the block."""
+    """A force on ``block`` at the material point ``at`` (reference coordinates, m), N per metre of thickness.
+
+    With ``follower`` it rotates with the block."""
 
     block: int
     at: tuple[float, float]
@@ -80,19 +82,17 @@ class PointLoad:
 
 @dataclass(frozen=True, eq=False)
 class WaterTable:
-    """Water that stands in all joints, cracks between blocks and on all outer faces below a line.
+    """A water table: pressure in joints and on outer faces of blocks below a line, p = γw · depth.
 
-    ``points`` (n, 2) m, x ascending: the line, level beyond its ends; under it the pressure is ``unit_weight`` (N/m³)
-    times the depth below it, above it there is none. ``level`` (m) raises the whole line with time. An inclined line is
-    a piezometric one: the pressure on a joint under it is what that line says. The pressure acts on both faces of a
-    joint, so that contact forces are effective ones and a submerged block is lifted by the weight of the water it
-    displaces. ``dry`` names edges that no water reaches (lined or drained).
+    points       (n, 2) m, x ascending: the piezometric line, level beyond its ends
+    unit_weight  γw, N/m³
+    level        history of the rise of the whole line, m
+    dry          names of edges that no water reaches (lined or drained)
+    ground       (n, 2) m, the rock's surface from left to right: the table does not rise above it. None: water above
+                 the ground is ponded and presses on it
 
-    Where the line stands above the rock, water is ponded there and presses on it. With ``ground`` (n, 2) m, the rock's
-    surface from left to right, the table is never above it: it follows the ground in front of a slope, and nothing
-    presses on the ground itself.
-
-    Blocks carry their own (saturated) density; their stress is the total one.
+    The pressure acts on both faces of a joint: contact forces are effective forces, and a submerged block is buoyant.
+    Blocks have their saturated density; their stress is the total stress.
     """
 
     points: np.ndarray
@@ -116,7 +116,7 @@ class WaterTable:
             _refuse_columns("the level of a water table", self.level, 1)
 
     def line_at(self, time: float) -> tuple[np.ndarray, np.ndarray]:
-        """(x ascending, y) of the table's points at ``time``, m."""
+        """Points (x ascending, y) of the table at ``time`` s, m."""
         x, y = np.asarray(self.points, dtype=float).T
         line = x, y + (0.0 if self.level is None else float(self.level.at(time)[0]))
         return line if self.ground is None else below_ground(line, self._lowest)
@@ -128,10 +128,9 @@ class WaterTable:
 
 @dataclass(frozen=True, eq=False)
 class ViscousBoundary:
-    """Edges called ``edge_name`` absorb the waves that reach them, as rock that goes on for ever would (dynamic steps
-    only).
+    """Edges called ``edge_name`` that absorb waves as unbounded rock would, in dynamic steps.
 
-    ``incoming`` (2,) m/s: particle velocity, as a history, of a plane wave that enters through them, straight on.
+    ``incoming``: history (2,) of the particle velocity of a plane wave that enters at normal incidence, m/s.
     """
 
     edge_name: str
@@ -144,10 +143,9 @@ class ViscousBoundary:
 
 @dataclass(frozen=True, eq=False)
 class Excavation:
-    """At ``time`` (s) ``blocks`` are taken out, and those whose reference centroid lies in ``polygon`` (n, 2).
+    """Excavation of ``blocks``, and of those whose reference centroid lies in ``polygon`` (n, 2) m, at ``time`` s.
 
-    Their contacts vanish, loads and bolts on them go, and the run goes on. With ``drained`` no water presses any more
-    on what lay against them.
+    Their contacts, loads and bolts are removed. With ``drained`` no water presses on the faces that lay against them.
     """
 
     time: float
@@ -168,7 +166,7 @@ class Excavation:
 
 @dataclass(frozen=True, eq=False)
 class Loads:
-    """Everything that acts on the blocks. ``gravity`` (2,) m/s² as a history; the scene's ramp is part of it."""
+    """All loads on the blocks. ``gravity``: history (2,) of its acceleration, m/s², the scene's ramp included."""
 
     gravity: History = field(default_factory=lambda: History.constant([0.0, 0.0]))
     edge_tractions: tuple[EdgeTraction, ...] = ()

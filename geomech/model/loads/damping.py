@@ -1,4 +1,4 @@
-"""Rayleigh damping from fractions of critical damping at two frequencies."""
+"""Rayleigh damping α M + β K from fractions of critical damping at two frequencies."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The ground over a section, and a water table beside it: where the table would stand above the ground, and how deep."""
+"""Ground surface of a section and a water table above it: ponds and their depth."""
 
 from __future__ import annotations
 
@@ -6,12 +6,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-#: A step of the ground is given this part of its width to fall in: a table is a function of x.
+#: Width of a vertical step of the ground, over the section's width: a table must be a function of x.
 _STEP = 1e-9
 
 
 class Pond(NamedTuple):
-    """Water above the ground from ``start`` to ``end``, m along x, at most ``depth`` m deep."""
+    """Ponded water from x = ``start`` to ``end``, m, at most ``depth`` m deep."""
 
     start: float
     end: float
@@ -19,8 +19,10 @@ class Pond(NamedTuple):
 
 
 def lowest_over(ground: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """(x ascending, y) of the lowest ground at every x, m: ``ground`` (n, 2) is a line from left to right, with
-    overhangs and vertical faces. At a step the lower side counts."""
+    """The lowest ground at every x as a line (x ascending, y), m.
+
+    ``ground`` (n, 2) m runs from left to right and may have overhangs and vertical faces; at a step the lower side
+    counts."""
     x = np.unique(ground[:, 0])
     step = _STEP * (x[-1] - x[0])
     x = x[np.append(True, np.diff(x) > step)]
@@ -51,8 +53,10 @@ def lowest_over(ground: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return np.array(xs), np.array(ys)
 
 
-def _together(line: tuple[np.ndarray, np.ndarray], ground: tuple[np.ndarray, np.ndarray]):
-    """(x, height of the ``line``, height of the ``ground``) at all their points and where they cross."""
+def _together(
+    line: tuple[np.ndarray, np.ndarray], ground: tuple[np.ndarray, np.ndarray]
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """(x, y of the ``line``, y of the ``ground``), m, at all their points and crossings."""
     x = np.unique(np.concatenate([line[0], ground[0]]))
     above = np.interp(x, *line) - np.interp(x, *ground)
     cross = np.flatnonzero(above[:-1] * above[1:] < 0)
@@ -64,10 +68,10 @@ def _together(line: tuple[np.ndarray, np.ndarray], ground: tuple[np.ndarray, np.
 def below_ground(
     line: tuple[np.ndarray, np.ndarray], ground: tuple[np.ndarray, np.ndarray]
 ) -> tuple[np.ndarray, np.ndarray]:
-    """The lower one of the ``line`` and the ``ground``, both (x ascending, y), as such a line."""
+    """The minimum of ``line`` and ``ground``, both (x ascending, y), as such a line."""
     x, own, cap = _together(line, ground)
     y = np.minimum(own, cap)
-    # Where neither bends, nor one takes over from the other, no point is needed.
+    # Points where neither bends, nor the minimum changes sides, are not needed.
     needed = np.ones(len(x), bool)
     if len(x) > 2:
         first, second = np.diff(x)[:-1], np.diff(x)[1:]
@@ -77,7 +81,7 @@ def below_ground(
 
 
 def ponds(line: tuple[np.ndarray, np.ndarray], ground: tuple[np.ndarray, np.ndarray]) -> list[Pond]:
-    """Where the ``line`` stands above the ``ground``, both (x ascending, y), by more than round-off."""
+    """Ponds: where ``line`` lies above ``ground``, both (x ascending, y), by more than round-off."""
     x, own, cap = _together(line, ground)
     inside = (x >= ground[0][0]) & (x <= ground[0][-1])
     x, deep = x[inside], (own - cap)[inside]

@@ -9,9 +9,10 @@ from functools import cached_property
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-#: What a column of a record may be given in, and how many SI units one of them is. Standard gravity is 9.80665 m/s²
-#: (ISO 80000-3), 1 gal = 1 cm/s².
+#: Units of columns of a record and their factors to SI. Standard gravity is 9.80665 m/s² (ISO 80000-3),
+#: 1 gal = 1 cm/s².
 UNITS = {
     "s": 1.0,
     "ms": 1e-3,
@@ -49,8 +50,9 @@ _TIMES = ("s", "ms", "min", "h", "d", "")
 
 @dataclass(frozen=True, eq=False)
 class Wave:
-    """``amplitude`` (k,) · sin(2π ``frequency`` (t − ``start``) + ``phase``) from ``start`` to ``end`` (s), zero
-    elsewhere; frequency in Hz, phase in rad."""
+    """A sinusoid: ``amplitude`` (k,) · sin(2π ``frequency`` (t − ``start``) + ``phase``) from ``start`` to ``end``.
+
+    Zero elsewhere. Times s, frequency Hz, phase rad."""
 
     amplitude: np.ndarray
     frequency: float
@@ -72,7 +74,7 @@ class Wave:
         return self.amplitude * math.sin(2 * math.pi * self.frequency * (time - self.start) + self.phase)
 
     def integrals(self, time: float) -> tuple[np.ndarray, np.ndarray]:
-        """∫ and ∬ of the wave from −∞ to ``time``."""
+        """First and second time integral of the wave from −∞ to ``time``."""
         omega, phase = 2 * math.pi * self.frequency, self.phase
         x = min(max(time - self.start, 0.0), self.end - self.start)
         once = (math.cos(phase) - math.cos(omega * x + phase)) / omega
@@ -83,11 +85,14 @@ class Wave:
 
 @dataclass(frozen=True, eq=False)
 class History:
-    """A piecewise linear function of time, held constant beyond its ends except where ``rate`` lets it run on, and a
-    ``wave`` on top of it.
+    """A piecewise linear function of time, constant beyond its ends, plus a sinusoid.
 
-    ``times`` (n,) s, ascending; ``values`` (n, k); ``rate`` (k,) per second after the last time. Raises ValueError for
-    times that do not ascend, and for values that are not finite or not as many.
+    times   (n,) s, ascending
+    values  (n, k)
+    rate    (k,) per second: slope after the last time; None: constant
+    wave    added sinusoid; None: none
+
+    Raises ValueError for times that do not ascend, and for values that are not finite or not as many.
     """
 
     times: np.ndarray
@@ -109,37 +114,43 @@ class History:
             raise ValueError(f"the times of a history must ascend: {times[at + 1]:g} s follows {times[at]:g} s")
 
     @classmethod
-    def constant(cls, value) -> History:
+    def constant(cls, value: ArrayLike) -> History:
         return cls(np.zeros(1), np.atleast_2d(np.asarray(value, dtype=float)))
 
     @classmethod
-    def ramp(cls, rate, start: float = 0.0) -> History:
-        """Zero until ``start``, then growing at ``rate`` per second for ever."""
+    def ramp(cls, rate: ArrayLike, start: float = 0.0) -> History:
+        """Zero until ``start`` s, then growing at ``rate`` per second."""
         rate = np.atleast_1d(np.asarray(rate, dtype=float))
         return cls(np.array([start]), np.zeros((1, len(rate))), rate)
 
     @classmethod
     def sinusoid(
-        cls, amplitude, frequency: float, *, phase: float = 0.0, start: float = 0.0, end: float = math.inf, mean=None
+        cls,
+        amplitude: ArrayLike,
+        frequency: float,
+        *,
+        phase: float = 0.0,
+        start: float = 0.0,
+        end: float = math.inf,
+        mean: ArrayLike | None = None,
     ) -> History:
-        """``mean`` (zero) and from ``start`` to ``end`` ``amplitude`` · sin(2π ``frequency`` (t − start) +
-        ``phase``)."""
+        """``mean`` (default 0) plus, from ``start`` to ``end`` s, ``amplitude`` · sin(2π ``frequency`` (t − start) +
+        ``phase``); frequency Hz, phase rad."""
         amplitude = np.atleast_1d(np.asarray(amplitude, dtype=float))
         base = cls.constant(np.zeros(len(amplitude)) if mean is None else mean)
         return replace(base, wave=Wave(amplitude, frequency, phase, start, end))
 
     @classmethod
-    def table(cls, times, values) -> History:
+    def table(cls, times: ArrayLike, values: ArrayLike) -> History:
         """Piecewise linear through ``values`` (n, k) or (n,) at ``times`` (n,) s."""
         values = np.asarray(values, dtype=float)
         return cls(np.asarray(times, dtype=float), values[:, None] if values.ndim == 1 else values)
 
     @classmethod
-    def from_file(cls, path: str | Path, columns: int | None = None, scale=1.0) -> History:
-        """The record in the text file ``path``: time, then one or more values in a line (`read_record`), times
-        ``scale``.
+    def from_file(cls, path: str | Path, columns: int | None = None, scale: ArrayLike = 1.0) -> History:
+        """The record in the text file ``path`` (`read_record`), multiplied by ``scale``.
 
-        ``columns``: how many values there must be. A one-column record is made a vector by a ``scale`` (k,).
+        ``columns``: required number of values per line. A ``scale`` (k,) turns a one-column record into a vector.
         """
         times, values = read_record(path)
         if columns is not None and values.shape[1] != columns:
@@ -149,7 +160,7 @@ class History:
         return cls(times, values * np.asarray(scale, dtype=float))
 
     def at(self, time: float) -> np.ndarray:
-        """(k,) the value at ``time``."""
+        """(k,) value at ``time`` s."""
         if len(self.times) == 1:
             value = np.array(self.values[0], dtype=float)
         else:
@@ -160,8 +171,8 @@ class History:
             value = value + self.wave.at(time)
         return value
 
-    def scaled(self, factor) -> History:
-        """``factor`` (a number, or (k,) one a component) times this history."""
+    def scaled(self, factor: ArrayLike) -> History:
+        """This history times ``factor``: a number, or one per component (k,)."""
         wave = self.wave
         return History(
             self.times,
@@ -171,11 +182,11 @@ class History:
         )
 
     def integral(self, time: float) -> np.ndarray:
-        """(k,) ∫ from 0 to ``time``: the velocity from rest of an acceleration. Exact."""
+        """(k,) exact integral from 0 to ``time`` s: of an acceleration, the velocity from rest."""
         return self._integrals(time)[0] - self._at_zero[0]
 
     def double_integral(self, time: float) -> np.ndarray:
-        """(k,) ∬ from 0 to ``time``: the displacement from rest of an acceleration. Exact."""
+        """(k,) exact double integral from 0 to ``time`` s: of an acceleration, the displacement from rest."""
         return self._integrals(time)[1] - self._at_zero[1] - self._at_zero[0] * time
 
     @cached_property
@@ -184,7 +195,7 @@ class History:
 
     @cached_property
     def _sums(self) -> tuple[np.ndarray, np.ndarray]:
-        """(n, k) ∫ and ∬ from the first time to each."""
+        """(n, k) each: first and second integral from the first time to every time."""
         dt = np.diff(self.times)[:, None]
         v0, v1 = self.values[:-1], self.values[1:]
         zero = np.zeros((1, self.values.shape[1]))
@@ -193,7 +204,7 @@ class History:
         return once, twice
 
     def _integrals(self, time: float) -> tuple[np.ndarray, np.ndarray]:
-        """∫ and ∬ from the first time."""
+        """First and second integral from the first time to ``time``."""
         once, twice = self._sums
         n = int(np.searchsorted(self.times, time, side="right")) - 1
         start = max(n, 0)
@@ -213,7 +224,7 @@ class History:
 
 
 def refuse_no_history(what: str, history: object) -> None:
-    """Raises TypeError, saying ``what`` it is of, for what is no `History`."""
+    """Raise TypeError that begins with ``what`` unless ``history`` is a `History`."""
     if not isinstance(history, History):
         raise TypeError(
             f"{what} must be a History, for what never changes History.constant(…), got a {type(history).__name__}"
@@ -221,10 +232,12 @@ def refuse_no_history(what: str, history: object) -> None:
 
 
 def baseline_corrected(acceleration: History, degree: int = 1) -> History:
-    """The record less the polynomial of ``degree`` in time whose velocity fits the record's best (least squares), so
-    that the base comes to rest and does not drift away: degree 0 takes a constant acceleration off, 1 a linear one.
+    """Baseline correction: the record minus a polynomial of ``degree`` in time, so that the base does not drift.
 
-    Raises ValueError for a record of fewer times than coefficients, or one that runs on for ever.
+    The polynomial is the one whose velocity fits the record's velocity best (least squares): degree 0 removes a
+    constant acceleration, 1 a linear one.
+
+    Raises ValueError for fewer than ``degree`` + 2 times, and for a history that has a ``rate`` or a ``wave``.
     """
     times = np.asarray(acceleration.times, dtype=float)
     if acceleration.rate is not None or acceleration.wave is not None:
@@ -241,13 +254,14 @@ def baseline_corrected(acceleration: History, degree: int = 1) -> History:
 
 
 def read_record(path: str | Path) -> tuple[np.ndarray, np.ndarray]:
-    """(times (n,) s, values (n, k)) of a text file in SI units: time and one or more values in a line, parted by
-    commas, semicolons, tabs or blanks.
+    """Read a record: (times (n,) s, values (n, k)) in SI units from a text file.
 
-    Empty lines and what follows a ``#`` are skipped. The first line may be a header that names the columns, each with
-    its unit in brackets or parentheses: ``time [s], acceleration [g]``; without it, SI units hold. Raises ValueError
-    naming file and line for a unit that is not known, columns that are missing or too many, what is not a number, and
-    times that do not ascend; FileNotFoundError when there is no such file.
+    A line holds the time and one or more values, separated by commas, semicolons, tabs or blanks. Empty lines, and text
+    after ``#``, are skipped. The first line may be a header with a unit per column: ``time [s], acceleration [g]``;
+    without it, units are SI.
+
+    Raises ValueError that names file and line for an unknown unit, a wrong number of columns, text that is no number,
+    and times that do not ascend; FileNotFoundError for a missing file.
     """
     path = Path(path)
     rows: list[list[float]] = []
@@ -291,18 +305,19 @@ def _is_number(text: str) -> bool:
 
 
 def _header(path: Path, number: int, line: str) -> list[float]:
-    """SI units in one of each column's, from a line such as ``time (s); acceleration (cm/s²)``."""
+    """Factors to SI units, one per column, from a header such as ``time (s); acceleration (cm/s²)``."""
     columns = (
         re.split(r"[,;\t]+", line) if re.search(r"[,;\t]", line) else re.findall(r"\S+(?:\s*[\[(][^\])]*[\])])?", line)
     )
     factors = []
     for k, column in enumerate(c.strip() for c in columns):
         found = re.search(r"[\[(]([^\])]*)[\])]", column)
-        unit = (found.group(1) if found else "").strip().lower().replace("²", "2").replace("^", "").replace("**", "")
+        written = found.group(1) if found else ""
+        unit = written.strip().lower().replace("²", "2").replace("^", "").replace("**", "")
         known = _TIMES if k == 0 else tuple(UNITS)
         if unit not in known:
             raise ValueError(
-                f"{path}:{number}: column {k + 1} is in {found.group(1)!r}, which is not known; "
+                f"{path}:{number}: column {k + 1} is in {written!r}, which is not known; "
                 f"{'times are' if k == 0 else 'units are'} {', '.join(u for u in known if u)}"
             )
         factors.append(UNITS[unit])

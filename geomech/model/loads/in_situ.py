@@ -1,4 +1,4 @@
-"""The stress that the rock has before anything is done to it."""
+"""In-situ stress of the rock before the run, linear in the coordinates."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ import numpy as np
 
 @dataclass(frozen=True, eq=False)
 class InSituStress:
-    """σ(x) = ``stress`` + ``gradient`` · (x − ``about``): components (xx, yy, xy), Pa, tension positive; ``gradient``
-    (3, 2) Pa/m.
+    """σ(x) = ``stress`` + ``gradient`` · (x − ``about``), components (xx, yy, xy), tension positive.
 
-    Raises ValueError for arrays of other shapes or values that are not finite.
+    ``stress`` (3,) Pa, ``gradient`` (3, 2) Pa/m, ``about`` (2,) m. Raises ValueError for arrays of other shapes or
+    values that are not finite.
     """
 
     stress: np.ndarray
@@ -27,8 +27,9 @@ class InSituStress:
 
     @classmethod
     def geostatic(cls, surface: float, unit_weight: float, k0: float, *, surcharge: float = 0.0) -> InSituStress:
-        """σ_v = −(``surcharge`` + ``unit_weight`` · depth) below the level ``surface`` (m), σ_h = ``k0`` σ_v, principal
-        axes upright; ``unit_weight`` ρg N/m³, ``surcharge`` Pa."""
+        """Geostatic stress: σ_v = −(``surcharge`` + ``unit_weight`` · depth), σ_h = ``k0`` σ_v, no shear.
+
+        Depth is below the level ``surface`` (m); ``unit_weight`` ρg N/m³, ``surcharge`` Pa."""
         if not k0 >= 0:
             raise ValueError(f"the ratio K0 of horizontal to vertical stress must not be negative, got {k0!r}")
         share = np.array([k0, 1.0, 0.0])
@@ -37,8 +38,8 @@ class InSituStress:
         return cls(-surcharge * share, gradient, (0.0, surface))
 
     def at(self, points: np.ndarray) -> np.ndarray:
-        """(..., 3) Pa at ``points`` (..., 2); above the surface of a geostatic field it would pull, which is cut off
-        nowhere."""
+        """(..., 3) stress at ``points`` (..., 2), Pa. A geostatic field is tensile above its surface: it is not cut
+        off there."""
         return (
             np.asarray(self.stress, dtype=float)
             + (points - np.asarray(self.about, dtype=float)) @ np.asarray(self.gradient, dtype=float).T

@@ -1,4 +1,4 @@
-"""Motion that is given: of blocks, of points on them, of the base that they stand on."""
+"""Prescribed motion of blocks, of material points, and of the base."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from .history import History, refuse_no_history
 #: The six unknowns of a block, in order.
 UNKNOWNS = ("u0", "v0", "r0", "ex", "ey", "gxy")
 
-#: What a history gives: the displacement itself, or the rate at which it grows.
+#: Kinds of histories: the displacement itself, or its rate.
 Kind = Literal["displacement", "velocity"]
 
 
@@ -25,11 +25,10 @@ def _known_kind(kind: str, what: str) -> None:
 
 @dataclass(frozen=True, eq=False)
 class BlockMotion:
-    """The motion of ``block`` in some of its unknowns, exact: u0, v0 (m) of its centroid, r0 (rad), the strains ex, ey,
-    gxy.
+    """Prescribed motion of some unknowns of ``block``: u0, v0 (m) of its centroid, r0 (rad), strains ex, ey, gxy.
 
-    ``history`` has a column for each of ``unknowns``: their values since time 0, or their rates. The rest of the
-    unknowns follow their equations of motion. A fixed block moves as u0, v0 and r0 say and rests in what is not named.
+    ``history`` has a column for each of ``unknowns``: their values since time 0, or their rates. The other unknowns of
+    a moving block follow the equations of motion, those of a fixed block stay zero. The motion is imposed exactly.
     """
 
     block: int
@@ -49,11 +48,11 @@ class BlockMotion:
             )
 
     def total(self, time: float) -> np.ndarray:
-        """(k,) what is imposed until ``time``."""
+        """(k,) prescribed values at ``time`` s."""
         return self.history.at(time) if self.kind == "displacement" else self.history.integral(time)
 
     def rate(self, start: float, end: float) -> np.ndarray:
-        """(k,) their rates at ``end``, where the history is a displacement the mean ones since ``start``."""
+        """(k,) prescribed rates at ``end`` s; of a displacement history, their mean from ``start`` to ``end``."""
         return _rate(self.history, self.kind, start, end)
 
 
@@ -65,10 +64,11 @@ def _rate(history: History, kind: str, start: float, end: float) -> np.ndarray:
 
 @dataclass(frozen=True, eq=False)
 class PointMotion:
-    """The motion of the material point ``at`` (reference coordinates) of ``block``.
+    """Prescribed motion of the material point ``at`` (reference coordinates, m) of ``block``.
 
-    ``history``: its displacement since time 0 (m), or its velocity; two columns, x and y, or one along ``direction``,
-    the point then being free across it. Exact, or by a spring of ``stiffness`` (N/m per metre of thickness).
+    ``history``: its displacement since time 0 (m), or its velocity (m/s): two columns, x and y, or one along
+    ``direction``; across that the point is free. Imposed exactly, or by a spring of ``stiffness`` (N/m per metre of
+    thickness).
     """
 
     block: int
@@ -92,16 +92,16 @@ class PointMotion:
             raise ValueError(f"the stiffness that moves a point must be positive, got {self.stiffness!r} N/m")
 
     def total(self, time: float) -> np.ndarray:
-        """(k,) m, what is imposed until ``time``."""
+        """(k,) prescribed displacement at ``time`` s, m."""
         return self.history.at(time) if self.kind == "displacement" else self.history.integral(time)
 
     def rate(self, start: float, end: float) -> np.ndarray:
-        """(k,) m/s at ``end``, where the history is a displacement the mean since ``start``."""
+        """(k,) prescribed velocity at ``end`` s, m/s; of a displacement history, its mean from ``start`` to ``end``."""
         return _rate(self.history, self.kind, start, end)
 
     @property
     def axes(self) -> np.ndarray:
-        """(k, 2) unit vectors along which the motion is given."""
+        """(k, 2) unit vectors along which the motion is prescribed."""
         if self.direction is None:
             return np.eye(2)
         return np.array([self.direction], dtype=float) / math.hypot(*self.direction)
@@ -109,12 +109,12 @@ class PointMotion:
 
 @dataclass(frozen=True, eq=False)
 class BaseMotion:
-    """Shaking: ``acceleration`` (x and y, m/s²) of the ground.
+    """Base shaking by the ground's ``acceleration``: history of x and y components, m/s².
 
-    ``frame`` "ground": the fixed blocks (all, or those in ``blocks``) move as the record says, from rest at time 0, and
-    everything is seen from the ground at rest. "base": seen by one who rides on the base, the fixed blocks stand and
-    every block feels the body force −ρ a; in a step it is the record's mean, so that velocities are exact. Both are the
-    same motion when all fixed blocks shake together.
+    ``frame`` "ground": the fixed blocks (all, or those in ``blocks``) follow the record from rest at time 0, in the
+    frame of the ground at rest. "base": in the frame of the moving base, the fixed blocks rest and the body force −ρ a
+    acts on every block; over a step it is the record's mean, so that velocities are exact. Both describe the same
+    motion when all fixed blocks shake together.
     """
 
     acceleration: History
@@ -131,5 +131,5 @@ class BaseMotion:
             raise ValueError('seen from the "base" all fixed blocks move together: name no blocks')
 
     def total(self, time: float) -> np.ndarray:
-        """(2,) m, how far the base has gone until ``time``."""
+        """(2,) displacement of the base at ``time`` s, m."""
         return self.acceleration.double_integral(time)

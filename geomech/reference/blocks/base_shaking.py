@@ -1,4 +1,4 @@
-"""Rigid blocks on a shaken base: Newmark's sliding block, Housner's rocking block.
+"""Rigid blocks on a shaken base: Newmark's (1965) sliding block and Housner's (1963) rocking block.
 
 SI units, angles rad; base accelerations are those of the ground, horizontal, positive in x.
 """
@@ -18,8 +18,8 @@ def sliding_block(
     The ground accelerates by ``base`` (n,) m/s², linear between the times and positive towards the uphill side of a
     plane of ``incline``, so that positive values throw the block downhill. Newmark (1965), "Effects of earthquakes on
     dams and embankments", Géotechnique 15, 139-160: ẍ = T − sign(ẋ) N tan φ with T = g sin α + a cos α and N = g cos α
-    − a sin α per unit of mass; at rest it sticks while |T| ≤ N tan φ. Uphill slip is followed too. Between two times, T
-    and N are linear, so every stop and start is a root of a polynomial: exact but for round-off.
+    − a sin α per unit of mass; at rest it sticks while |T| ≤ N tan φ. Uphill slip is included. Between two times, T
+    and N are linear, so every stop and start is a root of a polynomial: the solution is exact to round-off.
     """
     slope = math.tan(friction_angle)
     pull = gravity * math.sin(incline) + np.asarray(base, dtype=float) * math.cos(incline)
@@ -96,14 +96,14 @@ def housner_period(amplitude: float, slenderness: float, half_diagonal: float, g
 def rocking_restitution(slenderness: float) -> float:
     """Angular velocity after an impact over that before: 1 − (3/2) sin²α.
 
-    Angular momentum about the corner that lands is kept and the other lifts off (Housner 1963, eq. 9, whose r is the
-    square).
+    Angular momentum about the landing corner is conserved and the other corner lifts off (Housner 1963, eq. 9, whose r
+    is the square).
     """
     return 1.0 - 1.5 * math.sin(slenderness) ** 2
 
 
 def uplift_acceleration(slenderness: float, gravity: float = 9.81) -> float:
-    """g tan α: the least steady or peak horizontal acceleration that lifts a corner (Milne & Omori 1893; Housner
+    """g tan α, m/s²: the least horizontal acceleration that lifts a corner (Milne & Omori 1893; Housner
     1963)."""
     return gravity * math.tan(slenderness)
 

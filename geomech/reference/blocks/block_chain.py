@@ -1,13 +1,13 @@
-"""Longitudinal waves along a row of blocks that strain uniformly and touch through springs.
+"""Longitudinal waves along a row of uniformly strained blocks connected by springs.
 
 A block of length h, cross-section A (per metre of thickness), mass m = ρ A h has the displacement u + e x along the
-row: mean motion u and strain e. Its neighbours press its faces through springs of stiffness K (N/m, all springs of a
-joint together):
+row: mean displacement u and strain e. Its neighbours act on its faces through springs of stiffness K (N/m, sum over a
+joint):
 
     m ü_k = N_{k+1/2} − N_{k−1/2},    (m h²/12) ë_k = (h/2)(N_{k+1/2} + N_{k−1/2}) − E A h e_k,
     N_{k+1/2} = K (u_{k+1} − u_k − (h/2)(e_{k+1} + e_k))
 
-Brillouin (1946), Wave propagation in periodic structures, ch. 3-4: a diatomic chain of another kind; derived here. SI
+Derived here; compare the diatomic chain of Brillouin (1946), Wave propagation in periodic structures, ch. 3-4. SI
 units.
 """
 

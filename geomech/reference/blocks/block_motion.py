@@ -27,12 +27,13 @@ def incline_acceleration(incline: float, friction_angle: float, gravity: float =
 
 
 def stopping_distance(speed: float, friction_angle: float, gravity: float = 9.81) -> float:
-    """v²/(2 g tan φ), m: how far a block pushed at ``speed`` on level ground slides (work against Coulomb friction)."""
+    """Sliding distance of a block with the initial ``speed`` on level ground, v²/(2 g tan φ), m (work of Coulomb
+    friction)."""
     return speed**2 / (2 * gravity * math.tan(friction_angle))
 
 
 def shi_amplification(omega_dt: float) -> np.ndarray:
-    """(2, 2) what Shi's (1988) time step does to (x, v dt) of an undamped oscillator, Ω = ω dt.
+    """Amplification matrix (2, 2) of Shi's (1988) time step for (x, v dt) of an undamped oscillator, Ω = ω dt.
 
     d = v dt + a dt²/2 and v' = v + a dt with a = −ω²(x + d): Newmark's (1959) scheme with β = ½, γ = 1. Its
     determinant, the squared modulus of the complex pair for Ω < 4, is 1/(1 + Ω²/2).
@@ -42,7 +43,7 @@ def shi_amplification(omega_dt: float) -> np.ndarray:
 
 
 def newmark_amplification(omega_dt: float, beta: float, gamma: float) -> np.ndarray:
-    """(3, 3) what a step of Newmark's (1959) scheme does to (x, v dt, a dt²) of an undamped oscillator, Ω = ω dt.
+    """Amplification matrix (3, 3) of Newmark's (1959) scheme for (x, v dt, a dt²) of an undamped oscillator, Ω = ω dt.
 
     x₁ = x + v dt + ((½−β) a + β a₁) dt², v₁ = v + ((1−γ) a + γ a₁) dt, a₁ = −ω² x₁ (Hughes 1987, §9.1).
     """
@@ -52,7 +53,7 @@ def newmark_amplification(omega_dt: float, beta: float, gamma: float) -> np.ndar
 
 
 def bossak_amplification(omega_dt: float, radius: float) -> np.ndarray:
-    """(3, 3) what a step of the α-scheme of Wood, Bossak & Zienkiewicz (1981) does to (x, v dt, a dt²), Ω = ω dt.
+    """Amplification matrix (3, 3) of the α-scheme of Wood, Bossak & Zienkiewicz (1981) for (x, v dt, a dt²), Ω = ω dt.
 
     Newmark's displacement and velocity with (1−α) a₁ + α a = −ω² x₁; α = (ϱ−1)/(ϱ+1), γ = ½−α, β = ¼(1−α)² give it the
     ``radius`` ϱ as Ω → ∞ (Chung & Hulbert 1993).
@@ -65,7 +66,8 @@ def bossak_amplification(omega_dt: float, radius: float) -> np.ndarray:
 
 
 def apparent_oscillation(amplification: np.ndarray) -> tuple[float, float]:
-    """(fraction of critical damping, frequency · dt) that a scheme's ``amplification`` gives an undamped oscillator.
+    """Numerical damping (fraction of critical) and frequency · dt of an undamped oscillator, from a scheme's
+    ``amplification`` matrix.
 
     From its complex pair λ = exp(−ξ̄ω̄dt ± iω̄_d dt) with ω̄_d = ω̄ √(1−ξ̄²) (Hughes 1987, §9.1).
     """
@@ -94,15 +96,15 @@ def column_shortening(
     """Shortening (m) of a column of equal blocks, block k carrying the mean force ``load[k]`` (N/m), and of the
     contacts under each block, which carry ``load[k]`` too if the load stands at its end: Σ F h/(w E') + Σ F/(2 p).
 
-    Hooke's law with the plane modulus E/(1−ν²) for free lateral expansion in plane strain; two springs p a joint.
+    Hooke's law with the plane modulus E/(1−ν²) for free lateral expansion in plane strain; two springs p per joint.
     """
     load = np.asarray(load, dtype=float)
     return float(np.sum(load * height / (width * plane_modulus)) + np.sum(load) / (2 * contact_stiffness))
 
 
 def plastic_impact_bounds(masses: tuple[float, float], speeds: tuple[float, float]) -> tuple[float, float]:
-    """(total momentum, least kinetic energy) of two bodies that meet head on: Newton (1687); the least is the plastic
-    case."""
+    """Total momentum and least kinetic energy of two bodies in a head-on impact; the least is that of a plastic impact
+    (Newton 1687)."""
     m, v = np.asarray(masses), np.asarray(speeds)
     momentum = float(m @ v)
     return momentum, momentum**2 / (2 * float(m.sum()))

@@ -1,4 +1,4 @@
-"""A rigid block, or two, on a plane incline: stays, slides, topples, or slides and topples, and how fast it starts.
+"""One or two rigid blocks on an incline: rest, sliding, toppling or both, and the initial accelerations.
 
 A column of width b and height h has the slenderness angle δ with tan δ = b/h. Ashby (1971), "Sliding and toppling modes
 of failure in models and jointed rock slopes" (MSc thesis, Imperial College), drew the map over α, δ, φ from statics;
@@ -28,7 +28,7 @@ def toe_holds_above(slenderness: float, incline: float) -> float:
 
 
 def failure_mode(slenderness: float, friction_angle: float, incline: float) -> str:
-    """One of `MODES`: what a column does from rest (Yagoda-Biran & Hatzor 2013)."""
+    """Mode of a column released from rest, one of `MODES` (Yagoda-Biran & Hatzor 2013)."""
     if incline <= slenderness:
         if friction_angle >= incline:
             return "stable"
@@ -67,14 +67,14 @@ def stacked_accelerations(
     """Accelerations (m/s²) down the ``incline`` of a lower and an upper block from rest, friction angle
     ``base_friction`` under the lower, ``between`` them; ``masses`` lower first. Neither topples.
 
-    Coulomb (1785) in each joint. If the upper block slides on the lower it drags it along with its friction; the lower
-    one never outruns it, since friction would then push the upper one faster than free sliding.
+    Coulomb (1785) in each joint. If the upper block slides on the lower one, its friction drags the lower one along.
+    The lower one is never faster: friction would then accelerate the upper one beyond free sliding.
     """
     lower, upper = masses
     weight = gravity * math.sin(incline)
     press = gravity * math.cos(incline)
     together = max(0.0, weight - press * math.tan(base_friction))
-    # What the joint must carry for both to move as one.
+    # Shear force in the joint if both move together.
     if abs(weight - together) <= press * math.tan(between):
         return together, together
     drag = press * math.tan(between)

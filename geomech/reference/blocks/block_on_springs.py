@@ -1,9 +1,9 @@
-"""A square that may strain, on an incline, on two springs with friction: explicit integration in time.
+"""A deformable square block on an incline, on two frictional springs: explicit time integration, a second method.
 
-Independent of the block solver: small motions of fixed axes along and across the incline, forces at the start of a step
-only, steps that resolve the stiffest spring, friction as a return mapping of a spring in series with a slider. A
-first-order block has no other physics, so what this does under a suddenly acting weight is what a block solver must
-tend to.
+Independent of the block solver: small displacements on fixed axes along and across the incline, forces at the start of
+each step, steps that resolve the stiffest spring, friction by the return mapping of a spring in series with a slider. A
+first-order block has no other physics, so that the block solver must converge to this motion under a suddenly applied
+weight.
 """
 
 from __future__ import annotations

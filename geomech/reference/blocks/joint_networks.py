@@ -1,4 +1,4 @@
-"""Joint networks of which the statistics are known: Fisher's law of directions, discs cut by a plane, Poisson lines."""
+"""Closed-form statistics of joint networks: Fisher distribution, traces of discs on a plane, Poisson lines."""
 
 from __future__ import annotations
 
@@ -6,12 +6,13 @@ import numpy as np
 
 
 def fisher_mean_resultant(concentration: float) -> float:
-    """Length of the mean of unit vectors by Fisher's law, coth κ − 1/κ (Fisher 1953, Proc. R. Soc. A 217, 295)."""
+    """Length of the mean of unit vectors with Fisher's distribution, coth κ − 1/κ (Fisher 1953, Proc. R. Soc. A 217,
+    295)."""
     return 1.0 / np.tanh(concentration) - 1.0 / concentration
 
 
 def trace_length_of_discs(length: np.ndarray, diameter: float) -> np.ndarray:
-    """Part of the traces not longer than ``length`` m where a plane cuts discs of one ``diameter`` m that lie anywhere:
+    """Fraction of traces not longer than ``length`` m where a plane cuts randomly placed discs of one ``diameter`` m:
     1 − √(1 − (l/D)²) (Warburton 1980, Int. J. Rock Mech. Min. Sci. 17, 33: density l / (D √(D² − l²)))."""
     return 1.0 - np.sqrt(1.0 - np.clip(np.asarray(length, dtype=float) / diameter, 0.0, 1.0) ** 2)
 
@@ -30,6 +31,6 @@ def cells_of_poisson_lines(length_per_area: float) -> dict[str, float]:
 
 
 def scan_line_spacing(distance: np.ndarray, per_length: float) -> np.ndarray:
-    """Part of the spacings along a scan-line not larger than ``distance`` m where traces fall anywhere: exponential
+    """Fraction of spacings along a scan-line not larger than ``distance`` m for randomly placed traces: exponential
     (Priest & Hudson 1976, Int. J. Rock Mech. Min. Sci. 13, 135)."""
     return 1.0 - np.exp(-per_length * np.asarray(distance, dtype=float))

@@ -1,4 +1,4 @@
-"""Strength of rough joints: a published table, and joints in direct shear by integration of their laws."""
+"""Rough joints: a published table of Barton's strength, and direct shear at constant stiffness by integration."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ ROUGH_JOINT_TABLE = np.array(
     ]
 )
 
-#: Limit of the whole angle of a rough joint where the normal stress vanishes: Barton & Choubey (1977).
+#: Largest total friction angle of a rough joint at low normal stress, degrees (Barton & Choubey 1977).
 STEEPEST_ANGLE_DEG = 70.0
 
 

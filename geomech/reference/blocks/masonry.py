@@ -1,4 +1,4 @@
-"""Masonry that stands by its shape: the thinnest semicircular arch, and the thrust and snap-through of voussoir beams.
+"""Masonry statics: the thinnest semicircular arch, and thrust and snap-through of voussoir beams.
 
 Lengths m, forces N per metre of thickness, densities kg/m³, angles rad unless a name says degrees.
 """
@@ -70,7 +70,7 @@ def least_pull(n: int, ratio: float) -> float:
 
 
 def thinnest_arch(n: int) -> float:
-    """t/R below which an arch of ``n`` voussoirs falls: the root of `least_pull`.
+    """Limit thickness t/R below which an arch of ``n`` voussoirs collapses: the root of `least_pull`.
 
     Hinges form at joints only, so few voussoirs stand at less: 0.1041 (6), 0.1015 (9), 0.1049 (12), 0.1070 (25), 0.1074
     (50); Milankovitch's 0.1075 is the limit of many.
@@ -81,7 +81,7 @@ def thinnest_arch(n: int) -> float:
 
 
 def three_hinge_thrust(span: float, thickness: float, unit_weight: float) -> float:
-    """Thrust (N) of a beam of two rigid halves that lean on each other: w S²/(8 T), hinges at the corners; w = γ T."""
+    """Thrust (N) of a three-hinge beam of two rigid halves with hinges at the corners: w S²/(8 T), w = γ T."""
     return unit_weight * thickness * span**2 / (8.0 * thickness)
 
 

@@ -1,13 +1,14 @@
-"""A beam on two supports with an edge crack in its middle, by complex series and boundary collocation: a second method.
+"""Three-point bending of a beam with an edge crack, by complex series and boundary collocation: a second method.
 
-The three point loads are Flamant's (1892), each in its own half-plane: they leave the sides that they act on free. What
-they leave on the other sides, and across the crack, is taken off by
+The three point loads are Flamant's (1892) solutions, each in its own half-plane: the side that it acts on is free of
+traction. Their tractions on the other sides, and on the crack, are cancelled by
 
     Φ = P/√z + Q + q/2,   Ω = P/√z − Q + q/2
 
 with the tip in z = 0, the crack along z < 0 and q(x) the polynomial that is minus the loads' traction there (its
-Taylor series about the lower side): the crack's faces are free whatever P and Q are, and these, polynomials with real coefficients made orthogonal on the outline
-(Brubeck, Nakatsukasa & Trefethen 2021), are fitted to the rest by least squares. K_I = 2√(2π) P(0).
+Taylor series about the lower side): the crack's faces are free whatever P and Q are, and these, polynomials with real
+coefficients made orthogonal on the outline (Brubeck, Nakatsukasa & Trefethen 2021), are fitted to the rest by least
+squares. K_I = 2√(2π) P(0).
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""A straight crack in the middle of a plate by complex series and boundary collocation: a second method.
+"""A straight central crack in a plate or disc, by complex series and boundary collocation: a second method.
 
 With the crack on |x| < a, y = 0 and free of traction, Muskhelishvili's Φ and Ω are (Isida 1971; Newman 1971)
 

@@ -1,4 +1,5 @@
-"""Stars and kinks: cracks of straight arms that meet in a point, by `dislocations` (graded there), and their limits."""
+"""Star-shaped and kinked cracks: straight arms that meet at a point, by `dislocations` graded there, and their
+limits."""
 
 from __future__ import annotations
 

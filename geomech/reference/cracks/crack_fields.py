@@ -1,4 +1,4 @@
-"""Stress and displacement about a crack, point by point: Westergaard's whole field and Williams' at a tip."""
+"""Stress and displacement around a crack: Westergaard's full field, Williams' tip field, and a circular arc crack."""
 
 from __future__ import annotations
 

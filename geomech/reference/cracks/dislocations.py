@@ -1,4 +1,4 @@
-"""Straight cracks by distributed dislocations: a method of its own to hold the crack solver against.
+"""Straight cracks by distributed dislocations: a second method, independent of the crack solver.
 
 A crack is an unknown density a(t) of edge dislocations, each of which has Muskhelishvili's potentials
 
@@ -7,8 +7,9 @@ A crack is an unknown density a(t) of edge dislocations, each of which has Muskh
 plus images that free a straight or a circular boundary from traction. Tractions on the faces are collocated half-way
 between the quadrature points (Erdogan & Gupta 1972): Gauss–Chebyshev where an arm ends in two tips. An arm that begins
 in a corner, a junction or at a boundary is parametrised by the power `GRADING` of the same variable, which makes the
-weak singularity there smooth; the error then falls like n^(−2·GRADING) or better. With displacement discontinuities
-this shares neither unknowns, nor shapes, nor quadrature, and it is slow but converges to ten digits.
+weak singularity there smooth; the error then falls like n^(−2·GRADING) or better. It shares neither
+unknowns, nor shape functions, nor quadrature with displacement discontinuity elements; it is slow but converges to ten
+digits.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-#: Power by which points crowd into the beginning of an arm that is no tip.
+#: Exponent of the grading of points towards the start of an arm that is not a tip.
 GRADING = 4
 
 
@@ -123,7 +124,7 @@ def stress_intensity(arms: list[Arm], stress, domain="plane", n: int = 65) -> np
     for k in np.unique(crack):
         here = np.flatnonzero(crack == k)
         if not arms[here[0]].open:
-            # The faces come together again: no dislocation is left over.
+            # The crack closes at both ends: the net dislocation is zero.
             extra.append(np.repeat(crack == k, n).astype(float))
         # An arm has one point more than equations; what is left after closure vanishes at junctions and mouths.
         for arm in here if arms[here[0]].open else here[1:]:

@@ -1,5 +1,4 @@
-"""The speed of Rayleigh's surface wave, the fastest that a crack in tension can run (Rayleigh 1885; Freund 1990, ch.
-7)."""
+"""Speed of Rayleigh waves, the limit speed of a mode I crack (Rayleigh 1885; Freund 1990, ch. 7)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A crack parallel to a free surface, pressed open by a fluid."""
+"""A pressurised crack parallel to a free surface: K_I and K_II of the thin-layer limit (Hutchinson & Suo 1992)."""
 
 from __future__ import annotations
 

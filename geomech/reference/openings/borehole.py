@@ -1,4 +1,4 @@
-"""What breaks the wall of a borehole, from Kirsch's stress there and the strength of whole rock.
+"""Borehole breakout and breakdown from Kirsch's wall stress and the strength of intact rock.
 
 All stresses count as compressive when positive here: ``greater`` and ``lesser`` remote ones across the hole, Pa; mud
 ``pressure`` on the wall, none of it in the rock.
@@ -10,7 +10,7 @@ import math
 
 
 def breakout_ratio(greater: float, lesser: float, cohesion: float, friction_angle: float) -> float:
-    """By how much both remote stresses have to be multiplied for the wall of an empty hole to fail in shear: uniaxial
+    """Factor on both remote stresses at which the wall of an empty hole fails in shear: uniaxial
     strength 2c cos φ/(1 − sin φ) over the greatest hoop stress 3σ_H − σ_h (Kirsch 1898; Jaeger, Cook & Zimmerman 2007,
     ch. 8). It is reached where the wall faces σ_h, so that breakouts point along the lesser stress (Bell & Gough
     1979)."""
@@ -19,5 +19,6 @@ def breakout_ratio(greater: float, lesser: float, cohesion: float, friction_angl
 
 
 def breakdown_pressure(greater: float, lesser: float, tensile_strength: float) -> float:
-    """Mud pressure that tears the wall, 3σ_h − σ_H + T (Hubbert & Willis 1957); the fracture runs along σ_H."""
+    """Mud pressure at which the wall fails in tension, 3σ_h − σ_H + T (Hubbert & Willis 1957); the fracture runs along
+    σ_H."""
     return 3 * lesser - greater + tensile_strength

@@ -1,4 +1,4 @@
-"""Circular holes in an infinite plate."""
+"""Stress around a circular hole in an infinite plate (Kirsch 1898; Lamé 1852)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A block that hangs in the roof of a tunnel: on a rock bridge, and between two joints that widen downwards.
+"""Limit equilibrium of a roof block: on a rock bridge, and between two joints that diverge downwards.
 
 Forces N per metre of thickness, lengths m, angles rad. The block is symmetric; its side joints stand at ``half_angle``
 from the vertical, and the rock on either side presses on them with the horizontal ``thrust``.
@@ -19,7 +19,7 @@ def ligament_factor(force: float, half_width: float) -> float:
 
 
 def bridge_force(weight: float, thrust: float, half_angle: float, friction: float) -> float:
-    """What a bridge above the block carries once the block is about to slide: W − 2H tan(φ − α), not less than 0.
+    """Force in a bridge above the block when the block is about to slide: W − 2H tan(φ − α), at least 0, N.
 
     Statics of the wedge between two planes on which the reaction is inclined by φ against the motion (as for the roof
     block of Goodman & Shi 1985, Block Theory, and Brady & Brown, Rock Mechanics for Underground Mining, on roof
@@ -29,7 +29,7 @@ def bridge_force(weight: float, thrust: float, half_angle: float, friction: floa
 
 
 def least_thrust(weight: float, half_angle: float, friction: float) -> float:
-    """The thrust that holds the block without any bridge, W/(2 tan(φ − α)); infinite for φ ≤ α."""
+    """Least thrust that holds the block without a bridge, W/(2 tan(φ − α)), N; infinite for φ ≤ α."""
     return weight / (2 * math.tan(friction - half_angle)) if friction > half_angle else math.inf
 
 

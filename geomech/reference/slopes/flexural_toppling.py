@@ -1,5 +1,4 @@
-"""Columns of rock that bend over under their own weight: stress at the base, K of a flaw there, of joints between
-columns.
+"""Flexural toppling of rock columns under their own weight: stress at the base, and K of a flaw and of joints there.
 
 A column of length ℓ and thickness t stands on rock; gravity acts at δ (rad) from its axis. Per metre of width; SI.
 """

@@ -1,4 +1,4 @@
-"""Limit equilibrium of slopes that slide on planes: one block on one plane, two blocks on two.
+"""Limit equilibrium of plane failure and of the two-block (active–passive) wedge.
 
 Angles rad, forces N per metre of thickness, lengths m.
 """
@@ -42,7 +42,7 @@ def two_block_friction(
     """
 
     def surplus(angle: float) -> float:
-        """Thrust that the active block gives less what the passive one resists."""
+        """Thrust of the active block minus resistance of the passive one."""
         slope = math.tan(angle)
         drag = slope if interface is None else math.tan(interface)
         thrusts = []

@@ -1,11 +1,11 @@
-"""The slope of sixteen blocks that topples and slides, and its limit equilibrium.
+"""Toppling slope of sixteen blocks (Goodman & Bray 1976): geometry, published forces, and limit equilibrium.
 
 Goodman & Bray (1976), "Toppling of rock slopes", in: Rock engineering for foundations and slopes, ASCE Specialty
 Conference, Boulder, vol. 2, 201-234; the example and its table also in Hoek & Bray (1981), Rock slope engineering, 3rd
 ed., chapter 10, and in Wyllie & Mah (2004), 4th ed., table 9.1. Blocks are numbered from the toe, 1 … 16, block 10
 stands at the crest. Lengths m, forces kN per metre of thickness, unit weight kN/m³.
 
-The printed forces are not taken on trust: `limit_equilibrium` repeats every thrust within 0.1 kN, every normal force
+`limit_equilibrium` reproduces the printed forces: every thrust within 0.1 kN, every normal force
 within 1.5 kN (three are printed without decimals) and the limit friction within 1e-4
 (`tests/validation/test_dda_slopes.py`).
 """
@@ -39,7 +39,7 @@ PUBLISHED_S = np.array(
     [971.8, 1941.3, 2912.1, 3152.5, 3159.4, 3199.5, 3257.8, 3327.3, 3404.6, 3729.3, 3520.0,
      2966.8, 2457.5, 2000, 1250, 500]
 )  # fmt: skip
-#: Blocks that slide, that topple, that stand.
+#: Blocks that slide, that topple, and that are stable.
 SLIDING, TOPPLING, STANDING = range(1, 4), range(4, 14), range(14, 17)
 
 

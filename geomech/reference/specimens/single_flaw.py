@@ -1,4 +1,4 @@
-"""The specimen with one flaw, and closed forms for wing cracks.
+"""Specimen with one flaw (Wong et al. 2002), and closed forms for wing cracks.
 
 Wong, Tang, Chau & Tsang (2002), "Splitting failure in brittle rocks containing pre-existing flaws under uniaxial
 compression", Engineering Fracture Mechanics 69, 1853-1871: a plate of 50 × 170 mm with a centre flaw of half-length

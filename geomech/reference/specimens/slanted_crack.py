@@ -1,4 +1,4 @@
-"""A slanted crack in a plate in tension: the angles at which it was seen to start (Erdogan & Sih 1963)."""
+"""Slanted crack in a plate in tension: measured initiation angles (Erdogan & Sih 1963)."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import math
 HALF_WIDTH, HALF_HEIGHT, HALF_LENGTH = 0.5 * 9 * 0.0254, 0.5 * 18 * 0.0254, 0.0254
 POISSONS_RATIO = 1 / 3
 
-#: β between crack and pull → mean angle by which the crack turned to start, degrees (Erdogan & Sih 1963, J. Basic Engng
+#: β between crack and tension → mean initiation angle, degrees (Erdogan & Sih 1963, J. Basic Engng
 #: 85, 519–527, in the means of Sih 1974, Int. J. Fracture 10, 305–321, Table 1). Neither paper was at hand: angles and
 #: the sheets' sizes were read where a boundary-element code is held against that table (github.com/l-s-campos/BEM_gmsh,
 #: commit 2b55f3b, scripts/crack/erdogan_sih_mts.jl), and are those of earlier notes from the literature. Single cracks

@@ -1,4 +1,4 @@
-"""The specimen with two cracks: published figures, and independently computed stress intensity factors.
+"""Specimen with two cracks (Haeri et al. 2014): published values, and independently computed stress intensity factors.
 
 Haeri, Shahriar, Fatehi Marji, Moarefvand (2014), "On the strength and crack propagation process of the pre-cracked
 rock-like specimens under uniaxial compression", Strength of Materials 46, 140-152, tested and computed it; Khanizadeh

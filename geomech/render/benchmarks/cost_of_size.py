@@ -14,6 +14,8 @@ _ABREAST = 3
 
 
 class Measured(Protocol):
+    """What a scene of so many blocks costs."""
+
     scene: str
     blocks: int
     iteration: float
@@ -21,6 +23,8 @@ class Measured(Protocol):
 
 
 class Cut(Protocol):
+    """What cutting rock into so many blocks costs."""
+
     network: str
     blocks: int
     cutting: float

@@ -13,6 +13,8 @@ LEAST = 1e-4
 
 
 class Cost(Protocol):
+    """What a second of motion costs with one time step, and how far it is off."""
+
     dt: float
     off_slab: float
     second: float
@@ -21,6 +23,8 @@ class Cost(Protocol):
 
 
 class Sized(Protocol):
+    """Those costs for so many blocks."""
+
     blocks: int
     costs: Sequence[Cost]
     wall: float

@@ -11,6 +11,8 @@ from .slope_outcomes import COLOURS
 
 
 class Sliding(Protocol):
+    """What a slope with a known slide came to, by time step."""
+
     seed: int
     verdict: str
     steps: Sequence[float]

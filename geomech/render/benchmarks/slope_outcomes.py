@@ -24,6 +24,8 @@ LEAST = 1e-16
 
 
 class Outcome(Protocol):
+    """What a random slope came to."""
+
     seed: int
     verdict: str
     reason: str

@@ -14,12 +14,16 @@ _ZERO = "#f4f4f4"
 
 
 class Judged(Protocol):
+    """A cell of a map with its verdict and error."""
+
     map: str
     verdict: str
     error: float
 
 
 class Grid(Protocol):
+    """A map: what is measured, and its rows and columns."""
+
     title: str
     measure: str
     row_name: str

@@ -14,6 +14,8 @@ _STYLES = (
 
 
 class Measured(Protocol):
+    """Cost and error of a method at one size of a problem."""
+
     problem: str
     method: str
     size: int

@@ -37,10 +37,12 @@ def drive(run: Run, rows: np.ndarray) -> np.ndarray:
 
 
 def drive_label(run: Run) -> str:
+    """What the axis of the leading load, or of time, is called."""
     return load_label(run) if run.led else "time, s"
 
 
 def load_label(run: Run) -> str:
+    """What the axis of the leading load is called, with its unit."""
     unit = load_unit(run)[0]
     return f"load in tension, {unit}" if sense(run) < 0 else f"load, {unit}"
 

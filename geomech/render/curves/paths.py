@@ -11,6 +11,8 @@ import numpy as np
 from .plots import COLOURS, figure_of
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
     from geomech.model import Cracks
 
 #: Rock shown around the cracks, in parts of what they span.
@@ -59,26 +61,7 @@ def crack_paths(
         middle = (points[title].min(axis=0) + points[title].max(axis=0)) / 2
         if title in outlines:
             panel.fill(*(1e3 * outlines[title]).T, facecolor="#f1efe9", edgecolor="#3b3f46", lw=0.9)
-        for name, cracks in runs.items():
-            k = names.index(name)
-            line, wider = ("-", "--", ":")[k // len(COLOURS) % 3], 0.45 * (len(runs) - list(runs).index(name) - 1)
-            for old in (False, True):
-                lines = 1e3 * cracks.nodes[cracks.segments[(cracks.birth_cycle == 0) == old]]
-                if not len(lines):
-                    continue
-                # One broken line for all segments.
-                x, y = np.concatenate([lines, np.full((len(lines), 1, 2), np.nan)], axis=1).reshape(-1, 2).T
-                colour = "#15161a" if old else COLOURS[k % len(COLOURS)]
-                label = name if not old and len(names) > 1 else None
-                panel.plot(
-                    x,
-                    y,
-                    color=colour,
-                    lw=2.4 if old else 1.5 + wider,
-                    ls="-" if old else line,
-                    label=label,
-                    solid_capstyle="round",
-                )
+        _draw_runs(panel, runs, names)
         panel.set(
             title=title,
             aspect="equal",
@@ -102,3 +85,27 @@ def crack_paths(
             fontsize=9,
         )
     return save()
+
+
+def _draw_runs(panel: Axes, runs: Mapping[str, Cracks], names: list[str]) -> None:
+    """The cracks of all ``runs`` in one ``panel``, in the colours of their ``names``."""
+    for name, cracks in runs.items():
+        k = names.index(name)
+        line, wider = ("-", "--", ":")[k // len(COLOURS) % 3], 0.45 * (len(runs) - list(runs).index(name) - 1)
+        for old in (False, True):
+            lines = 1e3 * cracks.nodes[cracks.segments[(cracks.birth_cycle == 0) == old]]
+            if not len(lines):
+                continue
+            # One broken line for all segments.
+            x, y = np.concatenate([lines, np.full((len(lines), 1, 2), np.nan)], axis=1).reshape(-1, 2).T
+            colour = "#15161a" if old else COLOURS[k % len(COLOURS)]
+            label = name if not old and len(names) > 1 else None
+            panel.plot(
+                x,
+                y,
+                color=colour,
+                lw=2.4 if old else 1.5 + wider,
+                ls="-" if old else line,
+                label=label,
+                solid_capstyle="round",
+            )

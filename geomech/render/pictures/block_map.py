@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from geomech.model import Problem
+from geomech.model import Blocks, Problem
 from geomech.model.loads.ground import lowest_over, ponds
 from geomech.scene.assembly.load_functions import deepest_pond
 from geomech.shapes.block_cutting.rock_outline import ground_of
 from geomech.shapes.joint_networks.rock_bridges import rock_bridges
 from geomech.shapes.parts import JOINT
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 #: Joint sets in order: apart from one another for all kinds of eyes (after Okabe & Ito 2008), and from the rock.
 SETS = ("#0072b2", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#8c564b", "#7f7f7f", "#b5bd00")
@@ -24,10 +27,7 @@ FIXED, INK, CRACK, BRIDGE, LOAD, WATER = "#b9bcc2", "#33363b", "#d7263d", "#ff7a
 def draw_block_map(scene: Any, told: dict[str, Any], path: Path | str) -> Path:
     """Draw the blocks of a loaded scene, with the statistics that `geomech.output.block_model.block_system` has ``told``, as a
     PNG."""
-    from matplotlib.collections import LineCollection, PathCollection
     from matplotlib.figure import Figure
-    from matplotlib.lines import Line2D
-    from matplotlib.patches import Patch
 
     problem: Problem = scene.problem()
     blocks, cracks = problem.blocks, problem.cracks
@@ -42,56 +42,11 @@ def draw_block_map(scene: Any, told: dict[str, Any], path: Path | str) -> Path:
     # Thinner lines where there are many blocks.
     thin = float(np.clip(2.2 / max(1.0, (blocks.n_blocks / 60) ** 0.35), 0.25, 2.2))
     keys: list[Any] = []
-
-    outlines = [_path(blocks.loops(b)) for b in range(blocks.n_blocks)]
-    rng = np.random.default_rng(0)
-    shade = rng.uniform(0.955, 1.0, blocks.n_blocks)[:, None] if blocks.n_blocks > 1 else np.ones((1, 1))
-    fill = np.array([_rgb(ROCKS[m % len(ROCKS)]) for m in blocks.material])
-    fill[blocks.fixed] = _rgb(FIXED)
-    axes.add_collection(PathCollection(outlines, facecolors=fill * shade, edgecolors="none"))
-    for m, material in enumerate(problem.materials):
-        if (blocks.material[~blocks.fixed] == m).any():
-            keys.append(Patch(facecolor=ROCKS[m % len(ROCKS)], edgecolor=INK, lw=0.5, label=material.name))
-    if blocks.fixed.any():
-        held = [outline for outline, fixed in zip(outlines, blocks.fixed) if fixed]
-        axes.add_collection(PathCollection(held, facecolors="none", edgecolors="#8d9199", hatch="////", linewidths=0))
-        keys.append(Patch(facecolor=FIXED, edgecolor="#8d9199", hatch="////", label="fixed"))
-
     edges = np.stack([blocks.vertices, blocks.vertices[blocks.next_vertex]], axis=1)
-    colour = joint_colours(scene)
-    joints = list(colour)
-    plain = np.array([not name.startswith(JOINT) for name in blocks.edge_names])[blocks.edge_name]
-    axes.add_collection(LineCollection(edges[plain], colors=INK, linewidths=max(0.6, 0.6 * thin), capstyle="round"))
-    statistics = {JOINT + entry["name"]: entry for entry in told["sets"]}
-    for name in joints:
-        if name in blocks.edge_names:
-            own = blocks.edge_name == blocks.edge_names.index(name)
-            axes.add_collection(LineCollection(edges[own], colors=colour[name], linewidths=thin, capstyle="round"))
-        label = name.removeprefix(JOINT)
-        if name in statistics:
-            angle, density = statistics[name]["mean_angle_deg"], statistics[name]["p21_per_m"]
-            label += "  none in the rock" if angle is None else f"  {angle:.0f}°, P21 {density:.2g} m/m²"
-        keys.append(Line2D([], [], color=colour[name], lw=2.2, label=f"joints {label}"))
-
+    keys += _draw_rock(axes, problem)
+    keys += _draw_joints(axes, scene, blocks, told, thin)
     if cracks.n_segments:
-        segments = cracks.nodes[cracks.segments]
-        axes.add_collection(
-            LineCollection(segments, colors=CRACK, linewidths=1.5 * max(thin, 0.8), capstyle="round", zorder=4)
-        )
-        keys.append(Line2D([], [], color=CRACK, lw=2.6, label=f"cracks ({cracks.n_cracks})"))
-        bridges = rock_bridges(blocks, cracks)
-        # A bridge as long as the drawing is just rock: those that a crack may cross are shown.
-        short = bridges[np.hypot(*(bridges[:, 1] - bridges[:, 0]).T) < 0.25 * size] if len(bridges) else bridges
-        if len(short):
-            axes.add_collection(
-                LineCollection(
-                    short, colors=BRIDGE, linewidths=max(0.8 * thin, 0.7), linestyles=(0, (1.2, 1.6)), zorder=3
-                )
-            )
-            keys.append(
-                Line2D([], [], color=BRIDGE, lw=1.6, ls=(0, (1.2, 1.6)), label=f"rock bridges ({len(bridges)})")
-            )
-
+        keys += _draw_cracks(axes, problem, thin, size)
     keys += _conditions(axes, scene, problem, edges, size)
     margin = 0.05 * size
     axes.set(xlim=(low[0] - margin, high[0] + margin), ylim=(low[1] - margin, high[1] + margin), aspect="equal")
@@ -111,6 +66,76 @@ def draw_block_map(scene: Any, told: dict[str, Any], path: Path | str) -> Path:
     path.parent.mkdir(parents=True, exist_ok=True)
     figure.savefig(path, facecolor="white")
     return path
+
+
+def _draw_rock(axes: Axes, problem: Problem) -> list[Any]:
+    """Blocks in the colours of their rock; what these are called."""
+    from matplotlib.collections import PathCollection
+    from matplotlib.patches import Patch
+
+    blocks = problem.blocks
+    keys: list[Any] = []
+    outlines = [_path(blocks.loops(b)) for b in range(blocks.n_blocks)]
+    rng = np.random.default_rng(0)
+    shade = rng.uniform(0.955, 1.0, blocks.n_blocks)[:, None] if blocks.n_blocks > 1 else np.ones((1, 1))
+    fill = np.array([_rgb(ROCKS[m % len(ROCKS)]) for m in blocks.material])
+    fill[blocks.fixed] = _rgb(FIXED)
+    axes.add_collection(PathCollection(outlines, facecolors=fill * shade, edgecolors="none"))
+    for m, material in enumerate(problem.materials):
+        if (blocks.material[~blocks.fixed] == m).any():
+            keys.append(Patch(facecolor=ROCKS[m % len(ROCKS)], edgecolor=INK, lw=0.5, label=material.name))
+    if blocks.fixed.any():
+        held = [outline for outline, fixed in zip(outlines, blocks.fixed) if fixed]
+        axes.add_collection(PathCollection(held, facecolors="none", edgecolors="#8d9199", hatch="////", linewidths=0))
+        keys.append(Patch(facecolor=FIXED, edgecolor="#8d9199", hatch="////", label="fixed"))
+    return keys
+
+
+def _draw_joints(axes: Axes, scene: Any, blocks: Blocks, told: dict[str, Any], thin: float) -> list[Any]:
+    """Outlines and joints, in lines as ``thin`` as this; what the sets of joints are called."""
+    from matplotlib.collections import LineCollection
+    from matplotlib.lines import Line2D
+
+    keys: list[Any] = []
+    edges = np.stack([blocks.vertices, blocks.vertices[blocks.next_vertex]], axis=1)
+    colour = joint_colours(scene)
+    joints = list(colour)
+    plain = np.array([not name.startswith(JOINT) for name in blocks.edge_names])[blocks.edge_name]
+    axes.add_collection(LineCollection(edges[plain], colors=INK, linewidths=max(0.6, 0.6 * thin), capstyle="round"))
+    statistics = {JOINT + entry["name"]: entry for entry in told["sets"]}
+    for name in joints:
+        if name in blocks.edge_names:
+            own = blocks.edge_name == blocks.edge_names.index(name)
+            axes.add_collection(LineCollection(edges[own], colors=colour[name], linewidths=thin, capstyle="round"))
+        label = name.removeprefix(JOINT)
+        if name in statistics:
+            angle, density = statistics[name]["mean_angle_deg"], statistics[name]["p21_per_m"]
+            label += "  none in the rock" if angle is None else f"  {angle:.0f}°, P21 {density:.2g} m/m²"
+        keys.append(Line2D([], [], color=colour[name], lw=2.2, label=f"joints {label}"))
+    return keys
+
+
+def _draw_cracks(axes: Axes, problem: Problem, thin: float, size: float) -> list[Any]:
+    """Cracks, and the rock bridges that one of them may cross; what these are called."""
+    from matplotlib.collections import LineCollection
+    from matplotlib.lines import Line2D
+
+    blocks, cracks = problem.blocks, problem.cracks
+    keys: list[Any] = []
+    segments = cracks.nodes[cracks.segments]
+    axes.add_collection(
+        LineCollection(segments, colors=CRACK, linewidths=1.5 * max(thin, 0.8), capstyle="round", zorder=4)
+    )
+    keys.append(Line2D([], [], color=CRACK, lw=2.6, label=f"cracks ({cracks.n_cracks})"))
+    bridges = rock_bridges(blocks, cracks)
+    # A bridge as long as the drawing is just rock: those that a crack may cross are shown.
+    short = bridges[np.hypot(*(bridges[:, 1] - bridges[:, 0]).T) < 0.25 * size] if len(bridges) else bridges
+    if len(short):
+        axes.add_collection(
+            LineCollection(short, colors=BRIDGE, linewidths=max(0.8 * thin, 0.7), linestyles=(0, (1.2, 1.6)), zorder=3)
+        )
+        keys.append(Line2D([], [], color=BRIDGE, lw=1.6, ls=(0, (1.2, 1.6)), label=f"rock bridges ({len(bridges)})"))
+    return keys
 
 
 def joint_colours(scene: Any) -> dict[str, str]:

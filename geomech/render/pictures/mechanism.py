@@ -20,6 +20,8 @@ _ARROW = 0.12
 
 
 class Moving(Protocol):
+    """A block that moves at failure."""
+
     name: str
     kind: str
     displacement: tuple[float, float]

@@ -19,7 +19,7 @@ from ...shapes.traces.field_lines import (
 from ...shapes.traces.trace_tables import read_field_file
 from ..errors import Fault
 from ..locator import Path
-from ..tables.geometry import Geometry
+from ..tables.geometry import Geometry, TraceFile
 from ..validation import nearest
 
 
@@ -61,31 +61,7 @@ def read_traces(
                         "export both in one: coordinates are taken as they are",
                     )
                 )
-        named, idle, left = named_lines(file, entry.layers, entry.name, entry.kind)
-        present = list(dict.fromkeys(line.layer for line in file.lines))
-        for pattern, said in entry.layers.items():
-            if said.strip().lower() in UNFINISHED:
-                faults.append(
-                    Fault(
-                        place(("geometry", "traces", k, "layers", pattern)),
-                        f"{said!r} wants a name after it",
-                        f'write "{said}:{"x" if said == "guided" else "NAME"}", or "" to leave it to the name of the '
-                        "layer",
-                    )
-                )
-        for pattern in idle:
-            faults.append(
-                Fault(
-                    place(("geometry", "traces", k, "layers", pattern)),
-                    f"{FilePath(entry.file).name} has no layer {pattern!r}, or one before it means them all",
-                    nearest(pattern, present),
-                )
-            )
-        if not named:
-            what = f"its layers are {', '.join(map(repr, left))}" if left else "it is empty"
-            warnings.append(
-                Fault(place(source), f"{FilePath(entry.file).name} gives no lines: {what}", "name them in `layers`")
-            )
+        named = _named_lines(file, k, entry, place, faults, warnings)
         every += named
         by_file[k] = [item for item in named if item.role == "joint"]
         path_of.update((item.line.place, source) for item in named)
@@ -112,6 +88,47 @@ def read_traces(
             warnings.append(Fault(place(at), message, way_out))
         add(part, partial(_source, part, path_of), zones)
     return True, crs
+
+
+def _named_lines(
+    file: FieldFile,
+    k: int,
+    entry: TraceFile,
+    place: Callable[[Path], str],
+    faults: list[Fault],
+    warnings: list[Fault],
+) -> list[Named]:
+    """The lines of a ``file``, the entry number ``k`` of the scene, with what they are; what is wrong with its layers goes
+    to ``faults``, and what it leaves out to ``warnings``."""
+    named, idle, left = named_lines(file, entry.layers, entry.name, entry.kind)
+    present = list(dict.fromkeys(line.layer for line in file.lines))
+    for pattern, said in entry.layers.items():
+        if said.strip().lower() in UNFINISHED:
+            faults.append(
+                Fault(
+                    place(("geometry", "traces", k, "layers", pattern)),
+                    f"{said!r} wants a name after it",
+                    f'write "{said}:{"x" if said == "guided" else "NAME"}", or "" to leave it to the name of the layer',
+                )
+            )
+    for pattern in idle:
+        faults.append(
+            Fault(
+                place(("geometry", "traces", k, "layers", pattern)),
+                f"{FilePath(entry.file).name} has no layer {pattern!r}, or one before it means them all",
+                nearest(pattern, present),
+            )
+        )
+    if not named:
+        what = f"its layers are {', '.join(map(repr, left))}" if left else "it is empty"
+        warnings.append(
+            Fault(
+                place(("geometry", "traces", k, "file")),
+                f"{FilePath(entry.file).name} gives no lines: {what}",
+                "name them in `layers`",
+            )
+        )
+    return named
 
 
 def _read(path: FilePath, unit: str | None, chord_tolerance: float | None, set_property: str) -> FieldFile:

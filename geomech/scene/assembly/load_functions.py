@@ -51,14 +51,17 @@ def history_of(table: Timed) -> History:
 
 
 def traction_history(table: TractionTable) -> History:
+    """The history of a traction, Pa."""
     return history_of(table)
 
 
 def force_history(table: ForceTable) -> History:
+    """The history of a force, N per metre of thickness."""
     return history_of(table)
 
 
 def profile_of(table: TractionTable) -> LinearProfile | None:
+    """How a traction changes along its edge; None where it does not."""
     p = table.profile
     return None if p is None else LinearProfile(p.start, p.end, p.factors)
 
@@ -156,6 +159,7 @@ def deepest_pond(tables: SceneTables, blocks: Blocks) -> tuple[Pond, float] | No
 
 
 def said_of_pond(pond: Pond, time: float, origin: tuple[float, float]) -> str:
+    """A pond in words, with the time at which it stands."""
     return (
         f"ponded up to {pond.depth:.3g} m deep from x = {pond.start + origin[0]:.6g} to {pond.end + origin[0]:.6g} m "
         f"({time:g} s)"

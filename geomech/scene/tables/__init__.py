@@ -17,6 +17,8 @@ __all__ = ["SceneTables"]
 
 
 class SceneTables(Table):
+    """A whole scene."""
+
     title: str = Field("", description="one line about the scene")
     geometry: Geometry = Field(description="what is where")
     materials: Annotated[dict[str, MaterialTable], Field(min_length=1)] = Field(description="materials by name")

@@ -10,6 +10,8 @@ from .entries import Finite, Four, Names, NotNegative, Pair, Points, Positive, T
 
 
 class ZoneShape(Table):
+    """[[geometry.zones]]: rock drawn as polygons."""
+
     name: str = Field(description="name of the zone; several zones of one name are several blocks of one kind")
     rectangle: Four | None = Field(None, description="two opposite corners, [x0, y0, x1, y1], m")
     polygon: Points | None = Field(None, description="corners in order, [[x, y], …], m")
@@ -23,6 +25,8 @@ class ZoneShape(Table):
 
 
 class CrackShape(Table):
+    """[[geometry.cracks]]: a crack drawn as a line."""
+
     name: str = Field(description="name of the crack")
     points: Points | None = Field(None, description="its polyline, [[x, y], …], m")
     centre: Pair | None = Field(None, description="centre of a straight crack, [x, y], m")
@@ -40,6 +44,8 @@ class CrackShape(Table):
 
 
 class EdgeShape(Table):
+    """[[geometry.edges]]: a named part of an outline."""
+
     name: str = Field(description='name for block edges, used by loads and joints ("load:top", "joint:bedding")')
     line: Annotated[tuple[Pair, Pair], Strict(False)] = Field(
         description="a straight piece, [[x, y], [x, y]], m: all block edges on it get the name"
@@ -48,6 +54,8 @@ class EdgeShape(Table):
 
 
 class JointShape(Table):
+    """[[geometry.joints]]: a joint drawn as a line."""
+
     name: str = Field(description='name of the joints; the block edges they make are called "joint:NAME"')
     points: Points = Field(description="a polyline along which rock parts, [[x, y], …], m")
     zones: Names = Field((), description="names of the zones that it cuts (unset: all)")
@@ -57,6 +65,8 @@ DistributionLaw = Literal["constant", "normal", "uniform", "lognormal", "exponen
 
 
 class JointSetShape(Table):
+    """[[geometry.joint_sets]]: joints by statistics."""
+
     name: str = Field(description='name of the set; the block edges it makes are called "joint:NAME"')
     kind: Literal["parallel", "poisson", "discs", "lines", "voronoi"] = Field(
         "parallel",
@@ -128,6 +138,8 @@ Unit = Literal["m", "km", "cm", "mm", "ft", "in"]
 
 
 class TraceFile(Table):
+    """[[geometry.traces]]: a file of traces mapped in the field."""
+
     file: str = Field(description="traces mapped in the field, .dxf, .csv or .geojson, relative to the scene file")
     name: str | None = Field(
         None, description="name of the joints, or cracks, of all its layers (unset: layers' own names)"
@@ -150,6 +162,8 @@ class TraceFile(Table):
 
 
 class Geometry(Table):
+    """[geometry]: what is drawn, and how it is cut into blocks."""
+
     model: str | None = Field(
         None,
         description="Gmsh model (.geo, .geo_unrolled, .msh, .step, .brep) or a mesh of another program (.inp, .bdf, .nas, .mesh, "

@@ -64,6 +64,8 @@ class Timed(Table):
 
 
 class ProfileTable(Table):
+    """How a traction changes along its edge."""
+
     start: Pair = Field(description="one point of the line along which the traction varies, [x, y], m")
     end: Pair = Field(description="the other, [x, y], m")
     factors: Pair = Field(description="what the traction is multiplied by at the two points, linear between and beyond")
@@ -76,6 +78,8 @@ class ProfileTable(Table):
 
 
 class TractionTable(Timed):
+    """[[loads.tractions]]: a traction on a named edge."""
+
     edge: str = Field(description="name of the edges it acts on")
     follower: bool = Field(False, description="true: it turns with its block (unset: it keeps its direction)")
     profile: ProfileTable | None = Field(None, description="linear distribution along the edges (unset: uniform)")
@@ -88,6 +92,8 @@ class TractionTable(Timed):
 
 
 class ForceTable(Timed):
+    """[[loads.forces]]: a force at a point."""
+
     at: Pair | None = Field(None, description="material point it acts on, [x, y], m")
     point: str | None = Field(None, description='name of the drawn point it acts on, as "load:crane", in place of `at`')
     zone: str | None = Field(None, description="zone of that point, where two zones touch")
@@ -108,6 +114,8 @@ class ForceTable(Timed):
 
 
 class ViscousBoundaryTable(Table):
+    """[[loads.viscous_boundaries]]: an edge that lets waves out."""
+
     edge: str = Field(description="name of the edges that let waves out (dynamic runs)")
     times_s: Annotated[tuple[Finite, ...], Strict(False)] | None = Field(
         None, description="times of `incoming_m_per_s`, s, ascending"
@@ -126,6 +134,8 @@ class ViscousBoundaryTable(Table):
 
 
 class MotionTable(Timed):
+    """[[loads.motions]]: a block whose motion is given."""
+
     zone: str = Field(description="zone whose blocks are moved, fixed ones too")
     axes: Literal["x", "y", "xy"] = Field("xy", description="components that are given; the others stay free")
     turns: bool = Field(False, description="true: the blocks may turn (unset: they keep their direction)")
@@ -139,6 +149,8 @@ class MotionTable(Timed):
 
 
 class PointMotionTable(Timed):
+    """[[loads.point_motions]]: a point whose motion is given."""
+
     at: Pair = Field(description="material point that is moved, [x, y], m")
     zone: str | None = Field(None, description="zone of that point, where two zones touch")
     axes: Literal["x", "y", "xy"] = Field("xy", description="components that are given; the others stay free")
@@ -155,6 +167,8 @@ class PointMotionTable(Timed):
 
 
 class BaseTable(Timed):
+    """[loads.base]: the motion of the ground."""
+
     frame: Literal["ground", "base"] = Field(
         "ground",
         description='"ground": the fixed blocks move as the record says; "base": they stand, and blocks feel minus the '
@@ -179,6 +193,8 @@ class BaseTable(Timed):
 
 
 class WaterTableTable(Table):
+    """[loads.water]: the water table."""
+
     points: Points | None = Field(
         None, description="the water table, [[x, y], …], m, x ascending, level beyond its ends (unset: the drawing's)"
     )
@@ -217,6 +233,8 @@ class WaterTableTable(Table):
 
 
 class BoltTable(Table):
+    """[[loads.bolts]]: a bolt between two points."""
+
     name: str = Field("bolt", description="name of the bolt in history.csv (of drawn ones: their own)")
     start: Pair | None = Field(None, description="its one end, a material point of a block, [x, y], m")
     end: Pair | None = Field(None, description="its other end, [x, y], m")
@@ -272,6 +290,8 @@ class BoltTable(Table):
 
 
 class ExcavationTable(Table):
+    """[[loads.excavations]]: blocks that are taken out."""
+
     time_s: NotNegative = Field(description="when the blocks are taken out, s")
     zones: Names = Field((), description="zones whose blocks are taken out")
     polygon: Points | None = Field(None, description="blocks whose centroid lies in it are taken out, [[x, y], …], m")
@@ -287,6 +307,8 @@ class ExcavationTable(Table):
 
 
 class InSituTable(Table):
+    """[loads.in_situ]: the stress in the rock before anything happens."""
+
     surface_m: Finite | None = Field(None, description="level of the surface, m: stress grows with the depth below it")
     unit_weight_n_per_m3: NotNegative | None = Field(None, description="unit weight of the rock above, ρg, N/m³")
     k0: NotNegative | None = Field(None, description="horizontal over vertical stress")
@@ -337,6 +359,8 @@ Stress = Annotated[tuple[Finite, Finite, Finite], Strict(False)]
 
 
 class RemoteTable(Rising):
+    """[[loads.remote]]: a stress far away in rock without an end."""
+
     value_pa: Stress | None = Field(None, description="constant stress [xx, yy, xy], Pa, tension positive")
     rate_pa_per_s: Stress | None = Field(None, description="stress that grows from zero, [xx, yy, xy], Pa/s")
     values_pa: Annotated[tuple[Stress, ...], Strict(False)] | None = Field(
@@ -345,6 +369,8 @@ class RemoteTable(Rising):
 
 
 class FluidTable(Rising):
+    """[[loads.fluids]]: fluid pressure in cracks and holes."""
+
     fills: Annotated[tuple[Literal["cracks", "holes"], ...], Strict(False), Field(min_length=1)] = Field(
         ("cracks",), description='"cracks", those that grow with them, "holes", or both'
     )
@@ -372,6 +398,8 @@ class FluidTable(Rising):
 
 
 class LoadsTable(Table):
+    """[loads]: everything that acts on the rock."""
+
     gravity_m_s2: Pair = Field((0.0, 0.0), description="acceleration of gravity [x, y], m/s²")
     gravity_ramp_s: NotNegative = Field(0.0, description="gravity grows linearly to its value over this time, s")
     leading_edge: str | None = Field(

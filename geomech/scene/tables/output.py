@@ -10,12 +10,16 @@ from .entries import NotNegative, Pair, Positive, Table
 
 
 class GaugeTable(Table):
+    """[gauge]: two points between which strain is measured."""
+
     start: Pair = Field(alias="from", description="one end of the axial strain gauge, [x, y], m")
     to: Pair = Field(description="its other end, [x, y], m")
     zone: str | None = Field(None, description="zone that carries it, where zones touch")
 
 
 class MonitorTable(Table):
+    """[[monitors]]: a point whose displacement is recorded."""
+
     name: str = Field(description="name of the monitor point in history.csv")
     at: Pair | None = Field(
         None,
@@ -25,6 +29,8 @@ class MonitorTable(Table):
 
 
 class OutputTable(Table):
+    """[output]: what a run writes."""
+
     every: Annotated[int, Field(ge=1)] = Field(
         1, description="write every n-th cycle; cycles with growth or an event, the first and the last always"
     )
@@ -50,6 +56,8 @@ class OutputTable(Table):
 
 
 class RenderTable(Table):
+    """[render]: what pictures show."""
+
     component: Literal["xx", "yy", "zz", "xy", "principal_max", "principal_min", "von_mises"] = Field(
         "yy", description="stress component that pictures show"
     )

@@ -10,6 +10,8 @@ from .entries import Names, NotNegative, Pair, Positive, Table
 
 
 class MaterialTable(Table):
+    """[materials.NAME]: a rock."""
+
     youngs_modulus_pa: Positive = Field(description="Young's modulus, Pa")
     poissons_ratio: Annotated[float, Field(gt=-1, lt=0.5)] = Field(description="Poisson's ratio")
     density_kg_m3: NotNegative = Field(description="density, kg/m³")
@@ -36,6 +38,8 @@ class MaterialTable(Table):
 
 
 class ZoneTable(Table):
+    """[zones.NAME]: what a zone is made of, and how it is held."""
+
     material: str | None = Field(None, description="a name of [materials] (unset: the only one there is)")
     fixed: bool = Field(False, description="true: its blocks do not move")
     guided: Literal["x", "y"] | None = Field(
@@ -69,6 +73,8 @@ class ZoneTable(Table):
 
 
 class JointTable(Table):
+    """[joints.NAME]: a joint law."""
+
     friction_angle_deg: Annotated[float, Field(ge=0, lt=90)] = Field(
         0.0, description="friction angle, degrees: that of the peak, with jrc the residual one"
     )
@@ -128,6 +134,8 @@ class JointTable(Table):
 
 
 class CrackTable(Table):
+    """[cracks.NAME]: a crack's faces."""
+
     aperture: float | str = Field(
         "closed", description='"closed", "slot" (its faces never meet) or the initial aperture in m'
     )

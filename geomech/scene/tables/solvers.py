@@ -11,6 +11,8 @@ from .entries import NotNegative, Pair, Positive, Table
 
 
 class DdaTable(Table):
+    """[dda]: settings of the block solver."""
+
     time_step_s: Positive = Field(1.0, description="longest time step, s")
     automatic_time_step: bool = Field(
         False,
@@ -109,6 +111,8 @@ class DdaTable(Table):
 
 
 class DdmTable(Table):
+    """[ddm]: settings of the crack solver."""
+
     target_error: Annotated[float, Field(gt=0, lt=1)] | None = Field(
         None,
         description="relative error of K asked for; order, elements and grading then follow from it, every solution is "
@@ -131,6 +135,8 @@ class DdmTable(Table):
 
 
 class GrowthTable(Table):
+    """[growth]: how cracks grow."""
+
     enabled: bool = Field(True, description="false: cracks open and slide, none grows")
     criterion: Literal["mts", "g", "s", "f"] = Field(
         "mts",
@@ -186,6 +192,8 @@ class GrowthTable(Table):
 
 
 class RunTable(Table):
+    """[run]: how long a run is, and what stops it."""
+
     end_time_s: Positive = Field(description="the run ends at this time, s")
     stop_at: Annotated[tuple[Literal[STOPS], ...], Strict(False)] = Field(
         ("coalescence", "split"),

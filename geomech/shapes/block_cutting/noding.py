@@ -333,6 +333,14 @@ def _met(graph: Graph, fresh: np.ndarray, n_outlines: int, tolerance: float, rou
             mends.append(Mend("near miss", *nodes[k].tolist(), away))
     if not merged and not through:
         return None
+    return _led_through(nodes, edges, source, settled, through)
+
+
+def _led_through(
+    nodes: np.ndarray, edges: np.ndarray, source: np.ndarray, settled: np.ndarray, through: dict[int, list[int]]
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """The segments (start, end, source, fresh) of ``edges``, some of which are led ``through`` nodes (edge → nodes); those
+    with a ``settled`` node are fresh."""
     starts, ends, sources = [], [], []
     whole = np.ones(len(edges), bool)
     whole[list(through)] = False

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from pathlib import Path
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -20,47 +21,116 @@ def drawing_of_mesh(gmsh, path: Path) -> GmshDrawing:
     Every entity of a physical surface is a zone, or several where it falls apart. Raises GmshModelError for meshes
     without physical surfaces or with outlines that touch themselves.
     """
-    tags, coordinates, _ = gmsh.model.mesh.getNodes()
-    at = {int(tag): k for k, tag in enumerate(tags)}
-    nodes = np.asarray(coordinates).reshape(-1, 3)
-    warnings: list[tuple[str, str]] = []
-    size = float(np.ptp(nodes, axis=0).max()) if len(nodes) else 0.0
-    if len(nodes) and np.abs(nodes[:, 2]).max() > 1e-9 * size:
-        worst = int(np.argmax(np.abs(nodes[:, 2])))
-        warnings.append(
-            (
-                f"{path.name}: node {tags[worst]} has z = {nodes[worst, 2]:g} m",
-                "the rock is plane and z is left away: draw in x and y, with z = 0",
-            )
+    mesh = _Mesh.of(gmsh, path)
+    warnings = _out_of_plane(mesh)
+    lines, where = _named_lines(mesh, warnings)
+    places: dict[tuple[str, int], str] = {}
+    zones, rim = _zones(mesh, _edge_names(mesh, lines), places)
+    if not zones:
+        raise GmshModelError(
+            f"{path.name} has no physical surface",
+            'name surfaces before meshing: Physical Surface("rock") = {1}; and save all physical groups',
         )
-    edge_name: dict[tuple[int, int], str] = {}
+    traces: list[Trace] = []
+    joints: list[Joint] = []
+    marks = _marked_nodes(mesh, places)
+    for name, pairs in lines.items():
+        inner = pairs if is_mark(name) else [pair for pair in pairs if (min(pair), max(pair)) not in rim]
+        if not inner:
+            continue
+        runs = tuple(mesh.nodes[_corners_of(run, mesh.nodes, {}, closed=False), :2] for run in chains(inner))
+        told = f"curves {', '.join(map(str, where[name]))}"
+        if is_mark(name):
+            places["marks", len(marks)] = told
+            marks.append(Mark(name, runs))
+        elif name.startswith(CRACK):
+            places["cracks", len(traces)] = told
+            traces.append(Trace(name[len(CRACK) :], runs))
+        elif name.startswith(JOINT):
+            places["joints", len(joints)] = told
+            joints.append(Joint(name, runs))
+        else:
+            warnings.append(
+                (f"{path.name}: physical curve {name!r} bounds no named surface", f'a crack is called "{CRACK}{name}"')
+            )
+    return GmshDrawing(tuple(zones), tuple(traces), {}, tuple(warnings), tuple(joints), places, tuple(marks))
+
+
+class _Mesh(NamedTuple):
+    """The mesh in Gmsh's current model, from the file ``path``: ``nodes`` (n, 3) m, the ``tags`` (n,) that the file gives
+    them, and the number that each tag stands ``at``."""
+
+    gmsh: Any
+    path: Path
+    nodes: np.ndarray
+    tags: np.ndarray
+    at: dict[int, int]
+
+    @classmethod
+    def of(cls, gmsh: Any, path: Path) -> _Mesh:
+        tags, coordinates, _ = gmsh.model.mesh.getNodes()
+        at = {int(tag): k for k, tag in enumerate(tags)}
+        return cls(gmsh, path, np.asarray(coordinates).reshape(-1, 3), tags, at)
+
+
+def _out_of_plane(mesh: _Mesh) -> list[tuple[str, str]]:
+    """A warning where nodes are off the plane z = 0."""
+    nodes, tags = mesh.nodes, mesh.tags
+    size = float(np.ptp(nodes, axis=0).max()) if len(nodes) else 0.0
+    if not len(nodes) or not np.abs(nodes[:, 2]).max() > 1e-9 * size:
+        return []
+    worst = int(np.argmax(np.abs(nodes[:, 2])))
+    message = f"{mesh.path.name}: node {tags[worst]} has z = {nodes[worst, 2]:g} m"
+    return [(message, "the rock is plane and z is left away: draw in x and y, with z = 0")]
+
+
+def _named_lines(
+    mesh: _Mesh, warnings: list[tuple[str, str]]
+) -> tuple[dict[str, list[tuple[int, int]]], dict[str, list[int]]]:
+    """The edges of the physical curves of each name, and the entities that they are on."""
     lines: dict[str, list[tuple[int, int]]] = {}
     where: dict[str, list[int]] = {}
-    for dim, group in gmsh.model.getPhysicalGroups(1):
-        name = gmsh.model.getPhysicalName(dim, group)
+    model = mesh.gmsh.model
+    for dim, group in model.getPhysicalGroups(1):
+        name = model.getPhysicalName(dim, group)
         if not name:
-            warnings.append((f"{path.name}: physical curve {group} has no name", "name it before meshing"))
+            warnings.append((f"{mesh.path.name}: physical curve {group} has no name", "name it before meshing"))
             continue
-        for entity in gmsh.model.getEntitiesForPhysicalGroup(dim, group):
-            for a, b in _corners(gmsh, 1, int(entity), at):
+        for entity in model.getEntitiesForPhysicalGroup(dim, group):
+            for a, b in _corners(mesh.gmsh, 1, int(entity), mesh.at):
                 lines.setdefault(name, []).append((a, b))
             where.setdefault(name, []).append(int(entity))
+    return lines, where
+
+
+def _edge_names(mesh: _Mesh, lines: dict[str, list[tuple[int, int]]]) -> dict[tuple[int, int], str]:
+    """The name of each edge on a physical curve that is no mark."""
+    edge_name: dict[tuple[int, int], str] = {}
     for name, pairs in lines.items():
         for pair in pairs if not is_mark(name) else ():
             edge = (min(pair), max(pair))
             if edge_name.setdefault(edge, name) != name:
                 raise GmshModelError(
-                    f"{path.name}: the edge from node {tags[pair[0]]} to node {tags[pair[1]]} is called both "
+                    f"{mesh.path.name}: the edge from node {mesh.tags[pair[0]]} to node {mesh.tags[pair[1]]} is called both "
                     f"{edge_name[edge]!r} and {name!r}",
                     "give each edge one physical name",
                 )
-    zones, rim, places = [], set(), {}
-    for dim, group in gmsh.model.getPhysicalGroups(2):
-        name = gmsh.model.getPhysicalName(dim, group) or f"zone {group}"
-        for entity in gmsh.model.getEntitiesForPhysicalGroup(dim, group):
-            outline = _rim(_corners(gmsh, 2, int(entity), at), nodes)
+    return edge_name
+
+
+def _zones(
+    mesh: _Mesh, edge_name: dict[tuple[int, int], str], places: dict[tuple[str, int], str]
+) -> tuple[list[Zone], set[tuple[int, int]]]:
+    """The zones of all physical surfaces, and the edges around them; where each zone is in the file goes to ``places``."""
+    zones: list[Zone] = []
+    rim: set[tuple[int, int]] = set()
+    model, nodes = mesh.gmsh.model, mesh.nodes
+    for dim, group in model.getPhysicalGroups(2):
+        name = model.getPhysicalName(dim, group) or f"zone {group}"
+        for entity in model.getEntitiesForPhysicalGroup(dim, group):
+            outline = _rim(_corners(mesh.gmsh, 2, int(entity), mesh.at), nodes)
             rim.update((min(pair), max(pair)) for pair in outline)
-            loops = _loops(outline, path, int(entity), tags)
+            loops = _loops(outline, mesh.path, int(entity), mesh.tags)
             for own in _nested(loops, nodes):
                 places["zones", len(zones)] = f"surface {int(entity)}"
                 kept = [_corners_of(loop, nodes, edge_name, closed=True) for loop in own]
@@ -69,39 +139,20 @@ def drawing_of_mesh(gmsh, path: Path) -> GmshDrawing:
                     label = {p[0]: edge_name.get((min(p), max(p)), "") for p in zip(loop, [*loop[1:], loop[0]])}
                     labels.append(tuple(label[node] for node in few))
                 zones.append(Zone(name, tuple(nodes[few, :2] for few in kept), tuple(labels)))
-    if not zones:
-        raise GmshModelError(
-            f"{path.name} has no physical surface",
-            'name surfaces before meshing: Physical Surface("rock") = {1}; and save all physical groups',
-        )
-    traces, joints, marks = [], [], []
-    for dim, group in gmsh.model.getPhysicalGroups(0):
-        name = gmsh.model.getPhysicalName(dim, group)
-        points = gmsh.model.mesh.getNodesForPhysicalGroup(dim, group)[0] if name else ()
+    return zones, rim
+
+
+def _marked_nodes(mesh: _Mesh, places: dict[tuple[str, int], str]) -> list[Mark]:
+    """The marks of all named physical points."""
+    marks: list[Mark] = []
+    model = mesh.gmsh.model
+    for dim, group in model.getPhysicalGroups(0):
+        name = model.getPhysicalName(dim, group)
+        points = model.mesh.getNodesForPhysicalGroup(dim, group)[0] if name else ()
         if len(points):
             places["marks", len(marks)] = f"node {', '.join(map(str, points))}"
-            marks.append(Mark(name, tuple(nodes[[at[int(tag)]], :2] for tag in points)))
-    for name, pairs in lines.items():
-        if is_mark(name):
-            places["marks", len(marks)] = f"curves {', '.join(map(str, where[name]))}"
-            runs = tuple(nodes[_corners_of(run, nodes, {}, closed=False), :2] for run in chains(pairs))
-            marks.append(Mark(name, runs))
-            continue
-        inner = [pair for pair in pairs if (min(pair), max(pair)) not in rim]
-        if not inner:
-            continue
-        runs = tuple(nodes[_corners_of(run, nodes, {}, closed=False), :2] for run in chains(inner))
-        if name.startswith(CRACK):
-            places["cracks", len(traces)] = f"curves {', '.join(map(str, where[name]))}"
-            traces.append(Trace(name[len(CRACK) :], runs))
-        elif name.startswith(JOINT):
-            places["joints", len(joints)] = f"curves {', '.join(map(str, where[name]))}"
-            joints.append(Joint(name, runs))
-        else:
-            warnings.append(
-                (f"{path.name}: physical curve {name!r} bounds no named surface", f'a crack is called "{CRACK}{name}"')
-            )
-    return GmshDrawing(tuple(zones), tuple(traces), {}, tuple(warnings), tuple(joints), places, tuple(marks))
+            marks.append(Mark(name, tuple(mesh.nodes[[mesh.at[int(tag)]], :2] for tag in points)))
+    return marks
 
 
 def _corners(gmsh, dim: int, entity: int, at: dict[int, int]) -> np.ndarray:

@@ -126,7 +126,6 @@ def _drawing(gmsh, path: Path, parameters: dict[str, Parameter], chord: float | 
         places["marks", len(marks)] = _entities("point", tags)
         marks.append(Mark(name, tuple(np.array([gmsh.model.getValue(0, tag, [])[:2]]) for tag in tags)))
     for name, _, tags in groups[1]:
-        inner = [tag for tag in tags if tag not in used]
         if is_mark(name):
             places["marks", len(marks)] = _entities("curve", tags)
             marks.append(Mark(name, tuple(curves.polyline(tag)[0] for tag in tags)))
@@ -137,17 +136,13 @@ def _drawing(gmsh, path: Path, parameters: dict[str, Parameter], chord: float | 
             traces.append(Trace(name[len(CRACK) :], tuple(curves.chained(tags))))
             traced.update(tags)
             continue
+        inner = [tag for tag in tags if tag not in used]
         if name.startswith(JOINT) and inner:
             places["joints", len(joints)] = _entities("curve", inner)
             joints.append(Joint(name, tuple(curves.chained(inner))))
             traced.update(inner)
             tags = [tag for tag in tags if tag in used]
-        for tag in tags:
-            if edge_name.setdefault(tag, name) != name:
-                raise GmshModelError(
-                    f"{path.name}: curve {tag} is called both {edge_name[tag]!r} and {name!r}",
-                    "give each edge one physical name",
-                )
+        _name_edges(path, name, tags, edge_name)
 
     zones, named = [], set()
     for name, _, tags in groups[2]:
@@ -165,14 +160,7 @@ def _drawing(gmsh, path: Path, parameters: dict[str, Parameter], chord: float | 
             warnings.append(
                 (f"{path.name}: surface {tag} has no physical name and is left out", "name it, or remove it")
             )
-    told: set[int] = set()
-    for name in dict.fromkeys(edge_name.values()):
-        tags = {tag for tag, its in edge_name.items() if its == name}
-        if not used & tags:
-            told |= tags
-            warnings.append(
-                (f"{path.name}: physical curve {name!r} bounds no named surface", f'a crack is called "{CRACK}{name}"')
-            )
+    told = _bound_nothing(path, edge_name, used, warnings)
     warnings += lost_curves(gmsh, path, curves, zones, used | traced | told)
     warnings += out_of_plane(gmsh, path, max(box[3] - box[0], box[4] - box[1]))
     chords = curves.chords()
@@ -186,6 +174,29 @@ def _drawing(gmsh, path: Path, parameters: dict[str, Parameter], chord: float | 
         tuple(marks),
         chords,
     )
+
+
+def _name_edges(path: Path, name: str, tags: list[int], edge_name: dict[int, str]) -> None:
+    """Call the curves ``tags`` by this ``name``; each has one."""
+    for tag in tags:
+        if edge_name.setdefault(tag, name) != name:
+            raise GmshModelError(
+                f"{path.name}: curve {tag} is called both {edge_name[tag]!r} and {name!r}",
+                "give each edge one physical name",
+            )
+
+
+def _bound_nothing(path: Path, edge_name: dict[int, str], used: set[int], warnings: list[tuple[str, str]]) -> set[int]:
+    """Named curves of which none is ``used`` by a surface, each name with a warning."""
+    told: set[int] = set()
+    for name in dict.fromkeys(edge_name.values()):
+        tags = {tag for tag, its in edge_name.items() if its == name}
+        if not used & tags:
+            told |= tags
+            warnings.append(
+                (f"{path.name}: physical curve {name!r} bounds no named surface", f'a crack is called "{CRACK}{name}"')
+            )
+    return told
 
 
 def _named_groups(gmsh, path: Path, warnings: list[tuple[str, str]]) -> dict[int, list[tuple[str, int, list[int]]]]:

@@ -74,7 +74,7 @@ def open_model(gmsh, path: Path) -> None:
         gmsh.merge(str(path))
         gmsh.model.occ.synchronize()
         error = None
-    except Exception as raised:  # noqa: BLE001 (Gmsh raises nothing narrower)
+    except Exception as raised:
         error = str(raised)
     finally:
         gmsh.option.setString("Geometry.OCCTargetUnit", unit)
@@ -97,7 +97,7 @@ def _forget_rest(gmsh) -> None:
             try:
                 gmsh.merge(str(empty))
                 left = any(line.startswith("Error") for line in gmsh.logger.get())
-            except Exception:  # noqa: BLE001 (Gmsh raises nothing narrower)
+            except Exception:
                 left = True
             gmsh.logger.stop()
             if not left:

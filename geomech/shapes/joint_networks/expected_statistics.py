@@ -37,6 +37,7 @@ def of_parallel(angle: Law | FisherAngle, spacing: Law, length: Law | None, gap:
 
 
 def of_poisson_traces(angle: Law | FisherAngle, length: Law, per_area: float) -> dict[str, float]:
+    """What traces that lie anywhere, ``per_area`` of them a m², come to on average, by the names of the statistics."""
     p21 = per_area * length.mean
     return {
         "p20_per_m2": per_area,

@@ -174,10 +174,8 @@ def drawing_of_lines(lines: Sequence[Named]) -> FieldDrawing:
         elif is_point and not name.startswith("monitor"):
             pointed.setdefault(name, []).append(line)
             continue
-        if role != "mark" and line.shape != "line":
-            closed = np.concatenate([points, points[:1]])
-        else:
-            closed = points
+        is_closed = role != "mark" and line.shape != "line"
+        closed = np.concatenate([points, points[:1]]) if is_closed else points
         if role in ("zone", "hole"):
             outlines.append(named)
         elif role == "joint":

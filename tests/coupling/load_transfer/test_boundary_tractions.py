@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from geomech.coupling.crack_compliance.added_compliance import stress_rotation
-from geomech.coupling.load_transfer.boundary_tractions import boundary_load
+from geomech.coupling.load_transfer.boundary_tractions import BoundaryForces, boundary_load
+from geomech.coupling.load_transfer.inertia_forces import BlockInertia
 from geomech.coupling.load_transfer.no_tension_pressure import no_pull
 from geomech.dda import EDGE_FORCE, POINT_FORCE
 from geomech.ddm.loads.body_loads import first_moments, resultants
@@ -41,7 +42,15 @@ def two_squares(offset=0.0):
 def load_of(block, blocks, contacts, **options):
     contacts = np.array(contacts, CONTACT)
     motion = Motion.of(blocks, blocks.vertices)
-    return boundary_load(block, blocks, blocks.vertices, motion, 0.0, contacts, *NOTHING, **options)
+    moving = {name: options.pop(name) for name in ("density", "gravity", "acceleration", "spin") if name in options}
+    forces = BoundaryForces(blocks.vertices, motion, contacts, *NOTHING, **options)
+    return boundary_load(block, blocks, forces, inertia(**moving))
+
+
+def inertia(rotation=0.0, density=0.0, spin=0.0, gravity=None, acceleration=None, overstress=None):
+    """That of one block."""
+    one = (None if of is None else np.asarray(of, dtype=float)[None] for of in (acceleration, None, overstress))
+    return BlockInertia(np.array([rotation]), np.array([density]), np.array([spin]), gravity, *one)
 
 
 def vertex_at(blocks, block, point):
@@ -215,10 +224,10 @@ def test_inertia_and_viscosity_of_a_strain_are_an_even_stress():
     beyond = np.array([0.2, -0.3, 0.5])
     motion = Motion.of(blocks, blocks.vertices)
     rows = np.array([row], CONTACT)
+    forces = BoundaryForces(blocks.vertices, motion, rows, *NOTHING)
     for angle in (0.0, 0.4):
         whole, even = (
-            boundary_load(1, blocks, blocks.vertices, motion, angle, rows, *NOTHING, **given, overstress=stress)
-            for stress in (None, beyond)
+            boundary_load(1, blocks, forces, inertia(angle, **given, overstress=stress)) for stress in (None, beyond)
         )
         _, _, second = area_moments(blocks.loops(1))
         assert whole.remote_stress is None
@@ -245,7 +254,7 @@ def test_turned_block_sees_its_forces_in_its_own_frame():
     turned = np.array(upright, CONTACT)
     turned["point"], turned["normal"] = points @ turn.T, [turn @ [0, 1]] * 2
     motion = Motion.of(blocks, turned_vertices)
-    there = boundary_load(0, blocks, turned_vertices, motion, angle, turned, *NOTHING)
+    there = boundary_load(0, blocks, BoundaryForces(turned_vertices, motion, turned, *NOTHING), inertia(angle))
     here = load_of(0, blocks, upright)
     assert there.segments == pytest.approx(here.segments, abs=1e-13)
     assert there.tractions == pytest.approx(here.tractions, abs=1e-13)
@@ -351,9 +360,10 @@ def test_shears_off_the_side_and_against_each_other_leave_a_strained_block_in_ba
     rows = [contact(v, bottom, 0, 1, p, -normal, f @ normal, -f @ along) for v, p, f in zip(vertex, at, force)]
     for row in rows:
         row["bonded"] = holds
-    load = boundary_load(
-        1, blocks, vertices, Motion.of(blocks, vertices), 0.0, np.array(rows, CONTACT), NOTHING[0], points,
+    forces = BoundaryForces(
+        vertices, Motion.of(blocks, vertices), np.array(rows, CONTACT), NOTHING[0], points,
         tensile_strength=[float(holds)],
     )  # fmt: skip
+    load = boundary_load(1, blocks, forces)
     # What is left is the gaps' change by strain.
     assert load.imbalance < 1e-6

@@ -352,7 +352,7 @@ def test_slivers_are_merged_along_their_longest_side():
 def test_a_mouth_off_the_boundary_is_refused():
     blocks = Blocks.from_polygons([SQUARE], names=["rock"])
     cracks = network([[1, 0.01], [1, 3]], [[0, 1]], surface=[0, 1])
-    with pytest.raises(ValueError, match="flaw0.*off the boundary of rock"):
+    with pytest.raises(ValueError, match=r"flaw0.*off the boundary of rock"):
         split_blocks(blocks, State.at_rest(blocks), cracks)
 
 

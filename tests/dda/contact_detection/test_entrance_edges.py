@@ -8,6 +8,8 @@ import pytest
 from geomech import dda
 from geomech.dda.contact_detection.entrance_edges import (
     Corners,
+    Known,
+    Outlines,
     convex_corners,
     describe_contacts,
     find_contacts,
@@ -32,8 +34,9 @@ def search(polygons, window=0.05, turn=0.0, fixed=None, rounding=0.01):
         convex_corners(v, next_, previous), *corner_lengths(blocks, rounding), np.zeros(len(polygons)), np.zeros_like(v),
         np.inf,
     )  # fmt: skip
-    table, met = find_contacts(v, next_, previous, start, near, window, none, corners)
-    geometry, mate, _ = describe_contacts(table, met, v, next_, previous, window, none, none, np.empty((0, 2)), none)
+    outlines = Outlines(v, next_, previous, start)
+    table, met = find_contacts(outlines, near, window, none, corners)
+    geometry, mate, _ = describe_contacts(table, met, outlines, window, Known(none, none, np.empty((0, 2)), none))
     return table, geometry, mate
 
 
@@ -161,7 +164,7 @@ def test_faces_that_a_crack_has_left_touch_and_do_not_overlap(window):
     bump = np.column_stack([x, 1.0 + 0.0026 * (1 - (x / 0.05) ** 2)])
     below = np.vstack([[[-2, 0], [2, 0], [2, 1]], bump[::-1], [[-2, 1]]])
     above = np.vstack([[[-2, 1]], bump, [[2, 1], [2, 2], [-2, 2]]])
-    table, geometry, _ = search([below, above], window=window)
+    _, geometry, _ = search([below, above], window=window)
     gap = geometry[:, 3]
     assert gap.min() > -1e-12
     # Level ends of the faces, and the facets in their imprint.
@@ -176,7 +179,7 @@ def test_corners_round_a_short_riser_do_not_overlap(window):
     below = np.array(base + left)
     inner = np.array([[-0.5, 0.0], [-0.15, 0.0146], [0.2, 0.0158], [0.5, 0.0267], [0.5, 10], [-0.5, 10]])
     outer = np.array([[-1.5, 0.0], [-1.15, 0.0], [-0.8, 0.0257], [-0.5, 0.0526], [-0.5, 10], [-1.5, 10]])
-    table, geometry, _ = search([below, inner, outer], window=window)
+    _, geometry, _ = search([below, inner, outer], window=window)
     gap = geometry[:, 3]
     assert gap.min() > -1e-12
     assert (np.abs(gap) < 1e-12).sum() >= 8

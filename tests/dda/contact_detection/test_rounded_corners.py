@@ -84,7 +84,7 @@ def test_nothing_of_the_wedge_lies_before_a_normal_that_is_found(corner):
     assert (outline @ n.T).max() < 1e-15
     x = rng.uniform(-2 * LENGTH, 2 * LENGTH, (3000, 2))
     for moved in (0.0, rng.normal(size=x.shape) * LENGTH):
-        normal, gap, line = meetings(x, moved, n)
+        normal, gap, _ = meetings(x, moved, n)
         before = np.einsum("knc,kc->kn", outline[None] - x[:, None], normal) + gap[:, None]
         assert before.max() < 1e-12 * LENGTH
 

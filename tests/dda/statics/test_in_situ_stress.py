@@ -91,7 +91,7 @@ def test_taking_the_upper_courses_out_unloads_what_is_below():
 
 def test_what_cannot_rest_is_said():
     blocks = Blocks.from_polygons([rectangle(0, 0, 1, 1), rectangle(0, 2, 1, 3)], fixed=[True, False], names=["a", "b"])
-    with pytest.raises(dda.NoInSituEquilibrium, match="do not come to rest.*'b'"):
+    with pytest.raises(dda.NoInSituEquilibrium, match=r"do not come to rest.*'b'"):
         dda.in_situ_state(
             system_of(blocks, 0.5), InSituStress(np.zeros(3)), Loads(gravity=History.constant([1.0, 0.0]))
         )

@@ -11,7 +11,7 @@ from geomech import dda
 from geomech.bench.robustness import thin_scenes
 from geomech.dda.contact_detection.neighbour_search import boxes
 from geomech.dda.contact_detection.thin_walls import from_outside
-from geomech.dda.step_control.continuous_collision import INTO, THROUGH, crossings
+from geomech.dda.step_control.continuous_collision import INTO, THROUGH, Allowed, Paths, crossings
 from geomech.dda.step_control.overlap_energy import Overlap, OverlapWatch
 from geomech.model import Blocks, DdaSettings, History, JointLaw, Loads, Material
 
@@ -28,10 +28,8 @@ def found(moved, pressed=0.0, corner=(-0.3, 0.4)):
     start = np.ascontiguousarray(blocks.vertex_start, np.int64)
     one, two = boxes(before, start[:-1]), boxes(after, start[:-1])
     box = np.concatenate([np.minimum(one[:, :2], two[:, :2]), np.maximum(one[:, 2:], two[:, 2:])], axis=1)
-    return crossings(
-        before, after, np.ascontiguousarray(blocks.next_vertex, np.int64), start, np.array([[0, 1]]), box,
-        np.full(8, pressed), np.sqrt(blocks.areas()), np.zeros(8),
-    )  # fmt: skip
+    paths = Paths(before, after, np.ascontiguousarray(blocks.next_vertex, np.int64), start)
+    return crossings(paths, np.array([[0, 1]]), box, Allowed(np.full(8, pressed), np.sqrt(blocks.areas()), np.zeros(8)))
 
 
 def test_what_ends_in_a_wall_or_beyond_it_is_found_by_the_face_it_came_in_by():
@@ -141,5 +139,5 @@ def test_energy_of_overlaps_is_told_of_and_ends_the_run(caplog):
     assert len(caplog.records) == 1
     assert "'a' and 'b' lay 0.01 m in each other near x = 2, y = 3 m" in caplog.text
     budget = budget.after(empty._replace(kinetic=100.0, before=100.0, overlap=3.0), 0.5)
-    with pytest.raises(dda.NotConverged, match="0.11 of all energy turned over .* 'a' and 'b'"):
+    with pytest.raises(dda.NotConverged, match=r"0.11 of all energy turned over .* 'a' and 'b'"):
         watch.check(budget, worst, ("a", "b"), 0.5)

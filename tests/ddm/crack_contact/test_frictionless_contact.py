@@ -141,7 +141,10 @@ def test_cement_holds_until_its_strength_and_is_lost_for_good():
     law = JointLaw("cemented", friction_angle=0.5, cohesion=5e6, tensile_strength=2e6)
     body = plane([LINE], law)
     across = np.array([-0.6, 0.8])
-    pull = lambda size: under(size * across[0] ** 2, size * across[1] ** 2, size * across[0] * across[1])
+
+    def pull(size):
+        return under(size * across[0] ** 2, size * across[1] ** 2, size * across[0] * across[1])
+
     held = body.solve(pull(1.9e6))
     assert (held.states == STICK).all() and not held.jumps.any()
     torn = body.solve(pull(2.1e6), history=held)
@@ -152,9 +155,9 @@ def test_cement_holds_until_its_strength_and_is_lost_for_good():
 
 
 def test_bad_laws_are_refused_by_name():
-    with pytest.raises(ValueError, match="'a'.*law 1.*there are 1"):
+    with pytest.raises(ValueError, match=r"'a'.*law 1.*there are 1"):
         plane([LINE], ROUGH, law=1, names=["a"])
-    with pytest.raises(ValueError, match="'a'.*aperture.*'glue'"):
+    with pytest.raises(ValueError, match=r"'a'.*aperture.*'glue'"):
         plane([LINE], JointLaw("glue", tensile_strength=1e6), aperture=1e-3, names=["a"])
 
 

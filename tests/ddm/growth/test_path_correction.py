@@ -19,7 +19,9 @@ def stepped(tips, ask, memory) -> tuple[float, int, Remembered]:
     """`chosen`, and what the step has told for the next one."""
     chords = Chords(tips, None if memory is None else {(0.0, 0.0): memory})
     tips["angle"] = chords.first
-    for look in range(1, LOOKS + 1):
+    look = 0
+    while look < LOOKS:
+        look += 1
         angle = float(tips["angle"][0])
         ends = np.array([[-1.0, 0.0], [0.0, 0.0], [np.cos(angle), np.sin(angle)]])
         grown = Cracks(

@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 from geomech.ddm.kernels import shape_functions
+from geomech.ddm.kernels.full_plane import Elements, Kernel
 from geomech.ddm.loads.unit_load_cache import on_elements
 from geomech.ddm.mesh.half_plane import HalfPlane
 from geomech.ddm.system.influence_matrix import ElementSet, add_fields, influence, line_influence
@@ -65,7 +66,8 @@ def exact(kind, start, end, density, point, force):
 def fields(kind, start, end, density, point, force, rock):
     stress, shift = np.zeros((1, 3)), np.zeros((1, 2))
     ends = np.array([start]), np.array([end]), np.array([kind])
-    add_fields(np.array([point]), *ends, density[None], NU, 1e-15, 1.0, force, stress, shift, rock)
+    kernel = Kernel(NU, 1e-15, 1.0, force)
+    add_fields(np.array([point]), Elements(*ends), density[None], kernel, stress, shift, rock)
     return np.concatenate([stress[0], shift[0]])
 
 
@@ -131,5 +133,6 @@ def test_matrices_are_the_fields(order):
         stress, shift = np.zeros((7 * (order + 1), 3)), np.zeros((7 * (order + 1), 2))
         points = elements.nodes.reshape(-1, 2)
         density = elements.densities(values)
-        add_fields(points, start, end, kind, density, NU, 1e-15, 1.0, force, stress, shift, rock)
+        kernel = Kernel(NU, 1e-15, 1.0, force)
+        add_fields(points, Elements(start, end, kind), density, kernel, stress, shift, rock)
         assert np.allclose(matrix @ values, on_elements(elements, stress), rtol=0, atol=3e-11 * np.abs(stress).max())

@@ -142,7 +142,7 @@ def test_pressure_in_cracks_by_place():
 def test_water_in_a_hole_of_a_block_needs_a_hold():
     hole = 0.3 * SQUARE
     water = ddm.BodyLoad(hole_pressure=ddm.Pressure(0, (0, -1e4), (0, 0.3)))
-    with pytest.raises(ddm.OutOfEquilibrium, match="force .0, -3600. N/m"):
+    with pytest.raises(ddm.OutOfEquilibrium, match=r"force .0, -3600. N/m"):
         ddm.Body([SQUARE, hole[::-1]], NONE, ROCK).solve(water)
     sol = ddm.Body([SQUARE, hole[::-1]], NONE, ROCK, supports=(ddm.Support(0, "normal"),)).solve(water)
     assert np.allclose(sol.reactions.force, [[0, 3600]], atol=1e-4 * 3600)

@@ -101,7 +101,7 @@ def test_what_is_held_decides_which_loads_are_refused():
     # Free to slide, the block stays where it is on the mean.
     mean = sol.displacement(np.array([[-0.4, 0.3], [0.4, 0.3]]))[:, 0].sum()
     assert abs(mean) < 1e-12
-    with pytest.raises(ddm.OutOfEquilibrium, match="force .40000, 0. N/m"):
+    with pytest.raises(ddm.OutOfEquilibrium, match=r"force .40000, 0. N/m"):
         body.solve(ddm.BodyLoad(body_force=[1e4, -WEIGHT]))
     pinned = ddm.Body([SQUARE], NONE, ROCK, supports=(Support(0),))
     # What the graded mesh leaves of the singular corners of a pinned side.
@@ -203,7 +203,7 @@ def test_a_block_hangs_on_a_bolt():
     first = ddm.Body(
         [SQUARE], Cracks.from_polylines([lines[:2]], aperture=np.inf), ROCK, holes=[0.3 * SQUARE], supports=bolt
     )
-    for load, force in loads:
+    for load, _ in loads:
         first.solve(load)
         first.solve(load)
     grown = Cracks.from_polylines([lines], aperture=np.inf)

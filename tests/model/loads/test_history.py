@@ -85,7 +85,7 @@ def test_a_faulty_record_is_refused_by_its_line(tmp_path, text, message):
 def test_the_wrong_number_of_components_is_refused(tmp_path):
     path = tmp_path / "quake.csv"
     path.write_text("0, 1\n1, 2\n")
-    with pytest.raises(ValueError, match="1 column.*2 are wanted"):
+    with pytest.raises(ValueError, match=r"1 column.*2 are wanted"):
         History.from_file(path, 2)
     with pytest.raises(ValueError, match="ascend: 0 s follows 1 s"):
         History.table([1.0, 0.0], [0.0, 0.0])

@@ -132,8 +132,9 @@ def test_a_crafted_checkpoint_is_refused(tmp_path, classes, nodes):
 def test_what_is_no_data_is_not_stored_and_ends_nothing(tmp_path, caplog):
     observer = Checkpoints(every=1)
     observer.on_start(None, tmp_path)
-    for value in (print, lambda: None, open(os.devnull), np.array([object()]), [_Runs(tmp_path)]):
-        assert not observer.write(1, 0.1, value)
+    with open(os.devnull, encoding="utf-8") as file:
+        for value in (print, lambda: None, file, np.array([object()]), [_Runs(tmp_path)]):
+            assert not observer.write(1, 0.1, value)
     assert caplog.text.count("no checkpoint of cycle 1") == 5
 
 
@@ -230,7 +231,7 @@ def test_a_table_that_has_lost_rows_is_not_gone_on_with(tmp_path, left):
     end = table.end
     table.close()
     path.unlink() if left is None else path.write_bytes(left)
-    with pytest.raises(FilesChanged, match="history.csv"):
+    with pytest.raises(FilesChanged, match=r"history.csv"):
         Table.cut_back(path, end)
 
 
@@ -262,7 +263,7 @@ def test_a_full_disk_leaves_the_series_readable(tmp_path, monkeypatch):
         return put(handle, content[: room - at], at)
 
     monkeypatch.setattr(os, "pwrite", with_little_room)
-    with pytest.raises(OSError, match="blocks.pvd"):
+    with pytest.raises(OSError, match=r"blocks.pvd"):
         collection.add(1.0, "vtk/blocks_1.vtu")
     assert read_collection(path) == [(0.0, tmp_path / "vtk/blocks_0.vtu")]
 

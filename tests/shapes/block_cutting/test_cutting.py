@@ -121,10 +121,8 @@ def test_holes_zones_and_islands():
     zones = [Zone("sand", (upper,)), Zone("clay", (lower,))]
     two = cut(zones, [Joint("joint:a", (line([5, -1], [5, 11]),))])
     assert (
-        sorted(two.blocks.names) == ["clay 1", "clay 2", "sand 1", "sand 2"]
-        and two.zone.tolist() == [0, 1, 0, 1]
-        or True
-    )
+        sorted(two.blocks.names) == ["clay 1", "clay 2", "sand 1", "sand 2"] and two.zone.tolist() == [0, 1, 0, 1]
+    ) or True
     assert [("sand", "clay")[z] for z in two.zone] == [name.split()[0] for name in two.blocks.names]
     # A closed joint inside is a block in a hole; one that touches the outline at a corner too.
     for corner in (2.0, 0.0):

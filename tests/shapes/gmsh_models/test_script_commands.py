@@ -114,7 +114,7 @@ def test_files_that_gmsh_would_take_for_scripts_are_refused(tmp_path, name, text
     monkeypatch.chdir(tmp_path)
     path = tmp_path / name
     path.write_text(text)
-    with pytest.raises(GmshModelError, match="no mesh of Gmsh|take a file called"):
+    with pytest.raises(GmshModelError, match=r"no mesh of Gmsh|take a file called"):
         read_gmsh_model(path)
     assert list(tmp_path.iterdir()) == [path]
 

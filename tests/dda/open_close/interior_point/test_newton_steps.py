@@ -34,10 +34,10 @@ def test_steps_solve_the_linearised_equations(given):
     normal, width, shear, (back, ahead) = (a.copy() for a in (path._normal, path._width, path._shear, path._slip))
     gap, along = path._g.copy(), path._s.copy()
     steps, solutions = path._steps, []
-    made, steps._made = steps._made, lambda *task: made(*task) and solutions.append(
+    made, steps._made = steps._made, lambda *task: (made(*task) and solutions.append(
         (steps.tried.unknowns, steps.tried.changed.copy(), steps.tried.sheared.copy(), steps.tried.goals.copy(),
          steps.tried.motion.copy(), steps.residual.copy(), steps.tried.far)
-    ) or steps.tried.far  # fmt: skip
+    )) or steps.tried.far  # fmt: skip
     path.advance()
     mine, theirs, vectors, lift = steps._fixed
     kn, ks, mu, base, rough = path._kn, path._ks, path._mu, path._base, path._rough
