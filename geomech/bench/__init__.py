@@ -13,6 +13,7 @@ if TYPE_CHECKING:
 TOPICS = {
     "accuracy": "geomech.bench.accuracy.published_values",
     "boundary": "geomech.bench.accuracy.boundary_stress",
+    "contact-solver": "geomech.bench.robustness.contact_solver",
     "coupling": "geomech.bench.cost.coupling_cost",
     "dda": "geomech.bench.cost.block_cost",
     "ddm": "geomech.bench.accuracy.work_precision",

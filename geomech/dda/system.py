@@ -24,7 +24,6 @@ from .loads.load_checks import StrayLoads
 from .loads.load_vectors import LoadMap
 from .open_close.contact_set import ContactSet
 from .open_close.equations import Unsettled
-from .open_close.iteration import MANY
 from .results import CrackResponse, NotConverged, StepResult
 from .step_control.relative_motion import Windows
 from .step_control.step_limits import CROSSING, UNSETTLED, StepLimits
@@ -32,8 +31,6 @@ from .time_step import Attempt
 
 log = logging.getLogger(__name__)
 
-#: A hasty step that has been cut so often takes its time.
-PATIENT_AFTER = 3
 #: Contacts of one step are sought anew, farther, so often at most; then it is cut.
 _FARTHER = 6
 #: A step is begun again so often where corners meet in another direction than was expected, …
@@ -206,13 +203,10 @@ class BlockSystem:
         crack: CrackResponse | None = None,
         load_time: float | None = None,
         like: StepResult | None = None,
-        hasty: bool = False,
     ) -> StepResult:
         """Move ``state`` by ``dt`` (default: the settings' time step) under ``loads`` taken at the time that the scheme
         weighs them to (the end of the step in Shi's), or at ``load_time`` however short the step becomes. ``like``: the
-        result of the same step with another ``crack``, from whose contact states iterations begin. ``hasty``: the first
-        `PATIENT_AFTER` cuts are made without trying the slow ways to contact states, as those of `MANY` blocks in
-        motion always are.
+        result of the same step with another ``crack``, from whose contact states iterations begin.
 
         A step whose contact states do not settle, or that moves a vertex too far, is halved or shortened and begun
         again from ``state``, which is never changed; ``result.dt`` says what was done, and the log why contacts wanted a
@@ -220,7 +214,6 @@ class BlockSystem:
         before they have moved, or when nothing holds them up in statics.
         """
         dt = self.settings.time_step if dt is None else float(dt)
-        hasty |= not self.scheme.static and len(self.moving) >= MANY
         if not 0 < dt < np.inf:
             raise ValueError(f"a time step must be positive, got {dt!r} s")
         # (Kernels are compiled for arrays that can be written to.)
@@ -256,7 +249,6 @@ class BlockSystem:
             try:
                 attempt = Attempt(
                     self, state, vertices, carried, moments, loads, dt, crack, found, cuts, load_time,
-                    patient=not hasty or cuts >= PATIENT_AFTER,
                 )  # fmt: skip
                 result = attempt.result()
             except Unsettled as failure:

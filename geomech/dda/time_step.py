@@ -33,8 +33,8 @@ from .loads.step_actions import StepActions, felt_gravity
 from .loads.viscous_boundary import QuietEdges
 from .open_close.augmented_lagrangian import settle_augmented
 from .open_close.contact_set import ContactSet
-from .open_close.equations import Unsettled
-from .open_close.iteration import hurries, settle
+from .open_close.equations import Equations, Unsettled
+from .open_close.iteration import is_large, settle
 from .open_close.settled_states import Settled
 from .results import CrackResponse, StepResult
 from .statics.out_of_balance import imbalance
@@ -104,11 +104,10 @@ class Attempt:
         found: ContactSet,
         cuts: int,
         load_time: float | None,
-        patient: bool = True,
     ) -> None:
         self.system, self.state, self.vertices, self.carried, self.moments = system, state, vertices, carried, moments
         self.dt, self.found, self.cuts, scheme = dt, found, cuts, system.scheme
-        self.time, self.patient = state.time + dt, patient
+        self.time = state.time + dt
         # Mass stays, whatever the strain does to the area.
         self.density = system.mass / moments[:, 0]
         self.given, self.n_free = crack is not None, len(system.moving)
@@ -192,7 +191,9 @@ class Attempt:
         self.order = system.free if self.pattern is None else self.pattern.order
         if self.pattern is not None and self.pattern.solver is not None:
             # What is cut at the first sign needs no factors in double, of 100 000 blocks another 1.6 GB.
-            self.pattern.solver.single_only = hurries(self.patient, scheme.static, self.n_free)
+            self.pattern.solver.single_only = is_large(
+                self.n_free, scheme.static, system.settings.contact_solver
+            )
         self.matrix, self.right, self.tangent, self.stress0 = assemble_blocks(
             self.order, self.moments, self.density, system.stiffness, system.compliance, self.begun, self.stress,
             self.crack_strain, self.given, self.crack_compliance, self.crack_offset, self.gravity, self.load, dt,
@@ -382,11 +383,11 @@ class Attempt:
 
         def solve(contacts: ContactSet, stiff: Springs, start: np.ndarray, stretch: np.ndarray) -> Settled:
             def settled(contacts: ContactSet) -> Settled:
-                most = system.settings.max_open_close_iterations
-                return settle(
-                    pattern, matrix, right, contacts, vectors, stiff, start, slack, most, curved,
-                    system.scheme.static, self.patient, expected=self._expected_unknowns(),
+                equations = Equations(
+                    pattern, matrix, right, contacts, vectors, stiff, start, slack, curved, system.scheme.static,
+                    self._expected_unknowns(),
                 )  # fmt: skip
+                return settle(equations, system.settings.max_open_close_iterations, system.settings.contact_solver)
 
             return stretched(settled, contacts, stiff, start, stretch, curved) if stretch.any() else settled(contacts)
 

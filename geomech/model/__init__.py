@@ -3,6 +3,7 @@
 from .blocks.block_arrays import Blocks
 from .blocks.block_motion import Motion
 from .blocks.corners import corner_lengths
+from .contact_solver import ContactSolver
 from .cracks.crack_arrays import Cracks
 from .cracks.whole_network import whole_network
 from .joints.bolt import BOLT, GROUND, Bolt, CrossesNoJoint, grouted_bolt
@@ -53,6 +54,7 @@ __all__ = [
     "BlockMotion",
     "Blocks",
     "Bolt",
+    "ContactSolver",
     "CrackFaces",
     "Cracks",
     "CrossesNoJoint",

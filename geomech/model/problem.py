@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from .blocks.block_arrays import Blocks
+from .contact_solver import ContactSolver
 from .cracks.crack_arrays import Cracks
 from .joints.joint_law import JointLaw
 from .loads.applied_loads import Loads
@@ -37,6 +38,7 @@ class DdaSettings:
                          most a quarter of the shortest edge there. Corners that overlap by less slide over each other,
                          others hold (the UDEC manual advises a hundredth of an edge)
     dynamic_factor       factor on the velocity carried from step to step: 0 static, 1 fully dynamic
+    contact_solver       what the open–close iteration is tuned by (`ContactSolver`); no scene sets it
     newmark              (β, γ) of Newmark's scheme with 2β ≥ γ ≥ ½ and β ≤ γ − ¼: (½, 1) is Shi's, (¼, ½) the
                          trapezoidal rule, which does not dissipate. γ > ½ dissipates and is of first order (of second
                          for free flight and rotation if γ = 2β)
@@ -77,6 +79,7 @@ class DdaSettings:
     penetration_tolerance: float = 1e-8
     max_open_close_iterations: int = 60
     max_step_cuts: int = 12
+    contact_solver: ContactSolver = field(default_factory=ContactSolver)
 
     def __post_init__(self) -> None:
         refuse_numbers(self, _DDA_NUMBERS)

@@ -8,22 +8,24 @@ import pytest
 
 from geomech import dda
 from geomech.bench.cost import block_scenes
-from geomech.dda import system as stepping
 from geomech.dda.linear_solver import assembly, block_solver, nested_dissection
 from geomech.dda.linear_solver.block_solver import BlockSolver
 from geomech.dda.linear_solver.multifrontal import Factors
-from geomech.dda.open_close import block_patches, iteration
-from geomech.model import Blocks, State
+from geomech.model import Blocks, ContactSolver, State
 
 
 @pytest.fixture
 def alive(monkeypatch):
     """As of 100 000 blocks: how many `Factors` are alive whenever some are made, and whether these are single."""
     for module, name, value in (
-        (block_solver, "SINGLE", 0), (nested_dissection, "KEPT", 0), (assembly, "DENSE_BLOCKS", 0), (iteration, "MANY", 0),
-        (stepping, "MANY", 0), (block_patches, "_MOST", 0),  # of 100 000, those of a patch are none beside the others
+        (block_solver, "SINGLE", 0), (nested_dissection, "KEPT", 0), (assembly, "DENSE_BLOCKS", 0),
     ):  # fmt: skip
         monkeypatch.setattr(module, name, value)
+    # Of 100 000 blocks, factors of a patch are none beside the others.
+    large, settings = ContactSolver(large_system=0, patch_blocks=0), block_scenes.settings
+    monkeypatch.setattr(
+        block_scenes, "settings", lambda *given, **named: replace(settings(*given, **named), contact_solver=large)
+    )
     made, told, factor = weakref.WeakSet(), [], Factors.factor
 
     def watched(self, *given):

@@ -17,8 +17,7 @@ from geomech.model import OPEN, Bolt, JointLaw, State
 @pytest.mark.parametrize(
     "n, law, most",
     [
-        # Without correctors 49 iterations; with them, but not centred again, the path ends early and rounded laws take
-        # 107.
+        # Without correctors of the central path 49 iterations.
         (1000, {}, 35),
         # Bonds that break round by round: 412 and 495 where the path lets them yield and knows of none that holds.
         (200, {"cohesion": 20e3}, 170),
@@ -35,7 +34,8 @@ def test_weight_put_on_at_once_is_carried_by_way_of_the_central_path(n, law, mos
     result = system.step(State.at_rest(blocks), block_scenes.WEIGHT)
     iterations = result.statistics["open_close_iterations"]
     print(f"{n} blocks, {law}: {iterations} iterations")
-    assert result.statistics["step_cuts"] == 0
+    # Where hundreds of bonds that pull are left when the path stops, the step is halved once.
+    assert result.statistics["step_cuts"] <= ("tensile_strength" in law)
     assert iterations <= most
     # Forces balance to the round-off of springs 1e5 times as stiff as the inertia, and what no bond holds keeps
     # Coulomb's law.

@@ -1,1 +1,1 @@
-"""Contact states and motion that agree with each other: the open–close iteration and its fallbacks."""
+"""Contact states and motion that agree with each other: the open–close iteration."""

@@ -14,19 +14,17 @@ from dataclasses import replace
 
 import numpy as np
 
+from ...model import ContactSolver
 from ..joint_laws.coulomb_return import moved
 from ..joint_laws.penalty_springs import Springs
 from ..linear_solver import assembly
 from .equations import Answer, Equations, States, Unsettled
 from .settled_states import Settled
 
-#: A patch reaches so many blocks beyond those whose contacts are wrong, fewer where it would take more than this part of
-#: all blocks, or more than so many: its factors stand beside those of all.
-_RINGS, _LARGEST, _MOST = 2, 0.4, 2000
-
 
 def settled_in_patch(
-    equations: Equations, which: np.ndarray, states: States, answer: Answer, settle: Callable[..., Settled],
+    equations: Equations, which: np.ndarray, states: States, answer: Answer, settle: Callable[[Equations], Settled],
+    solver: ContactSolver,
 ) -> tuple[States | None, float]:  # fmt: skip
     """``states`` with those of the contacts about ``which`` (n,) bool as ``settle`` finds them while all blocks farther
     off move as in the ``answer``, None where it finds none; and what it took, in solutions of the whole system."""
@@ -36,12 +34,12 @@ def settled_in_patch(
         return None, 0.0
     ends = order[found.block], order[found.other]
     inside, some, rows = np.zeros(n, bool), which, None
-    for _ in range(_RINGS + 1):
+    for _ in range(solver.patch_rings + 1):
         wider = np.append(inside, False)
         for end in ends:
             wider[end[some]] = True
         wider[-1] = False
-        if wider.sum() > min(_LARGEST * n, _MOST):
+        if wider.sum() > min(solver.patch_share * n, solver.patch_blocks):
             break
         inside, some = wider[:-1], wider[ends[0]] | wider[ends[1]]
         rows = np.flatnonzero(some)
@@ -72,8 +70,10 @@ def settled_in_patch(
         own.solver.work = pattern.solver.work
     try:
         settled = settle(
-            own, equations.matrix[inside], equations.right[inside], part, vectors, springs, gap,
-            equations.slack[rows], expected=_of(equations.expected, inside),
+            Equations(
+                own, equations.matrix[inside], equations.right[inside], part, vectors, springs, gap,
+                equations.slack[rows], None, equations.statics, _of(equations.expected, inside),
+            )
         )  # fmt: skip
     except Unsettled:
         return None, 0.0

@@ -14,11 +14,8 @@ from ..joint_laws.penalty_springs import Springs
 from ..linear_solver import assembly
 from ..linear_solver.block_solver import RESIDUAL
 from .contact_set import ContactSet
-from .local_complementarity import clusters, settled_together, with_neighbours
 from .settled_states import Settled
 
-#: No more than so many contacts have their states sought together.
-_JOINED = 80
 #: What solutions with residuals below this part of the forces tell wrong states is not asked for more digits.
 _ROUGHLY = 1e-8
 #: Bonds that come to their strengths within this part of the same load break at once.
@@ -108,40 +105,6 @@ class Equations:
         """The flat matrix, for others to fill until the next answer: one of 100 000 blocks takes 200 MB."""
         self._held = None
         return self._data
-
-    def together(self, which: np.ndarray, states: States, answer: Answer, budget: int) -> tuple[States | None, int]:
-        """``states`` with those of the contacts ``which`` (n,) bool sought together, those that have a free block in
-        common at a time; where none are found, as the ``answer`` calls for. And the solutions spent; None where they
-        would be more than the ``budget``."""
-        found, spent = self.found, 0
-        fixed = found, self.vectors, answer.springs, answer.gap
-        parts = clusters(which, found, self.pattern.order)
-        if 2 * which.sum() + len(parts) > budget:
-            return None, 0
-        for some in parts:
-            proposal = None
-            wider = with_neighbours(some, states.state, states.bonded, found, self.pattern.order)
-            for group in (some, wider):
-                cost = 2 * int(group.sum()) + 1
-                if proposal is None and group.sum() <= _JOINED and spent + cost <= budget:
-                    spent += cost
-                    try:
-                        proposal = settled_together(
-                            group,
-                            states.state,
-                            states.direction,
-                            self.pattern,
-                            self.matrix,
-                            self.right,
-                            *fixed,
-                            self.room,
-                        )
-                    except np.linalg.LinAlgError:
-                        # In statics nothing else may hold their blocks.
-                        break
-            called = some & (answer.violation > 0)
-            states = states.switched(called, answer.called) if proposal is None else States(*proposal, states.bonded)
-        return states, spent
 
     def answer(self, states: States, normal_force: np.ndarray, slip: np.ndarray) -> Answer:
         """Solve with ``states``; forces and slip (n,) as last known bend the lines of curved laws. Raises

@@ -136,7 +136,7 @@ def equilibrium(
 
     for _ in range(max_steps):
         try:
-            result = static.step(state, loads, dt, crack, time, hasty=True)
+            result = static.step(state, loads, dt, crack, time)
         except NotConverged as failure:
             return answer(False, bool(gone), str(failure))
         # Pseudo-time is no time: what the loads do at their times waits.

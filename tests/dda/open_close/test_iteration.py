@@ -12,7 +12,7 @@ from geomech import dda
 from geomech.bench.cost import block_scenes
 from geomech.dda.linear_solver import block_solver
 from geomech.dda.open_close import equations, iteration
-from geomech.model import Blocks, DdaSettings, History, JointLaw, Loads, Material, State
+from geomech.model import Blocks, ContactSolver, DdaSettings, History, JointLaw, Loads, Material, State
 
 WEIGHT = Loads(gravity=History.constant([0.0, -9.81]))
 
@@ -53,7 +53,7 @@ def test_a_wall_under_sudden_weight_settles_at_the_step_asked_for(friction_deg):
 def test_the_central_path_ends_where_contacts_agree(monkeypatch):
     # What it proposes for the first step of a wall is right but for a few contacts in a thousand.
     wrong = []
-    proposed, answer = iteration._proposed, equations.Equations.answer
+    proposed, answer = iteration._Search._proposed, equations.Equations.answer
     state = {"follows": False}
 
     def watch(*arguments):
@@ -67,7 +67,7 @@ def test_the_central_path_ends_where_contacts_agree(monkeypatch):
             state["follows"] = False
         return found
 
-    monkeypatch.setattr(iteration, "_proposed", watch)
+    monkeypatch.setattr(iteration._Search, "_proposed", watch)
     monkeypatch.setattr(equations.Equations, "answer", count)
     system = brick_wall(20, 9, 35.0, 0.01)
     system.step(State.at_rest(system.blocks), WEIGHT)
@@ -95,7 +95,7 @@ def test_bonds_break_only_where_they_must():
 class _PathOf:
     """A central path that leaves so many contacts undecided, one after the other."""
 
-    blocked, missed = False, 0.0
+    blocked, missed, taken, bonded = False, 0.0, 0, np.zeros(10_000, np.int64)
 
     def __init__(self, undecided, arrived, epsilon=0.1):
         self.epsilon = epsilon
@@ -103,6 +103,7 @@ class _PathOf:
         self.ended = self.arrived = False
 
     def advance(self):
+        self.taken += 1
         undecided = self._left.pop(0)
         self.ended, self.arrived = not self._left, self._arrived and not self._left
         return undecided
@@ -111,24 +112,33 @@ class _PathOf:
         return np.full(10_000, 1), np.zeros(10_000)
 
 
+def proposed(path, **solver):
+    """The states that ``path`` proposes to the search of a step of 10 000 contacts in statics."""
+    search = object.__new__(iteration._Search)
+    search.solver, search.found, search.large = ContactSolver(**solver), path.bonded, False
+    search.spent, search.offered = 0, set()
+    return search._proposed(path)
+
+
 @pytest.mark.parametrize(("undecided", "arrived", "taken"), [
     ([400, 12, 1], True, 2),  # few enough before the end
     ([400, 50, 20], True, 3),  # at its end the path has said all it can
     ([400, 50, 20], False, None),  # short of it, it has not
-    ([400, 50, 80], True, None),
 ])  # fmt: skip
 def test_a_path_that_arrives_proposes_its_states_though_some_contacts_hardly_touch(undecided, arrived, taken):
-    bonded = np.zeros(10_000, np.int64)
-    states, spent = iteration._proposed(_PathOf(undecided, arrived), bonded, set(), 60, False)
-    assert (states is not None) == (taken is not None)
-    assert spent == (taken or 3)
+    path = _PathOf(undecided, arrived)
+    assert (proposed(path) is not None) == (taken is not None)
+    assert path.taken == (taken or 3)
+
+
+def test_a_path_that_leads_nowhere_is_given_up():
+    path = _PathOf([400] * 90, True)
+    assert proposed(path, path_iterations=40) is None and path.taken == 40
 
 
 def test_a_path_whose_forces_and_gaps_are_still_large_proposes_nothing():
     """Of blocks that fly apart contacts are decided, too: where ε has not come down these are no states to try."""
-    bonded = np.zeros(10_000, np.int64)
-    states, _ = iteration._proposed(_PathOf([400, 12, 1], True, epsilon=800.0), bonded, set(), 60, False)
-    assert states is None
+    assert proposed(_PathOf([400, 12, 1], True, epsilon=800.0)) is None
 
 
 def test_a_wall_at_rest_is_asked_for_nothing_but_its_round_off():

@@ -23,7 +23,7 @@ from collections.abc import Callable
 import numpy as np
 
 from ....compiled import kept
-from ....model import OPEN, SLIP, STICK
+from ....model import OPEN, SLIP, STICK, ContactSolver
 from ...contact_detection.contact_finder import ContactSet
 from ...joint_laws.coulomb_return import moved
 from ...joint_laws.penalty_springs import Springs
@@ -33,31 +33,17 @@ from .newton_steps import THREADED, PathSteps
 
 #: The bond of a contact that has slipped and not lost all cohesion: it may slide.
 SLIPPED = 2
-#: ε is counted in units of the squared load on the blocks about a contact over its stiffness. It starts at so many
-#: times the mean of N²/kₙ in the last open–close iteration (slopes of 400 to 1 000 blocks: 1 takes a third more
-#: iterations, 1 000 walls a tenth more), and not below the second number.
-_START, _LEAST_START = 100.0, 0.1
-#: Further correctors of a step at most, sought while it goes less far than this (with four, paths of slopes come to an
-#: end sooner; with none they take a quarter more iterations), …
-_CORRECTORS, _FAR = 3, 0.9
-#: … for steps longer by a factor and an amount, and that are worth while where a step gets so much of this.
+#: Further correctors of a step are sought while it goes less far than this, …
+_FAR = 0.9
+#: … for steps longer by a factor and an amount, and that are worth while where a step gets so much of this (Gondzio 1996).
 _FARTHER, _FURTHER, _GAIN = 1.2, 0.1, 0.1
-#: So often contacts are centred again where steps have become short, with so much larger an ε than then (with the same
-#: one the path ends where it did).
-_AGAIN, _LARGER = 4, 10.0
-#: A contact's load is the largest within so many blocks of it. (With the load of its own two blocks a pebble below a
-#: large block stops the path at once; with so many, slopes of 400 to 1 000 blocks take a tenth fewer iterations too.)
-_PASSED_ON = 3
-#: Where the step is as short as that because of so small a part of the contacts (or so few), those alone are centred
-#: again about the motion that the others allow, with so much larger an ε, at most so many times: those that stop it
-#: before so much of the way, and with none larger than at the start. (Friction on two neighbours' corners may leave no
-#: way along the path. On a slope of 1 000 blocks that slides, steps for which all contacts were centred again, in vain,
-#: took 250 iterations and now take 40; with ε 100 times larger one in three still does.)
-_ALONE, _ALONE_FEW, _ALONE_FAR, _ALONE_LARGER, _ALONE_AGAIN = 0.005, 8, 0.3, 1000.0, 40
-#: ε, in the units of the start, below which only round-off is left to decide; steps shorter than this lead nowhere, …
+#: Contacts that alone stop a step before so much of the way are centred again alone, about the motion that the others
+#: allow, where they are no more than this part of all, or so few, …
+_ALONE_FAR, _ALONE, _ALONE_FEW = 0.3, 0.005, 8
+#: … with so much larger an ε, so often at most. (Friction on two neighbours' corners may leave no way along the path.)
+_ALONE_LARGER, _ALONE_AGAIN = 1000.0, 40
+#: ε, in the units of the start, below which only round-off is left to decide; steps shorter than this lead nowhere.
 _END, _STUCK = 1e-14, 1e-3
-#: … and so many in a row that are shorter than this, hardly.
-_BLOCKED, _SHORT = 5, 0.05
 #: Residual of a step, relative to its right side: what is left, the next step finds in the balance of forces. The
 #: predictor needs it too: a slope of 976 blocks under sudden weight takes 27 to 144 iterations with 1e-4 of that one
 #: alone, as the last digits fall, and 27 with 1e-5. (Walls ask for no more than 1e-4.)
@@ -102,7 +88,7 @@ class CentralPath:
     None for none.
 
     ``missed``: what is left out of balance, over the largest load; ``epsilon``: ε, in units of the squared loads over their
-    stiffness.
+    stiffness; ``taken``: iterations so far.
     """
 
     def __init__(
@@ -118,7 +104,9 @@ class CentralPath:
         forces: np.ndarray,
         room: Callable[[], np.ndarray] | None = None,
         expected: np.ndarray | None = None,
+        solver: ContactSolver | None = None,
     ) -> None:
+        self._solver, self.taken = solver or ContactSolver(), 0
         self._pattern, self._matrix, self._right = pattern, matrix, right
         self._n, self.bonded = len(found), bonded
         slipped = bonded == SLIPPED
@@ -144,7 +132,6 @@ class CentralPath:
         # Bonds are springs either way.
         self._bonds = springs.normal[held], springs.shear[held], gap[held], found.shear[held]
         self._kn, self._ks = springs.normal[some], springs.shear[some]
-        self._rise = np.zeros(len(some))
         slides = found.state[some] == SLIP
         friction = np.where(slides, springs.friction[some], springs.peak[some])
         firm = np.where(
@@ -160,7 +147,7 @@ class CentralPath:
         mine, others = order[self._at[0]], order[self._at[1]]
         # Small blocks pass on what large ones press them with: contacts in units of a small block's own load would have
         # forces that are nothing beside what they must balance, and no step of the path would get anywhere.
-        for _ in range(_PASSED_ON):
+        for _ in range(self._solver.path_load_rings):
             known = load.copy()
             np.maximum.at(load, mine, known[others])
             np.maximum.at(load, others, known[mine])
@@ -177,13 +164,13 @@ class CentralPath:
         self._s = along - found.shear[some] / self._ks
         self._load = max(float(np.abs(left).max()), 1e-300)
         mean = float(np.mean(forces[some] ** 2 / self._kn / self._unit)) if len(some) else 0.0
-        self._start = max(_START * mean, _LEAST_START)
+        self._start = max(self._solver.path_start * mean, self._solver.path_least_start)
         self._begin(self._start)
 
     @property
     def blocked(self) -> bool:
         """Whether the last iterations hardly got ahead."""
-        return self._blocked >= _BLOCKED
+        return self._blocked >= self._solver.path_blocked
 
     @property
     def stopped(self) -> bool:
@@ -236,10 +223,11 @@ class CentralPath:
         """Go on by one iteration; the number of contacts still undecided. Raises numpy.linalg.LinAlgError."""
         if self.ended:
             return 0
-        pattern, steps, unit = self._pattern, self._steps, self._unit
+        self.taken += 1
+        pattern, steps, unit, solver = self._pattern, self._steps, self._unit, self._solver
         total = steps.linearise(
             (self._normal, self._width, self._slip, self._shear, self._g, self._s),
-            (self._kn, self._ks, self._mu, self._base, self._rough, self._rise, unit),
+            (self._kn, self._ks, self._mu, self._base, self._rough, unit),
             (self._right - pattern.without_contacts(self._matrix, self._unknowns)).ravel(),
         )
         epsilon = total / float((1 + 2 * self._rough).sum())
@@ -250,13 +238,14 @@ class CentralPath:
             held = moved(self._unknowns, *self._held_at, self._all_lift[len(self._kn) :])
             pulled, sheared = -kn_held * (gap_held + held[:, 0]), before_held - ks_held * held[:, 1]
             add_forces(residual, *self._held_at, pulled, sheared)
-            none = np.zeros(len(kn_held))
-            springs = [np.concatenate(pair) for pair in zip(springs, (kn_held, ks_held, none, none), strict=True)]
-        stiff, stiff_along, slope, climb = springs
+            springs = [
+                np.concatenate(pair) for pair in zip(springs, (kn_held, ks_held, np.zeros(len(kn_held))), strict=True)
+            ]
+        stiff, stiff_along, slope = springs
         data = np.empty(pattern.size) if self._room is None else self._room()
         assembly.assemble(
             pattern, data, self._matrix, self._upper, self._lower, *self._all_at, stiff, stiff_along, slope,
-            self._all_lift - climb, self._sides,
+            self._all_lift, self._sides,
         )  # fmt: skip
         solution = solution_of(pattern, data)
 
@@ -268,7 +257,7 @@ class CentralPath:
         target = epsilon * (steps.products() / total) ** 3
         far = steps.correct(solve, target)
         steps.accept()
-        for _ in range(_CORRECTORS):
+        for _ in range(solver.path_correctors):
             if far > _FAR:
                 break
             wanted = min(1.0, _FARTHER * far + _FURTHER)
@@ -277,7 +266,7 @@ class CentralPath:
             steps.accept()
             far = steps.step.far
         alone = None
-        if far < _SHORT and self._lone < _ALONE_AGAIN:
+        if far < solver.path_short and self._lone < _ALONE_AGAIN:
             far, alone = self._without_few(steps.numbers.T, steps.step.changed.T, far)
         self._unknowns += far * steps.step.unknowns
         undecided = steps.go(far)
@@ -285,11 +274,11 @@ class CentralPath:
         if alone is not None:
             self._lone += 1
             self._centre_alone(alone, max(epsilon, min(_ALONE_LARGER * epsilon, self._start)))
-        self._blocked = self._blocked + 1 if far < _SHORT else 0
+        self._blocked = self._blocked + 1 if far < solver.path_short else 0
         self.epsilon = epsilon
-        if epsilon > _END and self._again < _AGAIN and (self.blocked or not far > _STUCK):
+        if epsilon > _END and self._again < solver.path_recentred and (self.blocked or not far > _STUCK):
             self._again += 1
-            self._blocked, self.epsilon = 0, _LARGER**self._again * epsilon
+            self._blocked, self.epsilon = 0, solver.path_recentred_larger**self._again * epsilon
             self._centre(self.epsilon * unit)
             return len(self._g)
         self.ended = not (epsilon > _END and far > _STUCK)

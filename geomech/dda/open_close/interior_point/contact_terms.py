@@ -25,14 +25,13 @@ LEAST_LEFT = 1e-14
 
 @_jit
 def linearise(
-    first, last, normals, widths, slip, shear, gap, along, kn, ks, mu, base, rough, rise, unit, numbers, missed, laws,
+    first, last, normals, widths, slip, shear, gap, along, kn, ks, mu, base, rough, unit, numbers, missed, laws,
     pulled,
 ):  # fmt: skip
     """The ``numbers`` (n, 6) of what is at hand, N ``normals`` (n,), w ``widths`` (n,), α and β ``slip`` (2, n) and S
-    ``shear`` (n,); what is ``missed`` (n, 2) m of gap and slip, and ``laws`` by which
-    contacts answer motions (n, 5): N m by which the product of N and w goes with N, −∂N/∂g, −∂S/∂s, ∂S/∂N, and by how
-    much the motion along the edge lifts; returns the sum of the products, each in its ``unit`` (n,) J. What is
-    ``pulled`` then, see `pull`, are the forces at hand."""
+    ``shear`` (n,); what is ``missed`` (n, 2) m of gap and slip, and ``laws`` by which contacts answer motions (n, 4):
+    N m by which the product of N and w goes with N, −∂N/∂g, −∂S/∂s and ∂S/∂N; returns the sum of the products, each in
+    its ``unit`` (n,) J. What is ``pulled`` then, see `pull`, are the forces at hand."""
     total = 0.0
     for c in range(uintp(first), uintp(last)):
         normal, width, back, ahead = normals[c], widths[c], slip[0, c], slip[1, c]
@@ -40,16 +39,15 @@ def linearise(
         least = LEAST_LEFT * strength
         above, below = max(strength - shear[c], least), max(strength + shear[c], least)
         flat = normal / kn[c]
-        missed[c, 0] = gap[c] + flat - width - rise[c] * (back + ahead)
+        missed[c, 0] = gap[c] + flat - width
         missed[c, 1] = along[c] + shear[c] / ks[c] - (ahead - back)
         less, more = back / above, ahead / below
         stiff = ks[c] / (1.0 + ks[c] * (less + more)) if rough[c] else 0.0
         slope = stiff * mu[c] * (less - more)
-        soft = width + flat + normal * rise[c] * (mu[c] * (less + more) - slope * (less - more))
+        soft = width + flat
         numbers[c, 0], numbers[c, 1], numbers[c, 2] = normal, width, back
         numbers[c, 3], numbers[c, 4], numbers[c, 5] = ahead, above, below
         laws[c, 0], laws[c, 1], laws[c, 2], laws[c, 3] = soft, normal / soft, stiff, slope
-        laws[c, 4] = rise[c] * stiff * (less - more)
         pulled[c, 0], pulled[c, 2] = normal, shear[c]
         own = normal * width
         if rough[c]:
@@ -59,24 +57,23 @@ def linearise(
 
 
 @_jit
-def pull(first, last, goals, numbers, missed, laws, rise, pulled):
+def pull(first, last, goals, numbers, missed, laws, pulled):
     """``pulled`` (n, 3) N of a Newton step where blocks stand still: normal forces, shear forces without what answers
-    these, and with it. ``goals`` (n, 3) J for the products; slip lifts by ``rise``."""
+    these, and with it. ``goals`` (n, 3) J for the products."""
     for c in range(uintp(first), uintp(last)):
         normal, width, above, below = numbers[c, 0], numbers[c, 1], numbers[c, 4], numbers[c, 5]
         # One division for both.
         share = 1.0 / (above * below)
         more, less = goals[c, 2] * above * share - numbers[c, 3], goals[c, 1] * below * share - numbers[c, 2]
         slid = more - less - missed[c, 1]
-        risen = laws[c, 4] * slid + (rise[c] * (more + less) if rise[c] > 0.0 else 0.0)
-        given = (goals[c, 0] - normal * (width + missed[c, 0] - risen)) / laws[c, 0]
+        given = (goals[c, 0] - normal * (width + missed[c, 0])) / laws[c, 0]
         sheared = laws[c, 2] * slid
         pulled[c, 0], pulled[c, 1], pulled[c, 2] = given, sheared, sheared + laws[c, 3] * given
 
 
 @_jit
 def change(
-    first, last, unknowns, mine, theirs, vectors, lift, goals, numbers, missed, pulled, laws, kn, mu, rough, rise,
+    first, last, unknowns, mine, theirs, vectors, lift, goals, numbers, missed, pulled, laws, kn, mu, rough,
     motion, changed, sheared,
 ):  # fmt: skip
     """The ``motion`` (n, 2) m of contacts that a step of the ``unknowns`` (6 n_blocks,) makes, gaps without what
@@ -99,15 +96,13 @@ def change(
         apart -= lift[c] * along
         motion[c, 0], motion[c, 1] = apart, along
         back, ahead, above, below = numbers[c, 2], numbers[c, 3], numbers[c, 4], numbers[c, 5]
-        pushed = pulled[c, 0] - laws[c, 1] * (apart + laws[c, 4] * along)
+        pushed = pulled[c, 0] - laws[c, 1] * apart
         drawn = pulled[c, 1] - laws[c, 2] * along + laws[c, 3] * pushed
         more, less = mu[c] * pushed - drawn, mu[c] * pushed + drawn
         share = 1.0 / (above * below)
         backward = (goals[c, 1] - back * more) * below * share - back
         forward = (goals[c, 2] - ahead * less) * above * share - ahead
         wider = apart + pushed / kn[c] + missed[c, 0]
-        if rise[c] > 0.0:
-            wider -= rise[c] * (backward + forward)
         changed[c, 0], changed[c, 1], changed[c, 2], changed[c, 3] = pushed, wider, backward, forward
         changed[c, 4], changed[c, 5], sheared[c] = more, less, drawn
         for k in range(6 if rough[c] else 2):

@@ -29,7 +29,7 @@ _NONE = np.empty(0)
 @kept(fastmath=False, error_model="numpy", nogil=True)
 def _work(
     claimed, told, share, share_blocks, task, epsilon, far, parts, mine, theirs, vectors, lift, kn, ks, mu, base, rough,
-    rise, unit, start, side, normal, width, slip, shear, gap, along, numbers, missed, laws, pulled, given, out,
+    unit, start, side, normal, width, slip, shear, gap, along, numbers, missed, laws, pulled, given, out,
     unknowns, goals, changed, better, motion, further, sheared,
 ):  # fmt: skip
     """Do the ``task`` by turns with other threads: first for contacts, whose sums are ``parts`` (n_shares,), then for
@@ -48,13 +48,13 @@ def _work(
             first, last = q * share, min(n, (q + 1) * share)
             if task == _LINEARISE:
                 parts[q] = linearise(
-                    first, last, normal, width, slip, shear, gap, along, kn, ks, mu, base, rough, rise, unit, numbers,
+                    first, last, normal, width, slip, shear, gap, along, kn, ks, mu, base, rough, unit, numbers,
                     missed, laws, pulled,
                 )  # fmt: skip
             elif task == _CHANGE:
                 parts[q] = change(
                     first, last, unknowns, mine, theirs, vectors, lift, better, numbers, missed, pulled, laws, kn, mu,
-                    rough, rise, motion, further, sheared,
+                    rough, motion, further, sheared,
                 )  # fmt: skip
             elif task == _GO:
                 go(first, last, far, motion, further, sheared, normal, width, slip, shear, gap, along)
@@ -66,7 +66,7 @@ def _work(
                     second_order(first, last, epsilon, unit, changed, better)
                 else:
                     nearer(first, last, epsilon, unit, far, _SPREAD, numbers, changed, goals, better)
-                pull(first, last, better, numbers, missed, laws, rise, pulled)
+                pull(first, last, better, numbers, missed, laws, pulled)
         else:
             # The forces on a block are known when those of all contacts are.
             await_value(told, 0, shares)
@@ -91,7 +91,7 @@ class PathSteps:
     """Steps of contacts between blocks whose unknowns have the numbers ``mine`` and ``theirs`` (n,), −1 for those
     without, of ``n_blocks``, with ``vectors`` (n, 2, 12) as from `assembly.contact_vectors` and ``lift`` (n,).
 
-    ``numbers`` (n, 6), ``laws`` (n, 5): see `contact_terms`. ``step`` is the step at hand, ``tried`` the last one made.
+    ``numbers`` (n, 6), ``laws`` (n, 4): see `contact_terms`. ``step`` is the step at hand, ``tried`` the last one made.
     """
 
     def __init__(
@@ -101,7 +101,7 @@ class PathSteps:
         self._fixed = mine, theirs, vectors, lift
         self._sides = sides_of(n_blocks, np.append(each, -1), mine, theirs)
         self._parts = np.empty((n + SHARE - 1) // SHARE)
-        self.numbers, self.laws = np.empty((n, 6)), np.empty((n, 5))
+        self.numbers, self.laws = np.empty((n, 6)), np.empty((n, 4))
         self._missed, self._pulled = np.empty((n, 2)), np.empty((n, 3))
         #: (6 n_blocks,) N that blocks are out of balance by, and the right side of a step.
         self.residual, self._side = np.empty(6 * n_blocks), np.empty(6 * n_blocks)
@@ -109,7 +109,7 @@ class PathSteps:
 
     def linearise(self, at_hand: tuple[np.ndarray, ...], springs: tuple[np.ndarray, ...], given: np.ndarray) -> float:
         """Make ready for steps from N, w, slip, S, gap and motion along the edge ``at_hand`` on, contacts (n,) with
-        ``springs`` kn, ks, μ, base, rough, rise and unit; ``given`` (6 n_blocks,) N are the forces on blocks without
+        ``springs`` kn, ks, μ, base, rough and unit; ``given`` (6 n_blocks,) N are the forces on blocks without
         those of contacts. The sum of the products."""
         self._at_hand, self._springs = at_hand, springs
         self._do(_LINEARISE, given=given, out=self.residual)
@@ -133,7 +133,7 @@ class PathSteps:
 
     def products(self) -> float:
         """Their sum where the present step ends."""
-        *_, rough, _, unit = self._springs
+        *_, rough, unit = self._springs
         return products(self.numbers, self.step.changed, self.step.far, rough, unit)
 
     def go(self, far: float) -> int:

@@ -9,12 +9,10 @@ import pytest
 
 from geomech import dda
 from geomech.bench.cost import block_scenes
-from geomech.dda import system as stepping
 from geomech.dda import time_step
-from geomech.dda.open_close import iteration
 from geomech.dda.open_close.interior_point.central_path import CentralPath
-from geomech.dda.open_close.iteration import _proposed, settle
-from geomech.model import OPEN, Blocks, DdaSettings, History, JointLaw, Loads, Material, State
+from geomech.dda.open_close.iteration import settle
+from geomech.model import OPEN, Blocks, ContactSolver, DdaSettings, History, JointLaw, Loads, Material, State
 
 STIFFNESS, FRICTION = 4e11, 0.7
 
@@ -59,8 +57,10 @@ def test_pebbles_below_a_large_block_bear_it(monkeypatch, gravity):
     asked = []
     monkeypatch.setattr(time_step, "settle", lambda *given, **named: asked.append(given) or settle(*given, **named))
     system.step(State.at_rest(blocks), Loads(gravity=History.constant(gravity)))
-    pattern, matrix, right, found, vectors, springs, gap, *_ = asked[0]
-    path = CentralPath(pattern, matrix, right, found, vectors, springs, gap, found.bonded, found.normal)
+    of = asked[0][0]
+    path = CentralPath(
+        of.pattern, of.matrix, of.right, of.found, of.vectors, of.springs, of.gap, of.found.bonded, of.found.normal
+    )  # fmt: skip
     taken = 0
     while not path.ended:
         path.advance()
@@ -85,36 +85,12 @@ def test_few_contacts_that_stop_the_path_are_centred_alone():
     assert path._without_few(numbers, changes, 1e-4)[1] is None
 
 
-class Following:
-    """A path of a thousand contacts whose ε falls tenfold an iteration and that is decided at its end, 1e-14, alone."""
-
-    missed, blocked, arrived, ended = 0.0, False, False, False
-
-    def __init__(self, epsilon: float) -> None:
-        self.epsilon = epsilon
-
-    def advance(self) -> int:
-        self.epsilon *= 0.1
-        self.ended = self.arrived = self.epsilon < 1e-14
-        return 0 if self.ended else 500
-
-    def states(self) -> tuple[np.ndarray, np.ndarray]:
-        return np.zeros(1000), np.zeros(1000)
-
-
-@pytest.mark.parametrize(("epsilon", "proposes"), [(1e-7, True), (1e-2, False)])
-def test_a_path_near_its_end_is_followed_to_it_whatever_it_took(epsilon, proposes):
-    proposal, spent = _proposed(Following(epsilon), np.zeros(1000, int), set(), 0, patient=False)
-    assert (proposal is not None) == proposes
-    assert spent == (8 if proposes else 0)
-
-
 def test_of_many_blocks_in_motion_a_step_whose_path_is_stopped_is_halved_at_once(monkeypatch):
     """What comes out is the half step, to the bit; in statics, and of fewer blocks, the path is followed."""
-    blocks, asked = block_scenes.slope(300), []
+    blocks, asked, large = block_scenes.slope(300), [], ContactSolver()
 
     def step(seconds, dynamic=True):
-        settings = block_scenes.settings(seconds, dynamic)
+        settings = dataclasses.replace(block_scenes.settings(seconds, dynamic), contact_solver=large)
         system = dda.BlockSystem(blocks, [block_scenes.ROCK], [block_scenes.JOINT], settings=settings)
         return system.step(State.at_rest(blocks), block_scenes.WEIGHT)
 
@@ -124,8 +100,7 @@ def test_of_many_blocks_in_motion_a_step_whose_path_is_stopped_is_halved_at_once
         return asked[0] is path
 
     whole = step(0.02)
-    for module in (iteration, stepping):
-        monkeypatch.setattr(module, "MANY", 100)
+    large = ContactSolver(large_system=100)
     half = step(0.01)
     monkeypatch.setattr(CentralPath, "stopped", property(stopped))
     result = step(0.02)
@@ -136,12 +111,12 @@ def test_of_many_blocks_in_motion_a_step_whose_path_is_stopped_is_halved_at_once
     assert step(0.02, dynamic=False).dt == 0.02 and not asked
 
 
-def test_many_blocks_that_no_wave_has_reached_need_not_decide_what_touches(monkeypatch):
+def test_many_blocks_that_no_wave_has_reached_need_not_decide_what_touches():
     """In 1 ms the base is felt a few blocks up; above, all fall together, and contacts neither bear nor part."""
-    for module in (iteration, stepping):
-        monkeypatch.setattr(module, "MANY", 100)
+    large = ContactSolver(large_system=100)
     blocks = block_scenes.slope(2500)
-    system = dda.BlockSystem(blocks, [block_scenes.ROCK], [block_scenes.JOINT], settings=block_scenes.settings(1e-3))
+    settings = dataclasses.replace(block_scenes.settings(1e-3), contact_solver=large)
+    system = dda.BlockSystem(blocks, [block_scenes.ROCK], [block_scenes.JOINT], settings=settings)
     result = system.step(State.at_rest(blocks), block_scenes.WEIGHT)
     assert result.dt == 1e-3 and result.statistics["unbalanced"] < 1e-9
     corner = blocks.vertices[blocks.vertex_start[:-1]]
@@ -151,17 +126,17 @@ def test_many_blocks_that_no_wave_has_reached_need_not_decide_what_touches(monke
     assert far.sum() > 100 and result.state.velocity[far, 1] == pytest.approx(fall, rel=1e-3)
 
 
-def test_one_brick_that_slides_on_many_at_rest_asks_for_no_path(monkeypatch):
+def test_one_brick_that_slides_on_many_at_rest_asks_for_no_path():
     """It shakes loose a twentieth of the contacts of 1 500 bricks: the paths stopped, and steps were cut twelve times
     in ten."""
-    for module in (iteration, stepping):
-        monkeypatch.setattr(module, "MANY", 1000)
+    large = ContactSolver(large_system=1000)
     blocks = block_scenes.with_loose_brick(block_scenes.wall(1500))
     state = block_scenes.at_rest(blocks)
     velocity = state.velocity.copy()
     velocity[-1, 0] = 0.4
     state = dataclasses.replace(state, velocity=velocity)
-    system = dda.BlockSystem(blocks, [block_scenes.ROCK], [block_scenes.JOINT], settings=block_scenes.settings(0.01))
+    settings = dataclasses.replace(block_scenes.settings(0.01), contact_solver=large)
+    system = dda.BlockSystem(blocks, [block_scenes.ROCK], [block_scenes.JOINT], settings=settings)
     took, cuts = [], []
     for _ in range(5):
         result = system.step(state, block_scenes.WEIGHT)

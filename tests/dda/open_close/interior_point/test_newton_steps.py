@@ -23,8 +23,8 @@ def given():
             blocks, [block_scenes.ROCK], [block_scenes.JOINT], settings=block_scenes.settings(0.01)
         )
         system.step(State.at_rest(blocks), block_scenes.WEIGHT)
-    pattern, matrix, right, found, vectors, springs, gap, *_ = asked[0]
-    return pattern, matrix, right, found, vectors, springs, gap, found.bonded, found.normal
+    of = asked[0][0]
+    return of.pattern, of.matrix, of.right, of.found, of.vectors, of.springs, of.gap, of.found.bonded, of.found.normal
 
 
 def test_steps_solve_the_linearised_equations(given):
@@ -89,3 +89,16 @@ def test_steps_do_not_depend_on_threads(given, monkeypatch):
         found.append((path.unknowns.copy(), path._normal.copy(), path._shear.copy()))
     for other in found[1:]:
         assert all(np.array_equal(one, two) for one, two in zip(found[0], other, strict=True))
+
+
+def test_products_are_those_where_the_step_ends(given):
+    """N w, and (strength ∓ S) times the slips, each over its contact's unit."""
+    path = CentralPath(*given)
+    for _ in range(2):
+        path.advance()
+    steps = path._steps
+    ends = steps.numbers + steps.step.far * steps.step.changed
+    normal, width, back, ahead, above, below = ends.T
+    own = normal * width + np.where(path._rough, back * above + ahead * below, 0.0)
+    assert not np.array_equal(path._rough, path._base > 0)
+    assert steps.products() == pytest.approx(float((own / path._unit).sum()), rel=1e-12)
