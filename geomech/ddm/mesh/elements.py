@@ -14,7 +14,6 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
 
@@ -34,12 +33,6 @@ FORGOTTEN = 3
 STRAIGHT = math.radians(0.1)
 #: … and elements there are of one length when the longer is less than so many times the shorter.
 ALIKE = 1.2
-#: Sides, or drawn segments of a crack, between which the way turns by less than this and is no longer than an element is
-#: wanted to be, are a line that was digitised: they are not beside each other, but one behind the other, rad.
-ONWARD = math.radians(60)
-#: Turns of closed cracks by less than the first, rad, at vertices no farther from the line through their neighbours than the
-#: second part of their crack's length, are its curvature, as digitised, and are not graded: they leave 3e-3 in K.
-CURVED, OFF_LINE = math.radians(25), 0.01
 #: A mouth nearer to an element's end than this part of its length moves the end instead of cutting a sliver.
 SLIVER = 0.08
 
@@ -97,7 +90,6 @@ def mesh(
     source[len(boundary[0]) :] += len(edges)
     pieces = np.concatenate([edges, cracks.nodes[cracks.segments]])
     touching, n_pieces = _touching(sides[2], pieces, len(edges), cracks, extent), len(pieces)
-    _take_onward(touching, pieces, _wanted(loops, cracks, settings), _chains(loops, cracks))
     if half_plane is not None:
         (start, end, pieces), kind, source, touching = _with_images(
             half_plane, (start, end, pieces), kind, source, touching, ON_SURFACE * extent
@@ -186,15 +178,7 @@ def _boundary(loops, edges, mouths, settings, grading, extent, marks):
     length = np.hypot(*(edges[:, 1] - edges[:, 0]).T)
     spans = _spans(loops)
     angles = np.concatenate([interior_angles(loop) for loop in loops])
-    first = np.cumsum([0] + [len(loop) for loop in loops])
-    corner = []
-    for k, span in enumerate(spans):
-        own, wanted = length[first[k] : first[k + 1]], span / settings.elements_per_side
-        arms = np.maximum(own, np.roll(own, 1))
-        corner += [
-            grading.left(grading.at_corner(angle), arm, wanted)
-            for angle, arm in zip(angles[first[k] : first[k + 1]], arms.tolist())
-        ]
+    corner = [grading.at_corner(angle) for angle in angles]
     if grading.target is not None:
         for point, deep in [*mouths, *marks]:
             for k in np.flatnonzero(np.hypot(*(edges[:, 0] - point).T) <= 1e-7 * max(spans)):
@@ -202,6 +186,7 @@ def _boundary(loops, edges, mouths, settings, grading, extent, marks):
     for point, deep in marks:
         for k in np.flatnonzero(np.hypot(*(edges[:, 0] - point).T) <= 1e-7 * max(spans)):
             corner[k] = max(corner[k], deep)
+    first = np.cumsum([0] + [len(loop) for loop in loops])
     lines: list[np.ndarray] = []
     for k in range(len(loops)):
         n_edges, span = len(loops[k]), spans[k]
@@ -314,8 +299,7 @@ def _cracks(cracks: Cracks, settings: DdmSettings, grading: Grading, extent: flo
     share = np.where(drawn, length / np.maximum(total[cracks.crack], 1e-300), 0.0)
     # To nine digits first: of a crack drawn in two halves, 2½ of five elements each, both get as many.
     count = np.maximum(1, np.rint(np.round(settings.elements_per_crack * share, 9)).astype(int))
-    wanted = _wanted([], cracks, settings)
-    layers = _node_layers(cracks, length / count, wanted, grading, edges)
+    layers = _node_layers(cracks, length / count, grading, edges)
     inner: list[float] = []
     pieces = np.ones(n, np.int64)
     for s in np.flatnonzero((count > 1) | layers.any(axis=1)).tolist():
@@ -338,11 +322,8 @@ def _cracks(cracks: Cracks, settings: DdmSettings, grading: Grading, extent: flo
     return cut(nodes, segments, tip, pieces, np.array(inner, dtype=float))
 
 
-def _node_layers(
-    cracks: Cracks, size: np.ndarray, wanted: np.ndarray, grading: Grading, edges: np.ndarray
-) -> np.ndarray:
-    """(n_segments, 2) graded layers at the start and end of every segment; ``size`` its element length, m, and ``wanted``
-    what its crack would have if it were straight, m, 0 where it has grown."""
+def _node_layers(cracks: Cracks, size: np.ndarray, grading: Grading, edges: np.ndarray) -> np.ndarray:
+    """(n_segments, 2) graded layers at the start and end of every segment; ``size`` its element length."""
     layers = np.zeros((cracks.n_segments, 2), int)
     closed, surface = _closed(cracks), cracks.surface
     first, ends = ends_at(cracks)
@@ -365,11 +346,9 @@ def _node_layers(
             turn = _heading(cracks, s) - _heading(cracks, r) + (math.pi if e == f else 0.0)
             turn = abs(math.remainder(turn, 2 * math.pi))
             if closed[s] and closed[r]:
-                of_curve = grading.target is None and turn < CURVED and wanted[s] and _near_the_line(cracks, s, e, r, f)
-                deep = 0 if of_curve else grading.at_closed_kink(turn)
+                deep = grading.at_closed_kink(turn)
             else:
                 deep = grading.at_kink(turn, KINK < turn and _forgotten(cracks, first, ends, here))
-            deep = grading.left(deep, max(size[s], size[r]), min(wanted[s], wanted[r]))
             if deep:
                 layers[s, e] = layers[r, f] = deep
         least = min(float(size[s]) for s, _ in here)
@@ -378,51 +357,6 @@ def _node_layers(
                 needed = round(math.log(least / float(size[at[0]])) / math.log(grading.ratio))
                 layers[at] = max(layers[at], needed) if grading.target is None else layers[at] + needed
     return layers
-
-
-def _wanted(loops: list[np.ndarray], cracks: Cracks, settings: DdmSettings) -> np.ndarray:
-    """(n_edges + n_segments,) m: how long elements would be were sides and cracks straight; 0 of increments of growth, each of
-    which is an element whatever its length."""
-    sides = [np.full(len(loop), math.sqrt(abs(signed_area(loop))) / settings.elements_per_side) for loop in loops]
-    length, drawn = cracks.lengths, cracks.birth_cycle == 0
-    total = np.bincount(cracks.crack, weights=np.where(drawn, length, 0.0)) if len(length) else np.zeros(0)
-    own = np.where(drawn, total[cracks.crack] / settings.elements_per_crack, 0.0)
-    return np.concatenate([*sides, own])
-
-
-def _chains(loops: list[np.ndarray], cracks: Cracks) -> list[np.ndarray]:
-    """Numbers of pieces (edges, then segments) that follow one another: of every loop, going round, and of every crack."""
-    first = np.cumsum([0] + [len(loop) for loop in loops]).tolist()
-    chains = [np.r_[a:b, a:b] for a, b in pairwise(first)]
-    if cracks.n_segments:
-        goes_on = (cracks.segments[1:, 0] == cracks.segments[:-1, 1]) & (cracks.crack[1:] == cracks.crack[:-1])
-        chains += np.split(first[-1] + np.arange(cracks.n_segments), np.flatnonzero(~goes_on) + 1)
-    return chains
-
-
-def _take_onward(touching: np.ndarray, pieces: np.ndarray, wanted: np.ndarray, chains: list[np.ndarray]) -> None:
-    """Set in ``touching`` (m, m) which ``pieces`` (m, 2, 2) are of one digitised line (`ONWARD`)."""
-    along = pieces[:, 1] - pieces[:, 0]
-    length, heading = np.hypot(*along.T).tolist(), np.arctan2(along[:, 1], along[:, 0]).tolist()
-    for chain in chains:
-        numbers = chain.tolist()
-        for k, a in enumerate(numbers):
-            way = 0.0
-            for last, b in zip(numbers[k:], numbers[k + 1 :]):
-                way += length[last] if last != a else 0.0
-                # Increments of growth are not digitised.
-                turns = abs(math.remainder(heading[b] - heading[a], 2 * math.pi)) > ONWARD
-                if wanted[b] == 0 or way > wanted[a] or b == a or turns:
-                    break
-                touching[a, b] = touching[b, a] = True
-
-
-def _near_the_line(cracks: Cracks, s: int, e: int, r: int, f: int) -> bool:
-    """Whether the node at the ends ``e`` and ``f`` of two segments is near the line through their other ends
-    (`OFF_LINE`)."""
-    (x, y), a, b = (cracks.nodes[cracks.segments[at]] for at in ((s, e), (s, 1 - e), (r, 1 - f)))
-    off = abs((b[0] - a[0]) * (y - a[1]) - (b[1] - a[1]) * (x - a[0])) / math.hypot(*(b - a))
-    return off <= OFF_LINE * float(cracks.lengths[cracks.crack == cracks.crack[s]].sum())
 
 
 def _heading(cracks: Cracks, segment: int) -> float:

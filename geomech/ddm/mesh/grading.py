@@ -149,13 +149,6 @@ class Grading:
             return 0
         return max(1, self._at_kink(turn, KINK_ERROR) + self.layers - KINK_LAYERS)
 
-    def left(self, layers: int, arm: float, wanted: float) -> int:
-        """What is left of ``layers`` at a node where the longest element that ends there has length ``arm``, m, by itself and
-        elements ``wanted`` m long would do: sides that were digitised shorter than that are layers already."""
-        if self.target is not None or not layers or not 0 < arm < wanted:
-            return layers
-        return max(0, layers - int(math.log(wanted / arm) / -math.log(self.ratio) + 1e-9))
-
     def at_node(self, wedges: np.ndarray, where: str) -> int:
         """At a junction ("crack") or, for the target, at a "mouth" whose faces enclose ``wedges`` (n,) of rock, rad.
         Without a target a junction gets what a kink about its widest wedge does, and no fewer than any node."""
