@@ -16,8 +16,8 @@ from ..ddm.iterative.crack_gmres import CROSSOVER as MANY_ON_CRACKS
 from ..ddm.mesh.elements import mesh
 from ..model import Problem, counted
 
-#: Multiplications a second of dense factors, and bytes and seconds of an unknown that is iterated on; measured on one thread
-#: by `geomech bench many`, to a factor of two.
+#: Multiplications a second of dense factors, and bytes and seconds of an unknown that is iterated on; rough values of one
+#: thread, for an estimate to a factor of two or three.
 RATE, BYTES, SECONDS = 1.5e10, 4e4, 3e-4
 #: Unknowns of one block from which its size is worth a word on what makes it so.
 LARGE = 3000

@@ -10,10 +10,9 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).parent))
 import numpy as np
 from compare_flawed_specimen import check, draw, report, worst_angle
+import specimen
 from specimen import FLAW, FRICTION_DEG, course, flaws
 
-#: Of each kind so many flaws, and so many specimens.
-NUMBERS, SEEDS = (5, 10, 20), (1, 2, 3)
 VARIANTS = {"closed": True, "open": False}
 
 
@@ -26,9 +25,9 @@ def main(folder: Path, out: Path, overrides=(), variants=(), quiet: bool = False
     alone = course(out / "one", [np.array([-half, half])], True, most=12)
     runs = {}
     for name in variants or VARIANTS:
-        for number in NUMBERS:
+        for number in specimen.NUMBERS:
             runs[VARIANTS[name], number] = []
-            for seed in SEEDS:
+            for seed in specimen.SEEDS:
                 found = course(out / f"{name}_{number}_{seed}", flaws(number, seed), VARIANTS[name])
                 runs[VARIANTS[name], number].append(found)
                 if not quiet:

@@ -10,6 +10,8 @@ import numpy as np
 
 import geomech
 
+#: Of each kind specimens with so many flaws, and of each number so many specimens.
+NUMBERS, SEEDS = (5, 10, 20), (1, 2, 3)
 WIDTH, HEIGHT = 0.060, 0.120  # of the specimen, m
 FLAW, GAP, EDGE = 0.010, 0.004, 0.008  # length of a flaw, least distance of two of them, and to the sides, m
 FRICTION_DEG = 30.0  # of closed flaws

@@ -98,7 +98,11 @@ def test_a_block_that_slides_goes_as_far_as_it_falls(plane):
         # The floor lies below the toe, which would run into it.
         .replace("[0, 0], [-4, 0]]", "[0, 0], [0, -2], [-4, -2]]"), encoding="utf-8",
     )  # fmt: skip
-    columns = {"fastest": "max(history.kinetic_energy)", "longest": "last(history.time)", "done": "energy.kinetic_energy"}
+    columns = {
+        "fastest": "max(history.kinetic_energy)",
+        "longest": "last(history.time)",
+        "done": "energy.kinetic_energy",
+    }
     plan = plan_of(plane, {"vary": {FRICTION: [5, 40]}, "measure": "run", "columns": columns})
     slides, stands = (
         carry_out(Job(k, str(plane), None, plan.changes(values), plan.settings, plan.box, plan.cells))
