@@ -75,6 +75,7 @@ LAW = {
     "softening_slip": (-1.0, NAN, INF),
     "dilation_slip": (0.0, -1.0, NAN),
     "max_closure": (0.0, -1.0, NAN, INF),
+    "restitution": (-0.1, 1.1, NAN),
 }
 ROCKS = {
     "youngs_modulus": (0.0, -1.0, NAN, INF),
@@ -130,7 +131,7 @@ def test_numbers_that_make_no_sense_are_refused_where_they_are_given(made, table
 
 
 def test_the_tables_hold_every_number_there_is():
-    no_numbers = {"name", "roughness", "rigid", "automatic_time_step", "block", "compression"}
+    no_numbers = {"name", "roughness", "rigid", "automatic_time_step", "block", "compression", "contact_solver"}
     for owner, table in ((DdaSettings, SETTINGS), (JointLaw, LAW), (Material, ROCKS), (Bolt, BOLTS)):
         assert set(owner.__dataclass_fields__) - no_numbers == set(table)
 

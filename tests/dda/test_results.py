@@ -310,7 +310,7 @@ def test_failure_names_the_reason_and_the_contact():
 def test_a_step_that_is_cut_tells_the_log_why(caplog):
     bricks = [rectangle(i + 0.5 * (j % 2), j, i + 1 + 0.5 * (j % 2), j + 1) for j in range(3) for i in range(4)]
     blocks = Blocks.from_polygons([rectangle(-1, -1, 6, 0), *bricks], fixed=[True] + [False] * len(bricks))
-    settings = DdaSettings(time_step=0.01, dynamic_factor=1.0, max_open_close_iterations=4, max_displacement_ratio=10.0)
+    settings = DdaSettings(time_step=0.01, dynamic_factor=1.0, max_open_close_iterations=2, max_displacement_ratio=10.0)
     system = dda.BlockSystem(
         blocks, [Material("rock", 10e9, 0.25, density=2600.0)], [JointLaw("j", friction_angle=0.5)], settings=settings
     )
@@ -319,7 +319,7 @@ def test_a_step_that_is_cut_tells_the_log_why(caplog):
     cuts = int(result.statistics["step_cuts"])
     assert cuts > 0 and result.dt == 0.01 / 2**cuts
     said = [r.getMessage() for r in caplog.records]
-    assert len(said) == 1 and f"cut from 0.01 to {result.dt:.4g} s: contact states did not settle in 4" in said[0]
+    assert len(said) == 1 and f"cut from 0.01 to {result.dt:.4g} s: contact states did not settle in" in said[0]
     assert "a corner of 'block" in said[0]
 
 

@@ -72,7 +72,7 @@ def test_sudden_weight_on_irregular_blocks_settles_without_cutting_the_step(slop
         state = result.state
         assert result.statistics["step_cuts"] == 0
         iterations.append(result.statistics["open_close_iterations"])
-    assert iterations[-1] <= 8
+    assert iterations[-1] <= 10
 
 
 @pytest.mark.slow

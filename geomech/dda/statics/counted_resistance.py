@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ...model import GROUND, OPEN, Blocks, Loads, State
+from ..joint_laws.whole_faces import WholeFaces
 from ..kinematics.simplex_integration import block_moments
 from ..loads.bolts import labels
 from ..system import BlockSystem
@@ -161,18 +162,22 @@ def parted_faces(system: BlockSystem, state: State) -> tuple[PartedFace, ...]:
 
 
 def hairline_faces(system: BlockSystem, state: State) -> tuple[PartedFace, ...]:
-    """Faces with whole cohesion that in ``state`` are open at all of their ends, by less than what blocks are known to,
-    and so hold nothing; the one that is open farthest first."""
+    """Faces of joints with cohesion that in ``state`` are open at all of their ends, by less than what blocks are known
+    to, and so hold nothing, bonded still or not; the one that is open farthest first."""
     near = system.contacts_near(state)
-    if near.whole is None:
+    if not system.finder.whole_faces:
         return ()
-    face, hair = near.whole.face, near.gap_before <= near.precision
-    loose = (near.state == OPEN) & (near.bonded > 0) & ~near.whole.touch(near.state)
+    cohesion = np.array([joint.cohesion for joint in system.joints])[near.law]
+    whole = WholeFaces.of(near.block, near.other, near.geometry, near.law, cohesion)
+    if whole is None:
+        return ()
+    face, hair = whole.face, near.gap_before <= near.precision
+    loose = (near.state == OPEN) & (face >= 0) & ~whole.touch(near.state)
     out = []
     for number in np.unique(face[loose & (face >= 0)]):
         own = np.flatnonzero(face == number)
         if hair[own].all():
-            first, length = int(own[0]), float(near.whole.length[own].sum())
+            first, length = int(own[0]), float(whole.length[own].sum())
             gap = float(near.gap_before[own].max())
             out.append(PartedFace(int(near.block[first]), int(near.other[first]), gap, length))
     return tuple(sorted(out, key=lambda each: -each.gap))
