@@ -191,9 +191,7 @@ class Attempt:
         self.order = system.free if self.pattern is None else self.pattern.order
         if self.pattern is not None and self.pattern.solver is not None:
             # What is cut at the first sign needs no factors in double, of 100 000 blocks another 1.6 GB.
-            self.pattern.solver.single_only = is_large(
-                self.n_free, scheme.static, system.settings.contact_solver
-            )
+            self.pattern.solver.single_only = is_large(self.n_free, scheme.static, system.settings.contact_solver)
         self.matrix, self.right, self.tangent, self.stress0 = assemble_blocks(
             self.order, self.moments, self.density, system.stiffness, system.compliance, self.begun, self.stress,
             self.crack_strain, self.given, self.crack_compliance, self.crack_offset, self.gravity, self.load, dt,

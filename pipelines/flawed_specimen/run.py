@@ -9,8 +9,8 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parent))
 import numpy as np
-from compare_flawed_specimen import check, draw, report, worst_angle
 import specimen
+from compare_flawed_specimen import check, draw, report, worst_angle
 from specimen import FLAW, FRICTION_DEG, course, flaws
 
 VARIANTS = {"closed": True, "open": False}
