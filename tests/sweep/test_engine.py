@@ -106,6 +106,7 @@ def test_what_has_changed_cannot_be_gone_on_with(plane, tmp_path):
         carry_out_sweep(pauses(plane), folder, LocalEngine(2), overwrite=True)
 
 
+@pytest.mark.slow
 @pytest.mark.other_machines
 def test_ctrl_c_keeps_what_has_ended(plane, tmp_path, interruptible):
     """The first interrupt lets the runs under way end: exit code 3, and the rest is made by --resume."""
@@ -142,6 +143,7 @@ def test_ctrl_c_keeps_what_has_ended(plane, tmp_path, interruptible):
     assert "200 runs" in done.stdout and read_sweep(folder).complete
 
 
+@pytest.mark.slow
 def test_a_run_whose_worker_always_ends_is_counted_as_failed(tmp_path):
     class Ending(LocalEngine):
         def _read(self, worker, again, attempts):
@@ -216,6 +218,7 @@ def test_time_left():
     assert time_left(109, 110, [2.0] * 50, 4, now - 54.5) == pytest.approx(2.0, rel=1e-3)  # the last one, on one worker
 
 
+@pytest.mark.slow
 def test_overhead_is_small(plane):
     """Processor time of this process for a run that costs nothing: below 5 ms, a hundredth of half a second."""
     plan = pauses(plane)

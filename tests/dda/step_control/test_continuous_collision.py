@@ -116,7 +116,7 @@ def test_a_ring_holds_what_flies_in_it(rigid, ratio):
 @pytest.mark.parametrize(
     ("scene", "thin", "speed"),
     [(thin_scenes.nested, 1e-3, 30.0), (thin_scenes.chain, 3e-3, 10.0), (thin_scenes.combs, 3e-3, 10.0),
-     (thin_scenes.cogs, 30.0, 20), (thin_scenes.sticks, 1e-3, 10.0), (thin_scenes.box_of_debris, 3e-3, 10.0)],
+     (thin_scenes.cogs, 30.0, 20), pytest.param(thin_scenes.sticks, 1e-3, 10.0, marks=pytest.mark.slow), (thin_scenes.box_of_debris, 3e-3, 10.0)],
 )  # fmt: skip
 def test_hooks_combs_cogs_sticks_and_boxes_stay_out_of_each_other(scene, thin, speed):
     for ratio in (1e-2, 1e-1):
