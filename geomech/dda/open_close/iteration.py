@@ -212,7 +212,7 @@ class _Search:
 
     def _by_path(self, answer: Answer) -> None:
         """States that the central path proposes. Raises `Unsettled` where it has none."""
-        equations, bonded = self.equations, self.states.without_open_bonds().bonded
+        equations, bonded = self.equations, self._bonds_on_path()
         if self.path is None or not np.array_equal(self.path.bonded, bonded):
             self.path = CentralPath(
                 equations.pattern, equations.matrix, equations.right, self.found, equations.vectors, answer.springs,
@@ -224,6 +224,13 @@ class _Search:
         self.seen.clear()
         self.states, self.most = proposal, max(self.most, self.newton + self.solver.newton_to_finish)
         self._begin_anew(proposed=True)
+
+    def _bonds_on_path(self) -> np.ndarray:
+        """(n,) the bonds that the central path counts with: those of open contacts are gone, but not where cohesion belongs
+        to the whole face (`whole_faces`): it stays with a face of which one end is open."""
+        states, whole = self.states, self.found.whole
+        bonded = states.without_open_bonds().bonded
+        return bonded if whole is None else np.where(whole.face >= 0, states.bonded, bonded)
 
     def _proposed(self, path: CentralPath) -> States | None:
         """States that the ``path`` proposes once nearly all contacts are decided, none of those offered already; None
