@@ -54,6 +54,7 @@ class Breaking(LocalEngine):
             yield row
 
 
+@pytest.mark.slow
 def test_the_table_is_the_same_whatever_the_engine_and_the_number_of_workers(plane, tmp_path):
     plan = pauses(plane)
     engines = {"one": LocalEngine(1), "three": LocalEngine(3), "killed": Killing(2)}
