@@ -23,7 +23,7 @@ from .drawing import Drawing, draw
 from .errors import Fault, SceneError, one_a_cause
 from .keys import describe_keys
 from .locator import Path, dotted, locate
-from .overrides import OverrideError, assign, changes_of, flattened
+from .overrides import OverrideError, assign, change_of, flattened
 from .overview import overview
 from .tables import SceneTables
 from .tables.output import OutputTable, RenderTable
@@ -181,8 +181,14 @@ def load_scene(
         if variant not in names:
             raise SceneError([Fault(str(path), f"the scene has no variant {variant!r}", nearest(variant, list(names)))])
         _apply_variant(data, variant, places, faults)
-    for number, (called, key, value) in enumerate(_changes(overrides, faults)):
+    if isinstance(overrides, str):
+        way = 'write ["section.key=value"] or {"section.key": value}'
+        raise SceneError([Fault(str(path), f"{overrides!r} is one text", way)])
+    changes = overrides.items() if isinstance(overrides, Mapping) else overrides
+    for number, one in enumerate(changes):
+        called = f"--set {one}" if isinstance(one, str) else f"{one[0]} = {one[1]!r}"
         try:
+            key, value = change_of(one)
             # Changes from outside are listed after the file's own faults.
             places.changed_by(assign(data, key, value), called, 1e9 + number)
         except OverrideError as error:
@@ -213,19 +219,6 @@ def load_scene(
     # Building asks the same questions as the checks did; whatever it would find has been found.
     quiet = Check(tables, data, drawing, place, [], [])
     return Scene(path, variant, tables, drawing, names, tuple(places.sorted(one_a_cause(warnings))), quiet, written)
-
-
-def _changes(overrides: Iterable[str] | Mapping[str, Any], faults: list[Fault]) -> list[tuple[str, Path, Any]]:
-    """The `changes_of` overrides that can be read; what is wrong with the others goes to ``faults``."""
-    each = [{key: value} for key, value in overrides.items()] if isinstance(overrides, Mapping) else overrides
-    found = []
-    for one in [each] if isinstance(each, str) else each:
-        try:
-            found += changes_of(one if isinstance(one, Mapping) or isinstance(each, str) else [one])
-        except OverrideError as error:
-            called = next(iter(one)) if isinstance(one, Mapping) else f"--set {one}"
-            faults.append(Fault(called, error.message, error.way_out))
-    return found
 
 
 def _file(path: FilePath) -> FilePath:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from pathlib import PurePath
 from typing import Any
 
@@ -33,15 +33,13 @@ def parse_override(text: str) -> tuple[Path, Any]:
         return path_of(key.strip()), {"True": True, "False": False}.get(value, value)
 
 
-def changes_of(overrides: Iterable[str] | Mapping[str, Any]) -> list[tuple[str, Path, Any]]:
-    """What is to be changed in a scene, as (what to call the change, path, value): of a list of "section.key=value", or
-    of a table of Python values by "section.key" (numbers of NumPy, paths and tuples as TOML has them). Raises
-    OverrideError for what is neither."""
-    if isinstance(overrides, Mapping):
-        return [(f"{key} = {value!r}", path_of(key), _as_toml(value, key)) for key, value in overrides.items()]
-    if isinstance(overrides, str):
-        raise OverrideError(f"{overrides!r} is one text", 'write ["section.key=value"] or {"section.key": value}')
-    return [(f"--set {text}", *parse_override(text)) for text in overrides]
+def change_of(one: str | tuple[str, Any]) -> tuple[Path, Any]:
+    """A change to a scene as path and value: of "section.key=value" (`parse_override`), or of a "section.key" and a Python
+    value (numbers of NumPy, paths and tuples as TOML has them). Raises OverrideError for what is neither."""
+    if isinstance(one, str):
+        return parse_override(one)
+    key, value = one
+    return path_of(key), _as_toml(value, key)
 
 
 def _as_toml(value: Any, key: str) -> Any:

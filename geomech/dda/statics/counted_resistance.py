@@ -174,7 +174,7 @@ def hairline_faces(system: BlockSystem, state: State) -> tuple[PartedFace, ...]:
     face, hair = whole.face, near.gap_before <= near.precision
     loose = (near.state == OPEN) & (face >= 0) & ~whole.touch(near.state)
     out = []
-    for number in np.unique(face[loose & (face >= 0)]):
+    for number in np.unique(face[loose]):
         own = np.flatnonzero(face == number)
         if hair[own].all():
             first, length = int(own[0]), float(whole.length[own].sum())
