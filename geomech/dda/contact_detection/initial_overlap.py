@@ -8,6 +8,7 @@ import numpy as np
 
 from ...compiled import kept, part
 from ...model import Blocks
+from ..step_control.continuous_collision import depth_inside
 from .neighbour_search import boxes, near_pairs
 
 log = logging.getLogger(__name__)
@@ -16,28 +17,6 @@ log = logging.getLogger(__name__)
 REFUSED = 1e-3
 #: and above which it is reported: the springs release the energy of the overlap.
 REPORTED = 1e-6
-
-
-@part(fastmath=False, error_model="numpy", nogil=True)
-def _depth_inside(x, y, vertices, next_vertex, first, last):
-    """Depth of (x, y) inside the polygon with the edges from ``first`` to ``last``, m; 0 outside."""
-    winding = 0
-    least = np.inf
-    for e in range(first, last):
-        f = next_vertex[e]
-        ax, ay = vertices[e, 0] - x, vertices[e, 1] - y
-        bx, by = vertices[f, 0] - x, vertices[f, 1] - y
-        dx, dy = bx - ax, by - ay
-        cross = ax * by - ay * bx
-        if ay <= 0.0:
-            winding += by > 0.0 and cross > 0.0
-        else:
-            winding -= by <= 0.0 and cross < 0.0
-        square = dx * dx + dy * dy
-        t = min(1.0, max(0.0, -(ax * dx + ay * dy) / square))
-        px, py = ax + t * dx, ay + t * dy
-        least = min(least, px * px + py * py)
-    return np.sqrt(least) if winding != 0 else 0.0
 
 
 @part(fastmath=False, error_model="numpy", nogil=True)
@@ -69,9 +48,9 @@ def depth_of_pair(vertices, next_vertex, start, box, centroid, a, b):
     for turn in range(2):
         i, j = (a, b) if turn == 0 else (b, a)
         # Coincident blocks have all corners on each other's outline.
-        if _depth_inside(centroid[i, 0], centroid[i, 1], vertices, next_vertex, start[i], start[i + 1]) > 0.0:
+        if depth_inside(centroid[i, 0], centroid[i, 1], vertices, next_vertex, start[i], start[i + 1])[0] > 0.0:
             depth = max(
-                depth, _depth_inside(centroid[i, 0], centroid[i, 1], vertices, next_vertex, start[j], start[j + 1])
+                depth, depth_inside(centroid[i, 0], centroid[i, 1], vertices, next_vertex, start[j], start[j + 1])[0]
             )
         # Corners and midpoints of edges: of blocks shifted along a common side only midpoints lie inside.
         for v in range(start[i], start[i + 1]):
@@ -79,7 +58,7 @@ def depth_of_pair(vertices, next_vertex, start, box, centroid, a, b):
                 x = vertices[v, 0] + share * (vertices[next_vertex[v], 0] - vertices[v, 0])
                 y = vertices[v, 1] + share * (vertices[next_vertex[v], 1] - vertices[v, 1])
                 if box[j, 0] < x < box[j, 2] and box[j, 1] < y < box[j, 3]:
-                    depth = max(depth, _depth_inside(x, y, vertices, next_vertex, start[j], start[j + 1]))
+                    depth = max(depth, depth_inside(x, y, vertices, next_vertex, start[j], start[j + 1])[0])
     if depth == 0.0:
         for e in range(start[a], start[a + 1]):
             for f in range(start[b], start[b + 1]):

@@ -12,6 +12,7 @@ from ...model import GROUND, OPEN, Blocks, Loads, State
 from ..joint_laws.whole_faces import WholeFaces
 from ..kinematics.simplex_integration import block_moments
 from ..loads.bolts import labels
+from ..open_close.contact_set import ContactSet
 from ..system import BlockSystem
 from .displacement_limit import MOVED
 from .safety_answer import Anchor, FactorOfSafety
@@ -148,17 +149,9 @@ def parted_faces(system: BlockSystem, state: State) -> tuple[PartedFace, ...]:
     near = system.contacts_near(state)
     if near.whole is None:
         return ()
-    face = near.whole.face
     open_ends = (near.state == OPEN) & (near.bonded > 0) & near.whole.touch(near.state)
-    out = []
-    for number in np.unique(face[open_ends]):
-        own = np.flatnonzero(open_ends & (face == number))
-        first = int(own[0])
-        length = float(near.whole.length[own].sum())
-        out.append(
-            PartedFace(int(near.block[first]), int(near.other[first]), float(near.gap_before[own].max()), length)
-        )
-    return tuple(sorted(out, key=lambda each: -each.gap))
+    face = near.whole.face
+    return _faces(near, near.whole, [np.flatnonzero(open_ends & (face == k)) for k in np.unique(face[open_ends])])
 
 
 def hairline_faces(system: BlockSystem, state: State) -> tuple[PartedFace, ...]:
@@ -173,13 +166,19 @@ def hairline_faces(system: BlockSystem, state: State) -> tuple[PartedFace, ...]:
         return ()
     face, hair = whole.face, near.gap_before <= near.precision
     loose = (near.state == OPEN) & (face >= 0) & ~whole.touch(near.state)
-    out = []
-    for number in np.unique(face[loose]):
-        own = np.flatnonzero(face == number)
-        if hair[own].all():
-            first, length = int(own[0]), float(whole.length[own].sum())
-            gap = float(near.gap_before[own].max())
-            out.append(PartedFace(int(near.block[first]), int(near.other[first]), gap, length))
+    own = [np.flatnonzero(face == number) for number in np.unique(face[loose])]
+    return _faces(near, whole, [contacts for contacts in own if hair[contacts].all()])
+
+
+def _faces(near: ContactSet, whole: WholeFaces, contacts: list[np.ndarray]) -> tuple[PartedFace, ...]:
+    """The faces whose open ends are these ``contacts`` (numbers in ``near``), the one that is open farthest first."""
+    out = [
+        PartedFace(
+            int(near.block[own[0]]), int(near.other[own[0]]), float(near.gap_before[own].max()),
+            float(whole.length[own].sum()),
+        )
+        for own in contacts
+    ]  # fmt: skip
     return tuple(sorted(out, key=lambda each: -each.gap))
 
 

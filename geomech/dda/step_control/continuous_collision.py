@@ -38,7 +38,7 @@ INTO, THROUGH = 0, 1
 
 
 @part(fastmath=False, error_model="numpy", nogil=True)
-def _depth(x, y, vertices, next_vertex, first, last):
+def depth_inside(x, y, vertices, next_vertex, first, last):
     """(how far (x, y) lies inside the polygon of the edges from ``first`` to ``last``, m, 0 outside; its nearest edge)."""
     winding, least, nearest = 0, np.inf, -1
     for e in range(first, last):
@@ -198,7 +198,7 @@ def _gone_through(paths, v, first, last, allowed, longest):
         if out < 0.0 or out > 1.0:
             continue
         if was == np.inf:
-            was, beside = _depth(x0, y0, before, next_vertex, first, last)
+            was, beside = depth_inside(x0, y0, before, next_vertex, first, last)
         if was > 0.0 and was > allowed:
             continue  # it lay deep in the block before: no way out is the wrong one
         # By which edge it has come in: the last one before it left, or the one that it lay on.
@@ -222,11 +222,11 @@ def _of_vertex(paths, box, allow, v, j, smaller):
         return -1, -1, 0.0
     least = _DEPTH * smaller
     allowed = _PRESSED * allow.pressed[v] + least
-    now, near = _depth(x1, y1, after, paths.next_vertex, first, last)
+    now, near = depth_inside(x1, y1, after, paths.next_vertex, first, last)
     if now > allowed:
         allowed += ROUNDED_OVERLAP * _rounded_off(v, after, allow.rounding, first, last)
     if now > allowed:
-        was, _ = _depth(x0, y0, before, paths.next_vertex, first, last)
+        was, _ = depth_inside(x0, y0, before, paths.next_vertex, first, last)
         return (INTO, near, now) if now > was + least else (-1, -1, 0.0)
     longest = max(_CORNER * smaller, _CUT * allow.rounding[v])
     edge, depth = _gone_through(paths, v, first, last, allowed, longest)
