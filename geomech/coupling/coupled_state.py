@@ -11,8 +11,8 @@ from .. import dda
 from ..ddm.counters import Work
 from ..model import Blocks, Cracks, Motion, Problem, State
 from ..model.blocks.polygon import winding_number
-from .crack_compliance.growth_screening import CannotGrow
-from .crack_compliance.load_extrapolation import Foretold
+from .crack_compliance.growth_screening import GrowthScreening
+from .crack_compliance.load_extrapolation import LoadExtrapolation
 from .crack_compliance.mean_stress_response import ByMeanStress
 from .crack_compliance.quasi_newton import Settling
 from .load_transfer.boundary_tractions import BoundaryLoad
@@ -53,8 +53,8 @@ class CrackedBlocks:
         self.loads: dict[int, BoundaryLoad] = {}
         self.compliances: dict[int, tuple] = {}
         self.by_mean_stress = ByMeanStress()
-        self.cannot_grow = CannotGrow()
-        self.settling, self.foretold = Settling(), Foretold()
+        self.growth_screening = GrowthScreening()
+        self.settling, self.extrapolation = Settling(), LoadExtrapolation()
         #: What the last steps of the tips have told of their paths.
         self.chords: Memory = {}
         # What crack faces with friction remember of the load step before: its passes all begin there.
@@ -105,7 +105,7 @@ class CrackedBlocks:
                 bodies, loads, warm, self.history, self.solved_from, self.problem.run.skip, self.blocks.names
             )
 
-    def felt(self) -> dict:
+    def strain_solutions(self) -> dict:
         """block → the solution that the strain of its cracks is from, in the last pass."""
         own = self.by_mean_stress
         hang = {block: own.solutions[block] for block in self.bodies if block in own and block in own.solutions}
@@ -138,8 +138,8 @@ class CrackedBlocks:
             for known in (self.bodies, self.solutions, self.compliances, self.solved_from)
         )
         self.by_mean_stress = self.by_mean_stress.inherited(parent, whole) if len(whole) else ByMeanStress()
-        self.cannot_grow.renumber(parent, whole)
-        self.settling, self.foretold = Settling(), Foretold()
+        self.growth_screening.renumber(parent, whole)
+        self.settling, self.extrapolation = Settling(), LoadExtrapolation()
         self._take_bodies()
 
     def take_step(self, state: State, budget: dda.EnergyBudget) -> None:

@@ -33,7 +33,7 @@ from .growth.first_state_change import FirstChange
 from .load_pass import Balance, balanced, toughness
 from .load_transfer.load_imbalance import LoadBalance
 from .load_transfer.unbounded_rock import out_of_sight, solved_pass
-from .monitoring.collapse import collapse_in_situ, lost, relax, unheld
+from .monitoring.collapse import collapse_in_situ, lost, relax, unsupported
 from .monitoring.energy_check import BendingWatch, BudgetWatch, GrowthWatch
 from .monitoring.mechanism import Mechanism
 
@@ -58,13 +58,13 @@ def cycles(problem: Problem) -> Iterator[Cycle]:
 
 @dataclass(frozen=True)
 class UnderWay:
-    """A load step of which a pass has grown cracks: what its next pass, number ``next_pass``, goes on with. ``told``
+    """A load step of which a pass has grown cracks: what its next pass, number ``next_pass``, goes on with. ``events``
     are the events of the pass before, ``pending`` those that taking the growth has brought; ``until``, in dynamics, the
     time at which the pass before has ended, ``whole`` s after the step began."""
 
     dt: float
     load_time: float | None
-    told: tuple[Event, ...]
+    events: tuple[Event, ...]
     pending: tuple[Event, ...]
     next_pass: int
     until: float | None = None
@@ -174,8 +174,8 @@ class Coupling:
     @property
     def stops_next(self) -> bool:
         """Whether the next pass is the last one, because of what has happened."""
-        told = () if self.under_way is None else self.under_way.told + self.under_way.pending
-        return self._stops(told + self._brought)
+        events = () if self.under_way is None else self.under_way.events + self.under_way.pending
+        return self._stops(events + self._brought)
 
     @property
     def ends_next(self) -> bool:
@@ -265,7 +265,7 @@ class Coupling:
             dt = min(self.length.dt, self.problem.run.end_time - now.state.time)
             begun, self._brought = UnderWay(dt, None, (), self._brought + self._excavated(), 0), ()
         most = max(growing.max_passes, MOST_PASSES) if self.static and growing.max_passes else growing.max_passes
-        stops = self._stops(begun.told)
+        stops = self._stops(begun.events)
         return _LoadStep(
             begun.dt, begun.load_time, begun.until, begun.whole, begun.pending, begun.next_pass, most, stops
         )
@@ -318,8 +318,8 @@ class Coupling:
         if growth is None and self.static and not step.stops:
             # Not before growth has ended: a block that hangs by a thread is strained beyond measure until it parts.
             collapse = lost(now, state)
-            told = collapse or unheld(now, found.result, self.mechanism)
-            events, step.stops = events + told, bool(collapse) or self._stops(told)
+            ended = collapse or unsupported(now, found.result, self.mechanism)
+            events, step.stops = events + ended, bool(collapse) or self._stops(ended)
         if growth is not None:
             found.tips["grown"] = growth.grown
             if self.tips is not None:
@@ -343,7 +343,7 @@ class Coupling:
             # Of an event step that is shorter than its inertia asks for, or goes back; of the last part of a pass.
             statistics["dt"] = gone_by
         if (now.bodies or cracks.under_way) and not self.endless:
-            cracks.passed(found.tips, now.blocks, now.problem.materials, *self._felt())
+            cracks.passed(found.tips, now.blocks, now.problem.materials, *self._strain_solutions())
             if grown.ends or grown.rests:
                 self._count_at_cracks(result.state, budget, grown.cut)
             statistics |= cracks.statistics()
@@ -401,7 +401,7 @@ class Coupling:
                 return replace(found, result=replace(result, state=replace(result.state, time=until)))
             self.range.check(now.motion(result.state), now.blocks, result.state.time)
             budget = self._budget_after(result, False)
-            now.crack_energy.passed(found.tips, now.blocks, now.problem.materials, *self._felt())
+            now.crack_energy.passed(found.tips, now.blocks, now.problem.materials, *self._strain_solutions())
             self._count_at_cracks(result.state, budget)
             now.take_step(result.state, budget)
 
@@ -418,11 +418,11 @@ class Coupling:
         now = self.now
         # (What was dug out without a block that parts is its own.)
         set_free = now.budget.split - budget.split if now.budget.is_cut else 0.0
-        now.crack_energy.after(now.state, state, now.blocks, now.felt(), now.by_mean_stress, set_free, cut)
+        now.crack_energy.after(now.state, state, now.blocks, now.strain_solutions(), now.by_mean_stress, set_free, cut)
 
-    def _felt(self) -> tuple:
+    def _strain_solutions(self) -> tuple:
         """What the blocks feel of their cracks, and whether they began the step under stress."""
-        return self.now.felt(), self.now.by_mean_stress, bool(self.now.state.stress.any())
+        return self.now.strain_solutions(), self.now.by_mean_stress, bool(self.now.state.stress.any())
 
     def _excavated(self) -> tuple[Event, ...]:
         """Take out the blocks whose time has come; an event for each."""

@@ -17,7 +17,7 @@ from .crack_compliance.load_extrapolation import Answer
 from .crack_compliance.quasi_newton import Settling
 from .load_path import loads_at
 from .load_transfer.elastic_bodies import boundary_loads, threads_for, tip_rows
-from .parallel_map import side_by_side
+from .parallel_map import parallel_map
 
 #: A pass is repeated while the crack strain it assumed and the one it found differ by more than this part of the
 #: block's strain.
@@ -203,7 +203,7 @@ def _with_tips(now: CrackedBlocks, result: StepResult, statistics: dict[str, flo
     for body in left_out.values():
         body.work.solutions_left_out += 1
     if not now.system.scheme.static:
-        now.cannot_grow.solved(now, tips, toughness(now, tips))
+        now.growth_screening.solved(now, tips, toughness(now, tips))
     return Balance(result, now.solutions, tips, statistics, left_out)
 
 
@@ -239,8 +239,8 @@ def _expected(now: CrackedBlocks, time: float) -> dda.CrackResponse:
         return now.response
     blocks = tuple(now.bodies)
     numbers = np.array(blocks)
-    known, beyond, s = now.foretold.at(loads_at(now.problem.loads, time), blocks, _systems(now))
-    last, grown = now.foretold.last(blocks), np.zeros_like(beyond)
+    known, beyond, s = now.extrapolation.at(loads_at(now.problem.loads, time), blocks, _systems(now))
+    last, grown = now.extrapolation.last(blocks), np.zeros_like(beyond)
     if last is not None:
         for b, solution in _answers_to_the_last_forces(now, numbers[~known].tolist()).items():
             k = blocks.index(b)
@@ -296,10 +296,10 @@ def _remember(now: CrackedBlocks, answer: Answer) -> None:
     had their first states."""
     blocks, state = tuple(now.bodies), now.state
     before = loads_at(now.problem.loads, state.time)
-    if now.foretold.last(blocks) is None and not (before.any() or state.stress.any() or state.crack_strain.any()):
+    if now.extrapolation.last(blocks) is None and not (before.any() or state.stress.any() or state.crack_strain.any()):
         nothing = np.zeros_like(answer.strain)
-        now.foretold.take(blocks, replace(answer, loads=before, strain=nothing, stress=nothing))
-    now.foretold.take(blocks, answer)
+        now.extrapolation.take(blocks, replace(answer, loads=before, strain=nothing, stress=nothing))
+    now.extrapolation.take(blocks, answer)
 
 
 def _solve_bodies(now: CrackedBlocks, result: StepResult) -> None:
@@ -313,7 +313,7 @@ def _solve_what_may_grow(now: CrackedBlocks, result: StepResult) -> dict:
     _take_loads(now, result)
     with now.timed("ddm solve"):
         # What tips that grow release is counted by all that they did before and after.
-        idle = set() if now.crack_energy.grows else now.cannot_grow.among(now, result.dt)
+        idle = set() if now.crack_energy.grows else now.growth_screening.among(now, result.dt)
     _solve(now, {block: body for block, body in now.bodies.items() if block not in idle})
     return {block: body for block, body in now.bodies.items() if block in idle}
 
@@ -343,7 +343,7 @@ def _take_response(
     with now.timed("ddm solve"):
         answers = _answers(now, state)
     with now.timed("compliance"):
-        own = side_by_side(lambda of: _compliance(now, *of), list(answers.items()), threads_for(now.bodies))
+        own = parallel_map(lambda of: _compliance(now, *of), list(answers.items()), threads_for(now.bodies))
         now.compliances.update(zip(answers, own))
         again, after = (dda.CrackResponse(now.response.compliance.copy(), now.response.offset.copy()) for _ in range(2))
         known = np.array([now.compliances[b][2] for b in answers])

@@ -50,7 +50,7 @@ class _Known:
 
 
 @dataclass(eq=False)
-class CannotGrow:
+class GrowthScreening:
     """``passes`` in which something was left out, and after how many of them it was ``asked`` for."""
 
     passes: int = 0

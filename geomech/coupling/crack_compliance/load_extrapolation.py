@@ -43,7 +43,7 @@ class Answer:
 
 
 @dataclass(eq=False)
-class Foretold:
+class LoadExtrapolation:
     """The last answers of the same ``blocks``, the newest first."""
 
     blocks: tuple[int, ...] = ()

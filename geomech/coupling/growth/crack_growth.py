@@ -132,7 +132,7 @@ def take_growth(now: CrackedBlocks, growth, state: State, solutions: dict) -> tu
         centre = now.blocks.loops(b)[0].mean(axis=0)
         events.append(event(now, "split", state, centre, f"{now.blocks.names[b]} is cut into {len(parts)} blocks"))
     loads, stands, begun = now.loads, now.state is state, now.state
-    stored = {block: of.crack_energy for block, of in now.felt().items()}
+    stored = {block: of.crack_energy for block, of in now.strain_solutions().items()}
     now.take_split(split)
     if now.problem.dda.dynamic_factor != 0.0:
         begin_in_motion(now, split, cut, begun, stored)

@@ -12,7 +12,7 @@ from ... import dda
 from ...ddm.counters import Work
 from ...ddm.crack_contact.face_laws import Released
 from ...model import TIP, Blocks, Cracks, Motion, Problem, State
-from ..parallel_map import side_by_side
+from ..parallel_map import parallel_map
 from . import boundary_tractions
 from .boundary_tractions import BoundaryForces, BoundaryLoad
 from .inertia_forces import BlockInertia
@@ -76,7 +76,7 @@ def elastic_bodies(
             half_plane=None if surface is None else ddm.HalfPlane(*surface),
         )
 
-    bodies.update(zip([of[0] for of in to_make], side_by_side(made, to_make)))
+    bodies.update(zip([of[0] for of in to_make], parallel_map(made, to_make)))
     return bodies, nodes_of
 
 
@@ -117,8 +117,8 @@ def boundary_loads(
     forces, numbers = result.forces, np.array(list(bodies), int)
     rigid = np.array([material.rigid for material in problem.materials], bool)
     keep_straight = blocks.fixed | rigid[blocks.material]
-    if blocks.held is not None:
-        keep_straight = keep_straight | blocks.held.any(axis=1)
+    if blocks.constrained is not None:
+        keep_straight = keep_straight | blocks.constrained.any(axis=1)
     density = np.array([material.density for material in problem.materials])
     acting = BoundaryForces(
         result.vertices,
@@ -192,7 +192,7 @@ def solve_bodies(
         except ddm.TargetMissed as failure:
             raise ddm.TargetMissed(failure.solution, failure.target, f"{_called(b, names)}: ") from failure
 
-    solutions = dict(zip(bodies, side_by_side(solved, list(bodies), threads_for(bodies))))
+    solutions = dict(zip(bodies, parallel_map(solved, list(bodies), threads_for(bodies))))
     if any(body.asked.target_error is not None for body in bodies.values()):
         # Those that meet the target error may be of finer bodies.
         bodies.update((b, solution.body) for b, solution in solutions.items())

@@ -16,11 +16,11 @@ BEYOND = 1e-5
 
 
 class LoadBalance:
-    """The largest imbalance of any block so far, ``told`` as it passes what is allowed, and again whenever it has
+    """The largest imbalance of any block so far, ``reported`` as it passes what is allowed, and again whenever it has
     doubled."""
 
     def __init__(self) -> None:
-        self.told = 0.0
+        self.reported = 0.0
         self.strain = 0.0
 
     def check(self, loads: Mapping[int, BoundaryLoad], blocks: Blocks, strain: float, time: float) -> None:
@@ -31,8 +31,8 @@ class LoadBalance:
             return
         b = max(loads, key=lambda block: loads[block].imbalance)
         most = loads[b].imbalance
-        if most > max(BEYOND + self.strain, 2.0 * self.told):
-            self.told = most
+        if most > max(BEYOND + self.strain, 2.0 * self.reported):
+            self.reported = most
             log.warning(
                 "t = %g s: the forces on %s that its cracks are solved for are out of balance by %.1e of their size; "
                 "its stress intensity factors are as uncertain",

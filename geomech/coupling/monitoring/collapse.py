@@ -59,7 +59,7 @@ def lost(now: CrackedBlocks, state: State) -> tuple[Event, ...]:
     return (event(now, "collapse", state, now.blocks.vertices[farthest], detail),)
 
 
-def unheld(now: CrackedBlocks, result: dda.StepResult, mechanism: Mechanism) -> tuple[Event, ...]:
+def unsupported(now: CrackedBlocks, result: dda.StepResult, mechanism: Mechanism) -> tuple[Event, ...]:
     """A mechanism, when blocks of a static run go on without bound after the load step of ``result``."""
     found = mechanism.check(result, now.blocks)
     if found is None:

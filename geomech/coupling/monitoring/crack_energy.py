@@ -125,14 +125,14 @@ class CrackEnergy:
         tips: np.ndarray,
         blocks: Blocks,
         materials: tuple[Material, ...],
-        felt: dict[int, Solution],
+        solutions: dict[int, Solution],
         by_mean_stress: ByMeanStress,
         stressed: bool = True,
     ) -> None:
         """A pass of the present step, which blocks began ``stressed`` or not, has ended with ``tips``, of which some are
-        about to grow, or none; ``felt`` is block → the `ddm.Solution` that it is strained by, those ``by_mean_stress``
+        about to grow, or none; ``solutions`` is block → the `ddm.Solution` that it is strained by, those ``by_mean_stress``
         by no more than their mean stress."""
-        hang = {block: of for block, of in felt.items() if block in by_mean_stress}
+        hang = {block: of for block, of in solutions.items() if block in by_mean_stress}
         self._strain_last = {block: of.crack_strain for block, of in hang.items()}
         self._last = FeltTips(tips, hang)
         if self._first is None:
@@ -165,9 +165,9 @@ class CrackEnergy:
                 self._parted = True
         for block, (stress, limit, strain, share) in self._limited.items():
             # What is taken for no softer than so much (`ByMeanStress.limit`) spends less on growth as its limit falls.
-            if block in felt:
+            if block in solutions:
                 now_stress, now_limit = by_mean_stress.stress[block]
-                less, known = now_limit - limit, felt[block]
+                less, known = now_limit - limit, solutions[block]
                 both = float(strain @ less @ stress + known.crack_strain @ less @ now_stress)
                 _add(self._released, block, 0.5 * known.body.area * share * both)
         turned = np.where(hangs, kink_release(tips), tips["k_eq"] ** 2) / modulus
@@ -185,7 +185,7 @@ class CrackEnergy:
             for row in grows.tolist()
         }
         self._limited = {
-            block: (*by_mean_stress.stress[block], felt[block].crack_strain, self._share_of(block, stressed))
+            block: (*by_mean_stress.stress[block], solutions[block].crack_strain, self._share_of(block, stressed))
             for block in np.unique(tips["block"][grows]).tolist()
             if block in by_mean_stress
         }
@@ -270,12 +270,12 @@ class CrackEnergy:
         before: State,
         state: State,
         blocks: Blocks,
-        felt: dict[int, Solution],
+        solutions: dict[int, Solution],
         by_mean_stress: ByMeanStress,
         set_free: float = 0.0,
         cut: Collection[int] = (),
     ) -> None:
-        """The step from ``before`` to ``state`` has been taken; ``felt`` at its end is block → the `ddm.Solution` that
+        """The step from ``before`` to ``state`` has been taken; ``solutions`` at its end is block → the `ddm.Solution` that
         it is strained by; ``by_mean_stress`` are those that feel no more than their mean stress. Blocks that have
         parted since the last step stored ``set_free`` J/m more before than their parts and new contacts did; those that
         are ``cut`` part here, by what now grows."""
@@ -284,16 +284,16 @@ class CrackEnergy:
         each = blocks.areas(before.vertices) * np.sum(mean * strain, axis=1)
         work = float(each.sum())
         if self.static:
-            gone = {block: felt[block] for block in cut if block in felt}
-            felt = {block: of for block, of in felt.items() if block not in gone}
+            gone = {block: solutions[block] for block in cut if block in solutions}
+            solutions = {block: of for block, of in solutions.items() if block not in gone}
             for block, of in gone.items():
                 rubbed, of_cement = of.given_way
                 self._runs_through(block, rubbed, of_cement.bond)
                 each[block] = 0.0
-        hangs = {block: block in by_mean_stress for block in felt}
-        done = sum(self._work_at_rest(before, felt, hangs, each)) if self.static else work
-        stored = sum(solution.crack_energy + solution.filling_energy for solution in felt.values())
-        rubbed, released_there = zip(*(of.given_way for of in felt.values())) if felt else ((), ())
+        hangs = {block: block in by_mean_stress for block in solutions}
+        done = sum(self._work_at_rest(before, solutions, hangs, each)) if self.static else work
+        stored = sum(solution.crack_energy + solution.filling_energy for solution in solutions.values())
+        rubbed, released_there = zip(*(of.given_way for of in solutions.values())) if solutions else ((), ())
         friction, bond = sum(rubbed), sum(of.bond for of in released_there)
         if self.static:
             done += sum(of.slip_onset + of.break_onset for of in released_there)
@@ -303,10 +303,10 @@ class CrackEnergy:
         # What a block stored that begins to hang, or is whole no more, was of another kind.
         self._parted |= any(hangs.get(block) != hung for block, hung in self._hangs.items() if block not in cut)
         # Cracks that are cut into stressed rock open against less than bears them: what is left over is set free.
-        new = [block for block, of in felt.items() if block not in self._hangs and of.jumps.size]
+        new = [block for block, of in solutions.items() if block not in self._hangs and of.jumps.size]
         self._parted |= bool(np.any(before.stress[new]))
         self._hangs = hangs
-        self._release_of_limited(felt, by_mean_stress)
+        self._release_of_limited(solutions, by_mean_stress)
         released, lost = sum(self._released.values()), sum(self._lost.values())
         rest = done + set_free - (stored - self.stored) - friction - bond - released
         self.work += work
@@ -327,29 +327,29 @@ class CrackEnergy:
         self._growing = {key: replace(of, share=1.0) for key, of in self._growing.items()}
         self._limited = {block: (*of[:3], 1.0) for block, of in self._limited.items()}
         self._grown = set()
-        self._hung = {block: Loaded.of(block, of, by_mean_stress) for block, of in felt.items() if hangs[block]}
-        self._rested = dict(felt) if self.static else {}
+        self._hung = {block: Loaded.of(block, of, by_mean_stress) for block, of in solutions.items() if hangs[block]}
+        self._rested = dict(solutions) if self.static else {}
 
-    def _release_of_limited(self, felt: dict[int, Solution], by_mean_stress: ByMeanStress) -> None:
+    def _release_of_limited(self, solutions: dict[int, Solution], by_mean_stress: ByMeanStress) -> None:
         """What is taken for no softer than so much releases, where it answers in proportion to its load, what lies between
         the lines on which it is loaded before and after, ½ A (σ₀·ε₁ − σ₁·ε₀), from where the present step began: K falls
         by much in an increment, and the limit with it."""
         for block in self._grown:
-            if block not in felt or block not in by_mean_stress:
+            if block not in solutions or block not in by_mean_stress:
                 continue
-            now = Loaded.of(block, felt[block], by_mean_stress)
+            now = Loaded.of(block, solutions[block], by_mean_stress)
             before = self._hung.get(block, Loaded(np.zeros(3), np.zeros(3), True))
             if now.in_proportion and before.in_proportion:
                 between = float(before.stress @ now.strain - now.stress @ before.strain)
-                self._released[block] = released = 0.5 * felt[block].body.area * between
+                self._released[block] = released = 0.5 * solutions[block].body.area * between
                 self._lost[block] = max(0.0, released - self._taken.get(block, 0.0)) if self.static else 0.0
 
     def _work_at_rest(
-        self, before: State, felt: dict[int, Solution], hangs: dict[int, bool], by_mean: np.ndarray
+        self, before: State, solutions: dict[int, Solution], hangs: dict[int, bool], by_mean: np.ndarray
     ) -> Iterator[float]:
         """J/m that forces at rest have done in opening the cracks, block by block; ``by_mean`` (n_blocks,) that of the
         mean stress, which is all of it where a block ``hangs`` and where there are no forces on cracks."""
-        for block, of in felt.items():
+        for block, of in solutions.items():
             began = self._rested.get(block)
             if hangs[block] or self._hangs.get(block, False):
                 yield float(by_mean[block])
@@ -357,7 +357,7 @@ class CrackEnergy:
                 yield work_on_cracks(began, of)
             else:
                 yield first_work_on_cracks(before.stress[block], float(before.rotation[block]), of)
-        yield float(sum(by_mean[block] for block in range(len(by_mean)) if block not in felt))
+        yield float(sum(by_mean[block] for block in range(len(by_mean)) if block not in solutions))
 
     def statistics(self) -> dict[str, float]:
         """Columns of a history, J/m."""

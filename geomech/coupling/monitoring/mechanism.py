@@ -36,18 +36,18 @@ class Mechanism:
     def __init__(self) -> None:
         self.ratios: list[float] = []
         self.ways: list[float] = []
-        self.told = False
+        self.reported = False
 
     def check(self, result: dda.StepResult, blocks: Blocks) -> tuple[int, str] | None:
         """After the load step of ``result``: the block that moves fastest and what is to be said, where blocks have
         been out of balance for `STEPS` load steps and what is out of balance does not fade."""
         ratio = float(result.statistics["unbalanced_ratio"])
         if not ratio > HELD:
-            self.ratios, self.ways, self.told = [], [], False
+            self.ratios, self.ways, self.reported = [], [], False
             return None
         self.ratios = [*self.ratios[-STEPS:], ratio]
         self.ways = [*self.ways[-STEPS:], float(np.hypot(*(result.state.vertices - blocks.vertices).T).max())]
-        if self.told or len(self.ratios) <= STEPS or ratio < (1.0 - FADES) * self.ratios[0]:
+        if self.reported or len(self.ratios) <= STEPS or ratio < (1.0 - FADES) * self.ratios[0]:
             return None
         speed = np.hypot(*result.state.velocity[:, :2].T)
         speed[np.asarray(blocks.fixed, bool)] = 0.0
@@ -55,7 +55,7 @@ class Mechanism:
             return None
         if ratio > FLYING and not _has_gone(int(np.argmax(speed)), result, blocks):
             return None
-        self.told = True
+        self.reported = True
         moving = np.flatnonzero(speed > 0.1 * speed.max())
         moving = moving[np.argsort(-speed[moving], kind="stable")]
         named = ", ".join(blocks.names[b] if blocks.names else f"block {b}" for b in moving[:NAMED].tolist())

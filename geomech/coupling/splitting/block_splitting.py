@@ -230,7 +230,7 @@ def _assemble(blocks: Blocks, pieces: list[_Piece]) -> Blocks:
         block_loop=np.cumsum([0, *(len(piece.loops) for piece in pieces)]),
         material=blocks.material[parent],
         fixed=blocks.fixed[parent],
-        held=None if blocks.held is None else blocks.held[parent],
+        constrained=None if blocks.constrained is None else blocks.constrained[parent],
         edge_name=np.array(labels, dtype=int),
         edge_names=tuple(known),
         names=tuple(piece.name for piece in pieces),

@@ -129,7 +129,7 @@ def _along(points: np.ndarray, a: np.ndarray, b: np.ndarray) -> tuple[np.ndarray
 
 
 @dataclass(eq=False)
-class _Told:
+class _Inherited:
     """Forces summed up for the contacts (n,) of a `ContactSet`, in current axes, on the block of the vertex."""
 
     force: np.ndarray
@@ -138,7 +138,7 @@ class _Told:
     known: np.ndarray
 
     @classmethod
-    def none(cls, n: int) -> _Told:
+    def none(cls, n: int) -> _Inherited:
         return cls(np.zeros((n, 2)), np.full(n, np.inf), np.zeros(n), np.zeros(n, bool))
 
 
@@ -164,44 +164,48 @@ def contacts_after(
     cut = [b for b in np.flatnonzero(parts > 1).tolist() if b in solutions]
     if not len(found) or (found is near and not cut):
         return state.contacts
-    told = _Told.none(len(found))
+    inherited = _Inherited.none(len(found))
     loaded = {load.edge_name for load in acting.edge_tractions}
     wet = np.zeros(0, EDGE_FORCE)
     if cut and acting.water is not None:
         alone = Loads(water=acting.water)
         wet = system.load_map.rows(alone, state.time, np.ascontiguousarray(state.vertices), state.rotation)[1]
     for parent in cut:
-        _tell_of_walls(told, found, split, parent, solutions[parent], float(state.rotation[parent]))
-        _tell_of_divided_edges(told, found, split, before, parent, loads[parent], loaded, wet)
-    return system.told(state, found, _contacts(system, found, told, blocks, np.isin(split.parent, cut)))
+        _inherit_along_walls(inherited, found, split, parent, solutions[parent], float(state.rotation[parent]))
+        _inherit_along_divided_edges(inherited, found, split, before, parent, loads[parent], loaded, wet)
+    return system.inherited_contacts(
+        state, found, _contacts(system, found, inherited, blocks, np.isin(split.parent, cut))
+    )
 
 
-def _contacts(system: dda.BlockSystem, found, told: _Told, blocks: Blocks, is_part: np.ndarray) -> dda.ToldContacts:
-    """``told`` as forces along the contacts' own axes; contacts of parts (n_blocks,) of which nothing is told keep what
+def _contacts(
+    system: dda.BlockSystem, found, inherited: _Inherited, blocks: Blocks, is_part: np.ndarray
+) -> dda.InheritedContacts:
+    """``inherited`` as forces along the contacts' own axes; contacts of parts (n_blocks,) of which nothing is told keep what
     they bear."""
     across = found.geometry[:, 1:3]
-    normal = np.sum(told.force * across, axis=1)
-    shear = np.sum(told.force * normal_of(across), axis=1)
-    least = _NOTHING * np.abs(told.force).max(initial=0.0)
+    normal = np.sum(inherited.force * across, axis=1)
+    shear = np.sum(inherited.force * normal_of(across), axis=1)
+    least = _NOTHING * np.abs(inherited.force).max(initial=0.0)
     normal = np.where((normal > least) | ((found.bonded == WHOLE) & (normal < -least)), normal, 0.0)
     rough = np.array([joint.roughness is not None for joint in system.joints])[found.law]
-    keeps = ~told.known & (found.state != OPEN) & (is_part[found.block] | is_part[found.other])
-    normal, shear = np.where(told.known, normal, found.normal), np.where(told.known, shear, found.shear)
+    keeps = ~inherited.known & (found.state != OPEN) & (is_part[found.block] | is_part[found.other])
+    normal, shear = np.where(inherited.known, normal, found.normal), np.where(inherited.known, shear, found.shear)
     size = np.sqrt(blocks.areas())
     farthest = _FARTHEST * np.minimum(size[found.block], size[found.other])
-    gap = np.minimum(told.gap, farthest)
+    gap = np.minimum(inherited.gap, farthest)
     # Joints as soft as their law says, of the little length that a corner may be left with, cannot bear what a whole
     # face did.
     normal = np.minimum(normal, found.springs.normal * farthest)
     most = np.where(rough, np.inf, found.springs.peak * np.maximum(normal, 0.0))
     shear = np.where(found.bonded > 0, shear, np.clip(shear, -most, most))
-    which = np.flatnonzero(told.known | keeps)
-    return dda.ToldContacts(
+    which = np.flatnonzero(inherited.known | keeps)
+    return dda.InheritedContacts(
         which=which,
         normal=normal[which],
         shear=shear[which],
-        gap=np.where(told.known & np.isfinite(told.gap), gap, found.gap)[which],
-        slip=np.where(told.known, told.slip, found.slip)[which],
+        gap=np.where(inherited.known & np.isfinite(inherited.gap), gap, found.gap)[which],
+        slip=np.where(inherited.known, inherited.slip, found.slip)[which],
     )
 
 
@@ -210,7 +214,7 @@ def _turned(vectors: np.ndarray, angle: float) -> np.ndarray:
     return vectors @ np.array([[c, s], [-s, c]])
 
 
-def _tell_of_walls(told: _Told, found, split: Split, parent: int, solution, rotation: float) -> None:
+def _inherit_along_walls(inherited: _Inherited, found, split: Split, parent: int, solution, rotation: float) -> None:
     """The tractions, gaps and slip of the faces along which ``parent`` is cut, to the contacts between its parts."""
     blocks = split.blocks
     faces, size = _Faces.of(solution), np.sqrt(blocks.areas())
@@ -245,11 +249,11 @@ def _tell_of_walls(told: _Told, found, split: Split, parent: int, solution, rota
             if row < 0:
                 continue
             sign = 1.0 if found.block[row] == upper else -1.0
-            told.force[row] += sign * force[end]
-            told.known[row] = True
-            if gap[end] < told.gap[row]:
-                told.gap[row] = gap[end]
-                told.slip[row] = sign * slip[end] * float(along @ normal_of(found.geometry[row, 1:3]))
+            inherited.force[row] += sign * force[end]
+            inherited.known[row] = True
+            if gap[end] < inherited.gap[row]:
+                inherited.gap[row] = gap[end]
+                inherited.slip[row] = sign * slip[end] * float(along @ normal_of(found.geometry[row, 1:3]))
 
 
 def _in_rock(solution, a: np.ndarray, b: np.ndarray, normal: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -277,8 +281,8 @@ def _contact_at(rows, found, across: np.ndarray, edges: tuple[int, int]) -> int:
     return where
 
 
-def _tell_of_divided_edges(
-    told: _Told,
+def _inherit_along_divided_edges(
+    inherited: _Inherited,
     found,
     split: Split,
     before: Blocks,
@@ -316,9 +320,9 @@ def _tell_of_divided_edges(
         if len(place):
             lumped -= _shares(at, neighbour, place) @ force
         sign = np.where(found.block[rows] == owner[side], 1.0, -1.0)
-        told.force[rows] += sign[:, None] * lumped
-        told.slip[rows] = found.slip[rows]
-        told.known[rows] = True
+        inherited.force[rows] += sign[:, None] * lumped
+        inherited.slip[rows] = found.slip[rows]
+        inherited.known[rows] = True
 
 
 def _water_on(wet: np.ndarray, a: np.ndarray, b: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -149,9 +149,9 @@ class FaceLaws:
 
     def limit(self, pressure: np.ndarray, broken: np.ndarray) -> np.ndarray:
         """Shear that the nodes stand under ``pressure``, Pa."""
-        return self.friction * np.maximum(pressure, 0.0) + self.held_by_cohesion(broken)
+        return self.friction * np.maximum(pressure, 0.0) + self.cohesive_strength(broken)
 
-    def held_by_cohesion(self, broken: np.ndarray) -> np.ndarray:
+    def cohesive_strength(self, broken: np.ndarray) -> np.ndarray:
         return np.where(broken, 0.0, self.cohesion)
 
 

@@ -73,13 +73,13 @@ class FaceEquations:
     ) -> tuple[np.ndarray, np.ndarray]:
         """Jumps and λ (n,) under ``right`` (n,); ``limit`` (n_nodes,) replaces the shear limit of slipping nodes."""
         laws, s = self.laws, self.system.matrix
-        held, slides, spring = self._rows(states, limit is not None)
+        prescribed, slides, spring = self._rows(states, limit is not None)
         a, t = laws.across, laws.along
         w, extra = np.zeros_like(right), np.zeros_like(right)
         w[a[states.closed]] = -laws.aperture[states.closed]
-        w[t] = np.where(held[t], memory.rest, 0.0)
-        w[~held] = 0.0
-        bound = laws.held_by_cohesion(memory.broken) if limit is None else limit
+        w[t] = np.where(prescribed[t], memory.rest, 0.0)
+        w[~prescribed] = 0.0
+        bound = laws.cohesive_strength(memory.broken) if limit is None else limit
         bound = np.where(states.way != 0, bound, 0.0)  # it may be infinite where nothing slips
         free, factor = self._factor(states, limit is not None)
         if isinstance(factor, HeldFactor):
@@ -101,7 +101,7 @@ class FaceEquations:
         reaction[a[closed]] = missing[a[closed]]
         filled = spring[a] > 0
         reaction[a[filled]] = -(spring[a] * (w[a] + laws.aperture))[filled]
-        stuck = held[t]
+        stuck = prescribed[t]
         reaction[t[stuck]] = missing[t[stuck]]
         springy = spring[t] > 0
         reaction[t[springy]] = -(spring[t] * (w[t] - memory.rest))[springy]
@@ -110,7 +110,7 @@ class FaceEquations:
         return w, reaction
 
     def _pull_of(self, w: np.ndarray) -> np.ndarray:
-        """S ``w`` of held jumps; from state to state few of them change."""
+        """S ``w`` of prescribed jumps; from state to state few of them change."""
         if self._pull is not None:
             changed = np.flatnonzero(w != self._pull[0])
             if len(changed) < FEW_CHANGED * len(w):
@@ -158,27 +158,27 @@ class FaceEquations:
         return out
 
     def _rows(self, states: FaceStates, frozen: bool) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Unknowns that are held (n,) bool, ± tan φ of sliding nodes (n_nodes,), stiffness of springs (n,)."""
+        """Unknowns that are prescribed (n,) bool, ± tan φ of sliding nodes (n_nodes,), stiffness of springs (n,)."""
         laws = self.laws
-        held, spring = np.zeros(self.system.n, bool), np.zeros(self.system.n)
+        prescribed, spring = np.zeros(self.system.n, bool), np.zeros(self.system.n)
         filled = np.isfinite(laws.normal)
-        held[laws.across] = states.closed & ~filled
+        prescribed[laws.across] = states.closed & ~filled
         spring[laws.across] = np.where(states.closed & filled, laws.normal, 0.0)
         sticks, soft = states.closed & laws.rough & (states.way == 0), np.isfinite(laws.shear)
-        held[laws.along] = sticks & ~soft
+        prescribed[laws.along] = sticks & ~soft
         spring[laws.along] = np.where(sticks & soft, laws.shear, 0.0)
         slides = states.way * np.where(states.pulled | frozen, 0.0, laws.friction)
-        return held, slides, spring
+        return prescribed, slides, spring
 
     def _factor(self, states: FaceStates, frozen: bool) -> tuple[np.ndarray, Factor | Iterated]:
         key = states.key + bytes([frozen])
         if key not in self._factors:
             if len(self._factors) >= _KEPT:
                 self._factors.pop(next(iter(self._factors)))
-            held, slides, spring = self._rows(states, frozen)
+            prescribed, slides, spring = self._rows(states, frozen)
             mixed = np.zeros(self.system.n)
             mixed[self.laws.along] = slides
-            self._factors[key] = self.system.changed(Rows(held, mixed, spring, self.laws.elements.per))
+            self._factors[key] = self.system.changed(Rows(prescribed, mixed, spring, self.laws.elements.per))
         return self._factors[key]
 
 
@@ -381,9 +381,9 @@ def settle_rough(
     work = memory.work + float(weights @ lost)
     # Faces that held as the step began, and slip at its end, bore less than their limit before it.
     untouched = not memory.states.closed.any() and not memory.rest.any()
-    held = memory.states.closed & (memory.states.way == 0) | laws.cemented(memory.broken)
-    held |= untouched & laws.closes & (laws.aperture == 0)
-    slips = np.where(held & slides, lost - 0.5 * (memory.shear - reaction[laws.along]) * (rest - memory.rest), 0.0)
+    stuck = memory.states.closed & (memory.states.way == 0) | laws.cemented(memory.broken)
+    stuck |= untouched & laws.closes & (laws.aperture == 0)
+    slips = np.where(stuck & slides, lost - 0.5 * (memory.shear - reaction[laws.along]) * (rest - memory.rest), 0.0)
     breaks = contact.broken & ~memory.broken
     bond, ahead = _breaking(laws, memory, w, pressure, shear, lost) if breaks.any() else np.zeros((2, len(lost)))
     new = float(weights[breaks] @ bond[breaks]), float(weights @ np.where(breaks, 0.0, slips))

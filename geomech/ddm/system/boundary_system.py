@@ -109,7 +109,7 @@ class BoundarySystem:
         """Keep of the rigid motions those that are free, and anchor holes by the others."""
         holds, g = self.holds, self.elements
         loop_of = mesh.edge_loop[g.source]
-        _, centre, radius = middle_of(g.take(np.flatnonzero(loop_of == 0)))
+        _, centre, radius = outline_centroid(g.take(np.flatnonzero(loop_of == 0)))
         whole, _ = rigid_motions(g, np.zeros_like(mesh.edge_loop), (centre, radius))
         self.free_motions = FreeMotions(centre, radius, holds.free_motions(whole))
         keep = ~holds.unknowns
@@ -122,10 +122,10 @@ class BoundarySystem:
             modes.append(motions @ free)
             means.append(holds.turned((free.T @ weights).T).T * keep)
             if k and free.shape[1] < 3:
-                held = np.linalg.svd(free.T)[2][free.shape[1] :].T
-                _, middle, size = middle_of(g.take(np.flatnonzero(loop_of == k)))
+                blocked = np.linalg.svd(free.T)[2][free.shape[1] :].T
+                _, middle, size = outline_centroid(g.take(np.flatnonzero(loop_of == k)))
                 hole = mesh.edges[mesh.edge_loop == k, 0]
-                anchors.add(motions @ held / self.extent, held, middle, size, hole)
+                anchors.add(motions @ blocked / self.extent, blocked, middle, size, hole)
         self.rigid, self.weights = np.hstack(modes), np.concatenate(means)
         self.anchors = anchors if anchors.number else None
 
@@ -175,7 +175,7 @@ class FreeMotions:
         return np.array([x, y]), turn * self.radius + arm[0] * y - arm[1] * x
 
 
-def middle_of(g: ElementSet) -> tuple[float, np.ndarray, float]:
+def outline_centroid(g: ElementSet) -> tuple[float, np.ndarray, float]:
     """Length of ``g``, mean (2,) of its points and their root mean square distance from it."""
     x, ds = g.nodes, g.quadrature
     perimeter = ds.sum()
@@ -196,7 +196,7 @@ def rigid_motions(
     loop_of = edge_loop[g.source] if g.n else np.empty(0, int)
     for k in range(n_loops):
         here = np.flatnonzero(loop_of == k)
-        perimeter, middle, radius = middle_of(g.take(here))
+        perimeter, middle, radius = outline_centroid(g.take(here))
         if about is not None:
             middle, radius = about
         rel, ds = g.nodes[here] - middle, g.quadrature[here]

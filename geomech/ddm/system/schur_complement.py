@@ -22,7 +22,7 @@ from .updated_factor import BaseOf, ContactBase, UpdatedFactor
 _SAFE = 1e-11
 #: From so many unknowns on contact goes by factors that outlast its states: where less than this part of the unknowns is
 #: held those of S, else those of other states (`updated_factor`).
-WORTHWHILE, MOST_HELD = 400, 0.05
+WORTHWHILE, MOST_PRESCRIBED = 400, 0.05
 #: Factors for so many sets of free unknowns are kept.
 _KEPT = 8
 #: Factors of so many states are there for others to go by: those of faces that slip, and of faces that stick where the load
@@ -50,7 +50,7 @@ class CrackSystem:
         self._factors: dict[bytes, tuple[np.ndarray, Factor]] = {}
         self._column_at = np.full(self.n, -1)
         self._columns = np.empty((self.n, 0))
-        self._held_now: tuple[bytes, np.ndarray, Factor] | None = None
+        self._prescribed_factor: tuple[bytes, np.ndarray, Factor] | None = None
 
     def opened(self, right: np.ndarray) -> np.ndarray:
         """S⁻¹ ``right``; zeros where it is not to be used (no `open_factor`)."""
@@ -72,7 +72,7 @@ class CrackSystem:
         if self.open_factor is not None:
             w = self.opened(right) if opened is None else opened.copy()
             if len(at):
-                columns, factor = self._held_columns(at)
+                columns, factor = self._prescribed_columns(at)
                 reaction[at] = factor.solve(w[at] - fixed[at])
                 w -= columns @ reaction[at]
                 w[at] = fixed[at]
@@ -87,11 +87,11 @@ class CrackSystem:
 
     def changed(self, rows: Rows) -> tuple[np.ndarray, Factor | BorderedFactor | HeldFactor | UpdatedFactor]:
         """The unknowns that are not held (indices) and factors of their equations."""
-        free, moving = np.flatnonzero(~rows.held), np.flatnonzero(rows.mixed)
+        free, moving = np.flatnonzero(~rows.prescribed), np.flatnonzero(rows.mixed)
         if len(free) == self.n and not len(moving) and not rows.spring.any() and self.open_factor is not None:
             return free, self.open_factor
         lasting = self.n >= WORTHWHILE and not rows.spring.any()
-        if lasting and self.n - len(free) < MOST_HELD * self.n and self.open_factor is not None:
+        if lasting and self.n - len(free) < MOST_PRESCRIBED * self.n and self.open_factor is not None:
             return free, HeldFactor(rows, self.open_factor, self, SINGULAR)
         updated = self._updated(rows) if lasting else None
         if updated is not None:
@@ -175,11 +175,11 @@ class CrackSystem:
             self._columns = np.hstack([self._columns, self.opened(right)])
         return self._columns[:, self._column_at[unknowns]]
 
-    def _held_columns(self, at: np.ndarray) -> tuple[np.ndarray, Factor]:
+    def _prescribed_columns(self, at: np.ndarray) -> tuple[np.ndarray, Factor]:
         """Columns ``at`` of S⁻¹ and the factors of their rows ``at``; mostly the same faces stay closed for long."""
         key = at.tobytes()
-        if self._held_now is None or self._held_now[0] != key:
+        if self._prescribed_factor is None or self._prescribed_factor[0] != key:
             columns = self.inverse_columns(at)
             factor = Factor(columns[at], "closed faces leave a part of the body without hold")
-            self._held_now = key, columns, factor
-        return self._held_now[1:]
+            self._prescribed_factor = key, columns, factor
+        return self._prescribed_factor[1:]

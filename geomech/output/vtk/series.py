@@ -9,7 +9,7 @@ from typing import Any
 
 from geomech.model import CHANGES, Cycle, Problem, Skip
 
-from ..background_jobs import Beside
+from ..background_jobs import BackgroundJobs
 from ..checkpoints.checkpoint_file import FilesChanged
 from ..fields import SERIES
 from ..tables.skipped_work import told
@@ -66,7 +66,7 @@ class Series:
         self._old = self._unlisted()
 
     def memory(self) -> dict[str, Any]:
-        self._beside.wait()
+        self._background.wait()
         listed = {name: list(collection.entries) for name, collection in self._collections.items()}
         return {"listed": listed, **{name: getattr(self, name) for name in _REMEMBERED}}
 
@@ -93,7 +93,7 @@ class Series:
             (folder / f"{name}.pvd").unlink(missing_ok=True)
         self._collections = {name: Collection(folder / f"{name}.pvd", listed.get(name, ())) for name in names}
         self._files = {name: GridFiles(name) for name in names}
-        self._beside, self._large = Beside(), set[str]()
+        self._background, self._large = BackgroundJobs(), set[str]()
 
     def _unlisted(self) -> set[str]:
         """The files of series in ``vtk`` that no collection lists."""
@@ -126,7 +126,7 @@ class Series:
                 self._write(cycle, at)
             self._write_last_interior()
         try:
-            self._beside.close()
+            self._background.close()
         finally:
             for collection in self._collections.values():
                 collection.close()
@@ -174,7 +174,7 @@ class Series:
             self._write_interior(cycle, at)
 
     def _write_interior(self, cycle: Cycle, at: float) -> None:
-        self._beside.do(self._interior, cycle, at)
+        self._background.do(self._interior, cycle, at)
         self._last_interior, self._segments_then = cycle.number, cycle.cracks.n_segments
 
     def _interior(self, cycle: Cycle, at: float) -> None:
@@ -188,7 +188,7 @@ class Series:
         been large stays beside, so that its files are listed in their order."""
         if name in self._large or _size(grid) > LARGE:
             self._large.add(name)
-            self._beside.do(self._put, name, cycle, at, grid)
+            self._background.do(self._put, name, cycle, at, grid)
         else:
             self._put(name, cycle, at, grid)
 
