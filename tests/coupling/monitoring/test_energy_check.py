@@ -114,7 +114,7 @@ def test_what_unstable_growth_sets_free_is_booked_and_told_once(caplog):
     lines = [record.getMessage() for record in caplog.records]
     assert not any("without work" in line for line in lines)
     (line,) = [line for line in lines if "grow at one load" in line]
-    assert last.statistics["growth_release"] >= float(re.search(r"set free (\S+) J/m", line)[1]) * 0.99 > 1.0
+    assert last.statistics["growth_release"] >= float(re.search(r"released (\S+) J/m", line)[1]) * 0.99 > 1.0
     assert abs(last.statistics["budget_residual"]) < 1e-6
 
 
