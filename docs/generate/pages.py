@@ -33,3 +33,6 @@ def write_all(folder: Path) -> None:
         path = folder / name
         if not path.is_file() or path.read_text(encoding="utf-8") != text:
             path.write_text(text, encoding="utf-8")
+    for file, chapter in verification.pictures():
+        if not (folder / file).is_file() or (folder / file).stat().st_mtime < verification.MEASURED.stat().st_mtime:
+            verification.draw(chapter, folder / file)
