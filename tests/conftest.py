@@ -16,6 +16,7 @@ FIGURES = ROOT / "docs" / "verification" / "figures.json"
 #: then the pages are out of date. Errors below `ROUND_OFF` differ among machines.
 WORSE, STALE, ROUND_OFF = 3.0, 10.0, 1e-9
 RECORDED = pytest.StashKey[dict]()
+FAILED = pytest.StashKey[bool]()
 
 
 def pytest_addoption(parser) -> None:
@@ -41,6 +42,14 @@ def pytest_sessionfinish(session) -> None:
         file.seek(0)
         file.truncate()
         file.write(json.dumps(dict(sorted(stored.items())), indent=1, ensure_ascii=False) + "\n")
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_makereport(item, call):
+    report = yield
+    if report.when == "call":
+        item.stash[FAILED] = report.failed
+    return report
 
 
 def _rounded(value: float, digits: int) -> float:
@@ -85,6 +94,8 @@ def verified(request) -> Iterator[Callable[..., None]]:
         mine[case] = row
 
     yield verify
+    if request.node.stash.get(FAILED, True):
+        return
     assert mine, "a test that takes `verified` states at least one figure"
     if record:
         slow = request.node.get_closest_marker("slow") is not None
