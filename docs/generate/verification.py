@@ -9,6 +9,7 @@ from __future__ import annotations
 import ast
 import json
 import math
+import re
 from collections.abc import Iterable, Iterator, Mapping
 from itertools import pairwise
 from pathlib import Path
@@ -51,13 +52,12 @@ of work by which `--against` compares machines, took {unit:.0f} ms. What the row
 fast](../verification/speed.md).
 """
 
-#: Page → its title, and the start of the paths of the tests whose figures it shows.
+#: Page → its title, and what the paths of the tests match whose figures it shows; a file is on the first that it matches.
 CHAPTERS = {
-    "blocks": ("Blocks, as measured", ("tests/validation/test_dda_", "tests/validation/test_safety_", "tests/dda/",
-                                       "tests/validation/test_joint_laws")),
-    "cracks": ("Cracks, as measured", ("tests/validation/",)),
-    "coupled": ("Blocks and cracks together, as measured", ("tests/pipelines/",)),
-}  # fmt: skip
+    "blocks": ("Blocks, as measured", r"tests/(dda/|validation/test_(dda|safety|joint_laws))"),
+    "cracks": ("Cracks, as measured", r"tests/(ddm|validation)/"),
+    "coupled": ("Blocks and cracks together, as measured", r"tests/(pipelines|coupling)/"),
+}
 
 CHAPTER = """# {title}
 
@@ -121,7 +121,7 @@ def measured(name: str) -> dict[str, dict[str, dict]]:
     """Path of a file of tests → test → ``slow`` and ``cases``, of the chapter ``name``; a file belongs to the first
     chapter that names it."""
     stored = json.loads(MEASURED.read_text(encoding="utf-8"))
-    of = {path: next((c for c, (_, starts) in CHAPTERS.items() if path.startswith(starts)), "") for path in stored}
+    of = {path: next((c for c, (_, pattern) in CHAPTERS.items() if re.match(pattern, path)), "") for path in stored}
     return {path: tests for path, tests in stored.items() if of[path] == name}
 
 

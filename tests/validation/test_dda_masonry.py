@@ -178,7 +178,7 @@ def test_thrust_of_voussoirs_converges_with_their_bricks():
 
 
 @pytest.mark.slow
-def test_a_voussoir_beam_snaps_through_where_its_arch_is_too_flat(verified):
+def test_a_voussoir_beam_snaps_through_where_its_arch_is_too_flat():
     span = 10.0
     system = voussoir_beam(span, 20, 4, 1e9)
     stands, falls, last = 4.0, 16.0, None
@@ -188,13 +188,6 @@ def test_a_voussoir_beam_snaps_through_where_its_arch_is_too_flat(verified):
         stands, falls, last = (trial, falls, found) if found else (stands, trial, last)
     arm = 1 - 2 / 3 * masonry.voussoir_contact(span, 1.0)
     print(f"snaps through at {stands:.3f} of its weight, having sagged {last[1] / arm:.3f} of its arm; 0.423 in theory")
-    verified(
-        "voussoir beam: sag at which it snaps through, of its arm",
-        None,
-        "Sofianos 1996",
-        found=last[1] / arm,
-        exact=masonry.SNAP_THROUGH_SAG,
-    )
     # The arm that he counts from shrinks with n, which grows with the load; the last 1 % of it brings a tenth of the
     # sag.
     assert last[1] / arm == pytest.approx(masonry.SNAP_THROUGH_SAG, rel=0.25)
