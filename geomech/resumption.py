@@ -196,8 +196,8 @@ def _begin_again(wish: _Wish) -> dict[str, Any]:
     end = _told_end(folder)
     if end is not None:
         raise Finished(
-            f"the run has ended ({end}), and it has no checkpoint (output.checkpoint_every, output.checkpoint_kept_mb): run the "
-            "scene anew to let it go on"
+            f"the run has ended ({end}), and it has no checkpoint: run the scene anew to let it go on, with a larger "
+            "output.checkpoint_kept_mb where it is its checkpoint's size that was too large"
         )
     if not (folder / "scene.toml").is_file():
         raise NotResumable(f"{folder} holds neither a checkpoint nor a scene.toml: run the scene anew")
