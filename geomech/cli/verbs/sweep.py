@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from ..messages import say, tell_compiling
+from ..messages import report_compiling, say
 from ..scenes import trust_argument
 from ..verb import DONE, FAILED, BadInput, Verbs, add_verb, check_folder
 from .run import prepare_for_a_run
@@ -100,7 +100,7 @@ def _sweep(options: argparse.Namespace) -> int:
         raise BadInput("--workers takes a number of processes, at least 1")
     prepare_for_a_run()
     if not options.quiet:
-        tell_compiling()
+        report_compiling()
     from ...sweep.cluster import EngineRefused
     from ...sweep.execution import CannotResume, Telling, carry_out_sweep, default_folder, engine_for, read_sweep
     from ...sweep.plan import plan_of

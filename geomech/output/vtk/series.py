@@ -11,7 +11,7 @@ from typing import Any
 
 from geomech.model import CHANGES, Cycle, Problem, Skip
 
-from ..background_jobs import Beside
+from ..background_jobs import BackgroundJobs
 from ..checkpoints.checkpoint_file import FilesChanged
 from ..tables.skipped_work import told
 from . import grids
@@ -78,7 +78,7 @@ class Series:
         self._open(problem, Path(folder), {})
 
     def memory(self) -> dict[str, Any]:
-        self._beside.wait()
+        self._background.wait()
         return {"listed": self._store.listed(), **{name: getattr(self, name) for name in _REMEMBERED}}
 
     def on_resume(self, problem: Problem, folder: Path, memory: dict[str, Any]) -> None:
@@ -102,7 +102,7 @@ class Series:
         names += ["bolts"] * bool(problem.loads.bolts) + ["water"] * (self._water is not None)
         self._names = names
         self._store = FORMATS[self.format](folder, names, listed, resumed=resumed)
-        self._beside, self._large = Beside(), set[str]()
+        self._background, self._large = BackgroundJobs(), set[str]()
 
     def on_cycle(self, cycle: Cycle) -> None:
         began = time.perf_counter()
@@ -131,7 +131,7 @@ class Series:
                 self._write(cycle, at)
             self._write_last_interior()
         try:
-            self._beside.close()
+            self._background.close()
         finally:
             self._store.close()
         self.seconds += time.perf_counter() - began
@@ -182,9 +182,9 @@ class Series:
         if self._first is not None and self._last_interior < 0 and self._first[0] is not cycle:
             # From the start on, so that all series of the run have one span of time.
             self._meshes.note_cracked(cycle)
-            self._beside.do(self._interior, *self._first)
+            self._background.do(self._interior, *self._first)
         self._first = None
-        self._beside.do(self._interior, cycle, at)
+        self._background.do(self._interior, cycle, at)
         self._last_interior, self._segments_then = cycle.number, cycle.cracks.n_segments
 
     def _interior(self, cycle: Cycle, at: float) -> None:
@@ -199,7 +199,7 @@ class Series:
         been large stays beside, so that its files are listed in their order."""
         if name in self._large or _size(grid) > LARGE:
             self._large.add(name)
-            self._beside.do(self._put, name, cycle, at, grid)
+            self._background.do(self._put, name, cycle, at, grid)
         else:
             self._put(name, cycle, at, grid)
 
