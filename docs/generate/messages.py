@@ -50,11 +50,12 @@ def messages(calls: tuple[str, ...], places: tuple[str, ...]) -> Iterator[tuple[
             for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
                 if not (isinstance(node, ast.Call) and _name(node.func) in calls):
                     continue
-                # `refuse(path, message, way out)`, `Fault(place, message, way out)`, but `log.warning(message, …)`.
-                first = 0 if _name(node.func) == "warning" else 1
-                message, way_out, *_ = [*map(_text, node.args[first:]), None, None]
+                # `refuse(path, message, way out)` or without a path; `log.warning(message, …)`.
+                texts = [*map(_text, node.args), None, None, None]
+                first = 0 if _name(node.func) == "warning" or " " in (texts[0] or "") else 1
+                message, way_out = texts[first : first + 2]
                 if message and re.search(r"\w \w", message):
-                    yield message, (way_out or "") if first else ""
+                    yield message, (way_out or "") if _name(node.func) != "warning" else ""
 
 
 def _name(function: ast.expr) -> str:

@@ -133,7 +133,13 @@ def chapter(name: str) -> str:
         lines += [f"![Errors of the convergence studies on this page](measured_{name}.png)", ""]
     for path, tests in measured(name).items():
         docstring = ast.get_docstring(ast.parse((ROOT / path).read_text(encoding="utf-8"))) or path
-        heading = " ".join(docstring.split("\n\n")[0].split()).partition(";")[0].rstrip(".")
+        heading = (
+            " ".join(docstring.split("\n\n")[0].split())
+            .partition(";")[0]
+            .partition(":")[0]
+            .partition(" against ")[0]
+            .rstrip(".")
+        )
         slow = ' -m "slow or not slow"' if any(test["slow"] for test in tests.values()) else ""
         lines += [f"## {heading}", "", f"`pytest -s{slow} {path}`", ""]
         rows = merged(tests)
