@@ -8,6 +8,7 @@ from __future__ import annotations
 import ast
 import re
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
@@ -47,8 +48,8 @@ def messages(calls: tuple[str, ...], places: tuple[str, ...]) -> Iterator[tuple[
     for place in places:
         root = PACKAGE / place
         for path in sorted(root.rglob("*.py")) if root.is_dir() else [root]:
-            for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
-                if not (isinstance(node, ast.Call) and _name(node.func) in calls):
+            for node in _calls(path):
+                if _name(node.func) not in calls:
                     continue
                 # `refuse(path, message, way out)` or without a path; `log.warning(message, …)`.
                 texts = [*map(_text, node.args), None, None, None]
@@ -56,6 +57,12 @@ def messages(calls: tuple[str, ...], places: tuple[str, ...]) -> Iterator[tuple[
                 message, way_out = texts[first : first + 2]
                 if message and re.search(r"\w \w", message):
                     yield message, (way_out or "") if _name(node.func) != "warning" else ""
+
+
+@cache
+def _calls(path: Path) -> list[ast.Call]:
+    tree = ast.parse(path.read_text(encoding="utf-8"))
+    return [node for node in ast.walk(tree) if isinstance(node, ast.Call)]
 
 
 def _name(function: ast.expr) -> str:
