@@ -9,20 +9,20 @@ from contextlib import suppress
 from types import FrameType
 from typing import Any, Self
 
-_TOLD = "stopping when this cycle is done; once more to stop at once"
+_MESSAGE = "stopping when this cycle is done; once more to stop at once"
 
 
 class Interruption:
     """While this context lasts, a first interrupt only sets ``asked``; the next raises KeyboardInterrupt, as all do
-    outside. ``told`` is what a first one is answered with.
+    outside. ``message`` is what a first one is answered with.
 
     SIGTERM and SIGHUP are taken the same way where they raise KeyboardInterrupt already, as on the command line. What is
     ignored stays ignored: a shell script starts its background jobs so, in order that a Ctrl-C meant for another
     program leaves them alone. In other threads than the main one, where signals do not arrive, nothing changes.
     """
 
-    def __init__(self, told: str = _TOLD) -> None:
-        self.asked, self.told = False, told
+    def __init__(self, message: str = _MESSAGE) -> None:
+        self.asked, self.message = False, message
         self._before: dict[int, Any] = {}
 
     def __enter__(self) -> Self:
@@ -42,4 +42,4 @@ class Interruption:
             raise KeyboardInterrupt
         self.asked = True
         with suppress(OSError):  # of a terminal that is gone
-            os.write(2, f"\n{self.told}\n".encode())
+            os.write(2, f"\n{self.message}\n".encode())

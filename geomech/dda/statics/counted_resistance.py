@@ -20,7 +20,7 @@ from .sharp_toes import FREE, Toe
 from .stability_trial import Trial
 
 #: So many toes are told of.
-_TOLD = 8
+_LISTED = 8
 #: Toes bar the way of blocks that come nearer to what they touch by this part of the fastest block's way, and hold
 #: what is more than this part of their block's weight.
 _BARRED, _BEARS = 1e-3, 1e-3
@@ -80,7 +80,7 @@ def _of_toes(blocks: Blocks, toes: tuple[Toe, ...], other: FactorOfSafety | None
         return f"{of.factor:.4f}" if math.isfinite(of.upper) else f"above {of.lower:g}"
 
     lines = []
-    for toe in toes[:_TOLD]:
+    for toe in toes[:_LISTED]:
         a, b = (blocks.names[k] if blocks.names else f"block {k}" for k in (toe.block, toe.other))
         where = f"the toe of {a!r} touches {b!r} at x = {_metres(toe.at[0])}, y = {_metres(toe.at[1])} m"
         if hold:

@@ -142,7 +142,7 @@ def test_small_blocks_spare_the_drawn_fault_and_are_told(tmp_path):
     assert coarse.problem().blocks.n_blocks < whole.problem().blocks.n_blocks
     assert coarse.problem().blocks.areas()[free].min() >= 3
     assert length(coarse, "joint:fault") == pytest.approx(length(whole, "joint:fault"), rel=1e-12) == pytest.approx(20)
-    said = coarse.drawing.jointed.told("listed elsewhere")
+    said = coarse.drawing.jointed.repair_lines("listed elsewhere")
     number = len([mend for mend in coarse.drawing.jointed.cutting.mends if mend.kind == "sliver"])
     assert any(text.startswith(f"{number} × sliver, up to ") and " m², at (" in text for text in said)
 
@@ -161,12 +161,12 @@ def test_poles_spread_by_fishers_law_turn_the_traces_of_any_set(tmp_path):
 
 
 @pytest.mark.parametrize(("spacing", "told"), [(1e-3, True), (1e-5, True), (0.2, False)])
-def test_sets_that_are_far_too_fine_are_refused_before_they_are_drawn(tmp_path, spacing, told):
+def test_sets_that_are_far_too_fine_are_refused_before_they_are_drawn(tmp_path, spacing, repair_lines):
     """Spacings in the wrong unit: 10⁴ and 10⁶ lines that cross those of the other set; the finest set is named."""
     path = tmp_path / "scene.toml"
     path.write_text(SCENE)
     fine = [f"geometry.joint_sets[0].spacing_m={spacing}"]
-    if not told:
+    if not repair_lines:
         load_scene(path, fine)
         return
     with pytest.raises(SceneError, match=r"about \de\+\d\d joints") as refused:
