@@ -161,12 +161,12 @@ def test_poles_spread_by_fishers_law_turn_the_traces_of_any_set(tmp_path):
 
 
 @pytest.mark.parametrize(("spacing", "told"), [(1e-3, True), (1e-5, True), (0.2, False)])
-def test_sets_that_are_far_too_fine_are_refused_before_they_are_drawn(tmp_path, spacing, repair_lines):
+def test_sets_that_are_far_too_fine_are_refused_before_they_are_drawn(tmp_path, spacing, told):
     """Spacings in the wrong unit: 10⁴ and 10⁶ lines that cross those of the other set; the finest set is named."""
     path = tmp_path / "scene.toml"
     path.write_text(SCENE)
     fine = [f"geometry.joint_sets[0].spacing_m={spacing}"]
-    if not repair_lines:
+    if not told:
         load_scene(path, fine)
         return
     with pytest.raises(SceneError, match=r"about \de\+\d\d joints") as refused:
