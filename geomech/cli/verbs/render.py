@@ -21,7 +21,7 @@ def declare(verbs: Verbs) -> None:
         "geomech render outputs/two_cracks/phi_30 --component yy --no-gif\n"
         "geomech render outputs/my_slope --field slip --time 0.3 --scale 1",
     )  # fmt: skip
-    render.description += (
+    render.description = str(render.description) + (
         " What is not said here, the scene's [render] table says. With --field, --cycle, --time, --range, --scale or "
         "--mp4 it draws one field; several runs get the same colours."
     )
