@@ -49,6 +49,30 @@ CONTACT = np.dtype(
     ]
 )
 
+#: One row per integration point of the faces of blocks of higher order (and per lone corner): its face by the vertices and
+#: edges of both ends (−1: a lone corner), its ``place`` between them, and what it remembers, as in CONTACT rows.
+FACE_POINT = np.dtype(
+    [
+        ("vertex", np.int64),
+        ("edge", np.int64),
+        ("far_vertex", np.int64),
+        ("far_edge", np.int64),
+        ("block", np.int64),
+        ("other", np.int64),
+        ("place", np.float64),  # along the face, 0 at the first end and 1 at the far one
+        ("point", np.float64, 2),  # current coordinates, m
+        ("length", np.float64),  # m of the face that it stands for
+        ("state", np.int64),
+        ("bonded", np.int64),
+        ("normal_force", np.float64),  # N/m
+        ("shear_force", np.float64),  # N/m
+        ("gap", np.float64),  # m
+        ("slip", np.float64),  # m
+        ("wear", np.float64),  # m
+        ("lift", np.float64),  # m
+    ]
+)
+
 #: One row per crack tip.
 TIP = np.dtype(
     [
@@ -82,6 +106,9 @@ class State:
     bolts         BOLT rows         one per bolt of the loads; empty before the first step
     imposed       (k,)              prescribed displacement of base, blocks and points; empty before step 1
     removed       (n_blocks,)       True: excavated; None: no block is
+    deflection    (k, 2)            m and m/s, of blocks of higher order (`Blocks.order`): the unknowns of deflection and
+                                    their rates, block by block; None: no block has any. ``vertices`` are without it
+    face_points   FACE_POINT rows   what points of the faces of such blocks remember
     """
 
     time: float
@@ -95,6 +122,8 @@ class State:
     bolts: np.ndarray = field(default_factory=lambda: np.empty(0, BOLT))
     imposed: np.ndarray = field(default_factory=lambda: np.empty(0))
     removed: np.ndarray | None = None
+    deflection: np.ndarray | None = None
+    face_points: np.ndarray | None = None
 
     @classmethod
     def at_rest(cls, blocks: Blocks) -> State:

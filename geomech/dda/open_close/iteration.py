@@ -193,7 +193,7 @@ class _Search:
     def _by_patch(self, answer: Answer, wrong: np.ndarray, number: int) -> bool:
         """Whether the wrong contacts, few, were settled on the blocks about them alone, from the best states so far."""
         solver, effort = self.solver, self.effort
-        if effort.within_patch or self.equations.pattern.solver is None or self.patched >= solver.patch_tries:
+        if not self.equations.first_order or effort.within_patch or self.equations.pattern.solver is None or self.patched >= solver.patch_tries:
             return False
         if (self.falls and not self.proposed) or self.fewest > solver.patch_wrong * len(self.found):
             return False
@@ -213,6 +213,8 @@ class _Search:
     def _by_path(self, answer: Answer) -> None:
         """States that the central path proposes. Raises `Unsettled` where it has none."""
         equations, bonded = self.equations, self._bonds_on_path()
+        if not equations.first_order:
+            raise self._unsettled(answer)
         if self.path is None or not np.array_equal(self.path.bonded, bonded):
             self.path = CentralPath(
                 equations.pattern, equations.matrix, equations.right, self.found, equations.vectors, answer.springs,
