@@ -18,6 +18,7 @@ import numpy as np
 from ...model import OPEN
 from ..kinematics.midpoint_configuration import Middle
 from ..open_close.contact_set import ContactSet
+from ..open_close.equations import Unsettled
 from ..results import StepResult
 from ..statics.out_of_balance import imbalance
 from ..time_step import Attempt
@@ -105,6 +106,15 @@ class BendingAttempt(Attempt):
             pieces.append(matrix.ravel())
             self.own_at[b], at = at, at + width * width
         self.own = np.concatenate(pieces) if pieces else np.zeros(0)
+
+    def _settled(self, pattern, matrix, right, found, gap, vectors, springs, curved):
+        try:
+            return super()._settled(pattern, matrix, right, found, gap, vectors, springs, curved)
+        except Unsettled as failure:
+            # Others know contacts by their corners.
+            if failure.contact < 0:
+                raise
+            raise Unsettled(str(failure), found.points.corner_of(failure.contact)) from failure
 
     def _equations(self, pattern, matrix, right, contacts, vectors, springs, gap, slack, curved):
         blocks = self.blocks

@@ -106,6 +106,11 @@ class Faces:
         at = self.ends[self.face[self.inside]]
         return value[at[:, 0]], value[at[:, 1]]
 
+    def corner_of(self, contact: int) -> int:
+        """The row of a corner of the face of a ``contact``."""
+        face = int(self.face[contact])
+        return int(self.lone[contact]) if face < 0 else int(self.ends[face, 0])
+
     def between(self, value: np.ndarray) -> np.ndarray:
         """(n,) of all contacts, linear between the corners' ``value`` (n_corners,)."""
         at_first, at_second = self._both(value)

@@ -102,7 +102,7 @@ class _Search:
         self.path: CentralPath | None = None
         self.seen: set[bytes] = set()
         self.offered: set[bytes] = set()
-        self.patched = 0
+        self.patched = self.pivots = 0
         # What closes sticking, is pulled open by its own shear and closes again can only slide: neither fits.
         self.closed, self.sheared = np.zeros(n, np.int64), np.zeros(n)
         self._begin_anew()
@@ -139,7 +139,9 @@ class _Search:
             self._count(number, answer, wrong)
             if self._by_patch(answer, wrong, number):
                 continue
-            if returned or self.tries > self._most_tries(number):
+            if not self.equations.first_order and (returned or self.tries > self.solver.newton_tries):
+                self._one_by_one(answer, wrong, called)
+            elif returned or self.tries > self._most_tries(number):
                 self._by_path(answer)
             else:
                 self.states = self.states.switched(wrong, called)
@@ -210,11 +212,20 @@ class _Search:
         self._begin_anew()
         return True
 
+    def _one_by_one(self, answer: Answer, wrong: np.ndarray, called: States) -> None:
+        """Switch the worst of the ``wrong`` contacts alone: block principal pivoting, which goes on with all of them as soon
+        as fewer are wrong than ever before (Júdice & Pires 1994). Raises `Unsettled`."""
+        self.pivots += 1
+        if self.pivots > self.effort.max_iterations:
+            raise self._unsettled(answer)
+        self.most = max(self.most, self.newton + self.effort.max_iterations)
+        # Where the worst leads back, the first does not (Murty 1974).
+        index = int(np.argmax(wrong)) if self.pivots % 2 == 0 else int(np.where(wrong, answer.violation, -1.0).argmax())
+        self.states = self.states.switched(np.arange(len(wrong)) == index, called)
+
     def _by_path(self, answer: Answer) -> None:
         """States that the central path proposes. Raises `Unsettled` where it has none."""
         equations, bonded = self.equations, self._bonds_on_path()
-        if not equations.first_order:
-            raise self._unsettled(answer)
         if self.path is None or not np.array_equal(self.path.bonded, bonded):
             self.path = CentralPath(
                 equations.pattern, equations.matrix, equations.right, self.found, equations.vectors, answer.springs,
