@@ -241,6 +241,8 @@ class Cycle:
                 compression
     strain      axial strain between the gauge points, positive in shortening; nan without a gauge
     tips        TIP rows of all blocks
+    bent        block → body of a block of higher order, with ``fields(points)`` as ``bodies`` have, and
+                ``deflection(points)`` (n, 2): by how much points lie off where the block's vertices say
     faces       the crack faces, or None when no block holds a crack
     bodies      block index → solved elastic body with ``fields(points)``: stress (n, 3) and displacement (n, 2)
                 in reference coordinates, for interior fields; ``residual``, ``condition``, ``tips`` and ``tip_errors``
@@ -263,6 +265,7 @@ class Cycle:
     tips: np.ndarray
     faces: CrackFaces | None = None
     bodies: dict[int, Any] = field(default_factory=dict)
+    bent: dict[int, Any] = field(default_factory=dict)
     events: tuple[Event, ...] = ()
     monitors: dict[str, np.ndarray] = field(default_factory=dict)
     statistics: dict[str, float] = field(default_factory=dict)
@@ -270,6 +273,25 @@ class Cycle:
     work: dict[str, int] = field(default_factory=dict)
     skips: dict[str, Skip] = field(default_factory=dict)
     shortened: tuple[Shortened, ...] = ()
+
+    @property
+    def inside(self) -> dict[int, Any]:
+        """block → what knows of stress and displacement inside it: cracked blocks, and those of higher order."""
+        return {**self.bent, **self.bodies} if self.bent else self.bodies
+
+    @cached_property
+    def moved(self) -> np.ndarray:
+        """(n_vertices, 2) m: displacement of the vertices of all blocks, their deflection included."""
+        out = self.state.vertices - self.blocks.vertices
+        for block, body in self.bent.items():
+            some = slice(self.blocks.vertex_start[block], self.blocks.vertex_start[block + 1])
+            out[some] += body.deflection(self.blocks.vertices[some])
+        return out
+
+    @property
+    def placed(self) -> np.ndarray:
+        """(n_vertices, 2) m: current coordinates of the vertices of all blocks, their deflection included."""
+        return self.blocks.vertices + self.moved if self.bent else self.state.vertices
 
     @cached_property
     def motion(self) -> Motion:

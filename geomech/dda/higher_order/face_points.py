@@ -117,6 +117,14 @@ class Faces:
         place = self.place[self.inside]
         return np.concatenate([value[self.lone], at_first + place * (at_second - at_first)])
 
+    def spread(self, force: np.ndarray) -> np.ndarray:
+        """(n,) forces of all contacts, of faces the linear stress whose resultant and moment the ``force`` (n_corners,) at
+        their ends has."""
+        first, second = self._both(force)
+        place = self.place[self.inside]
+        linear = (4.0 * first - 2.0 * second) * (1.0 - place) + (4.0 * second - 2.0 * first) * place
+        return np.concatenate([force[self.lone], self.share[self.inside] * linear])
+
     def at_corners(self, force: np.ndarray) -> np.ndarray:
         """(n_corners,) forces with the resultant and the moment of the ``force`` (n,) of all contacts."""
         out = np.zeros(len(self.corners))
@@ -212,8 +220,8 @@ class FaceContacts(ContactSet):
         return out._as_the_ends_say()._remembering(memory)
 
     def _as_the_ends_say(self) -> FaceContacts:
-        """Points that remember nothing: closed where both ends of their face are, bonded where both are, without
-        force."""
+        """Points that remember nothing: closed where both ends of their face are, bonded where both are, under the linear
+        stress with the forces of the ends."""
         faces, corners, inside = self.points, self.lumped, self.points.inside
         state, bonded = self.state.copy(), self.bonded.copy()
         first, second = faces._both(corners.state)
@@ -221,13 +229,11 @@ class FaceContacts(ContactSet):
         state[inside] = np.where(both, np.where((first == SLIP) & (second == SLIP), SLIP, STICK), OPEN)
         one, two = faces._both(corners.bonded)
         bonded[inside] = np.where((one > 0) & (two > 0), one, 0)
-        nothing = self.normal.copy()
-        nothing[inside] = 0.0
-        slip = np.where(self.points.face >= 0, 0.0, self.slip)
+        normal, shear = faces.spread(corners.normal), faces.spread(corners.shear)
         return replace(
-            self, state=state, bonded=bonded, normal=nothing, shear=np.where(faces.face >= 0, 0.0, self.shear),
-            slip=slip, wear=np.where(faces.face >= 0, 0.0, self.wear), stretch=np.zeros(len(slip)),
-            direction=np.where(faces.face >= 0, 0.0, self.direction),
+            self, state=state, bonded=bonded, normal=normal, shear=shear, slip=faces.between(corners.slip),
+            wear=faces.between(corners.wear), stretch=np.zeros(len(state)),
+            direction=np.where(state == SLIP, np.sign(shear), 0.0),
         )._tried_as_friction_has_it()  # fmt: skip
 
     def _remembering(self, memory: np.ndarray | None) -> FaceContacts:
