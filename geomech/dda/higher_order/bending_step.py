@@ -80,7 +80,7 @@ class BendingAttempt(Attempt):
         # Strains and deflection share inertia on the axes of the start, on which strains are unknowns.
         self.shared = self.density[:, None, None] * blocks.coupling(self.state.rotation) / size[:, None, None]
         self.bending_load = blocks.loads(self.points, self.edges, self.middle.vertices, self.angle)
-        stored, rates = blocks.padded(blocks.stiffness_times(self.deflection)), blocks.padded(self.rates)
+        stored, rates = blocks.stiffness_times(self.deflection), blocks.padded(self.rates)
         spin = self.density * self.carried[:, 2] ** 2
         own = self.bending_load - stored
         own += spin[:, None] * (blocks.basis.coupling[:, 0] + blocks.basis.coupling[:, 1])
@@ -89,22 +89,29 @@ class BendingAttempt(Attempt):
         own += by_rate * np.einsum("bej,be->bj", self.shared, size[:, None] * self.carried[:, 3:])
         self.coupled_right = by_rate * np.einsum("bej,bj->be", self.shared, rates)
         self.own_right = own
+        bending = (scheme.weight + drag / dt)[:, None, None] * blocks.stiffness
+        self._own_matrices(bending, inertia * self.shared, inertia * self.density * blocks.basis.area)
+
+    def _own_matrices(self, bending: np.ndarray, shared: np.ndarray, mass: np.ndarray) -> None:
+        """The blocks' own matrices, one after the other: ``bending`` (n_blocks, m, m) stiffness of deflection, what it
+        has in common with strains, ``shared`` (n_blocks, 3, m), and its ``mass`` (n_blocks,) on the diagonal."""
+        blocks, moving = self.blocks, self.system.moving
         self.own_at, pieces, at = np.full(len(self.order), -1), [], 0
-        for b in system.moving.tolist():
-            m, width = int(n_deflections(int(blocks.order[b]))), 6 * int(blocks.rows[b])
-            matrix = np.zeros((width, width))
-            matrix[:6, :6] = self.matrix[self.order[b]]
+        for order in np.unique(blocks.order[moving]).tolist():
+            some = moving[blocks.order[moving] == order]
+            m, width = int(n_deflections(order)), 6 * int(blocks.rows[some[0]])
+            own = np.zeros((len(some), width, width))
+            own[:, :6, :6] = self.matrix[self.order[some]]
             if m:
-                matrix[3:6, 6 : 6 + m] = inertia * self.shared[b, :, :m]
-                matrix[6 : 6 + m, 3:6] = matrix[3:6, 6 : 6 + m].T
-                bending = (scheme.weight + drag[b] / dt) * blocks.stiffness[b]
-                matrix[6 : 6 + m, 6 : 6 + m] = bending
-                some = np.arange(6, 6 + m)
-                matrix[some, some] += inertia * self.density[b] * blocks.basis.area[b]
-                spare = np.arange(6 + m, width)
-                matrix[spare, spare] = np.trace(bending) / m + inertia * self.density[b] * blocks.basis.area[b]
-            pieces.append(matrix.ravel())
-            self.own_at[b], at = at, at + width * width
+                own[:, 3:6, 6 : 6 + m] = shared[some, :, :m]
+                own[:, 6 : 6 + m, 3:6] = np.swapaxes(shared[some, :, :m], 1, 2)
+                own[:, 6 : 6 + m, 6 : 6 + m] = bending[some, :m, :m]
+                diagonal, spare = np.arange(6, 6 + m), np.arange(6 + m, width)
+                own[:, diagonal, diagonal] += mass[some, None]
+                own[:, spare, spare] = own[:, diagonal, diagonal].mean(axis=1, keepdims=True)
+            self.own_at[some] = at + np.arange(len(some)) * width * width
+            at += own.size
+            pieces.append(own.ravel())
         self.own = np.concatenate(pieces) if pieces else np.zeros(0)
 
     def _settled(self, pattern, matrix, right, found, gap, vectors, springs, curved):
@@ -117,32 +124,27 @@ class BendingAttempt(Attempt):
             raise Unsettled(str(failure), found.points.corner_of(failure.contact)) from failure
 
     def _equations(self, pattern, matrix, right, contacts, vectors, springs, gap, slack, curved):
-        blocks = self.blocks
+        blocks, moving, own = self.blocks, self.system.moving, self.own
         full = np.zeros((pattern.n, 6))
         full[: self.n_free] = right
-        own, own_right = self.own, np.zeros_like(full)
-        if matrix is not self.matrix or self.constrained:
+        full[self.order[moving], 3:6] += self.coupled_right[moving]
+        full.ravel()[self._deflection_at(pattern)] = self.own_right[blocks.owner, blocks.which]
+        if self._held() is not None:
+            # What is held has changed the six first rows and columns.
             own = own.copy()
-        for b in self.system.moving.tolist():
-            row, width = self.order[b], 6 * int(blocks.rows[b])
-            if self.constrained:
-                block = own[self.own_at[b] : self.own_at[b] + width * width].reshape(width, width)
-                block[:6, :6] = matrix[row]
-            full[row, 3:6] += self.coupled_right[b]
-            m = width - 6
-            own_right_b = np.zeros(m)
-            count = int(n_deflections(int(blocks.order[b])))
-            own_right_b[:count] = self.own_right[b, :count]
-            own_right[pattern.more[b] : pattern.more[b] + m // 6] = own_right_b.reshape(-1, 6)
+            for b in moving.tolist():
+                width = 6 * int(blocks.rows[b])
+                own[self.own_at[b] : self.own_at[b] + width * width].reshape(width, width)[:6, :6] = matrix[
+                    self.order[b]
+                ]
         return HigherOrderEquations(
-            pattern, matrix, full + own_right, contacts, vectors, springs, gap, slack, curved,
+            pattern, matrix, full, contacts, vectors, springs, gap, slack, curved,
             self.system.scheme.static, own=own, own_at=self.own_at, rows=self._rows(contacts, vectors),
         )  # fmt: skip
 
-    @property
-    def constrained(self) -> bool:
-        """Whether some unknowns of blocks are held, which changes their own matrices."""
-        return self._held() is not None
+    def _deflection_at(self, pattern) -> np.ndarray:
+        """(k,) where the unknowns of deflection stand among all."""
+        return 6 * pattern.more[self.blocks.owner] + self.blocks.which
 
     def _rows(self, found: ContactSet, vectors: np.ndarray) -> np.ndarray:
         """(n, 2, 2, w): way, side, the contacts' motion per unit of all unknowns of the side's block."""
@@ -197,11 +199,7 @@ class BendingAttempt(Attempt):
 
     def _deflected_by(self) -> np.ndarray:
         """(k,) m of deflection in the step, as it was solved last."""
-        blocks, change = self.blocks, np.zeros(self.blocks.n_unknowns)
-        for b in blocks.bending.tolist():
-            some, first = blocks.basis.of_block(b), self.pattern.more[b]
-            change[some] = self.unknowns[first : first + blocks.rows[b] - 1].ravel()[: some.stop - some.start]
-        return change
+        return self.unknowns.ravel()[self._deflection_at(self.pattern)]
 
     def _move(self) -> None:
         super()._move()
@@ -215,7 +213,7 @@ class BendingAttempt(Attempt):
             rows = self._rows(found, self.vectors)
             pattern = self.pattern
             self.slid = moved(
-                self.unknowns.ravel(), found.block, found.other, pattern.order, pattern.more, pattern.rows, rows
+                self.unknowns.ravel(), (found.block, found.other, pattern.order), (pattern.more, pattern.rows), rows
             )[:, 1]
 
     def path(self, after: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -266,12 +264,14 @@ class BendingAttempt(Attempt):
             np.einsum("b,be,bej,bj->", density, self.increment[:, 3:], coupling, blocks.padded(rate), optimize=True)
         )
         spun = density * self.carried[:, 2] ** 2
-        inertia -= float(np.einsum("b,bj,bj->", spun, blocks.basis.coupling[:, 0] + blocks.basis.coupling[:, 1], padded))
-        strained = float(change @ blocks.stiffness_times(self.deflection + scheme.weight * change))
+        inertia -= float(
+            np.einsum("b,bj,bj->", spun, blocks.basis.coupling[:, 0] + blocks.basis.coupling[:, 1], padded)
+        )
+        strained = float((padded * blocks.stiffness_times(self.deflection + scheme.weight * change)).sum())
         drag = scheme.stiffness_damping + 2.0 * scheme.block_damping * np.sqrt(
             self.density * self.moments[:, 0] / (12.0 * self.system.stiffness[:, 0, 0])
         )
-        bent = blocks.padded(blocks.stiffness_times(change))
+        bent = blocks.stiffness_times(change)
         damped = float((drag / dt) @ (bent * padded).sum(axis=1))
         damped += scheme.mass_damping / dt * self._mass_of(change, padded, coupling, density)
         lost = inertia - (after - kept) + strained - (u1 - u0)

@@ -54,11 +54,16 @@ class DeflectedBlocks:
         #: Width of a contact's row of one block.
         self.width = 6 * int(self.rows.max(initial=1))
         end = blocks.vertices[blocks.next_vertex]
-        self.stiffness = {
-            b: self.basis.stiffness(b, blocks.vertices[some], end[some], elastic[b])
-            for b in self.bending.tolist()
-            for some in [slice(blocks.vertex_start[b], blocks.vertex_start[b + 1])]
-        }
+        most = self.basis.coupling.shape[2]
+        #: (n_blocks, m, m) K, Pa, zeros beyond a block's own unknowns.
+        self.stiffness = np.zeros((blocks.n_blocks, most, most))
+        for b in self.bending.tolist():
+            some = slice(blocks.vertex_start[b], blocks.vertex_start[b + 1])
+            own = self.basis.stiffness(b, blocks.vertices[some], end[some], elastic[b])
+            self.stiffness[b, : len(own), : len(own)] = own
+        #: (k,) of each unknown its block, and which it is of this one's.
+        self.owner = np.repeat(np.arange(blocks.n_blocks), np.diff(self.basis.start))
+        self.which = np.arange(self.n_unknowns) - self.basis.start[self.owner]
 
     @property
     def n_unknowns(self) -> int:
@@ -71,9 +76,7 @@ class DeflectedBlocks:
     def padded(self, values: np.ndarray) -> np.ndarray:
         """(n_blocks, m) of the unknowns of all blocks ``values`` (k,), zeros beyond a block's own."""
         out = np.zeros((len(self.order), self.basis.coupling.shape[2]))
-        for b in self.bending.tolist():
-            some = self.basis.of_block(b)
-            out[b, : some.stop - some.start] = values[some]
+        out[self.owner, self.which] = values
         return out
 
     def material_points(self, vertices: np.ndarray, points: np.ndarray, owner: np.ndarray) -> np.ndarray:
@@ -170,18 +173,11 @@ class DeflectedBlocks:
 
     def elastic_energy(self, q: np.ndarray) -> float:
         """J/m of deflections ``q`` (k,)."""
-        return 0.5 * sum(
-            float(q[self.basis.of_block(b)] @ self.stiffness[b] @ q[self.basis.of_block(b)])
-            for b in self.bending.tolist()
-        )
+        return 0.5 * float((self.padded(q) * self.stiffness_times(q)).sum())
 
     def stiffness_times(self, q: np.ndarray) -> np.ndarray:
-        """(k,) N: K q."""
-        out = np.zeros_like(q)
-        for b in self.bending.tolist():
-            some = self.basis.of_block(b)
-            out[some] = self.stiffness[b] @ q[some]
-        return out
+        """(n_blocks, m) N: K q of deflections ``q`` (k,)."""
+        return np.einsum("bij,bj->bi", self.stiffness, self.padded(q))
 
     def coupling(self, angle: np.ndarray) -> np.ndarray:
         """(n_blocks, 3, m) Qᵀ G of blocks turned by ``angle`` (n_blocks,), m³."""

@@ -33,13 +33,13 @@ class HigherOrderEquations(Equations):
         assert isinstance(pattern, SixRowPattern)
         self._side[:] = self.right.ravel()
         blocks = found.block, found.other, pattern.order
-        stiff, along, slope, symmetric = springs_in_states(
-            self._side, *blocks, pattern.more, pattern.rows, self.rows, state, direction, gap, springs.normal,
-            springs.shear, springs.friction, springs.sliding, springs.lift, found.shear,
+        *laws, symmetric = springs_in_states(
+            self._side, blocks, (pattern.more, pattern.rows), self.rows, (state, direction, gap, found.shear),
+            (springs.normal, springs.shear, springs.friction, springs.sliding, springs.lift),
         )  # fmt: skip
         fill(
-            self._data, pattern.where, pattern.own, pattern.upper, pattern.lower, pattern.step, pattern.rows, *blocks,
-            self.own, self.own_at, self.rows, stiff, along, slope, springs.lift,
+            self._data, pattern.places, pattern.step, (self.own, self.own_at), blocks, self.rows,
+            (*laws, springs.lift),
         )  # fmt: skip
         return symmetric, None
 
@@ -47,10 +47,10 @@ class HigherOrderEquations(Equations):
         self, unknowns: np.ndarray, state: np.ndarray, direction: np.ndarray, springs: Springs, gap: np.ndarray
     ) -> np.ndarray:
         pattern, found = self.pattern, self.found
-        went = moved(unknowns, found.block, found.other, pattern.order, pattern.more, pattern.rows, self.rows)
+        blocks = found.block, found.other, pattern.order
+        across, along = moved(unknowns, blocks, (pattern.more, pattern.rows), self.rows).T
         out = np.zeros((len(found), 4))
-        along = went[:, 1]
-        out[:, 2], out[:, 3] = gap + went[:, 0] - springs.lift * along, along
+        out[:, 2], out[:, 3] = gap + across - springs.lift * along, along
         closed = state != OPEN
         out[closed, 0] = -(springs.normal * out[:, 2])[closed]
         stuck = found.shear - springs.shear * along

@@ -341,7 +341,12 @@ def _matching(found: FaceContacts, memory: np.ndarray) -> np.ndarray:
     ends = faces.ends[faces.face[inside], 1]
     far[inside] = np.stack([corners.vertex[ends], corners.edge[ends]], axis=1)
     same = len(memory) == len(found) and np.array_equal(memory["place"], faces.place)
-    for name, mine in (("vertex", found.vertex), ("edge", found.edge), ("far_vertex", far[:, 0]), ("far_edge", far[:, 1])):
+    for name, mine in (
+        ("vertex", found.vertex),
+        ("edge", found.edge),
+        ("far_vertex", far[:, 0]),
+        ("far_edge", far[:, 1]),
+    ):
         same = same and np.array_equal(memory[name], mine)
     if same:
         return np.arange(len(found))

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...compiled import kept
+from ...compiled import kept, part
 from ...model import OPEN, SLIP, STICK
 from ..linear_solver import assembly
 from ..linear_solver.block_solver import BlockSolver
@@ -40,9 +40,10 @@ class SixRowPattern(assembly.Pattern):
     own: np.ndarray = None
     step: int = 6
 
-    def six_rows(self, block: int) -> np.ndarray:
-        """The rows of six of a ``block``."""
-        return np.concatenate([[self.order[block]], self.more[block] + np.arange(self.rows[block] - 1)])
+    @property
+    def places(self) -> tuple[np.ndarray, ...]:
+        """As of `fill`."""
+        return self.where, self.own, self.upper, self.lower, self.rows
 
 
 def six_row_pattern(
@@ -98,63 +99,88 @@ def six_row_pattern(
     )  # fmt: skip
 
 
+@part(fastmath={"contract"}, error_model="numpy", nogil=True)
+def _add_own(data, where, first, step, rows, matrix, begin):
+    """Add a block's own ``matrix``, which begins at ``begin``, with ``rows`` rows of six."""
+    size = 6 * rows
+    for i in range(rows):
+        for j in range(rows):
+            at = where[first + i * rows + j]
+            for k in range(6):
+                given = begin + (6 * i + k) * size + 6 * j
+                for m in range(6):
+                    data[at + k * step + m] = matrix[given + m]
+
+
+@part(fastmath={"contract"}, error_model="numpy", nogil=True)
+def _add_pair(data, where, first, step, rows, others, given, along):
+    """Add push ⊗ pull + drag ⊗ across of a contact: ``given`` (2, w) push and drag of the block with ``rows`` rows of six,
+    ``along`` (2, w) pull and across of the one with ``others``."""
+    push, drag, pull, across = given[0], given[1], along[0], along[1]
+    for i in range(rows):
+        for j in range(others):
+            at = where[first + i * others + j]
+            for k in range(6):
+                p, s = push[6 * i + k], drag[6 * i + k]
+                for m in range(6):
+                    data[at + k * step + m] += p * pull[6 * j + m] + s * across[6 * j + m]
+
+
 @_jit
-def fill(
-    data, where, own_at, up_at, low_at, step, rows, block, other, order, matrix, matrix_at, vectors, normal, shear,
-    slope, lift,
-):  # fmt: skip
-    """Fill the flat matrix ``data`` with the blocks' own, ``matrix`` from ``matrix_at`` (n_blocks,) on, and contacts with
-    these laws, as `assembly.assemble`; ``vectors`` (n_contacts, 2, 2, w): way, side, unknowns of the side's block."""
+def fill(data, places, step, own, blocks, vectors, laws):
+    """Fill the flat matrix ``data`` with the blocks' own and with contacts, as `assembly.assemble`.
+
+    ``places``: ``where``, ``own``, ``upper``, ``lower`` and ``rows`` of the pattern; ``own``: the blocks' matrices, and where
+    each begins (n_blocks,); ``blocks``: block and other of contacts, and the pattern's order; ``vectors`` (n_contacts,
+    2, 2, w): way, side, unknowns of the side's block; ``laws``: kₙ, kₛ, μ and κ (n_contacts,)."""
+    where, own_at, upper, lower, rows = places
+    block, other, order = blocks
+    normal, shear, slope, lift = laws
     data[:] = 0.0
     for b in range(len(rows)):
-        r = rows[b]
-        if order[b] < 0:
-            continue
-        size = 6 * r
-        for i in range(r):
-            for j in range(r):
-                at = where[own_at[b] + i * r + j]
-                for k in range(6):
-                    given = matrix_at[b] + (6 * i + k) * size + 6 * j
-                    for m in range(6):
-                        data[at + k * step + m] = matrix[given + m]
+        if order[b] >= 0:
+            _add_own(data, where, own_at[b], step, rows[b], own[0], own[1][b])
     width = vectors.shape[3]
-    push, drag, pull, across = np.empty((2, width)), np.empty((2, width)), np.empty((2, width)), np.empty((2, width))
+    given, along = np.empty((2, 2, width)), np.empty((2, 2, width))
     for c in range(len(block)):
         if normal[c] == 0.0 and shear[c] == 0.0:
             continue
         for side in range(2):
             for a in range(width):
                 n, t = vectors[c, 0, side, a], vectors[c, 1, side, a]
-                push[side, a] = normal[c] * (n + slope[c] * t)
-                drag[side, a] = shear[c] * t
-                pull[side, a] = n - lift[c] * t
-                across[side, a] = t
-        for side in range(2):
-            b = block[c] if side == 0 else other[c]
-            if order[b] < 0:
-                continue
-            for seen in range(2):
-                d = block[c] if seen == 0 else other[c]
-                if order[d] < 0:
-                    continue
-                first = own_at[b] if side == seen else (up_at[c] if side == 0 else low_at[c])
-                for i in range(rows[b]):
-                    for j in range(rows[d]):
-                        at = where[first + i * rows[d] + j]
-                        for k in range(6):
-                            p, s = push[side, 6 * i + k], drag[side, 6 * i + k]
-                            for m in range(6):
-                                data[at + k * step + m] += p * pull[seen, 6 * j + m] + s * across[seen, 6 * j + m]
+                given[side, 0, a] = normal[c] * (n + slope[c] * t)
+                given[side, 1, a] = shear[c] * t
+                along[side, 0, a] = n - lift[c] * t
+                along[side, 1, a] = t
+        i, j = block[c], other[c]
+        if order[i] >= 0:
+            _add_pair(data, where, own_at[i], step, rows[i], rows[i], given[0], along[0])
+        if order[j] >= 0:
+            _add_pair(data, where, own_at[j], step, rows[j], rows[j], given[1], along[1])
+        if order[i] >= 0 and order[j] >= 0:
+            _add_pair(data, where, upper[c], step, rows[i], rows[j], given[0], along[1])
+            _add_pair(data, where, lower[c], step, rows[j], rows[i], given[1], along[0])
+
+
+@part(fastmath={"contract"}, error_model="numpy", nogil=True)
+def _add_force(right, first, more, count, along, push, drag):
+    """Add ``push`` across and ``drag`` along a face, ``along`` (2, w) of one block, to the right side."""
+    for a in range(count):
+        at = 6 * first + a if a < 6 else 6 * more + a - 6
+        right[at] += push * along[0, a] + drag * along[1, a]
 
 
 @_jit
-def springs_in_states(
-    right, block, other, order, more, rows, vectors, state, direction, gap, normal, shear, friction, sliding, lift,
-    shear0,
-):  # fmt: skip
-    """Add to ``right`` (6 n,) what closed contacts bear without motion; stiffness across and along, the part of the
-    normal force that slides (n_contacts,) each, and whether the matrix is symmetric (`assembly.assemble_contacts`)."""
+def springs_in_states(right, blocks, rows, vectors, states, springs):
+    """Add to ``right`` (6 n,) what closed contacts bear without motion; their stiffness across and along, the part of the
+    normal force that slides (n_contacts,) each, and whether the matrix is symmetric (`assembly.assemble_contacts`).
+
+    ``blocks``: block and other of contacts, and the pattern's order; ``rows``: ``more`` and ``rows`` of the pattern;
+    ``states``: state, direction, gap and initial shear force; ``springs``: kₙ, kₛ, friction, sliding force and lift."""
+    block, other, order = blocks
+    more, count = rows
+    state, direction, gap, shear0 = states
+    normal, shear, friction, sliding, lift = springs
     stiff, along, slope, symmetric = np.zeros(len(block)), np.zeros(len(block)), np.zeros(len(block)), True
     for c in range(len(block)):
         if state[c] == OPEN:
@@ -168,25 +194,26 @@ def springs_in_states(
         pressed = normal[c] * gap[c]
         for side in range(2):
             b = block[c] if side == 0 else other[c]
-            if order[b] < 0:
-                continue
-            for a in range(6 * rows[b]):
-                at = 6 * order[b] + a if a < 6 else 6 * more[b] + a - 6
-                n, t = vectors[c, 0, side, a], vectors[c, 1, side, a]
-                right[at] += given * t - pressed * (n + slope[c] * t)
+            if order[b] >= 0:
+                _add_force(
+                    right, order[b], more[b], 6 * count[b], vectors[c, :, side], -pressed, given - pressed * slope[c]
+                )
     return stiff, along, slope, symmetric
 
 
 @_jit
-def moved(unknowns, block, other, order, more, rows, vectors):
-    """(n_contacts, 2): motion across and along the face, of ``unknowns`` (6 n,)."""
+def moved(unknowns, blocks, rows, vectors):
+    """(n_contacts, 2): motion across and along the face, of ``unknowns`` (6 n,); the rest as for
+    `springs_in_states`."""
+    block, other, order = blocks
+    more, count = rows
     out = np.zeros((len(block), 2))
     for c in range(len(block)):
         for side in range(2):
             b = block[c] if side == 0 else other[c]
             if order[b] < 0:
                 continue
-            for a in range(6 * rows[b]):
+            for a in range(6 * count[b]):
                 value = unknowns[6 * order[b] + a] if a < 6 else unknowns[6 * more[b] + a - 6]
                 out[c, 0] += vectors[c, 0, side, a] * value
                 out[c, 1] += vectors[c, 1, side, a] * value

@@ -139,8 +139,8 @@ class _Search:
             self._count(number, answer, wrong)
             if self._by_patch(answer, wrong, number):
                 continue
-            if not self.equations.first_order and (returned or self.tries > self.solver.newton_tries):
-                self._one_by_one(answer, wrong, called)
+            if not self.equations.first_order:
+                self._pivot(answer, wrong, called, returned)
             elif returned or self.tries > self._most_tries(number):
                 self._by_path(answer)
             else:
@@ -195,7 +195,12 @@ class _Search:
     def _by_patch(self, answer: Answer, wrong: np.ndarray, number: int) -> bool:
         """Whether the wrong contacts, few, were settled on the blocks about them alone, from the best states so far."""
         solver, effort = self.solver, self.effort
-        if not self.equations.first_order or effort.within_patch or self.equations.pattern.solver is None or self.patched >= solver.patch_tries:
+        if (
+            not self.equations.first_order
+            or effort.within_patch
+            or self.equations.pattern.solver is None
+            or self.patched >= solver.patch_tries
+        ):
             return False
         if (self.falls and not self.proposed) or self.fewest > solver.patch_wrong * len(self.found):
             return False
@@ -212,16 +217,26 @@ class _Search:
         self._begin_anew()
         return True
 
-    def _one_by_one(self, answer: Answer, wrong: np.ndarray, called: States) -> None:
-        """Switch the worst of the ``wrong`` contacts alone: block principal pivoting, which goes on with all of them as soon
-        as fewer are wrong than ever before (Júdice & Pires 1994). Raises `Unsettled`."""
+    def _pivot(self, answer: Answer, wrong: np.ndarray, called: States, returned: bool) -> None:
+        """Switch all ``wrong`` contacts to the states ``called`` for or, once states have ``returned`` or fewer are not
+        wrong, those alone that are worst on their blocks, until fewer are wrong than ever before: block principal pivoting
+        (Júdice & Pires 1994). Raises `Unsettled`."""
+        if not returned and self.tries <= self.solver.newton_tries:
+            self.states = self.states.switched(wrong, called)
+            return
         self.pivots += 1
         if self.pivots > self.effort.max_iterations:
             raise self._unsettled(answer)
         self.most = max(self.most, self.newton + self.effort.max_iterations)
-        # Where the worst leads back, the first does not (Murty 1974).
-        index = int(np.argmax(wrong)) if self.pivots % 2 == 0 else int(np.where(wrong, answer.violation, -1.0).argmax())
-        self.states = self.states.switched(np.arange(len(wrong)) == index, called)
+        found, violation = self.found, np.where(wrong, answer.violation, 0.0)
+        if self.pivots <= self.effort.max_iterations // 2:
+            some = wrong & _half_as_wrong_as_the_worst(
+                violation, found.block, found.other, self.equations.pattern.order
+            )
+        else:
+            # Where many that are worst lead back, one by one they do not (Murty 1974).
+            some = np.arange(len(wrong)) == (violation.argmax() if self.pivots % 2 else wrong.argmax())
+        self.states = self.states.switched(some, called)
 
     def _by_path(self, answer: Answer) -> None:
         """States that the central path proposes. Raises `Unsettled` where it has none."""

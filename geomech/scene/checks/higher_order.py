@@ -41,7 +41,9 @@ def _check_cracks(c: Check, refuse) -> None:
     if c.drawing is not None and c.drawing.cracks is not None and c.drawing.cracks.n_segments:
         refuse("blocks of higher order cannot be cut by cracks yet", "leave `order` out, or the cracks")
     if t.growth is not None and t.growth.initiation:
-        refuse("cracks cannot begin in blocks of higher order yet", "say growth.initiation = false, or leave `order` out")
+        refuse(
+            "cracks cannot begin in blocks of higher order yet", "say growth.initiation = false, or leave `order` out"
+        )
 
 
 def _check_joints(c: Check, refuse) -> None:
