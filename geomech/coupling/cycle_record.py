@@ -40,7 +40,7 @@ def record(
         affine = motion.current(block, point) - np.asarray(point)
         return affine + bent[block].deflection(np.array([point], float))[0] if block in bent else affine
 
-    cycle = _Told(
+    cycle = _LazyCycle(
         number=now.number,
         load_step=now.load_step,
         growth_pass=growth_pass,
@@ -64,11 +64,11 @@ def record(
     del vars(cycle)["faces"]  # found when somebody asks for them
     if left_out:
         del vars(cycle)["tips"], vars(cycle)["bodies"]
-        vars(cycle)["_rest"] = _Rest(now, solutions, dict(left_out))
+        vars(cycle)["_rest"] = _LeftOut(now, solutions, dict(left_out))
     return cycle
 
 
-class _Told(Cycle):
+class _LazyCycle(Cycle):
     """A cycle whose crack faces are put together, and bodies that were left out solved, when they are asked for."""
 
     @cached_property
@@ -84,12 +84,12 @@ class _Told(Cycle):
         return self._rest.tips(self.bodies)
 
 
-class _Rest:
+class _LeftOut:
     """What it takes to solve bodies that were left out of a pass as they would have been in it: ``now`` as it is, which
     goes on."""
 
     def __init__(self, now: CrackedBlocks, solutions: dict, left_out: dict[int, Body]) -> None:
-        self._told, self._solutions, self._left_out = now.cannot_grow, solutions, left_out
+        self._told, self._solutions, self._left_out = now.growth_screening, solutions, left_out
         self._problem, self._blocks, self._nodes_of = now.problem, now.blocks, now.nodes_of
         self._order, self._loads = list(now.bodies), {block: now.loads[block] for block in left_out}
 

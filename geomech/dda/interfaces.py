@@ -55,14 +55,14 @@ class SteppedSystem(Protocol):
     moving: np.ndarray
     turns: np.ndarray
     rigid: np.ndarray
-    held: np.ndarray | None
+    constrained: np.ndarray | None
     taken_out: np.ndarray | None
     next: np.ndarray
     vertex_start: np.ndarray
     owner: np.ndarray
     half_diagonal: float
     rounding: float
-    rounding_told: bool
+    roundoff_reported: bool
     allowed_penetration: float
 
     @property

@@ -277,7 +277,7 @@ def _assembled(
         blocks, _ = assemble(parts.zones, (), parts.edges, geometry.tolerance_m)
         for k, only in parts.only_in.items():
             parts.joints[k] = within(parts.joints[k], [zone for zone in parts.zones if zone.name in only])
-        _tell_outside(geometry, parts, place, warnings)
+        _warn_outside(geometry, parts, place, warnings)
         cut = jointed(geometry, parts.zones, blocks, parts.traces, parts.joints, parts.chords)
     except ShapeError as error:
         counted_from = f"; coordinates count from ({origin[0]:.10g}, {origin[1]:.10g})" if origin.any() else ""
@@ -313,7 +313,7 @@ def _source(flaw: Flaw, parts: _Parts, joints: Sequence[str], own: Sequence[str]
     return parts.sources.get((flaw.part, key), (("geometry", flaw.part, index), ""))
 
 
-def _tell_outside(geometry: Geometry, parts: _Parts, place: Callable[[Path], str], warnings: list[Fault]) -> None:
+def _warn_outside(geometry: Geometry, parts: _Parts, place: Callable[[Path], str], warnings: list[Fault]) -> None:
     """Warn of joints, drawn in the scene or from files, of which nothing lies in the rock: units or origins that
     differ."""
     import shapely

@@ -25,7 +25,7 @@ def row(newmark, *, last_fixed=False, penalty=None) -> dda.BlockSystem:
         [rectangle(k, 0, k + 1, 1) for k in range(BLOCKS)],
         edge_names=names,
         fixed=[last_fixed and k == BLOCKS - 1 for k in range(BLOCKS)],
-        held=[[False, True, True, False, True, True]] * BLOCKS,
+        constrained=[[False, True, True, False, True, True]] * BLOCKS,
     )
     settings = DdaSettings(
         dynamic_factor=1.0, damping=0.0, newmark=newmark, max_displacement_ratio=1.0, normal_penalty=penalty
@@ -99,7 +99,9 @@ def test_waves_converge_with_the_order_of_their_scheme(newmark, order):
 def test_dashpots_brake_a_block_as_the_impedance_says(along, modulus):
     # ρ A v' = −√(ρ M) ℓ v on an edge across the motion (P) or along it (S): v falls by exp(−√(M/ρ) t ℓ/A).
     blocks = Blocks.from_polygons(
-        [rectangle(0, 0, 2, 3)], edge_names=[[["", "quiet", "", ""]]], held=[[False, False, True, True, True, True]]
+        [rectangle(0, 0, 2, 3)],
+        edge_names=[[["", "quiet", "", ""]]],
+        constrained=[[False, False, True, True, True, True]],
     )
     settings = DdaSettings(dynamic_factor=1.0, newmark=(0.25, 0.5), max_displacement_ratio=1.0)
     system = dda.BlockSystem(blocks, [ROCK], settings=settings)

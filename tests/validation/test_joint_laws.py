@@ -70,7 +70,7 @@ def direct_shear(
         return 2 if "wall" in (a, b) else int("joint" in (a, b) and "top" not in (a, b))
 
     blocks = Blocks.from_polygons(
-        polygons, fixed=fixed, edge_names=names, held=held, material=[0, 0] + [1 - f for f in fixed[2:]]
+        polygons, fixed=fixed, edge_names=names, constrained=held, material=[0, 0] + [1 - f for f in fixed[2:]]
     )
     materials = [Material(name, YOUNGS_MODULUS, POISSON, density=d) for name, d in (("light", 1.0), ("ram", 1e12))]
     settings = DdaSettings(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from ..messages import say, tell_compiling
+from ..messages import report_compiling, say
 from ..scenes import trust_argument
 from ..verb import DONE, BadInput, Verbs, add_verb
 from .run import prepare_for_a_run
@@ -36,7 +36,7 @@ def declare(verbs: Verbs) -> None:
 def _resume(options: argparse.Namespace) -> int:
     prepare_for_a_run()
     if not options.quiet:
-        tell_compiling()
+        report_compiling()
     from ...resumption import Finished, NotResumable, resume
 
     try:

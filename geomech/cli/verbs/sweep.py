@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from ..messages import say, tell_compiling
+from ..messages import report_compiling, say
 from ..scenes import trust_argument
 from ..verb import DONE, FAILED, BadInput, Verbs, add_verb, check_folder
 from .run import prepare_for_a_run
@@ -71,6 +71,10 @@ def declare(verbs: Verbs) -> None:
     made.add_argument("--rare", choices=("subset", "importance"), help="method for probabilities below 1e-2")
     made.add_argument("--keep", choices=("none", "failed", "all"), help="whose run folders are kept (none)")
     made.add_argument(
+        "--run-limit", type=float, metavar="SECONDS", dest="run_limit_s",
+        help="stop a run that takes longer, and count it as failed (no limit)",
+    )  # fmt: skip
+    made.add_argument(
         "--table", type=Path, metavar="FILE", help="settings as TOML (default sweep.toml beside the scene)"
     )
     made.add_argument(
@@ -96,7 +100,7 @@ def _sweep(options: argparse.Namespace) -> int:
         raise BadInput("--workers takes a number of processes, at least 1")
     prepare_for_a_run()
     if not options.quiet:
-        tell_compiling()
+        report_compiling()
     from ...sweep.cluster import EngineRefused
     from ...sweep.execution import CannotResume, Telling, carry_out_sweep, default_folder, engine_for, read_sweep
     from ...sweep.plan import plan_of
@@ -163,7 +167,18 @@ def _given(options: argparse.Namespace) -> dict[str, Any]:
     """The settings that the command line gives."""
     given: dict[str, Any] = {
         name: getattr(options, name)
-        for name in ("seeds", "runs", "seed", "measure", "fails", "along", "without_cracks", "rare", "keep")
+        for name in (
+            "seeds",
+            "runs",
+            "seed",
+            "measure",
+            "fails",
+            "along",
+            "without_cracks",
+            "rare",
+            "keep",
+            "run_limit_s",
+        )
         if getattr(options, name) is not None
     }
     if options.sampling:

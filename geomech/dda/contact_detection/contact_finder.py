@@ -19,7 +19,7 @@ from ..open_close.contact_set import ContactSet
 from ..statics.sharp_toes import SHARP, ToeCorners, stand_off
 from ..step_control.relative_motion import Approach, Windows, widths
 from . import contact_records
-from .bonded_corners import held_by_glue
+from .bonded_corners import find_bonded_corners
 from .entrance_edges import (
     FACE,
     SMOOTHED,
@@ -193,7 +193,7 @@ class ContactFinder:
         if glue_holds and remembered["bonded"].any():
             along = vertices[self._next[edge]] - vertices[edge]
             share = geometry[:, 4] / np.hypot(along[:, 0], along[:, 1])
-            glued = held_by_glue(vertex, edge, self._next, geometry[:, 0], share, remembered["bonded"] == 1)
+            glued = find_bonded_corners(vertex, edge, self._next, geometry[:, 0], share, remembered["bonded"] == 1)
             if glued is not None:
                 keep &= ~glued
         if not keep.all():
@@ -509,7 +509,7 @@ class ContactFinder:
             out &= ~(self._removed[self._owner[vertex]] | self._removed[self._owner[edge]])
         return out
 
-    def beyond_middle(self, vertices: np.ndarray, vertex: np.ndarray, edge: np.ndarray) -> np.ndarray:
+    def past_midpoint(self, vertices: np.ndarray, vertex: np.ndarray, edge: np.ndarray) -> np.ndarray:
         """(n,) True where a ``vertex`` lies behind its ``edge`` by more than half of what the block is thick there."""
         return ~from_outside(
             vertex, edge, self._off_lines(vertices, vertex, edge), vertices, self._next, self._previous, self._start,

@@ -16,7 +16,7 @@ from dataclasses import replace
 import numpy as np
 
 from ...model import OPEN
-from ..kinematics.midpoint_configuration import Middle
+from ..kinematics.midpoint_configuration import MidpointConfiguration
 from ..open_close.contact_set import ContactSet
 from ..open_close.equations import Unsettled
 from ..results import StepResult
@@ -79,7 +79,7 @@ class BendingAttempt(Attempt):
         size = np.sqrt(self.moments[:, 0])
         # Strains and deflection share inertia on the axes of the start, on which strains are unknowns.
         self.shared = self.density[:, None, None] * blocks.coupling(self.state.rotation) / size[:, None, None]
-        self.bending_load = blocks.loads(self.points, self.edges, self.middle.vertices, self.angle)
+        self.bending_load = blocks.loads(self.points, self.edges, self.midpoint.vertices, self.angle)
         stored, rates = blocks.stiffness_times(self.deflection), blocks.padded(self.rates)
         spin = self.density * self.carried[:, 2] ** 2
         own = self.bending_load - stored
@@ -129,7 +129,7 @@ class BendingAttempt(Attempt):
         full[: self.n_free] = right
         full[self.order[moving], 3:6] += self.coupled_right[moving]
         full.ravel()[self._deflection_at(pattern)] = self.own_right[blocks.owner, blocks.which]
-        if self._held() is not None:
+        if self._constrained() is not None:
             # What is held has changed the six first rows and columns.
             own = own.copy()
             for b in moving.tolist():
@@ -151,7 +151,7 @@ class BendingAttempt(Attempt):
         blocks, n = self.blocks, len(found)
         out = np.zeros((n, 2, 2, max(blocks.width, 6)))
         out[..., :6] = vectors.reshape(n, 2, 2, 6)
-        geometry = self.middle.contacts(found.geometry, found.block, found.other, self._along(found))
+        geometry = self.midpoint.contacts(found.geometry, found.block, found.other, self._along(found))
         normal = geometry[:, 1:3]
         ways = np.stack([normal, np.stack([-normal[:, 1], normal[:, 0]], axis=1)], axis=1)
         for side, (owner, points, sign) in enumerate(
@@ -187,9 +187,9 @@ class BendingAttempt(Attempt):
         super()._follow(increment, vertices)
         found, system, start = self.found, self.system, self.state.rotation
         change = self._deflected_by()
-        end = Middle.of(increment, 1.0, self.vertices, system.owner, self.moments)
+        end = MidpointConfiguration.of(increment, 1.0, self.vertices, system.owner, self.moments)
         normal = end.contacts(found.geometry, found.block, found.other, self._along(found))[:, 1:3]
-        acting = self.middle.contacts(found.geometry, found.block, found.other, self._along(found))[:, 1:3]
+        acting = self.midpoint.contacts(found.geometry, found.block, found.other, self._along(found))[:, 1:3]
         extra = []
         for turned in (lambda n: n, lambda n: np.stack([-n[:, 1], n[:, 0]], axis=1)):
             went = self._gaps(turned(normal), found, start + increment[:, 2], self.deflection + change)

@@ -26,8 +26,8 @@ def refuse_unsupported(
             raise ValueError(f"{names[block]!r} has order {order[block]}: {why}")
 
     refuse(bends & np.array([materials[m].rigid for m in blocks.material]), "a rigid block does not bend")
-    if blocks.held is not None:
-        refuse(bends & blocks.held.any(axis=1), "guided blocks of higher order are not supported yet")
+    if blocks.constrained is not None:
+        refuse(bends & blocks.constrained.any(axis=1), "guided blocks of higher order are not supported yet")
     law = next((law for law in joints if law.roughness is not None or not law.straight), None)
     if law is not None:
         refuse(bends, f"beside it no joint law may be curved yet, as {law.name!r} is")

@@ -105,9 +105,9 @@ class _Search:
         self.patched = self.pivots = 0
         # What closes sticking, is pulled open by its own shear and closes again can only slide: neither fits.
         self.closed, self.sheared = np.zeros(n, np.int64), np.zeros(n)
-        self._begin_anew()
+        self._restart()
 
-    def _begin_anew(self, proposed: bool = False) -> None:
+    def _restart(self, proposed: bool = False) -> None:
         """Other states than before are tried, ``proposed`` by the central path."""
         self.fewest, self.tries, self.proposed, self.falls = np.inf, 0, proposed, True
         self.best: tuple[States, Answer, np.ndarray] | None = None
@@ -168,7 +168,7 @@ class _Search:
             first = bonds & _half_as_wrong_as_the_worst(answer.violation, found.block, found.other, order)
         self.states = self.states.switched(first, answer.called)
         self.most = max(self.most, self.newton + self.effort.max_iterations)
-        self._begin_anew()
+        self._restart()
 
     def _called(self, answer: Answer, wrong: np.ndarray) -> States:
         """The states that the ``answer`` calls for."""
@@ -214,7 +214,7 @@ class _Search:
             self.proposed = False
             return False
         self.states = proposal
-        self._begin_anew()
+        self._restart()
         return True
 
     def _pivot(self, answer: Answer, wrong: np.ndarray, called: States, returned: bool) -> None:
@@ -251,7 +251,7 @@ class _Search:
             raise self._unsettled(answer)
         self.seen.clear()
         self.states, self.most = proposal, max(self.most, self.newton + self.solver.newton_to_finish)
-        self._begin_anew(proposed=True)
+        self._restart(proposed=True)
 
     def _bonds_on_path(self) -> np.ndarray:
         """(n,) the bonds that the central path counts with: those of open contacts are gone, but not where cohesion belongs

@@ -225,7 +225,7 @@ class StepLimits:
         )
         return Crossed(reason, np.zeros((0, 2), np.int64), np.zeros(0), False, (a, b))
 
-    def tell_pressed_through(self, result: StepResult) -> None:
+    def warn_of_penetration(self, result: StepResult) -> None:
         """Log a warning, once for two blocks, where a corner is pressed in beyond the middle of what it presses on: there
         springs no longer know from which side it came."""
         rows = result.contacts
@@ -235,7 +235,7 @@ class StepLimits:
             return
         vertices = np.ascontiguousarray(result.state.vertices)
         vertex, edge = (np.ascontiguousarray(rows[name]) for name in ("vertex", "edge"))
-        for k in np.flatnonzero(self._finder.beyond_middle(vertices, vertex, edge)).tolist():
+        for k in np.flatnonzero(self._finder.past_midpoint(vertices, vertex, edge)).tolist():
             pair = int(rows["block"][k]), int(rows["other"][k])
             if pair in self._told:
                 continue

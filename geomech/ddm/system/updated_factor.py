@@ -103,7 +103,7 @@ class Border:
     ``gone`` in the base whose unknown is held or no longer there; unknowns ``turned`` whose equation is another."""
 
     def __init__(self, of: BaseOf, rows: Rows):
-        free = ~rows.held
+        free = ~rows.prescribed
         known = free & (of.at >= 0)
         self.free, self.kept = np.flatnonzero(free), np.flatnonzero(known)
         self.places = of.at[self.kept]

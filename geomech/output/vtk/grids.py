@@ -1,7 +1,8 @@
 """A cycle as grids of points, cells and fields: blocks, cracks, tips and contacts.
 
-``configuration`` is "reference" (coordinates of the reference, ``displacement`` beside them) or "current" (coordinates
-as they are now; ``displacement`` is written all the same). All grids of a run share it, so they lie on one another.
+One rule holds for all files of a run: where a point is now = points + REFERENCE × displacement. With ``configuration``
+"reference" (REFERENCE = 1 in the field data) files hold the coordinates of the reference, and warping by displacement
+moves them; with "current" (REFERENCE = 0) the coordinates are those of now, and warping would move them twice.
 """
 
 from __future__ import annotations
@@ -170,6 +171,8 @@ def tips_grid(cycle: Cycle, motion: Motion, configuration: str) -> Grid:
             "growth_direction": growth,
             "grown": tips["grown"],
             "crack_id": tips["crack"],
+            "end": tips["end"],
+            "tip_id": tips["node"],
             "block_id": tips["block"],
         },
     )

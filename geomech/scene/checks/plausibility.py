@@ -9,7 +9,7 @@ from ...model import counted
 from ...model.blocks.corners import LARGEST_SHARE, corner_lengths
 from ...model.blocks.polygon import distance_to_edges
 from ...shapes.block_cutting.rock_outline import ground_of
-from ..assembly.fixed_blocks import fixed_blocks, held_unknowns
+from ..assembly.fixed_blocks import constrained_unknowns, fixed_blocks
 from ..assembly.load_functions import traction_history
 from ..tables import SceneTables
 from ..tables.loads import TractionTable
@@ -138,8 +138,8 @@ def _free_back(c: Check) -> None:
     x = float(ground[side, 0])
     starts, ends = blocks.vertices, blocks.vertices[blocks.next_vertex]
     loaded = {load.edge for load in (*t.loads.tractions, *t.loads.viscous_boundaries)}
-    held = held_unknowns(t, c.drawing)
-    free = ~fixed if held is None else ~fixed & ~held.any(axis=1)
+    constrained = constrained_unknowns(t, c.drawing)
+    free = ~fixed if constrained is None else ~fixed & ~constrained.any(axis=1)
     near = 1e-6 * float(np.ptp(blocks.vertices, axis=0).max())
     on = free[blocks.vertex_block] & (np.abs(starts[:, 0] - x) < near) & (np.abs(ends[:, 0] - x) < near)
     on &= ~np.isin(blocks.edge_name, [k for k, name in enumerate(blocks.edge_names) if name in loaded])
