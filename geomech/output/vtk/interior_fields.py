@@ -164,7 +164,7 @@ class InteriorMeshes:
 
     def _triangles_of(self, cycle: Cycle, b: int) -> int:
         """About how many triangles block ``b`` gets: fewer where many blocks bend, whose stress is smooth."""
-        if b in cycle.bodies:
+        if b not in cycle.bent:
             return self.n_triangles
         return max(_FEWEST, min(self.n_triangles, _OF_BENT // len(cycle.bent)))
 
