@@ -140,11 +140,12 @@ class State:
 
     def read_only(self) -> State:
         """The same with arrays that cannot be written to: views of these, no copies."""
-        return replace(self, **{name: _view(value) for name, value in self._arrays()})
+        views: dict[str, Any] = {name: _view(value) for name, value in self._arrays()}
+        return replace(self, **views)
 
     def writable(self) -> State:
         """The same with arrays that can be written to: these, copies of those that cannot."""
-        copies = {name: value.copy() for name, value in self._arrays() if not value.flags.writeable}
+        copies: dict[str, Any] = {name: value.copy() for name, value in self._arrays() if not value.flags.writeable}
         return replace(self, **copies) if copies else self
 
     def _arrays(self) -> list[tuple[str, np.ndarray]]:

@@ -18,7 +18,7 @@ def declare(verbs: Verbs) -> None:
         verbs, "render", _render, "draw a run: the last cycle as a picture, its growth as a movie, its curves",
         "geomech render outputs/two_cracks/phi_30 --component yy --no-gif",
     )  # fmt: skip
-    render.description += " What is not said here, the scene's [render] table says."
+    render.description = str(render.description) + " What is not said here, the scene's [render] table says."
     render.add_argument("run", type=Path, metavar="RUN", help="run folder")
     render.add_argument("--out", type=Path, metavar="DIR", help="where the pictures go (default RUN/pictures)")
     render.add_argument("--component", metavar="NAME", 
