@@ -54,7 +54,7 @@ def echo(times: np.ndarray, speeds: np.ndarray) -> float:
     return float(speeds[times > BLOCKS / 2 + PULSE + 5][np.abs(speeds[times > BLOCKS / 2 + PULSE + 5]).argmax()])
 
 
-def test_a_pulse_goes_in_along_and_out():
+def test_a_pulse_goes_in_along_and_out(verified):
     times, speeds, budget = wave(row((0.25, 0.5)), 2e-4, right=True)
     # The wave that the left edge lets in is the one asked for, at the speed of P-waves in the rock: springs between
     # blocks, 1/80 of a block's compliance E' each, slow it by 0.7 %.
@@ -64,6 +64,7 @@ def test_a_pulse_goes_in_along_and_out():
     # By as much the row's impedance is below the rock's: half of that comes back.
     reflected = echo(times, speeds)
     print(f"viscous end: {100 * reflected:.2f} % comes back")
+    verified("pulse into a viscous end: part that comes back", reflected, "none")
     assert abs(reflected) < 0.006
     assert abs(budget.residual) < 1e-5 * budget.turnover
     assert budget.last.stored < 1e-4 * budget.turnover

@@ -199,7 +199,8 @@ class _Columns:
     """Columns (n,) that are known by a number, made when first asked for."""
 
     def __init__(self, n: int):
-        self.n, self._at, self._values = n, {}, np.empty((n, 0), order="F")
+        self.n, self._values = n, np.empty((n, 0), order="F")
+        self._at: dict[int, int] = {}
 
     def of(self, numbers: np.ndarray, make) -> np.ndarray:
         """(n, k) those of ``numbers`` (k,); ``make(missing)`` makes what is not there."""
