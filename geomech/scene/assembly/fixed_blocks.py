@@ -57,6 +57,14 @@ def constrained_unknowns(tables: SceneTables, drawing: Drawing) -> np.ndarray | 
     return constrained if constrained.any() else None
 
 
+def block_orders(tables: SceneTables, drawing: Drawing) -> np.ndarray | None:
+    """(n_blocks,) the order of each block's displacement, 1 where it stands still; None where all are of first order."""
+    zones = tables.zones or {}
+    order = np.array([zones[zone].order if zone in zones else 1 for zone in drawing.zones], dtype=int)
+    order[fixed_blocks(tables, drawing)] = 1
+    return order if (order > 1).any() else None
+
+
 def check_holding(c: Check) -> None:
     """Edges that would guide must say along what."""
     for name in c.blocks.edge_names:

@@ -15,6 +15,7 @@ from ..tables import SceneTables
 from ..validation import nearest
 from .check import Check
 from .edges import check_edges
+from .higher_order import check_orders
 
 #: No tip advances by less, in units of the rock's largest side: coordinates of a drawing keep twelve digits.
 SHORTEST_ADVANCE = 1e-9
@@ -36,6 +37,7 @@ def check(c: Check) -> None:
         check_holding(c)
         check_borne(c)
         check_edges(c)
+        check_orders(c)
         _points(c)
         _toughness(c)
         _strength(c)
