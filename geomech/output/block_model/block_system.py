@@ -194,5 +194,5 @@ def _lines(statistics: dict[str, Any], jointed: Any) -> list[str]:
             f"  bridges   {bridges['number']}, mean {bridges['mean_m']:.3g} m, least {bridges['shortest_m']:.3g} m"
         )
     return rows + [
-        f"  mended    {text}" for text in (jointed.statistics("listed in block_system.json") if jointed else ())
+        f"  mended    {text}" for text in (jointed.repair_lines("listed in block_system.json") if jointed else ())
     ]
