@@ -19,6 +19,7 @@ from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, replace
 
 from ...model import Blocks, DdaSettings, JointLaw, Loads, Material, State
+from ...model.former_names import renamed_argument
 from ..joint_laws.reduced_strength import reduced
 from ..results import NotConverged
 from ..system import BlockSystem
@@ -55,6 +56,7 @@ class NothingToReduce(ValueError):
     support."""
 
 
+@renamed_argument("compare_toes", "compare")
 def factor_of_safety(
     blocks: Blocks,
     materials: Sequence[Material],
