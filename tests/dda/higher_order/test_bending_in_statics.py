@@ -119,6 +119,19 @@ def test_the_answer_does_not_depend_on_how_it_is_drawn(how):
     assert other.energy.contact == pytest.approx(drawn.energy.contact, rel=1e-6)
 
 
+@pytest.mark.parametrize("joint", [JointLaw("penalty", 0.6), BY_AREA])
+def test_a_vertex_within_a_side_changes_nothing(joint):
+    side = np.array([[0, 0], [1.3, 0], [4, 0], [4, 1], [0, 1.0]])
+    floor = rectangle(-1, -1, 5, 0)
+    plain, split = (
+        after(system_of([floor, block], [1, 0], [1, 4], joint=joint), WEIGHT, 3)
+        for block in (rectangle(0, 0, 4, 1), side)
+    )
+    assert split.energy.elastic == pytest.approx(plain.energy.elastic, rel=1e-9)
+    assert split.energy.contact == pytest.approx(plain.energy.contact, rel=1e-9)
+    assert split.contacts["normal_force"].sum() == pytest.approx(4 * 2500 * 9.81, rel=1e-9)
+
+
 def test_blocks_of_all_orders_stand_in_one_column():
     """Orders 1 to 8, one upon another, in one system: each bears the weight of what is above it."""
     polygons = [rectangle(-1, -1, 2, 0), *(rectangle(0, k, 1, k + 1) for k in range(8))]
