@@ -5,8 +5,10 @@ Where two straight sides touch, their contact stress is integrated with the Gaus
     ∫ f ds ≈ ℓ Σ wᵢ f(sᵢ),   exact for polynomials of degree 2n − 3 with n = p + 2 points, p the higher order of both,
 
 so that a uniform and, with it, any stress of a degree up to p + 1 loads every deflection as its integral does (patch
-test), and springs kₙ ℓ wᵢ at the points are the springs of the face. Both ends are among the points: a corner that
-stays in contact when its face parts keeps its spring and its force. Each point opens, sticks and slides by itself.
+test). Joints with a stiffness kₙ (Pa/m) have springs kₙ ℓ wᵢ; penalty springs are proportional to wᵢ and, at both ends of
+a face, as stiff as those of a corner (`penalty_springs`): the points at which a block tips over do not give way by more
+than corners do, and a corner that stays in contact when its face parts keeps its spring and its force. Each point
+opens, sticks and slides by itself.
 
 The gap at a point is that of the strained blocks, linear between the ends of the face, and n · (u_a − u_b) of their
 deflections. CONTACT rows, one at each end of a face, carry the resultant and the moment of its points; what points
@@ -46,7 +48,9 @@ class Faces:
     count    (m,)    how many there are
     place    (n,)    of all contacts, along the face from 0 to 1; 0 of lone ones
     face     (n,)    of all contacts; −1 of lone ones
-    share    (n,)    part of the face's springs that each has
+    share    (n,)    part of the face that each has
+    stiffer  (n,)    by how much penalty springs are stiffer than shares of two corners, so that those at the ends of a face
+                     are as stiff as a corner's
     swapped  (m,)    the vertex at the second end belongs to the block whose edge is touched at the first
     corners  (n_corners, 7)   geometry of the corners
     """
@@ -61,6 +65,7 @@ class Faces:
     place: np.ndarray
     face: np.ndarray
     share: np.ndarray
+    stiffer: np.ndarray
     swapped: np.ndarray
     corners: np.ndarray
 
@@ -93,11 +98,17 @@ class Faces:
             count=count,
             place=np.concatenate([np.zeros(len(lone)), *(rules[n][0] for n in count.tolist())]),
             face=np.concatenate([np.full(len(lone), -1), np.repeat(np.arange(len(ends)), count)]),
-            # A lone corner has the springs that it has as the end of a face.
             share=np.concatenate(
                 [
                     np.array([2.0 * rules[n][1][0] for n in highest[lone].tolist()]),
                     *(rules[n][1] for n in count.tolist()),
+                ]
+            ),
+            stiffer=0.5
+            / np.concatenate(
+                [
+                    np.array([rules[n][1][0] for n in highest[lone].tolist()]),
+                    *(np.full(n, rules[n][1][0]) for n in count.tolist()),
                 ]
             ),
             swapped=found.block[ends[:, 0]] != found.block[ends[:, 1]],
@@ -188,7 +199,7 @@ class Faces:
         def shared(value: np.ndarray, which: np.ndarray) -> np.ndarray:
             first, second = self._both(value)
             sums = np.concatenate([value[self.lone], first + second]) * self.share
-            return np.where(same(which), whole, 1.0) * sums
+            return np.where(same(which), whole, self.stiffer) * sums
 
         def same(value: np.ndarray) -> np.ndarray:
             return np.concatenate([value[self.lone], self._both(value)[0]])
