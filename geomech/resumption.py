@@ -20,7 +20,7 @@ log = logging.getLogger(__name__)
 #: Keys of a scene that may be changed when a run is gone on with: none of them changes what has happened.
 ALLOWED = (
     "title", "run.end_time_s", "run.stop_at", "output.every", "output.interior", "output.interior_every",
-    "output.checkpoint_every", "render",
+    "output.checkpoint_every", "output.checkpoint_kept_mb", "render",
 )  # fmt: skip
 #: Ends of a run that are none.
 _BROKEN_OFF = ("interrupted", "failed")
@@ -84,9 +84,10 @@ class _Wish(NamedTuple):
 
 def _resumed(wish: _Wish) -> dict[str, Any]:
     folder = wish.folder
-    header, path = next(checkpoint_file.whole(folder / checkpoint_file.FOLDER), (None, None))
-    if path is None:
+    found = next(checkpoint_file.whole(folder / checkpoint_file.FOLDER), None)
+    if found is None:
         return _begin_again(wish)
+    header, path = found
     _refuse_other_sources(header, path)
     scene = None if header["scene"] is None else wish.scene()
     changes = {} if scene is None else _changes(header, scene.resolved())
@@ -195,7 +196,10 @@ def _begin_again(wish: _Wish) -> dict[str, Any]:
     folder = wish.folder
     end = _told_end(folder)
     if end is not None:
-        raise Finished(f"the run has ended ({end}), and it has no checkpoint: run the scene anew to let it go on")
+        raise Finished(
+            f"the run has ended ({end}), and it has no checkpoint: run the scene anew to let it go on, with a larger "
+            "output.checkpoint_kept_mb where it is its checkpoint's size that was too large"
+        )
     if not (folder / "scene.toml").is_file():
         raise NotResumable(f"{folder} holds neither a checkpoint nor a scene.toml: run the scene anew")
     wish.tell(f"{folder} holds no checkpoint yet: the run begins again")

@@ -449,6 +449,23 @@ def test_what_is_no_run_is_told(write, tmp_path, capfd):
     assert cli.main(["resume", str(out)]) == cli.DONE and "the run has ended" in capfd.readouterr().err
 
 
+def test_an_ended_run_keeps_no_checkpoint_above_the_size_that_is_asked_for(write, tmp_path):
+    ended = ["run.end_time_s=0.04"]
+    for kept_mb, there in ((16, True), (0.001, False)):
+        scene, out = load_scene(write(SLIDING), [*ended, f"output.checkpoint_kept_mb={kept_mb}"]), tmp_path / f"{there}"
+        summary = run(scene, out, standard_observers(scene, quiet=True))
+        assert bool(list((out / "checkpoint").glob("*.checkpoint"))) == there
+        assert ("checkpoint_not_kept_mb" in summary) == (not there)
+    # One that was broken off keeps its own, whatever its size.
+    scene, out = (
+        load_scene(write(SLIDING), ["output.checkpoint_kept_mb=0", "output.checkpoint_every=1"]),
+        tmp_path / "off",
+    )
+    with pytest.raises(KeyboardInterrupt):
+        run(scene, out, [*standard_observers(scene, quiet=True), _At(3, KeyboardInterrupt())])
+    assert list((out / "checkpoint").glob("*.checkpoint"))
+
+
 class _At(Breaks):
     """Fails after ``cycle``."""
 

@@ -129,8 +129,8 @@ class Body:
         self._factored_after_all = previous is not None and previous._factored_after_all
         solver = "dense" if self._factored_after_all else settings.solver
         holds = Holds(self.boundary, self.supports, self.support_segments, self._extent) if self.supports else None
-        holes_held = holds is not None and bool(self.mesh.edge_loop[holds.sources.source].any())
-        many = half_plane is None and is_iterated(solver, self.boundary.n_unknowns, holds, holes_held)
+        holes_supported = holds is not None and bool(self.mesh.edge_loop[holds.sources.source].any())
+        many = half_plane is None and is_iterated(solver, self.boundary.n_unknowns, holds, holes_supported)
         factored = previous is not None and not previous.compressed and previous.faces.n > 0
         self.compressed = is_compressed("compressed" if many else solver, self.faces.n_unknowns, factored)
         if half_plane is not None and self.boundary.n_unknowns > FACTORABLE:

@@ -58,22 +58,22 @@ class DisplacementLimit:
         self._size = np.sqrt(system.blocks.areas())
         self._elastic: float | None = None
         self.reference = begin.vertices.copy()
-        self.seated = self._held()
+        self.seated = self._constrained()
         near = system.contacts_near(begin)
         touches = near.gap_before <= MOVED * np.minimum(self._size[near.block], self._size[near.other])
         self._seat(near.block[touches], near.other[touches])
 
-    def _held(self) -> np.ndarray:
+    def _constrained(self) -> np.ndarray:
         """(n_blocks,) what is held by anything but contacts."""
         system, blocks = self._system, self._system.blocks
-        held = system.fixed.copy()
-        if blocks.held is not None:
-            held |= blocks.held.any(axis=1)
+        constrained = system.fixed.copy()
+        if blocks.constrained is not None:
+            constrained |= blocks.constrained.any(axis=1)
         for bolt in self._loads.bolts:
-            held[bolt.block] |= bolt.other == GROUND
+            constrained[bolt.block] |= bolt.other == GROUND
         for motion in (*self._loads.block_motions, *self._loads.point_motions):
-            held[motion.block] = True
-        return held
+            constrained[motion.block] = True
+        return constrained
 
     def _seat(self, block: np.ndarray, other: np.ndarray) -> None:
         """Seat what touches seated blocks, one after the other."""
@@ -127,7 +127,7 @@ class DisplacementLimit:
         """(n_blocks,) m: how much of the way that blocks have ``moved`` (n_blocks,) has stretched a bolt elastically."""
         longest = np.zeros(len(moved))
         for bolt, row in zip(self._loads.bolts, state.bolts, strict=False):
-            if not row["installed"] or row["broken"] or not 0.0 < bolt.stiffness or math.isinf(bolt.yield_force):
+            if not row["installed"] or row["broken"] or not bolt.stiffness > 0.0 or math.isinf(bolt.yield_force):
                 continue
             elastic, yielded = abs(row["force"] - bolt.pretension) / bolt.stiffness, abs(row["plastic"])
             if elastic > 0.0:

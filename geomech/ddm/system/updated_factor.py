@@ -103,7 +103,7 @@ class Border:
     ``gone`` in the base whose unknown is held or no longer there; unknowns ``turned`` whose equation is another."""
 
     def __init__(self, of: BaseOf, rows: Rows):
-        free = ~rows.held
+        free = ~rows.prescribed
         known = free & (of.at >= 0)
         self.free, self.kept = np.flatnonzero(free), np.flatnonzero(known)
         self.places = of.at[self.kept]
@@ -193,7 +193,8 @@ class _Columns:
     """Columns (n,) that are known by a number, made when first asked for."""
 
     def __init__(self, n: int):
-        self.n, self._at, self._values = n, {}, np.empty((n, 0), order="F")
+        self.n, self._values = n, np.empty((n, 0), order="F")
+        self._at: dict[int, int] = {}
 
     def of(self, numbers: np.ndarray, make) -> np.ndarray:
         """(n, k) those of ``numbers`` (k,); ``make(missing)`` makes what is not there."""

@@ -13,13 +13,15 @@ from geomech.conventions import rotate_stress
 from geomech.model import Cracks, Cycle, Material
 from geomech.model.blocks.block_motion import Motion
 
-from .block_motion import rotation
+from .block_motion import displacement, rotation
 from .grids import principal_stresses, six_components, von_mises
 from .triangulate import Triangles
 from .vtu import TRIANGLE, Grid
 
 #: A node on a crack face is evaluated this far inside its own side, relative to its shortest triangle edge.
 _ASIDE = 1e-5
+#: Triangles of a block of higher order, at least, and of all of them together, about.
+_FEWEST, _OF_BENT = 60, 40_000
 #: Cracks that turn by more than this are sharp there: stress is singular, rad.
 _SHARP = math.radians(20)
 
@@ -52,14 +54,22 @@ class InteriorMeshes:
         self._cracked_materials: set[int] = set()
         self._triangles = Triangles()
 
+    def note_cracked(self, cycle: Cycle) -> None:
+        """Take the materials that hold cracks at ``cycle`` for those that crack, before an earlier cycle is drawn."""
+        self._cracked_materials |= {int(cycle.blocks.material[b]) for b in cycle.inside}
+
     def grid(self, cycle: Cycle, materials: Sequence[Material], motion: Motion, configuration: str) -> Grid:
         """The rock of ``cycle`` as one grid; empty until some block holds a crack."""
         blocks = cycle.blocks
-        self._cracked_materials |= {int(blocks.material[b]) for b in cycle.bodies}
+        self.note_cracked(cycle)
         whole = np.isin(blocks.material, [*self._cracked_materials]) & ~blocks.fixed
-        whole[[*cycle.bodies]] = False
+        whole[[*cycle.inside]] = False
         before, self._kept = self._kept, {}
-        parts = [self._block(cycle, b, body, motion, before) for b, body in sorted(cycle.bodies.items())]
+        parts = [self._block(cycle, b, body, motion, before) for b, body in sorted(cycle.inside.items())]
+        # Blocks whose cracks nobody has solved for yet: before the first step.
+        waiting = np.intersect1d(np.flatnonzero(whole), cycle.cracks.block).tolist()
+        whole[waiting] = False
+        parts += [self._waiting_block(cycle, b, motion, before) for b in waiting]
         parts += [self._whole_blocks(cycle, whole)] if whole.any() else []
         first = np.cumsum([0, *(len(p["points"]) for p in parts)])
 
@@ -111,6 +121,18 @@ class InteriorMeshes:
             "stress": rotate_stress(stress[:n], turn),
         }
 
+    def _waiting_block(self, cycle: Cycle, b: int, motion: Motion, before: dict[bytes, _Kept]) -> dict[str, np.ndarray]:
+        """A block with cracks before they are solved for: the one stress and the motion that it has as a block."""
+        kept = self._mesh(cycle, b, before)
+        owner = np.full(len(kept.points), b)
+        return {
+            "owner": owner,
+            "points": kept.mesh.points,
+            "triangles": kept.mesh.triangles,
+            "moved": displacement(motion, owner, kept.mesh.points),
+            "stress": cycle.state.stress[owner],
+        }
+
     def _whole_blocks(self, cycle: Cycle, whole: np.ndarray) -> dict[str, np.ndarray]:
         """Blocks without cracks (``whole``, a mask) have one strain and one stress each: their corners say it all."""
         blocks, state = cycle.blocks, cycle.state
@@ -133,12 +155,18 @@ class InteriorMeshes:
         if kept is None:
             from geomech.shapes.meshing import mesh_interior
 
-            size = math.sqrt(cycle.blocks.areas()[b] / (0.433 * self.n_triangles))
+            size = math.sqrt(cycle.blocks.areas()[b] / (0.433 * self._triangles_of(cycle, b)))
             mesh = mesh_interior(loops, cracks, size, size / self.tip_ratio)
             look_from = mesh.points + _ASIDE * _local_size(mesh)[:, None] * mesh.side
             kept = _Kept(mesh, look_from, _node_areas(mesh), *_about_singular(mesh, cracks))
         self._kept[key] = kept
         return kept
+
+    def _triangles_of(self, cycle: Cycle, b: int) -> int:
+        """About how many triangles block ``b`` gets: fewer where many blocks bend, whose stress is smooth."""
+        if b not in cycle.bent:
+            return self.n_triangles
+        return max(_FEWEST, min(self.n_triangles, _OF_BENT // len(cycle.bent)))
 
 
 def _singular_nodes(cracks: Cracks) -> np.ndarray:
