@@ -14,7 +14,10 @@ from .interruption import Interruption
 from .model import Cycle, Problem
 
 if TYPE_CHECKING:
+    from . import dda
     from .coupling import Coupling
+    from .report.safety_page import SafetyReport
+    from .scene import Scene
 
 log = logging.getLogger(__name__)
 
@@ -41,7 +44,7 @@ def refuse_results(folders: Iterable[Path]) -> None:
         run_lock.refuse_results(folders)
 
 
-def cycles(scene) -> Iterator[Cycle]:
+def cycles(scene: Scene | str | Path) -> Iterator[Cycle]:
     """The coupling cycles of ``scene`` (a loaded scene, or a path to one); nothing is written.
 
     >>> for cycle in geomech.cycles("slope.toml"):
@@ -56,7 +59,7 @@ def cycles(scene) -> Iterator[Cycle]:
 
 
 def run(
-    scene,
+    scene: Scene | str | Path,
     out: str | Path | None = None,
     observers: Iterable[Any] | None = None,
     *,
@@ -192,12 +195,15 @@ class CoupledRun:
         if coupling.under_way is None or last:
             self.before_the_last = last
         # (Between the passes of the last step there is one already, from before it.)
-        if self.interruption.asked or last or (self.checkpoints.due and not self.before_the_last):
+        due = self.checkpoints is not None and self.checkpoints.due
+        if self.interruption.asked or last or (due and not self.before_the_last):
             self._store(coupling)
         if self.interruption.asked:
             raise KeyboardInterrupt
 
     def _store(self, coupling: Coupling) -> None:
+        if self.checkpoints is None:
+            return
         content = {
             "coupling": coupling,
             "observers": self.group.memories(),
@@ -220,14 +226,14 @@ def cracked_and_free(problem: Problem) -> list[str]:
 
 
 def factor_of_safety(
-    scene,
+    scene: Scene | str | Path,
     load_time: float | None = None,
     *,
     without_cracks: bool = False,
     along: Sequence[str] | None = None,
     divide: Mapping[str, float] | None = None,
-    **wishes,
-):
+    **wishes: Any,
+) -> dda.FactorOfSafety:
     """`geomech.dda.FactorOfSafety` of the blocks of ``scene``, by strength reduction under the loads of ``load_time`` s
     (default: the scene's end). ``wishes`` as for `geomech.dda.factor_of_safety`: tolerance, watch …
 
@@ -250,14 +256,14 @@ def factor_of_safety(
 
 
 def safety_report(
-    scene,
+    scene: Scene | str | Path,
     load_time: float | None = None,
     *,
     without_cracks: bool = False,
     along: Sequence[str] | None = None,
     divide: Mapping[str, float] | None = None,
-    **wishes,
-):
+    **wishes: Any,
+) -> SafetyReport:
     """`geomech.report.safety_page.SafetyReport` of the same: its ``text()``, ``as_dict()`` and ``draw(path)``; the factor
     itself is ``found``.
 
@@ -292,7 +298,7 @@ def safety_report(
     )  # fmt: skip
 
 
-def _spare(scene, folder: Path) -> None:
+def _spare(scene: Scene, folder: Path) -> None:
     """Refuse to put a run, and with it a scene.toml, where the scene itself is kept."""
     kept = folder / "scene.toml"
     if kept.exists() and kept.samefile(scene.path):
@@ -310,7 +316,7 @@ def _end_reason(stopping: list[str], error: BaseException | None) -> str:
     return stopping[0] if stopping else "end of the scene"
 
 
-def _loaded(scene):
+def _loaded(scene: Scene | str | Path) -> Scene:
     if isinstance(scene, (str, Path)):
         from .scene import load_scene
 

@@ -88,9 +88,10 @@ class _Wish(NamedTuple):
 
 def _resumed(wish: _Wish) -> dict[str, Any]:
     folder = wish.folder
-    header, path = next(checkpoint_file.whole(folder / checkpoint_file.FOLDER), (None, None))
-    if path is None:
+    found = next(checkpoint_file.whole(folder / checkpoint_file.FOLDER), None)
+    if found is None:
         return _begin_again(wish)
+    header, path = found
     _refuse_other_sources(header, path)
     scene = None if header["scene"] is None else wish.scene()
     changes = {} if scene is None else _changes(header, scene.resolved())

@@ -308,7 +308,8 @@ class Coupling:
         events = step.pending + self.changes.events(now, found)
         step.stops = step.stops or self._stops(events)
         # With control "toughness" nothing grows before the load at which a tip reaches its toughness.
-        may_grow = step.growth_pass < step.most and (not self.follows or self.events.reached)
+        driven = not self.follows or (self.events is not None and self.events.reached)
+        may_grow = step.growth_pass < step.most and driven
         growth = None
         if may_grow and not step.stops:
             longest = self._longest(step, found.tips)

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..dda.higher_order.bent_body import bent_bodies
 from ..dda.step_control.step_limits import shortened
 from ..ddm.counters import Work
 from ..model import WEIGHT, Blocks, CrackFaces, Cracks, Cycle, Event, Motion, Problem, Skip, State
@@ -33,6 +34,12 @@ def record(
     if endless is not None:
         state = replace(state, stress=np.broadcast_to(endless.stress_at(state.time), state.stress.shape).copy())
     work = vars(Work.total(now.works)) if now.works else {}
+    bent = bent_bodies(now.system.deflected, state, motion)
+
+    def moved(block: int, point: tuple[float, float]) -> np.ndarray:
+        affine = motion.current(block, point) - np.asarray(point)
+        return affine + bent[block].deflection(np.array([point], float))[0] if block in bent else affine
+
     cycle = _LazyCycle(
         number=now.number,
         load_step=now.load_step,
@@ -44,8 +51,9 @@ def record(
         cracks=now.cracks,
         tips=tips,
         bodies=solutions,
+        bent=bent,
         events=tuple(events),
-        monitors={name: motion.current(b, point) - np.asarray(point) for name, (b, point) in now.monitors.items()},
+        monitors={name: moved(b, point) for name, (b, point) in now.monitors.items()},
         statistics=statistics,
         seconds=dict(now.timed.seconds),
         work=work,

@@ -28,6 +28,8 @@ class AttemptedStep(Protocol):
     moments: np.ndarray
     largest: float
 
+    def path(self, after: np.ndarray) -> tuple[np.ndarray, np.ndarray]: ...
+
 
 class SteppedSystem(Protocol):
     """Blocks with what stays from step to step: material, mass, freedom, contact finder, time scheme.

@@ -14,6 +14,10 @@ from .contact_detection.inherited_contacts import InheritedContacts, at_their_sp
 from .contact_detection.initial_overlap import refuse_overlap
 from .counters import Work
 from .excavation import Excavations, until_next_event
+from .higher_order.bending_step import BendingAttempt
+from .higher_order.deflected_blocks import DeflectedBlocks
+from .higher_order.six_row_system import six_row_pattern
+from .higher_order.unsupported import refuse_unsupported, refuse_unsupported_loads
 from .kinematics.midpoint_configuration import MidpointConfiguration
 from .kinematics.newmark import TimeScheme
 from .kinematics.rigid_blocks import with_rigid
@@ -118,7 +122,12 @@ class BlockSystem:
         self.finder = ContactFinder(
             blocks, self.joints, joint_index, self.settings, modulus, rigid, self.mass, self.work
         )
+        self.deflected = None
         self._take_out(None, None)
+        if blocks.order is not None and (np.asarray(blocks.order) > 1)[~self.fixed].any():
+            refuse_unsupported(blocks, self.materials, self.joints, self.settings)
+            self.deflected = DeflectedBlocks(blocks, self.fixed, self.density, self.stiffness)
+            self.finder.at_corners = True
         rigid = rigid & ~self.fixed
         self.rigid = np.flatnonzero(rigid)
         self.compliance[rigid] = 0.0
@@ -219,6 +228,9 @@ class BlockSystem:
         # (Kernels are compiled for arrays that can be written to.)
         state = state.writable()
         self._stray_loads.refuse(loads)
+        if self.deflected is not None:
+            refuse_unsupported_loads(loads)
+            self.finder.deflection, self.finder.sag = self.deflected.deflection_of(state)
         removed = self.removed(loads, state.time)
         if removed is not self.taken_out:
             self._take_out(removed, self._excavations.drained(loads, state.time))
@@ -247,7 +259,7 @@ class BlockSystem:
             # What was tried before makes room first: its factors may be of other contacts than those of this attempt.
             attempt = result = None
             try:
-                attempt = Attempt(
+                attempt = (Attempt if self.deflected is None else BendingAttempt)(
                     self, state, vertices, carried, moments, loads, dt, crack, found, cuts, load_time,
                 )  # fmt: skip
                 result = attempt.result()
@@ -342,6 +354,8 @@ class BlockSystem:
         """The contacts with which the step is to be begun again because corners have met on the way that the ``attempt``
         went, with its contacts in ``state`` (n,), but not where they were expected to; None where all did."""
         found, moved = attempt.found, attempt.new_vertices - attempt.vertices
+        if found.lumped is not None:
+            found = found.lumped
         pressed = bool(((found.corner >= 0) & (state != OPEN)).any())
         strayed = np.abs(moved if search.motion is None else moved - search.motion).max()
         if not pressed and not strayed > 0.5 * search.margin:
@@ -384,6 +398,8 @@ class BlockSystem:
         rows = state.contacts
         # What has yet to come nearer presses nowhere.
         lift = float(np.abs(rows["lift"][(rows["state"] != OPEN) | (rows["lift"] > 0.0)]).max(initial=0.0))
+        if self.deflected is not None:
+            lift += 2.0 * float(self.finder.deflection.max())
         return self.limits.windows(vertices, carried, moments, dt, gravity, lift)
 
     def _standing(self, state: State, vertices: np.ndarray) -> Windows:
@@ -434,6 +450,13 @@ class BlockSystem:
         and its solver: kept from step to step while the same blocks do."""
         if linked is not None:
             block, other = np.concatenate([block, linked[0]]), np.concatenate([other, linked[1]])
+        if self.deflected is not None:
+            known = None if self._sparse is None else self._sparse[1]
+            pattern = six_row_pattern(self.free, self.deflected.rows, block, other, moments[:, 1:3], known)
+            if pattern.solver is not None:
+                pattern.solver.work = self.work
+            self._sparse = np.zeros((2, 0)), pattern
+            return pattern
         if int(self.free.max()) + 1 <= assembly.DENSE_BLOCKS:
             return assembly.dense_pattern(self.free, block, other)
         pairs, pattern = np.stack([block, other]), None

@@ -385,10 +385,7 @@ class Attempt:
 
         def solve(contacts: ContactSet, stiff: Springs, start: np.ndarray, stretch: np.ndarray) -> Settled:
             def settled(contacts: ContactSet) -> Settled:
-                equations = Equations(
-                    pattern, matrix, right, contacts, vectors, stiff, start, slack, curved, system.scheme.static,
-                    self._expected_unknowns(),
-                )  # fmt: skip
+                equations = self._equations(pattern, matrix, right, contacts, vectors, stiff, start, slack, curved)
                 return settle(equations, system.settings.max_open_close_iterations, system.settings.contact_solver)
 
             return (
@@ -401,6 +398,13 @@ class Attempt:
         if not system.allowed_penetration or not len(found):
             return solve(found, springs, gap, found.stretch)
         return settle_augmented(solve, found, springs, gap, system.finder.on_penalty(found), system.allowed_penetration)
+
+    def _equations(self, pattern, matrix, right, contacts, vectors, springs, gap, slack, curved) -> Equations:
+        """The equations of the step but for the states of ``contacts``."""
+        return Equations(
+            pattern, matrix, right, contacts, vectors, springs, gap, slack, curved, self.system.scheme.static,
+            self._expected_unknowns(),
+        )  # fmt: skip
 
     def _expected_unknowns(self) -> np.ndarray | None:
         """(6 n_free,) what the velocity makes of this step, in the unknowns of `assembly`; None in statics."""
@@ -461,6 +465,10 @@ class Attempt:
             self._stop(imposed)
             if self.striking is not None:
                 self._rebound(imposed)
+
+    def path(self, after: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """(n_vertices, 2) twice: where corners are before the step, and after it, from the vertices ``after`` it, m."""
+        return self.vertices, after
 
     def _remembered(self, mean: np.ndarray) -> np.ndarray | None:
         """(n_blocks, 6) the acceleration that the step began with, as far as it still holds; None before there is any.
@@ -565,7 +573,8 @@ class Attempt:
         state, actions, dt, gravity, midpoint = self.state, self.actions, self.dt, self.gravity, self.midpoint
         acting = self.acting
         if found.points is not None:
-            acting = midpoint.contacts(found.points.corners, found.block, found.other, self._along(found))
+            corners = found.lumped
+            acting = midpoint.contacts(found.points.corners, corners.block, corners.other, self._along(corners))
         rows = found.rows(settled, acting)
         reaction, acting_right, largest_force, acted = None, self.right, 0.0, {}
         points, load, turn = self.points, self.load, self.increment[:, 2]
@@ -576,13 +585,9 @@ class Attempt:
             acting_right, largest_force = actions.with_bolt_forces(self.right), actions.largest_bolt_force
             load = midpoint.loads_back(generalised(points, self.edges, midpoint.centroid))
             load = load + actions.work_forces(reaction, rows, midpoint.centroid)
-        end_shear = end_of_step(found.shear, settled.shear_force, settled.state == STICK, self.weight)
+        end_shear = self._end_shear()
         energy = self._energy(load, end_shear)
-        residual, ratio = imbalance(
-            self.matrix, acting_right, self.vectors, found.block, found.other, self.order, settled.unknowns,
-            settled.normal_force, settled.shear_force, self.acceleration, self.density, self.moments, gravity, load,
-            largest_force,
-        )  # fmt: skip
+        residual, ratio = self._imbalance(acting_right, load, largest_force)
         new_stress, acceleration = self.new_stress, self.acceleration
         if len(system.rigid):
             from_outside = load.copy()
@@ -599,7 +604,7 @@ class Attempt:
         if scheme.weight != 1.0 or found.points is not None:
             # Of what springs inside faces bear in shear, each goes on with its own.
             memory = copied(rows)
-            memory["shear_force"] = end_shear
+            memory["shear_force"] = found.shear_of_rows(end_shear)
         if system.taken_out is not None:
             new_stress[system.taken_out] = 0.0
         beyond = None
@@ -645,8 +650,22 @@ class Attempt:
             self.slack,
         )  # fmt: skip
         return StepResult(
-            new_state, dt, rows, forces, acceleration, energy, reserve, midpoint.vertices, self.turn, found.arcs,
+            new_state, dt, rows, forces, acceleration, energy, found.of_rows(reserve), midpoint.vertices, self.turn, found.arcs,
             statistics, self._worst_overlap() if energy.overlap > 0.0 else None,
+        )  # fmt: skip
+
+    def _end_shear(self) -> np.ndarray:
+        """(n,) N shear forces of contacts at the end of the step."""
+        settled = self.settled
+        return end_of_step(self.found.shear, settled.shear_force, settled.state == STICK, self.weight)
+
+    def _imbalance(self, right: np.ndarray, load: np.ndarray, largest: float) -> tuple[float, float]:
+        """As `imbalance`."""
+        found, settled = self.found, self.settled
+        return imbalance(
+            self.matrix, right, self.vectors, found.block, found.other, self.order, settled.unknowns,
+            settled.normal_force, settled.shear_force, self.acceleration, self.density, self.moments, self.gravity,
+            load, largest,
         )  # fmt: skip
 
     def _worst_overlap(self) -> tuple[float, int, int, float, float, float]:

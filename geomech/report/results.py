@@ -136,7 +136,8 @@ class RunResults:
         return f"<h4>{html.escape(self.title)}</h4><table>{table}</table>{_shown(self._pictures())}"
 
     def _pictures(self) -> Sequence[Path]:
-        return [path for path in (self.folder / "pictures" / "specimen.png",) if path.is_file()]
+        drawn = (self.folder / "pictures" / name for name in ("specimen.png", "displacement.png"))
+        return [path for path in drawn if path.is_file()][:1]
 
 
 def _shown(pictures: Sequence[Path]) -> str:

@@ -55,6 +55,12 @@ class Drawing:
     crs: dict[str, Any] | None = None
     folder: FilePath | None = None
 
+    def assembled(self) -> tuple[Blocks, Cracks]:
+        """Blocks and cracks. Raises ValueError where the drawing cannot be assembled."""
+        if self.blocks is None or self.cracks is None:
+            raise ValueError("the drawing could not be assembled")
+        return self.blocks, self.cracks
+
     def path_of_crack(self, name: str) -> Path:
         """Where in the scene the crack ``name`` is drawn, or what made it."""
         whole = ("geometry",) if self.model is None else ("geometry", "model")

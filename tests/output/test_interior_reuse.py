@@ -27,7 +27,7 @@ def cycle(corners: list[float], tips: list[float]) -> SimpleNamespace:
     cracks = Cracks.from_polylines(lines, block=range(len(corners)), aperture=0.0)
     bodies = {b: Field() for b in range(len(corners))}
     state = SimpleNamespace(stress=np.zeros((len(corners), 3)), vertices=blocks.vertices)
-    return SimpleNamespace(blocks=blocks, cracks=cracks, bodies=bodies, state=state)
+    return SimpleNamespace(blocks=blocks, cracks=cracks, bodies=bodies, inside=bodies, bent={}, state=state)
 
 
 def motion(n: int) -> SimpleNamespace:

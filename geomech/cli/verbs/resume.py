@@ -18,7 +18,7 @@ def declare(verbs: Verbs) -> None:
                                   "checkpoint",
         "geomech resume outputs/two_cracks/phi_30\ngeomech resume outputs/slope --set run.end_time_s=20",
     )  # fmt: skip
-    resume.description += (
+    resume.description = str(resume.description) + (
         " What is written is bit for bit what the run would have left uninterrupted. A run ends its cycle and stores "
         "itself on Ctrl-C or SIGTERM; a second one ends it at once. A run that a "
         "script has put in the background ignores Ctrl-C and ends on SIGTERM (`kill`)."

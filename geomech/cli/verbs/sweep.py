@@ -21,7 +21,7 @@ def declare(verbs: Verbs) -> None:
         "geomech sweep slope.toml --vary 'joints.beds.friction_angle_deg=normal(30, 4)' --runs 1000 --sampling sobol\n"
         "geomech sweep slope.toml --out outputs/slope_sweep --resume",
     )  # fmt: skip
-    made.description += (
+    made.description = str(made.description) + (
         " What varies, and all other settings, may stand in [sweep] of the scene or in a sweep.toml beside it; "
         "what the "
         "command line says goes before. One row a run goes to runs.csv and runs.parquet, a page to report.html."

@@ -125,7 +125,7 @@ def take_growth(now: CrackedBlocks, growth, state: State, solutions: dict) -> tu
         now.take_cracks(growth.cracks)
         return tuple(events)
     cut = now.blocks
-    for b in np.flatnonzero(np.bincount(split.parent, minlength=now.blocks.n_blocks) > 1):
+    for b in np.flatnonzero(np.bincount(split.parent, minlength=now.blocks.n_blocks) > 1).tolist():
         parts = np.flatnonzero(split.parent == b)
         centre = now.blocks.loops(b)[0].mean(axis=0)
         events.append(event(now, "split", state, centre, f"{now.blocks.names[b]} is cut into {len(parts)} blocks"))

@@ -188,7 +188,8 @@ def _found(key: np.ndarray, among: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 def _of_both(segment: np.ndarray, other: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Which of the segments (n, 4) and (m, 4) are in both: (n,), (m,) bool."""
     names = [[row.tobytes() for row in np.ascontiguousarray(each)] for each in (segment, other)]
-    return tuple(np.array([name in set(names[1 - k]) for name in names[k]], bool) for k in range(2))
+    own, others = (set(each) for each in names)
+    return np.array([name in others for name in names[0]], bool), np.array([name in own for name in names[1]], bool)
 
 
 def _turns(before: np.ndarray, after: np.ndarray) -> list[tuple[str, bool]]:

@@ -115,6 +115,15 @@ class ContactFinder:
         self._rigid = rigid
         # Triangles follow a rock that bends; multipliers hold what springs would give.
         self._bends = (np.diff(self._start) > 3) & ~rigid & ~blocks.fixed & (settings.contact == "penalty")
+        if blocks.order is not None:
+            # These bend themselves.
+            self._bends &= np.asarray(blocks.order) == 1
+        #: Whether contacts are found at the corners of faces only: points along faces are found from them.
+        self.at_corners = False
+        #: (n_blocks,) m: how far deflection moves a point of each block from where its vertices say, at most.
+        self.deflection = np.zeros(blocks.n_blocks)
+        #: (n_blocks,) m: how far its sides lie off the straight lines between their corners, at most.
+        self.sag = np.zeros(blocks.n_blocks)
         self._rounding, self._longest = corner_lengths(blocks, settings.corner_rounding)
         #: (n_vertices,) m: the lengths over which corners are rounded.
         self.rounding = np.minimum(self._rounding, self._longest)
@@ -213,7 +222,7 @@ class ContactFinder:
             cohesion = np.where(found.bonded > 0, self._table.cohesion[found.law], 0.0)
             whole = WholeFaces.of(found.block, found.other, found.geometry, found.law, cohesion)
             found = replace(found, whole=whole).sharing_cohesion(found.state, found.bonded)
-        return found if lumped else self._with_springs_in_faces(found, vertices, broken)
+        return found if lumped or self.at_corners else self._with_springs_in_faces(found, vertices, broken)
 
     def _meeting(
         self, old: np.ndarray, vertices: np.ndarray, window: float | Windows, motion: np.ndarray | None, margin: float
@@ -415,7 +424,7 @@ class ContactFinder:
         closed = old["state"] != OPEN
         for blocks in (old["block"][closed], old["other"][closed]):
             np.maximum.at(deepest, blocks, -old["gap"][closed])
-        return deepest
+        return deepest + self.deflection
 
     def _tilt(self, vertices, edge, corner, geometry) -> np.ndarray:
         """(n,) rad, as in `ContactSet`."""

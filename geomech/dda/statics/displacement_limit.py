@@ -126,7 +126,7 @@ class DisplacementLimit:
         """(n_blocks,) m: how much of the way that blocks have ``moved`` (n_blocks,) has stretched a bolt elastically."""
         longest = np.zeros(len(moved))
         for bolt, row in zip(self._loads.bolts, state.bolts, strict=False):
-            if not row["installed"] or row["broken"] or not 0.0 < bolt.stiffness or math.isinf(bolt.yield_force):
+            if not row["installed"] or row["broken"] or not bolt.stiffness > 0.0 or math.isinf(bolt.yield_force):
                 continue
             elastic, yielded = abs(row["force"] - bolt.pretension) / bolt.stiffness, abs(row["plastic"])
             if elastic > 0.0:

@@ -158,7 +158,7 @@ class StepLimits:
         """What has gone where contacts saw nothing come; None for nothing."""
         if len(self._size) < 2:
             return None
-        before, after = attempt.vertices, result.state.vertices
+        before, after = attempt.path(result.state.vertices)
         one, two = boxes(before, self._start[:-1]), boxes(after, self._start[:-1])
         box = np.concatenate([np.minimum(one[:, :2], two[:, :2]), np.maximum(one[:, 2:], two[:, 2:])], axis=1)
         pairs = self._finder.near_boxes(box)
@@ -203,6 +203,12 @@ class StepLimits:
             return np.repeat(of_block, np.diff(self._start))
         for vertices in (rows["vertex"], rows["edge"], self._next[rows["edge"]]):
             np.maximum.at(out, vertices, deep)
+        if self._finder.at_corners:
+            # Sides that bend lie off the straight lines between their corners.
+            sag, both = self._finder.sag, np.zeros(len(self._size))
+            for one, two in ((rows["block"], rows["other"]), (rows["other"], rows["block"])):
+                np.maximum.at(both, one, sag[one] + sag[two])
+            out += np.repeat(both, np.diff(self._start))
         return out
 
     def pressed_apart(self, attempt: AttemptedStep, result: StepResult) -> Crossed | None:

@@ -70,7 +70,7 @@ def settle(
         if not wrong.any():
             return Settled(closed, solves, undecided, -float(short.min(where=undecided, initial=0.0)))
         key = closed.tobytes()
-        again = key in been or single and len(been) == most
+        again = key in been or (single and len(been) == most)
         been.setdefault(key, (closed, -float(short.min())))
         if again and single:
             undecided = undecided | np.any([state != round_[0][0] for state, _ in round_], axis=0)

@@ -98,8 +98,9 @@ class Chords:
         self.kappa = np.full(len(tips), np.nan)
         #: … and the first trial chords.
         self.first = self.start.copy()
-        for row, point in enumerate(tips["point"].tolist() if memory else ()):
-            last, start = memory.get(tuple(point)), float(self.start[row])
+        known = memory or {}
+        for row, point in enumerate(tips["point"].tolist() if known else ()):
+            last, start = known.get(tuple(point)), float(self.start[row])
             if last is not None and abs(start) <= KINK:
                 self.kappa[row] = last.kappa_at(start)
                 # Without κ a trial is judged as one along the tangent, so it has to be one.

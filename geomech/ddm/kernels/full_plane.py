@@ -263,7 +263,7 @@ def _sort(points, first, n, elements, e, tol, side, tile, chosen, count):
     return c, tx, ty
 
 
-@_part
+@_inlined
 def _force_tractions(w, n1, factor, nu, y, turn, parts):
     """Traction (normal + i tangential) of line forces along and across an element, into ``parts``: half the deviator
     (σyy − σxx)/2 + i shear, rotated, plus half the trace."""
@@ -275,7 +275,7 @@ def _force_tractions(w, n1, factor, nu, y, turn, parts):
         store(parts, at + _B, (b + (1.0 - 2.0 * nu) * times_i(a)) * turn - im(a))
 
 
-@_part
+@_inlined
 def _jump_tractions(w, n1, f2, y, turn, parts):
     """Traction (normal + i tangential) of displacement jumps along and across an element."""
     f3 = f2 * y
@@ -284,6 +284,18 @@ def _jump_tractions(w, n1, f2, y, turn, parts):
         b, d = f2 * load_complex(w, at + _B), (f3 * load_complex(w, at + _D)) * turn
         store(parts, at, d - times_i(b) * turn - im(b))
         store(parts, at + _B, times_i(d) - re(b))
+
+
+@_inlined
+def nodal_sums(parts, step, nodal, source, j, n1):
+    """Tractions of the nodal density ``j`` along and across an element: Σ_k nodal[source, k, j] times those of the
+    monomials in ``parts``, ``step`` numbers an order."""
+    along, normal = both(splat(0.0), splat(0.0)), both(splat(0.0), splat(0.0))
+    for k in range(n1):
+        t = nodal[source, k, j]
+        along = along + t * load_complex(parts, k * step)
+        normal = normal + t * load_complex(parts, k * step + _B)
+    return along, normal
 
 
 @_jit
@@ -332,11 +344,7 @@ def tractions(points, tangents, per, first, last, elements, order, kernel, table
                     for k in range(WIDTH):
                         lane_places[k] = places[chosen[batch + k]]
                     for j in range(n1):
-                        along, normal = both(splat(0.0), splat(0.0)), both(splat(0.0), splat(0.0))
-                        for k in range(n1):
-                            t = nodal[source, k, j]
-                            along = along + t * load_complex(parts, k * _STEP)
-                            normal = normal + t * load_complex(parts, k * _STEP + _B)
+                        along, normal = nodal_sums(parts, _STEP, nodal, source, j, n1)
                         # Lanes with the same point write the same number to the same place.
                         at = (2 * e * n1 + j) * height
                         scatter(out, at + per, lane_places, 0, re(along))

@@ -27,7 +27,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from .full_plane import _CLASSES, _ROW, _TERMS, _TILE, _first_moment, _inlined, _jit, _part, _sort
+from .full_plane import _CLASSES, _ROW, _TERMS, _TILE, _first_moment, _inlined, _jit, _part, _sort, nodal_sums
 from .shape_functions import MAX_ORDER
 from .simd import (
     WIDTH,
@@ -126,7 +126,7 @@ def _moments(kind, distance, zp, zm, highest, table, w):
             t = (t - 3.0 * d) * i
 
 
-@_part
+@_inlined
 def _force_tractions(w, n1, g, kappa, eta, ty, conj, turn, lift, parts):
     """Traction (normal + i tangential) of line forces along and across an element, into ``parts``."""
     conj2 = conj * conj
@@ -146,7 +146,7 @@ def _force_tractions(w, n1, g, kappa, eta, ty, conj, turn, lift, parts):
         store(parts, at + _B, whole + (2.0 * g) * re(half))
 
 
-@_part
+@_inlined
 def _jump_tractions(w, n1, g, eta, ty, conj, turn, lift, parts):
     """Traction (normal + i tangential) of displacement jumps along and across an element."""
     conj2 = conj * conj
@@ -211,11 +211,7 @@ def tractions(points, tangents, per, first, last, elements, order, kernel, table
                     for k in range(WIDTH):
                         lane_places[k] = places[chosen[batch + k]]
                     for j in range(n1):
-                        along, normal = both(splat(0.0), splat(0.0)), both(splat(0.0), splat(0.0))
-                        for k in range(n1):
-                            t = nodal[source, k, j]
-                            along = along + t * load_complex(parts, k * _STEP)
-                            normal = normal + t * load_complex(parts, k * _STEP + _B)
+                        along, normal = nodal_sums(parts, _STEP, nodal, source, j, n1)
                         at = (2 * e * n1 + j) * height
                         pile(out, at + per, lane_places, 0, re(along))
                         pile(out, at, lane_places, 0, -im(along))

@@ -41,6 +41,8 @@ class Blocks:
         fixed         (n_blocks,)       True: the block does not move
         held          (n_blocks, 6)     True: that unknown (u0, v0, r0, εx, εy, γxy) of the block is constrained to
                                         zero, as for a guided platen; None: no moving block is constrained
+        order         (n_blocks,)       p of the complete polynomial that is a block's displacement, 1 to 8; None: all are
+                                        of first order
         edge_name     (n_vertices,)     index into ``edge_names`` (0: the empty name, unnamed)
         edge_names    tuple of str      e.g. ("", "load:top", "joint:set1")
         names         tuple of str      one name per block, for messages and files
@@ -55,6 +57,7 @@ class Blocks:
     edge_names: tuple[str, ...] = ("",)
     names: tuple[str, ...] = ()
     constrained: np.ndarray | None = None
+    order: np.ndarray | None = None
 
     @classmethod
     def from_polygons(
@@ -66,6 +69,7 @@ class Blocks:
         constrained: Sequence[Sequence[bool]] | None = None,
         edge_names: Sequence[Sequence[Sequence[str]]] | None = None,
         names: Sequence[str] | None = None,
+        order: Sequence[int] | None = None,
         held: Sequence[Sequence[bool]] | None = None,
     ) -> Blocks:
         """Build from ``polygons[block][loop]`` = (n, 2) vertices, m, without repeating the first.
@@ -85,7 +89,8 @@ class Blocks:
         if held is not None:
             _warn_held()
             constrained = held
-        given = {"material": material, "fixed": fixed, "held": constrained, "edge_names": edge_names, "names": names}
+        given = {"material": material, "fixed": fixed, "held": constrained, "edge_names": edge_names, "names": names,
+                 "order": order}  # fmt: skip
         _refuse_lengths(n_blocks, given)
         names = tuple(names) if names is not None else tuple(f"block {b}" for b in range(n_blocks))
         loops, block_loop = [], [0]
@@ -132,6 +137,7 @@ class Blocks:
             constrained=np.asarray(constrained, dtype=bool)
             if constrained is not None and np.any(constrained)
             else None,
+            order=None if order is None else np.asarray(order, dtype=int),
         )
 
     @property

@@ -57,12 +57,12 @@ def blocks_grid(
     cells, owner = triangles.of(blocks)
     stress = six_components(state.stress, blocks.material, materials)
     return Grid(
-        points=blocks.vertices if configuration == "reference" else state.vertices,
+        points=blocks.vertices if configuration == "reference" else cycle.placed,
         connectivity=cells.ravel(),
         offsets=np.arange(3, 3 * len(cells) + 1, 3),
         types=np.full(len(cells), TRIANGLE),
         point_data={
-            "displacement": state.vertices - blocks.vertices,
+            "displacement": cycle.moved,
             "velocity": vertex_velocity(blocks, state),
         },
         cell_data={
@@ -187,7 +187,7 @@ def contacts_grid(cycle: Cycle, configuration: str) -> Grid:
     return _cloud(
         reference if configuration == "reference" else contacts["point"],
         {
-            "displacement": cycle.state.vertices[contacts["vertex"]] - reference,
+            "displacement": cycle.moved[contacts["vertex"]],
             "force": force,
             "normal_force": contacts["normal_force"],
             "shear_force": contacts["shear_force"],

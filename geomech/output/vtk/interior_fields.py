@@ -20,6 +20,8 @@ from .vtu import TRIANGLE, Grid
 
 #: A node on a crack face is evaluated this far inside its own side, relative to its shortest triangle edge.
 _ASIDE = 1e-5
+#: Triangles of a block of higher order, at least, and of all of them together, about.
+_FEWEST, _OF_BENT = 60, 40_000
 #: Cracks that turn by more than this are sharp there: stress is singular, rad.
 _SHARP = math.radians(20)
 
@@ -54,16 +56,16 @@ class InteriorMeshes:
 
     def note_cracked(self, cycle: Cycle) -> None:
         """Take the materials that hold cracks at ``cycle`` for those that crack, before an earlier cycle is drawn."""
-        self._cracked_materials |= {int(cycle.blocks.material[b]) for b in cycle.bodies}
+        self._cracked_materials |= {int(cycle.blocks.material[b]) for b in cycle.inside}
 
     def grid(self, cycle: Cycle, materials: Sequence[Material], motion: Motion, configuration: str) -> Grid:
         """The rock of ``cycle`` as one grid; empty until some block holds a crack."""
         blocks = cycle.blocks
         self.note_cracked(cycle)
         whole = np.isin(blocks.material, [*self._cracked_materials]) & ~blocks.fixed
-        whole[[*cycle.bodies]] = False
+        whole[[*cycle.inside]] = False
         before, self._kept = self._kept, {}
-        parts = [self._block(cycle, b, body, motion, before) for b, body in sorted(cycle.bodies.items())]
+        parts = [self._block(cycle, b, body, motion, before) for b, body in sorted(cycle.inside.items())]
         # Blocks whose cracks nobody has solved for yet: before the first step.
         waiting = np.intersect1d(np.flatnonzero(whole), cycle.cracks.block).tolist()
         whole[waiting] = False
@@ -153,12 +155,18 @@ class InteriorMeshes:
         if kept is None:
             from geomech.shapes.meshing import mesh_interior
 
-            size = math.sqrt(cycle.blocks.areas()[b] / (0.433 * self.n_triangles))
+            size = math.sqrt(cycle.blocks.areas()[b] / (0.433 * self._triangles_of(cycle, b)))
             mesh = mesh_interior(loops, cracks, size, size / self.tip_ratio)
             look_from = mesh.points + _ASIDE * _local_size(mesh)[:, None] * mesh.side
             kept = _Kept(mesh, look_from, _node_areas(mesh), *_about_singular(mesh, cracks))
         self._kept[key] = kept
         return kept
+
+    def _triangles_of(self, cycle: Cycle, b: int) -> int:
+        """About how many triangles block ``b`` gets: fewer where many blocks bend, whose stress is smooth."""
+        if b not in cycle.bent:
+            return self.n_triangles
+        return max(_FEWEST, min(self.n_triangles, _OF_BENT // len(cycle.bent)))
 
 
 def _singular_nodes(cracks: Cracks) -> np.ndarray:

@@ -107,7 +107,7 @@ class Series:
     def on_cycle(self, cycle: Cycle) -> None:
         began = time.perf_counter()
         self._cycles += 1
-        self._cracked += bool(cycle.bodies)
+        self._cracked += bool(cycle.inside)
         if self._pending is not None and cycle.blocks.n_blocks != self._pending[0].blocks.n_blocks:
             self._write_last_interior()  # of the rock while it was whole
         # Every cycle takes its time, written or not, so that the times do not depend on what is left out.
@@ -150,7 +150,7 @@ class Series:
         }
 
     def _interior_wanted(self, cycle: Cycle) -> bool:
-        if not self.interior_every or cycle.number == 0 or not (cycle.bodies or self._last_interior >= 0):
+        if not self.interior_every or cycle.number == 0 or not (cycle.inside or self._last_interior >= 0):
             return False
         cut = self._pending is not None and cycle.blocks.n_blocks != self._pending[0].blocks.n_blocks
         if any(event.kind not in CHANGES for event in cycle.events) or cut or self._last_interior < 0:
@@ -174,7 +174,7 @@ class Series:
     def _write_last_interior(self) -> None:
         """The interior of the last cycle that came, unless it is written or there is none."""
         cycle, at, _ = self._pending
-        begun = bool(cycle.bodies) or self._last_interior >= 0
+        begun = bool(cycle.inside) or self._last_interior >= 0
         if self.interior_every and begun and cycle.number != self._last_interior:
             self._write_interior(cycle, at)
 

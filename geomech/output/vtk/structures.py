@@ -22,6 +22,9 @@ from .vtu import LINE, Grid
 #: States of a bolt in the files.
 NOT_INSTALLED, ACTS, YIELDS, BROKEN = 0, 1, 2, 3
 
+#: An edge that bends is drawn in so many pieces.
+_PIECES = 12
+
 
 def _lines(points: np.ndarray, pairs: np.ndarray, moved: np.ndarray, cell_data: dict[str, np.ndarray]) -> Grid:
     return Grid(
@@ -37,14 +40,45 @@ def _lines(points: np.ndarray, pairs: np.ndarray, moved: np.ndarray, cell_data: 
 def outlines_grid(cycle: Cycle, configuration: str) -> Grid:
     """Every edge of every block, holes included, as a line between two vertices of the block."""
     blocks, state = cycle.blocks, cycle.state
-    block = blocks.vertex_block
+    block, edge = blocks.vertex_block, np.arange(blocks.n_vertices)
     removed = np.zeros(blocks.n_blocks, bool) if state.removed is None else state.removed
+    pairs = np.stack([edge, blocks.next_vertex], axis=1)
+    points, moved = blocks.vertices, cycle.moved
+    placed = cycle.placed
+    if cycle.bent:
+        pairs, edge, more, more_moved = _bent_edges(cycle, pairs)
+        points, moved = np.concatenate([points, more]), np.concatenate([moved, more_moved])
+        placed = points + moved
     return _lines(
-        blocks.vertices if configuration == "reference" else state.vertices,
-        np.stack([np.arange(blocks.n_vertices), blocks.next_vertex], axis=1),
-        state.vertices - blocks.vertices,
-        {"block_id": block, "fixed": blocks.fixed[block], "removed": removed[block], "edge_name": blocks.edge_name},
-    )
+        points if configuration == "reference" else placed,
+        pairs,
+        moved,
+        {
+            "block_id": block[edge], "fixed": blocks.fixed[block[edge]], "removed": removed[block[edge]],
+            "edge_name": blocks.edge_name[edge],
+        },
+    )  # fmt: skip
+
+
+def _bent_edges(cycle: Cycle, pairs: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """The edges ``pairs`` (n, 2) with those of blocks of higher order in `_PIECES` each: lines (k, 2), the edge of each (k,),
+    and the points that this adds behind the vertices (m, 2) with their displacements (m, 2)."""
+    blocks, n = cycle.blocks, cycle.blocks.n_vertices
+    bends = np.isin(blocks.vertex_block, [*cycle.bent])
+    some = np.flatnonzero(bends)
+    at = np.arange(1, _PIECES)[:, None] / _PIECES
+    start, end = blocks.vertices[pairs[some, 0]], blocks.vertices[pairs[some, 1]]
+    more = (start[:, None] + at * (end - start)[:, None]).reshape(-1, 2)
+    owner = np.repeat(blocks.vertex_block[some], _PIECES - 1)
+    moved = displacement(cycle.motion, owner, more)
+    for block, body in cycle.bent.items():
+        own = owner == block
+        moved[own] += body.deflection(more[own])
+    inside = n + np.arange(len(more)).reshape(len(some), -1)
+    chain = np.concatenate([pairs[some, :1], inside, pairs[some, 1:]], axis=1)
+    lines = np.stack([chain[:, :-1], chain[:, 1:]], axis=2).reshape(-1, 2)
+    edge = np.concatenate([np.flatnonzero(~bends), np.repeat(some, _PIECES)])
+    return np.concatenate([pairs[~bends], lines]), edge, more, moved
 
 
 class BoltLines:

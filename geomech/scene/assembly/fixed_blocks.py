@@ -57,9 +57,17 @@ def constrained_unknowns(tables: SceneTables, drawing: Drawing) -> np.ndarray | 
     return constrained if constrained.any() else None
 
 
+def block_orders(tables: SceneTables, drawing: Drawing) -> np.ndarray | None:
+    """(n_blocks,) the order of each block's displacement, 1 where it stands still; None where all are of first order."""
+    zones = tables.zones or {}
+    order = np.array([zones[zone].order if zone in zones else 1 for zone in drawing.zones], dtype=int)
+    order[fixed_blocks(tables, drawing)] = 1
+    return order if (order > 1).any() else None
+
+
 def check_holding(c: Check) -> None:
     """Edges that would guide must say along what."""
-    for name in c.drawing.blocks.edge_names:
+    for name in c.blocks.edge_names:
         if name.partition(":")[0] == GUIDED and not holds(name):
             c.refuse(
                 ("geometry",),
@@ -70,7 +78,7 @@ def check_holding(c: Check) -> None:
 
 def check_borne(c: Check) -> None:
     """Weight wants something that bears it: without it all blocks fall together, and nothing else happens."""
-    t, blocks = c.tables, c.drawing.blocks
+    t, blocks = c.tables, c.blocks
     if t.loads is None or t.zones is None or not any(t.loads.gravity_m_s2):
         return
     loads = t.loads
@@ -78,7 +86,7 @@ def check_borne(c: Check) -> None:
         loads.tractions or loads.forces or loads.motions or loads.point_motions or loads.bolts
         or loads.viscous_boundaries or loads.water is not None
     )  # fmt: skip
-    if pushed or fixed_blocks(t, c.drawing).any() or constrained_unknowns(t, c.drawing) is not None:
+    if pushed or fixed_blocks(t, c.drawn).any() or constrained_unknowns(t, c.drawn) is not None:
         return
     lowest = int(blocks.vertex_block[np.argmin(blocks.vertices @ -np.array(loads.gravity_m_s2))])
     others = blocks.n_blocks - 1
