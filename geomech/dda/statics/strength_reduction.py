@@ -99,6 +99,14 @@ def factor_of_safety(
 
     Raises `NothingToReduce` when there is no strength to reduce, nothing that moves, or a ground that does,
     `NotConverged` when the blocks do not stand even with joints 64 times as strong.
+
+    >>> ground, square = np.array([[-1, -1], [2, -1], [2, 0], [-1, 0]]), np.array([[0, 0], [1, 0], [1, 1], [0, 1]])
+    >>> blocks = Blocks.from_polygons([ground, square], fixed=[True, False])
+    >>> rock, joint = Material("rock", 10e9, 0.25, density=2600.0), JointLaw("joint", np.radians(30))
+    >>> loads = Loads(gravity=History.constant([2.0, -9.81]))
+    >>> found = dda.factor_of_safety(blocks, [rock], [joint], loads)
+    >>> f"{found.factor:.4f}"  # g tan 30° / 2 m/s²
+    '2.8319'
     """
     names = [law.name for law in joints]
     unknown = [name for name in reduce or () if name not in names]
