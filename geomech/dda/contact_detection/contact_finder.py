@@ -132,7 +132,7 @@ class ContactFinder:
         #: Whether faces keep all their cohesion for as long as they touch anywhere (`whole_faces`).
         self.whole_faces = False
         self._corners = ToeCorners(
-            self._next, self._previous, self.rounding, np.sqrt(self._area)[self._owner], blocks.vertices
+            self._next, self._previous, self._owner, self.rounding, np.sqrt(self._area)[self._owner], blocks.vertices
         )
         self._always_fixed = np.ascontiguousarray(blocks.fixed, dtype=np.bool_)
         self.widths = widths(blocks.vertices, self._next, self._start, self._area)

@@ -19,8 +19,8 @@ from ...model import OPEN
 from ..kinematics.midpoint_configuration import MidpointConfiguration
 from ..open_close.contact_set import ContactSet
 from ..open_close.equations import Unsettled
+from ..out_of_balance import imbalance
 from ..results import StepResult
-from ..statics.out_of_balance import imbalance
 from ..time_step import Attempt
 from .deflected_blocks import DeflectedBlocks
 from .deflection_basis import n_deflections
