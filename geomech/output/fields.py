@@ -109,7 +109,13 @@ SERIES: dict[str, tuple[Field, ...]] = {
     ),
     # Interior fields are large and smooth, so single precision: seven digits are more than the mesh resolves.
     "interior": (
-        Field("displacement", "point", "m", "of the cracked body: block motion plus its own deformation", _XYZ),
+        Field(
+            "displacement",
+            "point",
+            "m",
+            "of the cracked body: block motion plus its own deformation, tied to the block's at contacts",
+            _XYZ,
+        ),
         Field(_STRESS[0], "point", *_STRESS[1:], VTK_STRESS, "float32"),
         Field(_PRINCIPAL[0], "point", *_PRINCIPAL[1:], _PRINCIPAL_NAMES, "float32"),
         Field("von_mises", "point", "Pa", "√(3 J₂) of the full tensor", dtype="float32"),

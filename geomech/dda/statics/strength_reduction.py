@@ -8,7 +8,8 @@ stable trial it falls to round-off within a few steps; in an unstable one it rem
 sliding it grows as A − B/F. Two unstable trials thus predict F, and a few more enclose it.
 
 As in limit equilibrium, sharp toes in re-entrant corners are rounded (`sharp_toes`), and a face keeps its whole
-cohesion while any part of it is in contact (`whole_faces`). The factors without these assumptions are reported as well.
+cohesion while any part of it is in contact (`whole_faces`). The factors without these assumptions are reported as well,
+and so is the largest factor with any admissible contact forces, where F is clearly below it (`admissible_forces`).
 """
 
 from __future__ import annotations
@@ -23,13 +24,16 @@ from ...model.former_names import renamed_argument
 from ..joint_laws.reduced_strength import reduced
 from ..results import NotConverged
 from ..system import BlockSystem
+from .admissible_forces import AdmissibleForces
 from .counted_resistance import (
     bearing_toes,
     hairline_faces,
     parted_faces,
     toes_in_the_way,
+    with_admissible_forces,
     with_anchors,
     with_hairlines,
+    with_no_mechanism,
     with_parted_faces,
     with_toes,
 )
@@ -47,6 +51,8 @@ _RELAXING = 100
 _FROM_AFAR = 3.0
 #: Largest factor, and smallest inverse, of the search for a stable and an unstable trial.
 _FARTHEST = 64.0
+#: Relative difference from the largest factor with admissible contact forces above which that is reported.
+_BEYOND = 1e-2
 #: Factor from step to step in the search for a stable trial near a known factor.
 _NEARBY = 0.85
 
@@ -92,6 +98,14 @@ def factor_of_safety(
 
     Raises `NothingToReduce` without strength to reduce, without moving blocks, or with a moving ground; `NotConverged`
     when the blocks are unstable even with joints 64 times as strong.
+
+    >>> ground, square = np.array([[-1, -1], [2, -1], [2, 0], [-1, 0]]), np.array([[0, 0], [1, 0], [1, 1], [0, 1]])
+    >>> blocks = Blocks.from_polygons([ground, square], fixed=[True, False])
+    >>> rock, joint = Material("rock", 10e9, 0.25, density=2600.0), JointLaw("joint", np.radians(30))
+    >>> loads = Loads(gravity=History.constant([2.0, -9.81]))
+    >>> found = dda.factor_of_safety(blocks, [rock], [joint], loads)
+    >>> f"{found.factor:.4f}"  # g tan 30° / 2 m/s²
+    '2.8319'
     """
     names = [law.name for law in joints]
     unknown = [name for name in reduce or () if name not in names]
@@ -168,7 +182,16 @@ class _Search:
         found = with_anchors(self.blocks, self.under.loads, found)
         if counted.toes != FREE:
             found = self._with_toes(found, counted)
-        return self._with_parted_faces(found, counted) if counted.whole_faces else found
+        if counted.whole_faces:
+            found = self._with_parted_faces(found, counted)
+        return self._with_admissible_forces(found, counted)
+
+    def _with_admissible_forces(self, found: FactorOfSafety, counted: Counted) -> FactorOfSafety:
+        if not math.isfinite(found.upper):
+            return with_no_mechanism(found)
+        system = self.system(found.lower, counted)
+        forces = AdmissibleForces.of(system, found.state, self.rest, self.joints, self.chosen)
+        return found if forces is None else with_admissible_forces(found, forces.largest_factor(found.upper, _BEYOND))
 
     def _with_toes(self, found: FactorOfSafety, counted: Counted) -> FactorOfSafety:
         bearing = self._bearing(found, counted)

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from geomech.conventions import rotate_stress
-from geomech.model import Cracks, Cycle, Material
+from geomech.model import OPEN, Cracks, Cycle, Material
 from geomech.model.blocks.block_motion import Motion
 
 from .block_motion import displacement, rotation
@@ -22,6 +22,8 @@ from .vtu import TRIANGLE, Grid
 _ASIDE = 1e-5
 #: Triangles of a block of higher order, at least, and of all of them together, about.
 _FEWEST, _OF_BENT = 60, 40_000
+#: Displacement is tied to the block's own within this part of its size (√area) about a contact.
+_TIED = 0.25
 #: Cracks that turn by more than this are sharp there: stress is singular, rad.
 _SHARP = math.radians(20)
 
@@ -111,13 +113,17 @@ class InteriorMeshes:
         for k in range(3):
             mean = np.bincount(kept.owner, weights=stress[n:, k], minlength=n)
             stress[singular, k] = mean[singular] / count[singular]
+        moved = _placed(
+            kept.mesh.points, kept.areas, own[:n], motion.reference_centre[b], motion.centre[b], gradient, turn
+        )
+        at = _contact_points(cycle, b)
+        as_block = displacement(motion, np.full(len(at), b), at)
+        reach = _TIED * math.sqrt(kept.areas.sum())
         return {
             "owner": np.full(n, b),
             "points": kept.mesh.points,
             "triangles": kept.mesh.triangles,
-            "moved": _placed(
-                kept.mesh.points, kept.areas, own[:n], motion.reference_centre[b], motion.centre[b], gradient, turn
-            ),
+            "moved": _tied(kept.mesh.points, moved, at, as_block, reach),
             "stress": rotate_stress(stress[:n], turn),
         }
 
@@ -214,6 +220,35 @@ def _node_areas(mesh: Any) -> np.ndarray:
     u, v = b - a, c - a
     third = np.abs(u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]) / 6
     return np.bincount(mesh.triangles.ravel(), weights=np.repeat(third, 3), minlength=len(mesh.points))
+
+
+def _contact_points(cycle: Cycle, b: int) -> np.ndarray:
+    """(n, 2) m in the reference: where closed contacts press on block ``b``, its own vertices or feet on its edges."""
+    contacts, blocks = cycle.state.contacts, cycle.blocks
+    closed = contacts[contacts["state"] != OPEN]
+    own, other = closed[closed["block"] == b], closed[closed["other"] == b]
+    first, share = other["edge"], other["position"][:, None]
+    feet = (1 - share) * blocks.vertices[first] + share * blocks.vertices[blocks.next_vertex[first]]
+    return np.unique(np.concatenate([blocks.vertices[own["vertex"]], feet]), axis=0)
+
+
+def _tied(points: np.ndarray, moved: np.ndarray, at: np.ndarray, as_block: np.ndarray, reach: float) -> np.ndarray:
+    """``moved`` (n, 2) m at ``points``, as the block moves (``as_block``) at the contacts ``at`` (k, 2) m, and as it was
+    beyond ``reach`` m of them.
+
+    The neighbour that presses there has met the block, which has one strain. The rock inside is also dented under the
+    load, by several times the block's shortening where the load is nearly a point: without this it would be drawn away
+    from its platens. What is added is continuous (Shepard's weights), so that cracks open and slip as before."""
+    if not len(at):
+        return moved
+    nearest = np.array([np.argmin(((points - place) ** 2).sum(axis=1)) for place in at])
+    lacks = as_block - moved[nearest]
+    square = ((points[:, None] - at) ** 2).sum(axis=2)
+    near = np.maximum(0.0, 1.0 - square / reach**2) ** 2
+    weights = near / np.maximum(square, (1e-6 * reach) ** 2)
+    total = weights.sum(axis=1)
+    mean = weights @ lacks / np.maximum(total, np.finfo(float).tiny)[:, None]
+    return moved + near.max(axis=1)[:, None] * mean
 
 
 def _placed(

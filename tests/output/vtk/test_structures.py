@@ -89,3 +89,31 @@ def test_the_interior_before_the_first_step_is_rock_at_rest(tmp_path):
     first, second = (read_grid(file) for _, file in read_collection(tmp_path / "interior.pvd"))
     assert np.array_equal(first.points, second.points)
     assert not first["von_mises"].any() and second["von_mises"].any()
+
+
+def test_rock_inside_meets_what_presses_on_it(tmp_path):
+    """A body dented by far more than its block is shortened: where contacts press it is as the block, in between the
+    jump across its crack is the same, and far from both it is as it was."""
+    from geomech.output.vtk.interior_fields import InteriorMeshes
+
+    class Dented(made.UniformBody):
+        def displacement(self, points):
+            dent = 1e-4 * np.exp(-np.hypot(*(points - [-0.03, -0.06]).T) / 0.01)
+            torn = np.where(points[:, 1] > points[:, 0], 1e-6, -1e-6)
+            return super().displacement(points) + np.stack([torn, dent], axis=1)
+
+    cycle = replace(made.cycle(1, 300, 0, 0), bodies={1: Dented(300 * made.RATE)})
+    free = replace(cycle, state=replace(cycle.state, contacts=cycle.state.contacts[:0]))
+    tied, loose = (
+        InteriorMeshes().grid(each, [made.ROCK, made.STEEL], each.motion, "reference") for each in (cycle, free)
+    )
+    moved, was = (grid.point_data["displacement"] for grid in (tied, loose))
+    start = cycle.blocks.vertex_start[1]
+    for vertex in (start, start + 1):
+        corner = np.argmin(np.hypot(*(tied.points - cycle.blocks.vertices[vertex]).T))
+        block = (cycle.state.vertices - cycle.blocks.vertices)[vertex]
+        assert np.allclose(moved[corner], block, rtol=0, atol=1e-9)
+    assert np.abs(was - moved).max() > 3e-5
+    far = np.hypot(*(tied.points - [0.0, 0.03]).T) < 0.03
+    assert np.array_equal(moved[far], was[far])
+    assert np.array_equal(tied.point_data["stress"], loose.point_data["stress"])
