@@ -32,7 +32,7 @@ class Finished(NotResumable):
 
 def resume(
     folder: str | Path,
-    overrides: Iterable[str] = (),
+    overrides: Iterable[str] | Mapping[str, Any] = (),
     observers: Iterable[Any] | None = None,
     *,
     quiet: bool = False,
@@ -42,15 +42,19 @@ def resume(
     on the same machine with as many threads, but for times of day. Rows and files that are later than the checkpoint
     are dropped.
 
-    ``overrides`` may change keys in `ALLOWED` ("run.end_time_s=20" lets a finished run go on: from before the step
-    that its
-    first end has cut, as a run that was as long from the beginning). A run without a checkpoint so far begins again.
+    ``overrides``, as for `load_scene`, may change keys in `ALLOWED`. A later ``run.end_time_s`` lets a finished run go
+    on from before the step that its end has cut, like a run that was as long from the beginning. A run without a
+    checkpoint begins again.
     ``observers`` are those of the run, by default the standard ones (``quiet``: they say nothing); ``tell`` is told
     when the run begins again. Raises `Finished` when
     there is nothing left to do, `NotResumable` when the run cannot be gone on with, `geomech.output.run_lock.FolderInUse`
     while another process is at work in the folder, SceneError on bad input.
+
+    >>> geomech.resume("outputs/broken_off", {"run.end_time_s": 0.3}, quiet=True)["time_s"]
+    0.3
     """
-    wish = _Wish(Path(folder), tuple(overrides), observers, quiet, tell)
+    changes = overrides if isinstance(overrides, Mapping) else tuple(overrides)
+    wish = _Wish(Path(folder), changes, observers, quiet, tell)
     _refuse_other_folders(wish.folder)
     with RunLock(wish.folder) as lock:
         if lock.stale:
@@ -62,7 +66,7 @@ class _Wish(NamedTuple):
     """What was asked for, as `resume` has it."""
 
     folder: Path
-    overrides: tuple[str, ...]
+    overrides: tuple[str, ...] | Mapping[str, Any]
     observers: Iterable[Any] | None
     quiet: bool
     tell: Callable[[str], None]

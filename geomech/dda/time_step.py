@@ -36,8 +36,8 @@ from .open_close.contact_set import ContactSet
 from .open_close.equations import Equations, Unsettled
 from .open_close.iteration import is_large, settle
 from .open_close.settled_states import Settled
+from .out_of_balance import imbalance
 from .results import CrackResponse, StepResult
-from .statics.out_of_balance import imbalance
 
 if TYPE_CHECKING:
     from .interfaces import SteppedSystem

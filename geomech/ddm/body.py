@@ -65,6 +65,12 @@ class Body:
     a crack segment counts in them. ``counts`` tells what making it took, ``work`` what was done since by all bodies
     that share it. Raises ValueError naming the item on geometry that is no body, numpy.linalg.LinAlgError when cracks
     cut a part off.
+
+    >>> rock = Material("rock", 17e9, 0.21, k_ic=2e6)
+    >>> crack = Cracks.from_polylines([np.array([[-1.0, 0.0], [1.0, 0.0]])])
+    >>> tips = ddm.Body([], crack, rock).solve(ddm.BodyLoad(remote_stress=[0.0, 1e6, 0.0])).tips
+    >>> [f"{k:.4f}" for k in tips["k_i"] / (1e6 * np.sqrt(np.pi))]  # a crack in tension: σ √(πa)
+    ['1.0000', '1.0000']
     """
 
     def __init__(

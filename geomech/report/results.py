@@ -26,9 +26,13 @@ def open_run(folder: str | Path) -> RunResults:
     """The run in ``folder``, one that lasts or failed included, as far as it has come. Raises FileNotFoundError where
     there is none, with the runs below the folder, if any.
 
-    >>> results = open_run("outputs/two_cracks/phi_30")          # doctest: +SKIP
-    >>> results.history[["time", "load", "crack_length"]].tail()  # doctest: +SKIP
-    >>> results.mesh("blocks", time=0.5).plot(scalars="stress")   # doctest: +SKIP
+    >>> results = geomech.open_run("outputs/slope")
+    >>> results.history[["time", "open_close_iterations"]].shape
+    (3, 2)
+    >>> sorted(results.series)[:2]
+    ['blocks', 'contacts']
+    >>> results.mesh("blocks", time=0.2).point_data["displacement"].shape
+    (8, 3)
     """
     folder = Path(folder)
     if not (folder / "history.csv").is_file():

@@ -167,6 +167,10 @@ def load_scene(
     ``path`` is a .toml file or a pipeline folder (then its scene.toml); ``variant`` one of the scene's [variants];
     ``overrides`` are changes on top, {"section.key": value} with Python values, or a list of "section.key=value" with
     values in TOML's way or bare words. Raises SceneError with every fault: place (file, line, key), message and way out. A scene that is not ``to_run`` may leave [run] out.
+
+    >>> scene = geomech.load_scene("slope.toml", {"joints.default.friction_angle_deg": 40})
+    >>> scene.problem().blocks.n_blocks
+    2
     """
     path = _file(FilePath(path))
     data, text = _parsed(path)

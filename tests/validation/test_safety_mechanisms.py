@@ -194,12 +194,18 @@ def test_a_plane_keeps_its_cohesion_when_the_tension_crack_lets_go(verified, way
     assert found.factor == pytest.approx(expected, rel=1e-3)
 
 
-def shear_box(step: float, tension: float, turns: bool, modulus: float, steps: int) -> list[float]:
-    """Pa on a face of 1 m that is pressed by 1 MPa and pushed ``step`` m a time; its cohesion is kept as it slips."""
+def shear_box(
+    step: float, tension: float, turns: bool, modulus: float, steps: int, nodes=(), height: float = 0.5
+) -> list[float]:
+    """Pa on a face of 1 m, with flat ``nodes`` on it, that is pressed by 1 MPa and pushed ``step`` m a time; its cohesion
+    is kept as it slips. The push acts at half the ``height`` of the upper block."""
     law = JointLaw("joint", math.radians(35), 200e3, tension, residual_cohesion=200e3)
     blocks = Blocks.from_polygons(
-        [np.array([[-1, -0.5], [2, -0.5], [2, 0], [-1, 0]]), np.array([[0, 0], [1, 0], [1, 0.5], [0, 0.5]])],
-        fixed=[True, False], edge_names=[[[""] * 4], [["", "", "top", ""]]],
+        [
+            np.array([[-1, -0.5], [2, -0.5], [2, 0], [-1, 0]]),
+            np.array([[0, 0], *[[x, 0] for x in nodes], [1, 0], [1, height], [0, height]]),
+        ],
+        fixed=[True, False], edge_names=[[[""] * 4], [[""] * (2 + len(nodes)) + ["top", ""]]],
     )  # fmt: skip
     system = dda.BlockSystem(
         blocks, [Material("rock", modulus, 0.25, density=1.0)], [law], settings=DdaSettings(max_displacement_ratio=0.5)
@@ -231,6 +237,27 @@ def test_a_shear_box_ends_at_its_strength_whatever_the_step(verified, step, tens
         "shear box with c = 200 kPa, seven of steps, stiffnesses and bonds", found[-1] / expected - 1, "c + σ tan φ"
     )
     assert found[-1] == pytest.approx(expected, rel=1e-3) and max(found) <= expected * 1.001
+
+
+@pytest.mark.parametrize(
+    ("step", "tension", "turns", "modulus", "steps"),
+    [
+        (2e-7, 0.0, True, 20e9, 120),
+        (2e-4, 0.0, True, 20e9, 4),
+        (1e-3, 100e3, True, 20e9, 4),
+        (1e-3, 0.0, False, 1e9, 4),
+    ],
+)
+def test_flat_vertices_on_the_face_of_a_shear_box_take_no_strength(step, tension, turns, modulus, steps):
+    """A flat push keeps the whole face closed: c ℓ + N tan φ. A push at half of 0.5 m bears beyond the kern
+    (e = 0.22 ℓ): one end parts, and its cohesion is not there, the same at any step; between no-tension bedding,
+    c 3(ℓ/2 − e) + N tan φ, and the closed face."""
+    nodes, whole = np.arange(1, 10) / 10, 200e3 + 1e6 * math.tan(math.radians(35))
+    found = shear_box(step, tension, turns, modulus, steps, nodes, 0.05)
+    assert found[-1] == pytest.approx(whole, rel=1e-3) and max(found) <= whole * 1.001
+    parted = shear_box(step, tension, turns, modulus, steps, nodes)
+    bedded = 200e3 * 3 * (0.5 - 0.22) + 1e6 * math.tan(math.radians(35))
+    assert bedded < parted[-1] < whole and parted[-1] == pytest.approx(890.2e3, rel=1e-3)
 
 
 @pytest.mark.parametrize("stiffness", [1e5, 3e5, 1e8])

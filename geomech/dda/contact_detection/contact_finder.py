@@ -132,7 +132,7 @@ class ContactFinder:
         #: Whether faces keep all their cohesion for as long as they touch anywhere (`whole_faces`).
         self.whole_faces = False
         self._corners = ToeCorners(
-            self._next, self._previous, self.rounding, np.sqrt(self._area)[self._owner], blocks.vertices
+            self._next, self._previous, self._owner, self.rounding, np.sqrt(self._area)[self._owner], blocks.vertices
         )
         self._always_fixed = np.ascontiguousarray(blocks.fixed, dtype=np.bool_)
         self.widths = widths(blocks.vertices, self._next, self._start, self._area)
@@ -455,6 +455,16 @@ class ContactFinder:
                 row = touched[at[np.argmin(np.linalg.norm(touched["point"][at] - geometry[c, 5:7], axis=1))]]
                 for name in ("slip", "wear", "lift"):
                     remembered[name][c] = row[name]
+
+    @property
+    def stiff_laws(self) -> np.ndarray:
+        """(n_laws,) which laws have a normal stiffness of their own."""
+        return self._stiff
+
+    @property
+    def stiff_along_laws(self) -> np.ndarray:
+        """(n_laws,) which laws have a shear stiffness of their own."""
+        return self._stiff_along
 
     @property
     def closure(self) -> np.ndarray:

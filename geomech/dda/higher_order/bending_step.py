@@ -19,8 +19,8 @@ from ...model import OPEN
 from ..kinematics.midpoint_configuration import MidpointConfiguration
 from ..open_close.contact_set import ContactSet
 from ..open_close.equations import Unsettled
+from ..out_of_balance import imbalance
 from ..results import StepResult
-from ..statics.out_of_balance import imbalance
 from ..time_step import Attempt
 from .deflected_blocks import DeflectedBlocks
 from .deflection_basis import n_deflections
@@ -45,7 +45,9 @@ class BendingAttempt(Attempt):
 
     def _on_faces(self, system, state, vertices: np.ndarray, corners: ContactSet) -> FaceContacts:
         """The contacts found at ``corners``, with points along faces and what deflection adds to their gaps."""
-        found = FaceContacts.along_faces(corners, self.blocks.order, state.face_points)
+        finder = system.finder
+        by_length = finder.stiff_laws[corners.law], finder.stiff_along_laws[corners.law]
+        found = FaceContacts.along_faces(corners, self.blocks.order, state.face_points, by_length)
         self.touching = self._material_points(found, vertices)
         if not self.deflection.any():
             return replace(found, deflected=np.zeros(len(found)))

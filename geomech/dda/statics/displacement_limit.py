@@ -23,6 +23,7 @@ import numpy as np
 from ...model import CONTACT, GROUND, OPEN, JointLaw, Loads, State
 from ..results import NotConverged, StepResult
 from ..system import BlockSystem
+from .sharp_toes import SHARP
 
 log = logging.getLogger(__name__)
 
@@ -155,8 +156,11 @@ class DisplacementLimit:
         begin = replace(
             self._begin, time=0.0, contacts=np.empty(0, CONTACT), velocity=np.zeros_like(self._begin.velocity)
         )
+        unbreakable = system.with_joints(laws)
+        # Bonds would draw together what stands off.
+        unbreakable.finder.toes = SHARP
         try:
-            result = system.with_joints(laws).step(begin, self._loads, _LONG, load_time=self._time)
+            result = unbreakable.step(begin, self._loads, _LONG, load_time=self._time)
         except (NotConverged, ValueError) as failure:
             log.debug("what elasticity explains is not known: %s", failure)
             return 0.0

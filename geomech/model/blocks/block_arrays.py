@@ -79,7 +79,12 @@ class Blocks:
 
         Raises ValueError that names the block for loops of fewer than three vertices, repeated vertices, non-finite
         coordinates, crossing edges, zero area, and holes that leave the outline or overlap; and for lists whose length
-        is not the number of blocks."""
+        is not the number of blocks.
+
+        >>> blocks = Blocks.from_polygons([np.array([[0, 0], [2, 0], [2, 1], [0, 1]])])
+        >>> blocks.n_blocks, float(blocks.areas()[0])
+        (1, 2.0)
+        """
         n_blocks = len(polygons)
         if held is not None:
             _warn_held()

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scenes_of_bending import ROCK, after, body_of, moved, rectangle, system_of
 
+from geomech.dda import NotConverged
 from geomech.model import OPEN, EdgeTraction, History, JointLaw, LinearProfile, Loads, Material
 
 #: Joints that give by their area: springs at corners, a number for each corner, cannot pass a patch test.
@@ -103,6 +106,22 @@ def test_a_cantilever_of_one_block_bends_as_finite_elements_say():
     assert error == pytest.approx([-0.278, -0.032, -0.009, -0.003], abs=1.5e-3)
 
 
+def test_deflections_that_are_not_small_are_reported_or_end_the_run(caplog):
+    """A beam of slenderness 40 that hangs from fixed rock: its end turns by q L³ / 6EI."""
+    length, depth = 20.0, 0.5
+    glue = JointLaw("glue", 0.5, cohesion=1e12, tensile_strength=1e12)
+    polygons = [rectangle(-1, 0, 0, depth), rectangle(0, 0, length, depth)]
+    turn = 2500 * 9.81 * depth * length**3 / (6 * depth**3 / 12)
+    for bent, reported in ((0.02, False), (0.12, True)):
+        rock = Material("rock", turn / bent, 0.0, 2500.0, plane="stress")
+        caplog.clear()
+        system = system_of(polygons, [1, 0], [1, 4], joint=glue, rock=rock)
+        state = after(system, WEIGHT, 1).state
+        assert any("is bent by" in record.message for record in caplog.records) == reported
+    with pytest.raises(NotConverged, match="'block 1' is bent by"):
+        system.deflected.check_small(replace(state, deflection=20.0 * state.deflection))
+
+
 @pytest.mark.parametrize("how", ["mirrored", "turned"])
 def test_the_answer_does_not_depend_on_how_it_is_drawn(how):
     polygons = [rectangle(-3, -1, 3, 0), rectangle(-1, 0, 0.2, 0.6), rectangle(-1, 0.6, 1.2, 1.0)]
@@ -117,6 +136,21 @@ def test_the_answer_does_not_depend_on_how_it_is_drawn(how):
         other = after(system_of(polygons, [1, 0, 0], [1, 3, 4], angle=0.3), loads, 3)
     assert other.energy.elastic == pytest.approx(drawn.energy.elastic, rel=1e-6)
     assert other.energy.contact == pytest.approx(drawn.energy.contact, rel=1e-6)
+
+
+@pytest.mark.parametrize("joint", [JointLaw("penalty", 0.6), BY_AREA])
+def test_a_vertex_within_a_side_changes_nothing(joint):
+    side = np.array([[0, 0], [1.3, 0], [4, 0], [4, 1], [0, 1.0]])
+    floor = rectangle(-1, -1, 5, 0)
+    plain, split = (
+        after(system_of([floor, block], [1, 0], [1, 4], joint=joint), WEIGHT, 3)
+        for block in (rectangle(0, 0, 4, 1), side)
+    )
+    # Penalties follow the length of the face that a corner stands for.
+    assert split.energy.elastic == pytest.approx(plain.energy.elastic, rel=1e-5)
+    if joint is BY_AREA:
+        assert split.energy.contact == pytest.approx(plain.energy.contact, rel=1e-9)
+    assert split.contacts["normal_force"].sum() == pytest.approx(4 * 2500 * 9.81, rel=1e-9)
 
 
 def test_blocks_of_all_orders_stand_in_one_column():
