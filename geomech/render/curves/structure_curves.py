@@ -24,7 +24,9 @@ def joint_curves(run: Run) -> dict[str, np.ndarray]:
     found = {}
     for name in dict.fromkeys(table["joint"].tolist()):
         rows = table[table["joint"] == name]
-        found[str(name).removeprefix("joint:") or "joints"] = np.stack([rows["time"], np.abs(rows["mean_slip"])], axis=1)
+        found[str(name).removeprefix("joint:") or "joints"] = np.stack(
+            [rows["time"], np.abs(rows["mean_slip"])], axis=1
+        )
     order = sorted(found, key=lambda name: -largest_of(found[name][:, 1]))[: len(COLOURS)]
     return {name: found[name] for name in order if len(found[name]) > 1 and largest_of(found[name][:, 1]) > 0}
 
