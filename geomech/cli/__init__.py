@@ -1,4 +1,4 @@
-"""The command line: ``geomech examples | new | check | build | run | resume | safety | sweep | render | report | bench | doctor``.
+"""The command line: ``geomech examples | new | check | build | run | resume | safety | sweep | render | view | report | bench | doctor``.
 
 Exit codes: 0 done, 1 the run failed (what was written stays readable), 2 bad input, 3 interrupted (Ctrl-C or SIGTERM).
 Each verb is a module: ``declare`` says its arguments, and nothing heavy is imported before the verb is asked for.
@@ -15,7 +15,7 @@ from .. import __version__
 from .messages import say, say_errors, silence, spell_out
 from .scenes import default_folder
 from .verb import BAD_INPUT, DONE, FAILED, INTERRUPTED, BadInput
-from .verbs import bench, build, check, doctor, render, report, resume, run, safety, starting, sweep
+from .verbs import bench, build, check, doctor, render, report, resume, run, safety, starting, sweep, view
 
 __all__ = ["BAD_INPUT", "DONE", "FAILED", "INTERRUPTED", "default_folder", "main"]
 
@@ -25,7 +25,7 @@ for _library in ("OPENBLAS", "MKL"):
     os.environ.setdefault(f"{_library}_NUM_THREADS", "1")
 
 #: In the order of the help.
-VERBS = (starting, check, build, run, resume, safety, sweep, render, report, bench, doctor)
+VERBS = (starting, check, build, run, resume, safety, sweep, render, view, report, bench, doctor)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -29,6 +29,9 @@ def declare(verbs: Verbs) -> None:
         metavar="FILE",
         help="where the page goes (default report.html in RUN, runs.html where RUN holds several)",
     )
+    report.add_argument(
+        "--play", action=argparse.BooleanOptionalAction, default=True, help="a slider over the cycles in the page"
+    )
     report.add_argument("--page", action=argparse.BooleanOptionalAction, default=True, help="write the page")
 
 
@@ -47,7 +50,7 @@ def _report(options: argparse.Namespace) -> int:
     if options.page and not options.csv:
         if len(options.runs) > 1:
             place = Path(os.path.commonpath([folder.resolve() for folder in folders]))
-        say(f"page: {write_page(place, runs, options.out)}")
+        say(f"page: {write_page(place, runs, options.out, play=options.play)}")
     return DONE
 
 
