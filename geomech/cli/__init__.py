@@ -15,7 +15,7 @@ from .. import __version__
 from .messages import say, say_errors, silence, spell_out
 from .scenes import default_folder
 from .verb import BAD_INPUT, DONE, FAILED, INTERRUPTED, BadInput
-from .verbs import bench, build, check, doctor, render, report, resume, run, safety, starting, sweep, view
+from .verbs import bench, build, check, doctor, render, report, resume, run, safety, starting, sweep
 
 __all__ = ["BAD_INPUT", "DONE", "FAILED", "INTERRUPTED", "default_folder", "main"]
 
@@ -25,7 +25,7 @@ for _library in ("OPENBLAS", "MKL"):
     os.environ.setdefault(f"{_library}_NUM_THREADS", "1")
 
 #: In the order of the help.
-VERBS = (starting, check, build, run, resume, safety, sweep, render, view, report, bench, doctor)
+VERBS = (starting, check, build, run, resume, safety, sweep, render, report, bench, doctor)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -122,6 +122,12 @@ class Places:
         }
         (folder / PLACES).write_text(json.dumps(places, indent=1), encoding="utf-8")
 
+    def memory(self) -> None:
+        """Nothing: the places are those of the reference."""
+
+    def on_resume(self, problem: Problem, folder: Path, memory: None) -> None:
+        self.on_start(problem, folder)
+
     def on_cycle(self, cycle: Cycle) -> None:
         pass
 

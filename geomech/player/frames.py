@@ -33,7 +33,10 @@ class Frames:
     _known: dict[bytes, int] = field(default_factory=dict)
 
     def frame(self, cycle: int) -> dict[str, Any]:
-        """The record of ``cycle``: its numbers, its meshes and its arrays."""
+        """The record of ``cycle``: its numbers, its meshes and its arrays; ``field_cycle`` is that of the field inside its
+        rock, where that is older."""
+        from ..render.pictures.field import agreeing
+
         made = Block()
         record: dict[str, Any] = {"cycle": cycle}
         blocks = self._grid("blocks", cycle)
@@ -42,6 +45,8 @@ class Frames:
         interior = self._interior(cycle)
         if interior is not None:
             record["interior"] = self._rock(made, interior)
+            if not agreeing(self.run, [cycle]):
+                record["field_cycle"] = max(number for number in self.run.grids("interior") if number <= cycle)
         contacts = self._grid("contacts", cycle)
         if contacts is not None and contacts.n_points and blocks is not None:
             self._contacts(made, contacts, blocks)

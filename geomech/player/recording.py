@@ -43,31 +43,30 @@ class Recording:
         self.origin = 0.5 * (low + high)
         self.size = np.maximum(high - low, 1e-12)
         self.frames = Frames(run, self.origin)
-        self._bytes: dict[int, int] = {}
 
-    def opening(self, quick: bool = False) -> dict[str, Any]:
-        """What stands still: title, places, names, and the magnification: that of the run's pictures, or, ``quick``, one
-        that takes no account of blocks that are then drawn inside each other."""
-        from ..render.pictures.look import final_cycle
-
+    def opening(self) -> dict[str, Any]:
+        """What stands still: title, places, names."""
         run, scene = self.run, self.run.scene
         return {
             "title": run.title,
             "name": run.folder.resolve().name,
             "origin": self.origin.tolist(),
             "size": self.size.tolist(),
-            "scale": quick_magnification(run) if quick else magnification(run),
-            "led": run.led,
-            "final": final_cycle(run),
             "materials": list(scene.get("materials", {})),
             "component": scene.get("render", {}).get("component", "yy"),
             **_places(run, self.origin),
         }
 
-    def state(self) -> dict[str, Any]:
-        """What grows with the run: how it ended, curves, tips, joints and events."""
-        summary = self.run.summary
+    def state(self, scale: float | None = None) -> dict[str, Any]:
+        """What grows with the run: how it ended, curves, tips, joints and events, and the magnification, by default
+        that of the run's pictures."""
+        from ..render.pictures.look import final_cycle
+
+        summary, final = self.run.summary, final_cycle(self.run)
         return {
+            "final": final,
+            "led": self.run.led,
+            "scale": magnification(self.run) if scale is None else scale,
             "end": summary.get("end"),
             "ended": bool(summary),
             "cracks": summary.get("cracks") or _crack_names(self.run),
@@ -77,19 +76,19 @@ class Recording:
             "events": _events(self.run, self.origin),
         }
 
-    def cycles(self) -> list[int]:
-        """Cycles that can be drawn as they were: those whose interior is that of their own cracks."""
+    def cycles(self, every: bool = False) -> list[int]:
+        """Cycles that can be drawn as they were: those whose interior is that of their own cracks. ``every``: all, with
+        the last interior before them."""
         from ..render.pictures.field import agreeing
 
         written = written_cycles(self.run)
         known = set(self.run.history["cycle"].astype(int).tolist())
-        return [number for number in agreeing(self.run, written) if number in known]
+        return [number for number in (written if every else agreeing(self.run, written)) if number in known]
 
     def frame(self, cycle: int) -> dict[str, Any]:
         """The record of one cycle, with time and load."""
         row = self.run.at(cycle)
         record = self.frames.frame(cycle)
-        self._bytes[cycle] = len(record["data"])
         for name in ("time", "load", "strain", "crack_length", "max_k_eq"):
             value = float(row[name])
             record[name] = value if math.isfinite(value) else None
@@ -100,21 +99,21 @@ class Recording:
         first, the others spread evenly over what happens."""
         cycles = self.cycles()
         chosen = evenly(self.run, cycles, most)
-        made: dict[int, dict[str, Any]] = {}
-        while True:
-            for number in sample(chosen, 6) if len(chosen) > 24 and not made else chosen:
-                if number not in made:
-                    made[number] = self.frame(number)
-            mean = sum(len(json.dumps(each)) for each in made.values()) / len(made)
-            mean += sum(len(json.dumps(mesh)) for mesh in self.frames.meshes) / len(made)
-            if len(made) == len(chosen) and (mean * len(chosen) <= 1.05 * budget or len(chosen) <= 2):
-                break
-            fitting = max(2, min(len(chosen), int(budget / mean)))
-            chosen = evenly(self.run, cycles, fitting) if fitting < len(chosen) else chosen
-            if all(number in made for number in chosen) and mean * len(chosen) <= 1.05 * budget:
-                break
+        made = {number: self.frame(number) for number in sample(chosen, 6)}
+        fitting = int(budget / self._size(made) * len(made))
+        if fitting < len(chosen):
+            chosen = evenly(self.run, cycles, max(2, fitting))
+        made |= {number: self.frame(number) for number in chosen if number not in made}
+        while len(chosen) > 2 and (size := self._size({number: made[number] for number in chosen})) > budget:
+            # Every round leaves out one at least.
+            chosen = evenly(self.run, chosen, max(2, min(len(chosen) - 1, int(len(chosen) * budget / size))))
         frames = [made[number] for number in chosen]
         return self.opening() | self.state() | _with_own_meshes(frames, self.frames.meshes) | {"of": len(cycles)}
+
+    def _size(self, made: dict[int, dict[str, Any]]) -> int:
+        """Bytes of text that these frames take, with their meshes."""
+        record = _with_own_meshes(list(made.values()), self.frames.meshes)
+        return sum(len(json.dumps(each)) for part in record.values() for each in part)
 
 
 def _with_own_meshes(frames: list[dict[str, Any]], meshes: list[dict[str, Any]]) -> dict[str, Any]:
@@ -156,11 +155,12 @@ def evenly(run: Run, cycles: Sequence[int], most: int) -> list[int]:
     fixed = {int(numbers[0]), int(numbers[-1])}
     for number in sorted(first.values()):
         at = int(np.searchsorted(numbers, number))
-        if at < len(numbers) and len(fixed) < max(2, most // 2):
+        if at < len(numbers) and len(fixed) < min(most, max(3, most // 2)):
             fixed.add(int(numbers[at]))
-    wanted = np.linspace(way[0], way[-1], max(2, most - len(fixed) + 2))
-    nearest = np.clip(np.searchsorted(way, wanted), 0, len(way) - 1)
-    return sorted(fixed | set(numbers[nearest].tolist()))[: max(most, len(fixed))]
+    room = max(0, most - len(fixed))
+    nearest = np.searchsorted(way, np.linspace(way[0], way[-1], room + 2)[1:-1])
+    between = sorted(set(numbers[np.clip(nearest, 0, len(way) - 1)].tolist()) - fixed)
+    return sorted(fixed | set(between))
 
 
 def magnification(run: Run) -> float:
@@ -174,14 +174,19 @@ def magnification(run: Run) -> float:
         return 1.0
 
 
-def quick_magnification(run: Run) -> float:
-    """A round factor by which points of the last cycle are seen to move against each other."""
+def quick_magnification(run: Run, cycle: int) -> float:
+    """A round factor by which points are seen to move against each other at ``cycle``, a quarter of what pictures begin
+    with: those then look for blocks that would be drawn inside each other, which takes seconds."""
     from ..render.pictures.look import DEFORMATION
 
-    grid = in_reference(run.grid("blocks", written_cycles(run)[-1]))
-    size = float(np.ptp(np.asarray(grid.points)[:, :2], axis=0).max())
-    spread = float(np.ptp(np.asarray(grid["displacement"]), axis=0).max())
-    wanted = DEFORMATION * size / spread if spread > 1e-12 * size else 1.0
+    size = spread = 0.0
+    for series in ("blocks", "interior"):
+        if any(number <= cycle for number in run.grids(series)):
+            grid = in_reference(run.grid(series, cycle))
+            if grid.n_cells:
+                size = max(size, float(np.ptp(np.asarray(grid.points)[:, :2], axis=0).max()))
+                spread = max(spread, float(np.ptp(np.asarray(grid["displacement"]), axis=0).max()))
+    wanted = 0.25 * DEFORMATION * size / spread if spread > 1e-12 * size else 1.0
     return max(1.0, float(f"{wanted:.1g}"))
 
 
@@ -207,7 +212,11 @@ def _bounds(run: Run) -> tuple[np.ndarray, np.ndarray]:
 def _places(run: Run, origin: np.ndarray) -> dict[str, Any]:
     """Monitors and bolts whose places the run has left in ``places.json``; the end of a bolt in the ground is marked."""
     path = run.folder / PLACES
-    found = json.loads(path.read_text(encoding="utf-8")) if path.is_file() else {}
+    if path.is_file():
+        found = json.loads(path.read_text(encoding="utf-8"))
+    else:  # a run of an earlier version
+        drawn = {each["name"]: each["at"] for each in run.scene.get("monitors", ()) if each.get("at") is not None}
+        found = {"monitors": drawn}
     columns = run.history.dtype.names or ()
 
     def placed(point: Sequence[float]) -> dict[str, float]:

@@ -25,7 +25,7 @@ from urllib.parse import parse_qs, urlsplit
 
 from ..output.reading import Run
 from .page import player, policy, whole_page
-from .recording import MOST_FRAMES, NothingToPlay, Recording, evenly
+from .recording import MOST_FRAMES, NothingToPlay, Recording, evenly, magnification, quick_magnification
 
 #: Bytes of text that the cycles of one run may take in the browser.
 LIVE_BUDGET = 48_000_000
@@ -50,6 +50,7 @@ class Watched:
     _began: float | None = None
     _bytes: int = 0
     _written: tuple[float, bool] | None = None
+    _scale: float | None = None
 
     def refresh(self) -> None:
         """Read what is new; a run that was begun again is read from its start."""
@@ -62,7 +63,7 @@ class Watched:
             self._written = written
             self.version += 1
         if self._began is not None and began != self._began:
-            self.frames, self.recording, self._bytes = [], None, 0
+            self.frames, self.recording, self._bytes, self._scale = [], None, 0, None
             self.generation += 1
         self._began = began
         if self.recording is None:
@@ -72,9 +73,13 @@ class Watched:
                 return
         else:
             self.recording.run = self.recording.frames.run = run
-        cycles = [number for number in self.recording.cycles() if number > self.last]
+        cycles = [number for number in self.recording.cycles(every=True) if number > self.last]
         self.more = False
         if not cycles:
+            if self.frames and run.summary and self._scale is None:
+                # It takes seconds, which a reader who sees the run already does not wait for.
+                self._scale = magnification(run)
+                self.version += 1
             return
         left = LIVE_BUDGET - self._bytes
         each = self._bytes / len(self.frames) if self.frames else 0.0
@@ -104,8 +109,9 @@ class Watched:
             "version": self.version,
         }
         if not frames:
-            record |= self.recording.opening(quick=True) | {"of": len(self.frames)}
-        return record | self.recording.state()
+            record |= self.recording.opening() | {"of": len(self.frames)}
+        scale = quick_magnification(self.recording.run, self.last) if self._scale is None else self._scale
+        return record | self.recording.state(scale)
 
 
 class Viewer:

@@ -95,7 +95,7 @@ function within(ax, ay, bx, by, cx, cy, px, py, slack = 0) {
 
 class Frame {
   constructor(record, arrays, meshes) {
-    Object.assign(this, { cycle: record.cycle, time: record.time, load: record.load, strain: record.strain, arrays });
+    Object.assign(this, { cycle: record.cycle, time: record.time, load: record.load, strain: record.strain, fieldCycle: record.field_cycle, arrays });
     this.blocks = record.blocks === undefined ? null : meshes[record.blocks];
     this.rock = record.interior === undefined ? null : meshes[record.interior];
     // Blocks that are solved inside are drawn by their mesh, the others as they are.
@@ -118,7 +118,7 @@ class Run {
   }
   // What grows with a run: curves, tips, joints, events and how it ended.
   async update(record) {
-    Object.assign(this, { version: record.version, end: record.end, ended: record.ended, events: record.events, cracks: record.cracks });
+    Object.assign(this, { version: record.version, scale: record.scale, led: record.led, final: record.final, end: record.end, ended: record.ended, events: record.events, cracks: record.cracks });
     const [curves, tips, joints] = await Promise.all([record.curves, record.tips, record.joints].map(
       (each) => each && Arrays.of(each)));
     this.curves = curves;
@@ -127,14 +127,12 @@ class Run {
     this.joints = joints;
     this.jointNames = record.joints ? record.joints.names : [];
   }
-  // The last frame up to a time.
-  frameAt(time) {
-    let low = 0, high = this.frames.length - 1;
-    while (low < high) {
-      const middle = (low + high + 1) >> 1;
-      if (this.frames[middle].time <= time) low = middle; else high = middle - 1;
-    }
-    return low;
+  // Whether time goes on only: a crack that grows under less and less load takes it back.
+  get goesOn() { return this.frames.every((f, k) => !k || f.time >= this.frames[k - 1].time); }
+  // [time, how many frames before it have the same time] of every frame.
+  moments() {
+    let same = 0;
+    return this.frames.map((f, k) => { same = k && f.time === this.frames[k - 1].time ? same + 1 : 0; return [f.time, same]; });
   }
   crackName(k) { return (this.cracks && this.cracks[k]) || `crack ${k + 1}`; }
 }

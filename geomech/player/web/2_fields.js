@@ -79,7 +79,7 @@ const CRACK_FIELDS = [
 
 // ColorBrewer's RdBu and YlGnBu (C. Brewer, colorbrewer2.org), which colour-blind readers can tell apart too.
 const DIVERGING = ["#053061", "#2166ac", "#4393c3", "#92c5de", "#d1e5f0", "#f7f7f7", "#fddbc7", "#f4a582", "#d6604d", "#b2182b", "#67001f"];
-const SEQUENTIAL = ["#ffffe0", "#edf8b1", "#c7e9b4", "#7fcdbb", "#41b6c4", "#1d91c0", "#225ea8", "#253494", "#081d58"];
+const SEQUENTIAL = ["#ffffd9", "#edf8b1", "#c7e9b4", "#7fcdbb", "#41b6c4", "#1d91c0", "#225ea8", "#253494", "#081d58"];
 const LINES = ["#8f0d33", "#d7263d", "#ff7a1a", "#ffb01f"], SIZES = ["#ffc04d", "#ff7a1a", "#d7263d", "#8f0d33"];
 // Okabe and Ito (2008), without black.
 const CLASSES = ["#E69F00", "#56B4E9", "#009E73", "#F0E442", "#0072B2", "#D55E00", "#CC79A7", "#999999"];

@@ -20,7 +20,7 @@ Run.prototype.gapBefore = function (frame) {
 
 class Player {
   constructor(root, live) {
-    this.root = root; this.live = live; this.runs = []; this.at = 0; this.pace = 1; this.ranges = new Map();
+    this.root = root; this.live = live; this.runs = []; this.at = 0; this.pace = 1; this.ranges = new Map(); this.own = new Set();
     root.classList.add("gm");
     this.message = el("p", { class: "gm-message" }, "Reading …");
     root.replaceChildren(this.message);
@@ -30,12 +30,10 @@ class Player {
   async open(records) {
     this.runs = await Promise.all(records.map((record) => Run.of(record)));
     for (const run of this.runs) this.prepare(run);
-    const first = this.runs[0];
     this.field = FIELDS.find((f) => f.key === this.startField()) || FIELDS[0];
     this.joints = JOINT_FIELDS[0]; this.cracks = CRACK_FIELDS[0];
     this.shown = { outlines: true, cracks: true, tips: true, labels: false, forces: false, bolts: true, monitors: true, events: false, reference: false };
-    this.scale = Math.min(...this.runs.map((run) => run.scale)); this.flip = false; this.selected = null;
-    if (this.runs.every((run) => run.scale === first.scale)) this.scale = first.scale;
+    this.scale = this.defaultScale(); this.flip = false; this.selected = null;
     this.build();
     this.say("");
     this.history.set([], "time", "s");
@@ -68,16 +66,23 @@ class Player {
   }
 
   // -- time ----------------------------------------------------------------------------------------------------
-  // One run steps by its cycles; several step by the times of all of them.
-  timeline() {
-    if (this.runs.length === 1) return this.runs[0].frames.map((f) => f.time);
-    return [...new Set(this.runs.flatMap((run) => run.frames.map((f) => f.time)))].sort((a, b) => a - b);
+  // One run steps by its cycles; several by the times of all of them, or, where time goes back in one, by their parts.
+  // ``rows[k]``: which frame each run shows at step k; ``times[k]``: the time then, if there is one.
+  setTimeline() {
+    const runs = this.runs, order = (a, b) => a[0] - b[0] || a[1] - b[1];
+    if (runs.length > 1 && runs.every((run) => run.goesOn)) {
+      const moments = runs.map((run) => run.moments()), seen = new Set(), at = runs.map(() => 0);
+      const all = moments.flat().filter((m) => !seen.has(m.join()) && seen.add(m.join())).sort(order);
+      this.rows = all.map((m) => moments.map((own, k) => { while (at[k] + 1 < own.length && order(own[at[k] + 1], m) <= 0) at[k]++; return at[k]; }));
+      this.times = all.map((m) => m[0]);
+    } else {
+      const n = Math.max(...runs.map((run) => run.frames.length));
+      this.rows = Array.from({ length: n }, (_, k) => runs.map((run) => (n > 1 ? Math.round(k * (run.frames.length - 1) / (n - 1)) : 0)));
+      this.times = runs.length === 1 ? runs[0].frames.map((f) => f.time) : null;
+    }
   }
-  get count() { return this.runs.length === 1 ? this.runs[0].frames.length : this.times.length; }
-  frameOf(run) {
-    if (this.runs.length === 1) return run.frames[Math.min(this.at, run.frames.length - 1)];
-    return run.frames[run.frameAt(this.times[Math.min(this.at, this.times.length - 1)])];
-  }
+  get count() { return this.rows.length; }
+  frameOf(run) { return run.frames[this.rows[Math.min(this.at, this.count - 1)][this.runs.indexOf(run)]]; }
   go(at) {
     this.at = Math.max(0, Math.min(this.count - 1, Math.round(at)));
     this.slider.value = String(this.at);
@@ -86,16 +91,15 @@ class Player {
   // To the cycle nearest to a place on a curve.
   goTo(value, of) {
     let best = 0, least = Infinity;
-    for (let k = 0; k < this.count; k++) {
-      const frame = this.runs.length === 1 ? this.runs[0].frames[k] : null;
-      const x = frame ? of(frame) : this.times[k], d = Math.abs(x - value);
+    for (let k = 0; k < this.count; k++) for (const [i, run] of this.runs.entries()) {
+      const d = Math.abs(of(run.frames[this.rows[k][i]]) - value);
       if (d < least) { least = d; best = k; }
     }
-    this.go(best);
+    this.stop(); this.go(best);
   }
   play() {
     if (this.playing) return this.stop();
-    if (this.at >= this.count - 1) this.at = 0;
+    if (this.at >= this.count - 1) this.go(0);
     this.playing = true; this.playButton.textContent = "❚❚"; this.playButton.setAttribute("aria-label", "pause");
     let before = null, way = this.at;
     const step = (now) => {
@@ -115,7 +119,7 @@ class Player {
 
   // -- page ----------------------------------------------------------------------------------------------------
   build() {
-    this.times = this.timeline();
+    this.setTimeline();
     this.stage = el("div", { class: "gm-stage" });
     this.drawings = this.runs.map((run) => {
       const canvas = el("canvas", { class: "gm-canvas", role: "img", tabindex: "0" });
@@ -213,14 +217,14 @@ class Player {
     const flip = el("input", { type: "checkbox", onchange: () => { this.flip = flip.checked; this.redraw(); this.writeRange(); } });
     this.flipRow = el("label", { class: "gm-check" }, flip, "compression positive");
     this.rangeRow = el("div", { class: "gm-field" }, el("span", {}, "Range"), el("div", { class: "gm-range" }, this.lowInput, "to", this.highInput, this.rangeUnit),
-      el("div", { class: "gm-row" }, this.button("all cycles", "range over all cycles", () => { this.ranges.delete(this.field.key); this.chosen(); }),
+      el("div", { class: "gm-row" }, this.button("all cycles", "range over all cycles", () => { this.ranges.delete(this.field.key); this.own.delete(this.field.key); this.chosen(); }),
         this.button("this cycle", "range of this cycle", () => this.rangeOfThis()), this.flipRow));
     rows.push(this.rangeRow);
     this.scaleInput = el("input", { type: "range", min: "-1", max: "5", step: "0.01", "aria-label": "magnification", oninput: () => this.setScale(this.fromSlider(Number(this.scaleInput.value))) });
     this.scaleText = el("input", { type: "text", inputmode: "decimal", "aria-label": "displacements times", onchange: () => { const v = Number(this.scaleText.value); if (v >= 0 && Number.isFinite(v)) this.setScale(v); else this.writeScale(); } });
     rows.push(el("div", { class: "gm-field" }, el("span", {}, "Displacements ×"), el("div", { class: "gm-range" }, this.scaleInput, this.scaleText),
       el("div", { class: "gm-row" }, ...[["0", 0], ["1", 1]].map(([text, v]) => this.button(text, `displacements × ${text}`, () => this.setScale(v))),
-        this.button("default", "so that they are seen", () => this.setScale(Math.min(...this.runs.map((run) => run.scale)))))));
+        this.button("default", "so that they are seen", () => { this.setScale(this.defaultScale()); this.scaleChosen = false; }))));
     if (has("c_gap")) {
       const joints = this.select("Joints", JOINT_FIELDS, this.joints.key, (key) => { this.joints = JOINT_FIELDS.find((f) => f.key === key); this.redraw(); });
       this.jointInput = joints.input; joints.input.dataset.role = "joints"; rows.push(joints.row);
@@ -271,7 +275,7 @@ class Player {
     if (!this.ranges.has(this.field.key)) this.ranges.set(this.field.key, robustRange(this.runs, this.field));
     return this.ranges.get(this.field.key);
   }
-  rangeOfThis() { this.ranges.set(this.field.key, robustRange(this.runs, this.field, (run) => this.frameOf(run))); this.writeRange(); this.redraw(); }
+  rangeOfThis() { this.own.add(this.field.key); this.ranges.set(this.field.key, robustRange(this.runs, this.field, (run) => this.frameOf(run))); this.writeRange(); this.redraw(); }
   chosen() {
     const plain = this.field.category || this.field.key === "none";
     this.rangeRow.hidden = plain; this.flipRow.hidden = !(this.field.of && this.field.signed);
@@ -289,11 +293,12 @@ class Player {
   }
   setRange() {
     const unit = this.unit, ends = [this.lowInput, this.highInput].map((i) => this.sign * Number(i.value.replace("−", "-")) * unit.factor).sort((a, b) => a - b);
-    if (ends.every(Number.isFinite) && ends[1] > ends[0]) this.ranges.set(this.field.key, ends);
+    if (ends.every(Number.isFinite) && ends[1] > ends[0]) { this.ranges.set(this.field.key, ends); this.own.add(this.field.key); }
     this.writeRange(); this.redraw();
   }
   fromSlider(v) { return v <= -0.99 ? 0 : 10 ** v; }
-  setScale(scale) { this.scale = scale < 100 ? Number(scale.toPrecision(3)) : Number(scale.toPrecision(2)); this.writeScale(); this.redraw(); }
+  defaultScale() { return Math.min(...this.runs.map((run) => run.scale)); }
+  setScale(scale) { this.scaleChosen = true; this.scale = scale < 100 ? Number(scale.toPrecision(3)) : Number(scale.toPrecision(2)); this.writeScale(); this.redraw(); }
   writeScale() { this.scaleText.value = String(this.scale); this.scaleInput.value = String(this.scale > 0 ? Math.log10(this.scale) : -1); }
   look() {
     const plain = this.field.category || this.field.key === "none", [low, high] = plain ? [0, 1] : this.range();
@@ -359,12 +364,13 @@ class Player {
       const frame = this.frameOf(drawing.run);
       drawing.draw(frame, look);
       const name = this.runs.length > 1 ? `${drawing.run.name}: ` : "";
-      drawing.note.textContent = this.runs.length > 1 ? `${name}cycle ${frame.cycle}` : "";
+      const older = frame.fieldCycle === undefined || look.field.category ? "" : `field inside rock: cycle ${frame.fieldCycle}`;
+      drawing.note.textContent = (this.runs.length > 1 ? `${name}cycle ${frame.cycle}  ` : "") + older;
       drawing.canvas.setAttribute("aria-label", `${drawing.run.title}, cycle ${frame.cycle}, ${this.field.label}`);
     }
     this.paintMilliseconds = performance.now() - began;
     const frame = this.frameOf(this.runs[0]);
-    const said = [`t = ${digits(this.runs.length > 1 ? this.times[this.at] : frame.time)} s`];
+    const said = [this.times ? `t = ${digits(this.times[this.at])} s` : `${Math.round(100 * this.at / Math.max(this.count - 1, 1))} % of each run`];
     if (this.runs.length === 1) {
       said.push(`cycle ${frame.cycle}`);
       if (this.runs[0].led && frame.load !== null) said.push(`load ${withUnit(Math.abs(frame.load), "Pa")}${frame.load < 0 ? " in tension" : ""}`);
@@ -633,13 +639,16 @@ class Player {
       await run.append(record); await run.update(record);
       this.prepare(run);
     }
-    for (const key of [...this.ranges.keys()]) if (key.includes(":")) this.ranges.delete(key);
-    this.times = this.timeline();
+    for (const key of [...this.ranges.keys()]) if (!this.own.has(key)) this.ranges.delete(key);
+    if (!this.scaleChosen) { this.scale = this.defaultScale(); this.writeScale(); }
+    this.setTimeline();
     this.slider.max = String(this.count - 1);
     this.markEvents();
     if (this.curve) this.setCurve(this.curve, false);
     if (follows && !this.playing) this.at = this.count - 1;
     this.slider.value = String(this.at);
+    if (this.drawings.every((d) => d.fitted)) { this.layout(); this.fit(); }
+    this.writeRange();
     this.redraw();
   }
 }
