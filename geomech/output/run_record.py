@@ -126,7 +126,9 @@ class Places:
         """Nothing: the places are those of the reference."""
 
     def on_resume(self, problem: Problem, folder: Path, memory: None) -> None:
-        self.on_start(problem, folder)
+        """The file stays; the model may have lost bolts meanwhile."""
+        if not (Path(folder) / PLACES).is_file():
+            self.on_start(problem, folder)
 
     def on_cycle(self, cycle: Cycle) -> None:
         pass

@@ -212,8 +212,8 @@ function lineRange(runs, field) {
     const step = Math.max(1, Math.ceil(run.frames.length / 60));
     run.frames.forEach((f, k) => {
       if (k % step && k !== run.frames.length - 1) return;
-      const n = (f.get(field.array) || []).length;
-      for (let i = 0; i < n; i++) found.push([field.value(f, i), 1]);
+      const n = (f.get(field.array) || []).length, every = Math.max(1, Math.ceil(n * Math.min(run.frames.length, 60) / 40000));
+      for (let i = 0; i < n; i += every) found.push([field.value(f, i), 1]);
     });
   }
   if (field.key === "birth") {

@@ -180,23 +180,34 @@ class Drawing {
     this.layer.getContext("2d").putImageData(filler.data, 0, 0);
     this.context.drawImage(this.layer, 0, 0);
   }
+  // Strokes outlines a hundred at a time: a browser takes far longer over one path of thousands.
   loops(points, skip) {
-    const m = this.frame.blocks, c = this.context;
+    const m = this.frame.blocks, c = this.context, { width, height } = this.canvas;
+    let gathered = 0;
     c.beginPath();
     for (let k = 0; k + 1 < m.starts.length; k++) {
       if (skip(m.loop_block[k])) continue;
-      for (let i = m.starts[k]; i < m.starts[k + 1]; i++) {
+      const first = m.starts[k], last = m.starts[k + 1];
+      let x0 = Infinity, x1 = -Infinity, y0 = Infinity, y1 = -Infinity;
+      for (let i = first; i < last; i++) {
+        const x = points[2 * m.corners[i]], y = points[2 * m.corners[i] + 1];
+        if (x < x0) x0 = x; if (x > x1) x1 = x; if (y < y0) y0 = y; if (y > y1) y1 = y;
+      }
+      if (x1 < 0 || x0 > width || y1 < 0 || y0 > height) continue;
+      for (let i = first; i < last; i++) {
         const at = 2 * m.corners[i];
-        if (i === m.starts[k]) c.moveTo(points[at], points[at + 1]); else c.lineTo(points[at], points[at + 1]);
+        if (i === first) c.moveTo(points[at], points[at + 1]); else c.lineTo(points[at], points[at + 1]);
       }
       c.closePath();
+      if (++gathered % 100 === 0) { c.stroke(); c.beginPath(); }
     }
+    c.stroke();
   }
   referenceOutlines() {
     const { frame, context: c } = this, m = frame.blocks;
-    this.loops(this.placed(m.x, m.y), () => false);
     c.setLineDash([4 * this.ratio, 4 * this.ratio]);
-    c.lineWidth = 0.8 * this.ratio; c.strokeStyle = this.look.ink.soft; c.stroke();
+    c.lineWidth = 0.8 * this.ratio; c.strokeStyle = this.look.ink.soft;
+    this.loops(this.placed(m.x, m.y), () => false);
     c.setLineDash([]);
   }
   outlines() {
@@ -209,13 +220,12 @@ class Drawing {
     if (frame.blocks) {
       const removed = frame.get("removed"), m = frame.blocks;
       this.loops(this.blockPoints, (b) => removed[b] || (this.rockPoints && frame.solved.has(m.block[b])));
-      c.stroke();
     }
     if (frame.rock) {
       const e = frame.rock.edges, p = this.rockPoints;
-      c.beginPath();
-      for (let k = 0; k < e.length; k += 2) { c.moveTo(p[2 * e[k]], p[2 * e[k] + 1]); c.lineTo(p[2 * e[k + 1]], p[2 * e[k + 1] + 1]); }
       c.lineWidth = 1.2 * this.ratio;
+      c.beginPath();
+      for (let k = 0; k < e.length; k += 2) { c.moveTo(p[2 * e[k]], p[2 * e[k] + 1]); c.lineTo(p[2 * e[k + 1]], p[2 * e[k + 1] + 1]); if (k % 800 === 798) { c.stroke(); c.beginPath(); } }
       c.stroke();
     }
   }
@@ -225,7 +235,10 @@ class Drawing {
     c.lineWidth = width * this.ratio;
     for (const [colour, lines] of pieces) {
       c.strokeStyle = colour; c.beginPath();
-      for (let k = 0; k < lines.length; k += 4) { c.moveTo(lines[k], lines[k + 1]); c.lineTo(lines[k + 2], lines[k + 3]); }
+      for (let k = 0; k < lines.length; k += 4) {
+        c.moveTo(lines[k], lines[k + 1]); c.lineTo(lines[k + 2], lines[k + 3]);
+        if (k % 800 === 796) { c.stroke(); c.beginPath(); }
+      }
       c.stroke();
     }
   }
@@ -235,7 +248,7 @@ class Drawing {
     return css(ramp(SIZES, Number.isFinite(share) ? Math.round(24 * share) / 24 : 0));
   }
   joints() {
-    const { frame, look } = this, faces = frame.get("faces"), at = frame.get("c_vertex"), p = this.blockPoints;
+    const { frame, look, context: c } = this, faces = frame.get("faces"), at = frame.get("c_vertex"), p = this.blockPoints;
     const pieces = new Map(), field = look.joints;
     for (let k = 0; k < faces.length; k += 2) {
       const a = at[faces[k]], b = at[faces[k + 1]];
@@ -248,7 +261,9 @@ class Drawing {
       if (!pieces.has(colour)) pieces.set(colour, []);
       pieces.get(colour).push(p[2 * a], p[2 * a + 1], p[2 * b], p[2 * b + 1]);
     }
+    c.lineCap = "butt";  // round ends of thousands of lines take several times as long
     this.strokes(pieces, 2.6);
+    c.lineCap = "round";
   }
   crackPoints() {
     const { frame, look } = this, x = frame.get("k_x"), y = frame.get("k_y");
@@ -306,7 +321,8 @@ class Drawing {
       // Of many tips the ten that are nearest to growing.
       const order = Array.from({ length: n }, (_, k) => k).sort((a, b) => frame.get("t_keq")[b] - frame.get("t_keq")[a]).slice(0, 10);
       for (const k of order) {
-        const text = `KI ${digits(k1[k] / 1e6, 3)}  KII ${digits(k2[k] / 1e6, 3)}`;
+        const largest = Math.max(Math.abs(k1[k]), Math.abs(k2[k]), 1) / 1e6, places = Math.min(6, Math.max(0, 2 - Math.floor(Math.log10(largest))));
+        const text = `K_I ${(k1[k] / 1e6).toFixed(places)}  K_II ${(k2[k] / 1e6).toFixed(places)} MPa √m`.replace(/-/g, "−");
         // Words go outwards from the middle of the drawing.
         this.label(text, p[2 * k], p[2 * k + 1], p[2 * k] < this.canvas.width / 2 ? -1 : 1);
       }
@@ -373,7 +389,7 @@ class Drawing {
     const place = selected.place(this, frame);
     if (selected.kind === "block" && frame.blocks && frame.blocks.place.has(selected.id)) {
       const own = frame.blocks.place.get(selected.id);
-      this.loops(this.blockPoints, (b) => b !== own); c.stroke();
+      this.loops(this.blockPoints, (b) => b !== own);
     } else if (selected.kind === "joint" && frame.get("faces")) {
       const { pair } = selected, faces = frame.get("faces"), at = frame.get("c_vertex"), p = this.blockPoints;
       c.lineWidth = 4 * r; c.beginPath();

@@ -77,7 +77,7 @@ class Chart {
     y0 -= pad; y1 += pad;
     c.font = `11px ${font}`;
     const yTicks = ticks(y0, y1, Math.max(2, height / 45));
-    const left = 14 + Math.max(...yTicks.map((t) => c.measureText(digits(t)).width)) + 6, top = 18, right = 10, bottom = 34;
+    const left = 14 + Math.max(...yTicks.map((t) => c.measureText(digits(t)).width)) + 6, top = 18, right = 18, bottom = 34;
     const w = width - left - right, h = height - top - bottom;
     this.area = { left, width: w, x0, x1 };
     const px = (x) => left + w * (x - x0) / (x1 - x0), py = (y) => top + h * (1 - (y - y0) / (y1 - y0));
