@@ -22,7 +22,10 @@ def declare(verbs: Verbs) -> None:
         "geomech report outputs/two_cracks/phi_0\ngeomech report outputs/two_cracks\ngeomech report outputs/bench_ddm\n"
         "geomech report outputs/slope_sweep",
     )  # fmt: skip
-    report.description += " The page is one file that needs nothing else: of a run, of runs side by side, of a sweep, or of what a benchmark left."
+    report.description = (
+        str(report.description)
+        + " The page is one file that needs nothing else: of a run, of runs side by side, of a sweep, or of what a benchmark left."
+    )
     report.add_argument(
         "runs", nargs="+", type=Path, metavar="RUN", help="run folders, folders of run folders, or a benchmark's folder"
     )

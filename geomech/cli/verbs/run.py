@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from ..messages import say_warnings, tell_compiling
+from ..messages import report_compiling, say_warnings
 from ..scenes import default_folder, scene_arguments, scenes_asked, variants_asked
 from ..verb import DONE, BadInput, Verbs, add_verb, check_folder
 
@@ -30,7 +30,7 @@ def _run(options: argparse.Namespace) -> int:
     check_folder("--out", options.out)
     prepare_for_a_run()
     if not options.quiet:
-        tell_compiling()
+        report_compiling()
     from ...pipeline import overwriting
 
     with overwriting(options.overwrite):

@@ -226,8 +226,18 @@ def closing_lines(summary: dict[str, Any], folder: Path) -> list[str]:
     if "mechanism" in summary.get("first", {}):
         lines.append(f"  {NO_ANSWER}")
     if summary.get("end") in STOPS and summary["end"] != "mechanism":
-        lines.append(f"  to go on beyond it: geomech resume {folder} --set 'run.stop_at=[]'")
+        lines.append(_way_on(summary, folder))
     return [*lines, f"  {folder}"]
+
+
+def _way_on(summary: dict[str, Any], folder: Path) -> str:
+    """How a run goes on beyond the event that ended it."""
+    size = summary.get("checkpoint_not_kept_mb")
+    if size is None:
+        return f"  to go on beyond it: geomech resume {folder} --set 'run.stop_at=[]'"
+    return (
+        f"  to go on beyond it: run again with --set output.checkpoint_kept_mb={math.ceil(size)}, then geomech resume"
+    )
 
 
 def _told(cycle: Cycle) -> str:
