@@ -194,6 +194,8 @@ _CURVES = {
     "crack_length": "Length of all cracks.",
     "energy": "What the work done went into.",
     "monitors": "Ways of the monitored points.",
+    "joints": "Mean slip of the joints that slipped farthest.",
+    "bolts": "Forces of the bolts that carry most.",
 }
 
 

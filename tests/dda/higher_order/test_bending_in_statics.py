@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from scenes_of_bending import ROCK, after, body_of, moved, rectangle, system_of
 
-from geomech.dda import NotConverged
-from geomech.model import OPEN, EdgeTraction, History, JointLaw, LinearProfile, Loads, Material
+from geomech.dda import NotConverged, equilibrium
+from geomech.model import OPEN, EdgeTraction, History, JointLaw, LinearProfile, Loads, Material, State
 
 #: Joints that give by their area: springs at corners, a number for each corner, cannot pass a patch test.
 BY_AREA = JointLaw("joint", 0.6, normal_stiffness=1e12, shear_stiffness=1e12)
@@ -85,6 +85,19 @@ def test_a_beam_on_two_supports_bends_under_its_weight():
     assert (rows["normal_force"] >= 0).all()
     points = result.state.face_points
     assert (points["state"] == OPEN).sum() > len(points) / 2
+
+
+def test_equilibrium_is_found_where_beams_sag():
+    """A slender beam on two bearings sags by 25 mm, 30 times as far as blocks of its size may move that do not bend, and is
+    no mechanism; static steps come to rest where the search does."""
+    polygons = [rectangle(-0.4, -1, 0, 0), rectangle(20, -1, 20.4, 0), rectangle(-0.4, 0, 20.4, 1)]
+    system = system_of(polygons, [1, 1, 0], [1, 1, 5], max_displacement_ratio=0.01)
+    found = equilibrium(system, State.at_rest(system.blocks), WEIGHT)
+    assert found.converged, found.reason
+    stepped = after(system, WEIGHT, 6).state
+    sag = moved(system, found.state, 2, [10.0, 0.5])[1]
+    assert sag == pytest.approx(-0.0264, rel=0.01)
+    assert sag == pytest.approx(moved(system, stepped, 2, [10.0, 0.5])[1], rel=1e-5)
 
 
 def test_a_cantilever_of_one_block_bends_as_finite_elements_say():
