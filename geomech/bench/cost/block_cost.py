@@ -28,9 +28,9 @@ from ..peers.block_iteration import (
     TOLERANCES,
     Iterated,
     block_jacobi,
-    factored_anew,
     pardiso,
     pardiso_available,
+    refactored,
     two_levels,
 )
 from . import block_scenes
@@ -158,8 +158,8 @@ def measure(quick: bool = False, blocks: int | None = None) -> Measured:
         cost, others = _measured(name, SCENES[name](n), LONGEST[not quick], jacobi, domains)
         costs.append(cost)
         for other in others:
-            told = {key: getattr(other, key) for key in ("method", "iterations", "seconds", "residual")}
-            iterated.append({"scene": name, "blocks": cost.blocks, **told})
+            found = {key: getattr(other, key) for key in ("method", "iterations", "seconds", "residual")}
+            iterated.append({"scene": name, "blocks": cost.blocks, **found})
     # Behind all others, for static steps of very many blocks take more memory.
     for k, (n, name) in enumerate(scenes):
         if n <= SETTLES if quick else (name == "wall" or n <= SLOPES_SETTLE):
@@ -272,7 +272,7 @@ def _measured(name: str, blocks: Blocks, longest: float, jacobi: bool, domains: 
     residual = float(np.linalg.norm(right - solver.multiply(data, x)) / np.linalg.norm(right))
     others = [Iterated("direct", 1, cost.solution, residual, x)]
     if n_free <= DIRECTLY or domains:
-        others.append(factored_anew(solver, centroid, data, right))
+        others.append(refactored(solver, centroid, data, right))
         others += [pardiso(solver, data, right)] if pardiso_available() else []
     if jacobi:
         others += [block_jacobi(solver, data, right, tolerance) for tolerance in TOLERANCES]

@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from ..messages import say, tell_compiling
+from ..messages import report_compiling, say
 from ..scenes import trust_argument
 from ..verb import DONE, FAILED, BadInput, Verbs, add_verb, check_folder
 from .run import prepare_for_a_run
@@ -21,7 +21,7 @@ def declare(verbs: Verbs) -> None:
         "geomech sweep slope.toml --vary 'joints.beds.friction_angle_deg=normal(30, 4)' --runs 1000 --sampling sobol\n"
         "geomech sweep slope.toml --out outputs/slope_sweep --resume",
     )  # fmt: skip
-    made.description += (
+    made.description = str(made.description) + (
         " What varies, and all other settings, may stand in [sweep] of the scene or in a sweep.toml beside it; "
         "what the "
         "command line says goes before. One row a run goes to runs.csv and runs.parquet, a page to report.html."
@@ -71,6 +71,10 @@ def declare(verbs: Verbs) -> None:
     made.add_argument("--rare", choices=("subset", "importance"), help="method for probabilities below 1e-2")
     made.add_argument("--keep", choices=("none", "failed", "all"), help="whose run folders are kept (none)")
     made.add_argument(
+        "--run-limit", type=float, metavar="SECONDS", dest="run_limit_s",
+        help="stop a run that takes longer, and count it as failed (no limit)",
+    )  # fmt: skip
+    made.add_argument(
         "--table", type=Path, metavar="FILE", help="settings as TOML (default sweep.toml beside the scene)"
     )
     made.add_argument(
@@ -96,7 +100,7 @@ def _sweep(options: argparse.Namespace) -> int:
         raise BadInput("--workers takes a number of processes, at least 1")
     prepare_for_a_run()
     if not options.quiet:
-        tell_compiling()
+        report_compiling()
     from ...sweep.cluster import EngineRefused
     from ...sweep.execution import CannotResume, Telling, carry_out_sweep, default_folder, engine_for, read_sweep
     from ...sweep.plan import plan_of
@@ -109,7 +113,7 @@ def _sweep(options: argparse.Namespace) -> int:
         else:
             plan = plan_of(
                 options.scene, given, overrides=options.overrides, variant=options.variant, table=options.table,
-                limit=options.limit, told="--",
+                limit=options.limit, source="--",
             )  # fmt: skip
             folder = options.out or default_folder(plan.scene)
         if options.plan:
@@ -163,7 +167,18 @@ def _given(options: argparse.Namespace) -> dict[str, Any]:
     """The settings that the command line gives."""
     given: dict[str, Any] = {
         name: getattr(options, name)
-        for name in ("seeds", "runs", "seed", "measure", "fails", "along", "without_cracks", "rare", "keep")
+        for name in (
+            "seeds",
+            "runs",
+            "seed",
+            "measure",
+            "fails",
+            "along",
+            "without_cracks",
+            "rare",
+            "keep",
+            "run_limit_s",
+        )
         if getattr(options, name) is not None
     }
     if options.sampling:

@@ -1,14 +1,14 @@
-"""Open–close iteration: contact states that agree with the motion they produce.
+"""Open–close iteration: contact states that are consistent with the motion they produce.
 
-A set of states makes the step linear; its solution is checked against them (`coulomb_return`). Every contact that fails
-is switched and the step is solved again: a semismooth Newton method, which ends in two or three iterations where few
-contacts change. Bonds, lost for good, break only when all else is right.
+Given contact states make the step linear. Its solution is checked against them (`coulomb_return`), every inconsistent
+contact is switched, and the step is solved again: a semismooth Newton method, which converges in two or three
+iterations where few contacts change. Bonds, whose loss is final, break only when everything else is consistent.
 
-Where the number of wrong contacts does not fall, operator splitting (`operator_splitting`) proposes states once in a
-step that moves; those that are still wrong are settled on the blocks about them alone (`block_patches`), if they are
-few; else the interior-point method (`CentralPath`) proposes states from which Newton's goes on. Where none of them
-leads on, the step is cut. Laws that are curved are lines within an iteration, which goes on until
-lines and laws agree on the forces. All that is tuned stands in `ContactSolver`.
+If the number of inconsistent contacts does not fall, operator splitting (`operator_splitting`) proposes states, once in
+a step in motion. Those that remain inconsistent are solved on the surrounding blocks alone (`block_patches`), if they
+are few; otherwise the interior-point method (`CentralPath`) proposes states from which Newton's method
+continues. If that fails, the step is cut. Nonlinear joint laws are linearised within an iteration, which continues
+until the laws agree with their linearisation. All parameters are in `ContactSolver`.
 """
 
 from __future__ import annotations
@@ -105,13 +105,13 @@ class _Search:
         self.path: CentralPath | None = None
         self.seen: set[bytes] = set()
         self.offered: set[bytes] = set()
-        self.patched = 0
+        self.patched = self.pivots = 0
         self.may_split = self.solver.splitting and not effort.within_patch and can_split(self.equations)
         # What closes sticking, is pulled open by its own shear and closes again can only slide: neither fits.
         self.closed, self.sheared = np.zeros(n, np.int64), np.zeros(n)
-        self._begin_anew()
+        self._restart()
 
-    def _begin_anew(self, proposed: bool = False) -> None:
+    def _restart(self, proposed: bool = False) -> None:
         """Other states than before are tried, ``proposed`` by the central path."""
         self.fewest, self.tries, self.proposed, self.falls = np.inf, 0, proposed, True
         self.best: tuple[States, Answer, np.ndarray] | None = None
@@ -143,7 +143,9 @@ class _Search:
             self._count(number, answer, wrong)
             if self._by_patch(answer, wrong, number):
                 continue
-            if returned or self.tries > self._most_tries(number):
+            if not self.equations.first_order:
+                self._pivot(answer, wrong, called, returned)
+            elif returned or self.tries > self._most_tries(number):
                 if not self._by_splitting():
                     self._by_path(answer)
             else:
@@ -171,7 +173,7 @@ class _Search:
             first = bonds & _half_as_wrong_as_the_worst(answer.violation, found.block, found.other, order)
         self.states = self.states.switched(first, answer.called)
         self.most = max(self.most, self.newton + self.effort.max_iterations)
-        self._begin_anew()
+        self._restart()
 
     def _called(self, answer: Answer, wrong: np.ndarray) -> States:
         """The states that the ``answer`` calls for."""
@@ -199,9 +201,14 @@ class _Search:
     def _by_patch(self, answer: Answer, wrong: np.ndarray, number: int) -> bool:
         """Whether the wrong contacts, few, were settled on the blocks about them alone, from the best states so far."""
         solver, effort = self.solver, self.effort
-        if not solver.patches or effort.within_patch or self.equations.pattern.solver is None:
-            return False
-        if self.may_split or self.patched >= solver.patch_tries:
+        if (
+            not solver.patches
+            or not self.equations.first_order
+            or effort.within_patch
+            or self.equations.pattern.solver is None
+            or self.may_split
+            or self.patched >= solver.patch_tries
+        ):
             return False
         if (self.falls and not self.proposed) or self.fewest > solver.patch_wrong * len(self.found):
             return False
@@ -215,7 +222,7 @@ class _Search:
             self.proposed = False
             return False
         self.states = proposal
-        self._begin_anew()
+        self._restart()
         return True
 
     def _by_splitting(self) -> bool:
@@ -231,8 +238,28 @@ class _Search:
         if proposal.states is None or proposal.states.key in self.seen:
             return False
         self.states, self.most = proposal.states, max(self.most, self.newton + self.solver.newton_to_finish)
-        self._begin_anew()
+        self._restart()
         return True
+    def _pivot(self, answer: Answer, wrong: np.ndarray, called: States, returned: bool) -> None:
+        """Switch all ``wrong`` contacts to the states ``called`` for or, once states have ``returned`` or fewer are not
+        wrong, those alone that are worst on their blocks, until fewer are wrong than ever before: block principal pivoting
+        (Júdice & Pires 1994). Raises `Unsettled`."""
+        if not returned and self.tries <= self.solver.newton_tries:
+            self.states = self.states.switched(wrong, called)
+            return
+        self.pivots += 1
+        if self.pivots > self.effort.max_iterations:
+            raise self._unsettled(answer)
+        self.most = max(self.most, self.newton + self.effort.max_iterations)
+        found, violation = self.found, np.where(wrong, answer.violation, 0.0)
+        if self.pivots <= self.effort.max_iterations // 2:
+            some = wrong & _half_as_wrong_as_the_worst(
+                violation, found.block, found.other, self.equations.pattern.order
+            )
+        else:
+            # Where many that are worst lead back, one by one they do not (Murty 1974).
+            some = np.arange(len(wrong)) == (violation.argmax() if self.pivots % 2 else wrong.argmax())
+        self.states = self.states.switched(some, called)
 
     def _by_path(self, answer: Answer) -> None:
         """States that the central path proposes. Raises `Unsettled` where it has none."""
@@ -247,7 +274,7 @@ class _Search:
             raise self._unsettled(answer)
         self.seen.clear()
         self.states, self.most = proposal, max(self.most, self.newton + self.solver.newton_to_finish)
-        self._begin_anew(proposed=True)
+        self._restart(proposed=True)
 
     def _bonds_on_path(self) -> np.ndarray:
         """(n,) the bonds that the central path counts with: those of open contacts are gone, but not where cohesion belongs

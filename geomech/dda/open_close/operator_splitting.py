@@ -90,9 +90,9 @@ def stiffness_between(equations: Equations) -> np.ndarray:
 
 
 def can_split(equations: Equations) -> bool:
-    """Not in statics, where no inertia holds blocks, nor for curved laws, nor where the system is so small that its matrix
-    is full."""
-    if equations.statics or equations.expected is None:
+    """Not in statics, where no inertia holds blocks, nor for blocks of higher order or curved laws, nor where the system
+    is so small that its matrix is full."""
+    if equations.statics or equations.expected is None or not equations.first_order:
         return False
     return equations.curved is None and equations.pattern.solver is not None
 

@@ -13,7 +13,7 @@ from .stability_trial import Trial
 
 #: So many blocks of a mechanism are described; one that turns by more than this (rad) as it goes its own size is said
 #: to.
-_TOLD, _TURNS = 8, 0.05
+_LISTED, _TURNS = 8, 0.05
 
 
 @dataclass(frozen=True)
@@ -39,6 +39,8 @@ class FactorOfSafety:
     were their tips sharp; where they hold (``toes_hold``), what it is without them; None where it is not known.
     ``factor_if_parted``: what it is if faces lose the cohesion of an end that opens, where that is another;
     ``factor_if_rigid``: what it is of rigid blocks, where faces of elastic ones hold nothing for being open by a hair.
+    ``admissible``: the largest factor with admissible contact forces (`admissible_forces`), where that is beyond the
+    factor by more than one per cent; None where it is not, or is not known.
     ``warnings`` in words."""
 
     factor: float
@@ -55,6 +57,7 @@ class FactorOfSafety:
     other_factor: float | None = None
     factor_if_parted: float | None = None
     factor_if_rigid: float | None = None
+    admissible: float | None = None
     warnings: tuple[str, ...] = ()
 
     @property
@@ -113,6 +116,7 @@ class FactorOfSafety:
             "factor_without_toes" if self.toes_hold else "factor_with_sharp_toes": self.other_factor,
             "factor_if_parted_faces_lose_cohesion": self.factor_if_parted,
             "factor_of_rigid_blocks": self.factor_if_rigid,
+            "largest_factor_with_admissible_forces": self.admissible,
             "warnings": list(self.warnings),
             "trials": [{name: getattr(t, name) for name in plain} for t in self.trials],
         }
@@ -129,7 +133,7 @@ def mechanism_of(blocks: Blocks, trial: Trial, moving: tuple[int, ...]) -> tuple
     """A line for each of the fastest blocks."""
     fastest = float(np.hypot(*trial.displacement[list(moving[:1])].T).max()) if moving else 1.0
     lines = []
-    for block in moving[:_TOLD]:
+    for block in moving[:_LISTED]:
         (x, y), turn = trial.displacement[block], trial.rotation[block]
         far = math.hypot(x, y)
         name = blocks.names[block] if blocks.names else f"block {block}"
@@ -140,6 +144,6 @@ def mechanism_of(blocks: Blocks, trial: Trial, moving: tuple[int, ...]) -> tuple
             turned = f"{math.degrees(abs(turn)) * size / far:.0f}° while it goes its own size, √area"
             text += f", turning {'left' if turn > 0 else 'right'} by {turned}"
         lines.append(text)
-    if len(moving) > _TOLD:
-        lines.append(f"and {len(moving) - _TOLD} more of {blocks.n_blocks} blocks")
+    if len(moving) > _LISTED:
+        lines.append(f"and {len(moving) - _LISTED} more of {blocks.n_blocks} blocks")
     return tuple(lines)
