@@ -240,6 +240,7 @@ class _Search:
         self.states, self.most = proposal.states, max(self.most, self.newton + self.solver.newton_to_finish)
         self._restart()
         return True
+
     def _pivot(self, answer: Answer, wrong: np.ndarray, called: States, returned: bool) -> None:
         """Switch all ``wrong`` contacts to the states ``called`` for or, once states have ``returned`` or fewer are not
         wrong, those alone that are worst on their blocks, until fewer are wrong than ever before: block principal pivoting
