@@ -8,10 +8,15 @@ Numba leaves the copies of what a kernel calls open to whoever loads code of the
 compiles that is what was called, compiled by itself; in runs that find the kernel compiled it is the kernel's own copy,
 which was optimised with it and fuses other products with sums: other last digits. Here they are the kernel's alone, and
 what only kernels call (`part`) is made machine code nowhere else.
+
+Most of the time of compiling goes into Numba's inference of types. While kernels are compiled it remembers what
+operators and functions give for arguments of given types, and compares its own settings by what is set in them; a
+`part` is compiled once for all integers that are passed to it, not once for each constant.
 """
 
 from __future__ import annotations
 
+import contextlib
 import functools
 import hashlib
 import logging
@@ -24,7 +29,7 @@ from types import CodeType
 import numpy as np
 from llvmlite import binding as llvm
 from numba import __version__ as numba_version
-from numba import config, njit
+from numba import config, njit, types
 
 from .kernel_folder import SOURCE, kernel_place, prune
 
@@ -35,8 +40,11 @@ try:
     from numba.core.codegen import JITCodeLibrary
     from numba.core.compiler import Compiler
     from numba.core.dispatcher import Dispatcher
+    from numba.core.targetconfig import ConfigStack, TargetConfig
+    from numba.core.types.functions import BaseFunction
 except ImportError:  # told below
     IndexDataCacheFile = UserProvidedCacheLocator = JITCodeLibrary = Compiler = object
+    ConfigStack = TargetConfig = BaseFunction = object
     Dispatcher = type(njit(lambda: None))
 
 #: What of Numba's inner parts is relied on; they may move in any version.
@@ -47,7 +55,10 @@ _INNER = (
                           "_open_for_write", "load", "save")),
     (Compiler, ("compile_extra",)),
     (UserProvidedCacheLocator, ("from_function", "ensure_cache_path", "get_cache_path")),
-    (Dispatcher, ("_insert", "_compile_for_args")),
+    (Dispatcher, ("_insert", "_compile_for_args", "get_call_template")),
+    (BaseFunction, ("get_call_type",)),
+    (ConfigStack, ("top_or_none",)),
+    (TargetConfig, ("values", "options", "__hash__")),
     (config, ("CACHE_LOCATOR_CLASSES", "CACHE_DIR")),
 )  # fmt: skip
 
@@ -103,6 +114,7 @@ def part(**options) -> Callable:
         # There is nothing that Python could call: it is told so, and nothing is put where it would be found.
         made._insert = lambda *signature, **how: None
         made._compile_for_args = functools.partial(_refuse, function.__qualname__)
+        made.get_call_template = functools.partial(_with_any_integer, made.get_call_template)
         return made
 
     return compiled
@@ -110,6 +122,76 @@ def part(**options) -> Callable:
 
 def _refuse(name: str, *args, **kwargs) -> None:
     raise TypeError(f"{name} is part of kernels, which alone can call it")
+
+
+def _with_any_integer(get_call_template: Callable, args: tuple, kws: dict) -> tuple:
+    """The call of a part with the types ``args`` and ``kws``, constants taken as integers of any value."""
+    return get_call_template(
+        tuple(_plain(each) for each in args), {name: _plain(each) for name, each in kws.items()}
+    )  # fmt: skip
+
+
+def _plain(given: types.Type) -> types.Type:
+    constant = isinstance(given, (types.IntegerLiteral, types.BooleanLiteral))
+    return types.unliteral(given) if constant else given
+
+
+#: Types of arguments for which a function always has the same signature, whatever their values.
+_PLAIN = (types.Number, types.Boolean, types.Array, types.UniTuple, types.Record)
+
+
+@contextlib.contextmanager
+def _quick_inference() -> Iterator[None]:
+    """Numba's inference of types, with `_remembered_call_type` and `_same_settings`, and its own again afterwards."""
+    replaced = (
+        (BaseFunction, "get_call_type", _remembered_call_type),
+        (TargetConfig, "__eq__", _same_settings),
+        (TargetConfig, "__hash__", _hash_of_settings),
+    )
+    before = [(owner, name, getattr(owner, name)) for owner, name, _ in replaced]
+    try:
+        for owner, name, ours in replaced:
+            setattr(owner, name, ours)
+        yield
+    finally:
+        for owner, name, theirs in before:
+            setattr(owner, name, theirs)
+
+
+_call_type = getattr(BaseFunction, "get_call_type", None)
+_signatures: dict[tuple, list[tuple]] = {}
+
+
+def _remembered_call_type(self: BaseFunction, context, args: tuple, kws: dict):
+    """The signature of a call of ``self``, found once for the same types and settings: Numba tries all that are
+    declared, in each of several rounds of inference."""
+    if type(self) is not types.Function or kws or not all(isinstance(each, _PLAIN) for each in args):
+        return _call_type(self, context, args, kws)
+    settings = ConfigStack.top_or_none()
+    known = _signatures.setdefault((self, context, tuple(args)), [])
+    for of, signature in known:
+        if of is settings or of == settings:
+            return signature
+    signature = _call_type(self, context, args, kws)
+    known.append((settings, signature))
+    return signature
+
+
+def _same_settings(self: TargetConfig, other: object) -> bool:
+    """Whether two sets of settings are the same; most are by what has been set in them."""
+    if not isinstance(other, TargetConfig):
+        return NotImplemented
+    return self is other or self._values == other._values or self.values() == other.values()
+
+
+@functools.cache
+def _hash_of(options: tuple[str, ...]) -> int:
+    return hash(tuple(sorted(options)))
+
+
+def _hash_of_settings(self: TargetConfig) -> int:
+    """What Numba's own gives, which is of the names of settings alone."""
+    return _hash_of(tuple(self.options))
 
 
 class _Kernel(JITCodeLibrary):
@@ -180,7 +262,8 @@ class _KernelCompiler(Compiler):
         if self.state.library is None:
             self.state.library = self.library(self.state.targetctx.codegen(), function.__qualname__)
             self.state.library.enable_object_caching()
-        return super().compile_extra(function)
+        with _quick_inference():
+            return super().compile_extra(function)
 
 
 class _PartCompiler(_KernelCompiler):

@@ -76,7 +76,7 @@ def copy(name: str, into: Path) -> list[Path]:
     files = [p for p in sorted(example.place.rglob("*")) if p.is_file()] if example.place.is_dir() else [example.place]
     base = example.place if example.place.is_dir() else example.place.parent
     into.mkdir(parents=True)
-    written = {}
+    written: dict[str, None] = {}
     for file in files:
         if "__pycache__" in file.parts or file.suffix == ".pyc":
             continue

@@ -14,7 +14,10 @@ from .interruption import Interruption
 from .model import Cycle, Problem
 
 if TYPE_CHECKING:
+    from . import dda
     from .coupling import Coupling
+    from .report.safety_page import SafetyReport
+    from .scene import Scene
 
 log = logging.getLogger(__name__)
 
@@ -41,15 +44,22 @@ def refuse_results(folders: Iterable[Path]) -> None:
         run_lock.refuse_results(folders)
 
 
-def cycles(scene) -> Iterator[Cycle]:
-    """The coupling cycles of ``scene`` (a loaded scene, or a path to one); nothing is written."""
+def cycles(scene: Scene | str | Path) -> Iterator[Cycle]:
+    """The coupling cycles of ``scene`` (a loaded scene, or a path to one); nothing is written.
+
+    >>> for cycle in geomech.cycles("slope.toml"):
+    ...     print(f"{cycle.state.time:.1f} s: {cycle.blocks.n_blocks} blocks, {len(cycle.tips)} crack tips")
+    0.0 s: 2 blocks, 0 crack tips
+    0.1 s: 2 blocks, 0 crack tips
+    0.2 s: 2 blocks, 0 crack tips
+    """
     from .coupling import cycles as run_problem
 
     return run_problem(_loaded(scene).problem())
 
 
 def run(
-    scene,
+    scene: Scene | str | Path,
     out: str | Path | None = None,
     observers: Iterable[Any] | None = None,
     *,
@@ -65,6 +75,10 @@ def run(
     Raises SceneError on bad input or when ``out`` is where the scene itself is kept,
     `geomech.output.run_lock.FolderRefused` where it holds the results of a run or another one is at work,
     `geomech.dda.NotConverged` when the blocks find no consistent contact state.
+
+    >>> summary = geomech.run("slope.toml", out="outputs/first", observers=[])
+    >>> summary["end"]
+    'end of the scene'
     """
     scene = _loaded(scene)
     folder = Path(out) if out is not None else Path("outputs") / scene.name
@@ -102,7 +116,7 @@ class CoupledRun:
 
     It begins at the start of ``problem``, or where ``stored``, the content of a checkpoint, was written (it is used
     up), with the title and the settings of the run that ``problem`` has now. A first interrupt ends it between two
-    cycles.
+    cycles, or in the middle of one that lasts (`geomech.interruption.PATIENCE`).
     """
 
     def __init__(
@@ -181,12 +195,17 @@ class CoupledRun:
         if coupling.under_way is None or last:
             self.before_the_last = last
         # (Between the passes of the last step there is one already, from before it.)
-        if self.interruption.asked or last or (self.checkpoints.due and not self.before_the_last):
+        due = self.checkpoints is not None and self.checkpoints.due
+        if self.interruption.asked:
+            self.interruption.wait()
+        if self.interruption.asked or last or (due and not self.before_the_last):
             self._store(coupling)
         if self.interruption.asked:
             raise KeyboardInterrupt
 
     def _store(self, coupling: Coupling) -> None:
+        if self.checkpoints is None:
+            return
         content = {
             "coupling": coupling,
             "observers": self.group.memories(),
@@ -209,14 +228,14 @@ def cracked_and_free(problem: Problem) -> list[str]:
 
 
 def factor_of_safety(
-    scene,
+    scene: Scene | str | Path,
     load_time: float | None = None,
     *,
     without_cracks: bool = False,
     along: Sequence[str] | None = None,
     divide: Mapping[str, float] | None = None,
-    **wishes,
-):
+    **wishes: Any,
+) -> dda.FactorOfSafety:
     """`geomech.dda.FactorOfSafety` of the blocks of ``scene``, by strength reduction under the loads of ``load_time`` s
     (default: the scene's end). ``wishes`` as for `geomech.dda.factor_of_safety`: tolerance, watch …
 
@@ -228,6 +247,10 @@ def factor_of_safety(
     hold counts as if they never broke: the answer is then a bound from above. Raises `CracksInBlocks` where there are
     such cracks and it is not said, SceneError on bad input, `geomech.dda.NothingToReduce` where there is no strength to
     reduce or a name is not known, `geomech.dda.NotConverged` where the blocks do not stand whatever their joints hold.
+
+    >>> found = geomech.factor_of_safety("slope.toml")
+    >>> f"{found.factor:.4f}"  # a block on a plane: tan 35° / tan 30°
+    '1.2128'
     """
     return safety_report(
         scene, load_time, without_cracks=without_cracks, along=along, divide=divide, **wishes
@@ -235,16 +258,23 @@ def factor_of_safety(
 
 
 def safety_report(
-    scene,
+    scene: Scene | str | Path,
     load_time: float | None = None,
     *,
     without_cracks: bool = False,
     along: Sequence[str] | None = None,
     divide: Mapping[str, float] | None = None,
-    **wishes,
-):
+    **wishes: Any,
+) -> SafetyReport:
     """`geomech.report.safety_page.SafetyReport` of the same: its ``text()``, ``as_dict()`` and ``draw(path)``; the factor
-    itself is ``found``."""
+    itself is ``found``.
+
+    >>> report = geomech.safety_report("slope.toml", divide={"friction": 1.25})
+    >>> report.found.factor < 1  # the design does not hold with a partial factor of 1.25
+    True
+    >>> report.found.mechanism
+    ('block: 1.00 of the fastest, towards -150°',)
+    """
     from . import dda
     from .report.safety_page import SafetyReport
 
@@ -270,7 +300,7 @@ def safety_report(
     )  # fmt: skip
 
 
-def _spare(scene, folder: Path) -> None:
+def _spare(scene: Scene, folder: Path) -> None:
     """Refuse to put a run, and with it a scene.toml, where the scene itself is kept."""
     kept = folder / "scene.toml"
     if kept.exists() and kept.samefile(scene.path):
@@ -288,7 +318,7 @@ def _end_reason(stopping: list[str], error: BaseException | None) -> str:
     return stopping[0] if stopping else "end of the scene"
 
 
-def _loaded(scene):
+def _loaded(scene: Scene | str | Path) -> Scene:
     if isinstance(scene, (str, Path)):
         from .scene import load_scene
 

@@ -20,7 +20,7 @@ log = logging.getLogger(__name__)
 #: Keys of a scene that may be changed when a run is gone on with: none of them changes what has happened.
 ALLOWED = (
     "title", "run.end_time_s", "run.stop_at", "output.every", "output.interior", "output.interior_every",
-    "output.checkpoint_every", "render",
+    "output.checkpoint_every", "output.checkpoint_kept_mb", "render",
 )  # fmt: skip
 #: Ends of a run that are none.
 _BROKEN_OFF = ("interrupted", "failed")
@@ -32,7 +32,7 @@ class Finished(NotResumable):
 
 def resume(
     folder: str | Path,
-    overrides: Iterable[str] = (),
+    overrides: Iterable[str] | Mapping[str, Any] = (),
     observers: Iterable[Any] | None = None,
     *,
     quiet: bool = False,
@@ -42,15 +42,19 @@ def resume(
     on the same machine with as many threads, but for times of day. Rows and files that are later than the checkpoint
     are dropped.
 
-    ``overrides`` may change keys in `ALLOWED` ("run.end_time_s=20" lets a finished run go on: from before the step
-    that its
-    first end has cut, as a run that was as long from the beginning). A run without a checkpoint so far begins again.
+    ``overrides``, as for `load_scene`, may change keys in `ALLOWED`. A later ``run.end_time_s`` lets a finished run go
+    on from before the step that its end has cut, like a run that was as long from the beginning. A run without a
+    checkpoint begins again.
     ``observers`` are those of the run, by default the standard ones (``quiet``: they say nothing); ``tell`` is told
     when the run begins again. Raises `Finished` when
     there is nothing left to do, `NotResumable` when the run cannot be gone on with, `geomech.output.run_lock.FolderInUse`
     while another process is at work in the folder, SceneError on bad input.
+
+    >>> geomech.resume("outputs/broken_off", {"run.end_time_s": 0.3}, quiet=True)["time_s"]
+    0.3
     """
-    wish = _Wish(Path(folder), tuple(overrides), observers, quiet, tell)
+    changes = overrides if isinstance(overrides, Mapping) else tuple(overrides)
+    wish = _Wish(Path(folder), changes, observers, quiet, tell)
     _refuse_other_folders(wish.folder)
     with RunLock(wish.folder) as lock:
         if lock.stale:
@@ -62,7 +66,7 @@ class _Wish(NamedTuple):
     """What was asked for, as `resume` has it."""
 
     folder: Path
-    overrides: tuple[str, ...]
+    overrides: tuple[str, ...] | Mapping[str, Any]
     observers: Iterable[Any] | None
     quiet: bool
     tell: Callable[[str], None]
@@ -84,9 +88,10 @@ class _Wish(NamedTuple):
 
 def _resumed(wish: _Wish) -> dict[str, Any]:
     folder = wish.folder
-    header, path = next(checkpoint_file.whole(folder / checkpoint_file.FOLDER), (None, None))
-    if path is None:
+    found = next(checkpoint_file.whole(folder / checkpoint_file.FOLDER), None)
+    if found is None:
         return _begin_again(wish)
+    header, path = found
     _refuse_other_sources(header, path)
     scene = None if header["scene"] is None else wish.scene()
     changes = {} if scene is None else _changes(header, scene.resolved())
@@ -195,7 +200,10 @@ def _begin_again(wish: _Wish) -> dict[str, Any]:
     folder = wish.folder
     end = _told_end(folder)
     if end is not None:
-        raise Finished(f"the run has ended ({end}), and it has no checkpoint: run the scene anew to let it go on")
+        raise Finished(
+            f"the run has ended ({end}), and it has no checkpoint: run the scene anew to let it go on, with a larger "
+            "output.checkpoint_kept_mb where it is its checkpoint's size that was too large"
+        )
     if not (folder / "scene.toml").is_file():
         raise NotResumable(f"{folder} holds neither a checkpoint nor a scene.toml: run the scene anew")
     wish.tell(f"{folder} holds no checkpoint yet: the run begins again")

@@ -43,6 +43,7 @@ EDGE = {
     "installing",
     "interruption",
     "pipeline",
+    "player",
     "report",
     "resumption",
     "study",
@@ -55,11 +56,12 @@ ONLY_IN = {
     "ezdxf": {"shapes"},
     "vtk": {"output", "render"},
     "vtkmodules": {"output", "render"},
-    "pyvista": {"output", "render", "bench", "report"},
+    "pyvista": {"output", "render", "bench", "report", "player"},
     "matplotlib": {"render"},
     "imageio": {"render"},
     "pydantic": {"scene"},
     "meshio": {"shapes", "output", "bench"},
+    "h5py": {"output"},
     "numba": {"compiled", "dda", "ddm", "coupling"},
     "shapely": {"shapes", "scene", "coupling", "output", "render"},
     "distributed": {"sweep", "bench"},
@@ -67,8 +69,8 @@ ONLY_IN = {
     "SALib": {"sweep"},
 }
 #: Heavy ones are imported where they are used, never when a module is.
-LAZY = {"gmsh", "ezdxf", "vtk", "vtkmodules", "pyvista", "matplotlib", "scipy", "imageio", "meshio", "distributed", "pyarrow",
-        "SALib"}  # fmt: skip
+LAZY = {"gmsh", "ezdxf", "vtk", "vtkmodules", "pyvista", "matplotlib", "scipy", "imageio", "meshio", "h5py", "distributed",
+        "pyarrow", "SALib"}  # fmt: skip
 
 SOURCES = sorted(HOUSE.rglob("*.py"))
 

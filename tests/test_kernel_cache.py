@@ -182,3 +182,24 @@ def test_a_numba_whose_inner_parts_have_moved_is_used_its_own_way(tmp_path, owne
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, env=environment, check=False)
     assert done.stdout.strip() == "6.0", done.stderr
     assert "kernels are kept in its own way" in done.stderr
+
+
+def test_a_part_is_compiled_once_for_all_constants(tmp_path):
+    """Numba compiles what is called with 0, with 1 and with n three times; Numba's own inference is back afterwards."""
+    (tmp_path / "constants.py").write_text(
+        "from geomech.compiled import kept, part\n"
+        "@part(nogil=True)\ndef shifted(x, n):\n    return x + n\n"
+        "@kept(nogil=True)\ndef scaled(x, n):\n    return shifted(x, 0) + shifted(x, 1) + shifted(x, n)\n"
+    )
+    code = (
+        "from numba.core.targetconfig import TargetConfig as settings\n"
+        "from numba.core.types.functions import BaseFunction\n"
+        "before = settings.__eq__, settings.__hash__, BaseFunction.get_call_type\n"
+        "from constants import scaled, shifted\n"
+        "print(scaled(1.0, 5), len(shifted.overloads))\n"
+        "print((settings.__eq__, settings.__hash__, BaseFunction.get_call_type) == before)"
+    )
+    environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path / "kernels")}
+    environment["PYTHONPATH"] = os.pathsep.join([str(tmp_path), str(Path(geomech.__file__).resolve().parents[1])])
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, env=environment)
+    assert done.stdout.split() == ["9.0", "1", "True"]

@@ -13,7 +13,9 @@ def as_rst(lines: list[str]) -> list[str]:
     """The lines of a docstring, without its common indentation, in reStructuredText."""
     out: list[str] = []
     for paragraph in _paragraphs(lines):
-        if all(line.startswith("  ") for line in paragraph):
+        if paragraph[0].startswith(">>>"):
+            out += [*paragraph, ""]
+        elif all(line.startswith("  ") for line in paragraph):
             literal = any(line.endswith("::") for line in out[-2:])
             out += [*([] if literal else ["", ".. code-block:: text", ""]), *("   " + line for line in paragraph), ""]
         else:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from . import command_line, equations, output_files, scene_keys, verification
+from . import command_line, equations, messages, output_files, scene_keys, verification
 
 ROOT = Path(__file__).parents[2]
 #: Files at the top of the project that are pages of the manual too.
@@ -19,6 +19,7 @@ def write_all(folder: Path) -> None:
         "command_line.md": command_line.page(),
         "output_files.md": output_files.page(),
         "equations.md": equations.page(),
+        "all_messages.md": messages.page(),
         **verification.pages(),
     }
     pages |= {
@@ -33,3 +34,6 @@ def write_all(folder: Path) -> None:
         path = folder / name
         if not path.is_file() or path.read_text(encoding="utf-8") != text:
             path.write_text(text, encoding="utf-8")
+    for file, chapter in verification.pictures():
+        if not (folder / file).is_file() or (folder / file).stat().st_mtime < verification.MEASURED.stat().st_mtime:
+            verification.draw(chapter, folder / file)

@@ -58,7 +58,7 @@ class Compiling(logging.Handler):
             say(f"  {self.count} compiled, {now - self.began:.0f} s so far")
 
 
-def tell_compiling() -> None:
+def report_compiling() -> None:
     """From now on, say when kernels are compiled."""
     logger = logging.getLogger("geomech.compiled")
     if not any(isinstance(handler, Compiling) for handler in logger.handlers):

@@ -1,4 +1,4 @@
-"""Blocks and cracks as a coupled run has them at present, with what the solvers keep of them from step to step."""
+"""State of a coupled run: blocks, cracks, and what both solvers keep from step to step."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from .. import dda
 from ..ddm.counters import Work
 from ..model import Blocks, Cracks, Motion, Problem, State
 from ..model.blocks.polygon import winding_number
-from .crack_compliance.growth_screening import CannotGrow
-from .crack_compliance.load_extrapolation import Foretold
+from .crack_compliance.growth_screening import GrowthScreening
+from .crack_compliance.load_extrapolation import LoadExtrapolation
 from .crack_compliance.mean_stress_response import ByMeanStress
 from .crack_compliance.quasi_newton import Settling
 from .load_transfer.boundary_tractions import BoundaryLoad
@@ -26,13 +26,13 @@ if TYPE_CHECKING:
 
 
 class CrackedBlocks:
-    """What a load step begins with, and what its passes change.
+    """Blocks and cracks at the start of a load step, and the quantities that its passes update.
 
-    ``state`` is that at the start of the step; ``problem`` has the loads as they are on the present blocks. ``number``
-    and ``load_step`` count cycles and load steps. ``bodies`` (block → elastic body), ``nodes_of`` (block → its nodes in
-    the whole network), ``solutions``, ``loads`` and ``compliances`` are of the last pass; ``response`` is what the
-    blocks are to assume of their cracks, ``by_mean_stress`` which of them feel only their mean stress, ``acted`` the
-    statistics of the last step, with what it takes to move blocks.
+    ``state`` is the state at the start of the step; ``problem`` has the loads on the present blocks. ``number`` and
+    ``load_step`` count cycles and load steps. Of the last pass: ``bodies`` (block → elastic body), ``nodes_of`` (block
+    → its nodes in the whole crack network), ``solutions``, ``loads`` and ``compliances``; ``response``: the crack
+    response that the blocks assume; ``by_mean_stress``: blocks whose cracks respond to the mean stress alone;
+    ``acted``: statistics of the last step, with the work and forces of prescribed motion.
     """
 
     def __init__(self, problem: Problem) -> None:
@@ -53,11 +53,11 @@ class CrackedBlocks:
         self.loads: dict[int, BoundaryLoad] = {}
         self.compliances: dict[int, tuple] = {}
         self.by_mean_stress = ByMeanStress()
-        self.cannot_grow = CannotGrow()
-        self.settling, self.foretold = Settling(), Foretold()
-        #: What the last steps of the tips have told of their paths.
+        self.growth_screening = GrowthScreening()
+        self.settling, self.extrapolation = Settling(), LoadExtrapolation()
+        #: Curvature of each tip's path in its last increments.
         self.chords: Memory = {}
-        # What crack faces with friction remember of the load step before: its passes all begin there.
+        # Slip and damage of frictional crack faces at the start of the load step, where all its passes begin.
         self.history: dict[int, object] = {}
         self.solved_from: dict[int, object] = {}
         self.budget, self.crack_energy = dda.EnergyBudget(), CrackEnergy(problem.dda.dynamic_factor == 0.0)
@@ -65,48 +65,47 @@ class CrackedBlocks:
         self.removed: np.ndarray | None = None
         self._motion: tuple[State, Motion] | None = None
         self._take_blocks()
-        #: Where the search for rest under the in-situ stress ended in a collapse.
+        #: Result of the search for in-situ equilibrium where that ended in a collapse.
         self.collapsed: dda.Equilibrium | None = None
         if problem.in_situ is not None:
             self._settle_in_situ()
 
     def motion(self, state: State) -> Motion:
-        """The blocks' motion in ``state``; the record of one step and the loads of the next ask for the same one."""
+        """Motion of the blocks in ``state``, kept for the record of a step and the loads of the next one."""
         if self._motion is None or self._motion[0] is not state:
             self._motion = state, Motion.of(self.blocks, state.vertices)
         return self._motion[1]
 
     def limits(self, block: int) -> list[np.ndarray]:
-        """Loops about the rock that cracks of ``block`` may grow in; of rock without an end those about what is not
-        rock."""
+        """Loops that bound the rock in which cracks of ``block`` may grow; in unbounded rock the loops around
+        openings."""
         return self.blocks.loops(block) if self.problem.endless is None else self.bodies[block].limits
 
     # -- the elastic bodies --------------------------------------------------------------------------------------------
 
     def take_cracks(self, cracks: Cracks) -> None:
-        """Go on with ``cracks`` in the same blocks."""
+        """Replace the cracks; the blocks stay."""
         self.cracks = cracks
         self._take_bodies()
 
     def _take_bodies(self) -> None:
-        """The elastic bodies of the present cracks, keeping what has not changed."""
+        """Make the elastic bodies of the present cracks; bodies that have not changed are kept."""
         self.bodies, self.nodes_of = self.bodies_of(self.cracks, self.bodies)
 
     def bodies_of(self, cracks: Cracks, kept: dict) -> tuple[dict, dict[int, np.ndarray]]:
-        """The elastic bodies that ``cracks`` would make of the present blocks, and their nodes; see
-        `elastic_bodies`."""
+        """Elastic bodies of the present blocks with these ``cracks``, and their nodes (see `elastic_bodies`)."""
         with self.timed("ddm assembly"):
             return elastic_bodies(self.problem, self.blocks, cracks, kept, self.works, self.removed)
 
     def solve(self, bodies: dict, loads: dict[int, BoundaryLoad], warm: dict) -> dict:
-        """block → solution of its body under its load, with the memory of crack faces at the start of the step."""
+        """Solutions (block →) of ``bodies`` under ``loads``, with the face memory of the start of the step."""
         with self.timed("ddm solve"):
             return solve_bodies(
                 bodies, loads, warm, self.history, self.solved_from, self.problem.run.skip, self.blocks.names
             )
 
-    def felt(self) -> dict:
-        """block → the solution that the strain of its cracks is from, in the last pass."""
+    def strain_solutions(self) -> dict:
+        """block → the solution from which the crack strain of the last pass was taken."""
         own = self.by_mean_stress
         hang = {block: own.solutions[block] for block in self.bodies if block in own and block in own.solutions}
         return {
@@ -118,8 +117,8 @@ class CrackedBlocks:
     # -- changes of the blocks -----------------------------------------------------------------------------------------
 
     def _take_blocks(self, parent: np.ndarray | None = None) -> None:
-        """New blocks: a new block system. Of blocks that are their ``parent`` (n_blocks,), whole, under another number
-        what is known of their cracks is kept."""
+        """Set up a block system for new blocks. ``parent`` (n_blocks,): previous number of each; of blocks that have
+        not split, all crack data are kept under the new number."""
         problem = self.problem
         self.system = dda.BlockSystem(
             self.blocks, problem.materials, problem.joints, joint_index=problem.joint_index, settings=problem.dda,
@@ -138,18 +137,19 @@ class CrackedBlocks:
             for known in (self.bodies, self.solutions, self.compliances, self.solved_from)
         )
         self.by_mean_stress = self.by_mean_stress.inherited(parent, whole) if len(whole) else ByMeanStress()
-        self.cannot_grow.renumber(parent, whole)
-        self.settling, self.foretold = Settling(), Foretold()
+        self.growth_screening.renumber(parent, whole)
+        self.settling, self.extrapolation = Settling(), LoadExtrapolation()
         self._take_bodies()
 
     def take_step(self, state: State, budget: dda.EnergyBudget) -> None:
-        """Go on from ``state``, where the last pass has left the blocks, with what the faces of its cracks remember."""
+        """Accept ``state``, and the memory of its crack faces, as the start of the next step."""
         self.state, self.budget = state, budget
         self.history = {b: s.memory for b, s in self.solutions.items() if s.memory is not None}
         self.by_mean_stress.take_step()
 
     def take_split(self, split) -> None:
-        """Blocks, state and cracks of the `Split`; gauges and monitors go to the child that holds their point."""
+        """Take blocks, state and cracks of the `Split`; gauges and monitors go to the part that contains their
+        point."""
 
         def child(block: int, point) -> int:
             parts = np.flatnonzero(split.parent == block)
@@ -171,7 +171,7 @@ class CrackedBlocks:
         self._take_blocks(split.parent)
 
     def take_out(self) -> list[int]:
-        """Leave out the elastic bodies of blocks that are taken out at the present time, and return these blocks."""
+        """Remove the elastic bodies of blocks excavated at the present time; returns these blocks."""
         removed = self.system.removed(self.problem.loads, self.state.time)
         if removed is self.removed:
             return []
@@ -181,9 +181,9 @@ class CrackedBlocks:
         return np.flatnonzero(new).tolist()
 
     def _settle_in_situ(self) -> None:
-        """Begin with the blocks at rest under the in-situ stress; where they are then is the reference. Cracks are as
-        if cut into them then: they open and slide from the first step on. Blocks that nothing holds have collapsed; raises
-        `dda.NoInSituEquilibrium` where no rest is found for another reason."""
+        """Start from equilibrium under the in-situ stress, which becomes the reference configuration. Cracks are cut
+        into the stressed rock: they open and slide from the first step on. Where blocks are unsupported the run starts
+        collapsed; raises `dda.NoInSituEquilibrium` where equilibrium is not found for another reason."""
         with self.timed("dda"):
             try:
                 found = dda.in_situ_state(self.system, self.problem.in_situ, self.problem.loads)
@@ -197,8 +197,7 @@ class CrackedBlocks:
         def moved(block: int, point) -> tuple[float, float]:
             return tuple(motion.current(block, np.asarray(point, dtype=float)).tolist())
 
-        # Cracks that end from both sides at one point of a joint may share its node: their blocks take it to two
-        # places.
+        # Crack ends on both sides of a joint may share a node; their blocks move it to two different places.
         ends = np.column_stack([self.cracks.segments.ravel(), np.repeat(self.cracks.block, 2)])
         kept, numbers = np.unique(ends, axis=0, return_inverse=True)
         node, owner = kept.T

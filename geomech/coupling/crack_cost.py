@@ -55,7 +55,8 @@ def crack_cost(problem: Problem) -> CrackCost:
         a, b = (size if size < many or problem.ddm.solver == "dense" else 0 for size, many in dense)
         memory += 8.0 * (2 * a * a + 2 * a * b + 4 * b * b) + BYTES * (m + n - a - b)
         seconds += (2 * a**3 / 3 + 2 * a * a * b + 2 * a * b * b + 2 * b**3 / 3) / RATE + SECONDS * (m + n - a - b)
-    return CrackCost(cracked, *counts.T, memory, seconds)
+    on_sides, on_cracks, sides = counts.T
+    return CrackCost(cracked, on_sides, on_cracks, sides, memory, seconds)
 
 
 def told(problem: Problem) -> list[str]:

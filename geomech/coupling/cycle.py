@@ -1,13 +1,16 @@
-"""The coupling cycle: blocks move, their contact forces load the cracked ones, cracks grow and soften them, again.
+"""The coupling cycle: DDA moves the blocks, their contact forces load the cracked blocks, and DDM grows the cracks.
 
-At each load the cycle is repeated from the same start of the step until no tip grows; every pass is yielded as a
-`Cycle`. The state that leaves the last pass starts the next load step. Where the load follows the cracks
-(`event_stepping`), each pass in which they grow is a load step of its own. Blocks part where a pass has left them: in
-statics the passes that follow at the same load begin there (unless the block hung by a thread), in dynamics the next
-step does.
+A load step is a sequence of passes (`load_pass`). Each pass starts from the blocks at the beginning of the step, and
+its cracks grow by one increment. The step ends with the first pass in which no tip grows, and its state starts the next
+load step. Every pass is yielded as a `Cycle`.
 
-At rest a load waits for tips that run: after ``max_passes`` passes the step is taken as it stands, and those that follow at
-the same load begin there, for `MOST_PASSES` in all.
+- With stepping "events" (`event_stepping`), load steps end at changes of state. With control "toughness", every pass in
+  which cracks grow is a load step of its own.
+- When a crack cuts a block, the block is split in the configuration of that pass. In statics the next passes at the
+  same
+  load start from there (except for a block that was connected by a thin ligament only); in dynamics the next step does.
+- In statics a load is held while tips run. After every ``max_passes`` passes the configuration is accepted and the next
+  passes at this load start from it, up to `MOST_PASSES` passes in total.
 """
 
 from __future__ import annotations
@@ -33,7 +36,7 @@ from .growth.first_state_change import FirstChange
 from .load_pass import Balance, balanced, toughness
 from .load_transfer.load_imbalance import LoadBalance
 from .load_transfer.unbounded_rock import out_of_sight, solved_pass
-from .monitoring.collapse import collapse_in_situ, lost, relax, unheld
+from .monitoring.collapse import collapse_in_situ, lost, relax, unsupported
 from .monitoring.energy_check import BendingWatch, BudgetWatch, GrowthWatch
 from .monitoring.mechanism import Mechanism
 
@@ -42,29 +45,30 @@ if TYPE_CHECKING:
 
 log = logging.getLogger(__name__)
 
-#: Growth passes for which a static load waits, where fewer are asked for: increments far shorter than blocks take tens.
+#: Most growth passes at one static load where ``max_passes`` is smaller. Increments far shorter than a block need tens.
 MOST_PASSES = 200
 
 
 def cycles(problem: Problem) -> Iterator[Cycle]:
-    """Run ``problem``, one `Cycle` a coupling cycle, from the initial state (number 0) to the scene's end.
+    """Run ``problem`` and yield one `Cycle` per pass, from the initial state (number 0) to the end time.
 
-    A static run also ends when a block goes out of reach, with a ``collapse`` event. Raises `geomech.dda.NotConverged`
-    when the block system finds no consistent contact state even at the smallest step, and ValueError where a dynamic
-    run is to step from event to event.
+    A static run also ends, with a ``collapse`` event, when a block moves out of reach. Raises
+    `geomech.dda.NotConverged` when the block system finds no consistent contact states even at the smallest step, and
+    ValueError for a dynamic run with stepping "events".
     """
     return Coupling(problem).cycles()
 
 
 @dataclass(frozen=True)
 class UnderWay:
-    """A load step of which a pass has grown cracks: what its next pass, number ``next_pass``, goes on with. ``told``
-    are the events of the pass before, ``pending`` those that taking the growth has brought; ``until``, in dynamics, the
-    time at which the pass before has ended, ``whole`` s after the step began."""
+    """A load step in progress, between two of its passes.
+
+    ``events`` of the last pass; ``pending`` events, from applying its growth; ``next_pass`` number of the next pass. In
+    dynamics ``until`` is the time (s) at which the last pass ended, ``whole`` the length of the step (s)."""
 
     dt: float
     load_time: float | None
-    told: tuple[Event, ...]
+    events: tuple[Event, ...]
     pending: tuple[Event, ...]
     next_pass: int
     until: float | None = None
@@ -73,8 +77,8 @@ class UnderWay:
 
 @dataclass
 class _LoadStep:
-    """A load step, pass by pass: what `UnderWay` keeps of it, the number of the present ``growth_pass``, the ``most``
-    passes that it may take, and whether a stop event has happened (``stops``)."""
+    """The load step of the present pass: the fields of `UnderWay`, the number of the pass (``growth_pass``), the
+    largest number of passes (``most``), and whether a stop event has occurred (``stops``)."""
 
     dt: float
     load_time: float | None
@@ -88,8 +92,8 @@ class _LoadStep:
 
 @dataclass(frozen=True, eq=False)
 class _Grown:
-    """The ``growth`` in a pass (None: nothing grows), its ``events``, the blocks that are ``cut``, whether it ``ends`` its
-    load step, and whether passes that follow begin where it has left the blocks (``rests``)."""
+    """Growth in a pass: ``growth`` (None: no tip grows), the ``events`` of the pass, the blocks that are ``cut``,
+    whether the pass ``ends`` its load step, and whether the next passes start from its configuration (``rests``)."""
 
     growth: Growth | None
     events: tuple[Event, ...]
@@ -99,17 +103,17 @@ class _Grown:
 
 
 class _EnergyBalance(NamedTuple):
-    """The ``budget`` after a pass, and its ``statistics``."""
+    """Energy ``budget`` after a pass, and the ``statistics`` of the pass."""
 
     budget: dda.EnergyBudget
     statistics: dict[str, float]
 
 
 class Coupling:
-    """The load steps of one coupled problem: what there is ``now``, and how long the next step is to be.
+    """The load steps of one coupled problem, with its present state (``now``) and the length of the next step.
 
-    ``between`` is called between any two passes, when all that the run goes on with is here, and nothing of it in the
-    generators' own variables: what is stored then goes on with `load_steps`.
+    ``between`` is called between any two passes, when the whole state of the run is in this object and none of it in
+    local variables of the generators. A checkpoint stored there continues with `load_steps`.
     """
 
     def __init__(self, problem: Problem) -> None:
@@ -128,19 +132,19 @@ class Coupling:
                     'equilibrium "" or "start"'
                 )
             self.events = EventSteps(problem)
-        #: What contacts and faces do; by other steps told where it is asked for, at the end of the step it happens in.
+        #: Changes of state of contacts and crack faces, reported at the end of the step in which they occur.
         self.changes = FirstChange(problem.run.events or ()) if self.events is None else self.events.changes
         self.follows = problem.run.control == "toughness"
         if self.follows and self.events is None:
             raise ValueError('control "toughness" needs stepping "events"')
-        #: What the growth that ended the last load step brought, where the load follows the cracks.
+        #: Events from applying the growth that ended the last load step (control "toughness").
         self._brought: tuple[Event, ...] = ()
         self.tips = None if self.static else TipsInTime(problem)
         self.range, self.balance, self.mechanism = dda.ElasticRange(), LoadBalance(), Mechanism()
         self.energy, self.bending, self.overlaps = BudgetWatch(), BendingWatch(), OverlapWatch()
         self.unstable = GrowthWatch()
         self.under_way: UnderWay | None = None
-        #: s, when the present load step began.
+        #: Time at which the present load step began, s.
         self.began = self.now.state.time
         self.between: Callable[[], None] = _go_on
 
@@ -151,36 +155,36 @@ class Coupling:
         vars(self).update(stored, between=_go_on)
 
     def take_run(self, problem: Problem) -> None:
-        """Go on with the title and the end, and what else may stop the run, that ``problem`` has."""
+        """Take title, end time and stop events from ``problem``, and continue with the rest unchanged."""
         self.problem, self.now.problem = (
             replace(each, title=problem.title, run=problem.run) for each in (self.problem, self.now.problem)
         )
 
     @property
     def endless(self) -> bool:
-        """Whether the rock has no end."""
+        """Whether the rock is unbounded."""
         return self.problem.endless is not None
 
     @property
     def enough(self) -> float:
-        """The part of its toughness from which a tip grows: off one by what events are found to."""
+        """Fraction of the toughness at which a tip grows: 1, less the tolerance to which event loads are found."""
         return 1.0 if self.events is None else 1.0 - SETTLED
 
     @property
     def together(self) -> float:
-        """The part of its toughness from which a tip grows with another."""
+        """Fraction of the toughness at which a tip grows together with another tip."""
         return 1.0 if self.events is None else 1.0 - TOGETHER
 
     @property
     def stops_next(self) -> bool:
-        """Whether the next pass is the last one, because of what has happened."""
-        told = () if self.under_way is None else self.under_way.told + self.under_way.pending
-        return self._stops(told + self._brought)
+        """Whether the next pass is the last one, because a stop event has occurred."""
+        events = () if self.under_way is None else self.under_way.events + self.under_way.pending
+        return self._stops(events + self._brought)
 
     @property
     def ends_next(self) -> bool:
-        """Whether the next load step is cut, or may be, because the run ends in it: one that lasted longer would take
-        another."""
+        """Whether the end time of the run cuts, or may cut, the next load step. A longer run would take another
+        step."""
         if self.under_way is not None:
             return False
         time, end = self.now.state.time, self.problem.run.end_time
@@ -189,11 +193,11 @@ class Coupling:
         return end - time < self.length.dt
 
     def cycles(self) -> Iterator[Cycle]:
-        """From the initial state to the end; the same to the bit in whatever process and beside whatever else."""
+        """All cycles from the initial state to the end, the same to the last bit in any process."""
         return alike(self._from_the_start())
 
     def load_steps(self) -> Iterator[Cycle]:
-        """The cycles from between two passes to the end."""
+        """The remaining cycles of a run that was stored between two passes."""
         return alike(self._load_steps())
 
     def _from_the_start(self) -> Iterator[Cycle]:
@@ -210,7 +214,7 @@ class Coupling:
             yield from self._load_steps()
 
     def _load_steps(self) -> Iterator[Cycle]:
-        # Rounding of the summed steps must not add a last, empty one.
+        # Rounding of the summed time must not add an empty last step.
         end = self.problem.run.end_time - 1e-9 * self.problem.dda.time_step
         while self.under_way is not None or self.now.state.time < end:
             self.between()
@@ -219,7 +223,7 @@ class Coupling:
                 return
 
     def _load_step(self):
-        """All passes at one load. Returns True when a stop event happened."""
+        """All passes at one load. Returns True when a stop event has occurred."""
         now, step = self.now, self._begin()
         if step.growth_pass == 0 and self.static and self.problem.dda.equilibrium == "loads":
             step.load_time = now.state.time + until_next_event(now.problem.loads, now.state.time, step.dt)
@@ -232,7 +236,7 @@ class Coupling:
         for growth_pass in range(step.growth_pass, step.most + 1):
             step.growth_pass = growth_pass
             now.number += 1
-            # What cracks have cut off rock without an end is held by nothing.
+            # A piece that cracks have cut out of unbounded rock is not supported by anything.
             found = None if self.endless and not now.bodies else self._solved(step)
             if found is None:
                 yield self._still(step.pending, growth_pass)
@@ -256,7 +260,7 @@ class Coupling:
         raise AssertionError("unreachable: the last pass takes no growth")
 
     def _begin(self) -> _LoadStep:
-        """The next load step, or the one under way, with the pass that it goes on with."""
+        """The next load step, or the one in progress, at its next pass."""
         now, growing = self.now, self.problem.growth
         begun, self.under_way = self.under_way, None
         if begun is None:
@@ -265,13 +269,13 @@ class Coupling:
             dt = min(self.length.dt, self.problem.run.end_time - now.state.time)
             begun, self._brought = UnderWay(dt, None, (), self._brought + self._excavated(), 0), ()
         most = max(growing.max_passes, MOST_PASSES) if self.static and growing.max_passes else growing.max_passes
-        stops = self._stops(begun.told)
+        stops = self._stops(begun.events)
         return _LoadStep(
             begun.dt, begun.load_time, begun.until, begun.whole, begun.pending, begun.next_pass, most, stops
         )
 
     def _solved(self, step: _LoadStep) -> Balance | None:
-        """The pass; None where what has ended the run leaves blocks that find no rest."""
+        """Solve the pass. Returns None where the run has ended and its blocks find no equilibrium afterwards."""
         now = self.now
         try:
             if self.events is not None and step.growth_pass == 0:
@@ -282,7 +286,7 @@ class Coupling:
         except dda.NotConverged as failure:
             if not (step.stops or self._stops(step.pending)):
                 raise
-            # What ended the run has happened; that its pieces find no rest does not undo it.
+            # The stop event stands, even though the pieces find no equilibrium after it.
             log.warning("cycle %d shows the blocks before they moved on: %s", now.number, failure)
             now.state = now.state if step.load_time is None else replace(now.state, time=step.load_time)
             return None
@@ -292,19 +296,20 @@ class Coupling:
             if now.bodies:
                 self.balance.check(now.loads, now.blocks, strain, result.state.time)
         if self.static:
-            # The passes of a step share its load, also when one of them has to take a shorter step.
+            # All passes of a static step have the same load, also when one of them takes a shorter step.
             step.load_time = result.state.time
         elif step.until is None:
             step.until, step.whole = result.state.time, result.dt
         return found
 
     def _grown(self, step: _LoadStep, found: Balance) -> _Grown:
-        """What grows in the pass ``found``, and the events in it; sets whether the step ``stops``."""
+        """Growth and events of the pass ``found``. Sets ``step.stops``."""
         now, state, growing = self.now, found.result.state, self.problem.growth
         events = step.pending + self.changes.events(now, found)
         step.stops = step.stops or self._stops(events)
-        # With control "toughness" nothing grows on the way to a lower load.
-        may_grow = step.growth_pass < step.most and (not self.follows or self.events.reached)
+        # With control "toughness" nothing grows before the load at which a tip reaches its toughness.
+        driven = not self.follows or (self.events is not None and self.events.reached)
+        may_grow = step.growth_pass < step.most and driven
         growth = None
         if may_grow and not step.stops:
             longest = self._longest(step, found.tips)
@@ -316,17 +321,17 @@ class Coupling:
             growth, born = births(now, found.solutions, state, self.enough)
             events += born
         if growth is None and self.static and not step.stops:
-            # Not before growth has ended: a block that hangs by a thread is strained beyond measure until it parts.
+            # Only when growth has ended: a block on a thin ligament moves excessively until it is cut off.
             collapse = lost(now, state)
-            told = collapse or unheld(now, found.result, self.mechanism)
-            events, step.stops = events + told, bool(collapse) or self._stops(told)
+            ended = collapse or unsupported(now, found.result, self.mechanism)
+            events, step.stops = events + ended, bool(collapse) or self._stops(ended)
         if growth is not None:
             found.tips["grown"] = growth.grown
             if self.tips is not None:
                 self.tips.went(found.tips)
             events += initiations(now, found.tips, state)
             step.stops = self._stops(events)
-        # Blocks part where the pass has left them, in equilibrium with what their faces bear.
+        # Blocks are split in the configuration of the pass, in equilibrium with the tractions on their crack faces.
         cut = () if self.endless else part_here(now, growth, state)
         parts = len(cut) > 0
         ends = growth is None or self.follows or (parts and not self.static)
@@ -334,16 +339,16 @@ class Coupling:
         return _Grown(growth, events, cut, ends, rests=parts or (not ends and many))
 
     def _energy_balance(self, step: _LoadStep, found: Balance, grown: _Grown) -> _EnergyBalance:
-        """The energy budget after the pass, checked, and the pass's statistics."""
+        """The energy budget after the pass, checked, and the statistics of the pass."""
         now, result, cracks = self.now, found.result, self.now.crack_energy
         budget = self._budget_after(result, self.static and step.growth_pass > 0)
         statistics = {**result.statistics, **budget.statistics(), **found.statistics}
         gone_by = result.state.time - self.began
         if abs(gone_by - result.dt) > 1e-9 * result.dt:
-            # Of an event step that is shorter than its inertia asks for, or goes back; of the last part of a pass.
+            # An event step shorter than the inertia step, or one that goes back; the last part of a dynamic pass.
             statistics["dt"] = gone_by
         if (now.bodies or cracks.under_way) and not self.endless:
-            cracks.passed(found.tips, now.blocks, now.problem.materials, *self._felt())
+            cracks.passed(found.tips, now.blocks, now.problem.materials, *self._strain_solutions())
             if grown.ends or grown.rests:
                 self._count_at_cracks(result.state, budget, grown.cut)
             statistics |= cracks.statistics()
@@ -360,7 +365,7 @@ class Coupling:
         return _EnergyBalance(budget, statistics)
 
     def _end(self, step: _LoadStep, found: Balance, grown: _Grown, energies: _EnergyBalance) -> None:
-        """Take the step as its last pass has left it."""
+        """Accept the step in the state of its last pass."""
         now, result = self.now, found.result
         if step.growth_pass == step.most and not step.stops and self._grow_on(step, found.tips):
             log.warning(
@@ -381,18 +386,19 @@ class Coupling:
             self.events.after(now, found)
 
     def _longest(self, step: _LoadStep, tips: np.ndarray) -> np.ndarray | float:
-        """How far ``tips`` may go in the step, m: as far as they like at rest."""
+        """Largest growth of each tip in the step, m; infinite in statics."""
         return np.inf if self.tips is None else self.tips.may_go(tips, self.now.blocks, step.whole, self.now.loads)
 
     def _grow_on(self, step: _LoadStep, tips: np.ndarray) -> bool:
-        """Whether any of ``tips`` after the last pass of a load step has enough of its toughness, and may go on."""
+        """Whether any tip still exceeds its toughness after the last pass and has growth left in the step."""
         longest = self._longest(step, tips)
         return bool(np.any((tips["k_eq"] >= self.enough * toughness(self.now, tips)) & (longest > 0)))
 
     def _until(self, until: float) -> Balance:
-        """A pass of a dynamic step of which another has ended at the time ``until``. Its tips have grown for all of
-        that time: where the blocks now need shorter steps, it takes as many as lead there, and all but the last are
-        gone on from."""
+        """A pass of a dynamic step of which an earlier pass ended at the time ``until``, s.
+
+        Its tips have grown over that whole time. Where the blocks now need shorter steps, as many are taken as lead to
+        ``until``, and all but the last are accepted."""
         now = self.now
         while True:
             found = balanced(now, until - now.state.time, None)
@@ -401,31 +407,32 @@ class Coupling:
                 return replace(found, result=replace(result, state=replace(result.state, time=until)))
             self.range.check(now.motion(result.state), now.blocks, result.state.time)
             budget = self._budget_after(result, False)
-            now.crack_energy.passed(found.tips, now.blocks, now.problem.materials, *self._felt())
+            now.crack_energy.passed(found.tips, now.blocks, now.problem.materials, *self._strain_solutions())
             self._count_at_cracks(result.state, budget)
             now.take_step(result.state, budget)
 
     def _budget_after(self, result: dda.StepResult, growing: bool) -> dda.EnergyBudget:
-        """The blocks' budget with the step ``result``, in which cracks are ``growing`` at one load or not."""
+        """The energy budget with the step ``result``; ``growing``: cracks grow at constant load."""
         now = self.now
-        # What is dug out takes what it stores along.
+        # Excavated rock takes its stored energy with it.
         dug = result.state.removed is not now.state.removed
         return (now.budget.cut() if dug else now.budget).after(result.energy, result.state.time, growing=growing)
 
     def _count_at_cracks(self, state: State, budget: dda.EnergyBudget, cut: Sequence[int] = ()) -> None:
-        """A step has been taken to ``state``, after which the blocks have this ``budget``, and in which some are
-        ``cut``."""
+        """Add to the crack energy balance a step to ``state`` with the block ``budget`` after it; ``cut`` are the
+        blocks that split."""
         now = self.now
-        # (What was dug out without a block that parts is its own.)
+        # Energy of excavated rock is not released by splitting.
         set_free = now.budget.split - budget.split if now.budget.is_cut else 0.0
-        now.crack_energy.after(now.state, state, now.blocks, now.felt(), now.by_mean_stress, set_free, cut)
+        now.crack_energy.after(now.state, state, now.blocks, now.strain_solutions(), now.by_mean_stress, set_free, cut)
 
-    def _felt(self) -> tuple:
-        """What the blocks feel of their cracks, and whether they began the step under stress."""
-        return self.now.felt(), self.now.by_mean_stress, bool(self.now.state.stress.any())
+    def _strain_solutions(self) -> tuple:
+        """The solutions that gave the crack strains, the blocks with mean-stress response, and whether the step began
+        under stress."""
+        return self.now.strain_solutions(), self.now.by_mean_stress, bool(self.now.state.stress.any())
 
     def _excavated(self) -> tuple[Event, ...]:
-        """Take out the blocks whose time has come; an event for each."""
+        """Remove the blocks whose time of excavation has come; one event for each."""
         now = self.now
         return tuple(
             event(now, "excavation", now.state, now.blocks.area_moments(b)[1], f"{now.blocks.names[b]} is taken out")
@@ -433,7 +440,7 @@ class Coupling:
         )
 
     def _still(self, events: tuple[Event, ...], growth_pass: int = 0) -> Cycle:
-        """The record of blocks that have not been moved."""
+        """The record of blocks that have not moved."""
         return record(self.now, self.now.state, np.empty(0, TIP), {}, events, growth_pass, {})
 
     def _stops(self, events: tuple[Event, ...]) -> bool:
@@ -441,4 +448,4 @@ class Coupling:
 
 
 def _go_on() -> None:
-    """Nobody wants anything between two passes."""
+    """Default of `Coupling.between`: do nothing."""

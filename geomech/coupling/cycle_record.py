@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..dda.higher_order.bent_body import bent_bodies
 from ..dda.step_control.step_limits import shortened
 from ..ddm.counters import Work
 from ..model import WEIGHT, Blocks, CrackFaces, Cracks, Cycle, Event, Motion, Problem, Skip, State
@@ -33,7 +34,13 @@ def record(
     if endless is not None:
         state = replace(state, stress=np.broadcast_to(endless.stress_at(state.time), state.stress.shape).copy())
     work = vars(Work.total(now.works)) if now.works else {}
-    cycle = _Told(
+    bent = bent_bodies(now.system.deflected, state, motion)
+
+    def moved(block: int, point: tuple[float, float]) -> np.ndarray:
+        affine = motion.current(block, point) - np.asarray(point)
+        return affine + bent[block].deflection(np.array([point], float))[0] if block in bent else affine
+
+    cycle = _LazyCycle(
         number=now.number,
         load_step=now.load_step,
         growth_pass=growth_pass,
@@ -44,8 +51,9 @@ def record(
         cracks=now.cracks,
         tips=tips,
         bodies=solutions,
+        bent=bent,
         events=tuple(events),
-        monitors={name: motion.current(b, point) - np.asarray(point) for name, (b, point) in now.monitors.items()},
+        monitors={name: moved(b, point) for name, (b, point) in now.monitors.items()},
         statistics=statistics,
         seconds=dict(now.timed.seconds),
         work=work,
@@ -56,11 +64,11 @@ def record(
     del vars(cycle)["faces"]  # found when somebody asks for them
     if left_out:
         del vars(cycle)["tips"], vars(cycle)["bodies"]
-        vars(cycle)["_rest"] = _Rest(now, solutions, dict(left_out))
+        vars(cycle)["_rest"] = _LeftOut(now, solutions, dict(left_out))
     return cycle
 
 
-class _Told(Cycle):
+class _LazyCycle(Cycle):
     """A cycle whose crack faces are put together, and bodies that were left out solved, when they are asked for."""
 
     @cached_property
@@ -76,12 +84,12 @@ class _Told(Cycle):
         return self._rest.tips(self.bodies)
 
 
-class _Rest:
+class _LeftOut:
     """What it takes to solve bodies that were left out of a pass as they would have been in it: ``now`` as it is, which
     goes on."""
 
     def __init__(self, now: CrackedBlocks, solutions: dict, left_out: dict[int, Body]) -> None:
-        self._told, self._solutions, self._left_out = now.cannot_grow, solutions, left_out
+        self._told, self._solutions, self._left_out = now.growth_screening, solutions, left_out
         self._problem, self._blocks, self._nodes_of = now.problem, now.blocks, now.nodes_of
         self._order, self._loads = list(now.bodies), {block: now.loads[block] for block in left_out}
 

@@ -1,5 +1,14 @@
-"""One pass at one load: the blocks move, their forces load the cracked ones, and the strain that cracks bring is the
-one that the blocks assumed."""
+"""One pass of the coupling at one load: fixed-point iteration between block motion and crack strain.
+
+DDA steps the blocks with an assumed crack response ε_c(σ) = offset + S σ of every cracked block. The contact forces of
+that step become tractions on the elastic bodies of the cracked blocks, DDM solves these, and their crack opening and
+slip give a new response. The iteration ends when assumed and computed crack strain agree:
+
+    max |ε_c,found − ε_c,assumed| / (|C σ| + |ε_c|) < tolerance
+
+Static iterations are accelerated by a quasi-Newton update of the offsets (`quasi_newton`) and start from an
+extrapolation in the loads (`load_extrapolation`).
+"""
 
 from __future__ import annotations
 
@@ -17,46 +26,43 @@ from .crack_compliance.load_extrapolation import Answer
 from .crack_compliance.quasi_newton import Settling
 from .load_path import loads_at
 from .load_transfer.elastic_bodies import boundary_loads, threads_for, tip_rows
-from .parallel_map import side_by_side
+from .parallel_map import parallel_map
 
-#: A pass is repeated while the crack strain it assumed and the one it found differ by more than this part of the
-#: block's strain.
+#: Relative tolerance of the crack strain in statics, of the block's strain.
 COMPLIANCE_TOLERANCE = 1e-6
 
-#: … in dynamics this one: what is left is corrected by the next of many steps, and far below what a toughness is known
-#: to.
+#: The same in dynamics. The next step corrects the rest, which is far below the accuracy of any measured toughness.
 DYNAMIC_TOLERANCE = 1e-4
 
-#: Strains below this part of the largest one in a cracked block are not asked to agree better than that one's: a block
-#: in free flight has hardly any.
+#: Strain scale of a nearly unstrained block, as a fraction of the largest strain of a cracked block: a block in free
+#: flight has hardly any strain to compare with.
 STILL = 1e-3
 
-#: Passes at one geometry; they agree after one or two, three where cracks have grown, some more where contacts and faces
-#: open and close. A lag that is left is corrected by the next step.
+#: Most iterations of a pass. One or two suffice at unchanged contact states, three after growth, more where contacts
+#: and crack faces open and close. The next step corrects what is left.
 COMPLIANCE_PASSES = 20
 
-#: At rest there are up to so many while they come together, each two of them to less than half: what is left is as large
-#: as rounding is blown up to on the way, and cracks that grow go by it.
+#: Most iterations of a static pass while every two of them at least halve the mismatch.
 COMING_TOGETHER = 40
 
-#: At rest, after so many of them blocks whose forces and strain have chased each other in the last half of them take
-#: their mean stress alone. (Which do in the very last one, rounding may decide.)
+#: Static iterations after which a block with oscillating forces and crack strain takes the mean-stress response
+#: (`mean_stress_response`). The choice is made from the last half of them; in the last one alone rounding could decide.
 PATIENCE = 10
 
-#: A strain that was assumed so well, relative, is not what has cut a step short.
+#: Relative mismatch of the assumed crack strain below which it did not cause a cut of the time step.
 CERTAIN = 1e-2
 
-#: Larger lags than this are no state: a shorter step is tried, in which inertia leaves strain less to do, so many times
-#: by half.
+#: Mismatch above which the pass has failed. In dynamics half the time step is then tried, up to `SHORTER` times: the
+#: shorter the step, the more the inertia limits the strain.
 NO_ANSWER = 0.1
 SHORTER = 4
 
 
 @dataclass(frozen=True, eq=False)
 class Balance:
-    """The step of the blocks, the solutions of the cracked ones (block → `ddm.Solution`), their TIP rows with the
-    criterion's angle and K_eq, and how well the two solvers agree. ``left_out``: bodies (block →) that cannot grow and
-    have not been solved."""
+    """Result of a pass: the step of the blocks (``result``), the DDM ``solutions`` (block → `ddm.Solution`), the TIP
+    rows ``tips`` with kink angle and K_eq, and ``statistics``. ``left_out`` (block → body): bodies that were not solved
+    because their cracks cannot grow."""
 
     result: StepResult
     solutions: dict
@@ -66,14 +72,14 @@ class Balance:
 
 
 def balanced(now: CrackedBlocks, dt: float, load_time: float | None) -> Balance:
-    """DDA step, boundary loads, DDM solves, until the crack strain that DDA assumed is the one DDM finds.
+    """Iterate DDA step, boundary tractions and DDM solutions of ``now`` until the crack strains agree.
 
-    ``load_time``: when the loads are those of that time, whatever step the blocks take; it then is the new time. Of
-    ``now`` the response, loads, solutions and statistics are renewed, nothing else. Raises `dda.NotConverged`, also
-    where blocks and cracks agree at no step.
+    ``dt`` s is the longest step. ``load_time`` s: apply the loads of that time whatever step the blocks take, and make
+    it the new time; None: the loads at the end of the step. Updates ``now.response``, ``loads``, ``solutions`` and
+    statistics. Raises `dda.NotConverged`, also where blocks and cracks agree at no step length.
     """
     begun, static = now.response, now.system.scheme.static
-    # At rest no block takes its mean stress for its softness (`by_mean_stress`), but where there is no answer without it.
+    # In statics the mean-stress response is used only where the iteration fails without it.
     for soft_ones_hang in (False, True) if static else (True,) * (1 + SHORTER):
         now.response = begun
         found, differences = _passes(now, dt, load_time, soft_ones_hang)
@@ -91,9 +97,10 @@ def balanced(now: CrackedBlocks, dt: float, load_time: float | None) -> Balance:
 
 @dataclass
 class _Chase:
-    """Blocks whose forces and strain chase each other in the passes of a step of which ``asked`` s were asked for: those
-    that have (``blocks``) since it was last tried as long as that (``tried_whole``), and in the last passes (``lately``);
-    ``doubt`` is by how much the strain that was assumed was off where a pass has cut the step short."""
+    """Blocks whose forces and crack strain oscillate in the iteration, for a step of ``asked`` s.
+
+    ``blocks``: since the full step was last tried (``tried_whole``); ``lately``: in the last iterations; ``doubt``:
+    largest mismatch of the assumed strain in an iteration that cut the step."""
 
     static: bool
     asked: float
@@ -103,19 +110,19 @@ class _Chase:
     doubt: float = 0.0
 
     def agreed(self, now: CrackedBlocks, dt: float) -> tuple[bool, set[int]]:
-        """Whether a pass of ``dt`` s in which blocks and cracks agree is the last one; if not, which blocks are to take
-        their mean stress alone, and the step is to be tried as long as it was asked for."""
-        # In a step that has been cut short by a chase blocks agree as their inertia holds them: that is no rest.
+        """Whether the iteration may end after strains have agreed in a step of ``dt`` s. If not, the full step is tried
+        again; the returned blocks take the mean-stress response first."""
+        # In a shortened static step blocks agree because inertia limits their motion; that is not equilibrium.
         give_way = _softest(now, self.blocks) if self.static and dt != self.asked and self.tried_whole else set()
         if not self.static or dt == self.asked or ((self.tried_whole or self.doubt < CERTAIN) and not give_way):
             return True, set()
-        # What cut a static step short may have been a strain that the first passes assumed.
+        # A crack strain assumed in the first iterations may have caused the cut of a static step.
         self.tried_whole, self.blocks = True, set()
         return False, give_way
 
     def goes_on(self, now: CrackedBlocks, attempt: int, differences: np.ndarray) -> set[int]:
-        """Which blocks are to take their mean stress alone after the pass number ``attempt``, in which they differ from
-        their cracks by ``differences`` (n_cracked,)."""
+        """Blocks that take the mean-stress response after iteration ``attempt``, in which assumed and found crack
+        strain differ by ``differences`` (n_cracked,)."""
         chasing = set(np.array(list(now.bodies), int)[differences > NO_ANSWER].tolist())
         self.blocks |= chasing
         self.lately = self.lately | chasing if attempt >= PATIENCE // 2 else set()
@@ -123,20 +130,20 @@ class _Chase:
 
 
 def _passes(now: CrackedBlocks, dt: float, load_time: float | None, soft_ones_hang: bool) -> tuple[Balance, np.ndarray]:
-    """Passes of a step of at most ``dt`` s, and by how much every cracked block still differs from its cracks (relative
-    strain)."""
+    """The iterations of a step of at most ``dt`` s; returns the result and the remaining relative mismatch of crack
+    strain (n_cracked,)."""
     static, settling = now.system.scheme.static, now.settling
     if static:
         settling.begin(tuple(now.bodies))
     else:
-        settling.forget()  # what contacts did a step ago, in motion they need not do again
+        settling.forget()  # in motion, contact changes of the last step need not recur
     tolerance = COMPLIANCE_TOLERANCE if static else DYNAMIC_TOLERANCE
     response = _expected(now, now.state.time + dt if load_time is None else load_time) if static else now.response
     result, iterations, chase = None, 0, _Chase(static, dt)
     left: list[float] = []
     for attempt in range(COMING_TOGETHER if static else COMPLIANCE_PASSES):
         result = _step(now, dt, load_time, response, result)
-        # Passes that took steps of unlike lengths, and so in statics bore unlike loads, would never agree.
+        # Iterations of different step lengths, and so in statics of different loads, would never agree.
         cut, dt = result.dt < dt, min(dt, result.dt)
         iterations += result.statistics["open_close_iterations"]
         now.acted = result.statistics
@@ -147,7 +154,7 @@ def _passes(now: CrackedBlocks, dt: float, load_time: float | None, soft_ones_ha
             now.by_mean_stress.take_all(now.bodies)
         elif soft_ones_hang:
             now.by_mean_stress.find(now.bodies, now.system.compliance, result.contacts)
-        # What answers to its mean stress needs no forces before there is an answer.
+        # A block with the mean-stress response needs no contact forces until the iteration has converged.
         solved = not all(block in now.by_mean_stress for block in now.bodies)
         if solved:
             _solve_bodies(now, result)
@@ -168,7 +175,7 @@ def _passes(now: CrackedBlocks, dt: float, load_time: float | None, soft_ones_ha
         for block in sorted(give_way):
             now.by_mean_stress.add(block)
         if give_way:
-            # What has cut the step short may have been the chase.
+            # The oscillation may have caused the cut of the step.
             dt = chase.asked
             settling.forget()
     left_out = {} if solved else _solve_what_may_grow(now, result)
@@ -184,7 +191,7 @@ def _passes(now: CrackedBlocks, dt: float, load_time: float | None, soft_ones_ha
 def _step(
     now: CrackedBlocks, dt: float, load_time: float | None, response: dda.CrackResponse, before: StepResult | None
 ) -> StepResult:
-    """A step of the blocks, which assume this ``response`` of their cracks; ``before``: that of the pass before."""
+    """A DDA step with this crack ``response``; ``before``: the step of the previous iteration."""
     with now.timed("dda"):
         result = now.system.step(now.state, now.problem.loads, dt, response, load_time, before)
         if load_time is not None and result.state.time != load_time:
@@ -193,23 +200,22 @@ def _step(
 
 
 def _with_tips(now: CrackedBlocks, result: StepResult, statistics: dict[str, float], left_out: dict) -> Balance:
-    """What the last pass has come to, with the tips of its cracks; bodies that were ``left_out`` are solved as well where
-    something grows."""
+    """The result of the last iteration, with its tips. Bodies ``left_out`` are solved as well where any tip grows."""
     tips = _judged(now)
     if left_out and (tips["k_eq"] >= toughness(now, tips)).any():
-        # Where something grows all of it is looked at: the step is taken again with what has grown.
+        # The step is repeated with the growth, so all tips are needed.
         _solve(now, now.bodies)
         left_out, tips = {}, _judged(now)
     for body in left_out.values():
         body.work.solutions_left_out += 1
     if not now.system.scheme.static:
-        now.cannot_grow.solved(now, tips, toughness(now, tips))
+        now.growth_screening.solved(now, tips, toughness(now, tips))
     return Balance(result, now.solutions, tips, statistics, left_out)
 
 
 def _softest(now: CrackedBlocks, chasing: set[int]) -> set[int]:
-    """The soft one of the ``chasing`` blocks, without those that it drags along; where there are more, all soft blocks: they
-    drag each other along, and after a few passes rounding decides which of them do."""
+    """The soft block among the oscillating ones (``chasing``), which drives the others. Where several are soft, all
+    soft blocks: they drive each other, and rounding would decide between them."""
 
     def soft(block: int) -> bool:
         return now.by_mean_stress.soft(block, now.bodies[block], now.system.compliance[block])
@@ -219,7 +225,7 @@ def _softest(now: CrackedBlocks, chasing: set[int]) -> set[int]:
 
 
 def toughness(now: CrackedBlocks, tips: np.ndarray) -> np.ndarray:
-    """(n_tips,) K_Ic of the rock that each tip stands in, Pa √m."""
+    """(n_tips,) fracture toughness K_Ic of the rock at each tip, Pa √m."""
     k_ic = np.array([material.k_ic for material in now.problem.materials])
     return k_ic[now.blocks.material[tips["block"]]]
 
@@ -233,14 +239,14 @@ def _systems(now: CrackedBlocks) -> tuple:
 
 
 def _expected(now: CrackedBlocks, time: float) -> dda.CrackResponse:
-    """What the first static pass at the loads of ``time`` should assume: what the answers at other loads foretell. What
-    cracks that have grown answer to the last forces, by which the blocks were strained as before, is a pass already."""
+    """Crack response to assume in the first static iteration at the loads of ``time``: extrapolated from earlier loads.
+    For cracks that have grown since, the response is computed from the last boundary forces."""
     if not now.bodies:
         return now.response
     blocks = tuple(now.bodies)
     numbers = np.array(blocks)
-    known, beyond, s = now.foretold.at(loads_at(now.problem.loads, time), blocks, _systems(now))
-    last, grown = now.foretold.last(blocks), np.zeros_like(beyond)
+    known, beyond, s = now.extrapolation.at(loads_at(now.problem.loads, time), blocks, _systems(now))
+    last, grown = now.extrapolation.last(blocks), np.zeros_like(beyond)
     if last is not None:
         for b, solution in _answers_to_the_last_forces(now, numbers[~known].tolist()).items():
             k = blocks.index(b)
@@ -264,15 +270,15 @@ def _expected(now: CrackedBlocks, time: float) -> dda.CrackResponse:
 
 
 def _strained(elastic: np.ndarray, stress: np.ndarray, strain: np.ndarray) -> np.ndarray:
-    """(n,) how much blocks of ``elastic`` compliance (n, 3, 3) are strained by ``stress`` (n, 3) and by the ``strain``
-    (n, 3) of their cracks."""
+    """(n,) strain scale of blocks with ``elastic`` compliance (n, 3, 3) under ``stress`` (n, 3) with crack ``strain``
+    (n, 3): |C σ| + |ε_c|."""
     size = np.abs(times(elastic, stress)).max(axis=1) + np.abs(strain).max(axis=1)
     return np.maximum(size, STILL * size.max())
 
 
 def _answers_to_the_last_forces(now: CrackedBlocks, grown: list[int]) -> dict:
-    """Of the ``grown`` blocks those of which that can be told: block → solution under the forces of the last pass. Sets
-    their compliances."""
+    """Solutions (block →) of the ``grown`` blocks under the boundary forces of the last pass, where these are known.
+    Sets their compliances."""
     asked = {b: now.bodies[b] for b in grown if b in now.loads and b not in now.by_mean_stress}
     if not asked:
         return {}
@@ -281,9 +287,9 @@ def _answers_to_the_last_forces(now: CrackedBlocks, grown: list[int]) -> dict:
     try:
         told = now.solve(asked, now.loads, now.solutions)
     except ddm.NotConverged:
-        # Faces may find a state under the forces of the next pass.
+        # Crack faces may still find consistent states under the forces of the next pass.
         return {}
-    # Whoever watches has those of the last pass still in hand.
+        # (Observers keep their own reference to the solutions of the last pass.)
     now.solutions = now.solutions | told
     now.solved_from = now.solved_from | {b: now.history[b] for b in told if b in now.history}
     with now.timed("compliance"):
@@ -292,35 +298,35 @@ def _answers_to_the_last_forces(now: CrackedBlocks, grown: list[int]) -> dict:
 
 
 def _remember(now: CrackedBlocks, answer: Answer) -> None:
-    """Passes agree on ``answer``. Before the first one, where nothing acted, there was none, and the faces of cracks
-    had their first states."""
+    """Store a converged ``answer`` for the extrapolation. Before the first one the unloaded state is stored: no strain
+    at no load, with the crack faces in their initial states."""
     blocks, state = tuple(now.bodies), now.state
     before = loads_at(now.problem.loads, state.time)
-    if now.foretold.last(blocks) is None and not (before.any() or state.stress.any() or state.crack_strain.any()):
+    if now.extrapolation.last(blocks) is None and not (before.any() or state.stress.any() or state.crack_strain.any()):
         nothing = np.zeros_like(answer.strain)
-        now.foretold.take(blocks, replace(answer, loads=before, strain=nothing, stress=nothing))
-    now.foretold.take(blocks, answer)
+        now.extrapolation.take(blocks, replace(answer, loads=before, strain=nothing, stress=nothing))
+    now.extrapolation.take(blocks, answer)
 
 
 def _solve_bodies(now: CrackedBlocks, result: StepResult) -> None:
-    """Every body under what the block solver's forces are on it."""
+    """Solve all bodies under the boundary tractions of the step ``result``."""
     _take_loads(now, result)
     _solve(now, now.bodies)
 
 
 def _solve_what_may_grow(now: CrackedBlocks, result: StepResult) -> dict:
-    """The same, but for bodies whose cracks cannot grow; returned are these (block →)."""
+    """Solve all bodies whose cracks may grow under the step ``result``; returns the others (block →)."""
     _take_loads(now, result)
     with now.timed("ddm solve"):
-        # What tips that grow release is counted by all that they did before and after.
-        idle = set() if now.crack_energy.grows else now.cannot_grow.among(now, result.dt)
+        # While tips grow, the energy they release is found from all solutions before and after.
+        idle = set() if now.crack_energy.grows else now.growth_screening.among(now, result.dt)
     _solve(now, {block: body for block, body in now.bodies.items() if block not in idle})
     return {block: body for block, body in now.bodies.items() if block in idle}
 
 
 def _take_loads(now: CrackedBlocks, result: StepResult) -> None:
     with now.timed("tractions"):
-        # Equilibrium holds where the forces of the step act.
+        # Forces are in equilibrium in the midpoint configuration, in which the step applies them.
         still = result.vertices is now.state.vertices
         motion = now.motion(now.state) if still else Motion.of(now.blocks, result.vertices)
         now.loads = boundary_loads(now.problem, now.blocks, now.state, motion, result, now.bodies)
@@ -337,13 +343,13 @@ def _solve(now: CrackedBlocks, bodies: dict) -> None:
 def _take_response(
     now: CrackedBlocks, state: State, settling: Settling, tolerance: float
 ) -> tuple[dda.CrackResponse, np.ndarray, Answer]:
-    """What the next pass should assume, how far off the last assumption was in each cracked block (relative strain),
-    and what was found. Sets what the next step should begin with."""
+    """The crack response for the next iteration, the relative mismatch of the assumed one (n_cracked,), and the strains
+    found. Sets ``now.response``, with which the next step begins."""
     blocks = np.array(list(now.bodies), int)
     with now.timed("ddm solve"):
         answers = _answers(now, state)
     with now.timed("compliance"):
-        own = side_by_side(lambda of: _compliance(now, *of), list(answers.items()), threads_for(now.bodies))
+        own = parallel_map(lambda of: _compliance(now, *of), list(answers.items()), threads_for(now.bodies))
         now.compliances.update(zip(answers, own))
         again, after = (dda.CrackResponse(now.response.compliance.copy(), now.response.offset.copy()) for _ in range(2))
         known = np.array([now.compliances[b][2] for b in answers])
@@ -356,7 +362,7 @@ def _take_response(
             limit = np.array(list(limits))
             turned = limit.transpose(0, 2, 1)
             known[hang], strain[hang] = turned @ known[hang] @ limit, times(turned, strain[hang])
-        # Blocks assume what they do in the axes in which a step begins, and carry it along as they turn.
+        # A response is given in the axes of the beginning of a step and rotates with its block.
         began, ends = now.state.rotation[blocks], state.rotation[blocks]
         stress = times(stress_rotations(began - ends), state.stress[blocks])
         assumed = times(stress_rotations(ends - began).transpose(0, 2, 1), state.crack_strain[blocks])

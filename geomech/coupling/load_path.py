@@ -1,4 +1,4 @@
-"""All that drives a run as functions of time, and where they have it at a time."""
+"""The time functions of all loads of a run, and their values at a given time."""
 
 from __future__ import annotations
 
@@ -8,9 +8,10 @@ from ..model import History, Loads
 
 
 def histories(loads: Loads) -> list[History]:
-    """All functions of time that act."""
-    timed = [*loads.edge_tractions, *loads.point_loads, *loads.block_motions, *loads.point_motions]
-    found = [loads.gravity, *(each.history for each in timed)]
+    """All time functions of ``loads``."""
+    found = [loads.gravity]
+    for group in (loads.edge_tractions, loads.point_loads, loads.block_motions, loads.point_motions):
+        found += [each.history for each in group]
     if loads.water is not None and loads.water.level is not None:
         found.append(loads.water.level)
     if loads.base is not None:
@@ -19,5 +20,5 @@ def histories(loads: Loads) -> list[History]:
 
 
 def loads_at(loads: Loads, time: float) -> np.ndarray:
-    """(n,) the values of all of them at ``time``, s, one after the other."""
+    """(n,) values of all time functions at ``time`` s, one after the other."""
     return np.concatenate([np.ravel(history.at(time)) for history in histories(loads)])

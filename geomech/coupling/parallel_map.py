@@ -15,7 +15,7 @@ THREADS = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else 
 _pools: dict[int, ThreadPoolExecutor] = {}
 
 
-def side_by_side(work: Callable[[_Item], _Result], items: Sequence[_Item], threads: int | None = None) -> list[_Result]:
+def parallel_map(work: Callable[[_Item], _Result], items: Sequence[_Item], threads: int | None = None) -> list[_Result]:
     """``work(item)`` of all ``items``, in their order, on ``threads`` threads (default `THREADS`).
 
     Every item is worked on by one thread alone, so that results do not depend on how many there are; ``work`` must

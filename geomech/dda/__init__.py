@@ -8,7 +8,7 @@
         ...
 """
 
-from .contact_detection.inherited_contacts import ToldContacts
+from .contact_detection.inherited_contacts import InheritedContacts
 from .counters import Work
 from .energy_balance import EnergyBudget, StepEnergy
 from .kinematics.displacement_matrix import displacement_matrix
@@ -40,6 +40,7 @@ __all__ = [
     "Equilibrium",
     "FactorOfSafety",
     "InSituState",
+    "InheritedContacts",
     "MobilisedJoint",
     "NoInSituEquilibrium",
     "NotConverged",
@@ -49,7 +50,6 @@ __all__ = [
     "StepLength",
     "StepResult",
     "TimeScheme",
-    "ToldContacts",
     "Work",
     "block_moments",
     "contact_resultants",

@@ -28,6 +28,8 @@ class AttemptedStep(Protocol):
     moments: np.ndarray
     largest: float
 
+    def path(self, after: np.ndarray) -> tuple[np.ndarray, np.ndarray]: ...
+
 
 class SteppedSystem(Protocol):
     """Blocks with what stays from step to step: material, mass, freedom, contact finder, time scheme.
@@ -53,14 +55,14 @@ class SteppedSystem(Protocol):
     moving: np.ndarray
     turns: np.ndarray
     rigid: np.ndarray
-    held: np.ndarray | None
+    constrained: np.ndarray | None
     taken_out: np.ndarray | None
     next: np.ndarray
     vertex_start: np.ndarray
     owner: np.ndarray
     half_diagonal: float
     rounding: float
-    rounding_told: bool
+    roundoff_reported: bool
     allowed_penetration: float
 
     @property

@@ -58,12 +58,19 @@ def run(
     and
     kept, and not written to (`State.writable` has copies).
 
-    ``for state in dda.run(blocks, [rock], [joint], loads, settings, 1.0): …``
-
     ``settings.equilibrium`` "start" brings the blocks to rest before the first state, "loads" in statics at every load
     too. Logs a warning when energy comes from nowhere, a block is strained beyond the elastic range, or dashpots have
     nothing to brake in statics. Raises `NotConverged` where no step or equilibrium is found, or a block is strained by
     more than a quarter, and ValueError for what makes no sense, before the first step as far as it can be told then.
+
+    >>> ground, square = np.array([[-1, -1], [2, -1], [2, 0], [-1, 0]]), np.array([[0, 0], [1, 0], [1, 1], [0, 1]])
+    >>> blocks = Blocks.from_polygons([ground, square], fixed=[True, False])
+    >>> rock, joint = Material("rock", 10e9, 0.25, density=2600.0), JointLaw("joint", np.radians(30))
+    >>> loads = Loads(gravity=History.constant([2.0, -9.81]))
+    >>> settings = DdaSettings(time_step=0.01, dynamic_factor=1.0)
+    >>> *_, last = dda.run(blocks, [rock], [joint], loads, settings, 0.05)
+    >>> f"{last.time:g} s, {len(last.vertices)} vertices"
+    '0.05 s, 8 vertices'
     """
     if not end_time >= 0:
         raise ValueError(f"end_time must not be negative, got {end_time!r} s")

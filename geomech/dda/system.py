@@ -10,11 +10,15 @@ import numpy as np
 
 from ..model import OPEN, Blocks, DdaSettings, JointLaw, Loads, Material, State
 from .contact_detection.contact_finder import ContactFinder
-from .contact_detection.inherited_contacts import ToldContacts, at_their_springs, told_rows
+from .contact_detection.inherited_contacts import InheritedContacts, at_their_springs, inherited_rows
 from .contact_detection.initial_overlap import refuse_overlap
 from .counters import Work
 from .excavation import Excavations, until_next_event
-from .kinematics.midpoint_configuration import Middle
+from .higher_order.bending_step import BendingAttempt
+from .higher_order.deflected_blocks import DeflectedBlocks
+from .higher_order.six_row_system import six_row_pattern
+from .higher_order.unsupported import refuse_unsupported, refuse_unsupported_loads
+from .kinematics.midpoint_configuration import MidpointConfiguration
 from .kinematics.newmark import TimeScheme
 from .kinematics.rigid_blocks import with_rigid
 from .kinematics.roundoff import rounding_of
@@ -72,7 +76,7 @@ class BlockSystem:
     (`penalties`). ``work`` counts what is done, of systems that share it together.
 
     What every `Attempt` at a step reads is made once: ``density`` (kg/m³), ``mass`` (kg/m), ``stiffness`` and
-    ``compliance`` (3, 3) of each block, ``held`` (what is held of its motion), ``rigid`` (indices), the ``finder`` of
+    ``compliance`` (3, 3) of each block, ``constrained`` (what is held of its motion), ``rigid`` (indices), the ``finder`` of
     contacts and the ``load_map``; and anew when blocks are ``taken_out``: which ones are ``fixed``, ``moving``
     (indices), which of them ``turns``, and ``free``, the number of a block among those that move, −1 for the others.
     ``allowed_penetration`` (m) is zero where penalty springs hold alone; ``rounding`` (m) is that of coordinates:
@@ -118,11 +122,16 @@ class BlockSystem:
         self.finder = ContactFinder(
             blocks, self.joints, joint_index, self.settings, modulus, rigid, self.mass, self.work
         )
+        self.deflected = None
         self._take_out(None, None)
+        if blocks.order is not None and (np.asarray(blocks.order) > 1)[~self.fixed].any():
+            refuse_unsupported(blocks, self.materials, self.joints, self.settings)
+            self.deflected = DeflectedBlocks(blocks, self.fixed, self.density, self.stiffness)
+            self.finder.at_corners = True
         rigid = rigid & ~self.fixed
         self.rigid = np.flatnonzero(rigid)
         self.compliance[rigid] = 0.0
-        self.held = with_rigid(blocks.held, rigid)
+        self.constrained = with_rigid(blocks.constrained, rigid)
         self.next = np.ascontiguousarray(blocks.next_vertex, np.int64)
         self.vertex_start = np.ascontiguousarray(blocks.vertex_start, np.int64)
         self.owner = np.ascontiguousarray(blocks.vertex_block, np.int64)
@@ -134,7 +143,7 @@ class BlockSystem:
             raise ValueError(f"{blocks.names[int(areas.argmin())]}: the block has no area")
         self._refuse_massless()
         self.half_diagonal = 0.5 * float(np.hypot(*np.ptp(vertices, axis=0)))
-        self.rounding, self.rounding_told = rounding_of(vertices), False
+        self.rounding, self.roundoff_reported = rounding_of(vertices), False
         self.limits = StepLimits(
             self.finder, self.settings, self.half_diagonal, self.vertex_start, self.next, self.work
         )
@@ -190,7 +199,7 @@ class BlockSystem:
         self.fixed = np.ascontiguousarray(fixed, dtype=np.bool_)
         self.free = np.where(self.fixed, -1, np.cumsum(~self.fixed) - 1).astype(np.int64)
         self.moving = np.flatnonzero(~self.fixed)
-        self.turns = ~self.fixed if self.blocks.held is None else ~(self.fixed | self.blocks.held[:, 2])
+        self.turns = ~self.fixed if self.blocks.constrained is None else ~(self.fixed | self.blocks.constrained[:, 2])
         self._sparse: tuple[np.ndarray, assembly.Pattern] | None = None
         self.finder.take_out(removed)
         self.load_map.take_out(removed, drained)
@@ -219,6 +228,9 @@ class BlockSystem:
         # (Kernels are compiled for arrays that can be written to.)
         state = state.writable()
         self._stray_loads.refuse(loads)
+        if self.deflected is not None:
+            refuse_unsupported_loads(loads)
+            self.finder.deflection, self.finder.sag = self.deflected.deflection_of(state)
         removed = self.removed(loads, state.time)
         if removed is not self.taken_out:
             self._take_out(removed, self._excavations.drained(loads, state.time))
@@ -231,7 +243,7 @@ class BlockSystem:
         if state.time == 0.0 and len(state.contacts) == 0:
             refuse_overlap(self.blocks, vertices, moments)
             self._excavations.refuse(loads)
-            self._refuse_unheld(loads, state.time + dt if load_time is None else load_time)
+            self._refuse_unsupported(loads, state.time + dt if load_time is None else load_time)
         gravity = loads.gravity.at(state.time + dt)
         dt = self.limits.foreseen(vertices, carried, moments, dt, gravity)
         search = self._search(state, vertices, carried, moments, dt, gravity)
@@ -247,7 +259,7 @@ class BlockSystem:
             # What was tried before makes room first: its factors may be of other contacts than those of this attempt.
             attempt = result = None
             try:
-                attempt = Attempt(
+                attempt = (Attempt if self.deflected is None else BendingAttempt)(
                     self, state, vertices, carried, moments, loads, dt, crack, found, cuts, load_time,
                 )  # fmt: skip
                 result = attempt.result()
@@ -279,7 +291,9 @@ class BlockSystem:
                         crossed = self.limits.pressed_apart(attempt, result)
                     if crossed is None:
                         self._refuse_crushed(result.state)
-                        self.limits.tell_pressed_through(result)
+                        if self.deflected is not None:
+                            self.deflected.check_small(result.state)
+                        self.limits.warn_of_penetration(result)
                         if failed:
                             log.info("step at t = %g s cut from %.4g to %.4g s: %s", state.time, asked, dt, failed)
                         result.statistics["limit_share"] = used.share
@@ -336,12 +350,14 @@ class BlockSystem:
         """(n_vertices, 2) m: what the velocities ``carried`` make of a step of ``dt``; None where there are none."""
         if not carried.any():
             return None
-        return Middle.of(dt * carried, 1.0, vertices, self.owner, moments).vertices - vertices
+        return MidpointConfiguration.of(dt * carried, 1.0, vertices, self.owner, moments).vertices - vertices
 
     def _with_corners_of(self, attempt: Attempt, search: _Search, state: np.ndarray) -> ContactSet | None:
         """The contacts with which the step is to be begun again because corners have met on the way that the ``attempt``
         went, with its contacts in ``state`` (n,), but not where they were expected to; None where all did."""
         found, moved = attempt.found, attempt.new_vertices - attempt.vertices
+        if found.lumped is not None:
+            found = found.lumped
         pressed = bool(((found.corner >= 0) & (state != OPEN)).any())
         strayed = np.abs(moved if search.motion is None else moved - search.motion).max()
         if not pressed and not strayed > 0.5 * search.margin:
@@ -384,6 +400,8 @@ class BlockSystem:
         rows = state.contacts
         # What has yet to come nearer presses nowhere.
         lift = float(np.abs(rows["lift"][(rows["state"] != OPEN) | (rows["lift"] > 0.0)]).max(initial=0.0))
+        if self.deflected is not None:
+            lift += 2.0 * float(self.finder.deflection.max())
         return self.limits.windows(vertices, carried, moments, dt, gravity, lift)
 
     def _standing(self, state: State, vertices: np.ndarray) -> Windows:
@@ -391,25 +409,25 @@ class BlockSystem:
         moments = block_moments(vertices, self.next, self.vertex_start)
         return self._near(state, vertices, np.zeros_like(state.velocity), moments, 0.0, np.zeros(2))
 
-    def told(self, state: State, found: ContactSet, forces: ToldContacts) -> np.ndarray:
+    def inherited_contacts(self, state: State, found: ContactSet, forces: InheritedContacts) -> np.ndarray:
         """CONTACT rows of ``found``, the contacts near ``state``, as ``forces`` say where they tell of one: for a
         `State` whose next step begins so."""
 
         def on_multiplier(contacts: ContactSet) -> np.ndarray:
-            held = bool(self.allowed_penetration)
-            return self.finder.on_penalty(contacts)[0] if held else np.zeros(len(contacts), bool)
+            has_multipliers = bool(self.allowed_penetration)
+            return self.finder.on_penalty(contacts)[0] if has_multipliers else np.zeros(len(contacts), bool)
 
-        rows = told_rows(found, forces, self.finder.closure, on_multiplier(found))
+        rows = inherited_rows(found, forces, self.finder.closure, on_multiplier(found))
         vertices = np.ascontiguousarray(state.vertices)
         placed = self.finder.find(replace(state, contacts=rows), vertices, self._standing(state, vertices))
         if placed.points is None:
             return rows
         return at_their_springs(rows, placed, forces.which, self.finder.closure, on_multiplier(placed))
 
-    def _refuse_unheld(self, loads: Loads, time: float) -> None:
+    def _refuse_unsupported(self, loads: Loads, time: float) -> None:
         """In statics weight needs something to rest on: what falls for ever has no equilibrium."""
         holds = (
-            self.fixed.any() or self.blocks.held is not None or loads.edge_tractions or loads.point_loads
+            self.fixed.any() or self.blocks.constrained is not None or loads.edge_tractions or loads.point_loads
             or loads.block_motions or loads.point_motions or loads.bolts or loads.viscous_boundaries or loads.water
         )  # fmt: skip
         if self.scheme.static and not holds and loads.gravity.at(time).any():
@@ -434,6 +452,13 @@ class BlockSystem:
         and its solver: kept from step to step while the same blocks do."""
         if linked is not None:
             block, other = np.concatenate([block, linked[0]]), np.concatenate([other, linked[1]])
+        if self.deflected is not None:
+            known = None if self._sparse is None else self._sparse[1]
+            pattern = six_row_pattern(self.free, self.deflected.rows, block, other, moments[:, 1:3], known)
+            if pattern.solver is not None:
+                pattern.solver.work = self.work
+            self._sparse = np.zeros((2, 0)), pattern
+            return pattern
         if int(self.free.max()) + 1 <= assembly.DENSE_BLOCKS:
             return assembly.dense_pattern(self.free, block, other)
         pairs, pattern = np.stack([block, other]), None

@@ -20,24 +20,24 @@ from .impacts.restitution import Rebound, RigidBlocks, Striking
 from .joint_laws.coulomb_return import reserves
 from .joint_laws.friction_arrest import Stopped, Unresolved, contact_speeds, dissipating, kinetic_energy, stop
 from .joint_laws.penalty_springs import Springs, end_of_step, over_a_step
-from .joint_laws.sheared_stick import stretched
+from .joint_laws.sheared_stick import settle_sheared_sticks
 from .kinematics.constraints import balanced, hold, with_rigid_motion
-from .kinematics.midpoint_configuration import Middle
+from .kinematics.midpoint_configuration import MidpointConfiguration
 from .kinematics.newmark import advance, assemble_blocks, turned
 from .kinematics.rigid_blocks import mean_stress
-from .kinematics.roundoff import tell_felt, undecided_gaps
+from .kinematics.roundoff import undecided_gaps, warn_of_roundoff
 from .kinematics.simplex_integration import block_moments
 from .linear_solver import assembly
 from .loads.load_vectors import AppliedForces, Inertia, generalised
-from .loads.step_actions import StepActions, felt_gravity
+from .loads.step_actions import StepActions, effective_gravity
 from .loads.viscous_boundary import QuietEdges
 from .open_close.augmented_lagrangian import settle_augmented
 from .open_close.contact_set import ContactSet
 from .open_close.equations import Equations, Unsettled
 from .open_close.iteration import is_large, settle
 from .open_close.settled_states import Settled
+from .out_of_balance import imbalance
 from .results import CrackResponse, StepResult
-from .statics.out_of_balance import imbalance
 
 if TYPE_CHECKING:
     from .interfaces import SteppedSystem
@@ -127,7 +127,7 @@ class Attempt:
         self._place(foreseen)
         if scheme.place == 1.0 and foreseen is not None:
             # From the end's arms the arc is long, but known as well as these.
-            self._follow(foreseen, self.middle.vertices)
+            self._follow(foreseen, self.midpoint.vertices)
         for bends in range(_BENDS, -1, -1):
             self._act(loads, load_time)
             self._assemble()
@@ -167,19 +167,23 @@ class Attempt:
     def _place(self, increment: np.ndarray | None) -> None:
         """Put the forces of the step where blocks are in the middle of ``increment`` (n_blocks, 6)."""
         system = self.system
-        self.middle = Middle.of(increment, system.scheme.place, self.vertices, system.owner, self.moments)
-        self.turn = np.zeros(len(self.moments)) if self.middle.turn is None else self.middle.turn
+        self.midpoint = MidpointConfiguration.of(
+            increment, system.scheme.place, self.vertices, system.owner, self.moments
+        )
+        self.turn = np.zeros(len(self.moments)) if self.midpoint.turn is None else self.midpoint.turn
 
     def _act(self, loads: Loads, load_time: float | None) -> None:
         """Forces, imposed motion and bolts of this step."""
-        system, state, scheme, dt, middle = self.system, self.state, self.system.scheme, self.dt, self.middle
+        system, state, scheme, dt, midpoint = self.system, self.state, self.system.scheme, self.dt, self.midpoint
         acting = state.time + scheme.weight * dt if load_time is None else load_time
-        self.gravity = felt_gravity(loads, state.time, acting, dt, scheme.static, scheme.ahead(state.acceleration, dt))
-        self.points, self.edges = system.load_map.rows(loads, acting, middle.vertices, state.rotation + self.turn)
-        self.load = middle.loads_back(generalised(self.points, self.edges, middle.centroid))
+        self.gravity = effective_gravity(
+            loads, state.time, acting, dt, scheme.static, scheme.ahead(state.acceleration, dt)
+        )
+        self.points, self.edges = system.load_map.rows(loads, acting, midpoint.vertices, state.rotation + self.turn)
+        self.load = midpoint.loads_back(generalised(self.points, self.edges, midpoint.centroid))
         end = self.time if load_time is None else load_time
         self.actions = StepActions.of(
-            system.blocks, system.fixed, loads, state, system.load_map, middle, system.free, system.taken_out, end
+            system.blocks, system.fixed, loads, state, system.load_map, midpoint, system.free, system.taken_out, end
         )
 
     def _assemble(self) -> None:
@@ -206,24 +210,24 @@ class Attempt:
         if loads.viscous_boundaries and not system.scheme.static and self.n_free:
             time = state.time + 0.5 * self.dt if load_time is None else load_time
             self.quiet = QuietEdges.of(
-                loads.viscous_boundaries, system.blocks, self.middle.vertices, time, system.density, system.stiffness,
+                loads.viscous_boundaries, system.blocks, self.midpoint.vertices, time, system.density, system.stiffness,
                 system.fixed,
             )  # fmt: skip
-            self.quiet.assemble(self.matrix, self.right, self.order, self.middle, self.dt)
+            self.quiet.assemble(self.matrix, self.right, self.order, self.midpoint, self.dt)
 
-    def _held(self) -> np.ndarray | None:
+    def _constrained(self) -> np.ndarray | None:
         """(n_blocks, 3) bool: what is held of the blocks' motion in this step; None where nothing is."""
-        system, actions, held = self.system, self.actions, self.system.held
+        system, actions, constrained = self.system, self.actions, self.system.constrained
         alone = system.scheme.static and system.blocks.n_blocks == 1 and self.n_free and actions is None
         weight = system.mass[0] * self.gravity if alone else None
         if alone and balanced(self.load[0], self.points, self.edges, weight, self.moments[0]):
-            held = with_rigid_motion(held)
-        return held if actions is None else actions.held(held)
+            constrained = with_rigid_motion(constrained)
+        return constrained if actions is None else actions.constrained(constrained)
 
     def _settle(self) -> None:
         """The states of contacts and the unknowns; faces with a stiffness are tried on other parts until they fit."""
-        actions, found, order, middle = self.actions, self.found, self.order, self.middle
-        held = self._held()
+        actions, found, order, midpoint = self.actions, self.found, self.order, self.midpoint
+        constrained = self._constrained()
         own, shared = (self.matrix, self.right), 0
         for tries in range(1, 2 * _PLACED + 1):
             if found.points is not None or tries > 1:
@@ -232,13 +236,13 @@ class Attempt:
             striking = self._striking(found)
             if striking is not None:
                 gap = striking.apart(gap, self.system.half_diagonal)
-            geometry = middle.contacts(found.geometry, found.block, found.other, self._along(found))
-            vectors = assembly.contact_vectors(found.block, found.other, geometry, order, middle.moments)
-            middle.turn_back(vectors, found.block, found.other, geometry)
+            geometry = midpoint.contacts(found.geometry, found.block, found.other, self._along(found))
+            vectors = assembly.contact_vectors(found.block, found.other, geometry, order, midpoint.moments)
+            midpoint.turn_back(vectors, found.block, found.other, geometry)
             if found.points is not None:
                 found.points.share_shear(vectors, found.block)
-            if held is not None and self.n_free:
-                hold(held, self.matrix, self.right, vectors, found.block, found.other, order)
+            if constrained is not None and self.n_free:
+                hold(constrained, self.matrix, self.right, vectors, found.block, found.other, order)
             if not self.n_free:
                 zero, self.slack = np.zeros(len(found)), np.full(len(found), self.system.rounding)
                 settled = Settled(
@@ -331,11 +335,11 @@ class Attempt:
         blocks, all_blocks = (found.block, found.other), np.arange(len(increment))
         scaled[:, 2:] *= np.sqrt(self.moments[:, :1])
         along = self._along(found)
-        geometry = self.middle.contacts(found.geometry, *blocks, along)
-        vectors = assembly.contact_vectors(*blocks, geometry, all_blocks, self.middle.moments)
-        self.middle.turn_back(vectors, *blocks, geometry)
+        geometry = self.midpoint.contacts(found.geometry, *blocks, along)
+        vectors = assembly.contact_vectors(*blocks, geometry, all_blocks, self.midpoint.moments)
+        self.midpoint.turn_back(vectors, *blocks, geometry)
         across, slid = (sliding(vectors, scaled, all_blocks, *blocks, way) for way in (0, 1))
-        end = Middle.of(increment, 1.0, self.vertices, system.owner, self.moments)
+        end = MidpointConfiguration.of(increment, 1.0, self.vertices, system.owner, self.moments)
         went = end.contacts(found.geometry, *blocks, along)[:, 0] - found.geometry[:, 0]
         arc = system.finder.gaps(vertices, self.vertices, found) - found.geometry[:, 3] - across
         self.found = self.found.along(arc, went * np.hypot(*along.T) - slid)
@@ -374,25 +378,33 @@ class Attempt:
             if system.scheme.static
             else undecided_gaps(system.rounding, right, pattern.order, found.block, found.other, springs.normal)
         )
-        if not system.rounding_told:
-            system.rounding_told = True
+        if not system.roundoff_reported:
+            system.roundoff_reported = True
             weight = np.where(system.fixed, np.inf, system.mass * np.hypot(*self.gravity))
-            tell_felt(system.rounding, weight, found.block, found.other, springs.normal, system.finder.names)
+            warn_of_roundoff(system.rounding, weight, found.block, found.other, springs.normal, system.finder.names)
 
         def solve(contacts: ContactSet, stiff: Springs, start: np.ndarray, stretch: np.ndarray) -> Settled:
             def settled(contacts: ContactSet) -> Settled:
-                equations = Equations(
-                    pattern, matrix, right, contacts, vectors, stiff, start, slack, curved, system.scheme.static,
-                    self._expected_unknowns(),
-                )  # fmt: skip
+                equations = self._equations(pattern, matrix, right, contacts, vectors, stiff, start, slack, curved)
                 return settle(equations, system.settings.max_open_close_iterations, system.settings.contact_solver)
 
-            return stretched(settled, contacts, stiff, start, stretch, curved) if stretch.any() else settled(contacts)
+            return (
+                settle_sheared_sticks(settled, contacts, stiff, start, stretch, curved)
+                if stretch.any()
+                else settled(contacts)
+            )
 
         found = replace(found, stretch=found.stretch + found.swing)
         if not system.allowed_penetration or not len(found):
             return solve(found, springs, gap, found.stretch)
         return settle_augmented(solve, found, springs, gap, system.finder.on_penalty(found), system.allowed_penetration)
+
+    def _equations(self, pattern, matrix, right, contacts, vectors, springs, gap, slack, curved) -> Equations:
+        """The equations of the step but for the states of ``contacts``."""
+        return Equations(
+            pattern, matrix, right, contacts, vectors, springs, gap, slack, curved, self.system.scheme.static,
+            self._expected_unknowns(),
+        )  # fmt: skip
 
     def _expected_unknowns(self) -> np.ndarray | None:
         """(6 n_free,) what the velocity makes of this step, in the unknowns of `assembly`; None in statics."""
@@ -431,9 +443,11 @@ class Attempt:
         imposed = None if actions is None else actions.imposed
         self.new_vertices, velocity, self.new_stress, self.new_crack, self.largest = self._advanced(increment)
         if self.quiet is not None:
-            absorbed = self.quiet.rows(increment, self.middle, dt)
+            absorbed = self.quiet.rows(increment, self.midpoint, dt)
             self.edges = np.concatenate([self.edges, absorbed])
-            self.load = self.load + self.middle.loads_back(generalised(self.points[:0], absorbed, self.middle.centroid))
+            self.load = self.load + self.midpoint.loads_back(
+                generalised(self.points[:0], absorbed, self.midpoint.centroid)
+            )
         acceleration = 2.0 * (increment - carried * dt) / (dt * dt)
         before = self._remembered(acceleration)
         velocity, self.kept = scheme.corrected(velocity, before, acceleration, increment[:, 2], dt)
@@ -451,6 +465,10 @@ class Attempt:
             self._stop(imposed)
             if self.striking is not None:
                 self._rebound(imposed)
+
+    def path(self, after: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """(n_vertices, 2) twice: where corners are before the step, and after it, from the vertices ``after`` it, m."""
+        return self.vertices, after
 
     def _remembered(self, mean: np.ndarray) -> np.ndarray | None:
         """(n_blocks, 6) the acceleration that the step began with, as far as it still holds; None before there is any.
@@ -476,7 +494,7 @@ class Attempt:
         mass = np.where(system.fixed, np.inf, system.mass)
         if not len(found):
             return
-        end = Middle.of(self.increment, 1.0, self.vertices, system.owner, self.moments)
+        end = MidpointConfiguration.of(self.increment, 1.0, self.vertices, system.owner, self.moments)
         geometry = end.contacts(found.geometry, found.block, found.other, self._along(found))
         speeds = contact_speeds(found, geometry, velocity, end.centroid)
         stopped = Stopped.of(found, self.settled, self.slid, speeds[:, 1], mass, self.dt, system.rounding)
@@ -538,11 +556,11 @@ class Attempt:
         inertia = self.density * (moments[:, 3] + moments[:, 4])
         inverse = 1.0 / np.stack([system.mass, system.mass, inertia], axis=1)
         inverse[system.fixed] = 0.0
-        if system.held is not None:
-            inverse[system.held[:, :3]] = 0.0
+        if system.constrained is not None:
+            inverse[system.constrained[:, :3]] = 0.0
         if imposed is not None:
             inverse[imposed.driven] = 0.0
-        end = Middle.of(increment, 1.0, self.vertices, system.owner, moments)
+        end = MidpointConfiguration.of(increment, 1.0, self.vertices, system.owner, moments)
         geometry = end.contacts(found.geometry, found.block, found.other, self._along(found))
         return RigidBlocks(
             end.centroid, inverse, self.velocity[:, :3], self.carried[:, :3], increment[:, 2], geometry[:, 1:3],
@@ -552,10 +570,11 @@ class Attempt:
     def result(self) -> StepResult:
         """The step as it is told of."""
         system, scheme, found, settled = self.system, self.system.scheme, self.found, self.settled
-        state, actions, dt, gravity, middle = self.state, self.actions, self.dt, self.gravity, self.middle
+        state, actions, dt, gravity, midpoint = self.state, self.actions, self.dt, self.gravity, self.midpoint
         acting = self.acting
         if found.points is not None:
-            acting = middle.contacts(found.points.corners, found.block, found.other, self._along(found))
+            corners = found.lumped
+            acting = midpoint.contacts(found.points.corners, corners.block, corners.other, self._along(corners))
         rows = found.rows(settled, acting)
         reaction, acting_right, largest_force, acted = None, self.right, 0.0, {}
         points, load, turn = self.points, self.load, self.increment[:, 2]
@@ -564,15 +583,11 @@ class Attempt:
         if actions is not None:
             points, reaction, acted = actions.acted(settled, self.unknowns, rows, points, self.new_vertices)
             acting_right, largest_force = actions.with_bolt_forces(self.right), actions.largest_bolt_force
-            load = middle.loads_back(generalised(points, self.edges, middle.centroid))
-            load = load + actions.work_forces(reaction, rows, middle.centroid)
-        end_shear = end_of_step(found.shear, settled.shear_force, settled.state == STICK, self.weight)
+            load = midpoint.loads_back(generalised(points, self.edges, midpoint.centroid))
+            load = load + actions.work_forces(reaction, rows, midpoint.centroid)
+        end_shear = self._end_shear()
         energy = self._energy(load, end_shear)
-        residual, ratio = imbalance(
-            self.matrix, acting_right, self.vectors, found.block, found.other, self.order, settled.unknowns,
-            settled.normal_force, settled.shear_force, self.acceleration, self.density, self.moments, gravity, load,
-            largest_force,
-        )  # fmt: skip
+        residual, ratio = self._imbalance(acting_right, load, largest_force)
         new_stress, acceleration = self.new_stress, self.acceleration
         if len(system.rigid):
             from_outside = load.copy()
@@ -580,7 +595,7 @@ class Attempt:
                 # What holds the strains of a rigid block is its stress.
                 from_outside[:, 3:] -= reaction[:, 3:]
             new_stress[system.rigid] = mean_stress(
-                system.rigid, rows, from_outside, middle.moments, self.density, acceleration, self.carried[:, 2], self.turn,
+                system.rigid, rows, from_outside, midpoint.moments, self.density, acceleration, self.carried[:, 2], self.turn,
                 turn,
             )  # fmt: skip
         if scheme.mass_damping:
@@ -589,7 +604,7 @@ class Attempt:
         if scheme.weight != 1.0 or found.points is not None:
             # Of what springs inside faces bear in shear, each goes on with its own.
             memory = copied(rows)
-            memory["shear_force"] = end_shear
+            memory["shear_force"] = found.shear_of_rows(end_shear)
         if system.taken_out is not None:
             new_stress[system.taken_out] = 0.0
         beyond = None
@@ -597,12 +612,12 @@ class Attempt:
             beyond = scheme.overstress(
                 self.increment[:, 3:], self.tangent, self.stress0 - self.stress, system.stiffness, system.mass, dt
             )
-        if middle.turn is not None:
-            acceleration = turned(acceleration, middle.turn)
-            beyond = None if beyond is None else rotate_stress(beyond, middle.turn)
+        if midpoint.turn is not None:
+            acceleration = turned(acceleration, midpoint.turn)
+            beyond = None if beyond is None else rotate_stress(beyond, midpoint.turn)
         inertia = Inertia(self.density, gravity, acceleration, self.carried[:, 2], system.fixed)
         area = self.moments[:, 0].copy()
-        forces = AppliedForces(points, self.edges, middle.centroid, area, inertia, reaction, beyond)
+        forces = AppliedForces(points, self.edges, midpoint.centroid, area, inertia, reaction, beyond)
         imposed = None if actions is None else actions.imposed
         new_state = State(
             time=self.time,
@@ -635,8 +650,22 @@ class Attempt:
             self.slack,
         )  # fmt: skip
         return StepResult(
-            new_state, dt, rows, forces, acceleration, energy, reserve, middle.vertices, self.turn, found.arcs,
+            new_state, dt, rows, forces, acceleration, energy, found.of_rows(reserve), midpoint.vertices, self.turn, found.arcs,
             statistics, self._worst_overlap() if energy.overlap > 0.0 else None,
+        )  # fmt: skip
+
+    def _end_shear(self) -> np.ndarray:
+        """(n,) N shear forces of contacts at the end of the step."""
+        settled = self.settled
+        return end_of_step(self.found.shear, settled.shear_force, settled.state == STICK, self.weight)
+
+    def _imbalance(self, right: np.ndarray, load: np.ndarray, largest: float) -> tuple[float, float]:
+        """As `imbalance`."""
+        found, settled = self.found, self.settled
+        return imbalance(
+            self.matrix, right, self.vectors, found.block, found.other, self.order, settled.unknowns,
+            settled.normal_force, settled.shear_force, self.acceleration, self.density, self.moments, self.gravity,
+            load, largest,
         )  # fmt: skip
 
     def _worst_overlap(self) -> tuple[float, int, int, float, float, float]:
@@ -694,8 +723,8 @@ class Attempt:
         normal, shear = self.found.springs.normal, self.settled.springs.shear
         if not self.system.allowed_penetration:
             return normal, shear
-        held = self.system.finder.on_penalty(self.found)
-        return np.where(held[0], 0.0, normal), np.where(held[1], 0.0, shear)
+        normal_multiplier, shear_multiplier = self.system.finder.on_penalty(self.found)
+        return np.where(normal_multiplier, 0.0, normal), np.where(shear_multiplier, 0.0, shear)
 
 
 def _deepest(closed: np.ndarray, before: np.ndarray, after: np.ndarray) -> float:

@@ -33,6 +33,12 @@ def solve_to(
     solution, which is that of the last mesh, is what it differs by from the one before: a bound of the error, ten times
     as large as a rule. Raises `TargetMissed`, with the last solution, when the highest order does not reach the target.
     ``body``: further arguments of `Body`.
+
+    >>> rock = Material("rock", 17e9, 0.21)
+    >>> crack = Cracks.from_polylines([np.array([[-1.0, 0.0], [1.0, 0.0]])])
+    >>> solution = ddm.solve_to([], crack, rock, ddm.BodyLoad(remote_stress=[0.0, 1e6, 0.0]), 1e-8)
+    >>> bool(abs(solution.tips["k_i"] / (1e6 * np.sqrt(np.pi)) - 1).max() < 1e-8)
+    True
     """
     check_target(target_error)
     # What is graded for twice the target is a tenth finer the second time.

@@ -65,6 +65,12 @@ class Body:
     a crack segment counts in them. ``counts`` tells what making it took, ``work`` what was done since by all bodies
     that share it. Raises ValueError naming the item on geometry that is no body, numpy.linalg.LinAlgError when cracks
     cut a part off.
+
+    >>> rock = Material("rock", 17e9, 0.21, k_ic=2e6)
+    >>> crack = Cracks.from_polylines([np.array([[-1.0, 0.0], [1.0, 0.0]])])
+    >>> tips = ddm.Body([], crack, rock).solve(ddm.BodyLoad(remote_stress=[0.0, 1e6, 0.0])).tips
+    >>> [f"{k:.4f}" for k in tips["k_i"] / (1e6 * np.sqrt(np.pi))]  # a crack in tension: σ √(πa)
+    ['1.0000', '1.0000']
     """
 
     def __init__(
@@ -129,8 +135,8 @@ class Body:
         self._factored_after_all = previous is not None and previous._factored_after_all
         solver = "dense" if self._factored_after_all else settings.solver
         holds = Holds(self.boundary, self.supports, self.support_segments, self._extent) if self.supports else None
-        holes_held = holds is not None and bool(self.mesh.edge_loop[holds.sources.source].any())
-        many = half_plane is None and is_iterated(solver, self.boundary.n_unknowns, holds, holes_held)
+        holes_supported = holds is not None and bool(self.mesh.edge_loop[holds.sources.source].any())
+        many = half_plane is None and is_iterated(solver, self.boundary.n_unknowns, holds, holes_supported)
         factored = previous is not None and not previous.compressed and previous.faces.n > 0
         self.compressed = is_compressed("compressed" if many else solver, self.faces.n_unknowns, factored)
         if half_plane is not None and self.boundary.n_unknowns > FACTORABLE:

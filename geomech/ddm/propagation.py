@@ -85,6 +85,13 @@ def propagate(
     "split" when cracks have cut off a part that nothing holds, or after ``max_steps``. ``body``: further arguments of
     `Body`. Raises ValueError on an unknown control or criterion and on a material without toughness, and what `Body`
     and its ``solve`` raise.
+
+    >>> rock = Material("rock", 17e9, 0.21, k_ic=2e6)
+    >>> crack = Cracks.from_polylines([np.array([[-5e-3, -5e-3], [5e-3, 5e-3]])], aperture=np.inf)
+    >>> load = ddm.BodyLoad(remote_stress=[0.0, -10e6, 0.0])
+    >>> steps = ddm.propagate([], crack, rock, load, GrowthSettings(increment=1e-3), control="toughness", max_steps=3)
+    >>> [len(step.tips) for step in steps]  # wing cracks from both ends
+    [2, 2, 2]
     """
     if control not in ("load", "toughness"):
         raise ValueError(f'control must be "load" or "toughness", got {control!r}')

@@ -20,7 +20,7 @@ from .loads.reactions import Reactions, reactions
 from .mesh.edge_location import OFF, onto_boundary, sides_for
 from .mesh.field_points import ElementEnds
 from .mesh.point_location import onto_rock
-from .system.boundary_system import middle_of
+from .system.boundary_system import outline_centroid
 from .system.influence_matrix import add_fields
 
 if TYPE_CHECKING:
@@ -323,8 +323,8 @@ class Solution:
                 density = elements.densities(values)
                 add(elements.start, elements.end, elements.kind, density, body._tol, False, seen_from)
         if body.supports:
-            held = body._outside.holds.sources
-            add(held.start, held.end, held.kind, held.densities(self._on_supports[1]), body._tol, True)
+            sources = body._outside.holds.sources
+            add(sources.start, sources.end, sources.kind, sources.densities(self._on_supports[1]), body._tol, True)
         if len(self._applied.segments):
             start, end, density = self._line_forces
             add(start, end, np.zeros(len(start), np.int64), density, 2 * OFF * body._extent, True)
@@ -377,7 +377,7 @@ class Solution:
         x, ds = g.nodes[here], g.quadrature[here]
         total = u[:, 0, :, None] * g.tangent[here, None] + u[:, 1, :, None] * g.normal[here, None]
         total = total + self._applied.regular(x.reshape(-1, 2)).reshape(x.shape)
-        perimeter, middle, radius = middle_of(g.take(here))
+        perimeter, middle, radius = outline_centroid(g.take(here))
         mean = np.einsum("ej,ejc->c", ds, total) / perimeter
         rel = x - middle
         turn = np.einsum("ej,ej->", ds, rel[..., 0] * total[..., 1] - rel[..., 1] * total[..., 0])

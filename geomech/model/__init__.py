@@ -34,13 +34,14 @@ from .problem import (
     RunSettings,
     counted,
 )  # fmt: skip
-from .state import CONTACT, OPEN, SLIP, STICK, TIP, CrackFaces, Cycle, Event, Shortened, Skip, State
+from .state import CONTACT, FACE_POINT, OPEN, SLIP, STICK, TIP, CrackFaces, Cycle, Event, Shortened, Skip, State
 from .unbounded_rock import EndlessRock, Fluid
 
 __all__ = [
     "BOLT",
     "CHANGES",
     "CONTACT",
+    "FACE_POINT",
     "GROUND",
     "LARGEST_CORNER",
     "OPEN",

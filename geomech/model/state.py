@@ -49,6 +49,30 @@ CONTACT = np.dtype(
     ]
 )
 
+#: One row per integration point of the faces of blocks of higher order (and per lone corner): its face by the vertices and
+#: edges of both ends (−1: a lone corner), its ``place`` between them, and what it remembers, as in CONTACT rows.
+FACE_POINT = np.dtype(
+    [
+        ("vertex", np.int64),
+        ("edge", np.int64),
+        ("far_vertex", np.int64),
+        ("far_edge", np.int64),
+        ("block", np.int64),
+        ("other", np.int64),
+        ("place", np.float64),  # along the face, 0 at the first end and 1 at the far one
+        ("point", np.float64, 2),  # current coordinates, m
+        ("length", np.float64),  # m of the face that it stands for
+        ("state", np.int64),
+        ("bonded", np.int64),
+        ("normal_force", np.float64),  # N/m
+        ("shear_force", np.float64),  # N/m
+        ("gap", np.float64),  # m
+        ("slip", np.float64),  # m
+        ("wear", np.float64),  # m
+        ("lift", np.float64),  # m
+    ]
+)
+
 #: One row per crack tip.
 TIP = np.dtype(
     [
@@ -82,6 +106,9 @@ class State:
     bolts         BOLT rows         one per bolt of the loads; empty before the first step
     imposed       (k,)              prescribed displacement of base, blocks and points; empty before step 1
     removed       (n_blocks,)       True: excavated; None: no block is
+    deflection    (k, 2)            m and m/s, of blocks of higher order (`Blocks.order`): the unknowns of deflection and
+                                    their rates, block by block; None: no block has any. ``vertices`` are without it
+    face_points   FACE_POINT rows   what points of the faces of such blocks remember
     """
 
     time: float
@@ -95,6 +122,8 @@ class State:
     bolts: np.ndarray = field(default_factory=lambda: np.empty(0, BOLT))
     imposed: np.ndarray = field(default_factory=lambda: np.empty(0))
     removed: np.ndarray | None = None
+    deflection: np.ndarray | None = None
+    face_points: np.ndarray | None = None
 
     @classmethod
     def at_rest(cls, blocks: Blocks) -> State:
@@ -111,11 +140,12 @@ class State:
 
     def read_only(self) -> State:
         """The same with arrays that cannot be written to: views of these, no copies."""
-        return replace(self, **{name: _view(value) for name, value in self._arrays()})
+        views: dict[str, Any] = {name: _view(value) for name, value in self._arrays()}
+        return replace(self, **views)
 
     def writable(self) -> State:
         """The same with arrays that can be written to: these, copies of those that cannot."""
-        copies = {name: value.copy() for name, value in self._arrays() if not value.flags.writeable}
+        copies: dict[str, Any] = {name: value.copy() for name, value in self._arrays() if not value.flags.writeable}
         return replace(self, **copies) if copies else self
 
     def _arrays(self) -> list[tuple[str, np.ndarray]]:
@@ -212,6 +242,8 @@ class Cycle:
                 compression
     strain      axial strain between the gauge points, positive in shortening; nan without a gauge
     tips        TIP rows of all blocks
+    bent        block → body of a block of higher order, with ``fields(points)`` as ``bodies`` have, and
+                ``deflection(points)`` (n, 2): by how much points lie off where the block's vertices say
     faces       the crack faces, or None when no block holds a crack
     bodies      block index → solved elastic body with ``fields(points)``: stress (n, 3) and displacement (n, 2)
                 in reference coordinates, for interior fields; ``residual``, ``condition``, ``tips`` and ``tip_errors``
@@ -234,6 +266,7 @@ class Cycle:
     tips: np.ndarray
     faces: CrackFaces | None = None
     bodies: dict[int, Any] = field(default_factory=dict)
+    bent: dict[int, Any] = field(default_factory=dict)
     events: tuple[Event, ...] = ()
     monitors: dict[str, np.ndarray] = field(default_factory=dict)
     statistics: dict[str, float] = field(default_factory=dict)
@@ -241,6 +274,25 @@ class Cycle:
     work: dict[str, int] = field(default_factory=dict)
     skips: dict[str, Skip] = field(default_factory=dict)
     shortened: tuple[Shortened, ...] = ()
+
+    @property
+    def inside(self) -> dict[int, Any]:
+        """block → what knows of stress and displacement inside it: cracked blocks, and those of higher order."""
+        return {**self.bent, **self.bodies} if self.bent else self.bodies
+
+    @cached_property
+    def moved(self) -> np.ndarray:
+        """(n_vertices, 2) m: displacement of the vertices of all blocks, their deflection included."""
+        out = self.state.vertices - self.blocks.vertices
+        for block, body in self.bent.items():
+            some = slice(self.blocks.vertex_start[block], self.blocks.vertex_start[block + 1])
+            out[some] += body.deflection(self.blocks.vertices[some])
+        return out
+
+    @property
+    def placed(self) -> np.ndarray:
+        """(n_vertices, 2) m: current coordinates of the vertices of all blocks, their deflection included."""
+        return self.blocks.vertices + self.moved if self.bent else self.state.vertices
 
     @cached_property
     def motion(self) -> Motion:

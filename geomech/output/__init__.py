@@ -8,12 +8,12 @@ from __future__ import annotations
 
 from typing import Any
 
-from .checkpoints.checkpoint_schedule import Checkpoints
+from .checkpoints.checkpoint_schedule import KEPT_MB, Checkpoints
 from .console.progress import Progress
 from .observer import Group, Observer
 from .reading import Run
 from .run_folder import RunFolder
-from .run_record import RunLog, SceneCopy
+from .run_record import Places, RunLog, SceneCopy
 from .tables.histories import Histories
 from .tables.joint_histories import JointHistories
 from .tables.summary import Summary
@@ -26,6 +26,7 @@ __all__ = [
     "Histories",
     "JointHistories",
     "Observer",
+    "Places",
     "Progress",
     "Run",
     "RunFolder",
@@ -40,7 +41,8 @@ __all__ = [
 
 def standard_observers(scene: Any = None, *, quiet: bool = False) -> list[Observer]:
     """The observers of an ordinary run. ``scene`` (a loaded scene, or None for the defaults) gives its ``output`` table
-    (``every``, ``joints``, ``interior_fields``, ``interior_every``, ``configuration``, ``checkpoint_every``) and its
+    (``every``, ``joints``, ``interior_fields``, ``interior_every``, ``configuration``, ``checkpoint_every``,
+    ``checkpoint_kept_mb``, ``format``) and its
     ``resolved()`` form."""
     output = getattr(scene, "output", None)
     resolved = None if scene is None else scene.resolved()
@@ -48,7 +50,7 @@ def standard_observers(scene: Any = None, *, quiet: bool = False) -> list[Observ
     if resolved is not None:
         # Before the folder is cleared: what then breaks off can begin again.
         watchers.append(SceneCopy(resolved))
-    watchers += [RunFolder(), RunLog()]
+    watchers += [RunFolder(), RunLog(), Places()]
     interior_every = getattr(output, "interior_every", 5) if getattr(output, "interior", True) else 0
     return [
         *watchers,
@@ -58,9 +60,14 @@ def standard_observers(scene: Any = None, *, quiet: bool = False) -> list[Observ
             every=getattr(output, "every", 1),
             interior_every=interior_every,
             configuration=getattr(output, "configuration", "reference"),
+            format=getattr(output, "format", "vtu"),
         ),
         ViewScript(getattr(output, "configuration", "reference")),
-        Checkpoints(every=getattr(output, "checkpoint_every", None), scene=resolved),
+        Checkpoints(
+            every=getattr(output, "checkpoint_every", None),
+            scene=resolved,
+            kept_mb=getattr(output, "checkpoint_kept_mb", KEPT_MB),
+        ),
         Summary(),  # after the writers, whose times it takes in
         Progress(quiet=quiet),
     ]

@@ -9,7 +9,7 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from typing import Any
 
 
-class Beside:
+class BackgroundJobs:
     """Jobs done one after another in a thread, in the order given; at most ``most`` wait.
 
     It pays for jobs of many milliseconds outside the interpreter; for short ones the two threads only take turns. A job

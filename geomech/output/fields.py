@@ -79,7 +79,9 @@ SERIES: dict[str, tuple[Field, ...]] = {
         Field("growth_angle", "point", "deg", "from the crack's direction to the growth direction, counter-clockwise"),
         Field("growth_direction", "point", "-", "unit vector the criterion points to", _XYZ),
         Field("grown", "point", "m", "advance in this cycle"),
-        Field("crack_id", "point", "-", "index of the crack", dtype="int32"),
+        Field("crack_id", "point", "-", "index of the crack; the names stand in CRACK_NAMES", dtype="int32"),
+        Field("end", "point", "-", "0 the tip at the start of its crack, 1 at its end", dtype="int32"),
+        Field("tip_id", "point", "-", "node of the crack network, as in tips.csv", dtype="int32"),
         Field("block_id", "point", "-", "index of the block it lies in", dtype="int32"),
     ),
     "contacts": (
@@ -107,11 +109,36 @@ SERIES: dict[str, tuple[Field, ...]] = {
     ),
     # Interior fields are large and smooth, so single precision: seven digits are more than the mesh resolves.
     "interior": (
-        Field("displacement", "point", "m", "of the cracked body: block motion plus its own deformation", _XYZ),
+        Field(
+            "displacement",
+            "point",
+            "m",
+            "of the cracked body: block motion plus its own deformation, tied to the block's at contacts",
+            _XYZ,
+        ),
         Field(_STRESS[0], "point", *_STRESS[1:], VTK_STRESS, "float32"),
         Field(_PRINCIPAL[0], "point", *_PRINCIPAL[1:], _PRINCIPAL_NAMES, "float32"),
         Field("von_mises", "point", "Pa", "√(3 J₂) of the full tensor", dtype="float32"),
         Field("block_id", "cell", "-", "index of the block", dtype="int32"),
+    ),
+    "outlines": (
+        _DISPLACEMENT,
+        Field("block_id", "cell", "-", "index of the block whose edge it is", dtype="int32"),
+        Field("fixed", "cell", "-", "1 where the block does not move", dtype="int32"),
+        Field("removed", "cell", "-", "1 where the block has been taken out", dtype="int32"),
+        Field("edge_name", "cell", "-", "index of the edge's name; the names stand in EDGE_NAMES", dtype="int32"),
+    ),
+    "bolts": (
+        _DISPLACEMENT,
+        Field("force", "cell", "N/m", "along the bolt, positive in tension"),
+        Field("shear_force", "cell", "N/m", "across the bolt (dowel action)"),
+        Field("yielded", "cell", "m", "elongation by yielding"),
+        Field("state", "cell", "-", "0 not installed yet, 1 acts, 2 yields, 3 broken", dtype="int32"),
+        Field("bolt_id", "cell", "-", "index of the bolt; the names stand in BOLT_NAMES", dtype="int32"),
+    ),
+    "water": (
+        _DISPLACEMENT,
+        Field("ponded", "cell", "-", "1 where the line is the surface of a pond, 0 in the rock", dtype="int32"),
     ),
 }
 
@@ -122,6 +149,9 @@ ACTIVE: dict[str, dict[str, str]] = {
     "tips": {"PointData": 'Scalars="K_eq" Vectors="displacement"'},
     "contacts": {"PointData": 'Scalars="normal_force" Vectors="force"'},
     "interior": {"PointData": 'Scalars="von_mises" Vectors="displacement"', "CellData": 'Scalars="block_id"'},
+    "outlines": {"PointData": 'Vectors="displacement"', "CellData": 'Scalars="block_id"'},
+    "bolts": {"PointData": 'Vectors="displacement"', "CellData": 'Scalars="force"'},
+    "water": {"PointData": 'Vectors="displacement"', "CellData": 'Scalars="ponded"'},
 }
 
 #: Columns every ``history.csv`` begins with, and their units; the step's statistics and the monitors follow.

@@ -12,7 +12,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from .fields import HISTORY, SERIES, TIPS
-from .vtk.vtu import read_collection
+from .vtk import vtkhdf
+from .vtk.vtkhdf import HdfStep
+from .vtk.vtu import EMPTY, read_collection
 
 if TYPE_CHECKING:
     import pyvista
@@ -27,6 +29,7 @@ class Run:
 
     def __init__(self, folder: Path | str) -> None:
         self.folder = Path(folder)
+        self._files: dict[str, dict[int, Path | HdfStep]] = {}
         if not (self.folder / "history.csv").is_file():
             raise FileNotFoundError(f"{self.folder} holds no run: history.csv is missing")
 
@@ -67,30 +70,47 @@ class Run:
     def title(self) -> str:
         return self.summary.get("title") or self.scene.get("title") or self.folder.name
 
-    def series(self, name: str) -> list[tuple[float, Path]]:
-        """(time, file) of every written cycle of the series ``name``; empty where it was not written."""
+    def series(self, name: str) -> list[tuple[float, Path | HdfStep]]:
+        """(time, file) of every written cycle of the series ``name``, or (time, step in its VTKHDF file); empty
+        where it was not written. `read_grid` reads either."""
         if name not in SERIES:
             raise KeyError(f"no series {name!r}; there are {', '.join(SERIES)}")
-        path = self.folder / f"{name}.pvd"
-        return read_collection(path) if path.is_file() else []
+        path, steps = self.folder / f"{name}.pvd", self.folder / (name + vtkhdf.SUFFIX)
+        if path.is_file():
+            return read_collection(path)
+        return vtkhdf.read_steps(steps) if steps.is_file() else []
 
-    def grids(self, name: str) -> dict[int, Path]:
-        """cycle number → file of the series ``name``, in order."""
-        return {int(file.stem.rpartition("_")[2]): file for _, file in self.series(name)}
+    def grids(self, name: str) -> dict[int, Path | HdfStep]:
+        """cycle number → file (or step) of the series ``name``, in order."""
+        if name not in self._files:
+            self._files[name] = {
+                file.cycle if isinstance(file, HdfStep) else int(file.stem.rpartition("_")[2]): file
+                for _, file in self.series(name)
+            }
+        return self._files[name]
 
     def grid(self, name: str, cycle: int) -> pyvista.UnstructuredGrid:
         """The series ``name`` at ``cycle``, or at the last cycle written before it. Raises KeyError without one."""
-        import pyvista
-
         files = self.grids(name)
         before = [number for number in files if number <= cycle]
         if not before:
             raise KeyError(f"{self.folder}: no {name} up to cycle {cycle}")
-        return pyvista.read(files[max(before)])
+        return read_grid(files[max(before)])
 
     def at(self, cycle: int) -> np.void:
         """The row of `history` for ``cycle``."""
         return self.history[np.searchsorted(self.history["cycle"], cycle)]
+
+
+def read_grid(where: Path | HdfStep) -> pyvista.UnstructuredGrid:
+    """A grid of a series as PyVista has it; one that was written to draw nothing (`geomech.output.vtk.vtu.nothing`) has
+    no points and no cells."""
+    import pyvista
+
+    grid = vtkhdf.read_step(where) if isinstance(where, HdfStep) else pyvista.read(where)
+    if grid.n_cells == 1 and int(grid.celltypes[0]) == EMPTY:
+        return grid.extract_cells(np.empty(0, int))
+    return grid
 
 
 def read_table(path: Path, numeric: Any) -> np.ndarray:

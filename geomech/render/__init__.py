@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from .sketch import sketch
 
@@ -21,13 +22,16 @@ def draw(
     width: int | None = None,
     movie: bool | None = None,
 ) -> list[Path]:
-    """Everything there is to see of ``run``, in the folder ``out`` (default: ``pictures`` in the run folder):
-    ``specimen.png``, ``growth.gif`` and the curves. The paths of what was drawn.
+    """Everything there is to see of ``run``, in the folder ``out`` (default: ``pictures`` in the run folder), and the
+    curves; the paths of what was drawn. Of cracked rock that is the stress at the end and the growth of the cracks,
+    ``specimen.png`` and ``growth.gif``; where blocks move, or nothing is cracked, ``displacement.png`` and
+    ``displacement.gif``, and after an earthquake ``slip.png``.
 
-    What is not said here the scene's ``[render]`` table says, and where that is silent too, stress yy, 800 pixels and a
-    movie. Raises ValueError for a run without a cycle, KeyError for an unknown stress component, RenderingUnavailable
+    What is not said here the scene's ``[render]`` table says, and where that is silent too, 800 pixels and a movie; a
+    ``component`` asks for stress whatever the run. `draw_field` draws any other field. Raises ValueError for a run without a cycle, KeyError for an unknown stress component, RenderingUnavailable
     where VTK can open no window."""
     from .curves.plots import plots
+    from .fields.draw import usual_field
     from .movie import movie as draw_movie
     from .pictures.look import final_cycle, look
     from .pictures.picture import picture
@@ -37,6 +41,9 @@ def draw(
             f"{run.folder}: the run has no cycle yet: let it go on (`geomech resume {run.folder}`), then draw it"
         )
     asked = run.scene.get("render", {})
+    folder = run.folder / "pictures" if out is None else Path(out)
+    if component is None and run.series("blocks") and usual_field(run) is not None:
+        return [*_motion(run, folder, asked, width, movie), *plots(run, folder, more=True)]
     last = final_cycle(run)
     fixed = look(
         run,
@@ -46,7 +53,6 @@ def draw(
         scale=asked.get("deformation_scale"),
         crack_colour=asked.get("crack_colour", "birth"),
     )
-    folder = run.folder / "pictures" if out is None else Path(out)
     folder.mkdir(parents=True, exist_ok=True)
     paths = [picture(run, folder / "specimen.png", fixed, last)]
     if asked.get("gif", True) if movie is None else movie:
@@ -54,3 +60,20 @@ def draw(
         made = draw_movie(run, folder / "growth.gif", fixed, frames_per_second=pace)
         paths += [made] if made is not None else []
     return [*paths, *plots(run, folder)]
+
+
+def _motion(run: Run, folder: Path, asked: dict[str, Any], width: int | None, movie: bool | None) -> list[Path]:
+    """Pictures of a run whose blocks move: how far, and after an earthquake how far joints have slipped."""
+    from .fields.draw import Wish, draw_field
+
+    wish = Wish(
+        scale=asked.get("deformation_scale"),
+        size=(width or asked.get("width_px", 800), None),
+        movies=(".gif",) if (asked.get("gif", True) if movie is None else movie) else (),
+        frames_per_second=asked.get("frames_per_second", 10.0),
+    )
+    paths = draw_field([run], wish, folder)
+    loads = run.scene.get("loads", {})
+    if loads.get("base") or loads.get("viscous_boundaries"):
+        paths += draw_field([run], replace(wish, field="slip", movies=()), folder)
+    return paths

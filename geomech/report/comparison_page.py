@@ -10,7 +10,7 @@ from typing import Any
 
 from ..output.reading import Run
 from .page import Page
-from .run_page import LISTED
+from .run_page import LISTED, add_player
 from .table import shown, table
 
 #: Keys of a scene that say where it lies, not what it is.
@@ -19,11 +19,13 @@ _NOT_TOLD = ("title", "geometry.model")
 PICTURED = 12
 
 
-def page_of_runs(runs: Sequence[Run], folder: Path) -> Page:
-    """The page of ``runs``, which lie in ``folder``."""
+def page_of_runs(runs: Sequence[Run], folder: Path, play: bool = True) -> Page:
+    """The page of ``runs``, which lie in ``folder``; with ``play`` their cycles can be played."""
     page = Page(_title(runs), f"{len(runs)} runs in {folder}")
     page.section("Side by side")
     add_table(page, runs)
+    if play:
+        add_player(page, runs)
     different = differences(runs)
     if different:
         page.section("What differs between their scenes")

@@ -18,6 +18,8 @@ if TYPE_CHECKING:
     import pandas
     import pyvista
 
+    from ..player.widget import RunPlayer
+
 #: Entries of the summary that a notebook shows, where the run has them.
 _SHOWN = ("end", "time_s", "peak_load_pa", "wall_s")
 
@@ -26,9 +28,13 @@ def open_run(folder: str | Path) -> RunResults:
     """The run in ``folder``, one that lasts or failed included, as far as it has come. Raises FileNotFoundError where
     there is none, with the runs below the folder, if any.
 
-    >>> results = open_run("outputs/two_cracks/phi_30")          # doctest: +SKIP
-    >>> results.history[["time", "load", "crack_length"]].tail()  # doctest: +SKIP
-    >>> results.mesh("blocks", time=0.5).plot(scalars="stress")   # doctest: +SKIP
+    >>> results = geomech.open_run("outputs/slope")
+    >>> results.history[["time", "open_close_iterations"]].shape
+    (3, 2)
+    >>> sorted(results.series)[:2]
+    ['blocks', 'contacts']
+    >>> results.mesh("blocks", time=0.2).point_data["displacement"].shape
+    (8, 3)
     """
     folder = Path(folder)
     if not (folder / "history.csv").is_file():
@@ -121,6 +127,16 @@ class RunResults:
 
         return draw(self._run, out, **options)
 
+    def view(self, *others: RunResults, height: int = 760, megabytes: float = 4.0) -> RunPlayer:
+        """The run as a notebook plays it, cycle by cycle, ``others`` beside it with one range of colours; as far as it has
+        come. Raises ValueError where nothing was written that could be drawn.
+
+        >>> geomech.open_run("outputs/two_cracks/phi_30").view()      # doctest: +SKIP
+        """
+        from ..player.widget import RunPlayer
+
+        return RunPlayer([self._run, *(other._run for other in others)], height, megabytes)
+
     def _repr_html_(self) -> str:
         rows = [("folder", str(self.folder)), ("cycles", str(len(self._run.history)))]
         rows += [(key, str(self.summary[key])) for key in _SHOWN if self.summary.get(key) is not None]
@@ -132,7 +148,8 @@ class RunResults:
         return f"<h4>{html.escape(self.title)}</h4><table>{table}</table>{_shown(self._pictures())}"
 
     def _pictures(self) -> Sequence[Path]:
-        return [path for path in (self.folder / "pictures" / "specimen.png",) if path.is_file()]
+        drawn = (self.folder / "pictures" / name for name in ("specimen.png", "displacement.png"))
+        return [path for path in drawn if path.is_file()][:1]
 
 
 def _shown(pictures: Sequence[Path]) -> str:

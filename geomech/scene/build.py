@@ -26,7 +26,7 @@ from ..model import (
     rayleigh_coefficients,
 )
 from ..shapes.parts import JOINT
-from .assembly.fixed_blocks import first_velocities, fixed_blocks, held_unknowns
+from .assembly.fixed_blocks import block_orders, constrained_unknowns, first_velocities, fixed_blocks
 from .assembly.joint_laws import joint_law
 from .assembly.load_functions import actions_of, force_history, in_situ_of, profile_of, traction_history
 from .checks.check import Check
@@ -48,7 +48,8 @@ def build_problem(tables: SceneTables, drawing: Drawing, check: Check) -> Proble
         drawing.blocks,
         material=np.array([names.index(material_of(tables, zone)) for zone in drawing.zones]),
         fixed=fixed_blocks(tables, drawing),
-        held=held_unknowns(tables, drawing),
+        constrained=constrained_unknowns(tables, drawing),
+        order=block_orders(tables, drawing),
     )
     joints, joint_of = _joints(tables, drawing)
     edge_laws = {name: joints[law] for (other, name), law in joint_of.items() if other == ""}

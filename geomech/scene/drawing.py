@@ -55,6 +55,12 @@ class Drawing:
     crs: dict[str, Any] | None = None
     folder: FilePath | None = None
 
+    def assembled(self) -> tuple[Blocks, Cracks]:
+        """Blocks and cracks. Raises ValueError where the drawing cannot be assembled."""
+        if self.blocks is None or self.cracks is None:
+            raise ValueError("the drawing could not be assembled")
+        return self.blocks, self.cracks
+
     def path_of_crack(self, name: str) -> Path:
         """Where in the scene the crack ``name`` is drawn, or what made it."""
         whole = ("geometry",) if self.model is None else ("geometry", "model")
@@ -277,7 +283,7 @@ def _assembled(
         blocks, _ = assemble(parts.zones, (), parts.edges, geometry.tolerance_m)
         for k, only in parts.only_in.items():
             parts.joints[k] = within(parts.joints[k], [zone for zone in parts.zones if zone.name in only])
-        _tell_outside(geometry, parts, place, warnings)
+        _warn_outside(geometry, parts, place, warnings)
         cut = jointed(geometry, parts.zones, blocks, parts.traces, parts.joints, parts.chords)
     except ShapeError as error:
         counted_from = f"; coordinates count from ({origin[0]:.10g}, {origin[1]:.10g})" if origin.any() else ""
@@ -313,7 +319,7 @@ def _source(flaw: Flaw, parts: _Parts, joints: Sequence[str], own: Sequence[str]
     return parts.sources.get((flaw.part, key), (("geometry", flaw.part, index), ""))
 
 
-def _tell_outside(geometry: Geometry, parts: _Parts, place: Callable[[Path], str], warnings: list[Fault]) -> None:
+def _warn_outside(geometry: Geometry, parts: _Parts, place: Callable[[Path], str], warnings: list[Fault]) -> None:
     """Warn of joints, drawn in the scene or from files, of which nothing lies in the rock: units or origins that
     differ."""
     import shapely

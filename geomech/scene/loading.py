@@ -5,7 +5,7 @@ from __future__ import annotations
 import copy
 import re
 import tomllib
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path as FilePath
 from typing import Any
@@ -53,8 +53,8 @@ class Scene:
     drawing: Drawing
     variants: tuple[str, ...]
     warnings: tuple[Fault, ...] = ()
-    _check: Check | None = field(default=None, repr=False)
-    _written: SceneTables | None = field(default=None, repr=False)
+    _check: Check = field(kw_only=True, repr=False)
+    _written: SceneTables = field(kw_only=True, repr=False)
 
     @property
     def title(self) -> str:
@@ -76,12 +76,12 @@ class Scene:
     @property
     def blocks(self) -> Blocks:
         """The blocks as drawn, without materials."""
-        return self.drawing.blocks
+        return self.drawing.assembled()[0]
 
     @property
     def cracks(self) -> Cracks:
         """The cracks as drawn, without apertures."""
-        return self.drawing.cracks
+        return self.drawing.assembled()[1]
 
     @property
     def origin(self) -> tuple[float, float]:
@@ -157,7 +157,7 @@ class _Places:
 
 def load_scene(
     path: str | FilePath,
-    overrides: Iterable[str] | Mapping[str, Any] = (),
+    overrides: Iterable[str | tuple[str, Any]] | Mapping[str, Any] = (),
     variant: str | None = None,
     *,
     to_run: bool = True,
@@ -167,6 +167,10 @@ def load_scene(
     ``path`` is a .toml file or a pipeline folder (then its scene.toml); ``variant`` one of the scene's [variants];
     ``overrides`` are changes on top, {"section.key": value} with Python values, or a list of "section.key=value" with
     values in TOML's way or bare words. Raises SceneError with every fault: place (file, line, key), message and way out. A scene that is not ``to_run`` may leave [run] out.
+
+    >>> scene = geomech.load_scene("slope.toml", {"joints.default.friction_angle_deg": 40})
+    >>> scene.problem().blocks.n_blocks
+    2
     """
     path = _file(FilePath(path))
     data, text = _parsed(path)
@@ -184,7 +188,7 @@ def load_scene(
     if isinstance(overrides, str):
         way = 'write ["section.key=value"] or {"section.key": value}'
         raise SceneError([Fault(str(path), f"{overrides!r} is one text", way)])
-    changes = overrides.items() if isinstance(overrides, Mapping) else overrides
+    changes: Iterable[str | tuple[str, Any]] = overrides.items() if isinstance(overrides, Mapping) else overrides
     for number, one in enumerate(changes):
         called = f"--set {one}" if isinstance(one, str) else f"{one[0]} = {one[1]!r}"
         try:
@@ -205,7 +209,8 @@ def load_scene(
     drawing = None
     if tables.geometry is not None:
         drawing = draw(tables.geometry, path.parent, places, faults, warnings)
-    written, place = tables, places
+    written = tables
+    place: Callable[[Path], str] = places
     if drawing is not None:
         tables, place = with_marks(moved(tables, drawing.origin), drawing, places, faults, warnings)
     sections = Check(tables, data, drawing, place, faults, warnings)
@@ -218,7 +223,16 @@ def load_scene(
     check_plausible(sections)
     # Building asks the same questions as the checks did; whatever it would find has been found.
     quiet = Check(tables, data, drawing, place, [], [])
-    return Scene(path, variant, tables, drawing, names, tuple(places.sorted(one_a_cause(warnings))), quiet, written)
+    return Scene(
+        path,
+        variant,
+        tables,
+        quiet.drawn,
+        names,
+        tuple(places.sorted(one_a_cause(warnings))),
+        _check=quiet,
+        _written=written,
+    )
 
 
 def _file(path: FilePath) -> FilePath:
@@ -259,13 +273,13 @@ def _parsed(path: FilePath) -> tuple[dict[str, Any], str]:
     except tomllib.TOMLDecodeError as error:
         found = re.search(r"\(at (?:line (\d+), column (\d+)|end of document)\)", str(error))
         message = str(error)[: found.start()].strip() if found else str(error)
-        line = found.group(1) if found and found.group(1) else str(text.count("\n") + 1)
+        place = found.group(1) if found and found.group(1) else str(text.count("\n") + 1)
         column = f", column {found.group(2)}" if found and found.group(2) else ""
-        source = text.splitlines()[int(line) - 1].strip() if 0 < int(line) <= len(text.splitlines()) else ""
+        source = text.splitlines()[int(place) - 1].strip() if 0 < int(place) <= len(text.splitlines()) else ""
         raise SceneError(
             [
                 Fault(
-                    f"{path}:{line}{column}",
+                    f"{path}:{place}{column}",
                     f"not valid TOML: {message}" + (f", in `{source}`" if source else ""),
                     _syntax_hint(source),
                 )
@@ -332,7 +346,10 @@ def _apply_variant(data: dict[str, Any], name: str, places: _Places, faults: lis
             faults.append(Fault(places(here), error.message, error.way_out))
 
 
-def _check_variants(data, names, chosen, path: FilePath, lines, faults: list[Fault]) -> None:
+def _check_variants(
+    data: dict[str, Any], names: Sequence[str], chosen: str | None, path: FilePath, lines: dict[Path, int],
+    faults: list[Fault],
+) -> None:  # fmt: skip
     """The tables of every variant that was not chosen: a typing error should not wait until its turn."""
     for name in names:
         if name == chosen:

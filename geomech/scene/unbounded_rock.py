@@ -105,7 +105,7 @@ def check_endless(c: Check) -> None:
 
 def _fluids(c: Check) -> None:
     """Cracks that a fluid is pumped into are there; one that stands in cracks which nothing connects is told."""
-    cracks = c.drawing.cracks
+    cracks = c.cracks
     for k, table in enumerate(c.tables.loads.fluids):
         for n, pattern in enumerate(table.cracks):
             if not any(fnmatchcase(name, pattern) for name in cracks.names):
@@ -127,7 +127,7 @@ def _fluids(c: Check) -> None:
 
 
 def _alone(c: Check, name: str) -> None:
-    n = c.drawing.blocks.n_blocks
+    n = c.blocks.n_blocks
     if n > 1:
         c.refuse(
             ("zones", name, "body"), f"rock without an end holds cracks and holes only, and there are {n} blocks",
@@ -136,7 +136,7 @@ def _alone(c: Check, name: str) -> None:
 
 
 def _surface_is_straight(c: Check, zone: str) -> bool:
-    name, blocks = c.tables.zones[zone].surface, c.drawing.blocks
+    name, blocks = c.tables.zones[zone].surface, c.blocks
     if name is None:
         return True
     place = ("zones", zone, "surface")
@@ -145,7 +145,7 @@ def _surface_is_straight(c: Check, zone: str) -> bool:
         known = [known for known in blocks.edge_names if known]
         c.refuse(place, f"the geometry has no edge {name!r}", nearest(name, known))
         return False
-    point, outward = _surface(c.drawing, name)
+    point, outward = _surface(c.drawn, name)
     height = (blocks.vertices - point) @ outward
     off = _STRAIGHT * np.ptp(blocks.vertices, axis=0).max()
     on = np.concatenate([height[edges], height[blocks.next_vertex[edges]]])
@@ -162,7 +162,7 @@ def _surface_is_free(c: Check, zone: str) -> None:
     """No stress from far away pulls at the free surface: nothing there would bear it."""
     if c.tables.zones[zone].surface is None:
         return
-    _, outward = _surface(c.drawing, c.tables.zones[zone].surface)
+    _, outward = _surface(c.drawn, c.tables.zones[zone].surface)
     histories = [rising_history(table) for table in c.tables.loads.remote]
     end = c.tables.run.end_time_s if c.tables.run is not None else 1.0
     for k, table in enumerate(c.tables.loads.remote):
@@ -181,7 +181,7 @@ def _surface_is_free(c: Check, zone: str) -> None:
 
 def _ends(c: Check, zone: str) -> None:
     """Cracks end in the rock, at a hole or at the free surface: the outline of what is seen is no end of the rock."""
-    blocks, cracks, name = c.drawing.blocks, c.drawing.cracks, c.tables.zones[zone].surface
+    blocks, cracks, name = c.blocks, c.cracks, c.tables.zones[zone].surface
     outline = np.arange(blocks.loop_start[0], blocks.loop_start[1])
     if name is not None:
         outline = np.setdiff1d(outline, blocks.edges_named(name))
@@ -191,7 +191,7 @@ def _ends(c: Check, zone: str) -> None:
         if distance_to_edges(at, a, b) <= _STRAIGHT * np.ptp(blocks.vertices, axis=0).max():
             crack = cracks.names[cracks.crack[np.argmax((cracks.segments == node).any(axis=1))]]
             c.refuse(
-                c.drawing.path_of_crack(crack),
+                c.drawn.path_of_crack(crack),
                 f"crack {crack!r} ends at ({at[0]:g}, {at[1]:g}) on the outline of zone {zone!r}, beyond which the rock goes on",
                 "draw the zone larger, or end the crack inside it",
             )

@@ -56,7 +56,8 @@ class DaskEngine:
         folder: Path | None = None, patience: float = 600.0,
     ) -> None:  # fmt: skip
         self.address, self.patience = address, patience
-        self.workers, self.notes = 1, []
+        self.workers = 1
+        self.notes: list[str] = []
         self._scene, self._folder = scene, folder
         self._client, self._own = client, client is None
         self._stopping = False

@@ -187,7 +187,7 @@ def carry_out_sweep(
         if lock.stale and telling and telling.say:
             telling.say(lock.stale)
         _prepare(folder, plan, resume, overwrite)
-        with Journal(folder / JOURNAL) as journal, Interruption(_STOPPING) as interruption:
+        with Journal(folder / JOURNAL) as journal, Interruption(_STOPPING, patience=None) as interruption:
             conduct = _Conduct(plan, folder, journal, engine, interruption, telling or Telling())
             return conduct.go()
 

@@ -204,7 +204,7 @@ def picked(rows: Sequence[Mapping[str, Any]], result: str, worst_is_least: bool 
         return {}
     found.sort(key=lambda each: (each[0], each[1]["run"]))
     ordered = [row for _, row in found]
-    kinds: dict[Any, list[dict[str, Any]]] = {}
+    kinds: dict[Any, list[Mapping[str, Any]]] = {}
     for row in ordered:
         kinds.setdefault(row.get("mechanism", row.get("condition")), []).append(row)
     most = max(kinds.values(), key=len)

@@ -124,5 +124,5 @@ def test_the_first_of_several_failures_is_told():
         return item
 
     with pytest.raises(ValueError, match="2"):
-        parallel_map.side_by_side(work, list(range(5)), threads=3)
-    assert parallel_map.side_by_side(lambda k: k * k, range(4), threads=2) == [0, 1, 4, 9]
+        parallel_map.parallel_map(work, list(range(5)), threads=3)
+    assert parallel_map.parallel_map(lambda k: k * k, range(4), threads=2) == [0, 1, 4, 9]

@@ -5,7 +5,7 @@ import pytest
 
 from geomech.bench.cost import block_cost, block_scenes
 from geomech.bench.peers import block_iteration
-from geomech.bench.peers.block_iteration import block_jacobi, factored_anew, two_levels
+from geomech.bench.peers.block_iteration import block_jacobi, refactored, two_levels
 
 
 @pytest.fixture(scope="module")
@@ -22,7 +22,7 @@ def test_other_solutions_are_those_of_the_direct_solver(monkeypatch, equations):
     for found in (
         block_jacobi(solver, data, right),
         two_levels(solver, centroid, np.sqrt(area), data, right),
-        factored_anew(solver, centroid, data, right),
+        refactored(solver, centroid, data, right),
     ):
         assert found.residual <= 2e-10
         # Condition 1e6 or so.

@@ -36,7 +36,7 @@ def sag(system: dda.BlockSystem, loads: Loads) -> float:
     return float(-(found.state.vertices - system.blocks.vertices)[:, 1].min())
 
 
-def test_a_cantilever_of_bricks_sags_as_timoshenkos():
+def test_a_cantilever_of_bricks_sags_as_timoshenkos(verified):
     load = DENSITY * SMALL * DEPTH
     # Bernoulli's beam and its shear, κ = 5/6, G = E/2.
     beam = load * LENGTH**4 / (8 * MODULUS * DEPTH**3 / 12) + load * LENGTH**2 / (2 * 5 / 6 * 0.5 * MODULUS * DEPTH)
@@ -44,6 +44,12 @@ def test_a_cantilever_of_bricks_sags_as_timoshenkos():
     one = [sag(glued_cantilever(n, 1), weight) / beam - 1 for n in (4, 8, 16)]
     more = [sag(glued_cantilever(8 * n, n), weight) / beam - 1 for n in (2, 3, 4)]
     print("sag over a beam's, one brick deep:", np.round(one, 4), "; of 2, 3, 4 courses:", np.round(more, 4))
+    verified("cantilever of glued bricks, one deep: sag", one, "Timoshenko's beam", over=("bricks", (4, 8, 16)))
+    verified(
+        "cantilever of 2, 3, 4 courses of glued bricks: sag (springs give 1/80)",
+        np.abs(more).max(),
+        "Timoshenko's beam",
+    )
     # Held at the corners of their faces these bricks sag 0.016, 0.024 and 0.05 of what they should.
     # Bricks two metres long see the moment at five places only; second order.
     assert one == pytest.approx([0.060, 0.0134, 0.0019], abs=1e-3)
@@ -86,7 +92,7 @@ def test_bricks_in_bond_are_too_stiff_by_a_part_that_falls_with_their_size():
     assert 1 - square[1] < 0.5 * (1 - square[0])
 
 
-def test_bricks_in_bond_bend_as_a_beam_does_the_more_of_them_there_are():
+def test_bricks_in_bond_bend_as_a_beam_does_the_more_of_them_there_are(verified):
     """A brick has one strain, so that a bed holds its ends together where a beam would shear between them: an error of
     the second order in its size, no fault of the bond. Of stiff glue; common springs, 40 E', give 1/80 of a brick's own
     stretch besides."""
@@ -97,10 +103,11 @@ def test_bricks_in_bond_bend_as_a_beam_does_the_more_of_them_there_are():
     missed = np.array([1 - sag(bricks_in_bond(8 * n, n, **stiff), weight) / beam for n in (4, 8, 16)])
     orders = np.log2(missed[:-1] / missed[1:])
     print("sag missed in 4, 8, 16 courses:", np.round(missed, 4), "; orders", np.round(orders, 2))
+    verified("square bricks in bond, stiff glue: sag", missed, "Timoshenko's beam", over=("courses", (4, 8, 16)))
     assert 0 < missed[-1] < 0.006 and orders[0] > 1.25 and orders[1] > 1.75
 
 
-def test_pure_bending_turns_as_curvature_says():
+def test_pure_bending_turns_as_curvature_says(verified):
     """θ = M x/(E I) under a couple on the end, no matter how many bricks."""
     moment = 1e3
     # A pair of forces, half of the depth apart.
@@ -117,6 +124,7 @@ def test_pure_bending_turns_as_curvature_says():
         middle = LENGTH * (1 - 0.5 / columns)
         turn = found.state.rotation[-1] / (-12 * moment * middle / (MODULUS * DEPTH**3)) - 1
         print(f"{columns} bricks: rotation off by {turn:.1e}")
+        verified(f"couple on a beam of {columns} bricks: rotation", turn, "M x / (E I)")
         # To what equilibrium is sought, a part 1e-4 of the largest force.
         assert abs(turn) < 1e-4
 

@@ -60,6 +60,17 @@ def test_figures_of_verification_are_the_stored_ones(docs, tmp_path):
         assert f"| observed order |  | {order:.1f} |" in table
 
 
+def test_all_messages_are_those_of_the_sources(docs):
+    from generate import messages
+
+    page = messages.page()
+    assert "gravity points upwards\\\n  → *y runs up" in page  # a warning of a scene with its way out
+    assert "viscous boundaries do nothing in a static run" in page  # of a run
+    assert page.count("\n- ") > 150 and "%" + "s" not in page
+    for title, *where in (messages.SCENE_ERRORS, messages.SCENE_WARNINGS, messages.RUN_WARNINGS):
+        assert title in page and len(set(messages.messages(*where))) > 15
+
+
 def test_docstrings_become_restructured_text(docs):
     from generate.docstrings import as_rst
 

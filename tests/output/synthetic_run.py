@@ -11,23 +11,29 @@ import math
 import numpy as np
 
 from geomech.model import (
+    BOLT,
     CONTACT,
     SLIP,
     STICK,
     TIP,
     Blocks,
+    Bolt,
     CrackFaces,
     Cracks,
     Cycle,
     Event,
+    Loads,
     Material,
     Problem,
     RunSettings,
     State,
+    WaterTable,
 )
 
 ROCK = Material("rock", 17e9, 0.21, 2200.0, 2e6)
 STEEL = Material("steel", 200e9, 0.3, 7800.0)
+#: From the bottom platen, which is fixed, up into the rock.
+BAR = Bolt(0, (0.01, -0.065), 1, (0.02, -0.05), 2e7, name="bar")
 RATE = 0.2e6  # Pa/s
 HALF_LENGTH = 5e-3
 TILT = math.radians(45.0)
@@ -78,6 +84,7 @@ def problem(end_time: float = 100.0) -> Problem:
         cracks=cracks(),
         materials=(ROCK, STEEL),
         joints=(),
+        loads=Loads(bolts=(BAR,), water=WaterTable(((-1.0, 0.02), (1.0, 0.08)))),
         run=RunSettings(end_time=end_time),
     )
 
@@ -134,6 +141,8 @@ def cycle(number: int, load_step: int, growth_pass: int, grown: int, *, turn: fl
         row["position"], row["point"], row["normal"] = float(1 - k), vertices[first], (0.0, 1.0)
         row["normal_force"], row["shear_force"] = 0.03 * load, (-1.0) ** k * 0.01 * load
         row["gap"], row["slip"], row["length"] = -1e-9 * k, 1e-6 * k, 0.03
+    bolts = np.zeros(1, BOLT)
+    bolts["installed"], bolts["force"], bolts["shear_force"] = number > 0, 1e-3 * load, -1e-4 * load
     tips = np.zeros(len(network.tips), TIP)
     for k, node in enumerate(network.tips):
         out = (1.0 if k else -1.0) * (np.array([0.0, 1.0]) if grown else np.array([1.0, 1.0]) / math.sqrt(2))
@@ -160,7 +169,7 @@ def cycle(number: int, load_step: int, growth_pass: int, grown: int, *, turn: fl
         load=load,
         strain=-strain_of(load)[1],
         blocks=shape,
-        state=State(time, vertices, np.zeros((3, 6)), stress, np.zeros(3), np.zeros((3, 3)), touching),
+        state=State(time, vertices, np.zeros((3, 6)), stress, np.zeros(3), np.zeros((3, 3)), touching, bolts=bolts),
         cracks=network,
         tips=tips,
         faces=faces,

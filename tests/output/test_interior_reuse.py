@@ -7,7 +7,7 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from geomech.model import Blocks, Cracks, Material
+from geomech.model import CONTACT, Blocks, Cracks, Material
 from geomech.output.vtk.interior_fields import InteriorMeshes
 from geomech.shapes import meshing
 
@@ -26,8 +26,8 @@ def cycle(corners: list[float], tips: list[float]) -> SimpleNamespace:
     lines = [np.array([[x + 0.2, 0.4], [x + tip, 0.6]]) for x, tip in zip(corners, tips)]
     cracks = Cracks.from_polylines(lines, block=range(len(corners)), aperture=0.0)
     bodies = {b: Field() for b in range(len(corners))}
-    state = SimpleNamespace(stress=np.zeros((len(corners), 3)), vertices=blocks.vertices)
-    return SimpleNamespace(blocks=blocks, cracks=cracks, bodies=bodies, state=state)
+    state = SimpleNamespace(stress=np.zeros((len(corners), 3)), vertices=blocks.vertices, contacts=np.empty(0, CONTACT))
+    return SimpleNamespace(blocks=blocks, cracks=cracks, bodies=bodies, inside=bodies, bent={}, state=state)
 
 
 def motion(n: int) -> SimpleNamespace:

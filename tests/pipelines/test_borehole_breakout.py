@@ -26,7 +26,7 @@ def test_the_study_runs_and_is_what_was_published(tmp_path):
     assert (tmp_path / "borehole.png").stat().st_size > 10_000
 
 
-def test_onset_and_breakdown_converge_to_the_closed_forms():
+def test_onset_and_breakdown_converge_to_the_closed_forms(verified):
     """Of second order in the sides of the polygon; half the sides, more than twice the error."""
     expected = {
         "breakout": breakout_ratio(GREATER, LESSER, ROCK.cohesion, ROCK.friction_angle),
@@ -39,6 +39,12 @@ def test_onset_and_breakdown_converge_to_the_closed_forms():
             errors.append(abs(compare_borehole.onset(run) / value - 1))
             assert np.abs(azimuths(run) - (90 if name == "breakout" else 0)).max() < 1e-3
         print(f"{name}: errors {errors}, observed order {np.log2(errors[0] / errors[1]):.2f}")
+        verified(
+            f"borehole, {name.replace('_', ' ')}: load at which rock fails first",
+            errors,
+            "Kirsch 1898; Hubbert & Willis 1957",
+            over=("sides of the borehole", (24, 48)),
+        )
         assert errors[1] < 0.5 * errors[0]
 
 

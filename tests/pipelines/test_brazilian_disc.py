@@ -52,9 +52,16 @@ def holds(disc: Pressed) -> None:
 
 
 @pytest.mark.parametrize("name", ["shear", "closing"])
-def test_factors_and_initiation(tmp_path, name):
+def test_factors_and_initiation(verified, tmp_path, name):
     disc = run_pipeline(tmp_path, name, wishes=("run.stop_at=['initiation']",))[name]
     holds(disc)
+    off = np.abs(disc.factors - disc.reference).max() / np.hypot(*disc.reference)
+    verified(f"Brazilian disc, variant {name}: factors of K", off, "Atkinson et al. 1982")
+    verified(
+        f"Brazilian disc, variant {name}: load of initiation",
+        disc.initiation / disc.expected - 1,
+        "factors of Atkinson et al. and the criterion",
+    )
     assert disc.end == "initiation"
     if name == "shear":
         assert disc.kink_deg == pytest.approx(70.5, abs=0.1)  # cos θ = 1/3, of shear alone (Erdogan & Sih 1963)

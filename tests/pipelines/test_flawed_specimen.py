@@ -16,7 +16,7 @@ import compare_flawed_specimen as study
 import specimen
 
 
-def test_one_closed_flaw_starts_at_the_load_of_ashby_and_hallam(tmp_path):
+def test_one_closed_flaw_starts_at_the_load_of_ashby_and_hallam(verified, tmp_path):
     """√3/(√(1+μ²) − μ) = 3 for 30°; a specimen as wide as six flaws starts 1 to 2 % earlier. A flaw that stands 10° steeper
     starts later."""
     import numpy as np
@@ -26,6 +26,13 @@ def test_one_closed_flaw_starts_at_the_load_of_ashby_and_hallam(tmp_path):
         half = 0.5 * specimen.FLAW * np.array([np.cos(angle), np.sin(angle)])
         first.append(specimen.course(tmp_path, [np.array([-half, half])], True, most=6).first)
     assert study.ashby_hallam(30.0) == pytest.approx(3.0)
+    verified(
+        "one closed flaw: σ √(πa) / K_Ic at initiation",
+        None,
+        "Ashby & Hallam 1986",
+        found=study.scaled(first[0]),
+        exact=3.0,
+    )
     assert study.scaled(first[0]) == pytest.approx(3.0, rel=study.FIRST_TOLERANCE)
     assert first[1] > 1.03 * first[0]
 

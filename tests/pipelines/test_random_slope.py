@@ -29,9 +29,14 @@ def out(tmp_path_factory) -> Path:
     return folder
 
 
-def test_every_factor_is_that_of_limit_equilibrium(out):
+def test_every_factor_is_that_of_limit_equilibrium(verified, out):
     found = read_sweep(out / "normal_strengths")
     assert len(found.rows) == 4
+    verified(
+        "factors of random planar slopes",
+        np.abs(study.factors_off("normal_strengths", found)).max(),
+        "limit equilibrium",
+    )
     assert np.abs(study.factors_off("normal_strengths", found)).max() < study.FACTOR_TOLERANCE
     assert "exact" in (out / "comparison.txt").read_text(encoding="utf-8")
     assert (out / "random_slope.png").stat().st_size > 10_000 and (out / "normal_strengths" / "report.html").is_file()

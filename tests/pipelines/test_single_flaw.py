@@ -83,7 +83,7 @@ def test_factors_before_growth(study):
     assert first.k[0, 0] < 0  # an open slot under compression
 
 
-def test_initiation_at_the_load_that_the_factors_give(study):
+def test_initiation_at_the_load_that_the_factors_give(verified, study):
     """K_eq = K_Ic, worked out by hand from the maximum tangential stress along the kink (Erdogan & Sih 1963): 32.98
     MPa, to the three digits that elements of the scene's order keep of K."""
     k_i, k_ii = -published.OPEN_SLOT[0], published.OPEN_SLOT[1]
@@ -92,6 +92,14 @@ def test_initiation_at_the_load_that_the_factors_give(study):
     expected = published.K_IC / hoop.max()
     assert np.degrees(theta[hoop.argmax()]) == pytest.approx(published.KINK_DEG, abs=0.1)
     assert expected == pytest.approx(32.98e6, abs=0.005e6)
+    verified(
+        "one open slot: load of initiation",
+        None,
+        "published factors and the criterion",
+        found=study.wings.load[0] / 1e6,
+        exact=expected / 1e6,
+        unit="MPa",
+    )
     assert study.wings.load[0] == pytest.approx(expected, rel=1e-3)
 
 
@@ -140,8 +148,13 @@ def test_wings_are_alike(study):
     assert np.allclose([last["x"].sum(), last["y"].sum()], 0, atol=1e-6)
 
 
-def test_stiffness_before_growth(study):
+def test_stiffness_before_growth(verified, study):
     """The dilute slot's, which knows nothing of the sides: they add a tenth to what is 5.5 %."""
+    verified(
+        "one open slot: tangent modulus of the specimen",
+        study.wings.tangent_modulus() / published.tangent_modulus() - 1,
+        "plane strain with the slot",
+    )
     assert study.wings.tangent_modulus() == pytest.approx(published.tangent_modulus(), rel=0.01)
 
 

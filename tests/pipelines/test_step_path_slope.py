@@ -46,10 +46,17 @@ def four(tmp_path_factory):
     return out, run_pipeline(out)
 
 
-def test_the_first_tip_starts_at_the_load_of_the_crack_solver_alone(four):
+def test_the_first_tip_starts_at_the_load_of_the_crack_solver_alone(verified, four):
     """7.2104 g for 7.2329 g: in ground as deep as it is wide 0.3 % are left of how it stands."""
     _, seen = four
     check("four", seen)
+    verified(
+        "en-échelon joints in a slope: first tip starts",
+        None,
+        "crack solver alone",
+        found=seen.started,
+        exact=seen.alone,
+    )
     assert seen.started == pytest.approx(seen.alone, rel=5e-3)
 
 

@@ -40,8 +40,9 @@ def ran(out: Path, *variants: str) -> dict[str, study.Watch]:
     return seen
 
 
-def test_bridge_breaks_and_block_falls_as_limit_equilibrium_has_it(tmp_path):
+def test_bridge_breaks_and_block_falls_as_limit_equilibrium_has_it(verified, tmp_path):
     seen = ran(tmp_path, "rough", "falls")
+    verified("key block that falls: acceleration", seen["falls"].acceleration / 9.81 - 1, "Newton")
     assert seen["falls"].acceleration == pytest.approx(9.81, rel=1e-6)
     assert "Newton" in (tmp_path / "comparison.txt").read_text(encoding="utf-8")
     kinds = {str(event["kind"]) for event in Run(tmp_path / "rough").events}
@@ -55,7 +56,7 @@ def test_walls_hold_squeeze_and_let_go(tmp_path):
     assert seen["let_go"].newton == pytest.approx(0.02 * 9.81, rel=0.01)
 
 
-def test_shorter_bridges_are_nearer_to_half_planes(tmp_path):
+def test_shorter_bridges_are_nearer_to_half_planes(verified, tmp_path):
     """The bridge's force from K_I = P/√(πc): its error falls with c, and so does what the roof's bending shears it."""
     errors, shears = [], []
     for half in (0.2, 0.1, 0.05):
@@ -74,6 +75,12 @@ def test_shorter_bridges_are_nearer_to_half_planes(tmp_path):
         errors.append(abs(tips["K_I"].mean() / roof_block.ligament_factor(weight, half) - 1))
         shears.append(abs(tips["K_II"] / tips["K_I"]).mean())
     print(f"errors of the force {errors}, K_II/K_I {shears}")
+    verified(
+        "bridge that holds a key block: its force from K",
+        errors,
+        "statics of the wedge",
+        over=("half-width of the bridge, m", (0.2, 0.1, 0.05)),
+    )
     assert errors[2] < errors[1] < errors[0] < 0.03
     assert shears[2] < 0.6 * shears[1] < 0.36 * shears[0]
 

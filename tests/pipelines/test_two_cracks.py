@@ -23,7 +23,14 @@ from geomech.scene import load_scene
 FOLDER = Path(__file__).parents[2] / "pipelines" / "two_cracks"
 sys.path.insert(0, str(FOLDER))
 from compare_settings import FAMILIES, LADDERS, apart, family
-from compare_two_cracks import COALESCENCE_LIMIT_MPA, Watch, _about_30, _between, coalescence_angle_deg
+from compare_two_cracks import (
+    COALESCENCE_LIMIT_MPA,
+    Watch,
+    _about_30,
+    _between,
+    coalescence_angle_deg,
+    coalescence_line_deg,
+)
 from first_step import KELVIN, QUADRATIC, first_step
 
 
@@ -83,10 +90,18 @@ def test_the_two_cracks_coalesce(specimens, phi):
 
 
 @pytest.mark.parametrize("phi", [0, 90])
-def test_initiation_at_the_load_that_the_factors_give(specimens, phi):
+def test_initiation_at_the_load_that_the_factors_give(verified, specimens, phi):
     """Steps end where K_eq = K_Ic. 2e-4 is what is left of K in the scene's elements (2e-5), and what the strain of
     3e-3 makes of a load that stays where it is (`test_coupling`: a tenth of it is allowed there)."""
     load = specimens[f"phi_{phi}"].watch.load("initiation")
+    verified(
+        f"two slots, φ = {phi}°: load of initiation",
+        None,
+        "factors computed independently and the criterion",
+        found=load / 1e6,
+        exact=expected_initiation(phi) / 1e6,
+        unit="MPa",
+    )
     assert load == pytest.approx(expected_initiation(phi), rel=2e-4)
 
 
@@ -236,10 +251,28 @@ def test_the_load_of_coalescence_has_a_limit(phi, limit, coarse, fine):
 
 
 @pytest.mark.slow
-def test_all_four_as_published(tmp_path):
+def test_all_four_as_published(verified, tmp_path):
     """The study as it stands. Of what is published, in kind: specimens with φ = 30 and 60 need more to coalesce than
     those with 0 and 90 (KB 2023, Figure 16). In numbers: the lines of coalescence of 0 and 90."""
     runs = run_pipeline(tmp_path, [f"phi_{phi}" for phi in published.PHI_DEG])
+    for phi in published.PHI_DEG:
+        watch = runs[f"phi_{phi}"].watch
+        independent = phi in published.OPEN_SLOT_K_I
+        exact = expected_initiation(phi) if independent else first_step(FOLDER, (), phi).initiation
+        verified(
+            f"φ = {phi}°: initiation", None,
+            "factors computed independently" if independent else "K of the first step, scaled",
+            found=watch.load("initiation") / 1e6, exact=exact / 1e6, unit="MPa",
+        )  # fmt: skip
+        verified(
+            f"φ = {phi}°: coalescence", None, "what finer increments tend to",
+            found=watch.load("coalescence") / 1e6, exact=COALESCENCE_LIMIT_MPA[phi], unit="MPa",
+        )  # fmt: skip
+        line, seen = coalescence_line_deg(watch), published.COALESCENCE_ANGLE_DEG["experiment"][phi]
+        verified(
+            f"φ = {phi}°: line of coalescence", line - seen, "experiment (Haeri et al. 2014)",
+            found=line, exact=seen, unit="°",
+        )  # fmt: skip
     assert coalesced(runs["phi_0"])
     assert coalesced(runs["phi_90"])
     loads = {phi: runs[f"phi_{phi}"].watch.load("coalescence") for phi in published.PHI_DEG}

@@ -43,7 +43,7 @@ def test_the_specimens_are_the_published_ones():
     assert p.cracks.lengths == pytest.approx([0.01, 0.01], rel=1e-10)
     assert np.isinf(p.cracks.aperture).all() and p.blocks.fixed.tolist() == [False, True, False]
     # The upper platen only comes down; without friction nothing else would keep it in place.
-    assert np.flatnonzero(p.blocks.held[2]).tolist() == [0, 2, 5] and not p.blocks.held[0].any()
+    assert np.flatnonzero(p.blocks.constrained[2]).tolist() == [0, 2, 5] and not p.blocks.constrained[0].any()
     rock = p.materials[p.blocks.material[0]]
     assert (rock.youngs_modulus, rock.poissons_ratio, rock.k_ic) == (17e9, 0.21, 2e6)
     (top,) = p.loads.edge_tractions

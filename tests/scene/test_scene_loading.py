@@ -172,7 +172,7 @@ def test_every_setting_arrives(scene_file):
     assert p.blocks.material.tolist() == [1, 0] and p.blocks.fixed.tolist() == [False, True]
     assert p.blocks.areas() == pytest.approx([1.0, 0.98], abs=1e-14)
     # Guided along x: v0, r0 and γxy are held, u0 and the strains along the axes are not.
-    assert p.blocks.held.tolist() == [[False, True, True, False, False, True], [False] * 6]
+    assert p.blocks.constrained.tolist() == [[False, True, True, False, False, True], [False] * 6]
     assert p.materials[1].plane == "stress" and p.materials[0].k_ic == math.inf
     assert p.cracks.aperture.tolist() == [math.inf, math.inf, 1e-4]
     assert p.cracks.law.tolist() == [0, 0, 1] and [law.name for law in p.face_laws] == ["frictionless", "bedding"]

@@ -55,7 +55,7 @@ def specimen(platens, turn=None, shift=(0.0, 0.0), length=1.0, stress=1.0, order
         [at(polygons[b]) for b in chosen],
         material=[material[b] for b in chosen],
         fixed=[fixed[b] for b in chosen],
-        held=held[chosen],
+        constrained=held[chosen],
         edge_names=[[names[b]] for b in chosen],
     )
     lines = [at(line) for line in crack_ends(45.0)]

@@ -47,7 +47,11 @@ def specimen(phi_deg=0.0, platens=True, end_time=3.0, cracks=None, **run):
     if platens:
         held[1, [0, 2, 5]] = True  # guided: it comes down and does nothing else
     blocks = Blocks.from_polygons(
-        polygons, material=[0, 1, 1][:n_blocks], fixed=[False, False, True][:n_blocks], held=held, edge_names=names
+        polygons,
+        material=[0, 1, 1][:n_blocks],
+        fixed=[False, False, True][:n_blocks],
+        constrained=held,
+        edge_names=names,
     )
     loads = [EdgeTraction("load:top", History.ramp([0.0, -RATE]))]
     if not platens:

@@ -94,7 +94,7 @@ def test_offset_parallel_cracks():
 
 
 @pytest.mark.parametrize("number", [20, pytest.param(50, marks=pytest.mark.slow)])
-def test_random_cracks(number):
+def test_random_cracks(verified, number):
     """The densest pair is a fifth of a crack apart. Default order to 5e-5 of σ√(πa), order 8 to 1e-6 (the reference has
     3e-7)."""
     ends = crack_arrays.random_cracks(number)
@@ -103,6 +103,7 @@ def test_random_cracks(number):
     for order, tolerance in ((4, 5e-5), (8, 1e-6)):
         error = np.abs(factors(slots(ends), stress, order=order) - exact).max()
         print(f"{number} random cracks, order {order}: {error:.1e}")
+        verified(f"{number} random cracks, order {order}: K", error, "distributed dislocations")
         assert error < tolerance
 
 
@@ -115,21 +116,23 @@ def in_a_row(middles, half, stress):
     return np.polyfit(1 / sizes, found, 2)[-1], sizes, np.array(found)
 
 
-def test_collinear_array():
+def test_collinear_array(verified):
     """The middle one of N cracks in a row tends to the periodic array like 1/N, as what is missing acts like Σ 1/n²
     beyond N/2; the parabola leaves 1/N³: 4e-5."""
     exact = crack_arrays.collinear_array(1.0, 0.6, 2.0) / ROOT
     limit, sizes, found = in_a_row([2.0, 0.0], 0.6, [0, 1, 0])
     orders = observed("collinear array", sizes, np.abs(found - exact))
     print(f"extrapolated: {limit / exact - 1:.1e}")
+    verified("row of collinear cracks, extrapolated: K", limit / exact - 1, "Irwin 1957")
     assert np.abs(orders - 1).max() < 0.1 and limit == pytest.approx(exact, rel=5e-5)
 
 
-def test_stacked_array():
+def test_stacked_array(verified):
     """The middle one of N cracks above one another, the same order; the stack is as high as five to twenty cracks long:
     the parabola leaves 1.4e-3."""
     exact = crack_arrays.stacked_array(1.0, 1.0) / ROOT
     limit, sizes, found = in_a_row([0.0, 1.0], 1.0, [0, 1, 0])
     orders = observed("stacked array", sizes, np.abs(found - exact))
     print(f"extrapolated: {limit / exact - 1:.1e}")
+    verified("stack of cracks, extrapolated: K", limit / exact - 1, "closed form")
     assert np.abs(orders - 1).max() < 0.2 and limit == pytest.approx(exact, rel=2e-3)

@@ -82,7 +82,7 @@ def sliding_case(name: str) -> tuple[float, float, np.ndarray, np.ndarray]:
         pytest.param("El Centro on an incline", "base", "penalty", marks=pytest.mark.slow),
     ],
 )
-def test_block_slides_on_a_shaken_base_as_newmark_says(case, frame, contact):
+def test_block_slides_on_a_shaken_base_as_newmark_says(verified, case, frame, contact):
     incline, friction, times, base = sliding_case(case)
     expected = exact.sliding_block(times, base, np.radians(incline), np.radians(friction))
     most = np.abs(expected).max()
@@ -98,6 +98,12 @@ def test_block_slides_on_a_shaken_base_as_newmark_says(case, frame, contact):
         + ", ".join(f"{e:.1e}" for e in errors)
         + f", order {order:.1f}"
     )
+    verified(
+        f"{case}, in the frame of the {frame}, {contact} contacts",
+        errors,
+        "Newmark's sliding block",
+        over=("time step, ms", [1e3 * dt for dt in steps]),
+    )
     # Within a step in which it stops or turns about, the block's way is off by a dt² / 8 (1e-3 at dt = 2 ms where it
     # turns about six times). On the level the record does that again and again after a few millimetres.
     assert errors[1] < {"El Centro on the level": 0.04, "El Centro on an incline": 0.02}.get(case, 1e-3)
@@ -105,7 +111,7 @@ def test_block_slides_on_a_shaken_base_as_newmark_says(case, frame, contact):
     assert order > 0.5 or (case == "El Centro on the level" and errors[0] < 0.03)
 
 
-def test_the_alpha_scheme_follows_a_base_that_shakes():
+def test_the_alpha_scheme_follows_a_base_that_shakes(verified):
     incline, friction, times, base = sliding_case("sine on an incline")
     expected = exact.sliding_block(times, base, np.radians(incline), np.radians(friction))
     errors = []
@@ -113,6 +119,9 @@ def test_the_alpha_scheme_follows_a_base_that_shakes():
         rows = slid(incline, friction, times, base, dt, "base", spectral_radius=0.6)
         errors.append(np.abs(rows[:, 1] - np.interp(rows[:, 0], times, expected)).max() / np.abs(expected).max())
     print(f"ϱ = 0.6: error at dt = 8, 2 ms: {errors[0]:.1e}, {errors[1]:.1e}")
+    verified(
+        "sine on an incline, spectral radius 0.6", errors, "Newmark's sliding block", over=("time step, ms", (8, 2))
+    )
     # Second order while it slides, a dt²/8 where it stops.
     assert errors[1] < 1e-3
     assert np.log(errors[0] / errors[1]) / np.log(4) > 1.5
@@ -150,7 +159,7 @@ def test_rocking_references_agree():
     assert exact.housner_period(0.6 * alpha, alpha, radius) == pytest.approx(period, rel=2e-3)
 
 
-def test_free_rocking_falls_in_a_quarter_period():
+def test_free_rocking_falls_in_a_quarter_period(verified):
     alpha, radius = np.radians(15), 1.0
     rows, errors = [], []
     for share in (0.3, 0.5, 0.8):
@@ -161,11 +170,14 @@ def test_free_rocking_falls_in_a_quarter_period():
         errors.append(first / expected - 1)
         rows.append(f"θ₀ = {share} α: {first:.4f} s ({expected:.4f} s)")
     print("falls back after", "; ".join(rows))
+    verified(
+        "free rocking from 0.3, 0.5 and 0.8 of the critical tilt: quarter period", np.abs(errors).max(), "Housner 1963"
+    )
     # The step in which it lands is not cut at the landing: half of 2 ms.
     assert np.abs(errors).max() < 2e-3
 
 
-def test_rocking_loses_at_impacts_what_housner_says():
+def test_rocking_loses_at_impacts_what_housner_says(verified):
     """θ(t) through two impacts: each keeps 1 − 1.5 sin²α of the angular velocity; nothing is tuned."""
     alpha, radius = np.radians(15), 1.0
     tilt = 0.5 * alpha
@@ -180,13 +192,14 @@ def test_rocking_loses_at_impacts_what_housner_says():
     print(
         f"rocking through two impacts, error of θ/θ₀ at dt = 8, 2 ms: {errors[0]:.3f} {errors[1]:.3f}, order {order:.1f}"
     )
+    verified("rocking through two impacts: tilt", errors, "Housner 1963", over=("time step, ms", (8, 2)))
     # A landing takes a step, and its contact gives: first order in dt, and what the elastic block keeps of the shock.
     assert errors[1] < 0.06
     assert errors[1] < 0.5 * errors[0]
 
 
 @pytest.mark.parametrize("slenderness_deg", [8, 15, 25])
-def test_a_corner_lifts_at_g_tan_alpha(slenderness_deg):
+def test_a_corner_lifts_at_g_tan_alpha(verified, slenderness_deg):
     alpha = np.radians(slenderness_deg)
     system = rocking_block(alpha, 1.0)
     start = settled(system)
@@ -202,12 +215,15 @@ def test_a_corner_lifts_at_g_tan_alpha(slenderness_deg):
         middle = 0.5 * (low + high)
         low, high = (middle, high) if stays(middle) else (low, middle)
     print(f"α = {slenderness_deg}°: rocks from {low / GRAVITY:.5f} g, tan α = {np.tan(alpha):.5f}")
+    verified(
+        "three slendernesses: acceleration at which a corner lifts", low / GRAVITY - np.tan(alpha), "g tan α", unit="g"
+    )
     # 2e-5 rad in 0.2 s are 1.3e-4 g; what the shock of a suddenly applied load adds is as small.
     assert low == pytest.approx(exact.uplift_acceleration(alpha), abs=4e-4 * GRAVITY)
 
 
 @pytest.mark.parametrize("duration", [0.25, 0.5])
-def test_a_pulse_overturns_as_housner_says(duration):
+def test_a_pulse_overturns_as_housner_says(verified, duration):
     """A constant base acceleration that lasts for ``duration``: the least that overturns."""
     alpha, radius = np.radians(12), 1.0
 
@@ -227,6 +243,11 @@ def test_a_pulse_overturns_as_housner_says(duration):
         low, high = (low, middle) if tops(middle, block=False) else (middle, high)
     housner = exact.overturning_pulse(duration, alpha, radius)
     print(f"pulse of {duration} s: overturns from {high / GRAVITY:.4f} g, slender block {housner / GRAVITY:.4f} g")
+    verified(
+        f"pulse of {duration:g} s that just overturns the rigid block, within 2 % of which the block stands and falls",
+        high / housner - 1,
+        "slender block, Housner 1963",
+    )
     assert high == pytest.approx(housner, rel=0.05)
     # dt = 5 ms: the pulse ends with a step.
     assert not tops(0.98 * high, block=True)

@@ -57,7 +57,9 @@ def momenta(system: dda.BlockSystem, state: State) -> tuple[np.ndarray, float]:
         ((0.25, 0.5), 0, 0.0, 5e-3),
     ],
 )
-def test_a_collision_of_nine_blocks_keeps_momentum_and_gains_no_energy(newmark, friction_deg, damping, step_rise):
+def test_a_collision_of_nine_blocks_keeps_momentum_and_gains_no_energy(
+    verified, newmark, friction_deg, damping, step_rise
+):
     system, state = swarm(1, newmark, friction_deg, damping)
     mass = DENSITY * system.blocks.areas()
     scale = float(mass @ np.hypot(state.velocity[:, 0], state.velocity[:, 1]))
@@ -79,6 +81,8 @@ def test_a_collision_of_nine_blocks_keeps_momentum_and_gains_no_energy(newmark, 
         f"largest rise in a step {max(0.0, np.diff(energies).max()):.0e}"
     )
     assert sum(touching) > 10
+    verified("nine blocks collide, three schemes: momentum", np.abs(after - before).max() / scale, "conserved")
+    verified("nine blocks collide, three schemes: angular momentum", abs(turned - turning) / scale, "conserved")
     # Contact forces are equal and opposite at one point: round-off of 300 steps.
     assert np.abs(after - before).max() < 1e-12 * scale
     # Forces act where blocks are in the middle of the step, which is foreseen but for impacts.

@@ -40,24 +40,36 @@ SLAB = 2600 * GRAVITY * 2 * 4 * np.cos(DIP)
 
 @pytest.mark.parametrize("friction_deg", [20, 40, 60])
 @pytest.mark.parametrize(("penalty", "time_step"), [(None, None), (5e10, 0.3), (5e13, 0.01)])
-def test_plane_failure_with_friction_to_round_off(friction_deg, penalty, time_step):
+def test_plane_failure_with_friction_to_round_off(verified, friction_deg, penalty, time_step):
     """tan φ / tan α, whatever the penalty and the step: what is out of balance is A − B/F exactly, and two trials give
     it."""
     found = slab(JointLaw("plane", np.radians(friction_deg)), penalty, time_step=time_step)
     expected = rock_slopes.plane_failure_factor(SLAB, DIP, 4.0, 0.0, np.radians(friction_deg))
     print(f"φ = {friction_deg}°: {found.factor:.10f}, should be {expected:.10f}")
+    verified(
+        f"plane failure, friction {friction_deg}°, three penalties and steps",
+        found.factor / expected - 1,
+        "tan φ / tan α",
+    )
     assert found.factor == pytest.approx(expected, rel=1e-9)
     assert found.lower < expected < found.upper <= found.lower * 1.002 + 1e-12
     assert found.moving == (1,) and found.mechanism[0].endswith("towards -145°")
 
 
 @pytest.mark.parametrize(("friction_deg", "cohesion"), [(40, 5e3), (40, 15e3), (20, 15e3)])
-def test_plane_failure_with_cohesion(friction_deg, cohesion):
+def test_plane_failure_with_cohesion(verified, friction_deg, cohesion):
     # The trials bracket the factor to 0.2 %.
     law = JointLaw("plane", np.radians(friction_deg), cohesion)
     expected = rock_slopes.plane_failure_factor(SLAB, DIP, 4.0, cohesion, np.radians(friction_deg))
     found = slab(law)
     print(f"φ = {friction_deg}°, c = {cohesion / 1e3:g} kPa: {found.factor:.4f}, should be {expected:.4f}")
+    verified(
+        f"plane failure, friction {friction_deg}°, c = {cohesion / 1e3:g} kPa",
+        None,
+        "limit equilibrium",
+        found=found.factor,
+        exact=expected,
+    )
     assert found.factor == pytest.approx(expected, rel=2e-3)
 
 
@@ -73,7 +85,7 @@ def test_plane_failure_in_an_earthquake():
         slab(law, loads=Loads(WEIGHT.gravity, base=BaseMotion(record)))
 
 
-def test_plane_failure_of_a_rough_joint():
+def test_plane_failure_of_a_rough_joint(verified):
     # σ tan(JRC log(JCS/σ) + φr) at the slab's mean pressure; the contacts at both ends press alike.
     law = JointLaw("rough", np.radians(28), roughness=Roughness(8.0, 40e6))
     pressure = SLAB * np.cos(DIP) / 4.0
@@ -81,11 +93,12 @@ def test_plane_failure_of_a_rough_joint():
     found = slab(law)
     expected = np.tan(angle) / np.tan(DIP)
     print(f"rough joint: {found.factor:.5f}, should be {expected:.5f}")
+    verified("plane failure of a rough joint", None, "Barton & Bandis", found=found.factor, exact=expected)
     assert found.factor == pytest.approx(expected, rel=1e-3)
 
 
 @pytest.mark.parametrize(("steep_deg", "flat_deg", "smooth"), [(50, 15, False), (55, 20, False), (50, 15, True)])
-def test_two_blocks_on_a_bilinear_plane(steep_deg, flat_deg, smooth):
+def test_two_blocks_on_a_bilinear_plane(verified, steep_deg, flat_deg, smooth):
     """Jaeger's active and passive block (1971): all joints reduced, or the planes alone beside a smooth interface."""
     steep, flat = np.radians(steep_deg), np.radians(flat_deg)
     width, height, cut = 4.0, 6.0, 0.5
@@ -111,11 +124,18 @@ def test_two_blocks_on_a_bilinear_plane(steep_deg, flat_deg, smooth):
     expected = np.tan(friction) / np.tan(limit)
     print(f"{steep_deg}° and {flat_deg}°: {found.factor:.6f}, should be {expected:.6f}")
     # The blocks' own strain turns the interface by 1e-6.
+    verified(
+        f"two blocks on planes of {steep_deg}° and {flat_deg}°, {'smooth' if smooth else 'rough'} interface",
+        None,
+        "Jaeger 1971",
+        found=found.factor,
+        exact=expected,
+    )
     assert found.factor == pytest.approx(expected, rel=1e-5)
     assert found.moving == (1, 2)
 
 
-def test_a_column_glued_to_an_incline_topples():
+def test_a_column_glued_to_an_incline_topples(verified):
     # Held by the tensile strength σt at the upper edge of its base (Navier), where its weight pulls by
     # W (3 h sin α / b − cos α)/b: F = σt b / [W (3 h sin α / b − cos α)]. Brittle: no drift points at it, bisection
     # does.
@@ -125,11 +145,12 @@ def test_a_column_glued_to_an_incline_topples():
     found = dda.factor_of_safety(blocks, [ROCK], [JointLaw("glue", np.radians(50), 1e6, strength)], WEIGHT)
     weight = 2600 * GRAVITY * width * height
     expected = strength * width / (weight * (3 * height * np.sin(dip) / width - np.cos(dip)))
+    verified("column glued to an incline", None, "Navier", found=found.factor, exact=expected)
     assert found.factor == pytest.approx(expected, rel=1e-3)
     assert "turning left" in found.mechanism[0]
 
 
-def test_toppling_slope_of_goodman_and_bray():
+def test_toppling_slope_of_goodman_and_bray(verified):
     # Their limit friction is 0.7855. Coulomb friction leaves the way to it open: weakened step by step the slope goes
     # at 0.788, with its weight put on at once at 0.783.
     blocks = Blocks.from_polygons(toppling_slope.polygons(), fixed=[True] + [False] * 16)
@@ -138,6 +159,13 @@ def test_toppling_slope_of_goodman_and_bray():
         Loads(gravity=History.constant([0.0, -10.0])),
     )  # fmt: skip
     print(f"limit tan φ = {1 / found.factor:.4f}, published {toppling_slope.LIMIT_FRICTION}")
+    verified(
+        "toppling slope of 16 blocks: limit tan φ",
+        None,
+        "Goodman & Bray 1976",
+        found=1 / found.factor,
+        exact=toppling_slope.LIMIT_FRICTION,
+    )
     assert 1 / found.factor == pytest.approx(toppling_slope.LIMIT_FRICTION, rel=5e-3)
     # All blocks move: those at the toe slide, those behind turn.
     assert set(found.moving) >= set(range(1, 12))

@@ -28,7 +28,7 @@ def travel(system, state) -> float:
 
 @pytest.mark.parametrize("dt", STEPS)
 @pytest.mark.parametrize("excess_deg", [1e-4, 0.1, 5.0])
-def test_a_block_at_rest_stays_to_the_friction_angle_at_every_step(dt, excess_deg):
+def test_a_block_at_rest_stays_to_the_friction_angle_at_every_step(verified, dt, excess_deg):
     # From static equilibrium: 1e-4° above the incline is 3.5e-6 of tan φ. Nothing moves beyond the round-off of
     # coordinates.
     system = block_on_slope(30 + excess_deg)
@@ -36,6 +36,12 @@ def test_a_block_at_rest_stays_to_the_friction_angle_at_every_step(dt, excess_de
     end = march(system, state, WEIGHT, 60 * dt, dt)
     crept = travel(system, end) - travel(system, state)
     print(f"sticking {excess_deg:g}° above the incline, dt = {dt:g} s: {crept:.1e} m in 60 steps")
+    verified(
+        "from equilibrium, friction 1e-4° to 5° above the incline, dt = 10 µs to 0.1 s: creep in 60 steps",
+        crept,
+        "statics",
+        unit="m",
+    )
     assert abs(crept) < 1e-13
     assert np.abs(end.velocity[1]).max() < 1e-10
 
@@ -67,7 +73,7 @@ def test_a_block_that_weighs_at_once_sticks_at_every_step(dt):
     assert abs(travel(system, later) - travel(system, end)) < 2e-7
 
 
-def test_sliding_is_right_at_any_step_and_any_penalty():
+def test_sliding_is_right_at_any_step_and_any_penalty(verified):
     # From equilibrium at 35° the friction drops to 15°. Trapezoidal sums of a constant acceleration are exact, so what
     # remains is the elastic shear let go (W/E over the path): no part of it may come from dt or from the penalty.
     rows = []
@@ -82,11 +88,16 @@ def test_sliding_is_right_at_any_step_and_any_penalty():
         rows.append(row)
         print(f"penalty {penalty:8.0e} Pa, error at dt = 20, 2 ms: " + " ".join(f"{e:9.2e}" for e in row))
     errors = np.array(rows)
+    verified(
+        "friction falls from 35° to 15°, three penalties, dt = 2 and 20 ms: way in 0.5 s",
+        np.abs(errors).max(),
+        "closed form of a rigid block",
+    )
     assert np.abs(errors).max() < 1e-7
     assert np.ptp(errors) < 1e-8
 
 
-def test_a_block_pushed_up_the_incline_comes_to_rest_and_stays():
+def test_a_block_pushed_up_the_incline_comes_to_rest_and_stays(verified):
     # Up the slope friction and weight both stop it: v²/(2g (sin α + cos α tan φ)); then 35° holds it on 30°. It lands
     # on its elastic shear: a micrometre or a few, 1e-4 of the way, whatever dt.
     expected = 1.0 / (2 * GRAVITY * (np.sin(SLOPE) + np.cos(SLOPE) * np.tan(np.radians(35))))
@@ -102,6 +113,9 @@ def test_a_block_pushed_up_the_incline_comes_to_rest_and_stays():
         later = march(system, end, WEIGHT, 0.2, dt)
         assert abs(travel(system, later) - travel(system, end)) < 2e-6
     print("pushed up, error at dt = 4, 1, 0.25 ms:", " ".join(f"{e:.1e}" for e in errors))
+    verified(
+        "block pushed up the incline, dt = 0.25 to 4 ms: where it stops", max(errors), "closed form of a rigid block"
+    )
     assert max(errors) < 3e-4
 
 
@@ -122,15 +136,21 @@ def stacked(base_deg, between_deg, youngs_modulus=50e9) -> tuple[np.ndarray, np.
 
 
 @pytest.mark.parametrize(("base_deg", "between_deg"), [(20, 45), (20, 10), (24, 26), (27, 15), (35, 10), (40, 35)])
-def test_stacked_blocks_slide_each_at_its_own_rate(base_deg, between_deg):
+def test_stacked_blocks_slide_each_at_its_own_rate(verified, base_deg, between_deg):
     got, (lower, upper) = stacked(base_deg, between_deg)
     print(f"φ {base_deg}° under {between_deg}°: {got[0]:.6f} {got[1]:.6f} m, should be {lower:.6f} {upper:.6f}")
     # Weight put on at once: micrometres of elastic shear and start.
+    verified(
+        "two stacked blocks, six pairs of friction angles: ways of 0.01 to 0.2 m in 0.3 s",
+        np.abs(got - [lower, upper]).max(),
+        "rigid blocks",
+        unit="m",
+    )
     assert got == pytest.approx([lower, upper], abs=1e-5)
 
 
 @pytest.mark.parametrize(("base_deg", "between_deg"), [(20, 45), (20, 10)])
-def test_stacked_blocks_converge_to_rigid_ones(base_deg, between_deg):
+def test_stacked_blocks_converge_to_rigid_ones(verified, base_deg, between_deg):
     errors = []
     for youngs_modulus in (5e9, 50e9, 500e9):
         got, expected = stacked(base_deg, between_deg, youngs_modulus)
@@ -138,6 +158,12 @@ def test_stacked_blocks_converge_to_rigid_ones(base_deg, between_deg):
     orders = np.log10(np.array(errors[:-1]) / errors[1:])
     print(f"φ {base_deg}° under {between_deg}°, E = 5, 50, 500 GPa: {np.array(errors)}, order in 1/E {orders.round(2)}")
     # What is left is the elastic shear that the weight put on at once makes.
+    verified(
+        f"two stacked blocks, friction {base_deg}° under {between_deg}°",
+        np.array(errors).max(axis=1),
+        "rigid blocks",
+        over=("Young's modulus, GPa", (5, 50, 500)),
+    )
     assert orders == pytest.approx(np.ones((2, 2)), abs=0.02)
 
 
@@ -158,7 +184,7 @@ def start(slenderness: float, friction: float) -> tuple[float, float]:
     return 2 * toe / state.time**2, 2 * state.rotation[1] / state.time**2
 
 
-def test_sliding_toppling_map():
+def test_sliding_toppling_map(verified):
     """Every mode of the (δ, φ) map and how fast it starts: 150 columns from slender to squat, slippery to rough."""
     worst = 0.0
     for slenderness in np.radians(np.arange(3, 60, 6.0)):
@@ -169,6 +195,7 @@ def test_sliding_toppling_map():
     print(f"largest difference of starting accelerations over the map: {worst:.1e} g")
     # Elastic shortening, W/E' ≤ 3 nm, over ½ g dt² = 0.12 mm; the rotation of a column b wide is b times more
     # sensitive.
+    verified("map of sliding and toppling, 150 columns: accelerations at the start", worst, "rigid body", unit="g")
     assert worst < 2e-5
 
 
@@ -192,7 +219,7 @@ def rigid_motion(slenderness: float, friction: float, end: float) -> np.ndarray:
 
 
 @pytest.mark.parametrize(("slenderness_deg", "friction_deg"), [(9, 12), (15, 18.5), (15, 30.5)])
-def test_columns_tilt_and_slide_as_rigid_ones_to_second_order(slenderness_deg, friction_deg):
+def test_columns_tilt_and_slide_as_rigid_ones_to_second_order(verified, slenderness_deg, friction_deg):
     """A fall of 0.1 s in eight steps and in sixteen: 1° of tilt, and the toe goes 8 mm, 0.8 mm, or holds."""
     slenderness, friction, end = np.radians(slenderness_deg), np.radians(friction_deg), 0.1
     expected, off = rigid_motion(slenderness, friction, end), []
@@ -204,6 +231,12 @@ def test_columns_tilt_and_slide_as_rigid_ones_to_second_order(slenderness_deg, f
         print(f"dt = {1e3 * dt:g} ms: toe off by {off[-1][0]:.1e} m, tilt by {off[-1][1]:.1e} of {expected[1]:.2e}")
     off = np.abs(off)
     print("order", np.log2(off[0] / off[1]).round(2))
+    verified(
+        f"column of {slenderness_deg:g}° on friction of {friction_deg:g}° that falls for 0.1 s: tilt",
+        off[:, 1] / expected[1],
+        "equations of a rigid body",
+        over=("time step, ms", (12.5, 6.25)),
+    )
     assert off[0].max() < 1e-3 * expected[1]
     # Second order, and a fifth of a micrometre of elastic give.
     assert (off[1] < 0.27 * off[0] + 2e-7).all()
@@ -214,7 +247,7 @@ def test_columns_tilt_and_slide_as_rigid_ones_to_second_order(slenderness_deg, f
     [("sliding", 0.0), ("toppling", 0.0), ("turns as it slides", 10.0), ("turns as it slides", 20.0)]
     + [("slides as it topples", d) for d in (5.0, 10.0, 20.0)],
 )
-def test_boundaries_of_the_map_are_where_they_should_be(what, boundary_deg):
+def test_boundaries_of_the_map_are_where_they_should_be(verified, what, boundary_deg):
     """Located by bisection. The threshold, 2e-4 g, moves them by 0.01° at most; the rest is elasticity, W/(E' b)."""
     least = 2e-4 * GRAVITY
     d = np.radians(boundary_deg)
@@ -235,4 +268,10 @@ def test_boundaries_of_the_map_are_where_they_should_be(what, boundary_deg):
         lo, hi = (middle, hi) if moves(middle) else (lo, middle)
     found = np.degrees(0.5 * (lo + hi))
     print(f"{what} {boundary_deg:g}: boundary at {found:.4f}°, should be {expected:.4f}°")
+    verified(
+        "boundaries between sliding, toppling and both, by bisection",
+        found - expected,
+        "Yagoda-Biran & Hatzor 2013",
+        unit="°",
+    )
     assert found == pytest.approx(expected, abs=0.02)

@@ -47,22 +47,30 @@ def test_arch_stands_and_falls_at_the_thickness_of_limit_analysis(n):
     assert not stands(n, 0.998 * thinnest)
 
 
-def test_limit_of_many_voussoirs_is_milankovitchs():
+def test_limit_of_many_voussoirs_is_milankovitchs(verified):
     ratios = [masonry.thinnest_arch(n) for n in (25, 50, 100)]
     print("thinnest arch of 25, 50, 100 voussoirs, t/R:", " ".join(f"{r:.5f}" for r in ratios))
+    verified(
+        "thinnest semicircular arch of 100 voussoirs, limit analysis: t/R",
+        None,
+        "Milankovitch 1907",
+        found=ratios[-1],
+        exact=masonry.MILANKOVITCH_RATIO,
+    )
     assert ratios[-1] == pytest.approx(masonry.MILANKOVITCH_RATIO, abs=1e-4)
     assert ratios == sorted(ratios)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("n", [6, 9, 12, 15, 25, 50, 100])
-def test_arch_limit_by_bisection(n):
+def test_arch_limit_by_bisection(verified, n):
     thinnest = masonry.thinnest_arch(n)
     low, high = 0.09, 0.12
     for _ in range(11):
         middle = 0.5 * (low + high)
         low, high = (low, middle) if stands(n, middle) else (middle, high)
     print(f"{n} voussoirs: falls below t/R = {high:.5f}, limit analysis {thinnest:.5f}, Milankovitch 0.1075")
+    verified(f"thinnest arch of {n} voussoirs that stands: t/R", None, "limit analysis", found=high, exact=thinnest)
     assert high == pytest.approx(thinnest, rel=2e-3)
 
 
@@ -85,7 +93,7 @@ def test_arch_falls_by_hinges_at_crown_haunches_and_springings():
 
 
 @pytest.mark.parametrize("youngs_modulus", [1e9, 1e10, 1e11])
-def test_beam_of_two_blocks(youngs_modulus):
+def test_beam_of_two_blocks(verified, youngs_modulus):
     """Thrust and sag: three-hinge statics on halves that strain; w S²/(8 T) when they are rigid."""
     span, thickness = 10.0, 1.0
     stone = Material("stone", youngs_modulus, 0.2, density=2500.0)
@@ -105,6 +113,7 @@ def test_beam_of_two_blocks(youngs_modulus):
         f"E = {youngs_modulus:.0e}: thrust {got / rigid:.6f} of the rigid one ({thrust / rigid:.6f}), sag {crown:.4e} "
         f"m ({sag:.4e})"
     )
+    verified(f"beam of two blocks, E = {youngs_modulus / 1e9:g} GPa: thrust", got / thrust - 1, "three-hinge statics")
     # Strains enter to second order, W/E' squared, and the friction spring under the corner as W/penalty.
     strain = thrust / (thickness * youngs_modulus)
     assert got / rigid == pytest.approx(thrust / rigid, abs=60 * strain**2 + 1e-8)
@@ -150,8 +159,14 @@ def against_sofianos(span: float, ladder: list[int]) -> list[float]:
 
 
 @pytest.mark.parametrize("span", [5.0, 10.0])
-def test_thrust_of_voussoirs_that_bend_is_sofianos(span):
+def test_thrust_of_voussoirs_that_bend_is_sofianos(verified, span):
     coarse, fine = against_sofianos(span, [2, 8])
+    verified(
+        f"voussoir beam, span/depth {span:g}, of 2 and 8 courses: thrust",
+        [coarse, fine],
+        "Sofianos 1996",
+        over=("courses", (2, 8)),
+    )
     # Two courses bear at their outermost corners, as if rigid: w S²/(8 T). His fit is good to some hundredths.
     assert coarse < -0.08 and abs(fine) < 0.025
 

@@ -59,7 +59,7 @@ WEIGHT = Loads(gravity=History.constant([0.0, -GRAVITY]))
 
 
 @pytest.mark.parametrize("dt", [0.02, 0.0037])
-def test_projectile_is_exact_at_any_step(dt):
+def test_projectile_is_exact_at_any_step(verified, dt):
     # d = v dt + g dt²/2 is exact for constant acceleration: only the round-off of adding 100 m coordinates remains.
     blocks = Blocks.from_polygons([rectangle(0, 0, 1, 2)])
     settings = DdaSettings(dynamic_factor=1.0, max_displacement_ratio=10.0)
@@ -70,32 +70,43 @@ def test_projectile_is_exact_at_any_step(dt):
     expected = exact.free_fall(np.array([1.3]), np.array([0, -GRAVITY]), np.array([3.0, 7.0]))
     error = np.abs(state.vertices - blocks.vertices - expected).max() / np.abs(expected).max()
     print(f"projectile, dt {dt}: {error:.1e}")
+    verified("projectile, dt = 3.7 and 20 ms", error, "closed form")
     assert state.vertices - blocks.vertices == pytest.approx(np.repeat(expected, 4, axis=0), rel=1e-12, abs=1e-12)
     assert state.velocity[0, :2] == pytest.approx([3.0, 7.0 - GRAVITY * 1.3], rel=1e-11)
 
 
-def test_frictionless_incline():
+def test_frictionless_incline(verified):
     # Exact but for the spring under the block: sliding is uncoupled from it, so round-off over penalty (1e-10) remains.
     system, state, down = incline(np.radians(30), 0.0)
     end = march(system, state, WEIGHT, 0.5, 1e-3)
     expected = 0.5 * exact.incline_acceleration(np.radians(30), 0.0) * 0.5**2
     print(f"incline without friction: {travel(system, end, down) / expected - 1:.1e}")
+    verified(
+        "block on an incline of 30° without friction, dt = 1 ms: way in 0.5 s",
+        travel(system, end, down) / expected - 1,
+        "closed form",
+    )
     assert travel(system, end, down) == pytest.approx(expected, rel=1e-9)
 
 
 @pytest.mark.parametrize("friction_deg", [5.0, 15.0, 25.0])
-def test_incline_with_friction(friction_deg):
+def test_incline_with_friction(verified, friction_deg):
     # Weight put on at once makes the block's own vibration start the slide: its share is the elastic shortening,
     # W/E' ≈ 1 µm, of half a metre of travel, and it does not depend on dt.
     system, state, down = incline(np.radians(30), np.radians(friction_deg))
     end = march(system, state, WEIGHT, 0.5, 1e-3)
     expected = 0.5 * exact.incline_acceleration(np.radians(30), np.radians(friction_deg)) * 0.5**2
     print(f"incline, friction {friction_deg}°: {travel(system, end, down) / expected - 1:.1e}")
+    verified(
+        f"block on an incline of 30°, friction {friction_deg:g}°, dt = 1 ms: way in 0.5 s",
+        travel(system, end, down) / expected - 1,
+        "closed form of a rigid block",
+    )
     assert travel(system, end, down) == pytest.approx(expected, rel=1e-5)
 
 
 @pytest.mark.parametrize("dt", [8e-3, 1e-3])
-def test_friction_on_an_incline_converges_to_the_rigid_block(dt):
+def test_friction_on_an_incline_converges_to_the_rigid_block(verified, dt):
     # What is left beside the closed form is the block's elastic shortening: first order in 1/E, the same at every dt.
     slope, friction = np.radians(30), np.radians(15)
     expected = 0.5 * exact.incline_acceleration(slope, friction) * 0.5**2
@@ -105,6 +116,12 @@ def test_friction_on_an_incline_converges_to_the_rigid_block(dt):
         errors.append(abs(travel(system, march(system, state, WEIGHT, 0.5, dt), down) / expected - 1))
     orders = np.log10(np.array(errors[:-1]) / errors[1:])
     print(f"incline, dt {dt}, E = 1, 10, 100 GPa: {np.array(errors)}, order in 1/E {orders.round(3)}")
+    verified(
+        f"the same, friction 15°, dt = {1e3 * dt:g} ms",
+        errors,
+        "closed form of a rigid block",
+        over=("Young's modulus, GPa", (1, 10, 100)),
+    )
     assert orders == pytest.approx([1.0, 1.0], abs=0.02)
     assert errors[1] < 1e-6
 
@@ -136,7 +153,7 @@ def test_a_block_that_carries_its_weight_sticks_at_every_step(dt):
     assert np.abs(end.velocity[1]).max() < 1e-6
 
 
-def test_friction_stops_a_pushed_block_where_it_should():
+def test_friction_stops_a_pushed_block_where_it_should(verified):
     """Every step is exact but that in which it stops: of what it would go there, ½ μ g dt² at most, it goes a part."""
     braking, errors = GRAVITY * np.tan(np.radians(30)), []
     for dt in (16e-3, 8e-3, 4e-3):
@@ -151,6 +168,9 @@ def test_friction_stops_a_pushed_block_where_it_should():
         assert errors[-1] < 0.2 * 0.5 * braking * dt**2
     orders = np.log2(np.divide(errors[:-1], errors[1:]))
     print(f"stopping distance, dt 16, 8, 4 ms: {np.array(errors)} m, order {orders.round(2)}")
+    verified(
+        "block that friction stops: distance, m", errors, "closed form", unit="m", over=("time step, ms", (16, 8, 4))
+    )
     assert orders == pytest.approx([2.0, 2.0], abs=0.05)
 
 
@@ -174,7 +194,7 @@ def test_time_integration_is_newmarks_with_the_amplification_that_shi_has():
             assert [state.stress[0, 0] / 10e9, state.velocity[0, 3] * dt] == pytest.approx(x, rel=1e-6, abs=1e-14)
 
 
-def test_damping_is_the_fraction_of_critical_that_it_says():
+def test_damping_is_the_fraction_of_critical_that_it_says(verified):
     # Well resolved, successive peaks of a free vibration fall by exp(−2πξ/√(1−ξ²)), the step's own dissipation aside.
     blocks = Blocks.from_polygons([rectangle(0, 0, 1, 1)])
     omega = exact.square_block_frequency(1.0, 10e9, 2600.0)
@@ -192,10 +212,15 @@ def test_damping_is_the_fraction_of_critical_that_it_says():
         fall[damping] = max(rates[3 * n // 2 :]) / max(rates[n // 2 : 3 * n // 2])
     print(f"decay: {fall[0.05] / fall[0.0] / np.exp(-2 * np.pi * 0.05 / np.sqrt(1 - 0.05**2)) - 1:.1e}")
     # Peaks are sampled n times a cycle, and dissipations add up to second order, (Ω ξ)² with Ω = 2π/n.
+    verified(
+        "decay of a vibration, 5 % of critical damping",
+        fall[0.05] / fall[0.0] / np.exp(-2 * np.pi * 0.05 / np.sqrt(1 - 0.05**2)) - 1,
+        "closed form",
+    )
     assert fall[0.05] / fall[0.0] == pytest.approx(np.exp(-2 * np.pi * 0.05 / np.sqrt(1 - 0.05**2)), rel=5e-4)
 
 
-def test_a_spinning_block_keeps_its_area_through_ten_turns():
+def test_a_spinning_block_keeps_its_area_through_ten_turns(verified):
     blocks = Blocks.from_polygons([rectangle(0, 0, 1, 1)])
     settings = DdaSettings(dynamic_factor=1.0, max_displacement_ratio=10.0)
     # Stiff, so that what the centrifugal force stretches (ρω²w²/12 over E, 4e-14) is below the tolerance.
@@ -208,11 +233,12 @@ def test_a_spinning_block_keeps_its_area_through_ten_turns():
     slower = 2 * exact.spinning_square_stress(1.0, 1000.0, spin) / 1e17
     assert state.rotation[0] == pytest.approx(20 * np.pi * (1 - slower), rel=1e-12)
     print(f"spinning ten turns: area {blocks.areas(state.vertices)[0] - 1:.1e}")
+    verified("block that spins ten turns: area", blocks.areas(state.vertices)[0] - 1, "conserved")
     assert blocks.areas(state.vertices)[0] == pytest.approx(1.0, abs=1e-10)
     assert state.vertices == pytest.approx(blocks.vertices, abs=1e-10)
 
 
-def test_a_spinning_block_is_stretched_by_its_own_rotation():
+def test_a_spinning_block_is_stretched_by_its_own_rotation(verified):
     blocks = Blocks.from_polygons([rectangle(0, 0, 2, 2)])
     settings = DdaSettings(dynamic_factor=1.0, damping=0.7, max_displacement_ratio=10.0)
     system = dda.BlockSystem(blocks, [Material("rock", 10e9, 0.25, density=2600.0)], settings=settings)
@@ -221,10 +247,11 @@ def test_a_spinning_block_is_stretched_by_its_own_rotation():
     state = march(system, state, Loads(), 0.02, 2e-5)
     expected = exact.spinning_square_stress(2.0, 2600.0, 10.0)
     print(f"stretched by its rotation: {np.abs(state.stress[0, :2] / expected - 1).max():.1e}")
+    verified("stress of a spinning square", np.abs(state.stress[0, :2] / expected - 1).max(), "closed form")
     assert state.stress[0] == pytest.approx([expected, expected, 0.0], rel=1e-4, abs=1e-4 * expected)
 
 
-def test_column_shortens_under_its_weight_and_a_load():
+def test_column_shortens_under_its_weight_and_a_load(verified):
     n, width, height, load = 8, 1.0, 2.0, 3e6
     polygons = [rectangle(-1, -1, 2, 0)] + [rectangle(0, height * k, width, height * (k + 1)) for k in range(n)]
     names = [[[""] * 4] for _ in range(n)] + [[["", "", "top", ""]]]
@@ -242,6 +269,7 @@ def test_column_shortens_under_its_weight_and_a_load():
     # Equilibrium is on the undeformed geometry (one step from rest): linear elasticity, to round-off of the solve.
     top = result.state.vertices[blocks.edges_named("top")[0], 1] - n * height
     print(f"column: shortening {np.abs(top / -shortening - 1).max():.1e}")
+    verified("column of blocks under its weight and a load: shortening", np.abs(top / -shortening - 1).max(), "statics")
     assert top == pytest.approx(-shortening, rel=1e-8)
     assert result.state.stress[1:, 1] == pytest.approx(-mean / width, rel=1e-8)
     assert result.state.stress[1:, 0] == pytest.approx(np.zeros(n), abs=1e-8 * load)

@@ -44,7 +44,7 @@ def slab(law: JointLaw) -> dda.BlockSystem:
 
 
 @pytest.mark.parametrize("cohesion", [0.0, 5e3, 15e3])
-def test_plane_failure_by_strength_reduction(cohesion):
+def test_plane_failure_by_strength_reduction(verified, cohesion):
     """Cohesion and tan φ divided by F until the slab goes: FoS = (c A + W cos α tan φ)/(W sin α).
 
     The formula holds where all of the joint fails at once, as a bonded face does however unevenly its ends are loaded.
@@ -64,11 +64,18 @@ def test_plane_failure_by_strength_reduction(cohesion):
     factor = limit(lambda f: not stands(f), 0.5, 3.0)
     print(f"c = {cohesion / 1e3:g} kPa: factor of safety {factor:.4f}, should be {expected:.4f}")
     # Bisection and threshold.
+    verified(
+        f"plane failure in motion, c = {cohesion / 1e3:g} kPa: factor of safety",
+        None,
+        "limit equilibrium",
+        found=factor,
+        exact=expected,
+    )
     assert factor == pytest.approx(expected, rel=3e-4)
 
 
 @pytest.mark.parametrize("depth", [0.6, 1.2, 1.8])
-def test_plane_failure_with_water_in_the_plane_and_behind(depth):
+def test_plane_failure_with_water_in_the_plane_and_behind(verified, depth):
     """Water stands ``depth`` deep in a tension crack behind the slab and drains along the plane to the toe, where it
     comes out: V = ½ γw z², U = ½ γw z A (Hoek & Bray 1981). The piezometric line is straight from the crack to the
     toe."""
@@ -93,11 +100,19 @@ def test_plane_failure_with_water_in_the_plane_and_behind(depth):
         f"z = {depth} m, U = {uplift / 1e3:.1f}, V = {thrust / 1e3:.1f} kN: {found:.4f}° needed, should be "
         f"{expected:.4f}°"
     )
+    verified(
+        f"plane failure, water {depth:g} m deep in the tension crack: friction needed",
+        None,
+        "Hoek & Bray 1981",
+        found=found,
+        exact=expected,
+        unit="°",
+    )
     assert found == pytest.approx(expected, abs=0.02)
 
 
 @pytest.mark.parametrize(("steep_deg", "flat_deg", "interface_deg"), [(50, 15, None), (55, 20, None), (50, 15, 0.0)])
-def test_two_blocks_on_a_bilinear_plane(steep_deg, flat_deg, interface_deg):
+def test_two_blocks_on_a_bilinear_plane(verified, steep_deg, flat_deg, interface_deg):
     """An active block pushes a passive one across an upright joint; the friction at which both go, by bisection."""
     steep, flat = np.radians(steep_deg), np.radians(flat_deg)
     width, height = 4.0, 6.0
@@ -131,6 +146,14 @@ def test_two_blocks_on_a_bilinear_plane(steep_deg, flat_deg, interface_deg):
         lambda f: stays(strong, system(f), joint_index=lambda a, b: 0 if "base" in (a, b) else 1), flat_deg, steep_deg
     )
     print(f"planes of {steep_deg}° and {flat_deg}°: limit friction {found:.4f}°, should be {expected:.4f}°")
+    verified(
+        f"two blocks on planes of {steep_deg}° and {flat_deg}°, {'rough' if interface_deg is None else 'smooth'} interface: limit friction",
+        None,
+        "Jaeger 1971",
+        found=found,
+        exact=expected,
+        unit="°",
+    )
     assert found == pytest.approx(expected, abs=0.05)
 
 
@@ -170,12 +193,19 @@ def test_toppling_slope_stands_and_falls_at_the_published_friction():
 
 @pytest.mark.slow
 @pytest.mark.parametrize("youngs_modulus", [1e10, 1e11, 1e12])
-def test_toppling_slope_limit_friction(youngs_modulus):
+def test_toppling_slope_limit_friction(verified, youngs_modulus):
     """By bisection on tan φ: 0.790, 0.7865, 0.7855 with the rock's stiffness, 0.7855 for rigid blocks."""
     start = settled(toppling(1.0, youngs_modulus), TOPPLING_WEIGHT, 3)
     found = limit(lambda f: creep(toppling(f, youngs_modulus), start) < 2e-4, 0.72, 0.9, 9)
     print(f"E = {youngs_modulus:.0e} Pa: limit tan φ = {found:.4f}, published {toppling_slope.LIMIT_FRICTION}")
     # Columns tilt by their elastic give, W/E', and their thrusts grow with it: first order in 1/E.
+    verified(
+        f"toppling slope of 16 blocks, E = {youngs_modulus / 1e9:g} GPa: limit tan φ",
+        None,
+        "Goodman & Bray 1976",
+        found=found,
+        exact=toppling_slope.LIMIT_FRICTION,
+    )
     assert found == pytest.approx(toppling_slope.LIMIT_FRICTION, abs=1.2e-3 + 5e7 / youngs_modulus)
 
 
@@ -193,7 +223,7 @@ def test_toppling_slope_just_below_its_limit_is_told_to_go(friction):
     assert gone[1:14].all() and len(found.moving) > 3
 
 
-def test_toppling_slope_carries_the_published_forces():
+def test_toppling_slope_carries_the_published_forces(verified):
     """R_n, S_n and the thrusts of all sixteen blocks just above the limit: the biggest, 4837 kN, to a per cent."""
     friction = 1.0015 * toppling_slope.LIMIT_FRICTION
     system = toppling(friction)
@@ -221,6 +251,13 @@ def test_toppling_slope_carries_the_published_forces():
             f"{toppling_slope.PUBLISHED_P[n - 1]:8.1f}"
         )
     # 0.15 % of friction above the limit and 0.1 % of elastic tilt move the thrusts by 40 kN of 4837.
+    published = np.column_stack([toppling_slope.PUBLISHED_R, toppling_slope.PUBLISHED_S])
+    verified(
+        "toppling slope: forces of up to 7662 kN under its blocks",
+        np.abs(base[1:] / 1e3 - published).max(),
+        "Goodman & Bray 1976",
+        unit="kN",
+    )
     assert base[1:, 0] / 1e3 == pytest.approx(toppling_slope.PUBLISHED_R, abs=25)
     assert base[1:, 1] / 1e3 == pytest.approx(toppling_slope.PUBLISHED_S, abs=25)
     assert thrust[2:] / 1e3 == pytest.approx(toppling_slope.PUBLISHED_P, abs=60)

@@ -147,7 +147,7 @@ def test_shi_takes_a_quarter_of_omega_dt_and_the_trapezoidal_rule_nothing():
 
 
 @pytest.mark.parametrize("name", ["Shi", "trapezoidal"])
-def test_a_bounce_loses_what_the_scheme_loses(name):
+def test_a_bounce_loses_what_the_scheme_loses(verified, name):
     """Undamped, half a swing v = v₀ cos ωt on the joint: Shi's scheme takes ½ k Δg² a step, dt ½ k ∫ v² dt = (π/2) ω dt
     of ½ m v₀², by its own dissipation; the trapezoidal rule what the steps miss in which the joint is met and left, of
     second order. All of it is booked as the scheme's."""
@@ -169,6 +169,7 @@ def test_a_bounce_loses_what_the_scheme_loses(name):
         losses.append(max(lost))
     orders = np.log2(np.array(losses[:-1]) / losses[1:])
     print(f"{name}: a bounce of 20, 40, 80 steps loses {losses} of its energy, orders {orders.round(2)}")
+    verified(f"energy that a bounce loses, {name}", losses, "none", over=("steps a bounce", (20, 40, 80)))
     if name == "Shi":
         assert losses[-1] == pytest.approx(0.5 * np.pi * np.pi / 80, rel=0.04)
         assert orders == pytest.approx([1, 1], abs=0.1)

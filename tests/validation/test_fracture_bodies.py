@@ -30,25 +30,35 @@ def line(*points, **kwargs):
 
 
 @pytest.mark.parametrize("height", fracture.CENTRE_CRACK_HALF)
-def test_centre_crack(height):
+def test_centre_crack(verified, height):
     """2e-5 at order 6 (order 4 leaves 2e-5 of its own); the reference has six digits."""
     body = ddm.Body([rectangle(1, height)], line([-0.5, 0], [0.5, 0], aperture=OPEN), ROCK, DdmSettings(order=6))
     k = body.solve(pull(1, height)).tips["k_i"] / fracture.griffith(1, 0.5)
     print(f"centre crack, a/W 0.5, H/W {height}: {np.abs(k / fracture.CENTRE_CRACK_HALF[height] - 1).max():.1e}")
+    verified(
+        f"centre crack, a/W = 0.5, H/W = {height:g}, order 6",
+        np.abs(k / fracture.CENTRE_CRACK_HALF[height] - 1).max(),
+        "boundary collocation",
+    )
     assert np.allclose(k, fracture.CENTRE_CRACK_HALF[height], atol=1.2e-5)
 
 
 @pytest.mark.parametrize("depth", fracture.EDGE_CRACK)
-def test_edge_crack(depth):
+def test_edge_crack(verified, depth):
     """Strip of H/W = 3 for the infinite one. 2e-4: half a digit of the table and the discretisation of p = 4."""
     crack = line([-0.5, 0], [depth - 0.5, 0], aperture=OPEN, surface=[(True, False)])
     k = ddm.Body([rectangle(0.5, 1.5)], crack, ROCK).solve(pull(0.5, 1.5)).tips["k_i"]
     print(f"edge crack, a/W {depth}: {k[0] / fracture.griffith(1, depth) / fracture.EDGE_CRACK[depth] - 1:.1e}")
+    verified(
+        f"edge crack, a/W = {depth:g}",
+        k[0] / fracture.griffith(1, depth) / fracture.EDGE_CRACK[depth] - 1,
+        "Kaya & Erdogan 1987",
+    )
     assert k[0] / fracture.griffith(1, depth) == pytest.approx(fracture.EDGE_CRACK[depth], rel=2e-4)
 
 
 @pytest.mark.parametrize("phi", two_cracks.OPEN_SLOT_K_I)
-def test_two_slot_specimen(phi):
+def test_two_slot_specimen(verified, phi):
     """1e-5 of the largest: the digits of the reference. Default settings."""
     cracks = Cracks.from_polylines(two_cracks.crack_ends(phi), aperture=OPEN)
     tips = ddm.Body([rectangle(0.03, 0.06)], cracks, ROCK).solve(pull(0.03, 0.06, -1.0)).tips
@@ -56,6 +66,11 @@ def test_two_slot_specimen(phi):
     for name, table in (("k_i", two_cracks.OPEN_SLOT_K_I), ("k_ii", two_cracks.OPEN_SLOT_K_II)):
         error = np.abs(tips[name] - table[phi]).max() / largest
         print(f"two slots, {phi}°, {name}: {error:.1e}")
+        verified(
+            f"two slots in the specimen, φ = {phi}°: {name}".replace("k_ii", "K_II").replace("k_i", "K_I"),
+            error,
+            "computed independently",
+        )
         assert error < 1e-5
 
 
@@ -126,7 +141,7 @@ def test_remote_stress_leaves_holes_free():
         assert np.abs(across).max() < 1e-2  # near the middle of a side between two corners
 
 
-def test_hole_in_tension():
+def test_hole_in_tension(verified):
     """Kirsch (1898): 3σ beside a circular hole and σ(1 + 1/8 + 3/32) one radius away. The middle of a facet of an n-gon
     sees O(1/n) less, so n = 48 and 96 are extrapolated; 1 % for the plate, which is only twenty radii wide."""
     beside = []
@@ -138,6 +153,11 @@ def test_hole_in_tension():
         s = sol.stress([[apothem, 0.0], [0.0, apothem], [2.0, 0.0]])
         beside.append((s[0, 1], s[1, 0]))
     print(f"hole of 48, 96 sides: {np.array(beside)[:, 0] - 3} of 3 σ, {np.array(beside)[:, 1] + 1} of −σ")
+    verified(
+        "beside a circular hole, 48 and 96 sides extrapolated: stress",
+        (2 * beside[1][0] - beside[0][0]) / 3 - 1,
+        "Kirsch 1898",
+    )
     assert 2 * beside[1][0] - beside[0][0] == pytest.approx(3.0, rel=0.01)
     assert 2 * beside[1][1] - beside[0][1] == pytest.approx(-1.0, abs=0.03)
     assert s[2, 1] == pytest.approx(1 + 0.5 / 4 + 1.5 / 16, rel=0.01)
@@ -154,7 +174,7 @@ def test_block_under_its_own_weight_on_a_base_pressure():
     assert np.allclose(sol.stress(p), expected, atol=1e-8 * 2600 * 9.81)
 
 
-def test_crack_in_a_heavy_block_feels_the_local_stress():
+def test_crack_in_a_heavy_block_feels_the_local_stress(verified):
     """A short vertical stress gradient over a small horizontal slot: K_I = σ_yy √(πa) at its depth, 1e-3 for a/W =
     0.02."""
     weight = 2600 * 9.81
@@ -162,10 +182,11 @@ def test_crack_in_a_heavy_block_feels_the_local_stress():
     sol = ddm.Body([rectangle(1, 1)], line([-0.02, 0.2], [0.02, 0.2], aperture=OPEN), ROCK).solve(load)
     exact = fracture.griffith(-0.8 * weight, 0.02)
     print(f"crack in a heavy block: {np.abs(sol.tips['k_i'] / exact - 1).max():.1e}")
+    verified("small crack in a heavy block: K_I", np.abs(sol.tips["k_i"] / exact - 1).max(), "closed form")
     assert np.allclose(sol.tips["k_i"], exact, rtol=1e-3)
 
 
-def test_spinning_disc_and_square():
+def test_spinning_disc_and_square(verified):
     """Disc: a 96-gon of the same area, 2e-3. Square: mean stress ρω²w²/12 by Gauss points over the area, 1e-5."""
     rate, rho = 10.0, ROCK.density
     q = 2 * np.pi * np.arange(96) / 96
@@ -175,6 +196,7 @@ def test_spinning_disc_and_square():
     centre = disc.stress([[0.01, 0.02]])[0]
     exact = fracture.spinning_disc_centre(rho, rate, 1.0, ROCK.poissons_ratio)
     print(f"spinning disc: {np.abs(centre[:2] / exact - 1).max():.1e}")
+    verified("spinning disc of 96 sides: stress in the middle", np.abs(centre[:2] / exact - 1).max(), "closed form")
     assert np.allclose(centre[:2], exact, rtol=2e-3) and abs(centre[2]) < 2e-3 * exact
     square = ddm.Body([rectangle(0.5, 0.5)], Cracks.from_polylines([]), ROCK).solve(spin)
     x, w = np.polynomial.legendre.leggauss(16)
@@ -234,7 +256,7 @@ def test_k_does_not_depend_on_where_a_load_ends_on_an_element(off):
     assert np.allclose(k, exact, rtol=1e-5 if off == 1e-7 else 5e-4)
 
 
-def test_crack_across_a_bending_stress_closes_by_a_third():
+def test_crack_across_a_bending_stress_closes_by_a_third(verified):
     """Frictionless contact with an unknown edge: closure point and K_I in closed form. The plate is 40 crack lengths
     wide; the closure point is known to a node's spacing, K_I to 1 %."""
     w = 20.0
@@ -248,13 +270,14 @@ def test_crack_across_a_bending_stress_closes_by_a_third():
     x = body.faces.nodes[..., 0]
     edge = x[sol.states != 0].max()
     print(f"crack in bending: closes {edge - shut:.1e} off, K_I {sol.tips['k_i'][1] / k - 1:.1e}")
+    verified("crack across a bending stress that closes in part: K_I", sol.tips["k_i"][1] / k - 1, "closed form")
     assert abs(edge - shut) < 1.0 / 24
     assert sol.tips["k_i"][0] == 0 and sol.tips["k_i"][1] == pytest.approx(k, rel=0.01)
     assert sol.faces.opening[:, 1:-1].min() >= -1e-9 * sol.faces.opening.max()
     assert sol.faces.traction[..., 0].max() <= 1e-9
 
 
-def test_compliance_of_a_small_crack_is_dilute():
+def test_compliance_of_a_small_crack_is_dilute(verified):
     """2e-3: finite-size correction of order (a/W)² for a/W = 0.02; a closed crack keeps the shear part only."""
     a = 0.02
     cracks = line([-a, 0], [a, 0])
@@ -262,6 +285,7 @@ def test_compliance_of_a_small_crack_is_dilute():
     exact = fracture.dilute_compliance(a, 4.0, ROCK.plane_modulus)
     got = body.compliance()
     print(f"dilute compliance: {np.abs(got - exact).max() / exact[1, 1]:.1e}")
+    verified("compliance of a small crack", np.abs(got - exact).max() / exact[1, 1], "dilute limit")
     assert np.allclose(got, exact, atol=2e-3 * exact[1, 1])
     pressed = body.solve(ddm.BodyLoad(remote_stress=[0, -1e6, 0.2e6]))
     closed = body.compliance(pressed)

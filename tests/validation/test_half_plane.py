@@ -38,7 +38,7 @@ def along(half_plane, stress=1.0):
     return stress * np.array([t[0] ** 2, t[1] ** 2, t[0] * t[1]])
 
 
-def test_edge_crack():
+def test_edge_crack(verified):
     """Koiter's edge crack: every two orders, with a layer more at the mouth, are a factor of ten or more."""
     exact = crack_arrays.EDGE_CRACK_HALF_PLANE
     errors = {}
@@ -49,6 +49,7 @@ def test_edge_crack():
         )
         errors[order] = abs(sol.tips["k_i"][0] / math.sqrt(math.pi) / exact - 1)
     print("edge crack in a half-plane:", {p: f"{e:.1e}" for p, e in errors.items()})
+    verified("edge crack in a half-plane: K_I", list(errors.values()), "Koiter 1965", over=("order p", list(errors)))
     assert errors[4] < 1e-6 and errors[6] < 5e-8
     assert errors[8] < 3e-9 and errors[10] < 3e-10
 
@@ -64,7 +65,7 @@ def test_target_error(target):
 
 
 @pytest.mark.parametrize("angle_deg", [30.0, 60.0, 120.0])
-def test_slanted_edge_crack(angle_deg):
+def test_slanted_edge_crack(verified, angle_deg):
     """Against distributed dislocations, which share nothing with displacement discontinuities. Mouths that are not
     upright are singular; 1e-6 is asked for."""
     a = math.radians(-angle_deg)
@@ -75,6 +76,7 @@ def test_slanted_edge_crack(angle_deg):
         [], slot((0, 0), tip, True), ROCK, ddm.BodyLoad(remote_stress=[1, 0, 0]), 1e-6, half_plane=SURFACE
     )
     off = np.abs(factors(sol) - exact).max() / np.abs(exact).max()
+    verified(f"edge crack at {angle_deg:g}° to a half-plane: K", off, "distributed dislocations")
     print(f"edge crack at {angle_deg:g}°: {off:.1e}")
     assert off < 3e-6
 

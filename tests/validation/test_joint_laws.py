@@ -70,7 +70,7 @@ def direct_shear(
         return 2 if "wall" in (a, b) else int("joint" in (a, b) and "top" not in (a, b))
 
     blocks = Blocks.from_polygons(
-        polygons, fixed=fixed, edge_names=names, held=held, material=[0, 0] + [1 - f for f in fixed[2:]]
+        polygons, fixed=fixed, edge_names=names, constrained=held, material=[0, 0] + [1 - f for f in fixed[2:]]
     )
     materials = [Material(name, YOUNGS_MODULUS, POISSON, density=d) for name, d in (("light", 1.0), ("ram", 1e12))]
     settings = DdaSettings(
@@ -106,13 +106,19 @@ def direct_shear(
     return np.array(rows).T, float(np.mean(iterations))
 
 
-def test_rough_strength_is_the_published_table():
+def test_rough_strength_is_the_published_table(verified):
     # Three decimals are printed.
     angle, jrc, jcs = joints.ROUGH_JOINT_EXAMPLE
     pressure, expected, slope, cohesion = joints.ROUGH_JOINT_TABLE.T
     full, n = 1e6 * pressure, len(pressure)
     strength, tangent, _ = rough_strength(full, np.full(n, jrc), np.full(n, jcs), np.full(n, angle))
     # The table's normal stresses are printed to three decimals too: 5e-4 of 0.36 MPa moves the rest by as much again.
+    verified(
+        "rough joint: strengths of the published table, MPa",
+        np.abs(strength / 1e6 - expected).max(),
+        "Barton",
+        unit="MPa",
+    )
     assert strength / 1e6 == pytest.approx(expected, abs=1.5e-3)
     assert tangent == pytest.approx(slope, abs=1.5e-3)
     assert (strength - tangent * full) / 1e6 == pytest.approx(cohesion, abs=1.5e-3)

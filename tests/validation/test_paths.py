@@ -50,7 +50,7 @@ def tip_after(increment: float, correct: bool) -> np.ndarray:
     return tip["point"]
 
 
-def test_a_corrected_path_does_not_depend_on_the_increment():
+def test_a_corrected_path_does_not_depend_on_the_increment(verified):
     """Halving the increment from 8 to 0.5 mm: how far the end of the path moves each time (printed with ``-s``).
 
     Corrected steps are of second order where a path is smooth and of order 3/2 where it leaves a kink like x^(3/2), as
@@ -64,6 +64,13 @@ def test_a_corrected_path_does_not_depend_on_the_increment():
         orders[correct] = np.log2(moves[correct][0] / moves[correct][-1]) / (len(moves[correct]) - 1)
         listed = ", ".join(f"{move:.1e}" for move in moves[correct])
         print(f"corrected {correct}: moves {listed} m, observed order {orders[correct]:.2f}")
+    verified(
+        "end of a path when the increment is halved, corrected",
+        moves[True],
+        "itself",
+        unit="m",
+        over=("increment, mm", (8, 4, 2, 1)),
+    )
     assert orders[True] > 1.4
     assert orders[False] < 1.2
     assert moves[True][1] < 1e-4

@@ -65,11 +65,14 @@ def above_a_floor(drop: float, **way) -> tuple[Blocks, Loads]:
         (3.0, {}),
     ],
 )
-def test_a_floor_below_the_plane_holds_nothing(drop, way):
+def test_a_floor_below_the_plane_holds_nothing(verified, drop, way):
     blocks, loads = above_a_floor(drop, **way)
     found = dda.factor_of_safety(blocks, [ROCK], [JointLaw("plane", math.radians(30))], loads)
     expected = math.tan(math.radians(30)) / math.tan(DIP)
     print(f"drop {drop} m: {found.factor:.5f}, should be {expected:.5f}; {found.warnings}")
+    verified(
+        f"plane {drop:g} m above a floor; as drawn, mirrored, turned", found.factor / expected - 1, "tan φ / tan α"
+    )
     assert found.factor == pytest.approx(expected, rel=1e-6)
     # Its toe touches the floor where it is drawn so: rounded, it holds nothing, and what its tip would hold is told.
     assert len(found.toes) == (drop == 0.0) and not found.toes_hold
@@ -118,7 +121,7 @@ def test_the_planar_slope_of_the_gallery_agrees_with_its_comment():
 
 @pytest.mark.parametrize("way", [{}, {"mirror": True}, {"turn": 0.4}])
 @pytest.mark.parametrize(("steep_deg", "flat_deg", "cohesion"), [(57, 24, 0.0), (50, 10, 10e3)])
-def test_sharp_toes_in_the_corner_of_a_bilinear_plane(steep_deg, flat_deg, cohesion, way):
+def test_sharp_toes_in_the_corner_of_a_bilinear_plane(verified, steep_deg, flat_deg, cohesion, way):
     """Jaeger's active and passive block with sharp toes: within 1e-3 of limit equilibrium, 1.2 times as much with tips
     that hold."""
     steep, flat = math.radians(steep_deg), math.radians(flat_deg)
@@ -156,6 +159,11 @@ def test_sharp_toes_in_the_corner_of_a_bilinear_plane(steep_deg, flat_deg, cohes
         middle = 0.5 * (low + high)
         low, high = (middle, high) if driving(middle) < 0 else (low, middle)
     print(f"{found.factor:.5f}, limit equilibrium {low:.5f}, with sharp tips {found.other_factor}")
+    verified(
+        f"two blocks with sharp toes, planes of {steep_deg}° and {flat_deg}°, c = {cohesion / 1e3:g} kPa; as drawn, mirrored, turned",
+        found.factor / low - 1,
+        "limit equilibrium",
+    )
     assert found.factor == pytest.approx(low, rel=2e-3)
     if not cohesion:
         assert low == pytest.approx(
@@ -167,7 +175,7 @@ def test_sharp_toes_in_the_corner_of_a_bilinear_plane(steep_deg, flat_deg, cohes
 
 
 @pytest.mark.parametrize("way", [{}, {"mirror": True}, {"turn": -0.3}])
-def test_a_plane_keeps_its_cohesion_when_the_tension_crack_lets_go(way):
+def test_a_plane_keeps_its_cohesion_when_the_tension_crack_lets_go(verified, way):
     """c ℓ of all of the plane, although its law is that of the crack, which opens and shares a corner with it."""
     foot, friction, cohesion = np.array([19.45, 15.28]), math.radians(36.4), 24.6e3
     base = [(-30, -23), (50, -23), (50, 21.3), (foot[0], 21.3), foot, (0, 0), (0, -13), (-30, -13)]
@@ -178,15 +186,26 @@ def test_a_plane_keeps_its_cohesion_when_the_tension_crack_lets_go(way):
     )
     found = dda.factor_of_safety(blocks, [ROCK], [law], loads)
     print(f"{found.factor:.5f}, limit equilibrium {expected:.5f}")
+    verified(
+        "plane with cohesion that shares a corner with a tension crack; as drawn, mirrored, turned",
+        found.factor / expected - 1,
+        "limit equilibrium",
+    )
     assert found.factor == pytest.approx(expected, rel=1e-3)
 
 
-def shear_box(step: float, tension: float, turns: bool, modulus: float, steps: int) -> list[float]:
-    """Pa on a face of 1 m that is pressed by 1 MPa and pushed ``step`` m a time; its cohesion is kept as it slips."""
+def shear_box(
+    step: float, tension: float, turns: bool, modulus: float, steps: int, nodes=(), height: float = 0.5
+) -> list[float]:
+    """Pa on a face of 1 m, with flat ``nodes`` on it, that is pressed by 1 MPa and pushed ``step`` m a time; its cohesion
+    is kept as it slips. The push acts at half the ``height`` of the upper block."""
     law = JointLaw("joint", math.radians(35), 200e3, tension, residual_cohesion=200e3)
     blocks = Blocks.from_polygons(
-        [np.array([[-1, -0.5], [2, -0.5], [2, 0], [-1, 0]]), np.array([[0, 0], [1, 0], [1, 0.5], [0, 0.5]])],
-        fixed=[True, False], edge_names=[[[""] * 4], [["", "", "top", ""]]],
+        [
+            np.array([[-1, -0.5], [2, -0.5], [2, 0], [-1, 0]]),
+            np.array([[0, 0], *[[x, 0] for x in nodes], [1, 0], [1, height], [0, height]]),
+        ],
+        fixed=[True, False], edge_names=[[[""] * 4], [[""] * (2 + len(nodes)) + ["top", ""]]],
     )  # fmt: skip
     system = dda.BlockSystem(
         blocks, [Material("rock", modulus, 0.25, density=1.0)], [law], settings=DdaSettings(max_displacement_ratio=0.5)
@@ -210,15 +229,39 @@ def shear_box(step: float, tension: float, turns: bool, modulus: float, steps: i
         (2e-4, 0.0, True, 20e9, 4), (2e-4, 0.0, False, 20e9, 4), (1e-3, 100e3, True, 20e9, 4), (1e-3, 0.0, True, 1e9, 4),
     ],
 )  # fmt: skip
-def test_a_shear_box_ends_at_its_strength_whatever_the_step(step, tension, turns, modulus, steps):
+def test_a_shear_box_ends_at_its_strength_whatever_the_step(verified, step, tension, turns, modulus, steps):
     expected = 200e3 + 1e6 * math.tan(math.radians(35))
     found = shear_box(step, tension, turns, modulus, steps)
     print(f"{step:g} m a step: {found[-1] / 1e3:.2f} kPa, should be {expected / 1e3:.2f}")
+    verified(
+        "shear box with c = 200 kPa, seven of steps, stiffnesses and bonds", found[-1] / expected - 1, "c + σ tan φ"
+    )
     assert found[-1] == pytest.approx(expected, rel=1e-3) and max(found) <= expected * 1.001
 
 
+@pytest.mark.parametrize(
+    ("step", "tension", "turns", "modulus", "steps"),
+    [
+        (2e-7, 0.0, True, 20e9, 120),
+        (2e-4, 0.0, True, 20e9, 4),
+        (1e-3, 100e3, True, 20e9, 4),
+        (1e-3, 0.0, False, 1e9, 4),
+    ],
+)
+def test_flat_vertices_on_the_face_of_a_shear_box_take_no_strength(step, tension, turns, modulus, steps):
+    """A flat push keeps the whole face closed: c ℓ + N tan φ. A push at half of 0.5 m bears beyond the kern
+    (e = 0.22 ℓ): one end parts, and its cohesion is not there, the same at any step; between no-tension bedding,
+    c 3(ℓ/2 − e) + N tan φ, and the closed face."""
+    nodes, whole = np.arange(1, 10) / 10, 200e3 + 1e6 * math.tan(math.radians(35))
+    found = shear_box(step, tension, turns, modulus, steps, nodes, 0.05)
+    assert found[-1] == pytest.approx(whole, rel=1e-3) and max(found) <= whole * 1.001
+    parted = shear_box(step, tension, turns, modulus, steps, nodes)
+    bedded = 200e3 * 3 * (0.5 - 0.22) + 1e6 * math.tan(math.radians(35))
+    assert bedded < parted[-1] < whole and parted[-1] == pytest.approx(890.2e3, rel=1e-3)
+
+
 @pytest.mark.parametrize("stiffness", [1e5, 3e5, 1e8])
-def test_a_soft_anchor_counts_with_its_yield_force_and_its_displacement_is_told(stiffness):
+def test_a_soft_anchor_counts_with_its_yield_force_and_its_displacement_is_told(verified, stiffness):
     """F = N tan φ / T of a block on a plane at 40° with the anchor at its yield force, within 1 %."""
     slope, friction, force = math.radians(40), math.radians(30), 15e3
     blocks = Blocks.from_polygons(
@@ -236,6 +279,9 @@ def test_a_soft_anchor_counts_with_its_yield_force_and_its_displacement_is_told(
     )
     anchor = found.anchors[0]
     print(f"{stiffness:g} N/m: {found.factor:.4f}, should be {expected:.4f}; {anchor}, {found.warnings}")
+    verified(
+        f"block held by an anchor of {stiffness:g} N/m", None, "limit equilibrium", found=found.factor, exact=expected
+    )
     assert found.factor == pytest.approx(expected, rel=1e-2)
     assert anchor.stretch == pytest.approx(5e3 / stiffness, rel=2e-2) and anchor.moved > anchor.stretch
     assert bool(found.warnings) == (stiffness < 1e8)
@@ -257,7 +303,7 @@ def test_an_anchor_that_never_yields_counts_with_what_it_takes_while_blocks_stay
 
 
 @pytest.mark.parametrize("mirror", [False, True])
-def test_a_toppling_row_does_not_remember_the_friction_that_it_began_with(mirror):
+def test_a_toppling_row_does_not_remember_the_friction_that_it_began_with(verified, mirror):
     slope, heights = math.radians(20), (0.8, 2.0, 3.5, 4.2, 4.0, 3.0)
     n = len(heights)
     columns = [turned(rectangle(k, 0, k + 1, h), slope) for k, h in enumerate(heights)]
@@ -268,6 +314,11 @@ def test_a_toppling_row_does_not_remember_the_friction_that_it_began_with(mirror
         found = dda.factor_of_safety(blocks, [ROCK], [JointLaw("joint", math.atan(tangent))], loads)
         limits.append(tangent / found.factor)
     print("limit tan φ", limits)
+    verified(
+        "toppling row from four strengths, as drawn and mirrored: spread of the limit friction",
+        max(limits) / min(limits) - 1,
+        "each other",
+    )
     assert max(limits) < 1.005 * min(limits)
 
 
@@ -288,7 +339,7 @@ STEPPED = {
 
 @pytest.mark.parametrize("way", [{}, {"mirror": True}])
 @pytest.mark.parametrize("which", STEPPED)
-def test_stepped_planes_keep_their_cohesion_under_a_block_that_strains_evenly(which, way):
+def test_stepped_planes_keep_their_cohesion_under_a_block_that_strains_evenly(verified, which, way):
     """F = (c Σℓ + W cos β tan φ)/(W sin β) of a block on two parallel planes with an open riser (limit equilibrium).
     The block, which strains evenly, parts by a thousandth of a millimetre at an end of a plane: c ℓ counts all the
     same, and what it were without is told. Where it parts all along a plane, the answer of rigid blocks is told."""
@@ -319,6 +370,11 @@ def test_stepped_planes_keep_their_cohesion_under_a_block_that_strains_evenly(wh
     length = np.hypot(*(b - a)) + np.hypot(*(d - c))
     expected = (cohesion * length / weight + math.cos(dip) * math.tan(math.radians(friction))) / math.sin(dip)
     print(f"{found.factor:.5f}, limit equilibrium {expected:.5f}; {found.warnings}")
+    verified(
+        f"stepped planes with cohesion, {which}",
+        (found.factor if "end" in which else found.factor_if_rigid) / expected - 1,
+        "limit equilibrium",
+    )
     if which == "one plane parts at an end":
         assert found.factor == pytest.approx(expected, rel=1e-3)
         assert found.factor_if_parted < 0.97 * expected and "touches at one end only" in found.warnings[-1]

@@ -28,9 +28,9 @@ from ..peers.block_iteration import (
     TOLERANCES,
     Iterated,
     block_jacobi,
-    factored_anew,
     pardiso,
     pardiso_available,
+    refactored,
     two_levels,
 )
 from . import block_scenes
@@ -272,7 +272,7 @@ def _measured(name: str, blocks: Blocks, longest: float, jacobi: bool, domains: 
     residual = float(np.linalg.norm(right - solver.multiply(data, x)) / np.linalg.norm(right))
     others = [Iterated("direct", 1, cost.solution, residual, x)]
     if n_free <= DIRECTLY or domains:
-        others.append(factored_anew(solver, centroid, data, right))
+        others.append(refactored(solver, centroid, data, right))
         others += [pardiso(solver, data, right)] if pardiso_available() else []
     if jacobi:
         others += [block_jacobi(solver, data, right, tolerance) for tolerance in TOLERANCES]

@@ -50,7 +50,7 @@ def pardiso_available() -> bool:
     return importlib.util.find_spec("pypardiso") is not None
 
 
-def factored_anew(solver: BlockSolver, points: np.ndarray, data: np.ndarray, right: np.ndarray) -> Iterated:
+def refactored(solver: BlockSolver, points: np.ndarray, data: np.ndarray, right: np.ndarray) -> Iterated:
     """As `geomech.dda` does where nothing is left of another set of contacts; ``points`` (n, 2) m are the blocks'
     centroids."""
     another = BlockSolver(points, _rows(solver), solver.columns)

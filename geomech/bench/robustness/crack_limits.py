@@ -170,15 +170,15 @@ def specimen(contrast: float, penalty: float, offset: float = 0.0, order: float 
     w, h, out, thick = 0.03, 0.06, 0.035, 0.01
     top = np.array([[-out, h], [out, h], [out, h + thick], [w, h + thick], [-w, h + thick], [-out, h + thick]])
     polygons = [p + offset for p in (rectangle(-w, -h, w, h), top, rectangle(-out, -h - thick, out, -h))]
-    held = np.zeros((3, 6), bool)
-    held[1, [0, 2, 5]] = True
+    constrained = np.zeros((3, 6), bool)
+    constrained[1, [0, 2, 5]] = True
     names = [[["", "", "", ""]], [["", "", "", "load:top", "", ""]], [["", "", "", ""]]]
     platen = Material("platen", 17e9 * contrast, 0.21, 2200.0)
     stiffness = penalty * ROCK.plane_modulus
     problem = Problem(
         title="specimen",
         blocks=Blocks.from_polygons(
-            polygons, material=[0, 1, 1], fixed=[False, False, True], held=held, edge_names=names
+            polygons, material=[0, 1, 1], fixed=[False, False, True], constrained=constrained, edge_names=names
         ),
         cracks=Cracks.from_polylines([line + offset for line in two_cracks.crack_ends(0)], aperture=math.inf),
         materials=(ROCK, platen),

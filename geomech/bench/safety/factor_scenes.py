@@ -337,4 +337,5 @@ _MAKERS = {
 
 
 def problem(slope: FactorSlope) -> Problem:
+    """The problem of the scene of ``slope``."""
     return problem_of(slope.scene)

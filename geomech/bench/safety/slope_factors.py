@@ -127,7 +127,7 @@ def _search(slope: FactorSlope, variant: str, seconds: float) -> Searched:
         said = tuple(getattr(found, "warnings", ()))
     except TimeUp as up:
         verdict, message = LONG, str(up)
-    except Exception as error:  # noqa: BLE001 (any but those known is what is looked for)
+    except Exception as error:  # any error but the known ones is a finding
         message = str(error)
         if time_up(error) is not None:
             verdict = LONG

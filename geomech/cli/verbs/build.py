@@ -19,7 +19,7 @@ def declare(verbs: Verbs) -> None:
                                 "runs",
         "geomech build slope.toml\ngeomech build slope.toml --set geometry.seed=7 --out /tmp/seed7",
     )  # fmt: skip
-    build.description += (
+    build.description = str(build.description) + (
         " Joint sets are told as they were asked for and as they came out (block_system.json), with a picture of block"
         " sizes, directions, trace lengths and nodes beside the blocks' own (joint_statistics.png)."
     )

@@ -23,9 +23,9 @@ def _doctor(options: argparse.Namespace) -> int:
 
     if options.warm:
         from ...doctor import warm
-        from ..messages import tell_compiling
+        from ..messages import report_compiling
 
-        tell_compiling()
+        report_compiling()
         warm()
     checks = examine()
     for check in checks:

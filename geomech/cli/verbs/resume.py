@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from ..messages import say, tell_compiling
+from ..messages import report_compiling, say
 from ..scenes import trust_argument
 from ..verb import DONE, BadInput, Verbs, add_verb
 from .run import prepare_for_a_run
@@ -18,7 +18,7 @@ def declare(verbs: Verbs) -> None:
                                   "checkpoint",
         "geomech resume outputs/two_cracks/phi_30\ngeomech resume outputs/slope --set run.end_time_s=20",
     )  # fmt: skip
-    resume.description += (
+    resume.description = str(resume.description) + (
         " What is written is bit for bit what the run would have left uninterrupted. A run ends its cycle and stores "
         "itself on Ctrl-C or SIGTERM; a second one ends it at once. A run that a "
         "script has put in the background ignores Ctrl-C and ends on SIGTERM (`kill`)."
@@ -36,7 +36,7 @@ def declare(verbs: Verbs) -> None:
 def _resume(options: argparse.Namespace) -> int:
     prepare_for_a_run()
     if not options.quiet:
-        tell_compiling()
+        report_compiling()
     from ...resumption import Finished, NotResumable, resume
 
     try:

@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from ..messages import say_warnings, tell_compiling
+from ..messages import report_compiling, say_warnings
 from ..scenes import default_folder, scene_arguments, scenes_asked, variants_asked
 from ..verb import DONE, BadInput, Verbs, add_verb, check_folder
 
@@ -30,7 +30,7 @@ def _run(options: argparse.Namespace) -> int:
     check_folder("--out", options.out)
     prepare_for_a_run()
     if not options.quiet:
-        tell_compiling()
+        report_compiling()
     from ...pipeline import overwriting
 
     with overwriting(options.overwrite):
@@ -72,10 +72,12 @@ def _run_script(place: Path, options: argparse.Namespace) -> int:
             say_warnings(scenes_asked(first, options).values())
     elif "all" in variants:
         raise BadInput(f"{place} holds no scene.toml that says what its variants are: name them")
+    from ...output.console.at_work import AtWork
+
     script = _load_script(place / "run.py")
-    result = script.main(
-        place, options.out or default_folder(place), overrides=options.overrides, variants=variants, quiet=options.quiet
-    )
+    out = options.out or default_folder(place)
+    with AtWork(place.resolve().name, quiet=options.quiet):
+        result = script.main(place, out, overrides=options.overrides, variants=variants, quiet=options.quiet)
     return DONE if result is None else int(result)
 
 

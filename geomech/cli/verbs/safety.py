@@ -6,7 +6,7 @@ import argparse
 import sys
 from pathlib import Path
 
-from ..messages import say, say_warnings, tell_compiling
+from ..messages import report_compiling, say, say_warnings
 from ..scenes import scene_arguments, scenes_asked
 from ..verb import DONE, BadInput, Verbs, add_verb, check_writable
 
@@ -65,7 +65,7 @@ def _safety(options: argparse.Namespace) -> int:
     except NothingToReduce as error:
         raise BadInput(f"--divide: {error}") from error
     if not options.quiet:
-        tell_compiling()
+        report_compiling()
     scenes = scenes_asked(load_scene(options.scene, options.overrides, None), options)
     say_warnings(scenes.values())
     told = {}

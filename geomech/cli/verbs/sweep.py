@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from ..messages import say, tell_compiling
+from ..messages import report_compiling, say
 from ..scenes import trust_argument
 from ..verb import DONE, FAILED, BadInput, Verbs, add_verb, check_folder
 from .run import prepare_for_a_run
@@ -21,7 +21,7 @@ def declare(verbs: Verbs) -> None:
         "geomech sweep slope.toml --vary 'joints.beds.friction_angle_deg=normal(30, 4)' --runs 1000 --sampling sobol\n"
         "geomech sweep slope.toml --out outputs/slope_sweep --resume",
     )  # fmt: skip
-    made.description += (
+    made.description = str(made.description) + (
         " What varies, and all other settings, may stand in [sweep] of the scene or in a sweep.toml beside it; "
         "what the "
         "command line says goes before. One row a run goes to runs.csv and runs.parquet, a page to report.html."
@@ -100,7 +100,7 @@ def _sweep(options: argparse.Namespace) -> int:
         raise BadInput("--workers takes a number of processes, at least 1")
     prepare_for_a_run()
     if not options.quiet:
-        tell_compiling()
+        report_compiling()
     from ...sweep.cluster import EngineRefused
     from ...sweep.execution import CannotResume, Telling, carry_out_sweep, default_folder, engine_for, read_sweep
     from ...sweep.plan import plan_of

@@ -1,9 +1,9 @@
-"""What a block's cracks add to its strain, handed back to the block solver.
+"""Crack compliance of a block: the strain that crack opening and slip add to it, as DDA uses it.
 
-The crack strain of a block is made linear in its mean stress, ε_c(σ) = offset + S σ: S from unit-stress solves of its
-elastic body (`geomech.ddm.Body.compliance`), the offset from the solve under the actual boundary load, so that the two
-agree where they were taken. The block solver then treats S implicitly (an explicit hand-back diverges as soon as the
-cracks are softer than the rock, which every nearly split block reaches).
+The crack strain is linearised in the mean stress, ε_c(σ) = offset + S σ. S comes from solutions under unit stresses
+(`geomech.ddm.Body.compliance`), the offset from the solution under the actual load, so that the two agree there. DDA
+treats S implicitly: handing ε_c back explicitly diverges as soon as the cracks are softer than the rock, which happens
+in every block before it is divided.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ import math
 
 import numpy as np
 
-#: Negative eigenvalues below this part of the largest are none.
+#: Negative eigenvalues smaller than this fraction of the largest count as zero.
 _ROUND_OFF = 1e-12
 
 
@@ -35,19 +35,18 @@ def stress_rotations(angle: np.ndarray) -> np.ndarray:
 
 
 def strain_rotation(angle: float) -> np.ndarray:
-    """The same for strain with engineering shear: Q⁻ᵀ, since σ·ε does not change; Q⁻¹ turns back."""
+    """The same for strain with engineering shear: Q⁻ᵀ, since σ·ε is invariant; Q⁻¹ rotates back."""
     return stress_rotation(-angle).T
 
 
 def passive(compliance: np.ndarray) -> np.ndarray:
-    """``compliance`` (3, 3) without what would give energy back: the nearest positive semidefinite one, whatever the
-    axes.
+    """The nearest positive semidefinite ``compliance`` (3, 3), independent of the axes.
 
-    Faces that slide under Coulomb's friction answer a normal stress with slip, but no shear stress with opening; the
-    symmetric part of such a response has a negative direction, in which a block, as soft as the rock or softer, would
-    have no stiffness. What is left out stays in the offset, and passes find it.
+    Faces that slide with Coulomb friction respond to normal stress with slip, but not to shear stress with opening. The
+    symmetric part of that response has a negative eigenvalue, along which a block as soft as its rock, or softer, would
+    have no stiffness. The part removed stays in the offset, and the iteration finds it.
     """
-    size = np.array([1.0, 1.0, np.sqrt(0.5)])  # of Mandel's components, in which axes turn without change of length
+    size = np.array([1.0, 1.0, np.sqrt(0.5)])  # Mandel components, whose length does not depend on the axes
     values, vectors = np.linalg.eigh(size[:, None] * compliance * size)
     if values[0] >= -_ROUND_OFF * values[-1]:
         return compliance
@@ -58,8 +57,8 @@ def passive(compliance: np.ndarray) -> np.ndarray:
 def crack_response(
     compliance: np.ndarray, crack_strain: np.ndarray, stress: np.ndarray, angle: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """(S, offset) in current axes from ``compliance`` and ``crack_strain`` in the block's reference axes and the mean
-    ``stress`` (current axes) at which the crack strain was found."""
+    """(S, offset) in current axes, from ``compliance`` and ``crack_strain`` in the block's reference axes and the mean
+    ``stress`` (current axes) at which that strain was found."""
     parts = (np.asarray(part)[None] for part in (compliance, crack_strain, stress, angle))
     s, offset = crack_responses(*parts)
     return s[0], offset[0]
@@ -76,5 +75,5 @@ def crack_responses(
 
 
 def times(matrices: np.ndarray, vectors: np.ndarray) -> np.ndarray:
-    """(n, 3) every matrix (n, 3, 3) times its vector (n, 3)."""
+    """(n, 3) product of every matrix (n, 3, 3) with its vector (n, 3)."""
     return (matrices @ vectors[..., None])[..., 0]

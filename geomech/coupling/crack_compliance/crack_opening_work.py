@@ -1,9 +1,9 @@
-"""The work that forces at rest do in opening the cracks of a body: what blocks of one strain cannot know of it.
+"""Work of static loads in opening the cracks of a body, beyond the work of its mean stress.
 
-Tractions t displace the outline of a cracked body by u_c more than that of a whole one. By reciprocity (Betti) their
-work on it is ∫ t·u_c ds = ∫ t₀·[u] ds, with t₀ what they bring to closed crack faces, whatever way they are spread; and
-½ of it is what a body with open cracks stores by them (Clapeyron). The mean stress does A σ : ε_c of it. The rest is the
-work of forces that bend, shear or press the block unevenly.
+Tractions t displace the outline of a cracked body by u_c more than that of the intact one. By Betti's theorem their
+work on it is ∫ t·u_c ds = ∫ t₀·[u] ds, where t₀ are the tractions that the same loads would cause on closed crack
+faces; half of it is stored by open cracks (Clapeyron). The mean stress does the part A σ : ε_c. The rest is the work of
+loads that bend, shear or press the block unevenly, which a block of uniform strain does not know.
 """
 
 from __future__ import annotations
@@ -19,8 +19,8 @@ if TYPE_CHECKING:
 
 
 def work_on_cracks(before: Solution, after: Solution) -> float:
-    """J/m done by the mean of the loads of two solutions on what the cracks have opened and slipped from one to the
-    other: ½ (t_a + t_b)·(u_b − u_a). Cracks may have grown between them; each load then is laid on each geometry."""
+    """Work on crack opening and slip between two solutions, J/m: ½ (t_a + t_b)·(u_b − u_a). Where cracks have grown in
+    between, each load is applied to each geometry."""
     load_a, load_b = before.closed_traction, after.closed_traction
     if before.body.crack_system is after.body.crack_system:
         a_on_b, b_on_a = load_a, load_b
@@ -31,8 +31,8 @@ def work_on_cracks(before: Solution, after: Solution) -> float:
 
 
 def first_work_on_cracks(stress: np.ndarray, rotation: float, after: Solution) -> float:
-    """The same of cracks that had not been there, in a block whose mean ``stress`` (3,), Pa, current axes, turned by
-    ``rotation`` rad, was all there was."""
+    """The same for cracks cut into a block whose only stress was the mean ``stress`` (3,), Pa, current axes; the block
+    is rotated by ``rotation`` rad."""
     load = after.closed_traction
     if np.any(stress):
         from ... import ddm

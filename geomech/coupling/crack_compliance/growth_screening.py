@@ -1,10 +1,10 @@
-"""Blocks in motion whose cracks cannot grow in a pass are not solved for, until somebody asks what is in them.
+"""Skips the solution of moving blocks whose cracks cannot grow, until somebody asks for it.
 
-In motion a block answers to its mean stress (`mean_stress_response`); the forces on it drive its tips, and no more. Where a
-bound of K under forces of their size (`ddm.fracture.sif_bound`) is below the toughness, the pass goes on without the solution, and
-gives the same blocks. The bound is found when a block has stood for a while with tips far from their toughness, or it
-would cost more than it spares; and where what is left out is asked for after most passes, as by a table of all tips,
-nothing is left out.
+In motion a block responds to its mean stress (`mean_stress_response`), so that the full solution only gives the loading
+of its tips. Where an upper bound of K under the present forces (`ddm.fracture.sif_bound`) is below the toughness, the
+pass continues without that solution, with the same blocks. The bound is computed after several solutions with tips far
+from their toughness; otherwise it would cost more than it saves. Where skipped solutions are requested after most
+passes, as by a table of all tips, nothing is skipped.
 """
 
 from __future__ import annotations
@@ -19,16 +19,16 @@ if TYPE_CHECKING:
     from ...ddm.fracture.sif_bound import TipBound
     from ...model import Blocks, Problem
 
-#: Solutions of a body after which its bound is found, which takes about as long as twenty of them; …
+#: Solutions of a body before its bound is computed, which takes about as long as twenty of them …
 STOOD = 5
-#: … where K_eq was no more than this part of the toughness: bounds are several times larger than K.
+#: … and largest K_eq/K_Ic at which it is: bounds are several times K.
 FAR = 0.1
-#: Of the toughness, what a bound has to stay below.
+#: Fraction of the toughness that the bound must not reach.
 BELOW = 1.0 - 1e-6
 
 
 class CoupledBlocks(Protocol):
-    """What of a coupled run is looked at: its blocks, and by block their elastic bodies, loads and solutions."""
+    """The part of a coupled run that is used: blocks, and by block their bodies, loads and solutions."""
 
     problem: Problem
     blocks: Blocks
@@ -39,8 +39,8 @@ class CoupledBlocks(Protocol):
 
 @dataclass(eq=False)
 class _Known:
-    """Of a body with this ``crack_system``: how often it was ``solved``, the ``bound`` and what of K_eq a unit of K comes
-    to at most; ``never``: it cannot be bounded."""
+    """Data of the body with this ``crack_system``: number of times it was ``solved``; the ``bound``; ``per_factor``:
+    largest K_eq per unit K; ``never``: it has no bound."""
 
     crack_system: object
     solved: int = 0
@@ -50,15 +50,15 @@ class _Known:
 
 
 @dataclass(eq=False)
-class CannotGrow:
-    """``passes`` in which something was left out, and after how many of them it was ``asked`` for."""
+class GrowthScreening:
+    """``passes`` in which solutions were skipped, and in how many of them they were ``asked`` for afterwards."""
 
     passes: int = 0
     asked: int = 0
     _known: dict[int, _Known] = field(default_factory=dict)
 
     def among(self, now: CoupledBlocks, dt: float) -> set[int]:
-        """The blocks that need not be solved for under the present loads, in a step of ``dt`` s."""
+        """Blocks that need no solution under the present loads in a step of ``dt`` s."""
         problem = now.problem
         if not _may_leave_out(problem) or 2 * self.asked > self.passes:
             return set()
@@ -67,7 +67,7 @@ class CannotGrow:
         return found
 
     def solved(self, now: CoupledBlocks, tips: np.ndarray, toughness: np.ndarray) -> None:
-        """Blocks have been solved for, and have these ``tips``, TIP rows, of this ``toughness`` (n_tips,)."""
+        """Take note of new solutions with these ``tips`` (TIP rows) and their ``toughness`` (n_tips,)."""
         if not _may_leave_out(now.problem):
             return
         near = set(tips["block"][tips["k_eq"] > FAR * toughness].tolist())
@@ -81,8 +81,7 @@ class CannotGrow:
                 self._bound(now, block, known)
 
     def renumber(self, parent: np.ndarray | None, whole: np.ndarray) -> None:
-        """Blocks are new ones: of those that are their ``parent`` (n_blocks,), ``whole`` (k,) numbers, what is known
-        stays."""
+        """Renumber the blocks: of ``whole`` (k,) new numbers, the data of their ``parent`` (n_blocks,) are kept."""
         known = self._known
         self._known = {child: known[parent[child]] for child in whole.tolist() if parent[child] in known}
 
@@ -101,7 +100,7 @@ class CannotGrow:
             return False
         if load.points is not None or load.bases:
             return False
-        # What drives tips to which waves take longer than a step is the mean of what was (`wave_arrival`).
+        # Tips that waves reach later than one step are loaded by the mean of earlier K_eq (`wave_arrival`).
         size = float(np.ptp(now.blocks.loops(block)[0], axis=0).max())
         if np.sqrt(2.0) * size > body.material.pressure_wave_speed * dt:
             return False
@@ -110,7 +109,7 @@ class CannotGrow:
 
 
 def _may_leave_out(problem: Problem) -> bool:
-    """Whether nothing but growth from tips is asked of solutions: no births of cracks, trial kinks or events of faces."""
+    """Whether only tip growth depends on the solutions: no crack initiation, trial kinks or events of crack faces."""
     growth = problem.growth
     moves = problem.dda.dynamic_factor != 0.0
     return moves and problem.run.skip and not (growth.initiation or growth.trial_kink or problem.run.events)

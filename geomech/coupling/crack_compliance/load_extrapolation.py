@@ -1,7 +1,7 @@
-"""What a static solution may expect of cracks before any pass, by their answers at other loads.
+"""Initial guess for the crack strain of a static load step, extrapolated from up to six earlier solutions.
 
-While no contact and no face changes its state, everything goes in a straight line with the loads: what the strain of
-cracks is beyond S σ, too. Two answers tell the third, where its loads are on the line through theirs.
+While no contact and no crack face changes its state, everything depends linearly on the loads, also the crack strain
+beyond S σ. Two earlier solutions give a third whose loads lie on the line through theirs.
 """
 
 from __future__ import annotations
@@ -12,20 +12,20 @@ import numpy as np
 
 from .added_compliance import times
 
-#: Answers that are looked back on.
+#: Number of earlier solutions kept.
 KEPT = 6
 
-#: S of a block whose change is below this part of it is the same.
+#: Relative change of S below which it counts as unchanged.
 _SAME = 1e-6
 
-#: Loads nearer to one another, or to a line, than this part of the largest are the same, or on it.
+#: Relative distance below which loads count as equal, or as lying on a line.
 _APART = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
 class Answer:
-    """At ``loads`` (k,) what ``systems`` of cracks (n) answer: their strain and the mean stress of their blocks, (n, 3)
-    in the blocks' own axes, and S (n, 3, 3)."""
+    """A converged solution: ``loads`` (k,); for n crack ``systems`` their strain and the mean stress of their blocks
+    (n, 3), in the blocks' own axes, and S (n, 3, 3)."""
 
     loads: np.ndarray
     systems: tuple
@@ -34,17 +34,17 @@ class Answer:
     compliance: np.ndarray
 
     def beyond(self, compliance: np.ndarray) -> np.ndarray:
-        """(n, 3) strain beyond S σ with this S."""
+        """(n, 3) crack strain beyond S σ, with S the ``compliance``."""
         return self.strain - times(compliance, self.stress)
 
     def is_of(self, systems: tuple) -> np.ndarray:
-        """(n,) bool, whose cracks are these."""
+        """(n,) bool: blocks whose crack system is the given one."""
         return np.array([a is b for a, b in zip(self.systems, systems)], bool)
 
 
 @dataclass(eq=False)
-class Foretold:
-    """The last answers of the same ``blocks``, the newest first."""
+class LoadExtrapolation:
+    """The last solutions of the same ``blocks``, the newest first."""
 
     blocks: tuple[int, ...] = ()
     answers: list[Answer] = field(default_factory=list)
@@ -61,9 +61,11 @@ class Foretold:
     def at(
         self, loads: np.ndarray, blocks: tuple[int, ...], systems: tuple
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Where it is known, (n,) bool, of crack ``systems`` in ``blocks``: strain of cracks beyond S σ at ``loads``
-        (n, 3), by the line through the nearest two answers with which they are on one line, or by the nearest one where
-        S is not that of both; and S (n, 3, 3)."""
+        """Extrapolate to ``loads`` for the crack ``systems`` in ``blocks``.
+
+        Returns where a value is known (n,) bool; the crack strain beyond S σ (n, 3), on the line through the nearest
+        two solutions that are collinear with ``loads``, or that of the nearest one where they differ in S; and S (n, 3,
+        3)."""
         n = len(blocks)
         if self.last(blocks) is None:
             return np.zeros(n, bool), np.zeros((n, 3)), np.zeros((n, 3, 3))

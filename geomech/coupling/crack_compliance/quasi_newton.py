@@ -1,4 +1,11 @@
-"""Passes of blocks and cracks at one load brought to agree: a quasi-Newton method that learns from every pass."""
+"""Quasi-Newton (Anderson) acceleration of the iteration between block motion and crack strain at one load.
+
+A pass assumes the crack strain offset + S σ and finds another one. The plain fixed-point iteration gains a factor of 3
+to 30 a pass: contacts redistribute their forces, which S (the response to mean stress) does not contain. Here the
+changes of offset and residual in earlier passes are combined so that, for a linear response, the residual is reduced as
+far as they allow (Anderson 1965; Walker & Ni 2011). Changes from earlier solutions are used as well, as far as newer
+ones do not already span them (Degroote, Bathe & Vierendeels 2009).
+"""
 
 from __future__ import annotations
 
@@ -6,17 +13,17 @@ from itertools import pairwise
 
 import numpy as np
 
-#: Passes of one solution that are looked back on.
+#: Passes of the present solution that are used.
 DEPTH = 4
 
-#: Changes from pass to pass of earlier solutions that are.
+#: Changes from earlier solutions that are used.
 OLDER = 12
 
-#: Changes of residuals of which less than this part is new say nothing new: in one solution, and of earlier ones, of
-#: which cracks that have grown and contacts that have slipped leave no more than so much true.
+#: Relative part of a change that must be linearly independent of newer ones: within one solution, and for earlier ones,
+#: which growth and slip have made inexact.
 _RANK, _RANK_OLDER = 1e-8, 3e-2
 
-#: S whose change is below this part of it is the same.
+#: Relative change of S below which it counts as unchanged.
 _SAME = 1e-6
 
 #: Least relaxation factor.
@@ -24,19 +31,11 @@ _LEAST = 0.05
 
 
 class Settling:
-    """The next offset of the crack strains, from those tried so far and what came out.
+    """The next offset of the crack strains, from those tried so far and their residuals.
 
-    A pass assumes the crack strain offset + S σ and finds another one. Handing back what it found is a fixed-point
-    iteration, which gains a factor of three to thirty a pass: contacts whose forces it moves load the cracks otherwise
-    than by the blocks' mean stress, which is all that S knows. Here changes from pass to pass are combined so that,
-    were the answer linear, what is left of the difference from agreement would cancel as far as it can (Anderson 1965;
-    Walker & Ni 2011). What blocks in contact do to cracks is nearly the same at another load, and beside it at grown
-    cracks: the changes that earlier solutions have seen count, too, the newest first, and older ones by what they tell
-    that newer ones have not (Degroote, Bathe & Vierendeels 2009). Where they do not help they are forgotten.
-
-    Where S itself has changed, with the states of crack faces, what was before tells nothing for all blocks together;
-    a block whose difference has turned about is then relaxed by Aitken's factor (Irons & Tuck 1969), for faces that
-    close at one answer and open at the other would go on for ever.
+    Where S has changed with the states of crack faces, the history is dropped. A block whose residual has changed its
+    sign is then relaxed by Aitken's factor (Irons & Tuck 1969); faces that close for one response and open for the
+    other would otherwise oscillate for ever.
     """
 
     def __init__(self) -> None:
@@ -50,29 +49,30 @@ class Settling:
         self._residuals: list[np.ndarray] = []
         self._compliance: np.ndarray | None = None
         self._last: tuple[np.ndarray, np.ndarray] | None = None
-        #: Largest residual of the last pass, relative, where earlier solutions led to the present one.
+        #: Largest relative residual of the last pass, where changes of earlier solutions were used.
         self._led: float | None = None
 
     def begin(self, blocks: tuple[int, ...]) -> None:
-        """Passes of another solution, of the cracked ``blocks``, follow."""
+        """Start another solution, for these cracked ``blocks``."""
         self._older = (self._changes() + self._older)[:OLDER] if blocks == self._blocks else []
         self._blocks = blocks
         self._start()
 
     def forget(self) -> None:
-        """What earlier passes have shown is of no use: blocks answer otherwise from now on."""
+        """Drop all earlier passes: the blocks respond differently from now on."""
         self._older = []
         self._start()
 
     def _changes(self) -> list[tuple[np.ndarray, np.ndarray]]:
-        """From each pass to the next, the newest first."""
+        """The changes from each pass to the next, the newest first."""
         tried = list(zip(self._offsets, self._residuals))
         return [(b[0] - a[0], b[1] - a[1]) for a, b in pairwise(tried)][::-1]
 
     def next(self, offset: np.ndarray, residual: np.ndarray, compliance: np.ndarray, size: np.ndarray) -> np.ndarray:
-        """(n, 3) the offset to assume. ``offset`` (n, 3) is that of the last pass (told for the present
-        ``compliance``), (n, 3, 3), ``residual`` the crack strain found less the one assumed; ``size`` (n,) of the
-        blocks' strain weighs them."""
+        """(n, 3) the offset to assume next.
+
+        ``offset`` (n, 3) of the last pass, converted to the present ``compliance`` (n, 3, 3); ``residual`` (n, 3):
+        crack strain found minus assumed; ``size`` (n,): strain of each block, as a weight."""
         known = self._compliance
         if known is None or np.abs(known - compliance).max() > _SAME * np.abs(compliance).max():
             self._offsets, self._residuals, self._compliance = [], [], compliance
@@ -90,13 +90,13 @@ class Settling:
         return offset + residual - self._correction(residual, weight)
 
     def _correction(self, residual: np.ndarray, weight: np.ndarray) -> np.ndarray:
-        """(n, 3) Σ γ (Δoffset + Δresidual) with Σ γ Δresidual as near to the ``residual`` as can be."""
+        """(n, 3) Σ γ (Δoffset + Δresidual), with γ from least squares of Σ γ Δresidual = ``residual``."""
         own = self._changes()
         left = (residual * weight).ravel()
         ways: list[tuple[np.ndarray, np.ndarray]] = []
         correction = np.zeros_like(residual)
         for k, (moved, changed) in enumerate(own + self._older):
-            # By Gram and Schmidt: what of this change newer ones have not told, and what it moved for it.
+            # Gram-Schmidt: the part of this change that newer ones do not span, with the offsets that belong to it.
             new, full = (changed * weight).ravel(), moved + changed
             length = float(np.linalg.norm(new))
             for way, went in ways:
@@ -111,7 +111,8 @@ class Settling:
         return correction
 
     def _relaxation(self, residual: np.ndarray) -> np.ndarray:
-        """(n,) Aitken's factor of each block whose ``residual`` (n, 3) has turned about since the last pass, else 1."""
+        """(n,) Aitken's factor of each block whose ``residual`` (n, 3) has changed its sign since the last pass, else
+        1."""
         factor = np.ones(len(residual))
         if self._last is not None:
             before, used = self._last

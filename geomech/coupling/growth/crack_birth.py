@@ -1,4 +1,4 @@
-"""Cracks that are born in the blocks: where the whole rock of one of them has reached its strength."""
+"""Crack initiation in blocks: where intact rock has reached its strength."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ from ...model import Blocks, Cracks, GrowthSettings, Material
 def born_first(
     blocks: Blocks, materials: Sequence[Material], solutions: dict, settings: GrowthSettings
 ) -> tuple[Sequence, int]:
-    """The births (`ddm.growth.initiation.Birth`) of the most overstressed block (keys of ``solutions``), whether or not it has
-    reached its strength, and that block; ((), −1) when none has a strength to exceed."""
+    """The candidate cracks (`ddm.growth.initiation.Birth`) of the most overstressed block (keys of ``solutions``),
+    whether or not it has reached its strength, and the number of that block; ((), −1) if no material has a strength."""
     from ...ddm.growth.initiation import births
     from ...ddm.growth.tie_tolerance import reached
 
     found = {b: births(solution, materials[blocks.material[b]], settings, b) for b, solution in solutions.items()}
     most = max((of[0].overstress for of in found.values() if of), default=0.0)
-    # Of blocks that are alike the first.
+    # Among equally overstressed blocks, the first one.
     where = next((b for b, of in found.items() if of and reached(of[0].overstress, most)), -1)
     return found.get(where, ()), where
 
@@ -35,9 +35,9 @@ def bear_in_blocks(
     cycle: int,
     enough: float = 1.0,
 ):
-    """``cracks`` with those that are born in the most overstressed block, as a `Growth`, and the births; (None, ())
-    when no block is strained to ``enough`` times its strength; ``limits(block)``: loops about its rock. One block at a
-    time: the others then carry other loads."""
+    """``cracks`` with those that start in the most overstressed block, as a `Growth`, and the new cracks; (None, ()) if
+    no block reaches ``enough`` times its strength. ``limits(block)``: loops around its rock. Only one block at a time,
+    since new cracks change the loads of the others."""
     from ...ddm.growth.initiation import bear
     from ...ddm.growth.tie_tolerance import reached
     from ...ddm.growth.tip_advance import Growth
@@ -45,7 +45,7 @@ def bear_in_blocks(
     best, where = born_first(blocks, materials, solutions, settings)
     if not best or not reached(best[0].overstress, enough):
         return None, ()
-    # The body's segments are those of its block, in order.
+    # Segments of a body are those of its block, in the same order.
     of_block = np.flatnonzero(cracks.block == where)
     best = [replace(birth, segment=int(of_block[birth.segment])) if birth.segment >= 0 else birth for birth in best]
     grown = np.zeros(sum(len(solution.tips) for solution in solutions.values()))

@@ -1,4 +1,4 @@
-"""Growth at one load: which cracks grow or are born, what they meet, which blocks that cuts through."""
+"""Growth at one load: which tips grow, where cracks start, what they meet, and which blocks they cut."""
 
 from __future__ import annotations
 
@@ -25,9 +25,9 @@ def growth_of_tips(
     together: float = 1.0,
     longest: np.ndarray | float = np.inf,
 ):
-    """The new network (`ddm.growth.tip_advance.Growth`) when some of ``tips`` has a K_eq of ``enough`` times its toughness, else
-    None; those with ``together`` times theirs grow with it. No tip goes farther than ``longest`` (n_tips,) m, and none
-    with 0. Sets the angles that were followed."""
+    """Grow all ``tips`` with K_eq of at least ``enough`` times their toughness, and with them those that reach
+    ``together`` times theirs. Returns the new network (`ddm.growth.tip_advance.Growth`), or None if no tip grows.
+    ``longest`` (n_tips,) m: largest increment of each tip, 0 for none. Sets the growth angles."""
     k_ic = toughness(now, tips)
     from ...ddm.growth.path_correction import corrected
     from ...ddm.growth.tie_tolerance import reached
@@ -52,13 +52,12 @@ def growth_of_tips(
 
     growth = corrected(tips, grow, look_ahead, now.number, now.problem.growth.correct, now.chords)
     if growth is not None:
-        now.bodies = trial  # most of it is what the corrected step needs
+        now.bodies = trial  # the corrected step reuses most of their matrices
     return growth
 
 
 def drive(now: CrackedBlocks, found: Balance) -> float:
-    """How near to growth the cracks are: the largest K_eq/K_Ic, or the largest overstress where cracks may be born;
-    growth starts at one."""
+    """Largest K_eq/K_Ic of all tips, or largest stress over strength where cracks may start: growth begins at 1."""
     most = float(np.max(found.tips["k_eq"] / toughness(now, found.tips), initial=0.0))
     if now.problem.growth.initiation:
         from .crack_birth import born_first
@@ -70,7 +69,7 @@ def drive(now: CrackedBlocks, found: Balance) -> float:
 
 
 def births(now: CrackedBlocks, solutions: dict, state: State, enough: float = 1.0):
-    """New cracks, and their events, where no tip grows and whole rock is strained to ``enough`` times its strength."""
+    """New cracks and their events, where no tip grows and intact rock reaches ``enough`` times its strength."""
     from .crack_birth import bear_in_blocks
 
     with now.timed("growth"):
@@ -85,7 +84,7 @@ def births(now: CrackedBlocks, solutions: dict, state: State, enough: float = 1.
 
 
 def initiations(now: CrackedBlocks, tips: np.ndarray, state: State) -> tuple[Event, ...]:
-    """An event for every tip that grows for the first time; wings inherit their crack and end by position."""
+    """An event for every tip that grows for the first time; wing cracks inherit the crack, and the end by position."""
     events = []
     first = {int(s): k for k, s in reversed(list(enumerate(now.cracks.segments.ravel())))}
     for tip in tips[tips["grown"] > 0]:
@@ -98,8 +97,8 @@ def initiations(now: CrackedBlocks, tips: np.ndarray, state: State) -> tuple[Eve
 
 
 def part_here(now: CrackedBlocks, growth, state: State) -> list[int]:
-    """The blocks that ``growth`` (None: there is none) cuts in two, where their parts can go on from ``state``, in
-    which the pass has left them."""
+    """The blocks that ``growth`` (None: no growth) cuts in two and whose parts can start from ``state``, the end of the
+    pass."""
     if growth is None or not growth.joins:
         return []
     with now.timed("growth"):
@@ -109,9 +108,8 @@ def part_here(now: CrackedBlocks, growth, state: State) -> list[int]:
 
 
 def take_growth(now: CrackedBlocks, growth, state: State, solutions: dict) -> tuple[Event, ...]:
-    """Make ``growth`` the present geometry; split what it cut through. Returns the events it brought, at ``state``, the
-    end of the pass with these ``solutions``. Where the blocks stand there, the parts begin with the forces of their
-    faces."""
+    """Make ``growth`` the present geometry and split the blocks it cuts. Returns its events, at ``state``, the end of
+    the pass with these ``solutions``. Blocks that are in that state inherit the forces on their crack faces."""
     names = now.cracks.names
     events = []
     for join in growth.joins:
@@ -127,12 +125,12 @@ def take_growth(now: CrackedBlocks, growth, state: State, solutions: dict) -> tu
         now.take_cracks(growth.cracks)
         return tuple(events)
     cut = now.blocks
-    for b in np.flatnonzero(np.bincount(split.parent, minlength=now.blocks.n_blocks) > 1):
+    for b in np.flatnonzero(np.bincount(split.parent, minlength=now.blocks.n_blocks) > 1).tolist():
         parts = np.flatnonzero(split.parent == b)
         centre = now.blocks.loops(b)[0].mean(axis=0)
         events.append(event(now, "split", state, centre, f"{now.blocks.names[b]} is cut into {len(parts)} blocks"))
     loads, stands, begun = now.loads, now.state is state, now.state
-    stored = {block: of.crack_energy for block, of in now.felt().items()}
+    stored = {block: of.crack_energy for block, of in now.strain_solutions().items()}
     now.take_split(split)
     if now.problem.dda.dynamic_factor != 0.0:
         begin_in_motion(now, split, cut, begun, stored)
@@ -145,7 +143,7 @@ def take_growth(now: CrackedBlocks, growth, state: State, solutions: dict) -> tu
 
 
 def _mean_stress(state: State, solutions: dict):
-    """block → (polygon → mean stress there, current axes), from the last solved elastic body."""
+    """block → (polygon → mean stress in it, current axes), from the last solutions."""
 
     def of_block(block: int):
         solution = solutions[block]

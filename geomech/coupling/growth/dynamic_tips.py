@@ -1,5 +1,5 @@
-"""What tips do in the time of a dynamic run: they start when waves have had the time to reach them, and run no faster
-than waves do."""
+"""Tip growth in dynamic runs: delayed by the arrival of waves (`wave_arrival`), limited in speed
+(`tip_speed_limit`)."""
 
 from __future__ import annotations
 
@@ -22,15 +22,15 @@ class TipsInTime:
         self._k_ic = np.array([m.k_ic for m in problem.materials])
 
     def may_go(self, tips: np.ndarray, blocks: Blocks, dt: float, loads: Mapping[int, BoundaryLoad]) -> np.ndarray:
-        """(n_tips,) m, how far ``tips`` may still go in the present step of ``dt`` s."""
+        """(n_tips,) m, remaining growth of ``tips`` in the present step of ``dt`` s."""
         return np.where(self._driven(tips, blocks, dt, loads), self.speed.left(tips, blocks, dt), 0.0)
 
     def went(self, tips: np.ndarray) -> None:
-        """``tips`` have ``grown`` in a pass of the present step."""
+        """Take note of what ``tips`` have ``grown`` in a pass of the present step."""
         self.speed.went(tips)
 
     def end(self, tips: np.ndarray, blocks: Blocks, dt: float, loads: Mapping[int, BoundaryLoad]) -> None:
-        """The step of ``dt`` s has ended with ``tips``."""
+        """The step of ``dt`` s ends with ``tips``."""
         self.speed.end(tips, blocks, dt, self._driven(tips, blocks, dt, loads))
         self.waves.end(tips, blocks, dt, loads)
 

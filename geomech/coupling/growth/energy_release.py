@@ -1,5 +1,5 @@
-"""What tips release and blocks store: K as it is felt, G over an increment and as a tip turns, and whether a block answers
-in proportion to its load."""
+"""Energy release at tips and energy stored by blocks: K under the forces that strain the block, G over an increment and
+at a kink, and whether the response of a block is proportional to its load."""
 
 from __future__ import annotations
 
@@ -15,16 +15,16 @@ if TYPE_CHECKING:
     from ...ddm import Solution
     from ..crack_compliance.mean_stress_response import ByMeanStress
 
-#: rad; the series of kinks is good for no larger ones.
+#: rad; the kink series is accurate up to this angle.
 _LARGEST_KINK = 2.2
-#: Energy around cracks is half of stress times strain to this part of itself where they answer in proportion: to what
-#: elements leave of reciprocity.
+#: Relative difference between crack energy and half of stress times strain up to which a block counts as proportional:
+#: the error of the elements in Betti's theorem.
 PROPORTIONAL = 1e-3
 
 
 class FeltTips:
-    """``tips``, and those of blocks that were left out, with the K that the mean stress brings in blocks that feel no
-    more, ``hang`` (block → solution); found when something grows."""
+    """``tips``, those of skipped blocks included, with K under the mean stress in blocks that respond to that alone,
+    ``hang`` (block → solution). Computed on first use, since it is needed only where something grows."""
 
     def __init__(self, tips: np.ndarray, hang: dict[int, Solution]) -> None:
         self._tips, self._hang = tips, hang
@@ -47,14 +47,14 @@ class FeltTips:
 
 
 def _runs(number: np.ndarray) -> Iterator[tuple[int, int]]:
-    """Where rows of one ``number`` (n,) begin and end; those of a block stand together."""
+    """Begin and end of the rows with each ``number`` (n,); equal numbers are adjacent."""
     marks = [0, *(np.flatnonzero(np.diff(number)) + 1).tolist(), len(number)]
     return pairwise(marks) if len(number) else iter(())
 
 
 def kink_release(tips: np.ndarray) -> np.ndarray:
-    """(n,) k₁² + k₂² at the tips of kinks of no length by the growth angles of ``tips`` (Amestoy & Leblond 1992), of
-    those that close k₂² alone."""
+    """(n,) k₁² + k₂² at infinitesimal kinks in the growth directions of ``tips`` (Amestoy & Leblond 1992); k₂² alone
+    for kinks that close."""
     from ...ddm.fracture.criteria import kink_factors
 
     angle = np.clip(tips["angle"], -_LARGEST_KINK, _LARGEST_KINK)
@@ -63,8 +63,8 @@ def kink_release(tips: np.ndarray) -> np.ndarray:
 
 
 def mean_release(before: float, after: float) -> float:
-    """G over an increment, by the trapezoidal rule, and as of an exponential where it falls: growth that comes to rest may
-    take nearly all of it on the first part of a long one."""
+    """Mean G over an increment: trapezoidal rule, or that of an exponential where G falls (growth that arrests may
+    release nearly all of it on the first part of a long increment)."""
     if not 0 < after < before:
         return 0.5 * (before + after)
     return (before - after) / np.log(before / after)
@@ -72,8 +72,8 @@ def mean_release(before: float, after: float) -> float:
 
 @dataclass(frozen=True, eq=False)
 class Loaded:
-    """A block under its mean ``stress``, Pa, and the ``strain`` of its cracks, in its own axes; ``in_proportion``: it
-    stores half of their product, as where no face rubs or has closed."""
+    """A block under its mean ``stress``, Pa, with the ``strain`` of its cracks, in its own axes; ``in_proportion``: it
+    stores half of their product, as long as no face slides or has closed."""
 
     stress: np.ndarray
     strain: np.ndarray

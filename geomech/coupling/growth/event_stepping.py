@@ -1,14 +1,14 @@
-"""Load steps that end where something happens: at the time, and so at the load, at which the most driven tip has just
-K_eq = K_Ic, or whole rock its strength, or a contact or a crack face changes its state (`first_state_change`), instead of at
-the end of the fixed step in which that comes about.
+"""Event stepping: load steps that end at events instead of after a fixed time.
 
-While nothing changes state K is nearly linear in the load, so secants find that time in two or three solutions, all of
-them steps from the same start. On the way there steps are as long as blocks may move in one. Loads at which tips start,
-join and cut through then do not depend on the time step.
+An event is the load at which the most highly loaded tip has K_eq = K_Ic, intact rock reaches its strength, or a contact
+or crack face changes its state (`first_state_change`). Between changes of state K is nearly linear in the load, so that
+a secant search finds the time of the event in two or three solutions, all from the same start. The loads at which
+cracks start, coalesce and cut through then do not depend on the time step.
 
 With control "toughness" the load follows the cracks: every increment of growth is made at the load at which the most
-driven tip has K_eq = K_Ic, whether that is higher than the last one (stable growth) or lower (growth that would run
-away under a dead load). Time is then no more than what the loads are functions of, and goes back where the load does.
+highly loaded tip has K_eq = K_Ic, whether that load is higher than the last one (stable growth) or lower (growth that
+would be unstable under constant load). Time is then only the parameter of the load functions, and decreases where the
+load does.
 """
 
 from __future__ import annotations
@@ -28,32 +28,32 @@ from .crack_growth import drive
 from .first_state_change import FOUND, FirstChange
 from .root_finding import Crossing
 
-#: An event is found when the drive, K_eq/K_Ic, is off one by less than this.
+#: Tolerance of an event: |K_eq/K_Ic − 1|.
 SETTLED = 1e-6
-#: Tips driven within this part of their toughness grow with the one that has reached it: images of one another by
-#: symmetry differ by the rounding of their paths, which must not part them.
+#: Tips within this fraction of their toughness grow with the one that has reached it: symmetric tips differ by rounding
+#: and must not be separated by it.
 TOGETHER = 1e-3
-#: Forces are in equilibrium on the geometry at the start of a step. A step to an event that would move blocks by more
-#: than the first (in units of half the diagonal, as ``max_displacement_ratio``) goes the second part of the way, and the
-#: next one the rest: K at the event is then off by no more than the former, times what K depends on the shape of the
-#: blocks.
+#: Forces are in equilibrium in the configuration at the start of a step. A step to an event that would move blocks by
+#: more than NEAR (in units of half the diagonal, as ``max_displacement_ratio``) covers the fraction APPROACH of the
+#: way, and the next step the rest: the error of K at the event is then at most NEAR times the sensitivity of K to the
+#: block shape.
 NEAR, APPROACH = 1e-5, 0.98
-#: The same where crack faces have friction, of which a step leaves more than that: steps to events go all the way, and on the
-#: way to none no farther.
+#: The same for frictional crack faces, whose state depends on the load path by more than that: steps to events go all
+#: the way, and other steps no farther than this.
 NEAR_ROUGH = 1e-3
-#: A load that falls while faces with friction hold K is sought in parts of the last one.
+#: With frictional faces, a falling load is searched in steps of this factor.
 FURTHER_BACK = 0.75
-#: Steps on the way are to move blocks by this part of what a step may.
+#: Steps between events aim at this fraction of the allowed displacement.
 USE = 0.8
-#: Solutions that one search may take, and those without the event between two of them.
+#: Most solutions of one search, and most of them before the event is enclosed.
 MOST, OPEN = 40, 5
-#: Two times nearer than this part of themselves are one. An event between them is a jump of the drive (faces that close
-#: or begin to slip), and tips grow at the later one, beyond it.
+#: Relative difference below which two times are the same. An event between two such times is a jump of K (faces that
+#: close or start to slip); tips grow at the later one.
 JUMP = 1e-6
 
 
 class EventSteps:
-    """The first pass of every load step of a static run: how far it goes, from what the last ones have shown."""
+    """The first pass of every load step of a static run, with its length predicted from the last steps."""
 
     def __init__(self, problem: Problem) -> None:
         run, timed = problem.run, histories(problem.loads)
@@ -61,25 +61,25 @@ class EventSteps:
             timed += problem.endless.histories
         self.time_step, self.follows = problem.dda.time_step, run.control == "toughness"
         self._corners = np.unique(np.concatenate([np.asarray(h.times, dtype=float) for h in timed]))
-        # Between the corners of piecewise linear histories a step may take any length; within a sinusoid it may not.
+        # Between the corners of piecewise linear histories a step may have any length; within a sinusoid it may not.
         swings = any(h.wave is not None for h in timed)
         self._longest = run.longest_step or (self.time_step if swings else math.inf)
-        #: Drive of the cracks as they are, at the start of the step, and its growth per second; None: not known yet.
+        #: Largest K_eq/K_Ic at the start of the step, and its rate, 1/s; None: not known yet.
         self._drive: float | None = 0.0
         self._rate = 0.0
-        #: Displacement ratio per second in the last step; None before there is one.
+        #: Displacement ratio per second in the last step; None before the first.
         self._pace: float | None = None
         #: Whether crack faces have friction.
         self._rough = False
         #: Whether the last first pass ended at an event.
         self.reached = False
-        #: What contacts and faces do on the way.
+        #: Changes of state of contacts and crack faces.
         self.changes = FirstChange(("contacts", "faces") if run.events is None else run.events)
 
     def first_pass(self, now: CrackedBlocks, end: float) -> Balance:
-        """The blocks moved to the next event, or towards it as far as one step goes, at most to the time ``end``; with
-        control "toughness" back to it where it lies behind. ``reached`` then says whether they are there. Raises
-        `dda.NotConverged`."""
+        """Move the blocks to the next event, or towards it as far as one step may go, at most to the time ``end``; with
+        control "toughness" back to it where it is at a lower load. ``reached`` then says whether the event was reached.
+        Raises `dda.NotConverged`."""
         start = now.state.time
         self._rough = any(body.rough for body in now.bodies.values())
         search = Crossing(self._rate)
@@ -98,14 +98,14 @@ class EventSteps:
         return found
 
     def after(self, now: CrackedBlocks, found: Balance) -> None:
-        """The load step has ended with a pass at the load of the first one, in which nothing grew."""
+        """The load step has ended with the pass ``found``, at the load of its first pass and without growth."""
         before, self._drive = self._drive, drive(now, found)
-        # Where loads are proportional to time, and in most other cases nearly, the rate changes as the drive does.
+        # Where loads are proportional to time, and nearly so in most other cases, the rate is proportional to K.
         self._rate *= self._drive / before if before else 1.0
         self.changes.after(now, found)
 
     def grown(self) -> None:
-        """The cracks have grown at the end of the load step."""
+        """The load step has ended with growth."""
         self._drive = None
         self.changes.grown()
 
@@ -114,12 +114,12 @@ class EventSteps:
         limit = self._limit(now, start, end)
         event = search.next
         if event <= start:
-            # Tips that growth has not brought to rest.
+            # Tips still exceed their toughness after the last growth.
             event = limit = min(limit, start + self.time_step)
         whole = event <= limit and not self._far(event - start)
         aim = event if whole else min(start + APPROACH * (event - start), limit)
         if self._rough and self._pace:
-            # While faces stick nothing tells how far the event is.
+            # While faces stick, the rate does not predict the event.
             aim = min(aim, start + NEAR_ROUGH / self._pace)
         if self.changes.expected is not None:
             aim = min(aim, max(self.changes.expected * (1 + FOUND), start + FOUND * limit))
@@ -133,24 +133,24 @@ class EventSteps:
             if self.reached or (excess < 0 and not goes_on):
                 break
             if search.next <= start:
-                # Driven from the start on, by tips that growth has not brought to rest: the load does not go back for
-                # them.
+                # Tips exceed their toughness from the start of the step, after the last growth; the load is not reduced
+                # for them.
                 self.reached = True
                 break
             aim = min(search.next, limit)
             whole = whole or not self._far(aim - start)
             if not whole:
-                # It lies within a long step.
+                # The event is within a long step.
                 aim = start + APPROACH * (aim - start)
         else:
             self.reached = excess > 0
         return found, excess
 
     def _back(self, now: CrackedBlocks, search: Crossing, end: float) -> tuple[Balance, float]:
-        """Down to the load at which tips are driven no further; where none is low enough, to no load."""
+        """Reduce the load to that at which K_eq = K_Ic for the most highly loaded tip; to zero if K_eq stays above."""
         start = now.state.time
-        # Faces with friction slip on as the crack grows, under a load that falls. Were the way back made in two steps, they
-        # would stick in the second, in which nothing grows, and keep K where it is however far the load falls.
+        # Frictional faces continue to slip as the crack grows under a falling load. If the way back were divided into
+        # two steps, they would stick in the second, without growth, and keep K constant however far the load falls.
         rough = self._rough
         limit = max(0.0, start - self._most(now))
         whole = rough or (search.next >= limit and not self._far(start - search.next))
@@ -165,7 +165,7 @@ class EventSteps:
                 break
             aim = max(search.next, limit)
             if rough and not search.enclosed:
-                # The drive hardly changes while faces stick: nothing tells how far back the event is.
+                # K hardly changes while faces stick, so that the rate does not predict the event.
                 aim = max(aim, FURTHER_BACK * at)
             whole = whole or not self._far(start - aim)
             if not whole:
@@ -177,9 +177,9 @@ class EventSteps:
     def _at(
         self, now: CrackedBlocks, time: float, most: float, free: bool = False, look: bool = True
     ) -> tuple[Balance, float]:
-        """A pass at the loads of ``time`` from the start of the step, or, where there is a ``look`` at that, at those at
-        which something changes its state on the way there, and how far the drive then is above one. ``most`` is how long
-        the step may be, s; a ``free`` one may be cut short by how far blocks may move."""
+        """A pass at the loads of ``time`` from the start of the step, and K_eq/K_Ic − 1 there. With ``look``, the pass
+        is that of the first change of state on the way, if there is one. ``most`` s: longest step; a ``free`` step may
+        be cut by the displacement limit."""
         found = self._solve(now, time, free)
         if look:
             found = self.changes.first(
@@ -191,7 +191,7 @@ class EventSteps:
 
     def _solve(self, now: CrackedBlocks, time: float, free: bool = False) -> Balance:
         way = time - now.state.time
-        # The length of a static step is no more than its inertia: short ones would hold the blocks back.
+        # The length of a static step only sets its inertia; short steps would hold the blocks back.
         found = solved_pass(now, max(abs(way), self.time_step), None if free and way >= self.time_step else time)
         way = found.result.state.time - now.state.time
         if way != 0:
@@ -199,16 +199,15 @@ class EventSteps:
         return found
 
     def _towards(self, start: float, event: float) -> float:
-        """How far a step from ``start`` may go to be right at the ``event``: there, or most of the way."""
+        """How far a step from ``start`` may go to arrive exactly at the ``event``: there, or most of the way."""
         return start + APPROACH * (event - start) if self._far(abs(event - start)) else event
 
     def _far(self, way: float) -> bool:
         return self._pace is None or self._pace * way > (NEAR_ROUGH if self._rough else NEAR)
 
     def may_pass(self, now: CrackedBlocks, end: float) -> bool:
-        """Whether the next first pass would go beyond the time ``end`` s but for it, as far as can be said before: no
-        tip is
-        expected to be driven before."""
+        """Whether the next first pass would go beyond the time ``end`` s if that did not limit it, as far as
+        predictable: no tip is expected to reach its toughness before."""
         start = now.state.time
         if self._limit(now, start, math.inf) <= end:
             return False
@@ -221,7 +220,7 @@ class EventSteps:
         return min(start + min(stage, self._most(now)), *corner[:1].tolist(), end)
 
     def _most(self, now: CrackedBlocks) -> float:
-        """The longest step, s, by how fast blocks have moved in the last one."""
+        """The longest step, s, from the speed of the blocks in the last one."""
         if not self._pace:
             return min(self._longest, math.inf if self._pace == 0 else self.time_step)
         return min(self._longest, max(self.time_step, USE * now.system.settings.max_displacement_ratio / self._pace))

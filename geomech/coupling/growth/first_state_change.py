@@ -1,11 +1,11 @@
-"""The load at which the first contact, or crack face, changes its state on the way to another load.
+"""The load of the first change of state of a contact or crack face on the way to another load.
 
-While all states stand, what each of them has in `reserve` falls linearly with the load: two passes before a change tell
-where it comes about, and a pass just beyond that shows it. What changes without a warning of that kind (bonds that
-break as one, corners that slide off) is enclosed by halves.
+As long as all states persist, the `reserve` of each (its distance from the change) is linear in the load. Two passes
+before a change therefore predict its load, and a pass just beyond confirms it. Changes that cannot be predicted in this
+way (bonds that break together, corners that slide off an edge) are enclosed by bisection.
 
-Changes far apart are found one by one. In a rush of them, as where a wall settles brick by brick, more and more of them
-are taken together, so that it costs no more than some dozen steps more than without.
+Changes far apart are found one by one. In a rapid succession, as when a wall settles brick by brick, more and more of
+them are taken together, which limits the cost to a few dozen additional steps.
 """
 
 from __future__ import annotations
@@ -25,22 +25,22 @@ from ..monitoring.state_changes import Change, Watched
 
 log = logging.getLogger(__name__)
 
-#: A change is found when it is known to this part of the time (and so, where loads are proportional to it, of the
-#: load); among more than `MANY` contacts to that one.
+#: Relative tolerance of the time of a change (and of its load, where loads are proportional to time); with more than
+#: `MANY` contacts the second one.
 FOUND, ROUGHLY, MANY = 1e-6, 1e-3, 100
-#: The first look into a way of which nothing is known, as a part of it: near its start all states stand.
+#: First trial on a way without prediction, as a fraction of it: near the start all states persist.
 FIRST_LOOK = 1 / 64
-#: Looks for one change; what has not been found then is told where it is known to have come about.
+#: Trials for one change; after these it is reported at the time at which it is known to have occurred.
 LOOKS = 12
-#: A step to a change is short if it is less than this part of what a step may be. After a short one changes nearer than
-#: `MORE` times (of many contacts, `MUCH_MORE`) as much as before are taken together, after others nearer than `LESS`
-#: times as much.
+#: A step to a change is short if it is less than this fraction of the longest step. After a short one, changes within
+#: `MORE` times (with many contacts `MUCH_MORE` times) the previous interval are taken together, otherwise within
+#: `LESS`.
 SHORT, MORE, MUCH_MORE, LESS = 1 / 8, 1.5, 3.0, 0.25
 
 
 class _Search(NamedTuple):
-    """A search for the first change: ``way`` is 1 where the load rises, −1 where it falls; times nearer than ``within`` s
-    are one, changes nearer than ``grain`` s to the last one are taken with it; ``approach`` as of `FirstChange.first`."""
+    """A search for the first change: ``way`` 1 for rising, −1 for falling load; times within ``within`` s are the same,
+    changes within ``grain`` s of the last one are taken with it; ``approach`` as in `FirstChange.first`."""
 
     way: int
     within: float
@@ -48,24 +48,24 @@ class _Search(NamedTuple):
     approach: Callable[[float], float]
 
     def beyond(self, at: float) -> float:
-        """Just beyond a change that is expected ``at`` a time, s."""
+        """A time just beyond the expected time ``at`` of a change, s."""
         return at + 0.25 * self.way * self.within
 
 
 class FirstChange:
-    """Where contacts and faces, those of the ``kinds`` "contacts" and "faces", change their states; and what to tell of
-    it, whatever the steps (`events`)."""
+    """Finds changes of state of "contacts" and "faces" (the ``kinds``), and reports them for any stepping
+    (`events`)."""
 
     def __init__(self, kinds: tuple[str, ...]) -> None:
         self.kinds = tuple(kind for kind in kinds if kind in ("contacts", "faces"))
-        #: The pass that the present step begins with, and one before it in the same states.
+        #: The pass at the start of the present step, and an earlier one with the same states.
         self._seen: Watched | None = None
         self._older: Watched | None = None
-        #: The pass that was told of last.
+        #: The pass that was reported last.
         self._told: Watched | None = None
-        #: Where the next change is expected, s, once a step has been made most of the way there.
+        #: Time at which the next change is expected, s, after a step most of the way there.
         self.expected: float | None = None
-        #: Where the last one was found, and how near to it others are taken with the next; s.
+        #: Time of the last change, and the interval within which others are taken with the next; s.
         self._last, self._near = 0.0, 0.0
         #: Whether the last pass ended at a change.
         self.reached = False
@@ -74,9 +74,10 @@ class FirstChange:
         self, now: CrackedBlocks, found: Balance, solve: Callable[[float], Balance], approach: Callable[[float], float],
         most: float,
     ) -> Balance:  # fmt: skip
-        """``found``, or the pass at the first change on the way there from the start of the step: what ``solve`` finds
-        at a time. It is the last one that was solved. ``approach`` says how far to go towards a time in one step,
-        ``most`` is how long one may be, s."""
+        """``found``, or the pass at the first change between the start of the step and ``found``.
+
+        ``solve`` computes the pass at a given time; the returned one was solved last. ``approach`` limits how far one
+        step may go towards a time; ``most`` s is the longest step."""
         self.reached = False
         if not self.kinds:
             return found
@@ -102,7 +103,7 @@ class FirstChange:
             try:
                 last = solve(aim)
             except NotConverged as failure:
-                # Blocks have found their states farther on: the change is told there.
+                # The blocks have consistent states farther on: the change is reported there.
                 log.debug("no look at t = %g s: %s", aim, failure)
                 last = None
                 break
@@ -110,12 +111,12 @@ class FirstChange:
             changed = seen.changes(now, base)
             if changed:
                 found, high, changes = last, seen, changed
-                # What has changed here, and not yet in a pass farther on, is not looked for from there: backwards.
+                # Changes here that have not yet occurred in a pass farther on are not searched for from there.
                 low = [each for each in low if way * (high.time - each.time) > 0]
                 if not low:
                     break
             elif at is not None and aim != search.beyond(at):
-                # Most of the way, or all that is taken together, and nothing has changed.
+                # No change on most of the way, or within the interval that is taken together.
                 self.expected = at
                 return last
             else:
@@ -128,8 +129,8 @@ class FirstChange:
     def _next_look(
         self, look: int, search: _Search, changes: list[Change], low: list[Watched], high: Watched
     ) -> tuple[float | None, float | None]:
-        """Where to look next, s, and where the first of ``changes`` is expected (None: not told); None where the pass
-        ``high`` is where it comes about."""
+        """The next trial time, s (None: the pass ``high`` is the change), and the predicted time of the first of
+        ``changes`` (None: no prediction)."""
         way, within, grain = search.way, search.within, search.grain
         if abs(high.time - low[-1].time) <= within:
             return None, None
@@ -137,7 +138,7 @@ class FirstChange:
         if at is not None and abs(at - high.time) <= within:
             return None, at
         if at is None or way * (at - high.time) > 0 or look % 3 == 2:
-            # Something happens in between; or what is left shrinks from one side only.
+            # Something else happens in between, or the interval shrinks from one side only.
             share, at = FIRST_LOOK if len(low) == 1 else 0.5, None
             aim = low[-1].time + share * (high.time - low[-1].time)
         else:
@@ -151,8 +152,8 @@ class FirstChange:
         return aim, at
 
     def _before(self, now: CrackedBlocks, high: Watched, solve: Callable[[float], Balance]) -> list[Watched]:
-        """Passes before ``high`` in which nothing has changed yet, the last one that with which its states are
-        compared; none where blocks find no states so near to the start."""
+        """Passes before ``high`` without any change, the last one being that with which states are compared; empty
+        where the blocks have no consistent states so close to the start."""
         if self._seen is not None and self._seen.same_faces(high) and self._seen.numbering == high.numbering:
             return [self._seen] if self._older is None else [self._older, self._seen]
         start = now.state.time
@@ -170,7 +171,7 @@ class FirstChange:
         self._last, self.expected, self.reached = time, None, True
 
     def after(self, now: CrackedBlocks, found: Balance) -> None:
-        """The load step has ended with the pass ``found``, in which nothing grew."""
+        """The load step has ended with the pass ``found``, without growth."""
         if not self.kinds:
             return
         seen, before = Watched.of(now, found, self.kinds), self._seen
@@ -181,11 +182,11 @@ class FirstChange:
         self._seen = seen
 
     def grown(self) -> None:
-        """The cracks have grown at the end of the load step."""
+        """The load step has ended with growth."""
         self._seen = self._older = self.expected = None
 
     def events(self, now: CrackedBlocks, found: Balance) -> tuple[Event, ...]:
-        """What is another in the pass ``found`` than in the one before it."""
+        """Changes of state between the previous pass and ``found``."""
         if not self.kinds:
             return ()
         seen, before = Watched.of(now, found, self.kinds), self._told
@@ -195,8 +196,8 @@ class FirstChange:
 
 
 def _first_of(changes: list[Change], low: list[Watched], high: Watched) -> float | None:
-    """The time at which the first of ``changes``, found in the pass ``high``, comes about by the last two passes before
-    it; None where they do not tell."""
+    """Time of the first of ``changes``, found in the pass ``high``, extrapolated from the last two passes before it;
+    None where these do not predict it."""
     if len(low) < 2 or low[-2].time == low[-1].time:
         return None
     times = []
@@ -215,8 +216,8 @@ def _first_of(changes: list[Change], low: list[Watched], high: Watched) -> float
 
 
 def _reserve(change: Change, of: Watched, high: Watched) -> np.ndarray:
-    """What the contacts or nodes that ``change`` is about had in reserve in an earlier pass; nan where they were not
-    there, or had changed before."""
+    """Reserve, in an earlier pass, of the contacts or nodes of ``change``; nan where they did not exist or had changed
+    before."""
     rows = change.rows
     none = np.full(len(rows), np.nan)
     if not change.contacts:

@@ -1,19 +1,18 @@
-"""Where a function that is costly, and nearly linear, passes zero."""
+"""Root of an expensive, nearly linear function: secants, then the Illinois rule (Dowell & Jarratt 1971)."""
 
 from __future__ import annotations
 
 import math
 
-#: Points that may leave an interval longer than half of what it was.
+#: Points that may leave the interval longer than half of its former length.
 _PATIENCE = 3
 
 
 class Crossing:
-    """The zero of a rising function, sought from points that are added one by one: secants until two points lie on
-    either side of it, then the Illinois rule (Dowell & Jarratt 1971), which keeps it between them, or half their
-    interval where that has not halved it in three points.
+    """The root of a rising function, from points added one at a time.
 
-    ``slope`` is that of the last two points, before there are two a guess.
+    Secants until two points enclose the root; then the Illinois rule, which keeps it enclosed, or bisection where three
+    points have not halved the interval. ``slope``: that of the last two points, initially a guess.
     """
 
     def __init__(self, slope: float) -> None:
@@ -25,7 +24,7 @@ class Crossing:
         self._halved_at, self._since = math.inf, 0
 
     def add(self, at: float, value: float) -> None:
-        """The function has ``value`` at ``at``."""
+        """Add the point (``at``, ``value``)."""
         if self._last is not None and at != self._last[0]:
             self.slope = (value - self._last[1]) / (at - self._last[0])
         self._last = at, value
@@ -35,7 +34,7 @@ class Crossing:
         else:
             self._high = at, value
         if side == self._side and self.enclosed:
-            # The far end has stayed: half its value draws the next point over the zero.
+            # The same end has stayed twice: half its value moves the next point across the root.
             if side < 0:
                 self._high = self._high[0], 0.5 * self._high[1]
             else:
@@ -52,13 +51,12 @@ class Crossing:
 
     @property
     def width(self) -> float:
-        """Of the interval that holds the zero; infinite while none does."""
+        """Length of the interval that contains the root; infinite until there is one."""
         return abs(self._high[0] - self._low[0]) if self.enclosed else math.inf
 
     @property
     def next(self) -> float:
-        """Where to look next; infinite where the last points leave no zero ahead. Raises ValueError before there is
-        one."""
+        """The next trial point; infinite where the last points show no root ahead. Raises ValueError without points."""
         if self.enclosed:
             (a, f), (b, g) = self._low, self._high
             if self._since >= _PATIENCE:

@@ -1,10 +1,9 @@
-"""How far tips may run in a step of a dynamic run: no faster than a part of the speed of Rayleigh's wave.
+"""Largest growth of tips in a dynamic step: a fraction of the Rayleigh wave speed.
 
-A crack that is driven harder than its toughness asks for runs, and what drives it comes and goes with the waves in its
-block. A step that let it grow until it arrests would give it, in a millisecond, the length that seconds of the same
-load would; and a push of one step's length would grow what it never had the time to. The wave's speed bounds that of a
-crack in tension (Freund 1990); those measured in rock and glass stay below about half of it (Ravi-Chandar & Knauss
-1984).
+Running cracks are bounded by the Rayleigh wave speed c_R in tension (Freund 1990); measured speeds in rock and glass
+stay below about half of it (Ravi-Chandar & Knauss 1984). The loading of a tip varies with the waves in its block:
+without a limit a step of a millisecond would give a crack the length that only seconds of the same load could, and a
+short pulse would grow it by more than its duration allows.
 """
 
 from __future__ import annotations
@@ -16,11 +15,11 @@ from ...model import Blocks, Problem
 
 
 class TipSpeed:
-    """The way that each tip, by its crack and end, still has in the present step.
+    """Growth that remains for each tip, by crack and end, in the present step.
 
-    ``problem.growth.speed_limit`` times c_R times the step. Of a tip that is driven but has too little way for the
-    shortest increment, that much is kept for the next step: it grows when it could have got there. Rock without mass
-    has no limit.
+    The limit is ``problem.growth.speed_limit`` times c_R times the step length. A tip above its toughness whose limit
+    is less than the shortest increment keeps it for the next step: it grows when it could have covered the distance.
+    Without density there is no limit.
     """
 
     def __init__(self, problem: Problem) -> None:
@@ -30,7 +29,7 @@ class TipSpeed:
         self._gone: dict[tuple[int, int], float] = {}
 
     def left(self, tips: np.ndarray, blocks: Blocks, dt: float) -> np.ndarray:
-        """(n_tips,) m that ``tips`` may still go in a step of ``dt`` s; 0 for less than the shortest increment."""
+        """(n_tips,) m, remaining growth of ``tips`` in a step of ``dt`` s; 0 if less than the shortest increment."""
         way = self._speed[blocks.material[tips["block"]]] * dt
         if not np.isfinite(way).any():
             return way
@@ -38,20 +37,21 @@ class TipSpeed:
         return np.where(reached(way, self._shortest), way, 0.0)
 
     def went(self, tips: np.ndarray) -> None:
-        """``tips`` have ``grown`` in a pass of the present step."""
+        """Take note of what ``tips`` have ``grown`` in a pass of the present step."""
         for key, grown in zip(_keys(tips), tips["grown"].tolist()):
             if grown > 0:
                 self._gone[key] = self._gone.get(key, 0.0) + grown
 
     def fastest(self, dt: float) -> float:
-        """m/s, of all tips in the present step of ``dt`` s."""
+        """Largest tip speed in the present step of ``dt`` s, m/s."""
         return max(self._gone.values(), default=0.0) / dt
 
     def end(self, tips: np.ndarray, blocks: Blocks, dt: float, driven: np.ndarray) -> None:
-        """The step of ``dt`` s has ended with ``tips``, of which some are still ``driven`` (n_tips,)."""
+        """The step of ``dt`` s ends with ``tips``, some of which are still above their toughness: ``driven``
+        (n_tips,)."""
         way = self._speed[blocks.material[tips["block"]]] * dt + self._of(self._kept, tips) - self._of(self._gone, tips)
         waits = driven & np.isfinite(way)
-        # What a tip could have gone and did not, since nothing drove it, is no head start.
+        # Growth that an unloaded tip did not use is not carried over.
         self._kept = {
             key: min(left, self._shortest) for key, left, wants in zip(_keys(tips), way.tolist(), waits) if wants
         }

@@ -1,12 +1,13 @@
-"""In dynamics a tip feels its block's boundary only when waves have come from there.
+"""Delayed loading of tips in dynamics: forces on the boundary reach a tip with the pressure wave.
 
-The crack solver answers at once: forces on the block, its inertia as a body force, all of the block in equilibrium. Of
-a sudden force that is wrong until waves have crossed the block: a block that falls on its base is decelerated as a
-whole, its strain is not there yet, and the inertia of the strain to come puts the middle in *tension* (by half of the
-pressure on a bar pressed at both ends, for a quarter of the time that a wave takes). Contacts that knock on their
-springs bring such spikes in every step. So a tip grows by the mean of K_eq over the time that a wave from the boundary
-takes to it, the form of the incubation-time criterion (1/τ) ∫ K dt ≥ K_Ic over the last τ of Petrov & Morozov (1994),
-where steps are shorter than that.
+The crack solver is quasi-static: the forces on a block, its inertia as a body force, and the whole block are in
+equilibrium at once. After a sudden force this is wrong until waves have crossed the block. A block that falls on its
+base is decelerated as a whole before its strain has developed, and the inertia of that future strain puts its centre in
+*tension* (half of the pressure on a bar pressed at both ends, for a quarter of the travel time). Contacts that vibrate
+on their springs cause such peaks in every step. Where steps are shorter than the travel time τ from the loaded
+boundary, a tip therefore grows by the mean of K_eq over τ, the incubation-time criterion of Petrov & Morozov (1994):
+
+    (1/τ) ∫ K dt ≥ K_Ic over the last τ.
 """
 
 from __future__ import annotations
@@ -25,18 +26,18 @@ _Key = tuple[int, int]
 
 
 class WaveTime:
-    """What has driven each tip, by its crack and end, for the time that waves take to it."""
+    """K_eq of each tip, by crack and end, over the travel time of waves to it."""
 
     def __init__(self, problem: Problem) -> None:
         self._speed = np.array([m.pressure_wave_speed for m in problem.materials])
-        #: (dt, K_eq) of the steps before, the last one first, as far as they count.
+        #: (dt, K_eq) of the last steps, the latest first, as far back as they count.
         self._past: dict[_Key, list[tuple[float, float]]] = {}
 
     def drive(
         self, tips: np.ndarray, blocks: Blocks, dt: float, loads: Mapping[int, BoundaryLoad] = _NONE
     ) -> np.ndarray:
-        """(n_tips,) the lesser of K_eq in the present step of ``dt`` s and of its mean over the time of a wave, Pa √m,
-        from what is loaded of its block's boundary (block → `BoundaryLoad`), or any of it where nothing is."""
+        """(n_tips,) the lesser of K_eq in the present step of ``dt`` s and its mean over the travel time from the
+        loaded boundary of the block (block → `BoundaryLoad`), or from any of it without load, Pa √m."""
         driven = tips["k_eq"].copy()
         for row, time in self._longer(tips, blocks, dt, loads):
             tip = tips[row]
@@ -50,7 +51,7 @@ class WaveTime:
         return driven
 
     def end(self, tips: np.ndarray, blocks: Blocks, dt: float, loads: Mapping[int, BoundaryLoad] = _NONE) -> None:
-        """The step of ``dt`` s has ended with ``tips``."""
+        """The step of ``dt`` s ends with ``tips``."""
         past = {}
         for row, time in self._longer(tips, blocks, dt, loads):
             tip = tips[row]
@@ -67,7 +68,7 @@ class WaveTime:
     def _longer(
         self, tips: np.ndarray, blocks: Blocks, dt: float, loads: Mapping[int, BoundaryLoad]
     ) -> list[tuple[int, float]]:
-        """Rows of ``tips`` to which waves take longer than ``dt``, and how long, s."""
+        """Rows of ``tips`` to which waves travel for longer than ``dt``, and the travel times, s."""
         speed = self._speed[blocks.material[tips["block"]]]
         size = np.array([np.ptp(blocks.loops(b)[0], axis=0).max() for b in np.unique(tips["block"]).tolist()])
         if not len(tips) or not (np.sqrt(2.0) * size.max() > speed.min() * dt):

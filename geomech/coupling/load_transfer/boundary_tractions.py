@@ -1,30 +1,27 @@
-"""Contact forces of a block made into one boundary load of its elastic body, with the same force and moment.
+"""Boundary load of an elastic body from the contact forces on its block, with the same resultant and moment.
 
-The contacts of one joint face (two edges that lie against each other) are one distribution with the resultant and
-moment of its contact forces: linear, or, but for bonds with tensile strength, a triangle where that would pull although
-the resultant pushes (`no_tension_pressure`). It ends where
-the faces do: a contact that opens takes the pressure back from its place the further the wider it gapes. Shear follows
-the pressure, so that it breaks Coulomb's law nowhere unless it breaks it as a whole. A lone vertex pressed into an edge
-spreads over a short piece of that edge; a lone force on a block's own corner is resolved along the corner's two edges
-and enters there as shear, which keeps both force and moment exactly. What presses beyond the end of an edge acts at
-that end, and its moment about it on the whole outline. Tractions change without a jump as contacts come and go.
+- The contacts of one joint face (two edges that face each other) become one traction distribution with the resultant
+  and moment of the contact forces: linear, or without tension where the joint has no tensile strength
+  (`no_tension_pressure`). Shear is proportional to pressure, so that Coulomb's law holds along the face wherever it
+  holds for the resultant. The distribution ends where the faces part; its end moves continuously as contacts open and
+  close.
+- A single vertex on an edge loads a short piece of that edge. A single force on the block's own corner is resolved
+  along the two edges of the corner and acts as shear, which preserves force and moment exactly.
+- A force beyond the end of an edge acts at that end; its moment is applied to the whole outline.
 
-By the route "bases" faces on blocks that are fixed or guided press as on a rigid base, as their own elasticity has it
-(`geomech.ddm.loads.rigid_bases`), with the same force and moment; here it is said only where.
+With route "bases", the pressure of faces on fixed or guided blocks is that of a rigid base
+(`geomech.ddm.loads.rigid_bases`) with the same resultant and moment. Two other routes are for comparison: "springs"
+applies each contact force as a point force on the boundary; "kelvin-springs" applies these through Kelvin's solution
+for the infinite plane (Khanizadeh Bahabadi et al. 2023, eqs. 2-4).
 
-Two other routes are there to be compared with: "springs" leaves each contact's force where its spring is, a point force
-on the boundary; "kelvin-springs" takes these by Kelvin's solution for the infinite plane, as Khanizadeh Bahabadi et al.
-(2023, eqs. 2-4) write.
+All loads are in the reference frame of the block: points are mapped back by its affine motion, forces rotated back. The
+resultant that remains is balanced by the block's inertia (d'Alembert), applied as a body force linear in x
+(`inertia_forces`), so that the elastic problem is in equilibrium to round-off.
 
-All of it lives in the block's reference frame: points are mapped back by the block's affine motion, forces turned
-back by its rotation. What the forces then leave out of balance is the block's inertia (d'Alembert): it is put on as
-a body force, linear in x, so that the elastic problem is in equilibrium to round-off.
-
-What the forces leave out of the block's mean stress, its strain's inertia and viscosity take: in the block solver an
-even stress, and an even stress it is here. The mean stress of the load is then the block's own, whose work on the
-strain of the cracks is all that the block spends on them. (As a body force, the strain's inertia would load a crack in
-the middle by half as much again, with nobody to do that work: cracks that run under waves gained 2 % of the load's
-work, and viscous stress that opened them took as much.)
+The forces' mean stress differs from the block's own by the inertia of its strain and by viscosity, which in DDA are
+uniform stresses. They are applied as a uniform stress here, too, so that the mean stress of the load is the block's own
+and does all the work on the crack strain. (As a body force the inertia of the strain would load a central crack by half
+as much again, without an equal loss in the block: cracks running under waves gained 2 % of the work of the load.)
 """
 
 from __future__ import annotations
@@ -46,16 +43,16 @@ from .piecewise_traction import Found, add_couple, add_edge_piece, add_point_loa
 
 @dataclass(frozen=True, eq=False)
 class BoundaryLoad:
-    """Load of one block's elastic body, reference frame.
+    """Load of the elastic body of one block, reference frame.
 
-    segments (m, 2, 2) pieces of the outline, directed along it; tractions (m, 2, 2) at their two ends, linear between;
-    remote_stress (3,) the even stress besides, Pa;
-    points and forces (k, 2) what acts at points, None without, ``kelvin`` as in `ddm.BodyLoad`;
-    body_force (2,) and body_force_gradient (2, 2): b = body_force + gradient · (x − about), N/m³; ``imbalance`` is the
-    resultant that inertia had to balance beyond the solver's own acceleration on the block as it is strained, relative
-    to the forces' size; ``bases`` are rows of segments in which pressure is yet to be found, and the traction (2,) with
-    a unit of it; ``crack_pressure`` (one for all, or (n_segments,)) and ``hole_pressure`` Pa, of fluids in endless
-    rock.
+    - segments (m, 2, 2): pieces of the outline, directed along it; tractions (m, 2, 2): at their two ends, linear
+      between, Pa
+    - remote_stress (3,): additional uniform stress, Pa
+    - points, forces (k, 2): point forces, None without; ``kelvin`` as in `ddm.BodyLoad`
+    - body_force (2,), body_force_gradient (2, 2): b = body_force + gradient · (x − about), N/m³
+    - imbalance: resultant that inertia has to balance beyond the solver's own acceleration, relative to the forces
+    - bases: rows of segments whose pressure is still to be found, and the traction (2,) per unit pressure
+    - crack_pressure (scalar or (n_segments,)), hole_pressure: fluid pressures in unbounded rock, Pa
     """
 
     segments: np.ndarray
@@ -75,11 +72,11 @@ class BoundaryLoad:
 
 @dataclass(frozen=True, eq=False)
 class BoundaryForces:
-    """What acts on blocks from outside, any of them, on the geometry on which it is in equilibrium.
+    """External forces on blocks in the configuration in which they are in equilibrium.
 
-    ``vertices`` (n_vertices, 2) and ``motion`` are that geometry; ``contacts`` CONTACT rows on it, ``edges`` EDGE_FORCE and
-    ``points`` POINT_FORCE rows; ``route``: "contacts", "bases", "springs" or "kelvin-springs"; ``keep_straight``
-    (n_blocks,) bool which blocks are bases; ``tensile_strength`` of the joint laws, Pa (None: none has any).
+    ``vertices`` (n_vertices, 2) and ``motion`` of that configuration; ``contacts`` CONTACT rows, ``edges`` EDGE_FORCE
+    rows, ``points`` POINT_FORCE rows; ``route``: "contacts", "bases", "springs" or "kelvin-springs"; ``keep_straight``
+    (n_blocks,) bool: blocks that act as rigid bases; ``tensile_strength`` of each joint law, Pa (None: all zero).
     """
 
     vertices: np.ndarray
@@ -92,7 +89,7 @@ class BoundaryForces:
     keep_straight: np.ndarray | None = None
 
     def holding(self) -> np.ndarray:
-        """(n_contacts,) bonds that may pull."""
+        """(n_contacts,) bool: bonded contacts with tensile strength."""
         if self.tensile_strength is None:
             return np.zeros(len(self.contacts), bool)
         strength = np.asarray(self.tensile_strength, dtype=float)
@@ -102,7 +99,7 @@ class BoundaryForces:
 def boundary_load(
     block: int, blocks: Blocks, forces: BoundaryForces, inertia: BlockInertia | None = None
 ) -> BoundaryLoad:
-    """The load of one ``block``, as of `boundary_loads`; at rest and without weight where no ``inertia`` is given."""
+    """Load of one ``block`` (see `boundary_loads`); at rest and without weight if ``inertia`` is None."""
     inertia = BlockInertia(np.zeros(1), np.zeros(1), np.zeros(1)) if inertia is None else inertia
     return boundary_loads(np.array([block]), blocks, forces, inertia)[0]
 
@@ -110,7 +107,7 @@ def boundary_load(
 def boundary_loads(
     numbers: np.ndarray, blocks: Blocks, forces: BoundaryForces, inertia: BlockInertia
 ) -> list[BoundaryLoad]:
-    """The loads of the blocks with these ``numbers`` (n,), of which ``inertia`` is."""
+    """Loads of the blocks ``numbers`` (n,), which have this ``inertia``."""
     numbers, n = np.asarray(numbers), len(numbers)
     moments = [blocks.area_moments(b) for b in numbers.tolist()]
     shape = BlockShape(*(np.array(each, dtype=float) for each in zip(*moments)))
@@ -151,8 +148,8 @@ def boundary_loads(
 
 
 def _with_room(given: tuple, room: int) -> tuple[Found, np.ndarray, np.ndarray]:
-    """What is `Found` of the ``given``, and of each block, where there is ``room`` for so many pieces, or as much as is
-    needed."""
+    """Run `_pieces` with ``room`` for that many pieces, again with more if it does not suffice; returns `Found`, the
+    counts per block and Σ r ⊗ f."""
     while True:
         found = Found(np.zeros(3, np.int64), np.empty((room, 8)), np.empty((room, 4)), np.empty((room, 4)))
         ends, stretch = _pieces(found, *given)
@@ -164,8 +161,8 @@ def _with_room(given: tuple, room: int) -> tuple[Found, np.ndarray, np.ndarray]:
 
 
 def _rows_of(owners: np.ndarray, numbers: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The columns of ``owners`` (k, m) that each of the ``numbers`` (n,) is in, in order, one after the other, and where
-    those of each begin and end, (n, 2)."""
+    """Columns of ``owners`` (k, m) in which each of ``numbers`` (n,) occurs, one after the other, and the begin and end
+    of those of each number (n, 2)."""
     column = np.broadcast_to(np.arange(owners.shape[1]), owners.shape).ravel()
     owner = owners.ravel()
     order = np.lexsort((column, owner))
@@ -174,8 +171,8 @@ def _rows_of(owners: np.ndarray, numbers: np.ndarray) -> tuple[np.ndarray, np.nd
 
 
 class _Asked(NamedTuple):
-    """The blocks whose loads are asked for: their ``numbers`` (n,), ``area`` (n,) m² and ``turn`` (n, 2), cosine and sine of
-    their rotation; and of all blocks how they have moved, as `Motion` has it."""
+    """Blocks whose loads are computed: ``numbers`` (n,), ``area`` (n,) m², ``turn`` (n, 2) cosine and sine of their
+    rotation. Of all blocks: centres and gradient of their `Motion`."""
 
     numbers: np.ndarray
     area: np.ndarray
@@ -186,9 +183,9 @@ class _Asked(NamedTuple):
 
 
 class _Acting(NamedTuple):
-    """CONTACT rows and which of them may pull (``holding``), EDGE_FORCE and POINT_FORCE rows; of each kind the numbers of
-    those on the blocks asked for, one after the other, and where those of a block begin and end (n, 2); and which blocks
-    are bases, ``based`` (n_blocks,)."""
+    """CONTACT rows with ``holding`` (may carry tension), EDGE_FORCE and POINT_FORCE rows. Of each kind: the row numbers
+    for the selected blocks, one after the other, and begin and end of those of each block (n, 2). ``based``
+    (n_blocks,): blocks that act as rigid bases."""
 
     contacts: np.ndarray
     holding: np.ndarray
@@ -205,9 +202,8 @@ class _Acting(NamedTuple):
 
 @kept(error_model="numpy", nogil=True)
 def _pieces(found, asked, of, vertex_start, acting, pointed):
-    """Add to what is ``found`` the loads of the blocks that are ``asked`` for, one after the other. Returned is how much of
-    each kind there is before each block, (n + 1, 3), and Σ r ⊗ f (n, 2, 2) of what shears stretch a block by beyond what
-    the pieces do."""
+    """Append the loads of the ``asked`` blocks to ``found``. Returns the number of rows of each kind before each block
+    (n + 1, 3), and Σ r ⊗ f (n, 2, 2) that the pieces do not reproduce."""
     n = len(asked.numbers)
     ends, stretch = np.zeros((n + 1, 3), np.int64), np.zeros((n, 2, 2))
     for b in range(n):
@@ -229,7 +225,7 @@ def _pieces(found, asked, of, vertex_start, acting, pointed):
                 while first < len(rows) and face[first] != number:
                     first += 1
                 if first == len(rows):
-                    continue  # all of it stands alone
+                    continue  # only single contacts
                 start = sides[number, 0]
                 based = acting.based[touches.against[first]]
                 amount, lost = add_face(found, of, start, touches, face, number, based)

@@ -1,5 +1,7 @@
-"""What touches a block: contacts as it feels them, gathered into joint faces and those that stand alone. Compiled
-(`boundary_tractions` has the kernel)."""
+"""Contacts of one block in its own frame, grouped by joint face; single corner contacts kept apart.
+
+Compiled; `boundary_tractions` has the kernel that calls these functions.
+"""
 
 from __future__ import annotations
 
@@ -12,11 +14,11 @@ from .piecewise_traction import FACE_ANGLE, SAME, jit, line_of, place_along
 
 
 class Touches(NamedTuple):
-    """Contacts as one of their blocks feels them, one after the other (n,).
+    """Contacts of one block, seen from that block; arrays (n,).
 
-    ``own``: the block owns the ``vertex``, not the ``edge``; (nx, ny) outward normal of the edge, current axes; the point
-    (px, py) and the force (fx, fy) on the block in its reference frame; ``acts``: it carries force; ``gap`` m; ``holds``:
-    it may pull; ``against``: the other block.
+    ``own``: the block owns the ``vertex`` (otherwise the ``edge``); (nx, ny) outward normal of the edge, current axes;
+    (px, py) point of contact, m, and (fx, fy) force on the block, N/m, in the reference frame of the block; ``acts``:
+    the force is not zero; ``gap`` m; ``holds``: the contact may carry tension; ``against``: the other block.
     """
 
     own: np.ndarray
@@ -36,8 +38,9 @@ class Touches(NamedTuple):
 
 @jit
 def touches_of(block, contacts, rows, holding, centre, reference_centre, gradient, c, s):
-    """What touches ``block``, which has moved as `Motion` has it and turned by the angle of cosine ``c`` and sine ``s``;
-    of the CONTACT ``rows`` (n,) of ``contacts`` those that are ``holding`` may pull."""
+    """Contacts of ``block``: the CONTACT ``rows`` (n,) of ``contacts``. ``holding``: those that may carry tension. The
+    block has moved by the affine `Motion` (``centre``, ``reference_centre``, ``gradient``) and rotated by the angle
+    with cosine ``c`` and sine ``s``."""
     n = len(rows)
     own, acts, holds = np.empty(n, np.bool_), np.empty(n, np.bool_), np.empty(n, np.bool_)
     vertex, edge, against = np.empty(n, np.int64), np.empty(n, np.int64), np.empty(n, np.int64)
@@ -66,8 +69,8 @@ def touches_of(block, contacts, rows, holding, centre, reference_centre, gradien
 
 @jit
 def on_outline(of, touches, k):
-    """Where a contact's spring stands on the block, reference frame: its vertex, or the foot of the other's on its
-    edge."""
+    """Point of the block on which contact ``k`` acts, reference frame: its own vertex, or the foot of the other block's
+    vertex on its edge."""
     if touches.own[k]:
         return of.vertices[touches.vertex[k], 0], of.vertices[touches.vertex[k], 1]
     edge = touches.edge[k]
@@ -80,7 +83,7 @@ def on_outline(of, touches, k):
 
 @jit
 def _touching_edge(of, vertex, nx, ny):
-    """Which of the two edges at ``vertex`` lies against an edge with outward normal (nx, ny), and the angle between."""
+    """The edge at ``vertex`` that faces an edge with outward normal (nx, ny), and the angle between the two edges."""
     best, least = -1, math.inf
     for edge in (vertex, of.before[vertex]):
         following = of.following[edge]
@@ -94,10 +97,11 @@ def _touching_edge(of, vertex, nx, ny):
 
 @jit
 def faces_and_lone(of, touches):
-    """What touches a block as joint faces with at least two distinct points: the first edges (k, 2) of the straight sides
-    of each, the own one first, the number of the face that each of the ``touches`` (n,) belongs to, −1 for none; and
-    the contacts left alone. A vertex in a straight side, as the end of a named piece, does not part what touches it into
-    faces of their own."""
+    """Group contacts into joint faces with at least two distinct points.
+
+    Returns the first edges (k, 2) of the two straight sides of each face, the block's own side first; the face of each
+    contact (n,), −1 for none; and the numbers of the single contacts that carry force. Vertices within a straight side,
+    as at the end of a named piece of edge, do not divide a face."""
     n = len(touches.own)
     face, lone, sides = np.full(n, -1), np.empty(n, np.int64), np.empty((n, 2), np.int64)
     alone = many = 0
@@ -121,10 +125,10 @@ def faces_and_lone(of, touches):
         near, far = math.inf, -math.inf
         for k in range(n):
             if face[k] == number and touches.acts[k]:
-                # A corner that has slid past an end of the side presses on that end.
+                # A corner that has slid past the end of the side presses on that end.
                 place = min(max(place_along(touches.px[k], touches.py[k], sx, sy, ax, ay), 0.0), length)
                 near, far = min(near, place), max(far, place)
-        # Points apart by no more than round-off are one.
+        # Points closer together than round-off count as one.
         if not far - near > SAME * length:
             for k in range(n):
                 if face[k] == number:

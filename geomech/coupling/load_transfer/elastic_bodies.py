@@ -1,4 +1,4 @@
-"""The elastic bodies of cracked blocks: made from blocks and cracks, loaded with the block solver's forces, solved."""
+"""Elastic bodies of cracked blocks: made from blocks and cracks, loaded with contact forces, and solved."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from ... import dda
 from ...ddm.counters import Work
 from ...ddm.crack_contact.face_laws import Released
 from ...model import TIP, Blocks, Cracks, Motion, Problem, State
-from ..parallel_map import side_by_side
+from ..parallel_map import parallel_map
 from . import boundary_tractions
 from .boundary_tractions import BoundaryForces, BoundaryLoad
 from .inertia_forces import BlockInertia
@@ -24,13 +24,12 @@ if TYPE_CHECKING:
 def elastic_bodies(
     problem: Problem, blocks: Blocks, cracks: Cracks, kept: dict, works: list[Work], removed: np.ndarray | None = None
 ) -> tuple[dict[int, Body], dict[int, np.ndarray]]:
-    """block → body of every moving block that holds ``cracks`` (or may come to), and block → its nodes in the whole
-    network. What keeps a fixed block in place, and so what strains it, is not known; what is ``removed`` (n_blocks,) is
-    not there.
+    """Bodies (block →) of all moving blocks with ``cracks``, or in which cracks may start, and their nodes in the whole
+    network (block →). Fixed blocks have none, since the forces that fix them are unknown; nor have those ``removed``
+    (n_blocks,).
 
-    ``kept``: earlier bodies of the same blocks. Those of which nothing has changed are taken as they are, of others
-    whatever has not is reused; the rest is made side by side. ``works``: the counts of what was done, of bodies without
-    an earlier one new ones at the end.
+    ``kept``: earlier bodies of the same blocks, reused as far as they have not changed; new ones are made in parallel.
+    ``works``: counters of the bodies; those of bodies without a predecessor are appended.
     """
     every = problem.growth.initiation or problem.endless is not None
     cracked = np.arange(blocks.n_blocks) if every else np.unique(cracks.block)
@@ -76,13 +75,13 @@ def elastic_bodies(
             half_plane=None if surface is None else ddm.HalfPlane(*surface),
         )
 
-    bodies.update(zip([of[0] for of in to_make], side_by_side(made, to_make)))
+    bodies.update(zip([of[0] for of in to_make], parallel_map(made, to_make)))
     return bodies, nodes_of
 
 
 def _check_pinches(blocks: Blocks, block: int) -> None:
-    """Raises `dda.NotConverged` where loops of ``block`` meet in a point, as where a crack frees a splinter beside the
-    surface that it has come from: rock that hangs by a point bears no stress there that elements could resolve."""
+    """Raises `dda.NotConverged` where loops of ``block`` touch in a point, as where a crack frees a splinter at the
+    surface it started from: elements cannot resolve the stress in rock connected by a point."""
     loops = blocks.loops(block)
     if len(loops) == 1:
         return
@@ -98,12 +97,12 @@ def _check_pinches(blocks: Blocks, block: int) -> None:
 
 
 def _loops(problem: Problem, blocks: Blocks, block: int) -> list[np.ndarray]:
-    """The loops that bound the rock of ``block``: of rock without an end its holes."""
+    """Loops that bound the rock of ``block``; of unbounded rock its openings."""
     return blocks.loops(block) if problem.endless is None else blocks.loops(block)[1:]
 
 
 def _rows_of(number: np.ndarray, wanted: np.ndarray) -> list[np.ndarray]:
-    """The rows of each of the ``wanted`` numbers, in order, in the time of one sorting."""
+    """Rows of each of the ``wanted`` numbers, in order, by one sort."""
     order = np.argsort(number, kind="stable")
     first, last = (np.searchsorted(number[order], wanted, side) for side in ("left", "right"))
     return [order[a:b] for a, b in zip(first.tolist(), last.tolist())]
@@ -112,13 +111,13 @@ def _rows_of(number: np.ndarray, wanted: np.ndarray) -> list[np.ndarray]:
 def boundary_loads(
     problem: Problem, blocks: Blocks, state: State, motion: Motion, result, bodies: dict
 ) -> dict[int, BoundaryLoad]:
-    """block → load of every one of ``bodies``, from the step ``result`` that began at ``state``; ``motion`` leads to
-    its vertices: on that geometry the forces are in equilibrium."""
+    """Loads (block →) of all ``bodies`` from the step ``result`` that began at ``state``. ``motion`` leads to the
+    vertices of the result, where its forces are in equilibrium."""
     forces, numbers = result.forces, np.array(list(bodies), int)
     rigid = np.array([material.rigid for material in problem.materials], bool)
     keep_straight = blocks.fixed | rigid[blocks.material]
-    if blocks.held is not None:
-        keep_straight = keep_straight | blocks.held.any(axis=1)
+    if blocks.constrained is not None:
+        keep_straight = keep_straight | blocks.constrained.any(axis=1)
     density = np.array([material.density for material in problem.materials])
     acting = BoundaryForces(
         result.vertices,
@@ -144,7 +143,8 @@ def boundary_loads(
 
 
 def beside_acting(contacts: np.ndarray, n_blocks: int) -> np.ndarray:
-    """CONTACT rows of all pairs of blocks between which some contact carries force: where it may end, others tell."""
+    """CONTACT rows of all pairs of blocks with a loaded contact, the open ones included: they show where a face
+    ends."""
     pair = np.minimum(contacts["block"], contacts["other"]) * n_blocks + np.maximum(
         contacts["block"], contacts["other"]
     )
@@ -161,11 +161,12 @@ def solve_bodies(
     skip: bool = True,
     names: Sequence[str] = (),
 ) -> dict:
-    """block → solution of its body, side by side; ``warm``: earlier solutions, whose face states are the first guess;
-    ``history``: what crack faces with friction remember of the load step before. An earlier solution of the same
-    geometry under the very same load is the answer, where ``solved_from`` (the ``history`` of ``warm``) is the same,
-    too, and nothing is to be worked out anew (``skip``). Raises what `ddm.Body.solve` raises, with the block's name, of
-    ``names``, before it."""
+    """Solutions (block →) of ``bodies`` under ``loads``, in parallel.
+
+    ``warm``: earlier solutions, whose face states are the first guess; ``history``: slip and damage of frictional faces
+    at the start of the load step; ``solved_from``: the history with which ``warm`` were solved. With ``skip``, an
+    earlier solution of the same geometry, load and history is returned as it is. Raises what `ddm.Body.solve` raises,
+    with the name of the block (of ``names``) in front."""
     from ... import ddm
 
     solved_from = {} if solved_from is None else solved_from
@@ -185,16 +186,16 @@ def solve_bodies(
                 return on_bases(body, ddm.BodyLoad(**asked), bases, known, history.get(b))
             return body.solve(ddm.BodyLoad(**asked), warm=known, history=history.get(b))
         except (ValueError, ddm.NotConverged) as failure:
-            # (Others have more than a message, as `ddm.OutOfEquilibrium`.)
+            # (Subclasses, as `ddm.OutOfEquilibrium`, carry more than a message.)
             if type(failure) not in (ValueError, ddm.NotConverged):
                 raise
             raise type(failure)(f"{_called(b, names)}: {failure}") from failure
         except ddm.TargetMissed as failure:
             raise ddm.TargetMissed(failure.solution, failure.target, f"{_called(b, names)}: ") from failure
 
-    solutions = dict(zip(bodies, side_by_side(solved, list(bodies), threads_for(bodies))))
+    solutions = dict(zip(bodies, parallel_map(solved, list(bodies), threads_for(bodies))))
     if any(body.asked.target_error is not None for body in bodies.values()):
-        # Those that meet the target error may be of finer bodies.
+        # Solutions that meet the target error may belong to refined bodies.
         bodies.update((b, solution.body) for b, solution in solutions.items())
     return solutions
 
@@ -203,23 +204,23 @@ def _called(block: int, names: Sequence[str]) -> str:
     return names[block] if block < len(names) else f"block {block}"
 
 
-#: Unknowns of a body from which solving it on a thread of its own pays: what is smaller takes about a millisecond, most
-#: of it in the interpreter, and threads then wait for each other (a fourth slower on two cores with 400 unknowns).
+#: Unknowns from which a body is solved on a thread of its own. A smaller one takes about a millisecond, most of it in
+#: the interpreter, where threads wait for each other (400 unknowns: a quarter slower on two cores).
 LARGE = 1000
 
 
 def threads_for(bodies: dict[int, Body]) -> int | None:
-    """On how many threads the ``bodies`` are worth being solved; None: all there are."""
+    """Number of threads for solving ``bodies``; None: all."""
     large = sum(body.boundary.n_unknowns + body.faces.n_unknowns >= LARGE for body in bodies.values())
     return None if large > 1 else 1
 
 
-#: What of a `BoundaryLoad` is a load.
+#: The fields of a `BoundaryLoad` that define the load.
 _ASKED = tuple(each.name for each in fields(BoundaryLoad) if each.name not in ("imbalance", "bases"))
 
 
 def _same_question(body: Body, known, asked: dict[str, np.ndarray | None]) -> bool:
-    """Whether ``body`` under the load ``asked`` has been solved as ``known``."""
+    """Whether ``known`` is the solution of ``body`` under the load ``asked``."""
     return known.body is body and all(
         (of is None) == (before is None) and (of is None or np.array_equal(of, before))
         for of, before in ((asked[name], getattr(known.load, name)) for name in _ASKED)
@@ -227,9 +228,9 @@ def _same_question(body: Body, known, asked: dict[str, np.ndarray | None]) -> bo
 
 
 def inherited(history: dict, parent: np.ndarray, cracks: Cracks) -> dict:
-    """child → what the faces of its ``cracks`` remember (`ddm.FaceMemory`), from that of the parents, ``parent``
-    (n_children,). Children keep their parent's reference coordinates, and so its memory; the work done by friction so
-    far goes on with one of them, or a sum over blocks would count it twice."""
+    """child → memory of the faces of its ``cracks`` (`ddm.FaceMemory`), from ``history`` of the ``parent``
+    (n_children,). Children keep the reference coordinates of their parent, and so its memory. The friction work so far
+    is assigned to one of the children, so that sums over blocks count it once."""
     found, told = {}, set()
     for child in np.unique(cracks.block).tolist():
         block = int(parent[child])
@@ -240,7 +241,7 @@ def inherited(history: dict, parent: np.ndarray, cracks: Cracks) -> dict:
 
 
 def tip_rows(problem: Problem, blocks: Blocks, solutions: dict, nodes_of: dict[int, np.ndarray]) -> np.ndarray:
-    """TIP rows of all solved bodies with the criterion's angle and K_eq, nodes counted in the whole network."""
+    """TIP rows of all solved bodies with kink angle and K_eq; nodes numbered in the whole network."""
     if not solutions:
         return np.empty(0, TIP)
     from ...ddm.fracture.f_criterion import judged, judged_rows

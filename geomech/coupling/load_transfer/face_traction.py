@@ -1,5 +1,9 @@
-"""The forces of a joint face's contacts as one traction along the side of the block that it covers. Compiled (`boundary_tractions`
-has the kernel)."""
+"""Traction on one side of a block from the contacts of one joint face, with the same resultant and moment.
+
+With the push P, its moment M about the start of the side and the shear T of the contacts, the traction is p(s)(n +
+(T/P) t) with ∫ p ds = P and ∫ s p ds = M: p linear, or a triangle where a linear pressure would be tensile
+(`no_tension_pressure`). Compiled; `boundary_tractions` has the kernel that calls these functions.
+"""
 
 from __future__ import annotations
 
@@ -19,13 +23,13 @@ from .piecewise_traction import (
     place_along,
 )
 
-#: A resultant nearer to an end of a face than this part of it presses there and nowhere else.
+#: A resultant closer to the end of a face than this fraction of its length acts as a force at that end.
 AT_AN_END = 1e-2
 
 
 class _Spread(NamedTuple):
-    """Push N, its moment about the start of a side N m, and shear N along that, to be spread over it; (wx, wy) is the
-    traction with a unit of pressure; whether it may pull (``holds``), and shear is ``even``."""
+    """Resultant of a face on a side: push N/m (``total``), its ``moment`` about the start of the side, ``shear`` along
+    the side; (wx, wy) traction per unit pressure; ``holds``: may be tensile; ``even``: uniform shear instead."""
 
     total: float
     moment: float
@@ -38,14 +42,14 @@ class _Spread(NamedTuple):
 
 @jit
 def add_face(found, of, start, touches, face, number, based):
-    """All ``touches`` of the ``face`` (n,) with this ``number``, which cover the straight side that begins with the edge
-    ``start``, as one distribution with the resultant and moment of their forces; where it is ``based`` on what keeps
-    straight, it is yet to be found how they are spread (rows of pieces and the traction with a unit of pressure are
-    added, too).
+    """Add the traction of the contacts with this face ``number`` to ``found``, on the straight side that begins with
+    the edge ``start``.
 
-    Returned are the moment (N m) by which shears along the side stretch the block beyond what the tractions do, for those
-    of two contacts that oppose each other have neither resultant nor moment; and the couple (N m) that forces lose which
-    act beyond the end of the edge that bears them."""
+    ``based``: the face lies on a rigid base, and the distribution of its pressure is found later by
+    `geomech.ddm.loads.rigid_bases`; the rows of its pieces and the traction per unit pressure are added, too.
+
+    Returns two moments, N: Σ r ⊗ f along the side that the tractions do not reproduce (opposed shears of two contacts
+    have neither resultant nor moment), and the couple lost by forces that act beyond the end of their edge."""
     sx, sy, ax, ay, length = line_of(of, start)
     total, moment, shear, size, turned, stretched = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     least, most, near, far, holds = length, 0.0, length, 0.0, True
@@ -70,17 +74,17 @@ def add_face(found, of, start, touches, face, number, based):
         moment += push * place
         shear += along
         stretched += along * place
-        # A contact that is pressed in, or gapes, has its shear off the side.
+        # The shear of a contact with overlap or gap acts off the side.
         turned -= along * (ax * (touches.py[k] - sy) - ay * (touches.px[k] - sx))
         size += abs(x) + abs(y)
         holds = holds and touches.holds[k]
-    # The force that goes with a unit of pressure: shear in proportion to it, evenly spread where faces are held
-    # together besides and there is none to go by. Pressure on a bond that may pull is linear, and shear even, wherever
-    # its resultant is: it goes on without a jump as that leaves the face.
+    # Traction per unit pressure: shear is proportional to pressure. On bonds, and where the pressure gives no scale, it
+    # is uniform. On a bond with tensile strength the pressure is linear wherever its resultant lies, so that the
+    # traction is continuous as the resultant leaves the face.
     inside = total > 0 and least <= moment / total <= most
     moment += turned
     if inside and not holds:
-        # What only pushes cannot do so beyond its ends.
+        # Contacts in compression cannot have their resultant outside the face.
         moment = min(max(moment, total * least), total * most)
     even = holds or abs(total) <= 1e-9 * size or not inside
     slope = 0.0 if even else shear / total
@@ -101,8 +105,8 @@ def add_face(found, of, start, touches, face, number, based):
 
 @jit
 def _add_spread(found, of, start, touches, face, number, spread, stretched):
-    """Add the tractions of a face to what is ``found``: linear, or a triangle where that would pull. Returned are the
-    couple that forces lose beyond the end of an edge, and what is left to be ``stretched`` by beside even shear."""
+    """Add the tractions of a face to ``found``, linear or without tension. Returns the couple lost at the ends of
+    edges, and what remains of ``stretched`` after uniform shear."""
     sx, sy, ax, ay, length = line_of(of, start)
     wx, wy, couple = spread.wx, spread.wy, 0.0
     lows = _ends(touches, face, number, sx, sy, ax, ay, length, -1)
@@ -136,8 +140,11 @@ def _add_spread(found, of, start, touches, face, number, spread, stretched):
 
 @jit
 def _ends(touches, face, number, sx, sy, ax, ay, length, way):
-    """Two places where a face's pressure may end on one side (``way`` −1 or 1), and the share of each: the last contact that acts,
-    and the next one that gapes, the less the wider it does beside how much the other one gives."""
+    """Where the pressure of a face may end on one side (``way`` −1 or 1): two places with weights that add up to 1.
+
+    They are the outermost contact that carries force and the next open one. The weight of the open one falls with its
+    gap, in proportion to the overlap of the closed one, so that the traction is continuous as contacts open and
+    close."""
     closed, closed_at, strength = -1, 0.0, 0.0
     for k in range(len(face)):
         if face[k] == number and touches.acts[k]:
@@ -161,8 +168,8 @@ def _ends(touches, face, number, sx, sy, ax, ay, length, way):
 
 @jit
 def _add_at_end(found, of, start, place, fx, fy):
-    """A force at a ``place`` of a straight side where its pressure ends: that on the grid, from which moments are
-    taken, and not that of the contact, which is off it. Returned is the couple that is left."""
+    """Add a force at ``place`` on a straight side, where its pressure ends. Moments are taken about this point of the
+    grid, not about the contact beside it. Returns the remaining couple."""
     sx, sy, ax, ay, _ = line_of(of, start)
     edge = start
     for k in range(of.chain_first[start] + 1, of.chain_last[start] - 1):
@@ -174,8 +181,8 @@ def _add_at_end(found, of, start, place, fx, fy):
 
 @jit
 def add_lone(found, of, touches, k):
-    """The force of one contact where it is: on the block's own corner, or on the edge that another's corner meets.
-    Returned is the couple that is left."""
+    """Add the force of a single contact: on the block's own corner, or on the edge that the other block's corner
+    touches. Returns the remaining couple."""
     if touches.own[k]:
         add_corner_force(found, of, touches.vertex[k], touches.fx[k], touches.fy[k])
         return 0.0

@@ -1,5 +1,8 @@
-"""The inertia of blocks that their boundary loads leave, as body forces linear in x, so that all of it is in equilibrium
-(d'Alembert)."""
+"""Body forces that balance the boundary loads of a block: its inertia (d'Alembert), linear in x.
+
+b(x) = b₀ + G (x − x_c) with ∫ b dA = −Σ f and ∫ r × b dA = −Σ r × f, so that the elastic problem is in equilibrium to
+round-off.
+"""
 
 from __future__ import annotations
 
@@ -12,7 +15,8 @@ from .piecewise_traction import Found
 
 
 class BlockShape(NamedTuple):
-    """Area (n,) m², ``centroid`` (n, 2) m and ``second`` moments of area about it (n, 2, 2) m⁴ of blocks, as drawn."""
+    """Blocks in the reference configuration: ``area`` (n,) m², ``centroid`` (n, 2) m, ``second`` moments of area (n, 2,
+    2) m⁴ about it."""
 
     area: np.ndarray
     centroid: np.ndarray
@@ -21,12 +25,12 @@ class BlockShape(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class BlockInertia:
-    """The turning of blocks (n,), and what their inertia takes of the forces on them.
+    """Rotation of blocks (n,) and the forces that their inertia balances.
 
-    ``rotation`` (n,) rad, ``density`` (n,) kg/m³, ``acceleration`` (n, 6; None: none) and ``spin`` (n,) rad/s the blocks'
-    own, ``gravity`` (2,) m/s² (None: none); ``reaction`` (n, 6) N, N m, what imposes their motion, which is spread over a
-    block as its inertia is; ``overstress`` (n, 3) what the forces balance beyond the stress of a block, Pa, current axes
-    (None: at rest).
+    ``rotation`` (n,) rad, ``density`` (n,) kg/m³, ``acceleration`` (n, 6; None: zero), ``spin`` (n,) rad/s, ``gravity``
+    (2,) m/s² (None: zero); ``reaction`` (n, 6) N, N m: forces that impose a motion, distributed over the block like its
+    inertia; ``overstress`` (n, 3) Pa: what the forces balance beyond the stress of the block (inertia of strain and
+    viscosity), current axes (None: at rest).
     """
 
     rotation: np.ndarray
@@ -38,7 +42,7 @@ class BlockInertia:
     overstress: np.ndarray | None = None
 
     def only(self, k: int) -> BlockInertia:
-        """That of the block in the row ``k`` alone."""
+        """The inertia of the block in row ``k``."""
         row = slice(k, k + 1)
         rows = (None if of is None else of[row] for of in (self.acceleration, self.reaction, self.overstress))
         return BlockInertia(self.rotation[row], self.density[row], self.spin[row], self.gravity, *rows)
@@ -48,13 +52,12 @@ def balanced(
     found: Found, ends: np.ndarray, shape: BlockShape, inertia: BlockInertia, turn: np.ndarray, left_out: np.ndarray,
     strained: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:  # fmt: skip
-    """Body force (n, 2) of blocks of this ``shape`` at their centroids, its gradient (n, 2, 2), the even stress (n, 3) that
-    the strain's inertia is where the blocks are in motion (where there is an overstress), and what the solver's own
-    ``inertia`` does not balance, relative to the forces' size (n,).
+    """Body force (n, 2) at the centroids of blocks, its gradient (n, 2, 2), the uniform stress (n, 3) that stands for
+    the inertia of their strain (where there is an overstress), and the remaining imbalance relative to the forces (n,).
 
-    ``found``: the pieces and points of all blocks, ``ends`` (n + 1, 3) how many of them there are before each block;
-    ``turn`` (n, 2) cosine and sine of the blocks' rotation, ``left_out`` (n, 2, 2) Σ r ⊗ f of what the pieces miss,
-    ``strained`` (n, 2, 2) the gradient of the blocks' motion."""
+    ``found``: pieces and points of all blocks; ``ends`` (n + 1, 3): their number before each block; ``turn`` (n, 2):
+    cosine and sine of the rotations; ``left_out`` (n, 2, 2): Σ r ⊗ f that the pieces do not reproduce; ``strained`` (n,
+    2, 2): displacement gradient of the blocks."""
     area, centroid, second = shape
     density, spin = np.asarray(inertia.density, dtype=float), np.asarray(inertia.spin, dtype=float)
     gravity = np.zeros(2) if inertia.gravity is None else np.asarray(inertia.gravity, dtype=float)
@@ -79,7 +82,7 @@ def balanced(
         left = second @ (whole - gradient).transpose(0, 2, 1) / area[:, None, None]
         even = np.stack([left[:, 0, 0], left[:, 1, 1], 0.5 * (left[:, 0, 1] + left[:, 1, 0])], axis=1)
     body_force = -force / area[:, None]
-    # The solver's forces balance on the block as it is strained, where their arms and its inertia are others by as much.
+    # The solver's forces balance on the strained block, whose lever arms and inertia differ by the strain.
     strain = turn_back @ strained
     moments = strain @ second @ strain.transpose(0, 2, 1)
     missed = _turning(strain @ (spread + left_out) + moments @ symmetric) + reaction[:, 2]
@@ -91,15 +94,15 @@ def balanced(
 def _resultants(
     pieces: np.ndarray, inside: np.ndarray, ends: np.ndarray, about: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Forces (n, 2) on blocks, the sums of their sizes (n,) and ∫ r ⊗ t ds (n, 2, 2), with the arms r from ``about``
-    (n, 2)."""
+    """Resultants (n, 2) of the forces on blocks, the sums of their magnitudes (n,), and ∫ r ⊗ t ds (n, 2, 2) with arms
+    r from ``about`` (n, 2)."""
     n = len(about)
     owner, at = (np.repeat(np.arange(n), np.diff(ends[:, k])) for k in (0, 1))
     a, b, p, q = pieces.reshape(-1, 4, 2).transpose(1, 0, 2)
     a, b = a - about[owner], b - about[owner]
     length = np.hypot(*(b - a).T)[:, None]
     sizes = 0.5 * length[:, 0] * (np.hypot(*p.T) + np.hypot(*q.T))
-    # ∫ x t of two functions linear along a length L is L/6 Σ x_i t_j, those of the same end counted twice.
+    # ∫ x t ds of two linear functions on a length L is L/6 Σ x_i t_j, with terms of the same end counted twice.
     ends_of = (2 * a + b)[:, :, None] * p[:, None] + (a + 2 * b)[:, :, None] * q[:, None]
     points, forces = inside[:, :2] - about[at], inside[:, 2:]
     force = _sums(0.5 * length * (p + q), owner, n) + _sums(forces, at, n)
@@ -110,21 +113,20 @@ def _resultants(
 
 
 def _sums(rows: np.ndarray, owner: np.ndarray, n: int) -> np.ndarray:
-    """(n, k) sums of the ``rows`` (m, k) of each ``owner`` (m,)."""
-    # (Sums of nothing are integers.)
+    """(n, k) sums of the ``rows`` (m, k) by ``owner`` (m,)."""
+    # (bincount of an empty array returns integers.)
     return np.stack([np.bincount(owner, weights=column, minlength=n).astype(float) for column in rows.T], axis=1)
 
 
 def _with_torque(symmetric: np.ndarray, spread: np.ndarray, second: np.ndarray) -> np.ndarray:
-    """The gradients of body forces, ``symmetric`` but for the angular inertia that leaves no moment beside forces of
-    ``spread``."""
+    """``symmetric`` gradients of body forces plus the angular inertia that balances the moment of ``spread``."""
     torque = _turning(spread + second @ symmetric) / _trace(second)
     none = np.zeros_like(torque)
     return symmetric + _matrices(none, torque, -torque, none)
 
 
 def _turning(spread: np.ndarray) -> np.ndarray:
-    """The moments of forces f at arms r, of which ``spread`` (n, 2, 2) is Σ r ⊗ f."""
+    """Moments Σ r × f, from ``spread`` (n, 2, 2) = Σ r ⊗ f."""
     return spread[:, 0, 1] - spread[:, 1, 0]
 
 

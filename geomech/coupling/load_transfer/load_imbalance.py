@@ -1,4 +1,4 @@
-"""Loads of cracked blocks that are not quite in balance: stress intensity factors are as uncertain."""
+"""Warns of boundary loads that are not in equilibrium: stress intensity factors are uncertain by as much."""
 
 from __future__ import annotations
 
@@ -10,29 +10,29 @@ from .boundary_tractions import BoundaryLoad
 
 log = logging.getLogger(__name__)
 
-#: What is left of force and moment, over their size, is told of beyond this and the strain: contacts that are pressed
-#: in, or stand apart, act off the outline by as much as blocks are strained.
+#: Imbalance of force and moment, relative to the forces, that is reported when it exceeds this plus the largest strain:
+#: contacts with overlap or gap act off the outline by as much as blocks are strained.
 BEYOND = 1e-5
 
 
 class LoadBalance:
-    """The largest imbalance of any block so far, ``told`` as it passes what is allowed, and again whenever it has
-    doubled."""
+    """The largest imbalance of any block so far; ``reported`` is the last one of which a warning was given. A new one
+    follows whenever it has doubled."""
 
     def __init__(self) -> None:
-        self.told = 0.0
+        self.reported = 0.0
         self.strain = 0.0
 
     def check(self, loads: Mapping[int, BoundaryLoad], blocks: Blocks, strain: float, time: float) -> None:
-        """Log a warning that names the block whose ``loads`` (block →) are worst, if they are off by more than the
-        largest ``strain`` so far allows."""
+        """Warn of the block whose boundary load is furthest from equilibrium, if the imbalance exceeds what the largest
+        ``strain`` so far explains. ``loads``: block → load; ``time`` s."""
         self.strain = max(self.strain, strain)
         if not loads:
             return
         b = max(loads, key=lambda block: loads[block].imbalance)
         most = loads[b].imbalance
-        if most > max(BEYOND + self.strain, 2.0 * self.told):
-            self.told = most
+        if most > max(BEYOND + self.strain, 2.0 * self.reported):
+            self.reported = most
             log.warning(
                 "t = %g s: the forces on %s that its cracks are solved for are out of balance by %.1e of their size; "
                 "its stress intensity factors are as uncertain",

@@ -1,10 +1,13 @@
-"""The pressure on a joint face that has the force and moment of its contacts and pulls nowhere.
+"""Pressure on a joint face with given resultant and moment, and without tension.
 
-A resultant in the middle third is the linear pressure on the whole length. Nearer to an end it would pull at the other
-one; it is then what a no-tension face does, a triangle on a shorter length, as a mixture of two triangles of fixed
-lengths, so that a body meets the same few loads again and again. At the very end all of it is a lone force, as it is
-when the contact there is the only one that is left: the pressure goes over into it without a jump, which would leave
-blocks and cracks no state to settle in.
+A resultant in the middle third of the face is a linear pressure on the whole length. Closer to an end, a linear
+pressure would be tensile at the other end; the pressure is then a triangle on part of the length (no-tension rule),
+
+    reach = 3 × distance of the resultant from the end,
+
+given as the weighted sum of two triangles of fixed lengths, so that a body meets only a few different loads. At the
+very end the pressure becomes a force at that end. All transitions are continuous; a jump could leave blocks and cracks
+without a consistent state.
 """
 
 from __future__ import annotations
@@ -12,7 +15,7 @@ from __future__ import annotations
 from ...compiled import kept
 from .piecewise_traction import jit
 
-#: Triangles are on 1/n, 2/n … of a face's length.
+#: Triangles have lengths of 1/n, 2/n … of the face.
 TRIANGLES = 8
 
 #: A piece without length.
@@ -21,11 +24,11 @@ NOTHING = (0.0, 0.0, 0.0, 0.0)
 
 @kept(error_model="numpy", nogil=True)
 def no_pull(length, force, moment):
-    """Two pieces (start, end, p_start, p_end) of a pressure on [0, length], linear on each (they add up; one may have no
-    length), and lone forces at its start and at its end, all together with resultant ``force`` and ``moment`` about 0.
+    """Two pieces (start, end, p_start, p_end) of a linear pressure on [0, length], which add up (one may be empty), and
+    forces at the start and the end, with resultant ``force`` and ``moment`` about 0.
 
-    None of it is negative where the force is positive and its line of action meets the face; a resultant outside cannot
-    be carried without pull and stays linear, pull and all, since force and moment come first.
+    Nothing is tensile if the force is positive and its line of action meets the face. A resultant outside the face
+    cannot be balanced without tension; the pressure then stays linear, since force and moment come first.
     """
     arm = moment / force if force > 0 else -1.0
     if 0 <= arm < length / 3:
@@ -45,9 +48,9 @@ def linear(length, force, moment):
 
 @jit
 def _near_end(length, force, arm):
-    """Reach and peak of the two triangles from the near end that have their resultant at ``arm`` from it, and the lone
-    force at that end."""
-    # A triangle's resultant is a third of its reach from its peak.
+    """Reach and peak of the two triangles at the near end whose resultant is at ``arm`` from it, and the force at that
+    end."""
+    # The resultant of a triangle is at a third of its reach from its peak.
     place = 3 * arm / length * TRIANGLES
     below = min(int(place), TRIANGLES - 1)
     more = place - below

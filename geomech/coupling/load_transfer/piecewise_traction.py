@@ -1,6 +1,7 @@
-"""Forces put on the outline of a block as tractions on pieces of its edges, each piece linear and on one edge.
+"""Forces on the outline of a block as tractions on pieces of its edges, each linear and on one edge.
 
-Compiled (`boundary_tractions` has the kernel): points and vectors are plain pairs, and what is found goes into ``found``.
+Compiled; `boundary_tractions` has the kernel that calls these functions. Points and vectors are pairs of numbers;
+results are appended to ``found``.
 """
 
 from __future__ import annotations
@@ -13,40 +14,40 @@ import numpy as np
 from ...compiled import part
 from ...model import Blocks
 
-#: Of what kernels call, and nobody else.
+#: For functions that only kernels call.
 jit = part(error_model="numpy", nogil=True)
 
-#: Two edges belong to one joint face when their directions differ by less than this.
+#: Two edges belong to one joint face if their directions differ by less than this angle.
 FACE_ANGLE = math.radians(10.0)
 FLAT = math.sin(FACE_ANGLE)
 
-#: A face that ends within this part of its edge's length of the edge's end ends there.
+#: A face that ends within this fraction of the edge length from the end of the edge ends there.
 SNAP = 1e-9
 
-#: Pressures end at a multiple of this part of an edge's length. Force and moment are kept on whatever length; and the
-#: body, which knows what segments that it has met before do to it, would meet new ones every step, for faces slide by
-#: strains.
+#: Pressures end at multiples of this fraction of the edge length. Force and moment are preserved for any length. Faces
+#: slide by as little as the strains, and without the grid each step would have load segments of its own, for which the
+#: body would have to compute new responses.
 GRID = 2.0**-12
 
-#: Contacts nearer to each other than this part of a face's length are at one place.
+#: Contacts closer together than this fraction of the face length act at one place.
 SAME = 1e-6
 
-#: A point load nearer to an edge than this part of its length stands on it.
+#: A point load closer to an edge than this fraction of its length acts on it.
 ON_EDGE = 1e-6
 
-#: A lone contact spreads over this part of its edge (of the corner's shorter edge).
+#: A single contact loads this fraction of its edge (of the shorter edge at a corner).
 LONE_SPREAD = 1.0 / 20.0
 
 
-#: Pieces of a face on a rigid base. A slot in a block as wide as deep, twice and three times as wide: K to 6e-4, 1e-4
-#: and 2e-3 with 24 of them, 7e-4, 2e-3 and 2 % with 16 (`tests/coupling/test_bases.py`).
+#: Pieces of a face on a rigid base. K of a slot in a block as wide as deep, twice and three times as wide is accurate
+#: to 6e-4, 1e-4 and 2e-3 with 24 pieces, and to 7e-4, 2e-3 and 2 % with 16 (`tests/coupling/test_bases.py`).
 ON_BASE = 24
 
 
 class Outlines(NamedTuple):
-    """The outlines of all blocks: reference ``vertices`` and those ``now`` (n, 2), and of every vertex or edge the
-    ``following`` and the one ``before``, the first edge of its straight side (`Blocks.side_start`) and, of these, where in
-    ``chain`` the vertices along the side begin and end."""
+    """Outlines of all blocks: reference ``vertices`` and current ones ``now`` (n, 2). For every vertex or edge: the
+    ``following`` one, the one ``before``, the first edge of its straight side (`Blocks.side_start`), and begin and end
+    in ``chain`` of the vertices along that side."""
 
     vertices: np.ndarray
     now: np.ndarray
@@ -59,9 +60,9 @@ class Outlines(NamedTuple):
 
 
 class Found(NamedTuple):
-    """Rows found so far, as many as there are in ``count`` (3,): ``pieces`` (m, 8), (x, y) of the start and of the end,
-    traction (x, y) there and there; points ``inside`` and forces there (k, 4); and of pieces on ``bases``, from which to
-    which row, and the traction with a unit of pressure (j, 4). What finds no room is only counted."""
+    """Output rows, with their ``count`` (3,): ``pieces`` (m, 8): (x, y) of start and end, traction (x, y) at both;
+    ``inside`` (k, 4): points and the forces there; ``bases`` (j, 4): first and last row of pieces on a rigid base,
+    traction per unit pressure. Rows beyond the room of the arrays are only counted."""
 
     count: np.ndarray
     pieces: np.ndarray
@@ -70,7 +71,7 @@ class Found(NamedTuple):
 
 
 def outlines(blocks: Blocks, now: np.ndarray) -> Outlines:
-    """Those of ``blocks`` whose vertices are ``now`` (n, 2)."""
+    """Outlines of ``blocks`` with the current vertices ``now`` (n, 2)."""
     return Outlines(
         blocks.vertices, np.ascontiguousarray(now), blocks.next_vertex, blocks.previous_vertex, *blocks.side_chains
     )
@@ -78,7 +79,7 @@ def outlines(blocks: Blocks, now: np.ndarray) -> Outlines:
 
 @jit
 def line_of(of, start):
-    """Start, direction and length of the straight side with the first edge ``start``, reference frame."""
+    """Start, direction and length of the straight side that begins with the edge ``start``, reference frame."""
     last = of.chain[of.chain_last[start] - 1]
     sx, sy = of.vertices[start, 0], of.vertices[start, 1]
     x, y = of.vertices[last, 0] - sx, of.vertices[last, 1] - sy
@@ -88,26 +89,26 @@ def line_of(of, start):
 
 @jit
 def place_along(px, py, sx, sy, ax, ay):
-    """How far from (sx, sy) along a unit (ax, ay) the point (px, py) lies, m."""
+    """Coordinate of the point (px, py) along the unit vector (ax, ay) from (sx, sy), m."""
     return (px - sx) * ax + (py - sy) * ay
 
 
 @jit
 def on_grid(place, length):
-    """The multiple of GRID times ``length`` that is nearest to ``place``."""
+    """The multiple of GRID times ``length`` nearest to ``place``."""
     return round(place / (GRID * length)) * (GRID * length)
 
 
 @jit
 def add(found, ax, ay, bx, by, tax, tay, tbx, tby):
-    """A piece from a to b, unless nothing acts on it."""
+    """Add a piece from a to b, unless its traction is zero."""
     if tax != 0 or tay != 0 or tbx != 0 or tby != 0:
         add_even_so(found, ax, ay, bx, by, tax, tay, tbx, tby)
 
 
 @jit
 def add_even_so(found, ax, ay, bx, by, tax, tay, tbx, tby):
-    """A piece from a to b."""
+    """Add a piece from a to b."""
     k = found.count[0]
     found.count[0] += 1
     if k < len(found.pieces):
@@ -117,7 +118,7 @@ def add_even_so(found, ax, ay, bx, by, tax, tay, tbx, tby):
 
 @jit
 def add_row(count, rows, kind, a, b, c, d):
-    """A row of four, of that ``kind``."""
+    """Add a row of four numbers to the array of this ``kind``."""
     k = count[kind]
     count[kind] += 1
     if k < len(rows):
@@ -126,8 +127,8 @@ def add_row(count, rows, kind, a, b, c, d):
 
 @jit
 def add_on_side(found, of, start, low, high, tax, tay, tbx, tby):
-    """A traction that goes from a to b over ``low`` to ``high`` of a straight side: one piece an edge, for a load segment
-    lies on one edge."""
+    """Add a traction, linear from a to b over [``low``, ``high``] of a straight side: one piece per edge, since a load
+    segment lies on one edge."""
     sx, sy, ax, ay, length = line_of(of, start)
     first, last = of.chain_first[start], of.chain_last[start]
     for k in range(first, last - 1):
@@ -140,7 +141,7 @@ def add_on_side(found, of, start, low, high, tax, tay, tbx, tby):
         a, b = max(low, mark), min(high, far)
         if b - a > SNAP * length:
             x0, y0, x1, y1 = sx + a * ax, sy + a * ay, sx + b * ax, sy + b * ay
-            # Bit for bit at the corner where it is there.
+            # At a corner of the block, exactly its coordinates.
             if a == mark:
                 x0, y0 = of.vertices[here, 0], of.vertices[here, 1]
             if b == far:
@@ -154,8 +155,9 @@ def add_on_side(found, of, start, low, high, tax, tay, tbx, tby):
 
 @jit
 def add_base(found, of, start, low, high, p_low, p_high, wx, wy):
-    """A pressure from ``p_low`` to ``p_high`` over ``low`` to ``high`` of a straight side, on pieces that another one may
-    take: short at the ends, where bases press most. (wx, wy) is the traction with a unit of it."""
+    """Add a pressure, linear from ``p_low`` to ``p_high`` over [``low``, ``high``] of a straight side, on pieces whose
+    pressures can be changed later: short at the ends, where a rigid base presses most. (wx, wy): traction per unit
+    pressure."""
     sx, sy, ax, ay, length = line_of(of, start)
     n = ON_BASE + 1
     places, vertex = (
@@ -174,7 +176,7 @@ def add_base(found, of, start, low, high, p_low, p_high, wx, wy):
                 places[j], vertex[j] = places[j - 1], vertex[j - 1]
                 j -= 1
             if places[j + 1] == at and j < n:
-                # A corner takes the place of a mark that is there.
+                # A corner of the block replaces a division point at the same place.
                 vertex[j + 1] = corner
                 for i in range(j, n):
                     places[i], vertex[i] = places[i + 1], vertex[i + 1]
@@ -196,7 +198,7 @@ def add_base(found, of, start, low, high, p_low, p_high, wx, wy):
 
 @jit
 def add_corner_force(found, of, vertex, fx, fy):
-    """A force on a corner, resolved along its two edges: shear on a short piece of each."""
+    """Add a force on a corner, resolved along its two edges: shear on a short piece of each."""
     previous, following = of.before[vertex], of.following[vertex]
     x, y = of.vertices[vertex, 0], of.vertices[vertex, 1]
     bx, by = x - of.vertices[previous, 0], y - of.vertices[previous, 1]
@@ -208,8 +210,8 @@ def add_corner_force(found, of, vertex, fx, fy):
     x0, y0, x1, y1 = x - reach * bx, y - reach * by, x + reach * ax, y + reach * ay
     fx, fy = fx / reach, fy / reach
     if abs(turn) < FLAT:
-        # The corner is as good as flat: its two edges cannot resolve a force across them. Half of it goes on each; the
-        # middle of the two halves is off the corner, and what moment that makes one half, across, gives the other.
+        # The two edges of a flat corner cannot resolve a transverse force. Half of it acts on each edge; the centre of
+        # the two halves is off the corner, and the pressure on one half is tilted to restore the moment.
         sx, sy = ax + bx, ay + by
         cross = ((ax - bx) * fy - (ay - by) * fx) / (2 * (sx * sx + sy * sy))
         ox, oy = -cross * sy, cross * sx
@@ -227,8 +229,8 @@ def add_corner_force(found, of, vertex, fx, fy):
 
 @jit
 def add_edge_force(found, of, edge, px, py, fx, fy):
-    """A force at a point of an edge, spread over a short piece of it with the same moment. One beyond its end acts at
-    that end; returned is the couple that is then left, N m."""
+    """Add a force at a point of an edge, distributed over a short piece of it with the same moment. Beyond the end of
+    the edge it acts at that end; returns the couple lost by that, N m per metre."""
     x, y = of.vertices[edge, 0], of.vertices[edge, 1]
     following = of.following[edge]
     ex, ey = of.vertices[following, 0], of.vertices[following, 1]
@@ -237,7 +239,7 @@ def add_edge_force(found, of, edge, px, py, fx, fy):
     acts_at = place_along(px, py, x, y, ax, ay)
     place = min(max(acts_at, 0.0), length)
     couple = (acts_at - place) * (ax * fy - ay * fx)
-    # About the point, hence narrower near an end of the edge; at the very end it is a corner force.
+    # Centred on the point, hence shorter near an end of the edge; at the end it is a force on the corner.
     if min(place, length - place) < SAME * length:
         add_corner_force(found, of, edge if place < length / 2 else following, fx, fy)
         return couple
@@ -245,7 +247,7 @@ def add_edge_force(found, of, edge, px, py, fx, fy):
     middle = place if middle <= 0.0 or middle >= length else middle
     half = min(LONE_SPREAD * length / 2, middle, length - middle)
     tx, ty = fx / (2 * half), fy / (2 * half)
-    # The push across the edge is where the point is, not in the middle.
+    # Tilted, so that the normal component acts at the point rather than at the centre of the piece.
     tilt = 3 * (place - middle) / half * (ax * ty - ay * tx)
     low, high = middle - half, middle + half
     add(
@@ -257,9 +259,9 @@ def add_edge_force(found, of, edge, px, py, fx, fy):
 
 @jit
 def add_couple(found, of, first, last, area, couple):
-    """A ``couple`` as an even shear flow q along all edges, ``first`` to ``last``, of a block of this ``area``: Bredt's
-    M = 2 A q. It has no resultant, stretches nothing in the mean, and stays small however short the edge is that the
-    forces have slid beyond."""
+    """Add a ``couple`` as uniform shear flow q along all edges, ``first`` to ``last``, of a block of this ``area``:
+    Bredt's formula M = 2 A q. It has no resultant and no mean stress, and stays small however short the edge was from
+    whose end the force has slid off."""
     if couple == 0:
         return
     for edge in range(first, last):
@@ -272,8 +274,8 @@ def add_couple(found, of, first, last, area, couple):
 
 @jit
 def add_edge_piece(found, of, row, c, s):
-    """A piece of an edge (EDGE_FORCE row, current coordinates) with its traction, which is linear there too: the block's
-    motion is affine. Its ends stay bit for bit at the edge's where they are there."""
+    """Add a loaded piece of an edge (EDGE_FORCE row, current coordinates). The traction stays linear, since the motion
+    of the block is affine. Ends that coincide with ends of the edge keep its exact coordinates."""
     first, last = row.edge, of.following[row.edge]
     nx, ny = of.now[last, 0] - of.now[first, 0], of.now[last, 1] - of.now[first, 1]
     ax, ay, bx, by = of.vertices[first, 0], of.vertices[first, 1], of.vertices[last, 0], of.vertices[last, 1]
@@ -282,7 +284,7 @@ def add_edge_piece(found, of, row, c, s):
     s0 = ((row.start[0] - of.now[first, 0]) * nx + (row.start[1] - of.now[first, 1]) * ny) / length**2
     s1 = ((row.end[0] - of.now[first, 0]) * nx + (row.end[1] - of.now[first, 1]) * ny) / length**2
     if abs(s1 - s0) <= SNAP:
-        return  # as where a water table meets the edge's end: no force to speak of, and no length to put it on
+        return  # as where a water table meets the end of an edge: negligible force, and no length to apply it to
     x0, y0, x1, y1 = ax + s0 * (bx - ax), ay + s0 * (by - ay), ax + s1 * (bx - ax), ay + s1 * (by - ay)
     if s0 < SNAP:
         x0, y0 = ax, ay
@@ -297,8 +299,8 @@ def add_edge_piece(found, of, row, c, s):
 
 @jit
 def add_point_load(found, of, first, last, px, py, fx, fy):
-    """A point load on an edge, of those from ``first`` to ``last``, is spread a little along it; one ``inside`` the rock
-    stays one. Returned is the couple that is left."""
+    """Add a point load of a block with the edges ``first`` to ``last``: distributed over a short piece of edge, or a
+    point force if it acts ``inside`` the rock. Returns the remaining couple."""
     nearest, least, scale = first, np.inf, 0.0
     for edge in range(first, last):
         x, y = of.vertices[edge, 0], of.vertices[edge, 1]

@@ -1,7 +1,7 @@
-"""Rock without an end in the coupling's cycle: no block presses on it, so a pass is one solution of the crack solver.
+"""Passes of unbounded rock: no block loads it, so that a pass is one solution of the crack solver.
 
-The block that stands for it is a window: fixed in the block solver, which has nothing to do with it, and no boundary to
-the cracks. Load steps, events, growth, checkpoints and whatever watches a run are those of every other scene.
+A block represents the rock as a window: it is fixed in DDA, and it is no boundary for the cracks. Load steps, events,
+growth, checkpoints and monitoring are those of every other scene.
 """
 
 from __future__ import annotations
@@ -22,12 +22,12 @@ from .elastic_bodies import tip_rows
 
 
 def solved_pass(now: CrackedBlocks, dt: float, load_time: float | None) -> Balance:
-    """A pass of blocks (`balanced`) or of rock without an end, whichever the problem has."""
+    """A pass at one load, of blocks (`balanced`) or of unbounded rock, whichever the problem has."""
     return (balanced if now.problem.endless is None else _endless_pass)(now, dt, load_time)
 
 
 def _endless_pass(now: CrackedBlocks, dt: float, load_time: float | None) -> Balance:
-    """A pass of at most ``dt`` s, or at the loads of ``load_time``. Of ``now`` loads and solutions are renewed."""
+    """A pass of at most ``dt`` s, or at the loads of ``load_time``. Updates loads and solutions of ``now``."""
     with now.timed("dda"):
         result = now.system.step(now.state, now.problem.loads, dt, now.response, load_time, None)
         if load_time is not None and result.state.time != load_time:
@@ -42,7 +42,7 @@ def _endless_pass(now: CrackedBlocks, dt: float, load_time: float | None) -> Bal
 
 
 def loads_of(now: CrackedBlocks, cracks: Cracks, bodies: dict) -> dict[int, BoundaryLoad]:
-    """block → what acts on it at the time of the last pass, with ``cracks`` in it."""
+    """Loads (block →) at the time of the last pass, with these ``cracks``."""
     endless, time = now.problem.endless, now.load_time
     load = BoundaryLoad(
         np.empty((0, 2, 2)), np.empty((0, 2, 2)), np.zeros(2), np.zeros((2, 2)), np.zeros(2), 0.0,
@@ -54,7 +54,7 @@ def loads_of(now: CrackedBlocks, cracks: Cracks, bodies: dict) -> dict[int, Boun
 
 
 def take_endless(now: CrackedBlocks, cracks: Cracks, state: State) -> tuple[Event, ...]:
-    """Make ``cracks`` the present ones, and tell of the piece that they have cut off, where there is one."""
+    """Accept ``cracks``; an event for the piece they have cut out, if any."""
     if not len(divided(now.blocks, cracks)):
         now.take_cracks(cracks)
         return ()
@@ -64,7 +64,7 @@ def take_endless(now: CrackedBlocks, cracks: Cracks, state: State) -> tuple[Even
 
 
 def out_of_sight(now: CrackedBlocks, growth, state: State) -> tuple[Event, ...]:
-    """An event where ``growth`` leads out of the window, beyond which nothing is shown and no mouth is found."""
+    """An event where ``growth`` leaves the window, beyond which nothing is drawn and intersections are not searched."""
     outline = now.blocks.loops(0)[0]
     for node in growth.cracks.nodes:
         if winding_number([outline], node) > 0.25:

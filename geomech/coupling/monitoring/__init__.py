@@ -1,1 +1,1 @@
-"""What a coupled run watches over: changes of state, collapse, mechanisms, the energy balance."""
+"""Monitoring of coupled runs: changes of state, collapse, mechanisms, the energy balance."""

@@ -1,5 +1,4 @@
-"""Blocks that nothing holds: static equilibrium sought and not found, blocks that slide on and on, or one gone out of
-reach."""
+"""Collapse of a static run: no equilibrium found, blocks that slide without bound, or a block out of reach."""
 
 from __future__ import annotations
 
@@ -17,13 +16,13 @@ log = logging.getLogger(__name__)
 
 
 def relax(now: CrackedBlocks, load_time: float) -> tuple[Event, ...]:
-    """Bring the blocks to rest under the loads of ``load_time``; a collapse when there is no equilibrium."""
+    """Bring the blocks to equilibrium under the loads of ``load_time``; a collapse event if there is none."""
     with now.timed("dda"):
         found = dda.equilibrium(
             now.system, now.state, now.problem.loads, load_time=load_time, crack=now.response,
             tolerance=now.problem.dda.unbalanced_tolerance,
         )  # fmt: skip
-    # The budget is one of the steps that are recorded.
+    # The energy budget covers recorded steps only.
     now.state, now.budget = found.state, now.budget.cut()
     if not found.collapsed:
         if not found.converged:
@@ -33,7 +32,7 @@ def relax(now: CrackedBlocks, load_time: float) -> tuple[Event, ...]:
 
 
 def collapse_in_situ(now: CrackedBlocks) -> tuple[Event, ...]:
-    """A collapse, when nothing held the blocks under the in-situ stress."""
+    """A collapse event if the blocks are unsupported under the in-situ stress."""
     if now.collapsed is None:
         return ()
     return _fallen(now, now.collapsed, "under the in-situ stress there is ", now.state.time)
@@ -47,8 +46,8 @@ def _fallen(now: CrackedBlocks, found: dda.Equilibrium, where: str, time: float)
 
 
 def lost(now: CrackedBlocks, state: State) -> tuple[Event, ...]:
-    """A collapse, when a block has gone farther than the blocks reach: in statics nothing will hold it any more, and
-    ever shorter steps would follow it for ever."""
+    """A collapse event if a block has moved farther than the extent of the blocks: in statics nothing will stop it, and
+    ever shorter steps would follow it."""
     moved = np.hypot(*(state.vertices - now.blocks.vertices).T)
     farthest = int(np.argmax(moved))
     if not moved[farthest] > np.hypot(*np.ptp(now.blocks.vertices, axis=0)):
@@ -59,8 +58,8 @@ def lost(now: CrackedBlocks, state: State) -> tuple[Event, ...]:
     return (event(now, "collapse", state, now.blocks.vertices[farthest], detail),)
 
 
-def unheld(now: CrackedBlocks, result: dda.StepResult, mechanism: Mechanism) -> tuple[Event, ...]:
-    """A mechanism, when blocks of a static run go on without bound after the load step of ``result``."""
+def unsupported(now: CrackedBlocks, result: dda.StepResult, mechanism: Mechanism) -> tuple[Event, ...]:
+    """A mechanism event if blocks of a static run keep accelerating after the load step of ``result``."""
     found = mechanism.check(result, now.blocks)
     if found is None:
         return ()

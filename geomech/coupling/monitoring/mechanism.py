@@ -1,8 +1,8 @@
-"""Blocks of a static run that nothing holds: what forces leave over is borne by the inertia of the steps alone.
+"""Detects mechanisms in static runs: blocks whose unbalanced force is carried by the inertia of the steps alone.
 
-A static step, which carries no velocity, solves (2M/dt² + K) d = F. What rests, or is strained, takes of F a part that
-fades from step to step, K d. What slides or turns without bound takes the same force in every step, 2M d/dt²: its
-displacements are those of steps of that length, and no answer to the load.
+A static step, which carries no velocity over, solves (2M/dt² + K) d = F. In blocks that come to rest the inertia part
+2M d/dt² fades from step to step and K d remains. In blocks that slide or rotate without bound it stays the same in
+every step; their displacements depend on the step length and are no response to the load.
 """
 
 from __future__ import annotations
@@ -16,38 +16,38 @@ from ...model import Blocks
 
 log = logging.getLogger(__name__)
 
-#: Blocks are held when less than this part of the forces on any of them is left to move it.
+#: Unbalanced force, relative to the forces on a block, below which the block counts as supported.
 HELD = 1e-2
-#: Where more is left, it must have faded by more than this part over so many load steps. Slowly rising loads on elastic
-#: rock leave less than the former part, and blocks that settle fade faster: a column of 100 m, in steps of 10 ms, by a
-#: third.
+#: Above that, it must have decreased by the first fraction over the second number of load steps. Slowly rising loads on
+#: elastic rock leave less than the limit above, and settling blocks fade faster: a column of 100 m, in steps of 10 ms,
+#: by a third.
 FADES, STEPS = 0.1, 5
-#: What flies, with nearly all its weight to move it, may still land: it is told of when it has gone this part of its
-#: size.
+#: A block in free flight (unbalanced by nearly its weight) may still land: it is reported when it has moved this
+#: fraction of its size.
 FLYING, GONE = 0.99, 0.05
-#: So many blocks are named.
+#: Number of blocks that are named.
 NAMED = 4
 
 
 class Mechanism:
-    """Watches the load steps of a static run; tells of a mechanism once, and again when blocks have been at rest in
+    """Watches the load steps of a static run; reports a mechanism once, and again if blocks have been at rest in
     between."""
 
     def __init__(self) -> None:
         self.ratios: list[float] = []
         self.ways: list[float] = []
-        self.told = False
+        self.reported = False
 
     def check(self, result: dda.StepResult, blocks: Blocks) -> tuple[int, str] | None:
-        """After the load step of ``result``: the block that moves fastest and what is to be said, where blocks have
-        been out of balance for `STEPS` load steps and what is out of balance does not fade."""
+        """After the load step of ``result``: the fastest block and a message, if blocks have been unbalanced for
+        `STEPS` load steps and the unbalanced force does not fade; otherwise None."""
         ratio = float(result.statistics["unbalanced_ratio"])
         if not ratio > HELD:
-            self.ratios, self.ways, self.told = [], [], False
+            self.ratios, self.ways, self.reported = [], [], False
             return None
         self.ratios = [*self.ratios[-STEPS:], ratio]
         self.ways = [*self.ways[-STEPS:], float(np.hypot(*(result.state.vertices - blocks.vertices).T).max())]
-        if self.told or len(self.ratios) <= STEPS or ratio < (1.0 - FADES) * self.ratios[0]:
+        if self.reported or len(self.ratios) <= STEPS or ratio < (1.0 - FADES) * self.ratios[0]:
             return None
         speed = np.hypot(*result.state.velocity[:, :2].T)
         speed[np.asarray(blocks.fixed, bool)] = 0.0
@@ -55,7 +55,7 @@ class Mechanism:
             return None
         if ratio > FLYING and not _has_gone(int(np.argmax(speed)), result, blocks):
             return None
-        self.told = True
+        self.reported = True
         moving = np.flatnonzero(speed > 0.1 * speed.max())
         moving = moving[np.argsort(-speed[moving], kind="stable")]
         named = ", ".join(blocks.names[b] if blocks.names else f"block {b}" for b in moving[:NAMED].tolist())
@@ -66,8 +66,8 @@ class Mechanism:
         )
 
     def _stretches(self, result: dda.StepResult, blocks: Blocks, block: int) -> bool:
-        """Whether a bolt that is being stretched will hold the ``block``: what it has gained so far, on the way so far,
-        will balance the rest before the block has gone `GONE` of its size."""
+        """Whether a bolt that is being stretched will stop the ``block``: its force, extrapolated along the present
+        motion, balances the rest before the block has moved `GONE` of its size."""
         bolts = result.state.bolts
         if not (bolts["installed"] & ~bolts["broken"]).any():
             return False

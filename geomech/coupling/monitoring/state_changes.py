@@ -1,9 +1,9 @@
-"""What contacts between blocks and crack faces do in a pass, and what of it is another than before.
+"""Changes of state of block contacts and crack faces in a pass, and the events they make.
 
-Of the contacts between two blocks, and of the nodes of a crack's faces, the first that slips (``slip``) and the last
-that did not yet (``sliding``: nothing holds any more but friction) are told of, and so with what opens (``opening``,
-``parting``); of what closes, or sticks again, the first. Every contact that opens or closes is told of, and every bond
-that is lost. Faces are followed through growth by the segments that they had before.
+Of the contacts between two blocks, and of the nodes of a crack's faces, the first to slip (``slip``) and the last
+(``sliding``: only friction is left) are reported, likewise for opening (``opening``, ``parting``); of closing and
+renewed sticking only the first. Every contact that opens or closes is reported, and every lost bond. Faces of growing
+cracks are identified by their earlier segments.
 """
 
 from __future__ import annotations
@@ -16,8 +16,8 @@ from ...model import OPEN, SLIP, STICK
 from ..coupled_state import CrackedBlocks
 from ..load_pass import Balance
 
-#: Nearer than this part of their tributary length, a contact that opens and one that closes between the same two blocks
-#: are one: a corner may be held by either block's edge.
+#: Distance, as a fraction of their tributary length, below which a contact that opens and one that closes between the
+#: same blocks are the same: the edge of either block may support a corner.
 _SAME_PLACE = 0.02
 
 _DOES = {
@@ -25,7 +25,7 @@ _DOES = {
     "stick": "sticks",
     "debonding": "loses bonds",
 }  # fmt: skip
-#: … and which states contacts or nodes take by it.
+#: … and the states that contacts or nodes take.
 _TAKES = {
     "opening": (OPEN,), "parting": (OPEN,), "closure": (STICK, SLIP), "slip": (SLIP,), "sliding": (SLIP,),
     "stick": (STICK,),
@@ -34,8 +34,8 @@ _TAKES = {
 
 @dataclass(frozen=True)
 class Change:
-    """``kind`` of event; ``rows``: contacts or nodes of faces (of the states after it) that have changed, ``contacts``
-    which of the two they are; ``last``: all have now, and they were the last ones to; where (m) and what is told."""
+    """A change of state: ``kind`` of event; ``rows``: contacts or nodes (numbers after the change) that changed,
+    ``contacts`` which of the two; ``last``: they were the last to change; place (m) and text."""
 
     kind: str
     contacts: bool
@@ -47,12 +47,12 @@ class Change:
 
 @dataclass(frozen=True, eq=False)
 class Watched:
-    """The states of a pass that ended at ``time``, s.
+    """The states of a pass that ended at ``time`` s.
 
-    Contacts, one row for each corner of a block and the block it touches, by ``key`` (n,) in rising order: ``state``,
-    ``bonded``, ``reserve`` N (`dda.StepResult`), ``point`` (n, 2), ``pair`` (n, 2) of blocks, ``length`` (n,) m;
-    ``numbering`` of blocks and vertices that keys belong to. Nodes of crack faces: ``face_state`` and ``face_reserve``
-    Pa (`ddm.Solution`), ``face_point`` (m, 2), ``segment`` (m, 4) ends of their segment, ``crack`` (m,).
+    Contacts, one row for each corner and the block it touches, sorted by ``key`` (n,): ``state``, ``bonded``,
+    ``reserve`` N/m (`dda.StepResult`), ``point`` (n, 2), ``pair`` (n, 2) of blocks, ``length`` (n,) m; ``numbering`` of
+    the blocks and vertices. Nodes of crack faces: ``face_state`` and ``face_reserve`` Pa (`ddm.Solution`),
+    ``face_point`` (m, 2), ``segment`` (m, 4) end points of their segment, ``crack`` (m,).
     """
 
     time: float
@@ -72,12 +72,12 @@ class Watched:
 
     @classmethod
     def of(cls, now: CrackedBlocks, found: Balance, kinds: tuple[str, ...]) -> Watched:
-        """What the pass ``found`` has shown of the ``kinds``, "contacts" and "faces"."""
+        """States in the pass ``found``, of the ``kinds`` "contacts" and "faces"."""
         rows, reserve = found.result.contacts, found.result.reserve
         if "contacts" not in kinds:
             rows, reserve = rows[:0], reserve[:0]
         key = rows["vertex"] * now.blocks.n_blocks + rows["other"]
-        # Of the edges of a block that a corner may touch, the one that it does.
+        # Of the edges of a block that a corner may touch, the closed one.
         order = np.lexsort((rows["state"] == OPEN, key))
         order = order[np.unique(key[order], return_index=True)[1]]
         rows = rows[order]
@@ -89,11 +89,11 @@ class Watched:
         )  # fmt: skip
 
     def same_faces(self, other: Watched) -> bool:
-        """Whether nodes of faces are the same in ``other``."""
+        """Whether ``other`` has the same nodes on crack faces."""
         return np.array_equal(self.face_point, other.face_point)
 
     def changes(self, now: CrackedBlocks, before: Watched) -> list[Change]:
-        """What is another than ``before``. Contacts are compared only between the same blocks."""
+        """Changes since ``before``. Contacts are compared only between the same blocks."""
         told = self._of_contacts(now, before) if self.numbering == before.numbering else []
         return told + self._of_faces(now, before)
 
@@ -103,7 +103,7 @@ class Watched:
         was[known], had[known] = before.state[rows], before.bonded[rows]
         lost = (had > 0) & (self.bonded == 0)
         opens, closes = (was != OPEN) & (self.state == OPEN), (was == OPEN) & (self.state != OPEN)
-        # A corner that is not near any more was open, or is held by the other block's edge.
+        # A corner that is no longer near was open, or is now supported by the edge of the other block.
         gone = np.setdiff1d(np.flatnonzero(before.state != OPEN), rows)
         kept = ~self._taken_over(opens, closes, before, gone)
         changed = np.flatnonzero(((was != self.state) | lost) & kept)
@@ -123,7 +123,7 @@ class Watched:
         return told
 
     def _taken_over(self, opens: np.ndarray, closes: np.ndarray, before: Watched, gone: np.ndarray) -> np.ndarray:
-        """(n,) bool: contacts that open or close beside one of the same blocks that does the opposite."""
+        """(n,) bool: contacts that open or close next to one of the same blocks that does the opposite."""
         out = np.zeros(len(opens), bool)
         opens, closes = np.flatnonzero(opens), np.flatnonzero(closes)
         if not len(closes) or not len(opens) + len(gone):
@@ -159,7 +159,7 @@ class Watched:
 
 
 def _faces(now: CrackedBlocks, solutions: dict) -> tuple[np.ndarray, ...]:
-    """State, reserve, place, segment and crack of the nodes of all faces that can meet."""
+    """State, reserve, position, segment and crack of all nodes of faces that can touch."""
     state, reserve, point, segment, crack = [], [], [], [], []
     for block, solution in solutions.items():
         faces = solution.faces
@@ -178,7 +178,7 @@ def _faces(now: CrackedBlocks, solutions: dict) -> tuple[np.ndarray, ...]:
 
 
 def _found(key: np.ndarray, among: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Rows of the sorted ``among`` (m,) that ``key`` (n,) has, and which of ``key`` (n,) bool these are."""
+    """Rows of the sorted ``among`` (m,) that match ``key`` (n,), and which of ``key`` match (n,) bool."""
     at = np.searchsorted(among, key)
     known = at < len(among)
     known[known] = among[at[known]] == key[known]
@@ -186,14 +186,15 @@ def _found(key: np.ndarray, among: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _of_both(segment: np.ndarray, other: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Which of the segments (n, 4) and (m, 4) are among the others: (n,), (m,) bool."""
+    """Which of the segments (n, 4) and (m, 4) are in both: (n,), (m,) bool."""
     names = [[row.tobytes() for row in np.ascontiguousarray(each)] for each in (segment, other)]
-    return tuple(np.array([name in set(names[1 - k]) for name in names[k]], bool) for k in range(2))
+    own, others = (set(each) for each in names)
+    return np.array([name in others for name in names[0]], bool), np.array([name in own for name in names[1]], bool)
 
 
 def _turns(before: np.ndarray, after: np.ndarray) -> list[tuple[str, bool]]:
-    """What kinds of events it is that states ``before`` (n,) of a joint, or a crack, have become ``after`` (m,), and
-    which of them is that of the last contact or node."""
+    """Kinds of events for the change of the states of a joint or crack from ``before`` (n,) to ``after`` (m,), and
+    whether each is that of the last contact or node."""
     (o, t, s), (o2, t2, s2) = (np.bincount(each, minlength=3).tolist() for each in (before, after))
     closed, closed2 = t + s, t2 + s2
     turns = (

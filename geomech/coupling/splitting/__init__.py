@@ -1,1 +1,1 @@
-"""Blocks that cracks have cut through become two or more, with forces, faces and loads inherited."""
+"""Splits blocks that cracks have cut through; the parts inherit forces, joint memory and loads."""

@@ -1,8 +1,8 @@
-"""Blocks that cracks have cut through become two or more.
+"""Splits a block along the cracks that cut through it.
 
-The outline, the holes and the cracks of a block are a planar graph whose nodes are already shared (mouths lie on the
-edges, crossings have a node), so the pieces are its faces: nothing is snapped here, and every coordinate that comes out
-is one that went in.
+Outline, holes and cracks of a block form a planar graph whose nodes are already shared (mouths lie on the edges,
+intersections have a node). The parts are the faces of this graph; no point is moved, and all coordinates are kept
+exactly.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from .planar_graph import BlockGraph, faces_without_slivers, steps
 
 _log = logging.getLogger(__name__)
 
-# What becomes of a crack segment: it stays a crack, is a face of two children, or went with a sliver.
+# Fate of a crack segment: still a crack; an edge of two parts; removed with a sliver.
 CRACK, WALL, MERGED = 0, 1, 2
 
 #: Loops of a polygon in reference coordinates → mean stress in it (3,), Pa, current axes.
@@ -29,15 +29,14 @@ MeanStress = Callable[[list[np.ndarray]], np.ndarray]
 class Split:
     """The scene after a split.
 
-    blocks     the children stand where their parent stood, the others as they were
-    state      its velocity, stress, rotation and crack strain handed down, contacts renumbered
-    cracks     what is not a block face now, each segment with the child that holds it
-    parent     (n_blocks,) the block before the split that each one comes from
-    lost_area  (n_blocks before,) m², area of each block less that of its parts: round-off, for slivers are merged
-    vertex_origin, edge_origin   (n_vertices,) the vertex, and the edge, before the split that each vertex, and the edge
-                                 that leaves
-               it, is (part of); −1 for a new vertex and for an edge that was a crack face
-    edge_span  (n_vertices, 2) from where to where on that edge, 0 to 1
+    blocks     the parts in place of their parents, the other blocks unchanged
+    state      velocity, stress, rotation and crack strain inherited, contacts renumbered
+    cracks     segments that are not block edges now, each with the part that contains it
+    parent     (n_blocks,) number of each block's parent before the split
+    lost_area  (n_blocks before,) m², area of each block less that of its parts: round-off, since slivers are merged
+    vertex_origin, edge_origin   (n_vertices,) the vertex before the split, and the edge before the split that the edge
+               leaving it is (part of); −1 for a new vertex and for a former crack face
+    edge_span  (n_vertices, 2) begin and end of the edge on that former edge, 0 to 1
     """
 
     blocks: Blocks
@@ -52,34 +51,35 @@ class Split:
 
 @dataclass(frozen=True, eq=False)
 class _Piece:
-    """One block to be: loops of (vertices, current coordinates, edge names), and where they come from."""
+    """A future block: loops of (vertices, current coordinates, edge names), and their origin."""
 
     loops: list[tuple[np.ndarray, np.ndarray, list[str]]]
-    origin: list[np.ndarray]  # a loop each: old vertex, −1 for a new one
-    edge_origin: list[np.ndarray]  # a loop each: old edge that the edge is (part of), −1 for a crack face
-    edge_span: list[np.ndarray]  # a loop each, (n, 2): from where to where on the old edge, 0 to 1
+    origin: list[np.ndarray]  # per loop: old vertex, −1 for a new one
+    edge_origin: list[np.ndarray]  # per loop: old edge that the edge is (part of), −1 for a crack face
+    edge_span: list[np.ndarray]  # per loop, (n, 2): begin and end on the old edge, 0 to 1
     parent: int
     name: str
 
 
 def divided(blocks: Blocks, cracks: Cracks) -> np.ndarray:
-    """The blocks that ``cracks`` cut in two. Raises ValueError as `split_blocks`."""
+    """Numbers of the blocks that ``cracks`` cut in two. Raises ValueError as `split_blocks`."""
     return np.array([b for b in np.unique(cracks.block).tolist() if BlockGraph.of(blocks, b, cracks).closes()], int)
 
 
 def split_blocks(
     blocks: Blocks, state: State, cracks: Cracks, mean_stress: Mapping[int, MeanStress] | None = None
 ) -> Split | None:
-    """Split every block that its cracks (with its boundary) divide; None when there is none.
+    """Split every block that its cracks, with its boundary, divide; None if there is none.
 
-    Children inherit material, fixity and the names of their edges; new edges are called "crack:<name>", children
-    "<parent>/1", "<parent>/2" … The parent's vertices keep reference and current coordinates to the last bit, new ones
-    follow its affine motion. The velocity is the parent's field, told about the child's centroid, so that mass,
-    momentum and angular momentum are those of the parent. Stress is the parent's, or what ``mean_stress[block]`` gives
-    for the child's loops. A child that still holds cracks keeps the parent's crack strain, one that is whole has none.
+    Parts inherit material, fixity and the names of their edges. New edges are called "crack:<name>", parts
+    "<parent>/1", "<parent>/2" … Vertices of the parent keep reference and current coordinates exactly; new ones follow
+    its affine motion. The velocity field of the parent is written about the centroid of each part, so that mass,
+    momentum and angular momentum are conserved. Stress is the parent's, or what ``mean_stress[block]`` gives for the
+    loops of the part. A part that still contains cracks keeps the parent's crack strain; an intact one has none.
 
-    Contacts follow their vertices and edges. One whose vertex now belongs to two blocks is dropped (and logged): the
-    next contact search finds it on both. Raises ValueError for a crack mouth that is not on its block's boundary.
+    Contacts follow their vertices and edges. A contact whose vertex now belongs to two blocks is dropped (and logged);
+    the next contact search finds it on both. Raises ValueError for a crack mouth that is not on the boundary of its
+    block.
     """
     cut: dict[int, BlockGraph] = {}
     for block in np.unique(cracks.block) if cracks.n_segments else ():
@@ -137,7 +137,7 @@ def split_blocks(
 def _divide(
     blocks: Blocks, state: State, cracks: Cracks, graph: BlockGraph, motion: Motion
 ) -> tuple[list[_Piece], np.ndarray, np.ndarray]:
-    """The children of one block; the fate of each of its crack segments; and which child (from 0) holds it."""
+    """The parts of one block; the fate of each of its crack segments; and the part (from 0) that contains it."""
     import shapely
 
     parent = graph.block
@@ -146,7 +146,7 @@ def _divide(
     is_wall = np.array([(a, b) in walls for a, b in graph.ends.tolist()], dtype=bool)
     wall_nodes = np.zeros(len(graph.points), bool)
     wall_nodes[graph.ends[is_wall]] = True
-    needed = (graph.vertex >= 0) | wall_nodes  # a mouth of a crack that goes nowhere is no corner of a block
+    needed = (graph.vertex >= 0) | wall_nodes  # the mouth of a crack that divides nothing is no vertex of a part
 
     boundary = {(a, b): k for k, (a, b) in enumerate(graph.edges.tolist())}
     face_name = {}
@@ -158,7 +158,7 @@ def _divide(
     old = graph.vertex >= 0
     current[old] = state.vertices[graph.vertex[old]]
 
-    # In the order of their lowest old vertex; pieces without one, islands, last.
+    # Ordered by the lowest old vertex; parts without one (islands) last.
     def order(rings: list[np.ndarray]) -> tuple:
         vertices = [v for ring in rings for v in graph.vertex[ring].tolist() if v >= 0]
         return (min(vertices, default=blocks.n_vertices), tuple(graph.points[rings[0]].min(axis=0).tolist()))
@@ -177,7 +177,7 @@ def _divide(
                     edges.append(-1 if k < 0 else int(graph.edge[k]))
                     spans.append([0.0, 1.0] if k < 0 else graph.span[k].tolist())
                 else:
-                    spans[-1][1] = graph.span[k, 1]  # the edge goes on past the mouth
+                    spans[-1][1] = graph.span[k, 1]  # the edge continues beyond the mouth
             corners = np.array(corners)
             loops.append((graph.points[corners], current[corners], names))
             origin.append(graph.vertex[corners])
@@ -187,14 +187,14 @@ def _divide(
         pieces.append(_Piece(loops, origin, edge_origin, edge_span, parent, name))
         polygons.append(shapely.Polygon(loops[0][0], [loop[0] for loop in loops[1:]]))
 
-    # Its middle tells where a segment lies: its ends may be on the boundary of several children.
+    # Located by its midpoint, since its ends may be on the boundary of several parts.
     middles = shapely.points(graph.points[graph.ends].mean(axis=1))
     apart = np.array([shapely.distance(polygon, middles) for polygon in polygons])
     return pieces, np.where(is_wall, WALL, np.where(kept, CRACK, MERGED)), apart.argmin(axis=0)
 
 
 def _from_first(graph: BlockGraph, ring: np.ndarray) -> np.ndarray:
-    """The ring turned to start at its lowest old vertex, or at its lowest leftmost point: the same on every machine."""
+    """``ring`` started at its lowest old vertex, or at its lowest leftmost point: the same on every machine."""
     vertex = graph.vertex[ring]
     if (vertex >= 0).any():
         at = int(np.where(vertex >= 0, vertex, vertex.max() + 1).argmin())
@@ -204,7 +204,7 @@ def _from_first(graph: BlockGraph, ring: np.ndarray) -> np.ndarray:
 
 
 def _whole(blocks: Blocks, state: State, block: int) -> _Piece:
-    """A block that stays as it is."""
+    """A block that is not split."""
     loops, origin = [], []
     for k in range(blocks.block_loop[block], blocks.block_loop[block + 1]):
         own = np.arange(blocks.loop_start[k], blocks.loop_start[k + 1])
@@ -215,11 +215,11 @@ def _whole(blocks: Blocks, state: State, block: int) -> _Piece:
     return _Piece(loops, origin, origin, spans, block, blocks.names[block])
 
 
-# -- what is handed down ---------------------------------------------------------------------------------------------
+# -- inheritance -----------------------------------------------------------------------------------------------------
 
 
 def _assemble(blocks: Blocks, pieces: list[_Piece]) -> Blocks:
-    """The new blocks, loops exactly as the pieces have them; edge names known before keep their numbers."""
+    """The new blocks, with the loops of ``pieces`` unchanged; known edge names keep their numbers."""
     loops = [loop for piece in pieces for loop in piece.loops]
     known = {name: k for k, name in enumerate(blocks.edge_names)}
     labels = [known.setdefault(name, len(known)) for _, _, names in loops for name in names]
@@ -230,7 +230,7 @@ def _assemble(blocks: Blocks, pieces: list[_Piece]) -> Blocks:
         block_loop=np.cumsum([0, *(len(piece.loops) for piece in pieces)]),
         material=blocks.material[parent],
         fixed=blocks.fixed[parent],
-        held=None if blocks.held is None else blocks.held[parent],
+        constrained=None if blocks.constrained is None else blocks.constrained[parent],
         edge_name=np.array(labels, dtype=int),
         edge_names=tuple(known),
         names=tuple(piece.name for piece in pieces),
@@ -238,7 +238,7 @@ def _assemble(blocks: Blocks, pieces: list[_Piece]) -> Blocks:
 
 
 def _velocity(blocks: Blocks, state: State, children: Blocks, vertices: np.ndarray, parent: np.ndarray) -> np.ndarray:
-    """The parents' first-order velocity fields, told about the children's current centroids."""
+    """Velocity fields of the parents, written about the current centroids of their parts."""
     velocity = state.velocity[parent].copy()
     for child in np.flatnonzero(np.bincount(parent, minlength=blocks.n_blocks)[parent] > 1):
         whole = _centroid(blocks.loops(int(parent[child]), state.vertices))
@@ -262,8 +262,8 @@ def _centroid(loops: list[np.ndarray]) -> np.ndarray:
 
 
 def _remaining(cracks: Cracks, fate: np.ndarray, holder: np.ndarray) -> Cracks:
-    """The segments that are still cracks, with their blocks' new numbers. A node on a new boundary is a mouth now; one
-    at which cracks of two children met becomes a node for each."""
+    """The remaining crack segments, with the new numbers of their blocks. A node on a new boundary becomes a mouth; a
+    node shared by cracks of two parts is duplicated."""
     rows = np.flatnonzero(fate == CRACK)
     on_wall = np.zeros(len(cracks.nodes), bool)
     on_wall[cracks.segments[fate == WALL]] = True
@@ -283,7 +283,7 @@ def _remaining(cracks: Cracks, fate: np.ndarray, holder: np.ndarray) -> Cracks:
 
 
 def _contacts(contacts: np.ndarray, pieces: list[_Piece]) -> np.ndarray:
-    """The contacts with their new vertices, edges and blocks."""
+    """The contacts with new numbers of vertices, edges and blocks."""
     vertices: dict[int, list[tuple[int, int]]] = {}
     edges: dict[int, list[tuple[int, int, float, float]]] = {}
     at = 0
@@ -299,7 +299,7 @@ def _contacts(contacts: np.ndarray, pieces: list[_Piece]) -> np.ndarray:
         if len(owners) > 1:
             _log.info("contact of vertex %d dropped: the vertex is split between two blocks", int(row["vertex"]))
             continue
-        # The part of the old edge that holds the contact; just outside a part when the contact lies off the edge's end.
+        # The part of the old edge with the contact; the nearest part when the contact lies beyond the end of the edge.
         edge, other, start, end = min(
             edges[int(row["edge"])], key=lambda part: max(part[2] - row["position"], row["position"] - part[3], 0.0)
         )

@@ -1,15 +1,17 @@
-"""What crack faces carry when blocks part along them becomes what the contacts of the new blocks begin with.
+"""Initial contact forces, gaps and slip between the parts of a split block, from the tractions on its crack faces.
 
 The last solution of the whole body is in equilibrium, and so is every part of it under the tractions on its own
-boundary. Each segment of a new face hands its traction on to the contacts at its two ends by the linear shape
-functions, which keep force and moment, press nowhere where the faces do not and break no Coulomb law that they obey.
-Faces that are apart leave a gap, and faces that have slid their slip. Along what the crack has only just cut, rock bore
-the stress: where it pressed as a whole, its resultant stays, with as much shear as the new joint can take; where it
-pulled, it lets go. Edges that a mouth has divided are treated likewise, with the traction from outside. The other
-contacts of the parts keep the forces that they had, whatever their springs become.
+boundary. Each segment of a new face distributes its traction to the contacts at its two ends by the linear shape
+functions. This preserves force and moment, puts no pressure where the faces have none, and violates no Coulomb law that
+the tractions satisfy. Open faces give a gap, sliding ones their slip.
 
-All that holds where the last pass has left the blocks. In statics a block that hangs by a thread is strained beyond
-measure before it parts; it then starts from where the load step began, and nothing is told.
+Along the last segment, which was intact rock in that solution, the resultant of its normal stress is kept if it is
+compressive, with as much shear as the new joint can carry; a tensile one is released. Edges of the parent that a mouth
+has divided are treated in the same way, with the external traction. All other contacts keep their forces.
+
+This requires that the parts start in the configuration of the last pass. In statics a block on a thin ligament strains
+excessively before it is cut; its parts start in the configuration at the beginning of the load step, without inherited
+forces.
 """
 
 from __future__ import annotations
@@ -29,34 +31,33 @@ from ..load_transfer.boundary_tractions import BoundaryLoad
 from .block_splitting import Split
 from .face_inheritance import from_their_faces
 
-#: Points and nodes nearer to a segment than this part of its length lie on it.
+#: Points and nodes closer to a segment than this fraction of its length lie on it.
 _ON = 1e-7
 #: … and load segments, on the line through the ends of a straight side.
 _ON_SIDE = 4 * STRAIGHT
-#: Contacts press along normals nearer to a face's than this (cosine, 4°): those of faces that bend no more are one.
+#: Contacts belong to a face if the angle between their normals is less than 4° (cosine): faces may be slightly bent.
 _ALIGNED = 0.9975
-#: Gauss points on a segment of whole rock.
+#: Gauss points on a segment of intact rock.
 _IN_ROCK = 12
-#: Gauss points on a piece of a load that is linear: its moment is a cubic at most.
+#: Gauss points on a linearly loaded piece: its moment is a polynomial of degree 3 at most.
 _IN_LOAD = 2
-#: Faces that are farther apart than this part of the smaller block's size (√area) are told to be so far, and press no
-#: deeper into each other: contacts are sought as far off as faces pass each other by, which must not reach the blocks'
-#: other sides.
+#: Largest initial gap or overlap, as a fraction of the size (√area) of the smaller block. Contacts are searched as far
+#: as faces are apart, and the search must not reach the opposite sides of the blocks.
 _FARTHEST = 0.02
-#: Faces have opened, beyond the width that they were given, by no more than this part of that size. Parts stand where
-#: their parent did, face on face, and as they close lie in each other by the gap that is told; one that hung by a
-#: thread had opened by any amount, without inertia. Half of what is refused in a drawing.
+#: Largest opening of faces beyond their given aperture, as a fraction of that size. Parts start where their parent was,
+#: and overlap by the inherited gap when they close; on a thin ligament, without inertia, faces may have opened by any
+#: amount. Half of the overlap that is refused in a drawing.
 _OPENED = 0.5 * REFUSED
-#: Mean strains of cracks up to here are small: strains of rock that breaks are a few thousandths.
+#: Largest mean crack strain that counts as small: the strain at failure of rock is a few thousandths.
 _SMALL = 0.01
-#: Forces below this part of the largest are round-off.
+#: Forces smaller than this fraction of the largest are round-off.
 _NOTHING = 1e-12
 
 
 @dataclass(frozen=True, eq=False)
 class _Faces:
-    """Crack faces of a solved body at points: traction (normal, shear) at nodes with their share of the length, gaps
-    and slip at the ends of elements; reference coordinates."""
+    """Crack faces of a solved body: traction (normal, shear) at nodes with their tributary length; gap and slip at the
+    ends of elements; reference coordinates."""
 
     nodes: np.ndarray  # (k, 2)
     share: np.ndarray  # (k,) m
@@ -73,12 +74,12 @@ class _Faces:
         along = (ends[:, 1] - ends[:, 0])[:, None]
         length = np.hypot(along[..., 0], along[..., 1])
         at = 2 * np.sum((elements.nodes - ends[:, :1]) * along, axis=2) / length**2 - 1
-        # Weights that are exact for polynomials through the nodes: positive at Chebyshev's and Gauss's.
+        # Quadrature weights exact for polynomials through the nodes; positive at Chebyshev and Gauss nodes.
         table = np.polynomial.legendre.legvander(at, at.shape[1] - 1).transpose(0, 2, 1)
         whole = np.zeros((len(at), at.shape[1], 1))
         whole[:, 0] = length
         aperture = solution.body.cracks.aperture[elements.source][:, None]
-        # A slot that cannot close has no width that is known.
+        # A slot of infinite aperture never closes; its gap is taken as the opening alone.
         aperture = np.where(np.isfinite(aperture), aperture, 0.0)
         return cls(
             elements.nodes.reshape(-1, 2),
@@ -91,16 +92,17 @@ class _Faces:
         )
 
     def on(self, a: np.ndarray, b: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:
-        """(places from 0 to 1, shares m, tractions) on the segment from ``a`` to ``b``; None where it is no crack
-        yet."""
+        """(places from 0 to 1, tributary lengths m, tractions) on the segment from ``a`` to ``b``; None where it was no
+        crack in the last solution."""
         here = np.repeat(self._elements_on(a, b), len(self.nodes) // len(self.ends))
-        # Elements graded to a corner at its end may be shorter than what tells them from the segment.
+        # Elements graded towards a corner at its end may be shorter than the tolerance of the test above.
         if self.share[here].sum() < 0.5 * np.hypot(*(b - a)):
             return None
         return _along(self.nodes[here], a, b)[0], self.share[here], self.traction[here]
 
     def ends_at(self, a: np.ndarray, b: np.ndarray, most: float) -> tuple[np.ndarray, np.ndarray]:
-        """(2,) gap and (2,) slip at the ends of the segment from ``a`` to ``b``, opened by ``most`` m."""
+        """(2,) gap and (2,) slip at the ends of the segment from ``a`` to ``b``, with an opening of at most ``most``
+        m."""
         here = self._elements_on(a, b)
         points = self.ends[here].reshape(-1, 2)
         nearest = [int(np.argmin(np.hypot(*(points - end).T))) for end in (a, b)]
@@ -108,19 +110,18 @@ class _Faces:
         return gap.ravel()[nearest], self.slip[here].ravel()[nearest]
 
     def _elements_on(self, a: np.ndarray, b: np.ndarray) -> np.ndarray:
-        """(n,) which elements have their middle on the segment from ``a`` to ``b``."""
+        """(n,) bool: elements with their midpoint on the segment from ``a`` to ``b``."""
         return _along(self.ends.mean(axis=1), a, b)[1]
 
 
 def holds_together(state: State, blocks: np.ndarray) -> bool:
-    """Whether the ``blocks`` (numbers) have small strains of cracks in ``state``, so that parts may begin where they
-    stand."""
+    """Whether the crack strains of ``blocks`` (numbers) in ``state`` are small, so that their parts can start there."""
     return bool(np.abs(state.crack_strain[blocks]).max(initial=0.0) <= _SMALL)
 
 
 def _along(points: np.ndarray, a: np.ndarray, b: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Where on the segment from ``a`` to ``b`` the ``points`` (n, 2) are, 0 to 1, and which of them are on it at
-    all."""
+    """Coordinates (n,) of ``points`` (n, 2) along the segment from ``a`` to ``b``, 0 to 1, and which of them lie on
+    it."""
     d = b - a
     square = float(d @ d)
     place = (points - a) @ d / square
@@ -129,8 +130,9 @@ def _along(points: np.ndarray, a: np.ndarray, b: np.ndarray) -> tuple[np.ndarray
 
 
 @dataclass(eq=False)
-class _Told:
-    """Forces summed up for the contacts (n,) of a `ContactSet`, in current axes, on the block of the vertex."""
+class _Inherited:
+    """Inherited forces, gaps and slip of the contacts (n,) of a `ContactSet`, in current axes, on the vertex's
+    block."""
 
     force: np.ndarray
     gap: np.ndarray
@@ -138,7 +140,7 @@ class _Told:
     known: np.ndarray
 
     @classmethod
-    def none(cls, n: int) -> _Told:
+    def none(cls, n: int) -> _Inherited:
         return cls(np.zeros((n, 2)), np.full(n, np.inf), np.zeros(n), np.zeros(n, bool))
 
 
@@ -151,11 +153,11 @@ def contacts_after(
     acting: Loads,
     contacts: np.ndarray,
 ) -> np.ndarray:
-    """CONTACT rows for the blocks of ``split``, whose next step begins with the forces at the end of the last.
+    """CONTACT rows of the blocks of ``split``, whose next step starts with the forces at the end of the last one.
 
-    ``system`` is that of the new blocks, ``before`` are those that were cut, ``solutions`` and boundary ``loads``
-    (block →) those of the last pass at ``split.state``; ``acting`` are the loads of the blocks, ``contacts`` the
-    CONTACT rows before the split.
+    ``system``: block system of the new blocks; ``before``: the blocks before the split; ``solutions`` and boundary
+    ``loads`` (block →) of the last pass at ``split.state``; ``acting``: loads on the blocks; ``contacts``: CONTACT rows
+    before the split.
     """
     blocks, state = split.blocks, split.state
     near = system.contacts_near(state)
@@ -164,44 +166,47 @@ def contacts_after(
     cut = [b for b in np.flatnonzero(parts > 1).tolist() if b in solutions]
     if not len(found) or (found is near and not cut):
         return state.contacts
-    told = _Told.none(len(found))
+    inherited = _Inherited.none(len(found))
     loaded = {load.edge_name for load in acting.edge_tractions}
     wet = np.zeros(0, EDGE_FORCE)
     if cut and acting.water is not None:
         alone = Loads(water=acting.water)
         wet = system.load_map.rows(alone, state.time, np.ascontiguousarray(state.vertices), state.rotation)[1]
     for parent in cut:
-        _tell_of_walls(told, found, split, parent, solutions[parent], float(state.rotation[parent]))
-        _tell_of_divided_edges(told, found, split, before, parent, loads[parent], loaded, wet)
-    return system.told(state, found, _contacts(system, found, told, blocks, np.isin(split.parent, cut)))
+        _inherit_along_walls(inherited, found, split, parent, solutions[parent], float(state.rotation[parent]))
+        _inherit_along_divided_edges(inherited, found, split, before, parent, loads[parent], loaded, wet)
+    return system.inherited_contacts(
+        state, found, _contacts(system, found, inherited, blocks, np.isin(split.parent, cut))
+    )
 
 
-def _contacts(system: dda.BlockSystem, found, told: _Told, blocks: Blocks, is_part: np.ndarray) -> dda.ToldContacts:
-    """``told`` as forces along the contacts' own axes; contacts of parts (n_blocks,) of which nothing is told keep what
-    they bear."""
+def _contacts(
+    system: dda.BlockSystem, found, inherited: _Inherited, blocks: Blocks, is_part: np.ndarray
+) -> dda.InheritedContacts:
+    """``inherited`` forces resolved along the contacts. Contacts of parts (n_blocks,) without an inherited value keep
+    their forces."""
     across = found.geometry[:, 1:3]
-    normal = np.sum(told.force * across, axis=1)
-    shear = np.sum(told.force * normal_of(across), axis=1)
-    least = _NOTHING * np.abs(told.force).max(initial=0.0)
+    normal = np.sum(inherited.force * across, axis=1)
+    shear = np.sum(inherited.force * normal_of(across), axis=1)
+    least = _NOTHING * np.abs(inherited.force).max(initial=0.0)
     normal = np.where((normal > least) | ((found.bonded == WHOLE) & (normal < -least)), normal, 0.0)
     rough = np.array([joint.roughness is not None for joint in system.joints])[found.law]
-    keeps = ~told.known & (found.state != OPEN) & (is_part[found.block] | is_part[found.other])
-    normal, shear = np.where(told.known, normal, found.normal), np.where(told.known, shear, found.shear)
+    keeps = ~inherited.known & (found.state != OPEN) & (is_part[found.block] | is_part[found.other])
+    normal, shear = np.where(inherited.known, normal, found.normal), np.where(inherited.known, shear, found.shear)
     size = np.sqrt(blocks.areas())
     farthest = _FARTHEST * np.minimum(size[found.block], size[found.other])
-    gap = np.minimum(told.gap, farthest)
-    # Joints as soft as their law says, of the little length that a corner may be left with, cannot bear what a whole
-    # face did.
+    gap = np.minimum(inherited.gap, farthest)
+    # A soft joint on a short remaining length cannot carry the force of the whole face.
     normal = np.minimum(normal, found.springs.normal * farthest)
     most = np.where(rough, np.inf, found.springs.peak * np.maximum(normal, 0.0))
     shear = np.where(found.bonded > 0, shear, np.clip(shear, -most, most))
-    which = np.flatnonzero(told.known | keeps)
-    return dda.ToldContacts(
+    which = np.flatnonzero(inherited.known | keeps)
+    return dda.InheritedContacts(
         which=which,
         normal=normal[which],
         shear=shear[which],
-        gap=np.where(told.known & np.isfinite(told.gap), gap, found.gap)[which],
-        slip=np.where(told.known, told.slip, found.slip)[which],
+        gap=np.where(inherited.known & np.isfinite(inherited.gap), gap, found.gap)[which],
+        slip=np.where(inherited.known, inherited.slip, found.slip)[which],
     )
 
 
@@ -210,8 +215,8 @@ def _turned(vectors: np.ndarray, angle: float) -> np.ndarray:
     return vectors @ np.array([[c, s], [-s, c]])
 
 
-def _tell_of_walls(told: _Told, found, split: Split, parent: int, solution, rotation: float) -> None:
-    """The tractions, gaps and slip of the faces along which ``parent`` is cut, to the contacts between its parts."""
+def _inherit_along_walls(inherited: _Inherited, found, split: Split, parent: int, solution, rotation: float) -> None:
+    """Give the tractions, gaps and slip on the faces that divide ``parent`` to the contacts between its parts."""
     blocks = split.blocks
     faces, size = _Faces.of(solution), np.sqrt(blocks.areas())
     points, following, owner = blocks.vertices, blocks.next_vertex, blocks.vertex_block
@@ -224,9 +229,9 @@ def _tell_of_walls(told: _Told, found, split: Split, parent: int, solution, rota
     for (ax, ay, bx, by), edge in edge_of.items():
         facing = edge_of.get((bx, by, ax, ay), -1)
         if facing < edge:
-            continue  # once a pair
+            continue  # once per pair
         a, b = np.array([ax, ay]), np.array([bx, by])
-        # Rock of the owner is on the left: it is the upper face.
+        # The owner's rock is on the left of its edge: the upper face.
         upper, pair = int(owner[edge]), frozenset((int(owner[edge]), int(owner[facing])))
         normal = normal_of((b - a) / np.hypot(*(b - a)))
         known = faces.on(a, b)
@@ -245,17 +250,17 @@ def _tell_of_walls(told: _Told, found, split: Split, parent: int, solution, rota
             if row < 0:
                 continue
             sign = 1.0 if found.block[row] == upper else -1.0
-            told.force[row] += sign * force[end]
-            told.known[row] = True
-            if gap[end] < told.gap[row]:
-                told.gap[row] = gap[end]
-                told.slip[row] = sign * slip[end] * float(along @ normal_of(found.geometry[row, 1:3]))
+            inherited.force[row] += sign * force[end]
+            inherited.known[row] = True
+            if gap[end] < inherited.gap[row]:
+                inherited.gap[row] = gap[end]
+                inherited.slip[row] = sign * slip[end] * float(along @ normal_of(found.geometry[row, 1:3]))
 
 
 def _in_rock(solution, a: np.ndarray, b: np.ndarray, normal: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Places, shares and tractions on a segment of rock that the last solution had whole: its resultant, if that
-    presses, where rock was pressed. Bent rock that lets go of its tension keeps no more of its pressure than is in
-    balance."""
+    """Places, tributary lengths and tractions on a segment that was intact rock in the last solution: the resultant, if
+    it is compressive, distributed over the compressed part. Bent rock whose tension is released keeps only the
+    compression in equilibrium."""
     gauss, weight = np.polynomial.legendre.leggauss(_IN_ROCK)
     place, share = 0.5 * (gauss + 1), 0.5 * weight * np.hypot(*(b - a))
     vector = traction(solution.stress(a + place[:, None] * (b - a)), normal)
@@ -267,7 +272,7 @@ def _in_rock(solution, a: np.ndarray, b: np.ndarray, normal: np.ndarray) -> tupl
 
 
 def _contact_at(rows, found, across: np.ndarray, edges: tuple[int, int]) -> int:
-    """Which of the contacts ``rows`` stands for a face across which it presses along ``across``; −1: none."""
+    """The contact of ``rows`` that transfers the normal force of a face with direction ``across``; −1: none."""
     best, where = (_ALIGNED, False), -1
     for row in rows:
         cosine = abs(float(found.geometry[row, 1:3] @ across))
@@ -277,8 +282,8 @@ def _contact_at(rows, found, across: np.ndarray, edges: tuple[int, int]) -> int:
     return where
 
 
-def _tell_of_divided_edges(
-    told: _Told,
+def _inherit_along_divided_edges(
+    inherited: _Inherited,
     found,
     split: Split,
     before: Blocks,
@@ -287,9 +292,9 @@ def _tell_of_divided_edges(
     loaded: set[str],
     wet: np.ndarray,
 ) -> None:
-    """The traction from outside on edges of ``parent`` that mouths have divided, or that end at a vertex that is two
-    now, to the contacts on the sides that their parts are in, but for the water's, EDGE_FORCE rows ``wet``. Where
-    contacts and an edge ``load`` share a side the traction is not theirs alone, and nothing is told."""
+    """Give the external traction on divided edges of ``parent``, and on edges at a duplicated vertex, to the contacts
+    of its parts. Water pressure (EDGE_FORCE rows ``wet``) is subtracted. Where contacts and an edge ``load`` share a
+    side the traction cannot be attributed, and nothing is inherited."""
     blocks, owner = split.blocks, split.blocks.vertex_block
     old_vertices = np.bincount(split.vertex_origin[split.vertex_origin >= 0], minlength=before.n_vertices)
     twice = old_vertices > 1
@@ -298,7 +303,7 @@ def _tell_of_divided_edges(
     partial = np.any(split.edge_span != [0.0, 1.0], axis=1)
     divided = here & (partial | twice[origin] | twice[before.next_vertex[origin]])
     rotation = float(split.state.rotation[parent])
-    # What touches an edge may stand on the next one of a straight side.
+    # A contact on an edge may act on the next edge of the same straight side.
     for side in sorted({blocks.side_start[edge] for edge in np.flatnonzero(divided).tolist()}):
         edges = np.array(blocks.sides[side][:-1])
         names = before.edge_name[split.edge_origin[edges]]
@@ -316,13 +321,13 @@ def _tell_of_divided_edges(
         if len(place):
             lumped -= _shares(at, neighbour, place) @ force
         sign = np.where(found.block[rows] == owner[side], 1.0, -1.0)
-        told.force[rows] += sign[:, None] * lumped
-        told.slip[rows] = found.slip[rows]
-        told.known[rows] = True
+        inherited.force[rows] += sign[:, None] * lumped
+        inherited.slip[rows] = found.slip[rows]
+        inherited.known[rows] = True
 
 
 def _water_on(wet: np.ndarray, a: np.ndarray, b: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Places (k,) from 0 to 1 between ``a`` and ``b``, and the forces (k, 2) N there of EDGE_FORCE rows ``wet``, all in
+    """Places (k,) from 0 to 1 between ``a`` and ``b``, and the forces (k, 2) N/m there of the EDGE_FORCE rows ``wet``;
     current coordinates."""
     gauss, weight = np.polynomial.legendre.leggauss(_IN_LOAD)
     t = 0.5 * (gauss + 1)[:, None, None]
@@ -333,10 +338,9 @@ def _water_on(wet: np.ndarray, a: np.ndarray, b: np.ndarray) -> tuple[np.ndarray
 
 
 def _shares(at: np.ndarray, neighbour: np.ndarray, place: np.ndarray) -> np.ndarray:
-    """(n, k) what part of a force at each ``place`` (k,) on an edge is that of each contact ``at`` (n,), with the block
-    ``neighbour`` (n,): by the linear shape functions, among the contacts of the neighbour that reaches there, of two
-    that do of the one that reaches further. (Two neighbours' corners meet on the edge within less than faces slide
-    by.)"""
+    """(n, k) shares of the contacts ``at`` (n,), with the blocks ``neighbour`` (n,), in forces at ``place`` (k,) on an
+    edge, by the linear shape functions. A force goes to the contacts of the neighbour whose contacts enclose its place;
+    where two do, to those that extend further."""
     out = np.zeros((len(at), len(place)))
     groups = [np.flatnonzero(neighbour == b) for b in np.unique(neighbour).tolist()]
     reach = np.array([[at[rows].min(), at[rows].max()] for rows in groups])
@@ -346,7 +350,7 @@ def _shares(at: np.ndarray, neighbour: np.ndarray, place: np.ndarray) -> np.ndar
     for number, rows in enumerate(groups):
         own = np.flatnonzero(nearest == number)
         stops, which = np.unique(np.round(at[rows], 9), return_inverse=True)
-        # What two contacts bear at one place they share.
+        # Contacts at the same place share its force.
         share = 1.0 / np.bincount(which)[which]
         for k, row in enumerate(rows.tolist()):
             hat = (np.arange(len(stops)) == which[k]).astype(float)
@@ -355,8 +359,8 @@ def _shares(at: np.ndarray, neighbour: np.ndarray, place: np.ndarray) -> np.ndar
 
 
 def _contacts_on(found, split: Split, side: list[int]) -> np.ndarray:
-    """The contacts on the straight ``side`` of a part (the vertices along it), with blocks that are no parts of the
-    same parent."""
+    """Contacts on the straight ``side`` of a part (the vertices along it), except with other parts of the same
+    parent."""
     blocks, vertices = split.blocks, split.state.vertices
     block = int(blocks.vertex_block[side[0]])
     others = split.parent != split.parent[block]
@@ -370,7 +374,7 @@ def _contacts_on(found, split: Split, side: list[int]) -> np.ndarray:
 
 
 def _loads_on(load: BoundaryLoad, a: np.ndarray, b: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Places (k,) from 0 to 1 on the edge from ``a`` to ``b``, reference coordinates, and the forces (k, 2) N of
+    """Places (k,) from 0 to 1 on the edge from ``a`` to ``b``, reference coordinates, and the forces (k, 2) N/m of
     ``load`` there."""
     gauss, weight = np.polynomial.legendre.leggauss(_IN_LOAD)
     places, forces = [np.zeros(0)], [np.zeros((0, 2))]

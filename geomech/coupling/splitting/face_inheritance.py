@@ -1,9 +1,9 @@
-"""Corners that come into a joint face when one of its blocks parts go on from what the face has become.
+"""New corners in a joint face inherit the state of the joint.
 
-A block that is cut while it leans on a neighbour gets new corners in the middle of their common face. Their contacts are
-new, but the joint is not: what glued it, what sliding has worn off and how far it has lifted is there as much between
-the old corners as at them. Without this each new corner would come unglued, and of a face that is cut in two half its
-length would have lost cohesion and tensile strength, without a force that broke it.
+When a block is cut while it rests on a neighbour, its parts get new corners within their common face. Their contacts
+are new, but the joint is not: bonding, wear, slip and dilation exist between the old corners as much as at them.
+Without this the new corners would be unbonded, and a face cut in two would lose half of its cohesion and tensile
+strength although no force has broken it.
 """
 
 from __future__ import annotations
@@ -18,17 +18,17 @@ from ...dda.joint_laws.bonds import ALIGNED, OFF_LINE
 if TYPE_CHECKING:
     from ...dda.open_close.contact_set import ContactSet
 
-#: A corner farther beyond the old contacts of a face than this part of its length is not in it.
+#: A corner farther beyond the old contacts of a face than this fraction of its length does not belong to it.
 _BEYOND = 1e-3
-#: What a contact remembers of its joint.
+#: Joint state of a contact.
 _MEMORY = ("bonded", "wear", "slip", "lift", "inset")
 
 
 def from_their_faces(found: ContactSet, kept: np.ndarray, old: np.ndarray, parent: np.ndarray) -> ContactSet:
-    """The contacts ``found`` after a split, new ones in a face of its ``parent`` (n_blocks,) blocks with the memory of
-    the nearest contact that the face had.
+    """Contacts ``found`` after a split; new ones in a face of their ``parent`` (n_blocks,) blocks get the state of the
+    nearest contact that this face had.
 
-    ``old`` are the CONTACT rows before the split, ``kept`` those that have come through it, with their new numbers.
+    ``old``: CONTACT rows before the split; ``kept``: those that still exist, with their new numbers.
     """
     faces = old[old["length"] > 0]
     parts = np.bincount(parent)[parent] > 1
@@ -45,7 +45,7 @@ def from_their_faces(found: ContactSet, kept: np.ndarray, old: np.ndarray, paren
     memory = {name: getattr(found, name).copy() for name in _MEMORY}
     for name in _MEMORY:
         memory[name][heirs] = faces[name][of]
-    # (Slip along the edge is the same seen from the other block, whose edge runs the other way.)
+    # (Slip along the edge is the same seen from the other block, whose edge has the opposite direction.)
     return replace(found, **memory)
 
 
@@ -55,7 +55,7 @@ def _key(vertex: np.ndarray, edge: np.ndarray) -> np.ndarray:
 
 
 def _nearest(found: ContactSet, row: int, faces: np.ndarray, parent: np.ndarray) -> int:
-    """Which of the old contacts ``faces`` is nearest to the corner of ``row`` in the same face; −1 for none."""
+    """The old contact among ``faces`` nearest to the corner of ``row`` in the same face; −1 if there is none."""
     a, b = parent[found.block[row]], parent[found.other[row]]
     same, swapped = ((faces["block"] == x) & (faces["other"] == y) for x, y in ((a, b), (b, a)))
     sense = np.where(same, 1.0, -1.0)

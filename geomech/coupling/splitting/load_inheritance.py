@@ -1,4 +1,4 @@
-"""The loads of blocks that split, on their children, and of blocks whose reference has moved."""
+"""Transfers the loads of split blocks to their parts, and loads to a new reference configuration."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from ...model import GROUND, Loads
 def on_children(loads: Loads, parent: np.ndarray, child: Callable[[int, tuple[float, float]], int]) -> Loads:
     """``loads`` with the numbers of the blocks after a split.
 
-    ``parent`` (n_blocks,) is the block before it of every block after it; ``child(block, point)`` the part of ``block``
-    that holds a point. What acts at a point goes with the part that has it, what moves or takes out a block as a whole
-    does so to all its parts.
+    ``parent`` (n_blocks,): each block's number before the split; ``child(block, point)``: the part of ``block`` that
+    contains a point. Point loads go to the part with their point; what moves or excavates a whole block applies to all
+    its parts.
     """
 
     def parts(block: int) -> list[int]:
@@ -45,7 +45,7 @@ def on_children(loads: Loads, parent: np.ndarray, child: Callable[[int, tuple[fl
 
 
 def on_moved(loads: Loads, moved: Callable[[int, tuple[float, float]], tuple[float, float]]) -> Loads:
-    """``loads`` with their material points where ``moved(block, point)`` says that these are in a new reference."""
+    """``loads`` with their material points at ``moved(block, point)``, in a new reference configuration."""
     return replace(
         loads,
         point_loads=tuple(replace(p, at=moved(p.block, p.at)) for p in loads.point_loads),

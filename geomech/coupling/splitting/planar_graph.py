@@ -189,6 +189,6 @@ def faces_without_slivers(graph: BlockGraph, names: str) -> tuple[list[list[np.n
                     other = owner[b, a]
                     shared[other] = shared.get(other, 0.0) + float(np.hypot(*(graph.points[b] - graph.points[a])))
                     sides.setdefault(other, []).append(by_ends[frozenset((a, b))])
-        into = max(shared, key=shared.get)
+        into = max(shared, key=lambda face: shared[face])
         kept[sides[into]] = False
         _log.info("%s: a sliver of %.3g m² is merged into its neighbour", names, areas[smallest])

@@ -15,7 +15,7 @@ _AT_END = 0.01
 _LEAST_FACE = 1e-6
 
 
-def held_by_glue(
+def find_bonded_corners(
     vertex: np.ndarray, edge: np.ndarray, after: np.ndarray, position: np.ndarray, share: np.ndarray, bonded: np.ndarray
 ) -> np.ndarray | None:
     """(n,) bool: contacts of two lone corners that bonds around the point hold together; None without any.

@@ -19,7 +19,7 @@ from ..open_close.contact_set import ContactSet
 from ..statics.sharp_toes import SHARP, ToeCorners, stand_off
 from ..step_control.relative_motion import Approach, Windows, widths
 from . import contact_records
-from .bonded_corners import held_by_glue
+from .bonded_corners import find_bonded_corners
 from .entrance_edges import (
     FACE,
     SMOOTHED,
@@ -115,6 +115,15 @@ class ContactFinder:
         self._rigid = rigid
         # Triangles follow a rock that bends; multipliers hold what springs would give.
         self._bends = (np.diff(self._start) > 3) & ~rigid & ~blocks.fixed & (settings.contact == "penalty")
+        if blocks.order is not None:
+            # These bend themselves.
+            self._bends &= np.asarray(blocks.order) == 1
+        #: Whether contacts are found at the corners of faces only: points along faces are found from them.
+        self.at_corners = False
+        #: (n_blocks,) m: how far deflection moves a point of each block from where its vertices say, at most.
+        self.deflection = np.zeros(blocks.n_blocks)
+        #: (n_blocks,) m: how far its sides lie off the straight lines between their corners, at most.
+        self.sag = np.zeros(blocks.n_blocks)
         self._rounding, self._longest = corner_lengths(blocks, settings.corner_rounding)
         #: (n_vertices,) m: the lengths over which corners are rounded.
         self.rounding = np.minimum(self._rounding, self._longest)
@@ -123,7 +132,7 @@ class ContactFinder:
         #: Whether faces keep all their cohesion for as long as they touch anywhere (`whole_faces`).
         self.whole_faces = False
         self._corners = ToeCorners(
-            self._next, self._previous, self.rounding, np.sqrt(self._area)[self._owner], blocks.vertices
+            self._next, self._previous, self._owner, self.rounding, np.sqrt(self._area)[self._owner], blocks.vertices
         )
         self._always_fixed = np.ascontiguousarray(blocks.fixed, dtype=np.bool_)
         self.widths = widths(blocks.vertices, self._next, self._start, self._area)
@@ -184,7 +193,7 @@ class ContactFinder:
         if glue_holds and remembered["bonded"].any():
             along = vertices[self._next[edge]] - vertices[edge]
             share = geometry[:, 4] / np.hypot(along[:, 0], along[:, 1])
-            glued = held_by_glue(vertex, edge, self._next, geometry[:, 0], share, remembered["bonded"] == 1)
+            glued = find_bonded_corners(vertex, edge, self._next, geometry[:, 0], share, remembered["bonded"] == 1)
             if glued is not None:
                 keep &= ~glued
         if not keep.all():
@@ -213,7 +222,7 @@ class ContactFinder:
             cohesion = np.where(found.bonded > 0, self._table.cohesion[found.law], 0.0)
             whole = WholeFaces.of(found.block, found.other, found.geometry, found.law, cohesion)
             found = replace(found, whole=whole).sharing_cohesion(found.state, found.bonded)
-        return found if lumped else self._with_springs_in_faces(found, vertices, broken)
+        return found if lumped or self.at_corners else self._with_springs_in_faces(found, vertices, broken)
 
     def _meeting(
         self, old: np.ndarray, vertices: np.ndarray, window: float | Windows, motion: np.ndarray | None, margin: float
@@ -415,7 +424,7 @@ class ContactFinder:
         closed = old["state"] != OPEN
         for blocks in (old["block"][closed], old["other"][closed]):
             np.maximum.at(deepest, blocks, -old["gap"][closed])
-        return deepest
+        return deepest + self.deflection
 
     def _tilt(self, vertices, edge, corner, geometry) -> np.ndarray:
         """(n,) rad, as in `ContactSet`."""
@@ -446,6 +455,16 @@ class ContactFinder:
                 row = touched[at[np.argmin(np.linalg.norm(touched["point"][at] - geometry[c, 5:7], axis=1))]]
                 for name in ("slip", "wear", "lift"):
                     remembered[name][c] = row[name]
+
+    @property
+    def stiff_laws(self) -> np.ndarray:
+        """(n_laws,) which laws have a normal stiffness of their own."""
+        return self._stiff
+
+    @property
+    def stiff_along_laws(self) -> np.ndarray:
+        """(n_laws,) which laws have a shear stiffness of their own."""
+        return self._stiff_along
 
     @property
     def closure(self) -> np.ndarray:
@@ -500,7 +519,7 @@ class ContactFinder:
             out &= ~(self._removed[self._owner[vertex]] | self._removed[self._owner[edge]])
         return out
 
-    def beyond_middle(self, vertices: np.ndarray, vertex: np.ndarray, edge: np.ndarray) -> np.ndarray:
+    def past_midpoint(self, vertices: np.ndarray, vertex: np.ndarray, edge: np.ndarray) -> np.ndarray:
         """(n,) True where a ``vertex`` lies behind its ``edge`` by more than half of what the block is thick there."""
         return ~from_outside(
             vertex, edge, self._off_lines(vertices, vertex, edge), vertices, self._next, self._previous, self._start,

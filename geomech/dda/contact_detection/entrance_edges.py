@@ -520,7 +520,9 @@ def _geometry(table, met, outlines):
         geometry[row, 0] = along / length
         geometry[row, 1], geometry[row, 2], geometry[row, 3] = nx, ny, gap
         geometry[row, 5], geometry[row, 6] = vertices[vertex, 0], vertices[vertex, 1]
-        geometry[row, 4], mate[row] = _tributary(outlines, vertex, edge, nx, ny, along, length)
+        before = _has_row(table, row, previous_vertex[edge])
+        after = _has_row(table, row, next_vertex[edge])
+        geometry[row, 4], mate[row] = _tributary(outlines, vertex, edge, nx, ny, along, length, before, after)
         if table[row, 2] >= 0:
             # Rounded corners have no face in common.
             geometry[row, 4] = 0.0
@@ -529,9 +531,23 @@ def _geometry(table, met, outlines):
 
 
 @part(fastmath=False, error_model="numpy", nogil=True)
-def _tributary(outlines, vertex, edge, nx, ny, along, length):
+def _has_row(table, row, edge):
+    """Whether the vertex of this ``row`` of the ``table`` also touches the line of another ``edge``; rows of one vertex
+    follow one another."""
+    for step in (-1, 1):
+        k = row + step
+        while 0 <= k < table.shape[0] and table[k, 0] == table[row, 0]:
+            if table[k, 1] == edge and table[k, 2] < 0:
+                return True
+            k += step
+    return False
+
+
+@part(fastmath=False, error_model="numpy", nogil=True)
+def _tributary(outlines, vertex, edge, nx, ny, along, length, before, after):
     """Half the overlap of the faces that meet where ``vertex`` touches an ``edge`` of the outward normal (nx, ny) and this
-    ``length`` so far ``along`` it, m; and the edge of the vertex's own block that faces it."""
+    ``length`` so far ``along`` it, m; and the edge of the vertex's own block that faces it. ``before`` and ``after``:
+    whether the vertex touches the edges before and after this one too, whose faces are counted there."""
     vertices, next_vertex, previous_vertex = outlines.vertices, outlines.next_vertex, outlines.previous_vertex
     tributary, facing, mate = 0.0, np.inf, vertex
     for own in (vertex, previous_vertex[vertex]):
@@ -548,11 +564,11 @@ def _tributary(outlines, vertex, edge, nx, ny, along, length):
         for turn in range(3):
             face = edge
             if turn == 1:
-                if along > ends:
+                if before or along > ends:
                     continue
                 face = previous_vertex[edge]
             elif turn == 2:
-                if along < length - ends:
+                if after or along < length - ends:
                     continue
                 face = next_vertex[edge]
             far = next_vertex[face]

@@ -22,7 +22,7 @@ _AT_STRENGTH = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
-class ToldContacts:
+class InheritedContacts:
     """Initial forces, gaps and slip of the contacts ``which`` (k,), rows of a `ContactSet`.
 
     normal  (k,) N, positive in compression; 0: open, unless the contact is bonded (which may carry tension)
@@ -38,8 +38,10 @@ class ToldContacts:
     slip: np.ndarray
 
 
-def told_rows(found: ContactSet, told: ToldContacts, closure: np.ndarray, on_multiplier: np.ndarray) -> np.ndarray:
-    """CONTACT rows of ``found``, with the forces ``told`` on the current geometry.
+def inherited_rows(
+    found: ContactSet, inherited: InheritedContacts, closure: np.ndarray, on_multiplier: np.ndarray
+) -> np.ndarray:
+    """CONTACT rows of ``found``, with the forces ``inherited`` on the current geometry.
 
     ``closure`` (n_laws,) maximum closure of each law, m (infinite: linear); ``on_multiplier`` (n,) bool: contacts whose
     normal force is a multiplier, not a spring force."""
@@ -52,20 +54,20 @@ def told_rows(found: ContactSet, told: ToldContacts, closure: np.ndarray, on_mul
     g = found.geometry
     rows["position"], rows["normal"], rows["point"], rows["length"] = g[:, 0], g[:, 1:3], g[:, 5:7], g[:, 4]
 
-    at, n = told.which, told.normal
+    at, n = inherited.which, inherited.normal
     closed = (n > 0) | (found.bonded[at] > 0)
     strength = found.springs.peak[at] * n
-    slides = closed & (found.bonded[at] == 0) & (np.abs(told.shear) >= (1 - _AT_STRENGTH) * strength)
+    slides = closed & (found.bonded[at] == 0) & (np.abs(inherited.shear) >= (1 - _AT_STRENGTH) * strength)
     # A contact that slides without friction has no force that gives its direction.
-    slides &= (told.shear != 0) | (strength == 0)
+    slides &= (inherited.shear != 0) | (strength == 0)
     pressed_in = np.where(on_multiplier[at], 0.0, _closed_by(n, found.springs.normal[at], closure[found.law[at]]))
     rows["state"][at] = np.where(closed, np.where(slides, SLIP, STICK), OPEN)
     rows["normal_force"][at] = np.where(closed, n, 0.0)
-    rows["shear_force"][at] = np.where(closed, told.shear, 0.0)
-    rows["gap"][at] = np.where(closed, -pressed_in, told.gap)
+    rows["shear_force"][at] = np.where(closed, inherited.shear, 0.0)
+    rows["gap"][at] = np.where(closed, -pressed_in, inherited.gap)
     rows["lift"][at] = g[at, 3] - rows["gap"][at]
-    rows["slip"][at] = told.slip
-    rows["wear"][at] = np.where(closed, np.maximum(found.wear[at], np.abs(told.slip)), found.wear[at])
+    rows["slip"][at] = inherited.slip
+    rows["wear"][at] = np.where(closed, np.maximum(found.wear[at], np.abs(inherited.slip)), found.wear[at])
     rows["stretch"][at], rows["bare"][at] = 0.0, -1.0
     return rows
 
@@ -73,7 +75,7 @@ def told_rows(found: ContactSet, told: ToldContacts, closure: np.ndarray, on_mul
 def at_their_springs(
     rows: np.ndarray, placed: ContactSet, which: np.ndarray, closure: np.ndarray, on_multiplier: np.ndarray
 ) -> np.ndarray:
-    """The ``rows`` of `told_rows`, with gaps for faces whose springs stand inside the face (``placed``).
+    """The ``rows`` of `inherited_rows`, with gaps for faces whose springs stand inside the face (``placed``).
 
     With these gaps the springs inside the face, not springs at its corners, carry the prescribed resultant and moment
     of the contacts ``which``."""
@@ -82,10 +84,10 @@ def at_their_springs(
     order = np.argsort(keys)
     here = order[np.minimum(np.searchsorted(keys[order], theirs), len(keys) - 1)]
     points = placed.points
-    told = np.zeros(len(rows), bool)
-    told[which] = True
+    inherited = np.zeros(len(rows), bool)
+    inherited[which] = True
     # Where only one end is prescribed, the other keeps its gap.
-    ends = points.ends[(told[here[points.ends]] & (rows["state"][here[points.ends]] != OPEN)).all(axis=1)]
+    ends = points.ends[(inherited[here[points.ends]] & (rows["state"][here[points.ends]] != OPEN)).all(axis=1)]
     force = points.at_points(rows["normal_force"][here])
     gap = points.gap_at_corners(
         np.where(on_multiplier, 0.0, -_closed_by(force, placed.springs.normal, closure[placed.law]))

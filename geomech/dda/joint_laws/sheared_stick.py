@@ -24,7 +24,7 @@ _AGREED = 1e-8
 _ROUNDS = 30
 
 
-def stretched(
+def settle_sheared_sticks(
     settle: Callable[[ContactSet], Settled],
     found: ContactSet,
     springs: Springs,

@@ -23,16 +23,16 @@ def balanced(load: np.ndarray, points: np.ndarray, edges: np.ndarray, weight: np
     return float(np.abs(weight).sum()) <= _BALANCE * size and bool((total <= _BALANCE * size).all())
 
 
-def with_rigid_motion(held: np.ndarray | None) -> np.ndarray:
-    """(1, 6) bool: the constrained unknowns ``held`` of a lone block, and its rigid motion."""
-    out = np.zeros((1, 6), bool) if held is None else held.copy()
+def with_rigid_motion(constrained: np.ndarray | None) -> np.ndarray:
+    """(1, 6) bool: the constrained unknowns ``constrained`` of a lone block, and its rigid motion."""
+    out = np.zeros((1, 6), bool) if constrained is None else constrained.copy()
     out[0, :3] = True
     return out
 
 
 @kept(fastmath=False, error_model="numpy", nogil=True)
-def hold(held, matrix, right, vectors, block, other, order):
-    """Constrain the unknowns ``held`` (n_blocks, 6) bool to zero, in place: their rows and columns
+def hold(constrained, matrix, right, vectors, block, other, order):
+    """Constrain the unknowns ``constrained`` (n_blocks, 6) bool to zero, in place: their rows and columns
     become diagonal.
 
     ``matrix`` (n, 6, 6) and ``right`` (n, 6) as in `assembly`; ``vectors`` (n_contacts, 2, 12) of the contacts between
@@ -42,19 +42,19 @@ def hold(held, matrix, right, vectors, block, other, order):
     for i in range(matrix.shape[0]):
         for k in range(6):
             size = max(size, abs(matrix[i, k, k]))
-    for b in range(held.shape[0]):
+    for b in range(constrained.shape[0]):
         i = order[b]
         if i < 0:
             continue
         for k in range(6):
-            if held[b, k]:
+            if constrained[b, k]:
                 for m in range(6):
                     matrix[i, k, m] = matrix[i, m, k] = 0.0
                 matrix[i, k, k] = size
                 right[i, k] = 0.0
     for c in range(block.shape[0]):
         for k in range(6):
-            if held[block[c], k]:
+            if constrained[block[c], k]:
                 vectors[c, 0, k] = vectors[c, 1, k] = 0.0
-            if held[other[c], k]:
+            if constrained[other[c], k]:
                 vectors[c, 0, 6 + k] = vectors[c, 1, 6 + k] = 0.0

@@ -63,7 +63,7 @@ def _moved(points, owner, affine, centroid):
 
 @kept(fastmath=False, error_model="numpy", nogil=True)
 def _contacts(geometry, block, other, affine, centroid, turn, edge):
-    """As `Middle.contacts`; ``edge`` (n, 2) m, the edges as vectors."""
+    """As `MidpointConfiguration.contacts`; ``edge`` (n, 2) m, the edges as vectors."""
     out = geometry.copy()
     for k in range(geometry.shape[0]):
         a, b = block[k], other[k]
@@ -102,7 +102,7 @@ def _to_start(xx, yy, xy, moment, affine, turn):
 
 @kept(fastmath=False, error_model="numpy", nogil=True)
 def _strains_back(vectors, block, other, geometry, size, affine, turn):
-    """As `Middle.turn_back`; ``size`` (n_blocks,) is √area, m."""
+    """As `MidpointConfiguration.turn_back`; ``size`` (n_blocks,) is √area, m."""
     for k in range(vectors.shape[0]):
         for side in range(2):
             b = block[k] if side == 0 else other[k]
@@ -127,7 +127,7 @@ def _rows_back(rows, owner, affine, turn):
 
 
 @dataclass(frozen=True, eq=False)
-class Middle:
+class MidpointConfiguration:
     """The configuration on which the forces of a step act.
 
     vertices  (n_vertices, 2)  m
@@ -144,7 +144,7 @@ class Middle:
     @classmethod
     def of(
         cls, increment: np.ndarray | None, part: float, vertices: np.ndarray, owner: np.ndarray, moments: np.ndarray
-    ) -> Middle:
+    ) -> MidpointConfiguration:
         """The configuration after ``part`` (0 to 1) of ``increment`` (n_blocks, 6; None: the start).
 
         ``vertices`` (n_vertices, 2) m and ``moments`` (n_blocks, 6) of the start; ``owner`` (n_vertices,) block."""

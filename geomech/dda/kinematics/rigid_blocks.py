@@ -11,11 +11,11 @@ import numpy as np
 from ...conventions import rotate_stress
 
 
-def with_rigid(held: np.ndarray | None, rigid: np.ndarray) -> np.ndarray | None:
-    """(n_blocks, 6) bool: the constraints ``held`` and the strains of ``rigid`` (n_blocks,) blocks; None: none."""
+def with_rigid(constrained: np.ndarray | None, rigid: np.ndarray) -> np.ndarray | None:
+    """(n_blocks, 6) bool: the constraints ``constrained`` and the strains of ``rigid`` (n_blocks,) blocks; None: none."""
     if not rigid.any():
-        return held
-    out = np.zeros((len(rigid), 6), bool) if held is None else held.copy()
+        return constrained
+    out = np.zeros((len(rigid), 6), bool) if constrained is None else constrained.copy()
     out[rigid, 3:] = True
     return out
 
@@ -28,12 +28,12 @@ def mean_stress(
     density: np.ndarray,
     acceleration: np.ndarray,
     spin: np.ndarray,
-    middle: np.ndarray,
+    contact_turn: np.ndarray,
     turn: np.ndarray,
 ) -> np.ndarray:
     """(n, 3) mean stress of ``blocks`` (n,), Pa, on axes rotated by ``turn`` (n_blocks,) rad.
 
-    ``contacts`` CONTACT rows on a configuration rotated by ``middle`` (n_blocks,) rad; ``load`` (n_blocks, 6)
+    ``contacts`` CONTACT rows on a configuration rotated by ``contact_turn`` (n_blocks,) rad; ``load`` (n_blocks, 6)
     generalised forces, N and N m; ``moments`` (n_blocks, 6); ``density`` (n_blocks,) kg/m³; ``acceleration`` (n_blocks,
     6); ``spin`` (n_blocks,) rad/s."""
     n = contacts["normal"]
@@ -45,7 +45,7 @@ def mean_stress(
         (x, y), (fx, fy) = (contacts["point"] - moments[own, 1:3]).T, sign * force.T
         for k, part in enumerate((x * fx, y * fy, 0.5 * (y * fx + x * fy))):
             virial[:, k] += np.bincount(own, weights=part, minlength=len(virial))
-    virial = rotate_stress(virial, -middle) + load[:, 3:]
+    virial = rotate_stress(virial, -contact_turn) + load[:, 3:]
     xx, yy, xy = moments[:, 3:6].T
     second = np.stack([xx, yy, xy], axis=1)
     turning = np.stack([-xy, xy, 0.5 * (xx - yy)], axis=1)

@@ -17,7 +17,7 @@ _ROUNDING = 5e-16
 #: contact that exceeds the round-off, by 1.3 times it at most, and costs one more solution.)
 _WANDERS, _NOTHING = 4.0, 1e-3
 #: Warn of a block whose contact forces from round-off exceed this part of its weight.
-_FELT = 1e-2
+_NOTICEABLE = 1e-2
 
 
 def rounding_of(vertices: np.ndarray) -> float:
@@ -38,7 +38,7 @@ def undecided_gaps(
     return np.clip(_NOTHING * least / np.maximum(normal, 1e-300), rounding, _WANDERS * rounding)
 
 
-def tell_felt(
+def warn_of_roundoff(
     rounding: float, weight: np.ndarray, block: np.ndarray, other: np.ndarray, normal: np.ndarray, names: Sequence[str]
 ) -> None:
     """Warn of the block whose weight is smallest relative to the contact forces that ``rounding`` (m) causes.
@@ -50,7 +50,7 @@ def tell_felt(
     least = np.minimum(weight[block], weight[other])
     share = rounding * normal / np.maximum(least, 1e-300)
     c = int(np.argmax(share))
-    if share[c] <= _FELT or least[c] == 0.0:
+    if share[c] <= _NOTICEABLE or least[c] == 0.0:
         return
     light = block[c] if weight[block[c]] <= weight[other[c]] else other[c]
     log.warning(

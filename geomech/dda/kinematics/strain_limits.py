@@ -22,7 +22,7 @@ class ElasticRange:
     """Largest strain of any block so far; a warning when it passes `BEYOND`, and each time it has doubled since."""
 
     def __init__(self) -> None:
-        self.told = 0.5 * BEYOND
+        self.reported = 0.5 * BEYOND
 
     def check(self, motion: Motion, blocks: Blocks, time: float) -> float:
         """Return the largest strain; log a warning that names the block where it is large.
@@ -38,8 +38,8 @@ class ElasticRange:
                 f"{name} is strained by {100 * most:.3g} % at t = {time:g} s: no linear elastic body. Its loads are "
                 "beyond its stiffness, or it hangs by a thread of rock: shorten the time step, or cut it where it hangs"
             )
-        if most >= 2.0 * self.told:
-            self.told = most
+        if most >= 2.0 * self.reported:
+            self.reported = most
             log.warning(
                 "t = %g s: %s is strained by %.3g %%, beyond the elastic range of rock: what it and its cracks do is a "
                 "guess",

@@ -16,7 +16,7 @@ import numpy as np
 
 from ...conventions import normal_of
 from ...model import BOLT, GROUND, Bolt
-from ..kinematics.midpoint_configuration import Middle
+from ..kinematics.midpoint_configuration import MidpointConfiguration
 from ..open_close.equations import Unsettled
 from .force_records import POINT_FORCE
 from .prescribed_motion import Pairs
@@ -83,7 +83,7 @@ class BoltSet:
         time: float,
         point_at,
         order: np.ndarray,
-        middle: Middle,
+        midpoint: MidpointConfiguration,
         removed: np.ndarray | None,
     ) -> tuple[BoltSet | None, np.ndarray]:
         """The bolts that act at ``time`` s (None: none), and all BOLT rows, newly installed bolts included.
@@ -117,10 +117,10 @@ class BoltSet:
             for side, (b, sign) in enumerate(((block[k], -1.0), (other[k], 1.0))):
                 if b == GROUND:
                     continue
-                ends[k, side] = middle.points(ends[k, None, side], np.array([b]))[0]
+                ends[k, side] = midpoint.points(ends[k, None, side], np.array([b]))[0]
                 if order[b] >= 0:
-                    h = np.sqrt(middle.moments[b, 0])
-                    t = axes[k] @ middle.displacement(ends[k, side], b) / [1.0, 1.0, h, h, h, h]
+                    h = np.sqrt(midpoint.moments[b, 0])
+                    t = axes[k] @ midpoint.displacement(ends[k, side], b) / [1.0, 1.0, h, h, h, h]
                     vectors[k, :, 6 * side : 6 * side + 6] = sign * t
         # A ground end has no unknowns: its half of the vectors is zero, and its block number may be the bolt's own
         # block.

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...model import UNKNOWNS, BaseMotion, BlockMotion, Blocks, Loads, PointMotion
-from ..kinematics.midpoint_configuration import Middle
+from ..kinematics.midpoint_configuration import MidpointConfiguration
 from .force_records import POINT_FORCE
 
 #: Rows of C are linearly dependent below this relative size: they contradict or repeat one another.
@@ -66,7 +66,7 @@ class Pairs:
 
 
 class ImposedMotion:
-    """Motion that ``loads`` prescribe from ``start`` to ``end`` (s), on the midpoint configuration ``middle``.
+    """Motion that ``loads`` prescribe from ``start`` to ``end`` (s), on the midpoint configuration ``midpoint``.
 
     ``totals`` (k,) are the values at ``end``, ``before`` those at the start as the last step left them (None: the
     values at ``start``): static equilibrium at one time may take many steps. ``increment`` and ``rate`` (n_blocks, 6)
@@ -77,13 +77,13 @@ class ImposedMotion:
     """
 
     def __init__(
-        self, blocks: Blocks, fixed: np.ndarray, removed: np.ndarray | None, loads: Loads, middle: Middle, point_at,
+        self, blocks: Blocks, fixed: np.ndarray, removed: np.ndarray | None, loads: Loads, midpoint: MidpointConfiguration, point_at,
         before: np.ndarray,
         start: float, end: float,
     ) -> None:  # fmt: skip
         n = blocks.n_blocks
-        self.blocks, self.fixed, self.moments = blocks, fixed, middle.moments
-        self._middle = middle
+        self.blocks, self.fixed, self.moments = blocks, fixed, midpoint.moments
+        self._midpoint = midpoint
         self.increment, self.rate = np.zeros((n, 6)), np.zeros((n, 6))
         self._given: dict[int, _Given] = {}
         self._springs: list[tuple[int, int, np.ndarray, np.ndarray]] = []
@@ -134,11 +134,11 @@ class ImposedMotion:
         self, number: int, motion: PointMotion, by: np.ndarray, now: np.ndarray, start: float, end: float
     ) -> None:
         b = motion.block
-        acts = self._middle.points(now[None], np.array([b]))[0]
+        acts = self._midpoint.points(now[None], np.array([b]))[0]
         self._rows[number]["block"], self._rows[number]["at"], self._rows[number]["point"] = b, motion.at, acts
         if self.fixed[b]:
             raise ValueError(f"a point of {self._name(b)} is to be moved, but the block is fixed: give its own motion")
-        rows = motion.axes @ self._middle.displacement(acts, b)
+        rows = motion.axes @ self._midpoint.displacement(acts, b)
         if motion.kind == "displacement":
             # Towards the total position, so that the next step corrects the second-order error of a rotation.
             by = motion.history.at(end) - motion.axes @ (now - np.asarray(motion.at, dtype=float))
@@ -168,13 +168,13 @@ class ImposedMotion:
         h = float(np.sqrt(self.moments[block, 0]))
         return np.array([1.0, 1.0, h, h, h, h])
 
-    def without_prescribed(self, held: np.ndarray) -> np.ndarray:
-        """The constraints ``held`` (n_blocks, 6) without those of blocks with prescribed motion, which impose them as
+    def without_prescribed(self, constrained: np.ndarray) -> np.ndarray:
+        """The constraints ``constrained`` (n_blocks, 6) without those of blocks with prescribed motion, which impose them as
         zeros."""
-        rest = held.copy()
+        rest = constrained.copy()
         for b, given in self._given.items():
             taken = {int(row.argmax()) for row, source in zip(given.rows, given.source, strict=True) if source < 0}
-            for unknown in set(np.flatnonzero(held[b]).tolist()) - taken:
+            for unknown in set(np.flatnonzero(constrained[b]).tolist()) - taken:
                 self._add(b, np.eye(6)[unknown], 0.0, 0.0, -1)
             rest[b] = False
         self._springs = [(number, b, rows * ~rest[b], by) for number, b, rows, by in self._springs]

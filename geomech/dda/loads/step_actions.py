@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from ...model import BOLT, GROUND, Blocks, Loads, State
-from ..kinematics.midpoint_configuration import Middle
+from ..kinematics.midpoint_configuration import MidpointConfiguration
 from ..linear_solver.assembly import Links, Pattern
 from ..open_close.contact_set import ContactSet
 from ..open_close.settled_states import Settled
@@ -22,7 +22,9 @@ from .prescribed_motion import ImposedMotion, Pairs
 Settle = Callable[[Pattern, np.ndarray, np.ndarray, ContactSet, np.ndarray], Settled]
 
 
-def felt_gravity(loads: Loads, start: float, acting: float, dt: float, static: bool, ahead: float = 0.0) -> np.ndarray:
+def effective_gravity(
+    loads: Loads, start: float, acting: float, dt: float, static: bool, ahead: float = 0.0
+) -> np.ndarray:
     """Effective gravity (2,), m/s²: gravity at the time ``acting`` minus the acceleration of a moving base frame.
 
     The base acceleration is averaged over ``dt`` from ``start`` + ``ahead`` (s): over the step for ``ahead`` 0, so that
@@ -40,11 +42,11 @@ class StepActions:
     """Prescribed motion and bolts of one attempt at a step; methods in the order in which the step calls them."""
 
     def __init__(
-        self, blocks: Blocks, fixed: np.ndarray, loads: Loads, state: State, load_map: LoadMap, middle: Middle,
+        self, blocks: Blocks, fixed: np.ndarray, loads: Loads, state: State, load_map: LoadMap, midpoint: MidpointConfiguration,
         order: np.ndarray, removed: np.ndarray | None, end: float,
     ) -> None:  # fmt: skip
         self.blocks, self.order, self.loads, self.load_map = blocks, order, loads, load_map
-        self.moments = middle.moments
+        self.moments = midpoint.moments
         vertices = state.vertices
 
         def point_at(block: int, at: tuple[float, float]) -> np.ndarray:
@@ -54,27 +56,29 @@ class StepActions:
         shaken = loads.base is not None and loads.base.frame == "ground"
         if shaken or loads.block_motions or loads.point_motions:
             self.imposed = ImposedMotion(
-                blocks, fixed, removed, loads, middle, point_at, state.imposed, state.time, end
+                blocks, fixed, removed, loads, midpoint, point_at, state.imposed, state.time, end
             )
         self.bolts: BoltSet | None = None
         self.memory = np.empty(0, BOLT)
         if loads.bolts:
             check_bolts(loads.bolts, blocks.fixed)
-            self.bolts, self.memory = BoltSet.of(loads.bolts, state.bolts, state.time, point_at, order, middle, removed)
+            self.bolts, self.memory = BoltSet.of(
+                loads.bolts, state.bolts, state.time, point_at, order, midpoint, removed
+            )
         #: (n_contacts,) m: contacts' motion along their edges due to the motion of fixed blocks.
         self.along = np.zeros(0)
         self._motion = np.zeros((0 if self.bolts is None else len(self.bolts.number), 2))
 
     @classmethod
     def of(
-        cls, blocks: Blocks, fixed: np.ndarray, loads: Loads, state: State, load_map: LoadMap, middle: Middle,
+        cls, blocks: Blocks, fixed: np.ndarray, loads: Loads, state: State, load_map: LoadMap, midpoint: MidpointConfiguration,
         order: np.ndarray, removed: np.ndarray | None, end: float,
     ) -> StepActions | None:  # fmt: skip
         """The actions of a step; None where ``loads`` are forces only."""
         shaken = loads.base is not None and loads.base.frame == "ground"
         if not (shaken or loads.block_motions or loads.point_motions or loads.bolts):
             return None
-        return cls(blocks, fixed, loads, state, load_map, middle, order, removed, end)
+        return cls(blocks, fixed, loads, state, load_map, midpoint, order, removed, end)
 
     @property
     def linked(self) -> tuple[np.ndarray, np.ndarray] | None:
@@ -84,19 +88,19 @@ class StepActions:
         pairs = self.bolts.pairs
         return pairs.block, np.where(pairs.other == GROUND, pairs.block, pairs.other)
 
-    def held(self, held: np.ndarray | None) -> np.ndarray | None:
-        """The constraints of ``held`` (n_blocks, 6) that the step itself imposes: without those of blocks with
+    def constrained(self, constrained: np.ndarray | None) -> np.ndarray | None:
+        """The constraints of ``constrained`` (n_blocks, 6) that the step itself imposes: without those of blocks with
         prescribed motion, which impose them together with it."""
-        if held is None:
+        if constrained is None:
             return None
         if self.imposed is not None:
-            held = self.imposed.without_prescribed(held)
+            constrained = self.imposed.without_prescribed(constrained)
         if self.bolts is not None:
             pairs = self.bolts.pairs
             for side, owner in enumerate((pairs.block, pairs.other)):
                 mine = owner >= 0
-                pairs.vectors[mine, :, 6 * side : 6 * side + 6] *= ~held[owner[mine], None]
-        return held
+                pairs.vectors[mine, :, 6 * side : 6 * side + 6] *= ~constrained[owner[mine], None]
+        return constrained
 
     def settle(
         self, pattern: Pattern, matrix: np.ndarray, right: np.ndarray, vectors: np.ndarray, acting: np.ndarray,
@@ -216,9 +220,9 @@ class StepActions:
             fx, fy = at_points[k]["force"]
             statistics[f"reaction_x:point {k + 1}"], statistics[f"reaction_y:point {k + 1}"] = float(fx), float(fy)
         driven = [motion.block for motion in self.loads.block_motions]
-        held = -contact_resultants(contacts, self.blocks.n_blocks, self.moments[:, 1:3]) if driven else None
+        constrained = -contact_resultants(contacts, self.blocks.n_blocks, self.moments[:, 1:3]) if driven else None
         for b in driven:
-            force = reaction[b] if self.order[b] >= 0 else held[b]
+            force = reaction[b] if self.order[b] >= 0 else constrained[b]
             for axis, value in zip("xy", force.tolist()):
                 statistics[f"reaction_{axis}:{self.blocks.names[b]}"] = value
         return all_points, reaction, statistics

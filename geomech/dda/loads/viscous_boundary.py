@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...model import Blocks, ViscousBoundary
-from ..kinematics.midpoint_configuration import Middle
+from ..kinematics.midpoint_configuration import MidpointConfiguration
 from .force_records import EDGE_FORCE
 
 #: Two Gauss points: exact for the square of a linear displacement.
@@ -66,27 +66,29 @@ class QuietEdges:
         )
         return cls(edge, block, ends, drag, incoming)
 
-    def assemble(self, matrix: np.ndarray, right: np.ndarray, order: np.ndarray, middle: Middle, dt: float) -> None:
+    def assemble(
+        self, matrix: np.ndarray, right: np.ndarray, order: np.ndarray, midpoint: MidpointConfiguration, dt: float
+    ) -> None:
         """Add the dashpots to the blocks' own ``matrix`` (n, 6, 6) and ``right`` (n, 6), scaled as in `assembly`;
-        ``middle`` is the configuration on which they act."""
+        ``midpoint`` is the configuration on which they act."""
         along = self.ends[:, 1] - self.ends[:, 0]
         half = 0.5 * np.hypot(along[:, 0], along[:, 1])
         scale = np.ones((len(self.edge), 6))
-        scale[:, 2:] /= np.sqrt(middle.moments[self.block, :1])
+        scale[:, 2:] /= np.sqrt(midpoint.moments[self.block, :1])
         rows = order[self.block]
         for at in _GAUSS:
-            t = middle.displacement(self.ends[:, 0] + at * along, self.block) * scale[:, None, :]
+            t = midpoint.displacement(self.ends[:, 0] + at * along, self.block) * scale[:, None, :]
             weighed = half[:, None, None] * np.einsum("nji,njk->nik", t, self.drag)
             np.add.at(matrix, rows, weighed @ t / dt)
             np.add.at(right, rows, 2.0 * np.einsum("nij,nj->ni", weighed, self.incoming))
 
-    def rows(self, increment: np.ndarray, middle: Middle, dt: float) -> np.ndarray:
+    def rows(self, increment: np.ndarray, midpoint: MidpointConfiguration, dt: float) -> np.ndarray:
         """EDGE_FORCE rows of the dashpots' tractions in a step of ``dt`` s with the displacement ``increment``
         (n_blocks, 6)."""
         out = np.zeros(len(self.edge), EDGE_FORCE)
         out["block"], out["edge"] = self.block, self.edge
         out["start"], out["end"] = self.ends[:, 0], self.ends[:, 1]
-        t = middle.displacement(self.ends, np.stack([self.block, self.block], axis=1))
+        t = midpoint.displacement(self.ends, np.stack([self.block, self.block], axis=1))
         velocity = np.einsum("neij,nj->nei", t, increment[self.block]) / dt
         out["traction"] = np.einsum("nij,nej->nei", self.drag, 2.0 * self.incoming[:, None] - velocity)
         along = self.ends[:, 1] - self.ends[:, 0]

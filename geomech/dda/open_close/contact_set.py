@@ -200,7 +200,7 @@ class ContactSet:
     def arcs(self) -> tuple[np.ndarray, np.ndarray]:
         """(n,) m each: the arc and the swing of the contacts at their corners."""
         found = self if self.lumped is None else self.lumped
-        return found.arc + np.zeros(len(self)), found.swing + np.zeros(len(self))
+        return found.arc + np.zeros(len(found)), found.swing + np.zeros(len(found))
 
     def cornered(self, better: ContactSet) -> ContactSet:
         """The contacts with springs at the corners of those faces that ``better``, by `misplaced`, has on other
@@ -220,6 +220,14 @@ class ContactSet:
     def blocks_of(self, contact: int) -> tuple[int, ...]:
         """The two blocks of a ``contact``; none for −1."""
         return () if contact < 0 else (int(self.block[contact]), int(self.other[contact]))
+
+    def of_rows(self, value: np.ndarray) -> np.ndarray:
+        """(n_rows,) the ``value`` (n,) of contacts for their CONTACT rows."""
+        return value
+
+    def shear_of_rows(self, shear: np.ndarray) -> np.ndarray:
+        """(n_rows,) N of CONTACT rows from the ``shear`` (n,) of the contacts."""
+        return shear
 
     def __len__(self) -> int:
         return len(self.vertex)

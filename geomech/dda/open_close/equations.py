@@ -92,6 +92,8 @@ class Equations:
     curved: CurvedJoints | None
     statics: bool
     expected: np.ndarray | None = None
+    #: Whether patches and the central path, which know six unknowns a block, can be tried.
+    first_order = True
 
     def __post_init__(self) -> None:
         self._data = np.empty(self.pattern.size)
@@ -116,11 +118,7 @@ class Equations:
             springs, gap = self.curved.lines(
                 self.springs, self.gap, found, state, direction, bonded, normal_force, plastic
             )
-        symmetric, held = assembly.assemble_contacts(
-            pattern, self._data, self._side, self.matrix, self.right, pattern.upper, pattern.lower, found.block,
-            found.other, pattern.order, self.vectors, state, direction, gap, springs.normal, springs.shear,
-            springs.friction, springs.sliding, springs.lift, found.shear, self._sides, self._held,
-        )  # fmt: skip
+        symmetric, held = self._assembled(state, direction, springs, gap)
         # Dense matrices are overwritten by their factors, links added to all.
         self._held = held if pattern.solver is not None and pattern.links is None else None
         if self._held is not None:
@@ -129,6 +127,25 @@ class Equations:
             if (answer.violation > 0).any() or pattern.solver.left <= RESIDUAL * forces:
                 return answer
         return self._answered(states, springs, gap, slip, symmetric, RESIDUAL)
+
+    def _assembled(self, state: np.ndarray, direction: np.ndarray, springs: Springs, gap: np.ndarray):
+        """Fill the matrix and the right side with contacts in this ``state``, as `assemble_contacts`."""
+        pattern, found = self.pattern, self.found
+        return assembly.assemble_contacts(
+            pattern, self._data, self._side, self.matrix, self.right, pattern.upper, pattern.lower, found.block,
+            found.other, pattern.order, self.vectors, state, direction, gap, springs.normal, springs.shear,
+            springs.friction, springs.sliding, springs.lift, found.shear, self._sides, self._held,
+        )  # fmt: skip
+
+    def _forces(
+        self, unknowns: np.ndarray, state: np.ndarray, direction: np.ndarray, springs: Springs, gap: np.ndarray
+    ) -> np.ndarray:
+        """(n, 4) as `contact_forces`."""
+        found = self.found
+        return contact_forces(
+            unknowns, found.block, found.other, self.pattern.order, self.vectors, state, direction, gap, springs.normal,
+            springs.shear, springs.friction, springs.sliding, springs.lift, found.shear,
+        )  # fmt: skip
 
     def _answered(
         self, states: States, springs: Springs, gap: np.ndarray, slip: np.ndarray, symmetric: bool, within: float
@@ -146,10 +163,7 @@ class Equations:
         if not np.isfinite(unknowns).all():
             raise Unsettled("the step's matrix is singular")
         self._near = unknowns
-        forces = contact_forces(
-            unknowns, found.block, found.other, pattern.order, self.vectors, state, direction, gap, springs.normal,
-            springs.shear, springs.friction, springs.sliding, springs.lift, found.shear,
-        )  # fmt: skip
+        forces = self._forces(unknowns, state, direction, springs, gap)
         known, missed = springs, None
         if self.curved is not None:
             slip = plastic_slip(forces, state, found.shear, springs)

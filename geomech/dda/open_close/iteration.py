@@ -102,12 +102,12 @@ class _Search:
         self.path: CentralPath | None = None
         self.seen: set[bytes] = set()
         self.offered: set[bytes] = set()
-        self.patched = 0
+        self.patched = self.pivots = 0
         # What closes sticking, is pulled open by its own shear and closes again can only slide: neither fits.
         self.closed, self.sheared = np.zeros(n, np.int64), np.zeros(n)
-        self._begin_anew()
+        self._restart()
 
-    def _begin_anew(self, proposed: bool = False) -> None:
+    def _restart(self, proposed: bool = False) -> None:
         """Other states than before are tried, ``proposed`` by the central path."""
         self.fewest, self.tries, self.proposed, self.falls = np.inf, 0, proposed, True
         self.best: tuple[States, Answer, np.ndarray] | None = None
@@ -139,7 +139,9 @@ class _Search:
             self._count(number, answer, wrong)
             if self._by_patch(answer, wrong, number):
                 continue
-            if returned or self.tries > self._most_tries(number):
+            if not self.equations.first_order:
+                self._pivot(answer, wrong, called, returned)
+            elif returned or self.tries > self._most_tries(number):
                 self._by_path(answer)
             else:
                 self.states = self.states.switched(wrong, called)
@@ -166,7 +168,7 @@ class _Search:
             first = bonds & _half_as_wrong_as_the_worst(answer.violation, found.block, found.other, order)
         self.states = self.states.switched(first, answer.called)
         self.most = max(self.most, self.newton + self.effort.max_iterations)
-        self._begin_anew()
+        self._restart()
 
     def _called(self, answer: Answer, wrong: np.ndarray) -> States:
         """The states that the ``answer`` calls for."""
@@ -193,7 +195,12 @@ class _Search:
     def _by_patch(self, answer: Answer, wrong: np.ndarray, number: int) -> bool:
         """Whether the wrong contacts, few, were settled on the blocks about them alone, from the best states so far."""
         solver, effort = self.solver, self.effort
-        if effort.within_patch or self.equations.pattern.solver is None or self.patched >= solver.patch_tries:
+        if (
+            not self.equations.first_order
+            or effort.within_patch
+            or self.equations.pattern.solver is None
+            or self.patched >= solver.patch_tries
+        ):
             return False
         if (self.falls and not self.proposed) or self.fewest > solver.patch_wrong * len(self.found):
             return False
@@ -207,8 +214,29 @@ class _Search:
             self.proposed = False
             return False
         self.states = proposal
-        self._begin_anew()
+        self._restart()
         return True
+
+    def _pivot(self, answer: Answer, wrong: np.ndarray, called: States, returned: bool) -> None:
+        """Switch all ``wrong`` contacts to the states ``called`` for or, once states have ``returned`` or fewer are not
+        wrong, those alone that are worst on their blocks, until fewer are wrong than ever before: block principal pivoting
+        (Júdice & Pires 1994). Raises `Unsettled`."""
+        if not returned and self.tries <= self.solver.newton_tries:
+            self.states = self.states.switched(wrong, called)
+            return
+        self.pivots += 1
+        if self.pivots > self.effort.max_iterations:
+            raise self._unsettled(answer)
+        self.most = max(self.most, self.newton + self.effort.max_iterations)
+        found, violation = self.found, np.where(wrong, answer.violation, 0.0)
+        if self.pivots <= self.effort.max_iterations // 2:
+            some = wrong & _half_as_wrong_as_the_worst(
+                violation, found.block, found.other, self.equations.pattern.order
+            )
+        else:
+            # Where many that are worst lead back, one by one they do not (Murty 1974).
+            some = np.arange(len(wrong)) == (violation.argmax() if self.pivots % 2 else wrong.argmax())
+        self.states = self.states.switched(some, called)
 
     def _by_path(self, answer: Answer) -> None:
         """States that the central path proposes. Raises `Unsettled` where it has none."""
@@ -223,7 +251,7 @@ class _Search:
             raise self._unsettled(answer)
         self.seen.clear()
         self.states, self.most = proposal, max(self.most, self.newton + self.solver.newton_to_finish)
-        self._begin_anew(proposed=True)
+        self._restart(proposed=True)
 
     def _bonds_on_path(self) -> np.ndarray:
         """(n,) the bonds that the central path counts with: those of open contacts are gone, but not where cohesion belongs

@@ -1,5 +1,5 @@
 """What a factor of safety counts on that is not joint strength alone: toes, anchors, cohesion of faces that have parted
-at one end; and the warnings that name it."""
+at one end, the way in which blocks are wedged; and the warnings that name it."""
 
 from __future__ import annotations
 
@@ -19,11 +19,13 @@ from .safety_answer import Anchor, FactorOfSafety
 from .sharp_toes import FREE, Toe
 from .stability_trial import Trial
 
-#: So many toes are told of.
+#: So many blocks with toes are named.
 _TOLD = 8
 #: Toes bar the way of blocks that come nearer to what they touch by this part of the fastest block's way, and hold
 #: what is more than this part of their block's weight.
 _BARRED, _BEARS = 1e-3, 1e-3
+#: Admissible forces up to a factor that is within this part of that of rigid blocks are explained by it.
+_AS_RIGID = 1e-2
 #: A bolt within this part of its yield force is at it.
 _AT_YIELD = 1e-6
 #: A bolt that never yields has taken on load when it bears more than its pretension by this part.
@@ -79,19 +81,31 @@ def _of_toes(blocks: Blocks, toes: tuple[Toe, ...], other: FactorOfSafety | None
     def factor(of: FactorOfSafety) -> str:
         return f"{of.factor:.4f}" if math.isfinite(of.upper) else f"above {of.lower:g}"
 
-    lines = []
-    for toe in toes[:_TOLD]:
-        a, b = (blocks.names[k] if blocks.names else f"block {k}" for k in (toe.block, toe.other))
-        where = f"the toe of {a!r} touches {b!r} at x = {_metres(toe.at[0])}, y = {_metres(toe.at[1])} m"
-        if hold:
-            without = "the blocks do not stand" if other is None else f"the factor is {factor(other)}"
-            lines.append(f"{where} and holds {toe.force / 1e3:.4g} kN/m; without it {without}")
-        else:
-            lines.append(
-                f"{where}; rounded, it stands off by {toe.stands_off:.3g} m and holds nothing before it has moved "
-                f"as far. A sharp tip would hold: factor {factor(other)}, which is not to be relied on"
-            )
-    return tuple(lines)
+    def name(block: int) -> str:
+        return repr(blocks.names[block] if blocks.names else f"block {block}")
+
+    first, one = toes[0], len({toe.block for toe in toes}) == 1
+    where = (
+        f"the toe of {name(first.block)} touches {name(first.other)} at x = {_metres(first.at[0])}, "
+        f"y = {_metres(first.at[1])} m"
+    )
+    if not one:
+        rest = list(dict.fromkeys(name(toe.block) for toe in toes if toe.block != first.block))
+        more = f" and {len(rest) - _TOLD} others" if len(rest) > _TOLD else ""
+        where += f" (so do those of {', '.join(rest[:_TOLD])}{more})"
+    if hold:
+        without = "the blocks do not stand" if other is None else f"the factor is {factor(other)}"
+        force = sum(toe.force for toe in toes) / 1e3
+        what = "holds" if one else "they hold"
+        return (f"{where} and {what} {force:.4g} kN/m; without {'it' if one else 'them'} {without}",)
+    off = max(toe.stands_off for toe in toes)
+    rounded = (
+        f"rounded, it stands off by {off:.3g} m and holds nothing before it has moved as far. A sharp tip would hold"
+        if one
+        else f"rounded, they stand off by up to {off:.3g} m and hold nothing before they have moved as far. Sharp tips "
+        "would hold"
+    )
+    return (f"{where}; {rounded}: factor {factor(other)}, which is not to be relied on",)
 
 
 def _metres(value: float) -> str:
@@ -211,3 +225,29 @@ def with_parted_faces(
         f"were it lost where faces are open, the factor would be {other.factor:.4f}"
     )
     return replace(found, factor_if_parted=other.factor, warnings=(*found.warnings, line))
+
+
+def with_admissible_forces(found: FactorOfSafety, largest: float | None) -> FactorOfSafety:
+    """The answer ``found`` with the ``largest`` factor that has admissible contact forces, if that is clearly beyond
+    it; without a warning where rigid blocks reach it, which is told already."""
+    if largest is None:
+        return found
+    rigid = found.factor_if_rigid
+    if rigid is not None and largest <= rigid * (1.0 + _AS_RIGID):
+        return replace(found, admissible=largest)
+    bound = f"up to a factor of {largest:.4f}" if math.isfinite(largest) else "at more than four times that factor"
+    line = (
+        f"friction does not determine how the blocks are wedged against one another: contact forces that balance the "
+        f"loads within the strength of all joints exist {bound}, which is an upper bound. The factor {found.factor:.4f} "
+        "is that of the contact forces which the deformation of the blocks brings about"
+    )
+    return replace(found, admissible=largest, warnings=(*found.warnings, line))
+
+
+def with_no_mechanism(found: FactorOfSafety) -> FactorOfSafety:
+    """The answer ``found`` of blocks that no reduction of strength sets in motion."""
+    line = (
+        f"blocks stand even with joint strength divided by {found.lower:g}: their shape or anchors hold them, not the "
+        "strength of joints. Check that every block which could fail is free to move"
+    )
+    return replace(found, warnings=(*found.warnings, line))

@@ -7,9 +7,9 @@ the size h = √area have therefore collapsed, wherever they end, once a vertex 
 
     h / 2000  +  five times the largest displacement were no joint to fail  +  what stretches a bolt to its yield force
 
-(the last at most h / 10, and nothing for a bolt that never yields: what it may take is a matter of how far blocks may move)
-and than any other block that has not. Blocks that were drawn apart from all that holds them first fall on it: their way
-counts from there.
+and twice what blocks of higher order deflect (what stretches a bolt counts h / 10 at most, and nothing for a bolt that
+never yields: what it may take is a matter of how far blocks may move), and than any other block that has not. Blocks
+that were drawn apart from all that holds them first fall on it: their way counts from there.
 """
 
 from __future__ import annotations
@@ -23,6 +23,7 @@ import numpy as np
 from ...model import CONTACT, GROUND, OPEN, JointLaw, Loads, State
 from ..results import NotConverged, StepResult
 from ..system import BlockSystem
+from .sharp_toes import SHARP
 
 log = logging.getLogger(__name__)
 
@@ -57,22 +58,22 @@ class DisplacementLimit:
         self._size = np.sqrt(system.blocks.areas())
         self._elastic: float | None = None
         self.reference = begin.vertices.copy()
-        self.seated = self._held()
+        self.seated = self._constrained()
         near = system.contacts_near(begin)
         touches = near.gap_before <= MOVED * np.minimum(self._size[near.block], self._size[near.other])
         self._seat(near.block[touches], near.other[touches])
 
-    def _held(self) -> np.ndarray:
+    def _constrained(self) -> np.ndarray:
         """(n_blocks,) what is held by anything but contacts."""
         system, blocks = self._system, self._system.blocks
-        held = system.fixed.copy()
-        if blocks.held is not None:
-            held |= blocks.held.any(axis=1)
+        constrained = system.fixed.copy()
+        if blocks.constrained is not None:
+            constrained |= blocks.constrained.any(axis=1)
         for bolt in self._loads.bolts:
-            held[bolt.block] |= bolt.other == GROUND
+            constrained[bolt.block] |= bolt.other == GROUND
         for motion in (*self._loads.block_motions, *self._loads.point_motions):
-            held[motion.block] = True
-        return held
+            constrained[motion.block] = True
+        return constrained
 
     def _seat(self, block: np.ndarray, other: np.ndarray) -> None:
         """Seat what touches seated blocks, one after the other."""
@@ -105,7 +106,7 @@ class DisplacementLimit:
         moved = self.moved(state.vertices)
         if not (moved > own)[~self._system.fixed].any():
             return own
-        own = own + self.elastic + self.stretching(state, moved)
+        own = own + self.elastic + self.stretching(state, moved) + self.bending(state)
         within = moved <= own
         return own + float(moved[within].max(initial=0.0))
 
@@ -126,7 +127,7 @@ class DisplacementLimit:
         """(n_blocks,) m: how much of the way that blocks have ``moved`` (n_blocks,) has stretched a bolt elastically."""
         longest = np.zeros(len(moved))
         for bolt, row in zip(self._loads.bolts, state.bolts, strict=False):
-            if not row["installed"] or row["broken"] or not 0.0 < bolt.stiffness or math.isinf(bolt.yield_force):
+            if not row["installed"] or row["broken"] or not bolt.stiffness > 0.0 or math.isinf(bolt.yield_force):
                 continue
             elastic, yielded = abs(row["force"] - bolt.pretension) / bolt.stiffness, abs(row["plastic"])
             if elastic > 0.0:
@@ -134,6 +135,12 @@ class DisplacementLimit:
                 most[[b for b in (bolt.block, bolt.other) if b != GROUND]] = _STRETCHED * elastic
                 longest = np.maximum(longest, np.minimum(most, moved * elastic / (elastic + yielded)))
         return np.minimum(longest, _FARTHEST * self._size)
+
+    def bending(self, state: State) -> float:
+        """m: what deflections of blocks of higher order explain: a beam goes down by as much as it bends, and what lies on
+        it by twice that."""
+        deflected = self._system.deflected
+        return 0.0 if deflected is None else 2.0 * float(deflected.deflection_of(state)[0].max())
 
     @property
     def elastic(self) -> float:
@@ -155,8 +162,11 @@ class DisplacementLimit:
         begin = replace(
             self._begin, time=0.0, contacts=np.empty(0, CONTACT), velocity=np.zeros_like(self._begin.velocity)
         )
+        unbreakable = system.with_joints(laws)
+        # Bonds would draw together what stands off.
+        unbreakable.finder.toes = SHARP
         try:
-            result = system.with_joints(laws).step(begin, self._loads, _LONG, load_time=self._time)
+            result = unbreakable.step(begin, self._loads, _LONG, load_time=self._time)
         except (NotConverged, ValueError) as failure:
             log.debug("what elasticity explains is not known: %s", failure)
             return 0.0

@@ -74,7 +74,7 @@ def mobilised_joints(
                 float(touching["length"][touching["state"] == SLIP].sum()) / length,
                 1.0 - float(touching["length"].sum()) / length,
                 chosen is None or law.name in chosen,
-            )  # fmt: skip
+            )
         )
     return sorted(out, key=lambda each: -each.share)
 

@@ -221,6 +221,8 @@ def unbalanced_force(system: BlockSystem, result: StepResult) -> float:
     mass = f.inertia.density * f.area
     # For a rotation the moment of inertia is of the order m h²/6: the bound is enough.
     out = mass * np.maximum(np.hypot(a[:, 0], a[:, 1]), np.sqrt(h2) / 6 * np.abs(a[:, 2]))
+    if system.deflected is not None:
+        out = np.maximum(out, mass * system.deflected.acceleration)
     acting = mass * float(np.hypot(*f.inertia.gravity))
     for rows in (f.points, f.edges):
         np.add.at(acting, rows["block"], np.hypot(rows["force"][:, 0], rows["force"][:, 1]))

@@ -39,6 +39,8 @@ class FactorOfSafety:
     were their tips sharp; where they hold (``toes_hold``), what it is without them; None where it is not known.
     ``factor_if_parted``: what it is if faces lose the cohesion of an end that opens, where that is another;
     ``factor_if_rigid``: what it is of rigid blocks, where faces of elastic ones hold nothing for being open by a hair.
+    ``admissible``: the largest factor with admissible contact forces (`admissible_forces`), where that is beyond the
+    factor by more than one per cent; None where it is not, or is not known.
     ``warnings`` in words."""
 
     factor: float
@@ -55,6 +57,7 @@ class FactorOfSafety:
     other_factor: float | None = None
     factor_if_parted: float | None = None
     factor_if_rigid: float | None = None
+    admissible: float | None = None
     warnings: tuple[str, ...] = ()
 
     @property
@@ -113,6 +116,7 @@ class FactorOfSafety:
             "factor_without_toes" if self.toes_hold else "factor_with_sharp_toes": self.other_factor,
             "factor_if_parted_faces_lose_cohesion": self.factor_if_parted,
             "factor_of_rigid_blocks": self.factor_if_rigid,
+            "largest_factor_with_admissible_forces": self.admissible,
             "warnings": list(self.warnings),
             "trials": [{name: getattr(t, name) for name in plain} for t in self.trials],
         }

@@ -9,6 +9,10 @@ line with the normal n by
     δ = ρ (b·n / cos α − tan α)
 
 when its tip is on it, and the block moves on by as much before it is held.
+
+A rim of a few centimetres at the end of a plane holds as a sharp corner does, and no rounding frees it. What the factor
+is without it is found by leaving out, with the corners, all faces shorter than a tenth of their block's size that stand
+at the end of a longer face of the same two blocks.
 """
 
 from __future__ import annotations
@@ -25,6 +29,9 @@ _FAR = 0.02
 _NEAR, _NEAR_IN_SIZES = 1.0, 1e-3
 #: … whose sides are no farther apart than this part of that.
 _TOUCHING = 0.1
+#: Faces up to this part of their block's size hold as a toe does, at the end of a face that is longer than that, to
+#: which they lean by more than this (sine of 20°).
+_SHORT, _LEANS = 0.1, 0.34
 #: What toes do in a search for equilibrium: hold with their sharp tips, are rounded, or hold nothing at all.
 SHARP, ROUNDED, FREE = "sharp", "rounded", "free"
 
@@ -49,11 +56,12 @@ class Toe:
 
 @dataclass(frozen=True, eq=False)
 class ToeCorners:
-    """Of each vertex (n_vertices,): the next one and the one before on its outline, its rounding length m, the size
-    √area (m) of its block, and where it was ``drawn`` (n_vertices, 2)."""
+    """Of each vertex (n_vertices,): the next one and the one before on its outline, its block (``owner``), its rounding
+    length m, the size √area (m) of its block, and where it was ``drawn`` (n_vertices, 2)."""
 
     after: np.ndarray
     before: np.ndarray
+    owner: np.ndarray
     rounding: np.ndarray
     size: np.ndarray
     drawn: np.ndarray
@@ -67,7 +75,8 @@ def stand_off(
     `FREE`; below zero for other contacts.
 
     ``vertex``, ``edge``, the corner that is ``met`` and ``geometry`` (n, 7) as in `ContactSet`, springs at the corners; ``vertices`` (n_vertices, 2)
-    m. Of those that are `FREE` are also corners that have come to touch what they were drawn apart from.
+    m. Of those that are `FREE` are also corners that have come to touch what they were drawn apart from, and the ends of
+    short faces beside longer ones.
     """
     out = np.full(len(vertex), -1.0)
     # Two corners that meet are rounded already.
@@ -76,6 +85,9 @@ def stand_off(
     faces = np.flatnonzero(
         (geometry[:, 4] > 0.0) & (geometry[:, 3] <= _TOUCHING * np.minimum(near[vertex], near[edge]))
     )
+    if toes == FREE:
+        short = _short_faces(vertex, edge, geometry, faces, corners)
+        out[short] = _FAR * corners.size[vertex[short]]
     if not lone.any():
         return out
     # Vertices that end a face which touches: those that stand on it, and those near which another's stand.
@@ -112,6 +124,33 @@ def stand_off(
         off = corners.rounding[v] * (np.einsum("na,na->n", middle, n) / np.maximum(cosine, 1e-300) - tangent)
     out[rows[sharp]] = np.maximum(off[sharp], 0.0)
     return out
+
+
+def _short_faces(
+    vertex: np.ndarray, edge: np.ndarray, geometry: np.ndarray, faces: np.ndarray, corners: ToeCorners
+) -> np.ndarray:
+    """Rows of the contacts on a short face beside a longer one of the same two blocks, corners at its ends included;
+    ``faces``: rows of the contacts on faces."""
+    size = np.minimum(corners.size[vertex], corners.size[edge])
+    # Each end of a face stands for half of it.
+    length = 2.0 * geometry[:, 4]
+    is_short = length <= _SHORT * size
+    some, long = faces[is_short[faces]], faces[~is_short[faces]]
+    one, two = corners.owner[vertex], corners.owner[edge]
+    low, high = np.minimum(one, two), np.maximum(one, two)
+    point, across = geometry[:, 5:7], geometry[:, 1:3] * np.where(one < two, 1.0, -1.0)[:, None]
+    out = np.zeros(len(vertex), bool)
+    for row in some:
+        same = (low == low[row]) & (high == high[row])
+        near = same & (np.hypot(*(point - point[row]).T) <= 1.5 * length[row])
+        beside = long[near[long]]
+        if (np.abs(_cross(across[row], across[beside])) > _LEANS).any():
+            out |= near & is_short & (np.abs(_cross(across[row], across)) < _LEANS)
+    return np.flatnonzero(out)
+
+
+def _cross(one: np.ndarray, two: np.ndarray) -> np.ndarray:
+    return one[0] * two[:, 1] - one[1] * two[:, 0]
 
 
 def _drawn_apart(vertex: np.ndarray, edge: np.ndarray, corners: ToeCorners) -> np.ndarray:

@@ -8,7 +8,8 @@ stays (`stability_trial`), and for sliding it grows as A − B/F. Two unstable t
 them, and few more close in.
 
 Sharp toes in re-entrant corners are rounded (`sharp_toes`), and faces keep all their cohesion while they touch anywhere
-(`whole_faces`), as limit equilibrium has it: what the factor would be otherwise is told beside.
+(`whole_faces`), as limit equilibrium has it: what the factor would be otherwise is told beside. So is the largest
+factor with any admissible contact forces, where the factor is clearly below it (`admissible_forces`).
 """
 
 from __future__ import annotations
@@ -22,13 +23,16 @@ from ...model import Blocks, DdaSettings, JointLaw, Loads, Material, State
 from ..joint_laws.reduced_strength import reduced
 from ..results import NotConverged
 from ..system import BlockSystem
+from .admissible_forces import AdmissibleForces
 from .counted_resistance import (
     bearing_toes,
     hairline_faces,
     parted_faces,
     toes_in_the_way,
+    with_admissible_forces,
     with_anchors,
     with_hairlines,
+    with_no_mechanism,
     with_parted_faces,
     with_toes,
 )
@@ -47,6 +51,8 @@ _RELAXING = 100
 _FROM_AFAR = 3.0
 #: The search for a trial that stands, and for one that does not, ends at this factor.
 _FARTHEST = 64.0
+#: What contact forces could balance beyond the factor by more than this part of it is reported.
+_BEYOND = 1e-2
 #: From a factor that is known to be near, the search for one that stands goes down by this part of itself.
 _NEARBY = 0.85
 
@@ -93,6 +99,14 @@ def factor_of_safety(
 
     Raises `NothingToReduce` when there is no strength to reduce, nothing that moves, or a ground that does,
     `NotConverged` when the blocks do not stand even with joints 64 times as strong.
+
+    >>> ground, square = np.array([[-1, -1], [2, -1], [2, 0], [-1, 0]]), np.array([[0, 0], [1, 0], [1, 1], [0, 1]])
+    >>> blocks = Blocks.from_polygons([ground, square], fixed=[True, False])
+    >>> rock, joint = Material("rock", 10e9, 0.25, density=2600.0), JointLaw("joint", np.radians(30))
+    >>> loads = Loads(gravity=History.constant([2.0, -9.81]))
+    >>> found = dda.factor_of_safety(blocks, [rock], [joint], loads)
+    >>> f"{found.factor:.4f}"  # g tan 30° / 2 m/s²
+    '2.8319'
     """
     names = [law.name for law in joints]
     unknown = [name for name in reduce or () if name not in names]
@@ -105,6 +119,11 @@ def factor_of_safety(
         raise NothingToReduce("the joints have no friction, cohesion or tensile strength that could be reduced")
     if not 0 < tolerance < 1:
         raise NothingToReduce(f"the tolerance of the factor must lie between 0 and 1, got {tolerance!r}")
+    if blocks.order is not None and (blocks.order > 1).any():
+        raise NothingToReduce(
+            "blocks of higher order ([zones.NAME] order) are not supported in the search for a factor of safety yet: "
+            "leave `order` out"
+        )
     if blocks.fixed.all():
         raise NothingToReduce("all blocks are fixed: none could fail")
     if loads.base is not None and loads.base.frame == "ground":
@@ -164,7 +183,16 @@ class _Search:
         found = with_anchors(self.blocks, self.under.loads, found)
         if counted.toes != FREE:
             found = self._with_toes(found, counted)
-        return self._with_parted_faces(found, counted) if counted.whole_faces else found
+        if counted.whole_faces:
+            found = self._with_parted_faces(found, counted)
+        return self._with_admissible_forces(found, counted)
+
+    def _with_admissible_forces(self, found: FactorOfSafety, counted: Counted) -> FactorOfSafety:
+        if not math.isfinite(found.upper):
+            return with_no_mechanism(found)
+        system = self.system(found.lower, counted)
+        forces = AdmissibleForces.of(system, found.state, self.rest, self.joints, self.chosen)
+        return found if forces is None else with_admissible_forces(found, forces.largest_factor(found.upper, _BEYOND))
 
     def _with_toes(self, found: FactorOfSafety, counted: Counted) -> FactorOfSafety:
         bearing = self._bearing(found, counted)

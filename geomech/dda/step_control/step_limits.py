@@ -158,7 +158,7 @@ class StepLimits:
         """What has gone where contacts saw nothing come; None for nothing."""
         if len(self._size) < 2:
             return None
-        before, after = attempt.vertices, result.state.vertices
+        before, after = attempt.path(result.state.vertices)
         one, two = boxes(before, self._start[:-1]), boxes(after, self._start[:-1])
         box = np.concatenate([np.minimum(one[:, :2], two[:, :2]), np.maximum(one[:, 2:], two[:, 2:])], axis=1)
         pairs = self._finder.near_boxes(box)
@@ -203,6 +203,12 @@ class StepLimits:
             return np.repeat(of_block, np.diff(self._start))
         for vertices in (rows["vertex"], rows["edge"], self._next[rows["edge"]]):
             np.maximum.at(out, vertices, deep)
+        if self._finder.at_corners:
+            # Sides that bend lie off the straight lines between their corners.
+            sag, both = self._finder.sag, np.zeros(len(self._size))
+            for one, two in ((rows["block"], rows["other"]), (rows["other"], rows["block"])):
+                np.maximum.at(both, one, sag[one] + sag[two])
+            out += np.repeat(both, np.diff(self._start))
         return out
 
     def pressed_apart(self, attempt: AttemptedStep, result: StepResult) -> Crossed | None:
@@ -219,7 +225,7 @@ class StepLimits:
         )
         return Crossed(reason, np.zeros((0, 2), np.int64), np.zeros(0), False, (a, b))
 
-    def tell_pressed_through(self, result: StepResult) -> None:
+    def warn_of_penetration(self, result: StepResult) -> None:
         """Log a warning, once for two blocks, where a corner is pressed in beyond the middle of what it presses on: there
         springs no longer know from which side it came."""
         rows = result.contacts
@@ -229,7 +235,7 @@ class StepLimits:
             return
         vertices = np.ascontiguousarray(result.state.vertices)
         vertex, edge = (np.ascontiguousarray(rows[name]) for name in ("vertex", "edge"))
-        for k in np.flatnonzero(self._finder.beyond_middle(vertices, vertex, edge)).tolist():
+        for k in np.flatnonzero(self._finder.past_midpoint(vertices, vertex, edge)).tolist():
             pair = int(rows["block"][k]), int(rows["other"][k])
             if pair in self._told:
                 continue

@@ -1,4 +1,4 @@
-"""The contact of a body's crack faces under one load, by the solver that their laws need."""
+"""Contact of the crack faces of a body under one load: chooses the solver that the face laws need."""
 
 from __future__ import annotations
 
@@ -17,19 +17,20 @@ from .frictionless_contact import NotConverged, Settled, settle
 if TYPE_CHECKING:
     from ..interfaces import CrackedBody, SolvedBody
 
-#: Faces that no state of contact satisfies may be this part of their crack: what happens at the end of a blade of rock
-#: is not felt by a tip that is far away.
+#: Largest fraction of a crack whose nodes may violate the contact conditions: the tip of a blade of rock has no
+#: influence on distant crack tips.
 UNDECIDED = 0.03
-#: Rock between a tip and a side, over the body's extent, that is worth a word when faces do not settle.
+#: Thickness of rock between tip and side, over the extent of the body, that a message mentions when faces do not
+#: converge.
 BY_A_THREAD = 1e-2
 _log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True, eq=False)
 class FaceAnswer:
-    """``jumps`` slip and opening (times 2μ) and ``traction`` on the faces, (n_unknowns,); ``closed`` (n_unknowns,)
-    bool, the openings that are used up; ``solves`` it took; of faces that have one, ``memory``
-    after this load, and ``began`` before."""
+    """Result: slip and opening ``jumps`` (times 2μ) and ``traction`` on the faces (n_unknowns,); ``closed``
+    (n_unknowns,) bool: openings at −aperture; number of ``solves``; face ``memory`` after this load and before it
+    (``began``)."""
 
     jumps: np.ndarray
     traction: np.ndarray
@@ -47,8 +48,9 @@ def settle_faces(
     warm: SolvedBody | None,
     history: SolvedBody | FaceMemory | None = None,
 ) -> FaceAnswer:
-    """The faces of ``body``; ``load_traction`` (n_unknowns,) is what loads do to closed faces, ``opened`` S⁻¹ of it,
-    ``pressure`` (n_elements, p+1) that of a fluid at the nodes. ``warm`` and ``history`` as in `Body.solve`."""
+    """Contact state of the faces of ``body``. ``load_traction`` (n_unknowns,): of the loads on closed faces;
+    ``opened``: S⁻¹ of it; ``pressure`` (n_elements, p+1): of fluid at the nodes. ``warm`` and ``history`` as in
+    `Body.solve`."""
     c = body.faces
     n = c.n_unknowns
     if n == 0:
@@ -90,8 +92,8 @@ def settle_faces(
 
 
 def _whereabouts(body: CrackedBody, node: int | None) -> str:
-    """The crack on which the ``node`` is, and what rock there is between its tips and the outline where that is next to
-    none: a piece that hangs by it rattles."""
+    """Text for messages: the crack of ``node``, and the thickness of rock between its tips and the outline where that
+    is next to zero."""
     c, cracks, edges = body.faces, body.cracks, body.mesh.edges
     said = ""
     if node is not None:
@@ -114,8 +116,8 @@ def _whereabouts(body: CrackedBody, node: int | None) -> str:
 
 
 def _judge(body: CrackedBody, settled: Settled) -> None:
-    """Log where the nodes are of which no state of contact was found. Raises NotConverged, which names the crack, when
-    they are more than a crack's last bit at a mouth or junction: then they matter."""
+    """Log the nodes without a consistent contact state. Raises NotConverged, naming the crack, when they are more than
+    the last bit of a crack at a mouth or junction."""
     c, cracks = body.faces, body.cracks
     at = np.flatnonzero(settled.undecided.reshape(c.n, -1).any(axis=1))
     crack = cracks.crack[c.source]
@@ -160,7 +162,7 @@ def _rough(
 
 
 def _memory(of: SolvedBody | FaceMemory, body: CrackedBody) -> FaceMemory:
-    """What the faces of ``of`` remember, on the elements of ``body``."""
+    """Face memory of ``of``, on the elements of ``body``."""
     if isinstance(of, FaceMemory):
         return carried_over(of, body.faces)
     memory = of.memory

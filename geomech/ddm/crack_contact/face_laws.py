@@ -1,12 +1,11 @@
-"""What crack faces do to each other: laws node by node, the states they can be in, and what they remember.
+"""Laws of crack faces, node by node: their parameters, contact states and memory.
 
-A law is a `JointLaw`. Faces press when the opening has used up the aperture (gap w_n + a = 0), rigidly, or through a
-filling of stiffness k_n: λ = −k_n (w_n + a)/2μ. Closed faces carry shear up to c + λ tan φ, and until then stick,
-rigidly or through k_s. Faces with tensile strength are cemented: they hold together, without aperture, until the normal
-traction passes the strength at a node; there cement and cohesion are lost for good. Cohesion otherwise is not used up
-by slip. Stiffness does not act across open faces.
-What grows is torn from whole rock: fresh faces have the friction of their crack's law, but no cohesion, cement or
-filling.
+A law is a `JointLaw`. Faces are closed when the opening has used up the aperture (gap w_n + a = 0), rigidly or through
+a filling of stiffness k_n: λ = −k_n (w_n + a)/2μ. Closed faces carry shear up to c + λ tan φ and stick below that,
+rigidly or through k_s. Faces with tensile strength are cemented: they have no aperture and stay together until the
+normal traction exceeds the strength at a node, where cement and cohesion are then lost for good. Cohesion is not
+reduced by slip, and open faces have no stiffness. Faces of new growth have the friction of their crack's law, but no
+cohesion, cement or filling.
 """
 
 from __future__ import annotations
@@ -24,16 +23,16 @@ from ..kernels import shape_functions
 if TYPE_CHECKING:
     from ..system.influence_matrix import ElementSet
 
-#: What faces do that nothing is said of.
+#: Default law of crack faces.
 SMOOTH = (JointLaw("frictionless"),)
-#: A node belongs to a former element when it is nearer to it than this part of that element's length.
+#: A node belongs to a former element if it is closer to it than this fraction of the element's length.
 _ON = 1e-7
 
 
 @dataclass(frozen=True, eq=False)
 class FaceStates:
-    """Of every node (n,): ``closed``; ``way`` 0 where closed faces stick, ±1 where they slip along or against the
-    tangent; ``pulled``, whether cement is in tension. Smooth faces that are closed neither stick nor have a way."""
+    """Contact states of nodes (n,): ``closed``; ``way`` 0 where closed faces stick, ±1 where they slip along or against
+    the tangent; ``pulled``: cement in tension. Closed frictionless faces have ``way`` 0."""
 
     closed: np.ndarray
     way: np.ndarray
@@ -49,10 +48,10 @@ class FaceStates:
 
 
 class Released(NamedTuple):
-    """J/m since the beginning. Of cement that broke, ``bond``: the mean of its strength and of what its faces bear
-    afterwards, on the way they part. Faces give way only once what they bear has come to their strength, while the
-    mean of a step's loads begins with the first of them: by so much more the loads did that were there when faces
-    slipped, ``slip_onset``, and parted, ``break_onset``."""
+    """Energy since the beginning, J/m. ``bond``: released by breaking cement, the mean of its strength and of the
+    traction after it, times the opening. Faces yield only once their traction has reached the strength, while the mean
+    load of a step starts with its beginning: the loads do more work by ``slip_onset`` where faces began to slip, and by
+    ``break_onset`` where they parted."""
 
     bond: float = 0.0
     slip_onset: float = 0.0
@@ -61,9 +60,9 @@ class Released(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class FaceMemory:
-    """What the faces of crack ``elements`` keep from load to load: ``rest`` (n,) the slip (times 2μ) at which they are
-    without shear, ``broken`` (n,) lost cement, ``work`` J/m done against friction since the beginning, ``states`` as
-    they were, ``pressure`` and ``shear`` (n,) Pa between them, ``released`` what giving way has come to."""
+    """State of the crack ``elements`` kept from load to load: ``rest`` (n,) slip (times 2μ) of zero shear; ``broken``
+    (n,) lost cement; ``work`` J/m of friction since the beginning; ``states``; ``pressure`` and ``shear`` (n,) Pa;
+    ``released``."""
 
     elements: ElementSet
     rest: np.ndarray
@@ -81,19 +80,19 @@ class FaceMemory:
 
 
 def all_smooth(laws: Sequence[JointLaw]) -> bool:
-    """Whether faces under these laws do no more than open and close. Raises ValueError for laws that faces cannot
-    follow."""
+    """Whether faces under these laws only open and close. Raises ValueError for laws that crack faces do not
+    support."""
     for one in laws:
         if not one.straight:
             raise ValueError(
-                f"joint {one.name!r}: crack faces know neither residual friction, softening, dilation, roughness nor "
-                "hyperbolic closure; give the crack a joint without them"
+                f"joint {one.name!r}: crack faces support neither residual friction, softening, dilation, roughness "
+                "nor hyperbolic closure; give the crack a joint without them"
             )
     return not any(one.friction or one.cohesion or one.tensile_strength or one.normal_stiffness for one in laws)
 
 
 def check_laws(laws: Sequence[JointLaw], cracks: Cracks) -> None:
-    """Raise ValueError naming the crack that has a law which is not there, or an aperture and yet is cemented."""
+    """Raise ValueError, naming the crack, for a law number that does not exist, or an aperture with cement."""
     law = cracks.law
     if not len(law) or (len(laws) == 1 and not law.any() and not laws[0].tensile_strength):
         return
@@ -112,11 +111,11 @@ def _called(cracks: Cracks, segment: int) -> str:
 
 
 class FaceLaws:
-    """The laws at the nodes of crack ``elements``, arrays (n_nodes,) in the order element, node.
+    """Laws at the nodes of crack ``elements``, arrays (n_nodes,) in the order element, node.
 
-    closes     whether faces can meet; ``aperture`` (times 2μ) how far they are apart
+    closes     whether faces can touch; ``aperture`` (times 2μ): their initial distance
     rough      whether they resist slip; ``friction`` tan φ, ``cohesion`` Pa
-    strength   Pa, of the cement
+    strength   tensile strength of the cement, Pa
     normal, shear   stiffness of the filling over 2μ, Pa/m; inf: rigid
     """
 
@@ -148,16 +147,16 @@ class FaceLaws:
         return (self.strength > 0) & ~broken
 
     def limit(self, pressure: np.ndarray, broken: np.ndarray) -> np.ndarray:
-        """Shear that the nodes stand under ``pressure``, Pa."""
-        return self.friction * np.maximum(pressure, 0.0) + self.held_by_cohesion(broken)
+        """Shear strength of the nodes under ``pressure``, Pa."""
+        return self.friction * np.maximum(pressure, 0.0) + self.cohesive_strength(broken)
 
-    def held_by_cohesion(self, broken: np.ndarray) -> np.ndarray:
+    def cohesive_strength(self, broken: np.ndarray) -> np.ndarray:
         return np.where(broken, 0.0, self.cohesion)
 
 
 def carried_over(memory: FaceMemory, now: ElementSet) -> FaceMemory:
-    """``memory`` on the elements ``now``: the same where an element is the same, slip interpolated and marks taken from
-    the nearest node where elements were divided or joined, nothing on fresh faces."""
+    """``memory`` on the elements ``now``: unchanged where an element is unchanged; slip interpolated, and states taken
+    from the nearest node, where elements were divided or joined; none on new faces."""
     was = memory.elements
     if now is was:
         return memory
@@ -167,7 +166,7 @@ def carried_over(memory: FaceMemory, now: ElementSet) -> FaceMemory:
     rest = np.zeros((now.n, now.per))
     old = memory.rest.reshape(was.n, was.per)
     kept = same >= 0
-    if kept.any():  # none is where the order has changed, and with it the number of nodes
+    if kept.any():  # none if the order has changed, and with it the number of nodes
         rest[kept], source[kept], marks[kept] = old[same[kept]], same[kept, None], np.arange(now.per)
     for e in np.flatnonzero(~kept):
         rel = now.nodes[e][:, None] - was.start

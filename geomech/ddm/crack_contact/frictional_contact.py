@@ -1,22 +1,21 @@
-"""Crack faces with friction, cement or a filling: which nodes are open, stick or slip, and the jumps that go with it.
+"""Frictional contact of crack faces: which nodes are open, stick or slip, and the jumps that go with it.
 
-With λ = right − S w the pressure and shear that the faces exert (`schur_complement`; the traction on them is −λ), every
-node obeys one linear equation in each direction, chosen by its state:
+With λ = right − S w the pressure and shear between the faces (`schur_complement`; the traction on them is −λ), every
+node satisfies one linear equation in each direction, according to its state:
 
     open         λ_n = 0,  λ_t = 0
     closed       w_n = −a                     or, filled,  λ_n = −κ_n (w_n + a)
     stick        w_t = rest                   or, filled,  λ_t = −κ_s (w_t − rest)
     slip (±)     λ_t = ∓(c + λ_n tan φ)
 
-and inequalities: gap ≥ 0, λ_n ≥ 0 (cemented: ≥ −strength), |λ_t| ≤ c + λ_n tan φ, slip against the shear that resists
-it. All nodes that break one change state at once, which is Newton's method for the semismooth equations (Alart &
-Curnier 1991) and needs a handful of solves however many cracks interact. Should it run in a circle, the shear limits
-are frozen (Tresca's friction, which nodes solve one at a time if need be) and brought up to date in turn
-(Panagiotopoulos 1975), and Newton's method begins again from there. What is returned obeys all inequalities to the
-tolerance, or `Missed` says which nodes do not (in blades of rock that elements do not resolve, no state may fit), or
-NotConverged that there are too many.
+and the inequalities gap ≥ 0, λ_n ≥ 0 (cemented: ≥ −strength), |λ_t| ≤ c + λ_n tan φ, with slip opposed to its shear.
+All nodes that violate one change state at once: Newton's method for the semismooth equations (Alart & Curnier 1991),
+which needs a handful of solutions however many cracks interact. If it cycles, the shear limits are frozen (Tresca
+friction, solved one node at a time if need be) and updated in turn (Panagiotopoulos 1975), and Newton's method starts
+again from there. The result satisfies all inequalities to the tolerance; `Missed` names the nodes that do not (in
+blades of rock thinner than the elements no state may fit), and NotConverged is raised if there are too many.
 
-`rest` is where the last load left the faces: the answer is one step, implicit in time, of a process with memory.
+`rest` is the slip left by the last load: the result is one step, implicit in time, of a history-dependent process.
 """
 
 from __future__ import annotations
@@ -35,32 +34,32 @@ from ..system.schur_complement import CrackSystem
 from .face_laws import FaceLaws, FaceMemory, FaceStates, Released
 from .frictionless_contact import NotConverged
 
-#: Pa: less than this is no load; strengths in units of it are still numbers.
+#: Smallest load, Pa; strengths divided by it are still finite.
 NO_STRESS = 1e-100
-#: Violations allowed, in units of the largest stress (and the opening that it makes).
+#: Allowed violation, relative to the largest stress (and the opening it causes).
 TOLERANCE = 1e-10
-#: Newton passes without a new least number of violations before limits are frozen, and passes in all.
+#: Newton steps without a new minimum of violated nodes before the limits are frozen, and most steps in total.
 _PATIENCE, _PASSES = 12, 2000
-#: Limits are frozen at most so often; they are up to date within this part of the largest stress.
+#: Most updates of frozen limits, and their tolerance relative to the largest stress.
 _FREEZES, _FROZEN_TOLERANCE = 60, 1e-6
-#: Nodes change one at a time at most so often, for each of them.
+#: Most single changes, per node.
 _ONE_BY_ONE = 3
-#: Factors for so many states are kept.
+#: Number of states whose factors are kept.
 _KEPT = 8
-#: Less than this part of the held jumps is another: then it is that part that is multiplied.
+#: Fraction of changed prescribed jumps below which only the changes are multiplied.
 FEW_CHANGED = 0.1
 
 
 class Missed(NamedTuple):
-    """``undecided`` (n_nodes,) bool, nodes that no state satisfies, and by how much laws are missed, ``violation`` of the
-    largest stress."""
+    """``undecided`` (n_nodes,) bool: nodes without a consistent state; ``violation``: largest violation, relative to
+    the largest stress."""
 
     undecided: np.ndarray
     violation: float
 
 
 class FaceEquations:
-    """The linear equations of nodes in given states: ``system`` with rows and columns changed as ``laws`` ask."""
+    """The linear equations of nodes in given states: ``system`` with rows and columns changed according to ``laws``."""
 
     def __init__(self, system: CrackSystem | IterativeCrackSystem, laws: FaceLaws, work: Work):
         self.system, self.laws, self._work = system, laws, work
@@ -73,13 +72,13 @@ class FaceEquations:
     ) -> tuple[np.ndarray, np.ndarray]:
         """Jumps and λ (n,) under ``right`` (n,); ``limit`` (n_nodes,) replaces the shear limit of slipping nodes."""
         laws, s = self.laws, self.system.matrix
-        held, slides, spring = self._rows(states, limit is not None)
+        prescribed, slides, spring = self._rows(states, limit is not None)
         a, t = laws.across, laws.along
         w, extra = np.zeros_like(right), np.zeros_like(right)
         w[a[states.closed]] = -laws.aperture[states.closed]
-        w[t] = np.where(held[t], memory.rest, 0.0)
-        w[~held] = 0.0
-        bound = laws.held_by_cohesion(memory.broken) if limit is None else limit
+        w[t] = np.where(prescribed[t], memory.rest, 0.0)
+        w[~prescribed] = 0.0
+        bound = laws.cohesive_strength(memory.broken) if limit is None else limit
         bound = np.where(states.way != 0, bound, 0.0)  # it may be infinite where nothing slips
         free, factor = self._factor(states, limit is not None)
         if isinstance(factor, HeldFactor):
@@ -101,7 +100,7 @@ class FaceEquations:
         reaction[a[closed]] = missing[a[closed]]
         filled = spring[a] > 0
         reaction[a[filled]] = -(spring[a] * (w[a] + laws.aperture))[filled]
-        stuck = held[t]
+        stuck = prescribed[t]
         reaction[t[stuck]] = missing[t[stuck]]
         springy = spring[t] > 0
         reaction[t[springy]] = -(spring[t] * (w[t] - memory.rest))[springy]
@@ -110,7 +109,7 @@ class FaceEquations:
         return w, reaction
 
     def _pull_of(self, w: np.ndarray) -> np.ndarray:
-        """S ``w`` of held jumps; from state to state few of them change."""
+        """S ``w`` of prescribed jumps; updated, since few of them change from state to state."""
         if self._pull is not None:
             changed = np.flatnonzero(w != self._pull[0])
             if len(changed) < FEW_CHANGED * len(w):
@@ -125,14 +124,14 @@ class FaceEquations:
         return pull
 
     def _opened(self, right: np.ndarray, factor: HeldFactor) -> np.ndarray:
-        """S⁻¹ ``right``, for one load after the other."""
+        """S⁻¹ ``right``, computed once per load."""
         if self._last is None or self._last[0] is not right:
             self._work.back_substitutions += 1
             self._last = right, factor.open.solve(right)
         return self._last[1]
 
     def tangent(self, right: np.ndarray, states: FaceStates) -> np.ndarray:
-        """(n, k) change of the jumps per change of ``right`` (n, k) while no node changes state."""
+        """(n, k) change of the jumps per change of ``right`` (n, k) at constant states."""
         w = np.zeros_like(right)
         free, factor = self._factor(states, False)
         w[free] = factor.solve(np.asfortranarray(self._mixed(right, states)[free]))
@@ -140,7 +139,7 @@ class FaceEquations:
         return w
 
     def adjoint(self, weights: np.ndarray, states: FaceStates) -> np.ndarray:
-        """(n, k) what multiplies ``right`` in ``weights``ᵀ w, (n, k), while no node changes state."""
+        """(n, k) y with ``weights``ᵀ w = yᵀ ``right`` at constant states (adjoint solution)."""
         laws = self.laws
         free, factor = self._factor(states, False)
         out = np.zeros_like(weights)
@@ -158,44 +157,44 @@ class FaceEquations:
         return out
 
     def _rows(self, states: FaceStates, frozen: bool) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Unknowns that are held (n,) bool, ± tan φ of sliding nodes (n_nodes,), stiffness of springs (n,)."""
+        """Prescribed unknowns (n,) bool, ± tan φ of sliding nodes (n_nodes,), stiffness of springs (n,)."""
         laws = self.laws
-        held, spring = np.zeros(self.system.n, bool), np.zeros(self.system.n)
+        prescribed, spring = np.zeros(self.system.n, bool), np.zeros(self.system.n)
         filled = np.isfinite(laws.normal)
-        held[laws.across] = states.closed & ~filled
+        prescribed[laws.across] = states.closed & ~filled
         spring[laws.across] = np.where(states.closed & filled, laws.normal, 0.0)
         sticks, soft = states.closed & laws.rough & (states.way == 0), np.isfinite(laws.shear)
-        held[laws.along] = sticks & ~soft
+        prescribed[laws.along] = sticks & ~soft
         spring[laws.along] = np.where(sticks & soft, laws.shear, 0.0)
         slides = states.way * np.where(states.pulled | frozen, 0.0, laws.friction)
-        return held, slides, spring
+        return prescribed, slides, spring
 
     def _factor(self, states: FaceStates, frozen: bool) -> tuple[np.ndarray, Factor | Iterated]:
         key = states.key + bytes([frozen])
         if key not in self._factors:
             if len(self._factors) >= _KEPT:
                 self._factors.pop(next(iter(self._factors)))
-            held, slides, spring = self._rows(states, frozen)
+            prescribed, slides, spring = self._rows(states, frozen)
             mixed = np.zeros(self.system.n)
             mixed[self.laws.along] = slides
-            self._factors[key] = self.system.changed(Rows(held, mixed, spring, self.laws.elements.per))
+            self._factors[key] = self.system.changed(Rows(prescribed, mixed, spring, self.laws.elements.per))
         return self._factors[key]
 
 
 class _Contact:
-    """One load: the search for the states."""
+    """The search for the contact states under one load."""
 
     def __init__(self, equations: FaceEquations, right: np.ndarray, memory: FaceMemory):
         self.equations, self.laws, self.right, self.memory = equations, equations.laws, right, memory
         self.broken = memory.broken.copy()
         self.length = float(self.laws.elements.length.max())
-        # Without load there is nothing to measure by but what slip has left behind.
+        # Without load the slip left behind is the only scale.
         left = 1e-8 * float(np.abs(memory.rest).max(initial=0.0)) / self.length
         self.stress = max(float(np.abs(right).max()), left, NO_STRESS)
         self.solves = 0
-        #: (n_nodes,) those that no state satisfies.
+        #: (n_nodes,) nodes without a consistent state.
         self.undecided = np.zeros(len(memory.broken), bool)
-        #: By how much their laws are missed, of the largest stress.
+        #: Largest violation of their laws, relative to the largest stress.
         self.violation = 0.0
 
     @property
@@ -203,7 +202,7 @@ class _Contact:
         return replace(self.memory, broken=self.broken)
 
     def first_guess(self) -> FaceStates:
-        """What the faces would do were there no others: exact for a straight crack under uniform stress."""
+        """States of isolated faces: exact for a straight crack under uniform stress."""
         laws = self.laws
         pressure, shear = self.right[laws.across], -self.right[laws.along]
         cemented = laws.cemented(self.broken)
@@ -212,7 +211,7 @@ class _Contact:
         return FaceStates(closed, way.astype(np.int8), cemented & (pressure < 0))
 
     def admissible(self, states: FaceStates) -> FaceStates:
-        """``states`` without what the laws do not know."""
+        """``states`` restricted to those that the laws allow."""
         closed = states.closed & self.laws.closes | self.laws.cemented(self.broken)
         way = np.where(closed & self.laws.rough, states.way, 0).astype(np.int8)
         return FaceStates(closed, way, states.pulled & self.laws.cemented(self.broken))
@@ -226,7 +225,7 @@ class _Contact:
     report, node = "", None
 
     def _next(self, states: FaceStates, w: np.ndarray, reaction: np.ndarray, limit: np.ndarray | None) -> tuple:
-        """The states that ``w`` and ``reaction`` ask for, the nodes that change, and the worst violation."""
+        """The states that ``w`` and ``reaction`` require, the nodes that change, and the largest violation."""
         laws, tol = self.laws, TOLERANCE
         gap = (w[laws.across] + laws.aperture) / (self.stress * self.length)
         pressure, shear = reaction[laws.across] / self.stress, -reaction[laws.along] / self.stress
@@ -245,11 +244,11 @@ class _Contact:
         way[starts] = np.sign(shear[starts])
         back = (states.way != 0) & (states.way * slip < -tol)
         way[back] = 0
-        # Faces that meet were free to slip and are taken to go on.
+        # Faces that close were free to slip, and are assumed to continue.
         way[meets & laws.rough] = np.sign(slip[meets & laws.rough])
         way[~closed] = 0
         if limit is None:
-            # A limit cannot be negative: cement lets go of friction in tension, other faces part.
+            # A limit cannot be negative: cement in tension has no friction, other faces open.
             changed = (closed != states.closed) | (way != states.way) | (pulled != states.pulled)
         else:
             pulled = states.pulled
@@ -263,14 +262,14 @@ class _Contact:
         return FaceStates(closed, way, pulled), changed, worst
 
     def _offset(self, states: FaceStates, reaction: np.ndarray) -> np.ndarray:
-        """Slip that shear springs carry where they slip."""
+        """Slip carried by shear springs at slipping nodes."""
         soft = np.isfinite(self.laws.shear) & (states.way != 0)
         stiffness = np.where(soft, self.laws.shear, 1.0)
         return np.where(soft, -reaction[self.laws.along] / stiffness, 0.0)
 
     def newton(self, states: FaceStates, limit: np.ndarray | None = None, single: bool = False):
-        """(states, w, λ) when all inequalities hold; None when it turns in a circle. ``single``: from then on one node
-        at a time, which ends for frozen limits (Murty 1974)."""
+        """(states, w, λ) that satisfy all inequalities; None when the iteration cycles. ``single``: from then on one
+        node at a time, which converges for frozen limits (Murty 1974)."""
         best, patience, one = len(states.closed) + 1, _PATIENCE, False
         been: list[FaceStates] = []
         while True:
@@ -307,9 +306,9 @@ class _Contact:
             states = new
 
     def _turns(self, been: list[FaceStates]) -> bool:
-        """Whether nodes that change one at a time have come back to states where they have ``been``, or have taken so many
-        steps that they hardly ever end: those that went to and fro are undecided from then on. (Where a blade of rock is
-        thinner than its elements are long no state of its nodes may fit.)"""
+        """Whether single changes have returned to earlier states (``been``) or take too many steps; the nodes that
+        alternate are undecided from then on. (Where a blade of rock is thinner than its elements no consistent state
+        may exist.)"""
         last = been[-1]
         first = next((k for k, state in enumerate(been[:-1]) if state.key == last.key), None)
         if first is None:
@@ -321,7 +320,7 @@ class _Contact:
         return True
 
     def settle(self, states: FaceStates):
-        """(states, w, λ) with cement intact as it now is."""
+        """(states, w, λ) with the cement that is still intact."""
         self.violation = 0.0
         found = self.newton(states)
         if found is not None:
@@ -330,7 +329,7 @@ class _Contact:
         for freeze in range(1, _FREEZES + 1):
             states, _, reaction = self.newton(states, limit, single=True)
             now = self.laws.limit(reaction[self.laws.across], self.broken)
-            # Near enough, Newton's method finishes what would take many more rounds.
+            # Close enough: Newton's method replaces many more updates.
             if (
                 freeze % 4 == 0
                 or np.abs(now - limit)[np.isfinite(now)].max(initial=0.0) < _FROZEN_TOLERANCE * self.stress
@@ -345,11 +344,11 @@ class _Contact:
 def settle_rough(
     equations: FaceEquations, right: np.ndarray, memory: FaceMemory, guess: FaceStates | None = None
 ) -> tuple[np.ndarray, np.ndarray, FaceMemory, int, Missed]:
-    """Slip and opening (times 2μ), λ = right − S w, what the faces remember afterwards, the number of solves, and what
-    does not hold to the tolerance.
+    """Contact of faces with friction, cement or filling.
 
-    ``right`` (n,) traction that fluid in the cracks exerts less that of the loads on closed faces; ``memory`` of the
-    load before; ``guess`` the states to begin with, rather than those of one crack by itself. Raises NotConverged.
+    ``right`` (n,): traction of fluid in the cracks minus that of the loads on closed faces; ``memory`` of the last
+    load; ``guess``: initial states, by default those of isolated faces. Returns slip and opening (times 2μ), λ = right
+    − S w, the new memory, the number of solves, and the remaining violations. Raises NotConverged.
     """
     laws = equations.laws
     contact = _Contact(equations, right, memory)
@@ -362,7 +361,7 @@ def settle_rough(
         drive = -reaction[laws.across] / np.where(cemented, laws.strength, np.inf)
         if not drive.max() > 1 + TOLERANCE:
             break
-        # The most strained nodes let go first; the others feel it before they are judged.
+        # The most stressed nodes break first, and the others are judged after that.
         contact.broken |= cemented & (drive > max(1.0, 0.9 * drive.max()))
         states = contact.admissible(FaceStates(states.closed & ~contact.broken, states.way, states.pulled))
     slip = w[laws.along]
@@ -370,20 +369,20 @@ def settle_rough(
     rest = np.where(holds, slip - contact._offset(states, reaction), slip)
     sticks = holds & (states.way == 0)
     rest[sticks] = memory.rest[sticks]
-    # The limit between the loads is the mean of those before and after (0 before faces have met), as where both rise
-    # together: of second order in the load step, and exact while the limit stays what it is.
+    # Shear limit during the step: mean of the limits before and after (0 before faces have closed). Second order in the
+    # load step, and exact for a constant limit.
     pressure = np.where(states.closed, reaction[laws.across], 0.0)
-    slides = states.way != 0  # what cannot has an infinite limit
+    slides = states.way != 0  # nodes that cannot slip have an infinite limit
     before = np.where(slides, laws.limit(memory.pressure, contact.broken), 0.0)
     lost = np.where(slides, 0.5 * (states.way * before - reaction[laws.along]) * (rest - memory.rest), 0.0)
     shear = np.where(states.closed, -reaction[laws.along], 0.0)
     weights = laws.elements.quadrature.ravel() / laws.twice_mu
     work = memory.work + float(weights @ lost)
-    # Faces that held as the step began, and slip at its end, bore less than their limit before it.
+    # Faces that stuck at the beginning of the step, and slip at its end, were below their limit before.
     untouched = not memory.states.closed.any() and not memory.rest.any()
-    held = memory.states.closed & (memory.states.way == 0) | laws.cemented(memory.broken)
-    held |= untouched & laws.closes & (laws.aperture == 0)
-    slips = np.where(held & slides, lost - 0.5 * (memory.shear - reaction[laws.along]) * (rest - memory.rest), 0.0)
+    stuck = memory.states.closed & (memory.states.way == 0) | laws.cemented(memory.broken)
+    stuck |= untouched & laws.closes & (laws.aperture == 0)
+    slips = np.where(stuck & slides, lost - 0.5 * (memory.shear - reaction[laws.along]) * (rest - memory.rest), 0.0)
     breaks = contact.broken & ~memory.broken
     bond, ahead = _breaking(laws, memory, w, pressure, shear, lost) if breaks.any() else np.zeros((2, len(lost)))
     new = float(weights[breaks] @ bond[breaks]), float(weights @ np.where(breaks, 0.0, slips))
@@ -395,8 +394,8 @@ def settle_rough(
 def _breaking(
     laws: FaceLaws, memory: FaceMemory, w: np.ndarray, pressure: np.ndarray, shear: np.ndarray, lost: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """(n_nodes,) what cement releases that breaks at its strength since the load of ``memory``, and how much more that
-    and what is ``lost`` to friction come to than the mean of what acts at both loads (times 2μ, J/m²)."""
+    """(n_nodes,) energy released by cement that has broken since the load of ``memory``, and the amount by which it and
+    the friction loss (``lost``) exceed the mean of the tractions at both loads (times 2μ, J/m²)."""
     pull_a, pull_b = -memory.pressure, -pressure
     strength = np.maximum(laws.strength, pull_a)
     parted = w[laws.across] + laws.aperture
@@ -414,6 +413,6 @@ def _breaking(
 
 
 def stored_by_fillings(laws: FaceLaws, pressure: np.ndarray, shear: np.ndarray) -> np.ndarray:
-    """(n_nodes,) energy (times 2μ, J/m²) of what is between faces under ``pressure`` and ``shear``, Pa; 0 of open
-    ones, between which nothing acts."""
+    """(n_nodes,) energy (times 2μ, J/m²) stored in fillings under ``pressure`` and ``shear``, Pa; 0 where faces are
+    open."""
     return 0.5 * (shear * shear / laws.shear + pressure * pressure / laws.normal)

@@ -1,18 +1,17 @@
 """Unilateral contact of crack faces: which collocation nodes are closed.
 
-With the boundary eliminated, the tractions on the faces are S w + r (S the Schur complement, w slip and opening, r what
-the loads do to closed faces). At every node the opening cannot pass −aperture and the face can only press:
+With the boundary eliminated, the tractions on the faces are S w + r (S the Schur complement, w slip and opening, r the
+tractions of the loads on closed faces). At every node the opening is at least −aperture and the faces cannot pull:
 
     w_n + a ≥ 0,   λ = −(S w + r)_n − p ≥ 0,   λ (w_n + a) = 0,   shear traction zero.
 
-It is solved by block principal pivoting (Júdice & Pires 1994): all violated nodes change side at once, as Newton's
-method would; when that turns in a round, one at a time in a fixed order of nodes (Murty 1974), which cannot for a
-P-matrix.
+Solved by block principal pivoting (Júdice & Pires 1994): all violated nodes change state at once, as in Newton's
+method. When that cycles, one node at a time in fixed order (Murty 1974), which cannot cycle for a P-matrix.
 
-Where rock runs out in a blade, between a crack and the side that it meets at a few degrees, discrete compliance is no
-P-matrix (a point of the blade's end, pressed upon, moves the wrong way), and no state of the nodes there may satisfy
-them all. Where single exchanges lead to nothing, the nodes of which block exchanges made their round are left
-undecided, in that of its states with the least violation, and the others settle without them.
+Where rock ends in a thin blade, between a crack and a side that it meets at a few degrees, the discrete compliance is
+not a P-matrix (a loaded point of the blade moves the wrong way), and no state may satisfy all nodes. If single changes
+do not converge, the nodes that took part in the cycle are left undecided, in the state of the cycle with the least
+violation, and the others are solved without them.
 """
 
 from __future__ import annotations
@@ -24,7 +23,7 @@ import numpy as np
 
 
 class NotConverged(RuntimeError):
-    """The contact of crack faces was not settled; ``node`` is the number of the one that is worst, if that is known."""
+    """Contact of crack faces did not converge; ``node``: the worst one, if known."""
 
     def __init__(self, message: str, node: int | None = None):
         super().__init__(message)
@@ -33,8 +32,8 @@ class NotConverged(RuntimeError):
 
 @dataclass(frozen=True, eq=False)
 class Settled:
-    """``closed`` (n,) bool after so many ``solves``; ``undecided`` (n,) bool, nodes that no state satisfies, and their
-    worst ``violation``, of the scale of gaps and pressures."""
+    """``closed`` (n,) bool after so many ``solves``; ``undecided`` (n,) bool: nodes without a consistent state, and
+    their largest ``violation``, relative to the scale of gaps and pressures."""
 
     closed: np.ndarray
     solves: int
@@ -52,14 +51,14 @@ def settle(
     """Which nodes are closed.
 
     ``respond(closed)`` (n,) bool solves with these nodes closed and returns the gap w_n + a and the pressure λ of all
-    nodes, each scaled to order one; what it was called with last is what is returned. ``can_close`` (n,) bool;
-    ``closed`` (n,) the first guess. Raises NotConverged.
+    nodes, each scaled to order one; its last call is that of the result. ``can_close`` (n,) bool; ``closed`` (n,):
+    first guess. Raises NotConverged.
     """
     closed = closed & can_close
     undecided = np.zeros(len(closed), bool)
     best, solves, single = len(closed), 0, False
     most = 2 * int(can_close.sum())
-    # The states that exchanges went through, with the violation of each, and the round that block exchanges turned in.
+    # States visited, with the violation of each, and the cycle in which block changes ended.
     been: dict[bytes, tuple[np.ndarray, float]] = {}
     round_: list[tuple[np.ndarray, float]] = []
     while solves < limit:
@@ -71,7 +70,7 @@ def settle(
         if not wrong.any():
             return Settled(closed, solves, undecided, -float(short.min(where=undecided, initial=0.0)))
         key = closed.tobytes()
-        again = key in been or single and len(been) == most
+        again = key in been or (single and len(been) == most)
         been.setdefault(key, (closed, -float(short.min())))
         if again and single:
             undecided = undecided | np.any([state != round_[0][0] for state, _ in round_], axis=0)

@@ -1,10 +1,10 @@
-"""Growth criteria: where a loaded tip turns to, and how hard it is driven.
+"""Growth criteria: direction and equivalent stress intensity factor of a loaded tip.
 
 Each criterion takes K_I and K_II of many tips, (n,) Pa √m, and the material, and returns ``(angle, k_eq)``: the growth
-angle from the crack's own direction (rad, counter-clockwise, so that a positive K_II gives a negative angle) and the
-equivalent stress intensity factor that is held against K_Ic. A tip that no tensile kink can leave has k_eq = 0 and
-angle 0 (the F-criterion knows kinks that shear besides). K_I may be negative: a slot that cannot close carries a
-compressive K_I and still kinks in tension to the side.
+angle from the direction of the crack (rad, counter-clockwise, so that a positive K_II gives a negative angle) and the
+equivalent stress intensity factor to be compared with K_Ic. A tip without a tensile kink has k_eq = 0 and angle 0 (the
+F-criterion also admits shear kinks). K_I may be negative: a slot that cannot close has a compressive K_I and still
+kinks in tension.
 """
 
 from __future__ import annotations
@@ -19,8 +19,8 @@ from ..growth import tie_tolerance
 
 Criterion = Callable[[np.ndarray, np.ndarray, Material], tuple[np.ndarray, np.ndarray]]
 
-# Stationary kinks are sought between these angles, first on a grid of one degree (no two lie closer). The series of
-# Amestoy & Leblond lose their digits beyond 126°: the last term they give, 4.1 m²⁰, is 0.003 there and grows fast.
+# Stationary kinks are searched between these angles, first on a grid of one degree (no two are closer). The series of
+# Amestoy & Leblond loses its digits beyond 126°: its last term, 4.1 m²⁰, is 0.003 there and grows fast.
 _GRID = np.radians(np.arange(-160.5, 161.0, 1.0))
 _KINK_GRID = np.radians(np.arange(-126.5, 127.0, 1.0))
 
@@ -92,9 +92,9 @@ def largest_relative_release_rate(
 
     So F = (k_1/K_Ic)² + (k_2/K_IIc)² with the factors k_1, k_2 of an infinitesimal kink (`kink_factors`); a kink that
     closes (k_1 < 0) has only its second part. K_IIc = K_Ic makes it the energy criterion, an infinite K_IIc that of
-    the largest k_1. What presses on the faces of a closed kink (friction, stress along the crack) does not come in: for
-    a kink of no length it vanishes beside k_1 and k_2 (`f_criterion` are of some length). Kinks beyond 126° are not
-    considered.
+    K_IIc = K_Ic gives the energy criterion, an infinite K_IIc that of the largest k_1. Tractions on the faces of a
+    closed kink (friction, stress along the crack) do not enter: for an infinitesimal kink they are negligible against
+    k_1 and k_2 (see `f_criterion` for kinks of finite length). Kinks beyond 126° are not considered.
     """
     k_i, k_ii = _tips(k_i, k_ii)
     share = material.k_ic / material.k_iic if np.isfinite(material.k_iic) else 0.0
@@ -127,8 +127,8 @@ def minimum_strain_energy_density(
 
     With κ = 3 − 4ν (ν the effective Poisson's ratio) and 16πμ taken out,
     a11 = (1 + cos θ)(κ − cos θ), a12 = sin θ (2 cos θ − κ + 1), a22 = (κ + 1)(1 − cos θ) + (1 + cos θ)(3 cos θ − 1).
-    S does not change with the sign of K, so of its minima the one with the largest hoop stress is taken, and only a
-    tensile one. K_eq = √(S_min / (2κ − 2)): the K_I that in pure mode I gives the same S ahead of the crack.
+    S does not depend on the sign of K, so of its minima the one with the largest hoop stress is taken, if that is
+    tensile. K_eq = √(S_min / (2κ − 2)): the K_I that gives the same S ahead of the crack in pure mode I.
     """
     k_i, k_ii = _tips(k_i, k_ii)
     kappa = 3 - 4 * material.effective_poissons_ratio
@@ -240,12 +240,12 @@ def _turning_points(slope: Callable, n_tips: int, grid: np.ndarray) -> tuple[np.
         middle = 0.5 * (low + high)
         rising = slope(tip, middle) > 0
         low, high = np.where(rising, middle, low), np.where(rising, high, middle)
-    # θ = 0 is often the exact answer, and bisection ends beside it.
+    # θ = 0 is often the exact root, and bisection ends next to it.
     return tip, np.where(np.abs(high) < 1e-15, 0.0, high)
 
 
 def _keep_best(angle: np.ndarray, best: np.ndarray, tip: np.ndarray, theta: np.ndarray, value: np.ndarray) -> None:
-    """For every tip keep the candidate with the largest positive value; of equal ones see `ties.best`."""
+    """Keep for every tip the candidate with the largest positive value; of equal ones see `tie_tolerance.best`."""
     for j in np.unique(tip[value > 0]).tolist():
         own = np.flatnonzero(tip == j)
         k = own[tie_tolerance.best(value[own], theta[own])]

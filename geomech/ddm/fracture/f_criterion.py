@@ -1,14 +1,14 @@
-"""The F-criterion on kinks that are tried: a short fictitious extension at every tip, solved in many directions.
+"""The F-criterion with trial kinks: a short fictitious extension at every tip, solved in many directions.
 
-For a kink of no length what presses on its faces vanishes beside its k_1 and k_2, so that under compression the energy
-criteria see wings that open where a real extension would be pressed shut. So, as Shen & Stephansson (1993) do, every
-tip is extended by a given length in one direction after the other, the body is solved with the kinks' faces in contact
-(with friction, where their crack has it), and the direction with the largest
+On an infinitesimal kink, tractions on its faces are negligible against k_1 and k_2, so that under compression the
+energy criteria predict wing cracks that open where a real extension would be closed. Therefore, following Shen &
+Stephansson (1993), every tip is extended by a given length in each of several directions, the body is solved with
+contact (and friction) on the kink faces, and the direction with the largest
 
     F = (k_1/K_Ic)² + (k_2/K_IIc)²
 
-counts, K_eq = √F K_Ic; between directions a parabola. Growth borders the factors of the body, and bodies of the same
-geometry keep theirs, so that a load costs one solution a direction.
+is taken, with K_eq = √F K_Ic and a parabola between directions. Trial bodies border the factors of the body and are
+kept, so that a load costs one solution per direction.
 """
 
 from __future__ import annotations
@@ -28,13 +28,13 @@ if TYPE_CHECKING:
     from ..loads.body_loads import BodyLoad
     from ..solution import Solution
 
-#: Directions in which kinks are tried, rad from the tip's own.
+#: Directions of trial kinks, rad from that of the tip.
 DIRECTIONS = np.radians(np.arange(-120.0, 121.0, 10.0))
 
 
 def judged(solution: Solution, growth: GrowthSettings, material: Material) -> tuple[np.ndarray, np.ndarray]:
-    """(n_tips,) angle and K_eq of the tips of ``solution`` by the criterion that ``growth`` asks for. Raises
-    ValueError where it is none, or one that trial kinks know nothing of."""
+    """(n_tips,) angle and K_eq of the tips of ``solution`` by the criterion in ``growth``. Raises ValueError for an
+    unknown criterion, or one that trial kinks do not support."""
     if growth.trial_kink > 0:
         check_criterion(growth)
         return driven(solution, growth.trial_kink, material)
@@ -42,8 +42,8 @@ def judged(solution: Solution, growth: GrowthSettings, material: Material) -> tu
 
 
 def judged_rows(tips: np.ndarray, growth: GrowthSettings, material: Material) -> tuple[np.ndarray, np.ndarray]:
-    """(n_tips,) the same of TIP rows, of one or many bodies, by a criterion that asks for no more than K. Raises
-    ValueError where there is none."""
+    """The same for TIP rows of one or more bodies, by a criterion that needs only K. Raises ValueError for an unknown
+    criterion."""
     check_criterion(growth)
     return CRITERIA[growth.criterion](tips["k_i"], tips["k_ii"], material)
 
@@ -59,9 +59,9 @@ def check_criterion(growth: GrowthSettings) -> None:
 
 
 def driven(solution: Solution, length: float, material: Material) -> tuple[np.ndarray, np.ndarray]:
-    """(n_tips,) angle of the kink with the largest F and its K_eq, Pa √m, from kinks of ``length`` m under the load,
-    and with the history, of ``solution``. Tips at which some kink does not fit into the rock, or its faces do not
-    settle, are judged by kinks of no length."""
+    """(n_tips,) angle of the kink with the largest F and its K_eq, Pa √m, from kinks of ``length`` m under the load and
+    with the history of ``solution``. Infinitesimal kinks are used at tips where a kink does not fit into the rock or
+    its faces do not converge."""
     tips, body = solution.tips, solution.body
     n = len(tips)
     value = np.full((len(DIRECTIONS), n), np.nan)
@@ -84,7 +84,7 @@ def driven(solution: Solution, length: float, material: Material) -> tuple[np.nd
 
 
 def _largest(value: np.ndarray, material: Material) -> tuple[np.ndarray, np.ndarray]:
-    """Angle and K_eq at the largest of ``value`` (n_directions, n_tips), by a parabola through its neighbours."""
+    """Angle and K_eq at the maximum of ``value`` (n_directions, n_tips), by a parabola through its neighbours."""
     every = np.arange(value.shape[1])
     at = np.clip([best_direction(column, DIRECTIONS) for column in value.T], 1, len(DIRECTIONS) - 2)
     low, best, high = (value[at + side, every] for side in (-1, 0, 1))
@@ -95,7 +95,7 @@ def _largest(value: np.ndarray, material: Material) -> tuple[np.ndarray, np.ndar
 
 
 def _fitting(body: Body, length: float) -> np.ndarray:
-    """(n_tips,) bool: tips that are farther than two kinks from all other cracks and from the boundary."""
+    """(n_tips,) bool: tips farther than two kink lengths from all other cracks and from the boundary."""
     network, tips = body.cracks, body.tip_elements[0]
     sides = body.sides
     pieces = np.concatenate([network.nodes[network.segments], sides])
@@ -107,14 +107,14 @@ def _fitting(body: Body, length: float) -> np.ndarray:
         s = np.clip(np.sum(rel * d, axis=1) / np.sum(d * d, axis=1), 0.0, 1.0)
         to = s[:, None] * d - rel
         distance = np.hypot(*to.T)
-        # What lies straight behind is the crack itself; no kink is turned so far.
+        # Points straight behind belong to the crack itself; no kink turns that far.
         behind = to @ tip["direction"] < -0.7 * distance
         out[j] = not (~behind & (distance <= 2 * length)).any()
     return out
 
 
 def _body(body: Body, k: int, length: float, at: np.ndarray) -> Body:
-    """``body`` with kinks in the ``k``-th direction from the tips ``at``; kept with it."""
+    """``body`` with kinks in direction ``k`` at the tips ``at``; kept with it."""
     kept = body.trials.setdefault(length, {})
     if k not in kept:
         from ..body import Body
@@ -136,8 +136,8 @@ def _body(body: Body, k: int, length: float, at: np.ndarray) -> Body:
 
 
 def _kinked(cracks: Cracks, tips: np.ndarray, angle: float, length: float) -> Cracks:
-    """``cracks`` with a segment more at each of ``tips`` (TIP rows), the nodes in their order behind all others. A
-    trial has no aperture: it is torn."""
+    """``cracks`` with one more segment at each of ``tips`` (TIP rows), the new nodes after all others. Trial kinks have
+    no aperture."""
     n, n_nodes = len(tips), len(cracks.nodes)
     turn = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
     owner = _owners(cracks, tips["node"])
@@ -162,8 +162,7 @@ def _owners(cracks: Cracks, nodes: np.ndarray) -> np.ndarray:
 
 
 def _load(load: BodyLoad, cracks: Cracks, at: np.ndarray) -> BodyLoad:
-    """``load`` on the kinked network: where every segment has its own fluid's pressure, a kink has that of its
-    crack."""
+    """``load`` on the network with kinks: with a fluid pressure for each segment, a kink has that of its crack."""
     pressure = load.crack_pressure
     if callable(pressure) or not np.ndim(pressure):
         return load

@@ -1,12 +1,12 @@
-"""What stress intensity factors cannot exceed under loads that are known by their size only.
+"""Upper bound of stress intensity factors under loads of which only the size is known.
 
-K of faces that stay open is linear in the load, K = ∮ h · t ds + …: h (x) is the weight function (Bueckner 1970), here of
-a force at x together with the body force that keeps the body in equilibrium with it, linear in the distance from its
-middle. So no tractions t of the same ∫ |t| ds bring more than the largest |h| of the outline, wherever they act; the even
-stress and what is symmetric in the body force's gradient are counted as they are.
+While faces stay open, K is linear in the load, K = ∮ h · t ds + …, with h (x) the weight function (Bueckner 1970): here
+K of a force at x together with the body force, linear in the distance from the centroid, that keeps the body in
+equilibrium. Tractions t of given ∫ |t| ds therefore cause at most the largest |h| of the outline, wherever they act.
+The uniform stress and the symmetric part of the gradient of the body force are taken exactly.
 
-h is smooth along an element of the boundary: it is taken from the two loads that are linear on it, as the linear function
-with the same two moments, and of that the larger end.
+h is smooth along a boundary element. It is represented by the linear function with the same two moments, from the two
+loads linear on the element; its larger end value counts.
 """
 
 from __future__ import annotations
@@ -26,21 +26,21 @@ if TYPE_CHECKING:
     from ..body import Body
     from ..loads.body_loads import BodyLoad
 
-#: What h may be more than the linear functions tell (0.98 to 1.02 times as much in `tests/ddm/test_tip_bound.py`).
+#: Safety factor on h (the exact maximum is 0.98 to 1.02 times the linear one in `tests/ddm/test_tip_bound.py`).
 MARGIN = 1.25
 
 
 def is_bounded(body: Body) -> bool:
-    """Whether K of ``body`` is linear in the load, whatever that is: open smooth faces, no holes, no supports."""
+    """Whether K of ``body`` is linear in any load: open frictionless faces, no holes, no supports."""
     return scales(body) and bool(len(body.cracks.tips)) and not body.closing[1].any()
 
 
 class TipBound:
-    """Of a ``body`` that `is_bounded`.
+    """Bounds for a ``body`` that `is_bounded`.
 
-    largest  (n_tips,) what a force on the outline of one newton brings at most, Pa √m
+    largest  (n_tips,) largest K of a unit force on the outline, Pa √m
     force    (n_tips, 2, 4) K_I and K_II of a unit gradient of the body force, xx, xy, yx, yy
-    even     (n_tips, 2, 3) of a unit even stress
+    even     (n_tips, 2, 3) of a unit uniform stress
     """
 
     def __init__(self, body: Body) -> None:
@@ -56,7 +56,7 @@ class TipBound:
         k = np.einsum("ut,sue->tse", known.on_boundary, on_both[0]) - np.einsum(
             "ut,sue->tse", known.on_faces, on_both[1]
         )
-        # Weighted means of h that the two linear loads have, and the ends of the linear function with these.
+        # Weighted means of h under the two linear loads, and end values of the linear function with these.
         means = k.reshape(2, n, len(outline), 2, 2) / (0.5 * length[:, None, None])
         ends = np.stack([2 * means[..., 0, :] - means[..., 1, :], 2 * means[..., 1, :] - means[..., 0, :]], axis=-2)
         at = np.stack([start, end], axis=1) - body.centroid
@@ -69,8 +69,8 @@ class TipBound:
         self.even = (known.on_faces.T @ unit).reshape(2, n, 3).transpose(1, 0, 2)
 
     def at_most(self, load: BodyLoad) -> np.ndarray:
-        """(n_tips,) Pa √m, what √(K_I² + K_II²) does not exceed under ``load``, of tractions on segments of the outline,
-        body force with gradient and even stress, in equilibrium."""
+        """(n_tips,) upper bound of √(K_I² + K_II²) under ``load``, Pa √m: tractions on segments of the outline, body
+        force with gradient, and uniform stress, in equilibrium."""
         along = load.segments[:, 1] - load.segments[:, 0]
         size = 0.5 * float(np.hypot(*along.T) @ np.hypot(load.tractions[..., 0], load.tractions[..., 1]).sum(axis=1))
         gradient = load.body_force_gradient
@@ -82,8 +82,8 @@ class TipBound:
 
 @lru_cache(maxsize=64)
 def most_per_factor(criterion: str, material: Material) -> float:
-    """K_eq by the ``criterion`` in ``material`` of √(K_I² + K_II²) = 1, at most: it goes with the size of both."""
+    """Largest K_eq of the ``criterion`` in ``material`` for √(K_I² + K_II²) = 1; K_eq is proportional to both."""
     angle = np.linspace(-np.pi, np.pi, 721)
     _, k_eq = CRITERIA[criterion](np.cos(angle), np.sin(angle), material)
-    # Half a degree beside the largest it is no more than this much larger.
+    # Half a degree from the maximum the value is lower by less than this.
     return 1.01 * float(k_eq.max())

@@ -1,8 +1,9 @@
-"""How far a stress intensity factor is to be trusted: a solution against a finer one.
+"""Error estimate of stress intensity factors by comparison with a finer solution.
 
-Estimates from one solution alone (decay of its coefficients, order p against p−1) follow the error of K only within
-factors of ten to a thousand: K is far more accurate than the densities it comes from, and odd and even orders differ.
-One order more, graded one step deeper, sees what is there; but for what the chords of curved walls do (`chord_error`).
+Estimates from one solution (decay of its coefficients, order p against p−1) follow the error of K only within factors
+of ten to a thousand: K is far more accurate than the densities it comes from, and odd and even orders differ. The finer
+solution has one order more and is graded one level deeper. The error of chords on curved walls is added
+(`chord_error`).
 """
 
 from __future__ import annotations
@@ -23,16 +24,16 @@ if TYPE_CHECKING:
 
 _log = logging.getLogger(__name__)
 
-#: The estimate is so many times the difference to the finer solution. Over the battery of
-#: `tests/validation/test_automatic.py` the difference alone is 0.35 to 1.3 times the error.
+#: Factor on the difference to the finer solution. In `tests/validation/test_automatic.py` the difference is 0.35 to 1.3
+#: times the error.
 SAFETY = 2.0
-#: An estimated error above this part of the largest K is told to the log.
+#: Estimated error, relative to the largest K, above which a warning is logged.
 WORTH_A_WARNING = 0.01
 
 
 def tip_errors(solution: SolvedBody) -> np.ndarray:
-    """(n_tips, 2) estimated absolute error of K_I and K_II at every tip, Pa √m, for the price of another body, somewhat
-    larger than the solution's own. Logs a warning when it exceeds 1 % of the largest K."""
+    """(n_tips, 2) estimated absolute error of K_I and K_II, Pa √m. Solves another, somewhat larger body. Logs a warning
+    when the error exceeds 1 % of the largest K."""
     body = solution.body
     k = factors(solution)
     if not len(k):
@@ -57,8 +58,8 @@ def warn(errors: np.ndarray, k: np.ndarray) -> None:
 
 
 def floor(body: CrackedBody) -> float:
-    """Relative error of K that grading leaves where it ends for round-off's sake (`grading.Grading.finest`), which a
-    finer solution shares and cannot show. Only meshes made for a target error go that far."""
+    """Relative error of K where grading stops because of round-off (`grading.Grading.finest`). A finer solution has it,
+    too, and cannot show it. Only meshes made for a target error are graded that far."""
     grading = Grading.of(body.settings)
     if grading.target is None:
         return 0.0
@@ -76,8 +77,8 @@ def floor(body: CrackedBody) -> float:
 
 
 def _left_at(body: CrackedBody, point: np.ndarray, part: float) -> float:
-    """What an element of ``part`` of its side or segment that ends at ``point`` leaves, if that is a node of the
-    geometry."""
+    """Error of an element of the fraction ``part`` of its side or segment that ends at ``point``, if that is a node of
+    the geometry."""
     network, left = body.cracks, 0.0
     for node in np.flatnonzero((network.nodes == point).all(axis=1) & (network.valence > 0)):
         where = "mouth" if network.surface[node] else "crack"

@@ -1,4 +1,4 @@
-"""Stress intensity factors to a target error: a solution held against finer meshes until it meets the target."""
+"""Stress intensity factors to a target error: finer meshes, until two solutions agree to the target."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ if TYPE_CHECKING:
 
 
 class TargetMissed(ValueError):
-    """Stress intensity factors that no mesh of ours brings to the ``target`` error that was asked for; ``solution`` is
-    the best one, with its `tip_errors`, and ``reached`` their largest beside the largest K."""
+    """The ``target`` error cannot be reached by any mesh; ``solution`` is the best one, with its `tip_errors`, and
+    ``reached`` the largest of these, relative to the largest K."""
 
     def __init__(self, solution: SolvedBody, target: float, where: str = "") -> None:
 
@@ -36,8 +36,8 @@ class TargetMissed(ValueError):
 
 
 def met(solution: SolvedBody, target: float, again: Callable[[CrackedBody], SolvedBody]) -> SolvedBody:
-    """``solution``, or that of a finer mesh, whose K are good to ``target`` by comparison with one that is finer still;
-    ``again`` solves for the same load on another body. Raises `TargetMissed` when the finest mesh is not enough."""
+    """``solution``, or one on a finer mesh, whose K is accurate to ``target`` by comparison with a still finer one.
+    ``again`` solves for the same load on another body. Raises `TargetMissed` when the finest mesh does not suffice."""
 
     while True:
         k = factors(solution)

@@ -1,4 +1,4 @@
-"""The elements at crack tips, and what of them a stress intensity factor is read from."""
+"""The elements at crack tips, and the weights that give stress intensity factors from their nodal values."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ from ..system.influence_matrix import ElementSet
 
 
 def tip_elements(cracks: Cracks, faces: ElementSet) -> tuple[np.ndarray, ...]:
-    """What the tips' rows say of geometry (TIP, factors zero), and of each its element, the element's last node,
-    weights (n_tips, p+1) that make nodal values the coefficient of √r, and whether its faces touch unloaded."""
+    """Geometry of the tips (TIP rows, factors zero), and of each its element, the last node of that element, weights
+    (n_tips, p+1) from nodal values to the coefficient of √r, and whether its faces touch without load."""
     n = len(cracks.tips)
     rows, element, last = np.zeros(n, TIP), np.zeros(n, int), np.zeros(n, int)
     lead, touching = np.zeros((n, faces.per)), np.zeros(n, bool)

@@ -1,4 +1,4 @@
-"""Stress intensity factors of a solution as an array, their largest, and what of them is round-off."""
+"""Stress intensity factors of a solution as an array, their maximum, and their round-off."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 if TYPE_CHECKING:
     from ..interfaces import SolvedBody
 
-#: K below this part of the stress on closed cracks times the root of their length is no K.
+#: Round-off of K, relative to the stress on closed cracks times the root of their length.
 ROUND_OFF = 1e-11
 
 
@@ -19,12 +19,12 @@ def factors(solution: SolvedBody) -> np.ndarray:
 
 
 def largest(k: np.ndarray) -> float:
-    """The largest √(K_I² + K_II²) of (n_tips, 2) factors: what errors are relative to."""
+    """The largest √(K_I² + K_II²) of (n_tips, 2) factors, to which errors are relative."""
     return float(np.hypot(*k.T).max(initial=0.0))
 
 
 def negligible(solution: SolvedBody) -> float:
-    """Pa √m: K that is round-off of the stress on the cracks, where faces in contact let none of it reach the tips."""
+    """Pa √m: K below which a value is round-off of the stress on the cracks, as where closed faces shield the tips."""
     return (
         ROUND_OFF
         * float(np.abs(solution.face_load).max(initial=0.0))

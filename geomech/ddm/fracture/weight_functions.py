@@ -1,13 +1,13 @@
 """Stress intensity factors as linear functionals of the loads, while crack faces stay as they are.
 
-K is a weighted sum of jumps, K = lᵀw, and the jumps follow linearly from the traction g that loads exert on the
-boundary, r on the cracks and p of the fluid in them: with M the equations of the faces (`frictional_contact`), M w = N (p n − r +
+K is a weighted sum of jumps, K = lᵀw, and the jumps depend linearly on the traction g of the loads on the boundary, r
+on the cracks, and the fluid pressure p. With M the equations of the faces (`frictional_contact`), M w = N (p n − r +
 A_CΓ A_ΓΓ⁻¹ g) + …,
 
     K = yᵀ (p n − r) + hᵀ g + K₀,     Mᵀ z = l,  y = Nᵀ z,  A_ΓΓᵀ h = A_CΓᵀ y.
 
-So one transposed solve a factor, with equations that are there, replaces a solve for every load. K₀ is what slip,
-springs and cohesion leave behind without any load.
+One transposed solution per factor, with existing equations, replaces a solution for every load. K₀ is due to slip,
+springs and cohesion that remain without load.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from ..loads.body_loads import BodyLoad
     from ..loads.unit_load_cache import UnitLoad
 
-#: Functionals of so many unit loads are remembered.
+#: Number of unit loads whose values are kept.
 _KEPT = 400
 
 
@@ -34,7 +34,7 @@ class TipFunctionals:
     on_faces     (n_crack_unknowns, 2 n_tips): y
     constant     (2 n_tips,): K₀, Pa √m
 
-    Where the crack unknowns are iterated on, so are these, by the transposed equations.
+    Where the crack unknowns are solved iteratively, so are these, by the transposed equations.
     """
 
     def __init__(self, body: CrackedBody, solution: SolvedBody | None = None):
@@ -61,8 +61,8 @@ class TipFunctionals:
         self._known: dict[int, tuple[UnitLoad, np.ndarray]] = {}
 
     def __call__(self, load: BodyLoad) -> np.ndarray:
-        """(n_tips, 2) K_I and K_II under ``load``, Pa √m: those of a solution, provided that its faces are in the same
-        states. Raises ValueError on loads that the body cannot bear (but does not ask for equilibrium)."""
+        """(n_tips, 2) K_I and K_II under ``load``, Pa √m: those of a solution, as long as the face states do not
+        change. Raises ValueError for loads that the body does not support (equilibrium is not checked)."""
         body = self.body
         _, units, rest, _ = body.lay_out(load)
         k = self.constant + self.on_faces.T @ self._fluid(load)
@@ -72,13 +72,12 @@ class TipFunctionals:
         for unit, size in units:
             k = k + self._of(unit) @ size
         k_i, k_ii = np.split(k, 2)
-        # As `Solution.tips` has it: faces that touch do not open a tip inwards.
+        # As in `Solution.tips`: closed faces cannot close a tip further.
         return np.stack([np.where(self._shut | (self._touching & (k_i < 0)), 0.0, k_i), k_ii], axis=1)
 
     def bound(self, load: BodyLoad, growth: float = 1.0) -> np.ndarray:
-        """(n_tips, 2) what |K_I| and |K_II| cannot exceed, Pa √m, under any load on the places where ``load`` acts
-        whose tractions and forces nowhere exceed ``growth`` times its largest, whatever their signs and
-        distribution."""
+        """(n_tips, 2) upper bounds of |K_I| and |K_II|, Pa √m, under any load at the places of ``load`` whose tractions
+        and forces nowhere exceed ``growth`` times its largest, with any sign and distribution."""
         body = self.body
         _, units, rest, _ = body.lay_out(load)
         fluid = self._fluid(load)
@@ -102,7 +101,7 @@ class TipFunctionals:
                 self._known.clear()
             n_g = len(self.on_boundary)
             value = self.on_boundary.T @ unit.applied[:n_g] - self.on_faces.T @ unit.applied[n_g:]
-            # The unit is kept with it, or its number might come again.
+            # The unit load is kept as well, or its id might be reused.
             known = self._known[id(unit)] = unit, value
         return known[1]
 

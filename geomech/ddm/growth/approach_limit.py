@@ -1,9 +1,9 @@
-"""Shorter increments where cracks come near each other.
+"""Shorter increments where cracks approach each other.
 
-A load at which cracks join is a maximum on the way of all tips together. Tips that stand ahead of where a load would
-bring them, by up to an increment, relieve or drive the others there: the maximum is then off by the first order of the
-increment, however exactly the tip that passes it is followed. So all tips of a block, the far ones too, take at least
-so many increments to what is left to the nearest other crack.
+The load at which cracks coalesce is a maximum along the paths of all tips together. Tips that are ahead of their place
+at that load, by up to an increment, unload or load the others: the error of the maximum is of first order in the
+increment, however exactly the coalescing tip is followed. Therefore all tips of a block, distant ones included, divide
+the remaining distance to the nearest other crack into at least a given number of increments.
 """
 
 from __future__ import annotations
@@ -14,9 +14,8 @@ from ...model import Cracks, GrowthSettings
 
 
 def longest_advance(cracks: Cracks, tips: np.ndarray, settings: GrowthSettings) -> np.ndarray:
-    """(n_tips,) m: how far each of ``tips`` (TIP rows) may go, the distance from the nearest tip in its block to
-    another crack over ``settings.approach_steps``; never less than the shortest increment, nor more than the
-    longest."""
+    """(n_tips,) m: largest increment of each of ``tips`` (TIP rows): the distance between the nearest tip in its block
+    and another crack over ``settings.approach_steps``, between the shortest and the longest increment."""
     out = np.full(len(tips), settings.increment)
     if not settings.approach_steps:
         return out

@@ -1,4 +1,4 @@
-"""The crack network while it is being changed, and the segment geometry that keeps it planar."""
+"""The crack network during changes, and the geometry of segments that keeps it planar."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ Point = tuple[float, float]
 
 @dataclass(eq=False)
 class Row:
-    """One segment: ``start`` and ``end`` nodes and what the network says of it."""
+    """One segment: its ``start`` and ``end`` nodes and its data in the network."""
 
     start: int
     end: int
@@ -28,7 +28,7 @@ class Row:
 
 @dataclass(frozen=True, eq=False)
 class Obstacle:
-    """A straight piece from ``a`` to ``b`` that a crack cannot cross: a segment (``row``) or a boundary edge (None)."""
+    """A straight piece from ``a`` to ``b`` that cracks cannot cross: a segment (``row``) or a boundary edge (None)."""
 
     a: Point
     b: Point
@@ -44,7 +44,7 @@ class Obstacle:
         )
 
     def ends_at(self, nodes: set[int], at: Point) -> bool:
-        """Whether it may touch the end ``at`` of a path: a segment of one of ``nodes``, an edge that holds the
+        """Whether it may touch the end ``at`` of a path: a segment of one of ``nodes``, or an edge that contains the
         point."""
         if self.row is not None:
             return self.row.start in nodes or self.row.end in nodes
@@ -53,8 +53,7 @@ class Obstacle:
 
 
 class Network:
-    """`Cracks` opened up for change: nodes and segments that can be added, split, moved and merged, then `freeze`\\
-    d."""
+    """Editable `Cracks`: nodes and segments can be added, split, moved and merged; `freeze` returns the result."""
 
     def __init__(self, cracks: Cracks, loops_of: Callable[[int], Sequence[np.ndarray]], cycle: int):
         self.names = cracks.names
@@ -78,7 +77,7 @@ class Network:
             self._at[row.end].append(row)
         self._loops_of = loops_of
         self._edges: dict[int, tuple[np.ndarray, list[Obstacle]]] = {}
-        # Boxes of the segments as they came; whatever changes afterwards is looked at one by one.
+        # Bounding boxes of the original segments; changed ones are tested one by one.
         ends = cracks.nodes[cracks.segments]
         self._low, self._high = ends.min(axis=1), ends.max(axis=1)
         self._original = list(self.rows)
@@ -123,7 +122,7 @@ class Network:
         return found
 
     def near(self, block: int, node: int, radius: float) -> list[Obstacle]:
-        """Segments and edges of ``block`` whose boxes come within ``radius`` of ``node``, but the node's own."""
+        """Segments and edges of ``block`` whose boxes are within ``radius`` of ``node``, except those of the node."""
         x, y = self.nodes[node]
         low, high = np.array([x - radius, y - radius]), np.array([x + radius, y + radius])
         found = []
@@ -156,12 +155,12 @@ class Network:
         return self._edges[block]
 
     def edges_at(self, block: int, point: Point, part: float) -> list[Obstacle]:
-        """The edges of ``block`` that are nearer to ``point`` than a ``part`` of their length."""
+        """The edges of ``block`` closer to ``point`` than the fraction ``part`` of their length."""
         _, edges = self._edges_of(block)
         return [edge for edge in edges if nearest_on(point, edge.a, edge.b)[0] <= part * math.dist(edge.a, edge.b)]
 
     def nodes_on(self, obstacle: Obstacle, block: int) -> list[tuple[int, Point]]:
-        """Nodes that a step can join on ``obstacle``: the ends of a segment, the crack mouths on an edge."""
+        """Nodes on ``obstacle`` that a step can join: the ends of a segment, the crack mouths on an edge."""
         if obstacle.row is not None:
             return [(n, self.nodes[n]) for n in (obstacle.row.start, obstacle.row.end)]
         mouths = []
@@ -173,10 +172,11 @@ class Network:
         return mouths
 
     def first_contact(self, node: int, start: Point, end: Point, obstacle: Obstacle, clearance: float) -> float | None:
-        """How far along the path from ``node`` (0 to 1) it comes within ``clearance`` of an obstacle; None: never.
+        """Coordinate (0 to 1) along the path from ``node`` at which it comes within ``clearance`` of an obstacle; None:
+        never.
 
-        A path may leave the boundary it starts from. Where a tip merely touches an obstacle, its path may leave to the
-        side on which the rest of its crack lies."""
+        A path may leave the boundary it starts from. A tip that merely touches an obstacle may leave to the side of the
+        rest of its crack."""
         t = _contact(start, end, obstacle.a, obstacle.b, clearance)
         if t is None:
             return None
@@ -200,8 +200,8 @@ class Network:
         return len(self.nodes) - 1
 
     def extend(self, tip: int, node: int) -> None:
-        """A new segment of the tip's crack from ``tip`` to ``node``, next to its neighbour in the list and directed as
-        the crack is."""
+        """Add a segment of the tip's crack from ``tip`` to ``node``, next to its neighbour in the list and in the
+        direction of the crack."""
         last = self._at[tip][0]
         onward = last.end == tip
         ends = (tip, node) if onward else (node, tip)
@@ -209,12 +209,12 @@ class Network:
         self._insert(self.rows.index(last) + onward, row)
 
     def begin(self, name: str, block: int, start: int, end: int) -> None:
-        """A new crack, last in the list, of one segment between two nodes; its faces obey the first law."""
+        """Add a crack of one segment between two nodes, last in the list; its faces have the first law."""
         self.names = (*self.names, name)
         self._insert(len(self.rows), Row(start, end, len(self.names) - 1, block, self.cycle, 0.0, 0))
 
     def split(self, row: Row, node: int) -> None:
-        """Divide ``row`` at ``node``; both halves keep what it was."""
+        """Divide ``row`` at ``node``; both halves keep its data."""
         at = self.rows.index(row)
         self._remove(row)
         kept = (row.crack, row.block, row.birth_cycle, row.aperture, row.law)
@@ -226,7 +226,7 @@ class Network:
         self._changed += [row for row in self._at[node] if row not in self._changed]
 
     def detach(self, row: Row, node: int, other: int) -> None:
-        """Let ``row`` end at ``other``, which nothing ends at yet, instead of at ``node``."""
+        """Let ``row`` end at the unused node ``other`` instead of ``node``."""
         row.start, row.end = (other if n == node else n for n in (row.start, row.end))
         self._at[node].remove(row)
         self._at[other].append(row)
@@ -254,7 +254,7 @@ class Network:
         self._gone.add(row)
 
     def freeze(self) -> Cracks:
-        """The network as it now stands, unused nodes dropped."""
+        """The present network without unused nodes."""
         segments = np.array([(row.start, row.end) for row in self.rows], dtype=int).reshape(-1, 2)
         used = np.array([bool(rows) for rows in self._at], dtype=bool)
         renumbered = np.cumsum(used) - 1
@@ -272,7 +272,7 @@ class Network:
 
 
 def nearest_on(p: Point, a: Point, b: Point) -> tuple[float, Point]:
-    """Distance from ``p`` to the segment ab, and the point of it that is nearest (its ends exactly)."""
+    """Distance from ``p`` to the segment ab, and the nearest point of it (its ends exactly)."""
     dx, dy = b[0] - a[0], b[1] - a[1]
     t = ((p[0] - a[0]) * dx + (p[1] - a[1]) * dy) / (dx * dx + dy * dy)
     at = a if t <= 0 else b if t >= 1 else (a[0] + t * dx, a[1] + t * dy)

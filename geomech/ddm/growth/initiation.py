@@ -1,19 +1,19 @@
-"""Cracks born where there was none: at a surface, a hole, the face of another crack, or inside the rock.
+"""Crack initiation in intact rock: at a surface, a hole, the face of another crack, or in the interior.
 
-Whole rock fails where its strength is reached. With principal stresses σ1 ≥ σ3 (in the plane, tension positive),
-tensile strength T, cohesion c and friction angle φ,
+Intact rock fails where it reaches its strength. With principal stresses σ1 ≥ σ3 (in the plane, tension positive),
+tensile strength T, cohesion c and friction angle φ, the stress over strength ("overstress") is
 
-    in tension  σ1 / T                                        along the plane normal to σ1,
-    in shear    [(σ1 − σ3) + (σ1 + σ3) sin φ] / (2 c cos φ)   along planes at ±(45° − φ/2) to the direction of σ3
+    in tension  σ1 / T                                        on the plane normal to σ1,
+    in shear    [(σ1 − σ3) + (σ1 + σ3) sin φ] / (2 c cos φ)   on planes at ±(45° − φ/2) to the direction of σ3
 
-(Mohr–Coulomb; the out-of-plane stress is left out) are its overstresses: one at failure, and proportional to the load
-where stress is. The more overstressed way is taken.
+(Mohr–Coulomb, without the out-of-plane stress): 1 at failure, and proportional to the load as long as stress is. The
+larger of the two decides.
 
-At a smooth surface the stress has a value, and so has the load at birth, whatever the elements and the increment. At a
-re-entrant corner it has none, and a stress concentration smaller than the rock's own scale does not break it. The
-stress may therefore be averaged from the surface inwards along the crack to be (Novozhilov 1969), over a distance that
-is the rock's: `material_length` gives the one with which a long crack fails at its K_Ic and a smooth wall at its
-strength. Corners are looked at only then. Zero, the default, is the strength at the point.
+On a smooth surface the stress is finite, and the initiation load does not depend on elements and increment. At a
+re-entrant corner it is singular, and a stress concentration smaller than the characteristic length of the rock does not
+break it. The stress may therefore be averaged along the future crack from the surface inwards (Novozhilov 1969), over a
+distance that is a property of the rock: `material_length` is the one with which a long crack fails at its K_Ic and a
+smooth wall at its strength. Corners are considered only then. Zero, the default, uses the stress at the point.
 """
 
 from __future__ import annotations
@@ -32,31 +32,30 @@ from ..solution import Solution
 from .crack_network import Network, Point, nearest_on
 from .tie_tolerance import ONE_WAY, TIED, in_order, reached
 
-#: Where cracks are looked for, by the names that scenes use.
+#: Where cracks may start, by the names in scenes.
 PLACES = ("", "surface", "everywhere")
-#: A crack leaves a surface at no less than this angle: below, it would peel a skin off that no increment resolves.
+#: Smallest angle between a new crack and its surface: below it, a skin thinner than any increment would peel off.
 LEAST_ANGLE = math.radians(10.0)
-#: Births at one time: those within this part of the most overstressed one, as images of one another are.
+#: New cracks at one time: within this fraction of the largest overstress, as symmetric ones are.
 TOGETHER = 1e-3
-#: Spacing of cracks at birth unless the settings say, and the distance from other cracks, in increments.
+#: Default spacing of new cracks, and their distance from other cracks, in increments.
 SPACING, APART = 5.0, 2.0
-#: A crack to be keeps this part of its length away from whatever else there is.
+#: Clearance of a new crack from anything else, as a fraction of its length.
 CLEARANCE = 0.2
-#: Turns of a crack up to this are no corners.
+#: Largest turn of a crack that does not count as a corner.
 SMOOTH = math.radians(20.0)
-#: A side of a polygon that turns by no more than this at either end is taken for a piece of a curve.
+#: A side of a polygon that turns by no more than this at both ends is part of a curve.
 CURVE = math.radians(31.0)
-#: Points of a grid in the rock, at most about.
+#: Approximate largest number of grid points in the rock.
 GRID = 4000
-#: The two faces of a crack are looked at from this part of an element's length beside it.
+#: Distance from a crack face at which its stress is evaluated, as a fraction of the element length.
 _BESIDE = 1e-6
 
 
 @dataclass(frozen=True)
 class Birth:
-    """A crack that the rock asks for, from ``start`` to ``end``: ``kind`` "tension" or "shear", ``place`` "surface"
-    (start on an outline or hole), "face" (start on ``segment`` of another crack) or "rock"; ``overstress`` 1 at
-    failure."""
+    """A new crack from ``start`` to ``end``: ``kind`` "tension" or "shear", ``place`` "surface" (start on an outline or
+    hole), "face" (start on ``segment`` of another crack) or "rock"; ``overstress`` 1 at failure."""
 
     kind: str
     place: str
@@ -82,18 +81,18 @@ def overstress(stress: np.ndarray, material: Material) -> tuple[np.ndarray, np.n
         shear = np.maximum(radius + mean * math.sin(phi), 0.0) / (material.cohesion * math.cos(phi))
     else:
         shear = np.zeros_like(radius)
-    # Under the same pressure on all sides every direction is one of σ1.
+    # Under equal stress on all sides every direction is principal.
     has_direction = radius > TIED * np.abs(mean)
     return tension, shear, np.where(has_direction, 0.5 * np.arctan2(2 * xy, xx - yy), 0.0)
 
 
 def births(solution: Solution, material: Material, settings: GrowthSettings, block: int = 0) -> list[Birth]:
-    """The cracks that would come first under this load, most overstressed first, whether or not that is above one.
+    """The new cracks that would start first under this load, most overstressed first, whether or not that exceeds 1.
 
-    ``settings.initiation`` says where to look ("surface" counts crack faces in). Each is settings.increment long and
-    has room: it keeps settings.initiation_spacing from tips, mouths, junctions and its sisters and crosses nothing.
-    Those within 0.1 % of the first come with it. ``block`` is the one that the body's cracks say they lie in; [] when
-    the rock has no strength to exceed, or no room. Raises ValueError on an unknown place.
+    ``settings.initiation``: where to search ("surface" includes crack faces). Each crack has the length
+    settings.increment, keeps settings.initiation_spacing from tips, mouths, junctions and other new cracks, and crosses
+    nothing. Those within 0.1 % of the first start with it. ``block``: number of the block in the body's cracks. [] if
+    the rock has no strength to exceed, or no room. Raises ValueError for an unknown place.
     """
     if settings.initiation not in PLACES:
         raise ValueError(f"no place for cracks to be born {settings.initiation!r}; there are {PLACES[1:]}")
@@ -118,7 +117,8 @@ def bear(
     cycle: int,
     block: int = 0,
 ) -> Cracks:
-    """``cracks`` with the ``births`` in them, named "born 1", "born 2" … on; ``segment`` counts in ``cracks``."""
+    """``cracks`` with the new cracks ``births``, named "born 1", "born 2" …; ``segment`` numbers are those in
+    ``cracks``."""
     network = Network(cracks, loops_of, cycle)
     pieces = [[row] for row in network.rows]
     number = sum(name.startswith("born ") for name in cracks.names)
@@ -141,11 +141,11 @@ def _spacing(settings: GrowthSettings) -> float:
     return settings.initiation_spacing or SPACING * settings.increment
 
 
-# -- where -----------------------------------------------------------------------------------------------------------
+# -- places ----------------------------------------------------------------------------------------------------------
 
 
 def _candidates(solution: Solution, material: Material, settings: GrowthSettings) -> list[Birth]:
-    """All cracks that could be born, most overstressed first."""
+    """All possible new cracks, most overstressed first."""
     found: list[Birth] = []
     surfaces = [_on_curves(solution), _on_sides(solution), _on_faces(solution)]
     if solution.body.half_plane is not None:
@@ -161,13 +161,14 @@ def _candidates(solution: Solution, material: Material, settings: GrowthSettings
     return [found[k] for k in in_order([-b.overstress for b in found], TIED * most)]
 
 
-# Points (n, 2) of surfaces, unit vectors into the rock, crack segments (−1 on outlines), and what gives the stress at
-# those of them that are asked for.
+# Points (n, 2) of surfaces, unit vectors into the rock, crack segments (−1 on outlines), and a function that gives the
+# stress at selected ones.
 
 
 def _on_curves(solution: Solution):
-    """The sides of polygons for curves, by their middles. At the vertices stress is the polygon's, and half-way it is
-    less than the curve's; its mean over the side is right to 0.4 % for a hole of 64 sides, 2.4 % for one of 24."""
+    """Sides of polygons that represent curves, by their midpoints. At the vertices the stress is that of the polygon,
+    and at the midpoints less than that of the curve; its mean over a side is accurate to 0.4 % for a hole of 64 sides,
+    2.4 % for 24."""
     body, g = solution.body, solution.body.boundary
     sides = np.flatnonzero(_sides_of_curves(body.loops))
     edge = body.mesh.edges[sides]
@@ -187,7 +188,7 @@ def _on_curves(solution: Solution):
 
 
 def _on_sides(solution: Solution):
-    """The other sides of outline and holes, by their collocation points; of elements at corners the middle ones."""
+    """The other sides of outline and holes, by their collocation points; of corner elements the central ones."""
     body, g = solution.body, solution.body.boundary
     edge = body.mesh.edges[g.source]
     t = shape_functions.nodes(g.family, g.order)
@@ -199,8 +200,7 @@ def _on_sides(solution: Solution):
 
 
 def _on_faces(solution: Solution):
-    """Both faces of the cracks. One divided near the end of an increment would leave a sliver of it: middle points
-    only."""
+    """Both faces of the cracks, by central points: a crack at the end of an increment would leave a sliver of it."""
     c = solution.body.faces
     t = shape_functions.nodes(c.family, c.order)
     middle = np.flatnonzero(np.abs(t) <= max(0.5, np.abs(t).min()))
@@ -212,13 +212,13 @@ def _on_faces(solution: Solution):
 
 
 def _on_free_surface(solution: Solution, settings: GrowthSettings):
-    """The surface of a half-plane, as far as an extent beyond what stands below it, evenly."""
+    """The surface of a half-plane, evenly spaced, to one extent beyond the structure below it."""
     body, rock = solution.body, solution.body.half_plane
     below = np.concatenate([*body.loops, body.cracks.nodes, np.empty((0, 2))])
     along = rock.frame(below)[:, 0] if len(below) else np.zeros(1)
     low, high = along.min() - body._extent, along.max() + body._extent
     n = min(GRID, math.ceil((1 - TIED) * (high - low) / _spacing(settings)))
-    # An odd number, so that symmetric bodies are looked at in the middle.
+    # An odd number, so that symmetric bodies have a point in the centre.
     x = low + (high - low) * (np.arange(2 * (n // 2) + 1) + 0.5) / (2 * (n // 2) + 1)
     points = np.asarray(rock.point) + x[:, None] * rock.turn[0]
     inward = np.broadcast_to(-np.asarray(rock.outward), points.shape)
@@ -226,13 +226,13 @@ def _on_free_surface(solution: Solution, settings: GrowthSettings):
 
 
 def _at_corners(solution: Solution, distance: float):
-    """Re-entrant corners of outline and holes; stress has a value only away from them, so half-way along the
+    """Re-entrant corners of outline and holes. The stress is finite only away from them: halfway along the
     ``distance``."""
     corners, inward = [np.empty((0, 2))], [np.empty((0, 2))]
     for loop in solution.body.loops:
         heading, turn = _turns(loop)
         sharp = turn < -CURVE
-        # Rock is on the left of both edges: along the mean of their normals.
+        # The rock is on the left of both edges: direction of the mean of their normals.
         into = heading - 0.5 * turn + 0.5 * math.pi
         corners.append(loop[sharp])
         inward.append(np.column_stack([np.cos(into), np.sin(into)])[sharp])
@@ -246,21 +246,21 @@ def _at_corners(solution: Solution, distance: float):
 
 
 def _sides_of_curves(loops: Sequence[np.ndarray]) -> np.ndarray:
-    """(n_edges,) whether an edge turns by no more than `CURVE` into both its neighbours."""
+    """(n_edges,) bool: edges that turn by no more than `CURVE` into both neighbours."""
     slight = [np.abs(_turns(loop)[1]) <= CURVE for loop in loops]
     return np.concatenate([np.empty(0, bool), *(here & np.roll(here, -1) for here in slight)])
 
 
 def _turns(loop: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """(n,) heading of the edge that leaves each vertex and the turn into it, rad; negative at re-entrant corners."""
+    """(n,) heading of the edge that leaves each vertex, and the turn into it, rad; negative at re-entrant corners."""
     way = np.roll(loop, -1, axis=0) - loop
     heading = np.arctan2(way[:, 1], way[:, 0])
     return heading, np.mod(heading - np.roll(heading, 1) + math.pi, 2 * math.pi) - math.pi
 
 
 def _away(cracks: Cracks, points: np.ndarray, own: np.ndarray, settings: GrowthSettings) -> np.ndarray:
-    """(n,) whether points keep their distance from tips, mouths, junctions and corners of cracks, where stress is a
-    matter of stress intensity, and, unless they lie on a face (``own`` ≥ 0), from cracks at all."""
+    """(n,) bool: points at sufficient distance from tips, mouths, junctions and corners of cracks, where stress
+    intensity governs, and from all cracks unless they lie on a face (``own`` ≥ 0)."""
     free = np.ones(len(points), bool)
     if not cracks.n_segments:
         return free
@@ -279,26 +279,26 @@ def _away(cracks: Cracks, points: np.ndarray, own: np.ndarray, settings: GrowthS
 
 
 def _corners(cracks: Cracks) -> np.ndarray:
-    """(n_nodes,) where a crack turns by more than `SMOOTH`."""
+    """(n_nodes,) bool: nodes at which a crack turns by more than `SMOOTH`."""
     way = np.zeros((len(cracks.nodes), 2))
     along = np.diff(cracks.nodes[cracks.segments], axis=1)[:, 0] / cracks.lengths[:, None]
     np.add.at(way, cracks.segments[:, 0], along)
     np.add.at(way, cracks.segments[:, 1], -along)
-    # Unit vectors out of a node that two segments leave at a turn ω add up to 2 sin(ω/2).
+    # Unit vectors from a node along two segments with a turn ω add up to 2 sin(ω/2).
     return (cracks.valence == 2) & (np.hypot(*way.T) > 2 * math.sin(SMOOTH / 2))
 
 
-# -- which way -------------------------------------------------------------------------------------------------------
+# -- directions ------------------------------------------------------------------------------------------------------
 
 
 def _from_surface(solution, material, settings, points, inward, segment, stress) -> Iterator[Birth]:
-    """Cracks from surface points into the rock, along the directions that the ``stress`` there asks for."""
+    """Cracks from surface points into the rock, in the directions given by the ``stress`` there."""
     loops = solution.body.limits
     for kind, way in _ways(stress, material, inward):
         here = np.flatnonzero(np.isfinite(way[:, 0]))
         felt = stress[here]
         if settings.initiation_distance > 0:
-            # Gauss points in the root of the distance, which takes in what rises like 1/√r to a corner.
+            # Gauss points in the root of the distance, which resolve a rise as 1/√r towards a corner.
             t, weight = np.polynomial.legendre.leggauss(5)
             root = 0.5 * (1 + t)
             at = settings.initiation_distance * root**2
@@ -319,7 +319,7 @@ def _from_surface(solution, material, settings, points, inward, segment, stress)
 
 
 def _ways(stress: np.ndarray, material: Material, inward: np.ndarray) -> Iterator[tuple[str, np.ndarray]]:
-    """Kind and unit vectors (n, 2) along cracks into the rock, nan where there is none of the kind."""
+    """Kind and unit vectors (n, 2) along cracks into the rock; nan where there is none of that kind."""
     tension, shear, angle = overstress(stress, material)
 
     def into(theta: np.ndarray, ok: np.ndarray) -> np.ndarray:
@@ -329,7 +329,7 @@ def _ways(stress: np.ndarray, material: Material, inward: np.ndarray) -> Iterato
         way[~ok | (np.abs(depth) < math.sin(LEAST_ANGLE))] = np.nan
         return way
 
-    across = angle + math.pi / 2  # the direction of σ3, along which tension parts the rock
+    across = angle + math.pi / 2  # the direction of σ3, along which tensile cracks run
     tears = reached(tension, shear)
     yield "tension", into(across, (tension > 0) & tears)
     slant = math.pi / 4 - material.friction_angle / 2
@@ -338,8 +338,8 @@ def _ways(stress: np.ndarray, material: Material, inward: np.ndarray) -> Iterato
 
 
 def _on_plane(kind: str, stress: np.ndarray, way: np.ndarray, material: Material) -> np.ndarray:
-    """Overstress (n,) of ``stress`` (n, 3) on the very planes of cracks along ``way`` (n, 2): σ_n/T, or (|τ| + σ_n tan
-    φ)/c. At a point these are the planes that `overstress` is of; a mean has other principal directions than the
+    """Overstress (n,) of ``stress`` (n, 3) on the planes of cracks along ``way`` (n, 2): σ_n/T, or (|τ| + σ_n tan φ)/c.
+    At a point these planes are those of `overstress`; an averaged stress has other principal directions than the
     surface."""
     normal = normal_of(way)
     t = traction(stress, normal)
@@ -351,7 +351,7 @@ def _on_plane(kind: str, stress: np.ndarray, way: np.ndarray, material: Material
 
 
 def _in_rock(solution, material, settings) -> Iterator[Birth]:
-    """Cracks inside the rock, their middles on a grid."""
+    """Cracks in the interior, with their midpoints on a grid."""
     body = solution.body
     corners = np.concatenate([*body.loops, body.cracks.nodes, np.empty((0, 2))])
     if not len(corners):
@@ -370,7 +370,7 @@ def _in_rock(solution, material, settings) -> Iterator[Birth]:
     tension, shear, angle = overstress(stress, material)
     tears = reached(tension, shear)
     theta = angle + math.pi / 2 + np.where(tears, 0.0, math.pi / 4 - material.friction_angle / 2)
-    # The second of the two ends is the one to the right, of a vertical crack the upper one.
+    # The second end is the one to the right; of a vertical crack the upper one.
     quarter = math.pi / 2 - ONE_WAY
     theta = np.mod(theta + quarter, math.pi) - quarter
     half = 0.5 * settings.increment * np.column_stack([np.cos(theta), np.sin(theta)])
@@ -381,7 +381,7 @@ def _in_rock(solution, material, settings) -> Iterator[Birth]:
 
 
 def _has_room(network: Network, birth: Birth, settings: GrowthSettings, block: int) -> bool:
-    """Whether the crack to be meets nothing but what it starts from."""
+    """Whether the new crack touches nothing but the surface it starts from."""
     clearance = CLEARANCE * settings.increment
     start = network.add_node(birth.start, surface=birth.place == "surface")
     own = network.rows[birth.segment] if birth.place == "face" else None

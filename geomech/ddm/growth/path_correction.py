@@ -1,24 +1,24 @@
-"""Curved crack paths from straight steps: predict, look ahead, bend.
+"""Curved crack paths from straight steps: trial step, criterion at its end, corrected step.
 
-A step along the tangent at its start errs by the turn that the path makes within it. The chord of a smooth path leaves
-its start at half the turn between the tangents at its ends, so a step is tried, the criterion is asked where it would
-go on, and the step is taken again, bent: second order in the increment. Out of a sharp kink a path starts like
-y ∝ x^(3/2) (Amestoy & Leblond 1992), whose chord has two thirds of the turn.
+A step along the tangent at its start errs by the turn of the path within it. The chord of a smooth path deviates from
+the tangent at its start by half the turn between the tangents at its ends. So a trial step is made, the criterion is
+evaluated at its end, and the step is repeated in a corrected direction: second order in the increment. From a sharp
+kink a path starts as y ∝ x^(3/2) (Amestoy & Leblond 1992), whose chord has two thirds of the turn.
 
-Compression σ along a crack makes this stiff. A step that leaves its line by ω meets a shear of its own of about
-σ ω √(πΔa), so that the turn the criterion asks for next falls by more than ω: by (1 + κ) ω, κ ~ |σ| √(πΔa) / K_I. This
-is what holds wing cracks to the line of the load (Cotterell & Rice 1980). From κ = 2 on, a single correction throws
-back as far as the trial went out, and a crack would go straight on with any K_II. So the condition on the chord is
-solved, not corrected once, where the look ahead says that it is stiff.
+Compression σ along a crack makes this stiff. A step at an angle ω to the path has a shear of its own of about σ ω
+√(πΔa), so that the turn given by the criterion at its end falls by (1 + κ) ω, κ ~ |σ| √(πΔa) / K_I. This effect keeps
+wing cracks in the direction of the load (Cotterell & Rice 1980). From κ = 2 on, a single correction overshoots by as
+much as the trial was off, and a crack would run straight on for any K_II. There the condition for the chord is solved
+by a secant iteration.
 
-A chord that has half of the turn is the trapezoidal rule: stable for all κ, but what one step leaves over comes back in
-the next with the other sign, κ/(2 + κ) of it, and stiff paths zigzag for long. With the share s of the turn it is
-(1 − s) κ/(1 + s κ): s = 1 − 1/κ from κ = 2 on leaves 1/κ, and in the limit no shear at the end of a step (backward
-Euler). κ falls with √Δa, so that fine steps have half the turn, and second order.
+The share s = 1/2 of the turn is the trapezoidal rule: stable for all κ, but the error of one step returns in the next
+with the other sign and the factor κ/(2 + κ), so that stiff paths zigzag. In general the factor is (1 − s) κ/(1 + s κ).
+From κ = 2 on, s = 1 − 1/κ leaves 1/κ, and in the limit no shear at the end of a step (backward Euler). κ falls with
+√Δa, so that fine steps have s = 1/2 and second order.
 
-From step to step neither κ nor the path's turn changes much. So where κ is known the first trial has half of the turn
-that the last step had between the tangents at its ends: on smooth paths it is off by tenths of a degree. κ then says
-how far to correct it, mostly without another look (`Remembered`), and often what was tried is the step.
+κ and the turn of the path change little from step to step. Where κ is known the first trial therefore has half of the
+last step's turn between the tangents at its ends; on smooth paths it is off by tenths of a degree. κ then gives the
+correction, mostly without another solution (`Remembered`), and often the trial is the step.
 """
 
 from __future__ import annotations
@@ -35,38 +35,38 @@ from .tip_advance import Growth
 #: A step that turns by more than this starts at a kink.
 KINK = np.radians(20.0)
 SMOOTH_SHARE, KINK_SHARE = 1 / 2, 2 / 3
-#: A chord is good when its direction is off its condition by less than this: K_II of about 1 % of K_I.
+#: Tolerance of the chord's direction: K_II of about 1 % of K_I.
 TOLERANCE = np.radians(1.0)
-#: From this κ on, paths are stiff: below, a single correction falls off from step to step.
+#: κ from which paths are stiff: below, the error of a single correction decays from step to step.
 STIFF = 2.0
-#: A correction onward by less than this that nothing says is stiff is taken as it is; of a larger one a second look
-#: tells whether it overshoots, which it does from the second figure for κ on. Steps of 1 mm along 140 MPa otherwise
-#: bend by 17° for 6°, then back, and miss the load that drives them by 14 %.
+#: Largest further turn that is corrected without a second trial unless it is known to be stiff. For a larger one the
+#: second trial shows whether it overshoots: κ above the second number. (Steps of 1 mm under 140 MPa would otherwise
+#: bend by 17° instead of 6°, then back, and miss the driving load by 14 %.)
 SMOOTH, GENTLE = np.radians(4.2), 1.0
-#: Looks ahead at most. Secants need two or three; what is left then is of the order of the tolerance.
+#: Most trials. Secants need two or three; the rest is then of the order of the tolerance.
 LOOKS = 5
-#: Bounds of the slope −1 − κ of the turn ahead over that of the chord. Beyond them two trials lie too close together to
-#: tell it.
+#: Bounds of the slope −1 − κ of the turn at the end against that of the chord; beyond them two trials are too close
+#: together to determine it.
 SLOPES = (-39.0, 0.0)
-#: The largest κ that a first look is believed.
+#: Largest κ accepted from a single trial.
 GUESSED = 8.0
-#: By this part the slope may have changed since the last step, or since the last look: a correction by it is taken
-#: unseen where what it may leave is within the tolerance.
+#: Possible relative change of the slope since the last step or trial: a correction with it is accepted without a trial
+#: where the resulting error is within the tolerance.
 CHANGED = 0.3
-#: A trial that would be corrected by less than this is the step: what is left of K_II turns the next one, and spares it
-#: the solution of another body. (Wings of the two-crack specimen in increments of 1, ½ and ¼ mm stay within 16, 10 and
-#: 3 µm of those corrected down to 0.03°.)
+#: A trial whose correction would be smaller than this is the step: its K_II turns the next one, and another body need
+#: not be solved. (Wings of the two-crack specimen in increments of 1, ½ and ¼ mm stay within 16, 10 and 3 µm of those
+#: corrected to 0.03°.)
 AS_TRIED = np.radians(0.25)
-#: A chord that turned on from its last trial by more than this tells the slope there.
+#: Smallest turn between two trials that determines the slope.
 TELLING = np.radians(0.5)
-#: The chord lies between the first trial and the first correction, since the condition falls by at least as much as the
-#: chord turns; by this part of their difference it may lie outside (tension along the crack, round-off).
+#: The chord lies between the first trial and the first correction, since the condition falls at least as fast as the
+#: chord turns; it may lie outside by this fraction of their difference (tension along the crack, round-off).
 OUTSIDE = 0.2
 
 
 class Remembered(NamedTuple):
-    """Of a tip's last step: ``kappa`` (nan: not known), the ``angle`` of its chord, the angle last ``tried`` before and
-    the one that the criterion asked for at the end of that trial, ``ahead``, and at the start of the step, ``start``."""
+    """Last step of a tip: ``kappa`` (nan: unknown), ``angle`` of its chord, angle ``tried`` last before that, the
+    angles of the criterion at the end of that trial (``ahead``) and at the start of the step (``start``)."""
 
     kappa: float
     angle: float
@@ -75,35 +75,35 @@ class Remembered(NamedTuple):
     start: float
 
     def kappa_at(self, start: float) -> float:
-        """κ now that the criterion asks for ``start`` at the end of the chord."""
+        """κ, given the angle ``start`` of the criterion at the end of the chord."""
         if abs(self.angle - self.tried) > TELLING:
             return -1 - float(np.clip((start - self.ahead) / (self.angle - self.tried), *SLOPES))
         return self.kappa
 
 
-#: Place of a tip → what its last step has told.
+#: Position of a tip → its last step.
 Memory = dict[tuple[float, float], Remembered]
 
 
 class Chords:
-    """The directions of one growth step's chords, looked for tip by tip: the steps of all tips are tried together.
+    """Directions of the chords of one growth step; the steps of all tips are tried together.
 
-    With θ the angle of the chord, θ₀ that of the criterion at its start, a(θ) the one that the criterion asks for at
-    its end and s the share of the turn, the condition is s (θ − θ₀ + a) = θ − θ₀, and a falls by 1 + κ times what θ
-    turns.
+    With θ the angle of the chord, θ₀ that of the criterion at its start, a(θ) that of the criterion at its end and s
+    the share of the turn, the condition is s (θ − θ₀ + a) = θ − θ₀, and a falls by (1 + κ) Δθ.
     """
 
     def __init__(self, tips: np.ndarray, memory: Memory | None = None) -> None:
         self.start = tips["angle"].copy()
-        #: κ by the last step, nan where it is not known, …
+        #: κ of the last step, nan where unknown, …
         self.kappa = np.full(len(tips), np.nan)
-        #: … and the chords to begin with.
+        #: … and the first trial chords.
         self.first = self.start.copy()
-        for row, point in enumerate(tips["point"].tolist() if memory else ()):
-            last, start = memory.get(tuple(point)), float(self.start[row])
+        known = memory or {}
+        for row, point in enumerate(tips["point"].tolist() if known else ()):
+            last, start = known.get(tuple(point)), float(self.start[row])
             if last is not None and abs(start) <= KINK:
                 self.kappa[row] = last.kappa_at(start)
-                # Without κ a first look is judged as one along the tangent: no other trial can be.
+                # Without κ a trial is judged as one along the tangent, so it has to be one.
                 if np.isfinite(self.kappa[row]) and max(abs(last.angle), abs(last.start)) <= KINK:
                     self.first[row] = start + SMOOTH_SHARE * (start - last.start + last.angle)
         self.share = np.where(np.abs(self.start) > KINK, KINK_SHARE, SMOOTH_SHARE)
@@ -116,10 +116,10 @@ class Chords:
         self.highest = np.full(len(tips), np.inf)
 
     def bend(self, tips: np.ndarray, grown: np.ndarray, ahead: np.ndarray, cracks: Cracks, cycle: int) -> bool:
-        """Better ``tips["angle"]`` of the tips that have ``grown`` (n_tips,); True when no further look is needed.
+        """Improve ``tips["angle"]`` of the tips that have ``grown`` (n_tips,); True when no further trial is needed.
 
-        ``ahead``: TIP rows of the tried network ``cracks`` with their growth angles; its segments of birth ``cycle``
-        are the steps that were tried.
+        ``ahead``: TIP rows of the trial network ``cracks`` with their growth angles; its segments of birth ``cycle``
+        are the trial steps.
         """
         self.looks += 1
         turns = _turns_ahead(tips, grown, ahead, cracks, cycle)
@@ -134,7 +134,7 @@ class Chords:
         off = np.abs(rest) > TOLERANCE  # not where there is nothing ahead, nan
         seen = np.isfinite(rest)
         if first:
-            # Faces that close make the condition jump; secants must not run away across the jump.
+            # Closing faces make the condition discontinuous; secants must not diverge across the jump.
             ends = np.stack([angle - OUTSIDE * rest, angle + (1 + OUTSIDE) * rest])
             self.lowest, self.highest = (
                 np.nanmin(ends, axis=0, initial=np.inf),
@@ -143,19 +143,19 @@ class Chords:
         left = np.abs(rest) * share * CHANGED * np.maximum(1 + kappa, 1.0) / (1 + share * kappa)
         tips["angle"][seen] = np.clip(angle + rest / (1 + share * kappa), self.lowest, self.highest)[seen]
         if first:
-            # A first look that turns on a little, the way the trial did, needs no second one: the path is smooth.
+            # A small further turn in the direction of the trial needs no second one: the path is smooth.
             straight = np.abs(self.start) < ONE_WAY
             self.onward = (straight | (rest * self.start >= 0)) & seen & ~known
             self.whole = angle + self.share * turns
             smooth = self.onward & (np.abs(rest) < SMOOTH) & (kappa < STIFF)
             unsettled = off & ~np.where(known, left <= TOLERANCE, smooth)
-            # … and says so: the next trial has half a turn, which is right where no trial is corrected (`AS_TRIED`).
-            # A path that goes straight on tells nothing.
+            # That determines κ: the next trial has half a turn, which suits trials without correction (`AS_TRIED`). A
+            # straight path does not determine κ.
             told = known | (smooth & ~(straight & (np.abs(turns) < ONE_WAY)))
         else:
             unsettled = off & (left > TOLERANCE)
             if self.looks == 2:
-                # Nor is a large turn stiff for its size alone: then the first correction was right, the whole of it.
+                # A large turn need not be stiff: then the whole first correction was right.
                 gentle = self.onward & (kappa < GENTLE)
                 tips["angle"][gentle], unsettled = self.whole[gentle], unsettled & ~gentle
         self.last_angle, self.last_turns = angle, turns
@@ -166,7 +166,7 @@ class Chords:
         return self.looks == LOOKS or not unsettled.any()
 
     def remember(self, memory: Memory, tips: np.ndarray, growth: Growth, cycle: int) -> None:
-        """Keep in ``memory`` what the steps that were taken have told, at their ends."""
+        """Store in ``memory``, by their ends, the data of the accepted steps."""
         ends = _new_ends(tips, growth.grown, growth.cracks, cycle)
         told = np.stack([self.kappa, tips["angle"], self.last_angle, self.last_turns, self.start], axis=1).tolist()
         for point, end, step in zip(tips["point"].tolist(), ends, told):
@@ -175,9 +175,9 @@ class Chords:
                 memory[tuple(growth.cracks.nodes[end].tolist())] = Remembered(*step)
 
     def _first_guess(self, turns: np.ndarray) -> np.ndarray:
-        """κ by the turn ahead of a trial along the tangent: on a smooth path, from half a turn before the tip, it is 2
-        + κ times that; of a zigzag about a straight line −κ times. 0 where that is not stiff; kinks do not tell, nor
-        does a path that goes straight on."""
+        """κ from the turn at the end of a trial along the tangent: on a smooth path it is 2 + κ times the half turn
+        before the tip; on a zigzag about a straight line −κ times. 0 where that is not stiff; kinks and straight paths
+        do not determine it."""
         turns = np.where(np.maximum(np.abs(turns), np.abs(self.start)) < ONE_WAY, np.nan, turns)
         with np.errstate(divide="ignore", invalid="ignore"):
             ratio = turns / self.start
@@ -185,8 +185,8 @@ class Chords:
         return np.where((kappa >= STIFF) & (np.abs(self.start) <= KINK), kappa, 0.0)
 
     def _secant(self, turns: np.ndarray, angle: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """κ by the last two looks, and whether (n_tips,) it is known; as it was where they are too near to one another
-        to tell, and 0 where it was not known."""
+        """κ from the last two trials, and whether it is known (n_tips,); unchanged where they are too close together,
+        and 0 where it was unknown."""
         with np.errstate(divide="ignore", invalid="ignore"):
             slope = (turns - self.last_turns) / (angle - self.last_angle)
         known = np.isfinite(self.kappa)
@@ -202,19 +202,19 @@ def corrected(
     correct: bool = True,
     memory: Memory | None = None,
 ) -> Growth | None:
-    """One growth step of all driven tips along chords; None when no tip moves. Sets the angles that were followed.
+    """One growth step of all driven tips along chords; None when no tip moves. Sets the final angles.
 
-    ``tips``: TIP rows with the criterion's ``angle`` and ``k_eq``; ``grow()`` advances them as they then stand, in
-    segments of birth ``cycle``; ``look_ahead(cracks)`` solves the tried network and returns its TIP rows with their
-    angles. Without ``correct`` the criterion's angles are followed as they are. ``memory``: of the last steps, brought
-    up to date.
+    ``tips``: TIP rows with the criterion's ``angle`` and ``k_eq``; ``grow()`` advances them in their present
+    directions, by segments of birth ``cycle``; ``look_ahead(cracks)`` solves the trial network and returns its TIP rows
+    with their angles. Without ``correct`` the criterion's angles are used unchanged. ``memory``: data of the last
+    steps, updated.
     """
     chords = Chords(tips, memory)
     if correct:
         tips["angle"] = chords.first
     growth = grow()
     settled = not correct
-    # A step that joins something may cut a piece off, on which there is nothing to solve.
+    # A step that joins something may cut off a piece, on which there is nothing to solve.
     while not settled and not growth.joins and np.any(growth.grown > 0):
         angle = tips["angle"].copy()
         settled = chords.bend(tips, growth.grown, look_ahead(growth.cracks), growth.cracks, cycle)
@@ -223,7 +223,7 @@ def corrected(
         tried, growth = growth, grow()
         stuck = (tried.grown > 0) & (growth.grown == 0)
         if stuck.any():
-            # Bent, a step would not leave its tip; the criterion's own direction does.
+            # A corrected step would not leave its tip; the criterion's own direction does.
             tips["angle"][stuck] = chords.start[stuck]
             growth = grow()
     if memory is not None and correct:
@@ -232,13 +232,13 @@ def corrected(
 
 
 def _turns_ahead(tips: np.ndarray, grown: np.ndarray, ahead: np.ndarray, cracks: Cracks, cycle: int) -> np.ndarray:
-    """(n_tips,) the angle that the criterion gives at the end of each tip's new segment; nan where there is no tip."""
+    """(n_tips,) angle of the criterion at the end of each tip's new segment; nan where there is no tip."""
     turn_at = {int(tip["node"]): float(tip["angle"]) for tip in ahead}
     return np.array([turn_at.get(node, np.nan) for node in _new_ends(tips, grown, cracks, cycle)])
 
 
 def _new_ends(tips: np.ndarray, grown: np.ndarray, cracks: Cracks, cycle: int) -> list[int]:
-    """The nodes in which the tips' new segments end, of birth ``cycle``; −1 where there is none."""
+    """The end nodes of the tips' new segments, of birth ``cycle``; −1 where there is none."""
     ends = [-1] * len(tips)
     new = np.flatnonzero(cracks.birth_cycle == cycle)
     at = cracks.nodes[cracks.segments[new]]  # (n, 2 ends, 2)

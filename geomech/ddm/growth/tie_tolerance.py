@@ -1,9 +1,9 @@
-"""What counts as equal where growth chooses: rounding must not.
+"""Tolerances for decisions in growth that must not depend on rounding.
 
-Sums are taken in another order by another processor, and differ in their last digits. In a symmetric body K at two
-tips, the sizes of two kinks or the ways to two faces are equal but for that, and multiples of an increment add up to a
-ligament or to less than it. So quantities that differ by less than what is named here are one, and a rule that does not
-look at them decides: as a rule that things stay as they are, else the order in which they are given.
+Processors sum in different orders and differ in the last digits. In a symmetric body K at two tips, the values of two
+kinks or the distances to two faces are equal up to that, and increments may just add up to a ligament or not.
+Quantities that differ by less than these tolerances count as equal, and another rule decides: in general that nothing
+changes, otherwise the given order.
 """
 
 from __future__ import annotations
@@ -13,11 +13,10 @@ from itertools import takewhile
 
 import numpy as np
 
-#: Values nearer than this part of themselves are one. Solutions agree to some 1e-12 between processors, and are right
-#: to 1e-5 at best.
+#: Relative tolerance of values. Solutions agree to about 1e-12 between processors, and are accurate to 1e-5 at best.
 TIED = 1e-9
-#: Directions nearer than this are one, rad. They move by 1e-13 between processors, and by this if K_II is off by 5e-7
-#: of K_I, a hundredth of what it is right to.
+#: Tolerance of directions, rad. They differ by 1e-13 between processors, and by this much if K_II is off by 5e-7 of
+#: K_I, a hundredth of its accuracy.
 ONE_WAY = 1e-6
 
 
@@ -27,8 +26,8 @@ def reached(value: np.ndarray, limit: np.ndarray | float) -> np.ndarray:
 
 
 def in_order(values: Sequence[float], apart: float) -> list[int]:
-    """Which of ``values`` comes first, second …, from the least on; those within ``apart`` of the least that is left
-    come next, as they are given."""
+    """Indices of ``values`` in ascending order; those within ``apart`` of the least remaining one come next, in the
+    given order."""
     rising = sorted(range(len(values)), key=lambda k: values[k])
     order: list[int] = []
     while len(order) < len(rising):
@@ -38,7 +37,7 @@ def in_order(values: Sequence[float], apart: float) -> list[int]:
 
 
 def best(value: np.ndarray, turn: np.ndarray) -> int:
-    """Which of the directions at ``turn`` (n,) rad from straight ahead has the largest ``value`` (n,); of those as good
-    the one that turns least, and of two that turn alike the one to the left (counter-clockwise)."""
+    """The direction, of those at ``turn`` (n,) rad from straight ahead, with the largest ``value`` (n,); of equal ones
+    that with the smallest turn, and of two equal turns the one to the left (counter-clockwise)."""
     as_good = np.flatnonzero(reached(value, np.max(value)))
     return int(as_good[np.argmin(np.abs(turn[as_good]) - ONE_WAY * (turn[as_good] > 0))])

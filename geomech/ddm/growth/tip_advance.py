@@ -1,16 +1,15 @@
 """Crack growth as pure geometry: each driven tip advances by one segment, or joins what it meets.
 
-A step is straight, from the tip by its increment along its growth angle. In order, it
+A step is straight, from the tip by its increment along its growth angle. In this order, it
 
-1. meets another driven tip that comes towards it half way (both end at one common node);
-2. is trimmed where it would cross a crack face or a boundary, and joins it there;
-3. otherwise, when its end comes near a crack or a boundary, nearer than its start, that lies ahead of it and can be
-  reached
-   without crossing anything, goes there instead;
-4. otherwise ends in the rock, a tip again.
+1. meets another driven tip that approaches it, halfway (both end at a common node); 2. is cut where it would cross a
+crack face or a boundary, and joins it there; 3. goes to a crack or a boundary ahead of it instead, if its end comes
+close to that, closer than its start, and nothing is
+   in between;
+4. otherwise ends in the rock as a tip.
 
-The network stays a planar graph: segments meet at common nodes and nowhere else. What lies just as far off as would
-be near is not near (`tie_tolerance`): with 9 mm left and increments of 6 mm that join within 3 mm a tip ends in the rock.
+The network stays a planar graph: segments meet at common nodes only. A distance equal to the join distance does not
+count as close (`tie_tolerance`): with 9 mm left and increments of 6 mm that join within 3 mm a tip ends in the rock.
 """
 
 from __future__ import annotations
@@ -27,30 +26,30 @@ from .approach_limit import longest_advance
 from .crack_network import Network, Obstacle, Point, Row, nearest_on, passage
 from .tie_tolerance import ONE_WAY, in_order, reached
 
-#: Shorter segments than this part of the shortest increment are not made: ends snap to what they nearly touch.
+#: Shortest segment, as a fraction of the shortest increment: ends snap to what they nearly touch.
 SLIVER = 0.1
-#: Two paths are kept apart by this part of a sliver, and lengths are one that differ by less.
+#: Clearance between paths, as a fraction of that length; also the tolerance of lengths.
 CLEARANCE = 1e-3
-#: A tip (first) or another node (second) is preferred to the bare face when its distance times this is the smaller.
+#: A tip (first) or another node (second) is preferred to the bare face if its distance times this is smaller.
 PREFER_TIP, PREFER_NODE = 0.6, 0.9
-#: A face that is crossed within this part of the join distance from one of its nodes is joined at that node.
+#: A face crossed within this fraction of the join distance from one of its nodes is joined at that node.
 SNAP_TO_TIP, SNAP_TO_NODE = 0.5, 0.1
-#: What is more than this off the direction of growth is not ahead.
+#: Points at a larger angle to the growth direction than this are not ahead.
 AHEAD = math.cos(math.radians(60.0) + ONE_WAY)
-#: Two tips meet half way when each lies within this of the other's direction of growth.
+#: Two tips meet halfway when each lies within this angle of the other's growth direction.
 FACING = math.cos(math.radians(45.0) + ONE_WAY)
-#: A way that would meet a boundary or a crack at a smaller angle goes straight across to it instead: the mouth, now or
-#: once a block parts along the crack, would be too sharp to be resolved (a body is refused below 3°), and the rock
-#: between is as good as gone.
+#: A path that would meet a boundary or a crack at a smaller angle goes straight across to it instead: the mouth would
+#: be too sharp to be resolved, now or once a block is split there (a body below 3° is refused), and the rock between
+#: carries hardly anything.
 GRAZES = math.sin(math.radians(5.0) - ONE_WAY)
-#: A tip that would turn back along its own crack more sharply than this stands still.
+#: A tip that would turn back along its own crack more sharply than this does not grow.
 TURN_BACK = math.radians(170.0)
 
 
 @dataclass(frozen=True)
 class Join:
-    """A tip that met something. ``tip_node`` counts in the network before growth; ``other_crack`` is −1 for the
-    boundary; ``kind`` is "coalescence" (with another crack), "self" (with its own) or "daylighting"."""
+    """A tip that met something. ``tip_node``: number before growth; ``other_crack``: −1 for the boundary; ``kind``:
+    "coalescence" (with another crack), "self" (with its own) or "daylighting"."""
 
     kind: str
     tip_node: int
@@ -61,9 +60,9 @@ class Join:
 
 @dataclass(frozen=True, eq=False)
 class Growth:
-    """``cracks`` after growth, ``grown`` (n_tips,) m, one entry a tip row, and the ``joins`` that came about.
+    """``cracks`` after growth, ``grown`` (n_tips,) m for each tip row, and the ``joins``.
 
-    Nodes keep their numbers unless a tip was drawn onto an existing node, which removes it.
+    Nodes keep their numbers, except for a tip that was moved onto an existing node and is removed.
     """
 
     cracks: Cracks
@@ -71,13 +70,13 @@ class Growth:
     joins: tuple[Join, ...]
 
 
-#: A way for a step to end: on which obstacle, at which of its nodes (None: between them), and where that is.
+#: A possible end of a step: obstacle, node on it (None: between its nodes), point.
 _Way = tuple[Obstacle, int | None, Point]
 
 
 @dataclass(frozen=True)
 class _Step:
-    """One tip's wish: from ``start`` by ``length`` along the unit vector ``direction``."""
+    """Intended step of one tip: from ``start`` by ``length`` along the unit vector ``direction``."""
 
     row: int  # in the tips given
     node: int
@@ -106,9 +105,9 @@ def advance(
     ``tips`` are TIP rows with ``k_eq`` and ``angle`` filled; ``k_ic`` (n_tips,) Pa √m; ``cycle`` is the birth cycle of
     new segments. The increment is settings.increment times (K_eq/K_Ic) over its largest value, but no less than
     settings.min_increment, and no more than ``longest`` (n_tips,) m; where that is 0 the tip stands. Near other cracks
-    it is shorter (`approach_limit`). New segments carry aperture 0 and continue their crack's direction and place in the
-    list. Tips are served in the order given. Raises
-    ValueError for a tip row that is no tip of the network, or whose angle is not finite.
+    it is shorter (`approach_limit`). New segments carry aperture 0 and continue their crack's direction and place in
+    the list. Tips are served in the order given. Raises ValueError for a tip row that is no tip of the network, or
+    whose angle is not finite.
     """
     k_ic = np.broadcast_to(np.asarray(k_ic, dtype=float), (len(tips),))
     grown = np.zeros(len(tips))
@@ -150,7 +149,7 @@ def advance(
 
 
 class _Work:
-    """The network under work, its lengths, and the joins so far."""
+    """The network during growth, its lengths, and the joins so far."""
 
     def __init__(self, network: Network, settings: GrowthSettings):
         self.network = network
@@ -171,7 +170,7 @@ class _Work:
 
 
 def _meet_half_way(work: _Work, steps: list[_Step], grown: np.ndarray) -> set[int]:
-    """Join pairs of tips that grow towards each other and meet in this advance; returns the rows served."""
+    """Join pairs of tips that approach and meet each other in this step; returns their rows."""
     network, pairs, met = work.network, [], set()
     for i, a in enumerate(steps):
         for b in steps[i + 1 :]:
@@ -179,7 +178,7 @@ def _meet_half_way(work: _Work, steps: list[_Step], grown: np.ndarray) -> set[in
                 continue
             d = (b.start[0] - a.start[0], b.start[1] - a.start[1])
             gap = math.hypot(*d)
-            # Nearer than a few slivers there is no room for two segments: one tip then simply reaches the other.
+            # Closer than a few slivers there is no room for two segments: one tip then simply reaches the other.
             if not (work.nearer(4 * work.sliver, gap) and work.nearer(gap, a.length + b.length + work.reach)):
                 continue
             d = (d[0] / gap, d[1] / gap)
@@ -212,8 +211,8 @@ def _meet_half_way(work: _Work, steps: list[_Step], grown: np.ndarray) -> set[in
 
 
 def _crossing(work: _Work, a: _Step, b: _Step) -> tuple[float, float]:
-    """(t, u) of two steps that cross, parts of their lengths; nan for those that do not, and for two along one line, of
-    which only rounding would say where."""
+    """(t, u): where two steps cross, as fractions of their lengths; nan if they do not, or if they are collinear, where
+    rounding would decide."""
     if abs(a.direction[0] * b.direction[1] - a.direction[1] * b.direction[0]) < ONE_WAY:
         return math.nan, math.nan
     parts = []
@@ -240,7 +239,7 @@ def _advance_one(work: _Work, step: _Step, grown: np.ndarray) -> None:
             end = min(math.dist(at, obstacle.a), math.dist(at, obstacle.b))
             if obstacle.row is not None and work.nearer(end, work.sliver):
                 continue  # past its end
-        # So near already that a segment would be a sliver: then the tip itself is drawn onto what it meets.
+        # If a segment would be a sliver, the tip itself is moved onto what it meets.
         drawn = work.nearer(math.dist(step.start, at), work.sliver)
         allowed = set() if node is None else {node}
         if not (_clear_when_drawn if drawn else _clear)(work, step, at, allowed, obstacle):
@@ -263,13 +262,13 @@ def _advance_one(work: _Work, step: _Step, grown: np.ndarray) -> None:
 
 
 def _grazes(start: Point, at: Point, face: Obstacle) -> bool:
-    """Whether the way from ``start`` to ``at`` on the ``face`` of a crack or a boundary runs nearly along it."""
+    """Whether the path from ``start`` to ``at`` on the ``face`` of a crack or a boundary runs nearly along it."""
     (x, y), (dx, dy) = (at[0] - start[0], at[1] - start[1]), (face.b[0] - face.a[0], face.b[1] - face.a[1])
     return abs(x * dy - y * dx) < GRAZES * math.hypot(x, y) * math.hypot(dx, dy)
 
 
 def _blocked(work: _Work, step: _Step) -> list[_Way] | None:
-    """Ways to end a step at the first thing it would cross, best first; None when nothing is in its way."""
+    """Possible ends of a step at the first obstacle it would cross, best first; None when there is none."""
     network, met = work.network, []
     for obstacle in network.near(step.block, step.node, step.length + work.reach):
         t = network.first_contact(step.node, step.start, step.end, obstacle, work.clearance)
@@ -277,7 +276,7 @@ def _blocked(work: _Work, step: _Step) -> list[_Way] | None:
             met.append((t, obstacle))
     if not met:
         return None
-    # At a corner, a junction or a mouth it meets several at once: the boundary then counts, which knows its mouths.
+    # At a corner, junction or mouth it meets several at once: the boundary then counts, which knows its mouths.
     met.sort(key=lambda each: each[1].row is not None)
     t, obstacle = met[in_order([t for t, _ in met], work.clearance / step.length)[0]]
     hit = (step.start[0] + t * (step.end[0] - step.start[0]), step.start[1] + t * (step.end[1] - step.start[1]))
@@ -286,7 +285,7 @@ def _blocked(work: _Work, step: _Step) -> list[_Way] | None:
     for node, point in network.nodes_on(obstacle, step.block):
         snap = SNAP_TO_TIP if network.is_tip(node) else SNAP_TO_NODE
         distance = math.dist(point, at)
-        # The straight way must still be the way the crack was going, or nearly so.
+        # The direct path must still be nearly that of the crack.
         ahead = _dot(_towards(step.start, point), step.direction) >= AHEAD or distance <= work.sliver
         near = work.nearer(distance, max(work.sliver, snap * work.reach))
         if ahead and near and not network.connected(step.node, node):
@@ -299,16 +298,16 @@ def _blocked(work: _Work, step: _Step) -> list[_Way] | None:
 
 
 def _attracted(work: _Work, step: _Step) -> list[_Way]:
-    """Ways to join what the free end of a step comes near, best first."""
+    """Possible joins of a step whose free end comes close to something, best first."""
     network, ways, seen = work.network, [], set()
     own = network.crack_at(step.node)
-    # Its own neighbourhood along the crack is always near and never a thing to join.
+    # The crack's own neighbourhood is always close, and never joined.
     tail = network.within(step.node, 2 * (step.length + work.reach) + work.clearance)
     for obstacle in network.near(step.block, step.node, step.length + work.reach):
         if obstacle.row is not None and obstacle.row in tail:
             continue
         distance, at = nearest_on(step.end, obstacle.a, obstacle.b)
-        # What a step leaves behind, as a crack that the tip has come past, does not draw it back.
+        # Something that recedes, as a crack the tip has passed, is not joined.
         if not work.nearer(distance, min(work.reach, nearest_on(step.start, obstacle.a, obstacle.b)[0])):
             continue
         is_own = obstacle.row is not None and obstacle.row.crack == own
@@ -332,18 +331,18 @@ def _attracted(work: _Work, step: _Step) -> list[_Way]:
 
 
 def _best_first(work: _Work, ways: list[tuple[float, Obstacle, int | None, Point]]) -> list[_Way]:
-    """``ways`` by their scores, m."""
+    """``ways`` in order of their scores, m."""
     return [ways[k][1:] for k in in_order([way[0] for way in ways], work.clearance)]
 
 
 def _clear(work: _Work, step: _Step, at: Point, allowed: set[int], target: Obstacle | None) -> bool:
-    """Whether the segment from the tip to ``at`` meets nothing on its way, but at its end the ``target`` or segments
-    that end at an ``allowed`` node. Grazing the target (below about 5°) counts as meeting it."""
+    """Whether the segment from the tip to ``at`` touches nothing, except at its end the ``target`` or segments that end
+    at an ``allowed`` node. Grazing the target (below about 5°) counts as touching it."""
     return _free_path(work, step.node, step.block, step.start, at, allowed, target)
 
 
 def _clear_when_drawn(work: _Work, step: _Step, at: Point, allowed: set[int], target: Obstacle) -> bool:
-    """`_clear` for the tip's last segment, were its end drawn to ``at``."""
+    """`_clear` for the tip's last segment with its end moved to ``at``."""
     before = work.network.other_end(step.node)
     start = work.network.nodes[before]
     if work.nearer(math.dist(start, at), work.sliver) or any(work.network.connected(before, node) for node in allowed):
@@ -362,7 +361,7 @@ def _free_path(
     target: Obstacle | None,
     without: Row | None = None,
 ) -> bool:
-    """`_clear` for any path from ``node`` at ``start``, leaving the segment ``without`` out of account."""
+    """`_clear` for any path from ``node`` at ``start``, ignoring the segment ``without``."""
     network = work.network
     length = math.dist(start, at)
     late = 1 - 12 * work.clearance / length
@@ -379,7 +378,7 @@ def _free_path(
 
 
 def _open_ring(work: _Work, block: int, chain: list[int], joined: int) -> None:
-    """Part the cracks of a mouth through which a ``chain`` of nodes has closed at ``joined``."""
+    """Separate the cracks of a mouth through which a ``chain`` of nodes has closed at ``joined``."""
 
     def free(node: int, at: Point, edge: Obstacle, row: Row) -> bool:
         return _free_path(work, node, block, work.network.nodes[node], at, set(), edge, row)
@@ -389,7 +388,7 @@ def _open_ring(work: _Work, block: int, chain: list[int], joined: int) -> None:
 
 
 def _draw(network: Network, tip: int, obstacle: Obstacle, node: int | None, at: Point) -> int:
-    """Move ``tip`` onto the obstacle, or onto its ``node``; the node where it then is."""
+    """Move ``tip`` onto the obstacle, or onto its ``node``; returns the node where it then is."""
     network.move(tip, at)
     if node is not None:
         network.merge(tip, node)
@@ -402,7 +401,7 @@ def _draw(network: Network, tip: int, obstacle: Obstacle, node: int | None, at: 
 
 
 def _anchor(network: Network, obstacle: Obstacle, node: int | None, at: Point) -> int:
-    """The node at which a step ends: the one given, or a new one on the obstacle."""
+    """The end node of a step: the given one, or a new one on the obstacle."""
     if node is not None:
         return node
     new = network.add_node(at, surface=obstacle.row is None)

@@ -31,10 +31,10 @@ NEAR = 12.0
 MOST_REACTIONS = 128_000_000
 
 
-def is_iterated(solver: str, n_unknowns: int, holds: Holds | None = None, holes_held: bool = False) -> bool:
+def is_iterated(solver: str, n_unknowns: int, holds: Holds | None = None, holes_supported: bool = False) -> bool:
     """Whether ``solver`` iterates on so many boundary unknowns, of which supports have those of ``holds``; where they
     hold a hole (`hole_supports`) the boundary is factored."""
-    if solver == "dense" or n_unknowns < CROSSOVER or holes_held:
+    if solver == "dense" or n_unknowns < CROSSOVER or holes_supported:
         return False
     return holds is None or n_unknowns * holds.sources.n_unknowns <= MOST_REACTIONS
 

@@ -45,14 +45,14 @@ class CoarseLevel:
         self._coarse = ElementSet(start, end, kind, np.arange(self.n), ORDER, elements.family, elements.half_plane)
         self._matrix = influence(self._coarse, self._coarse, nu, tol)
         self._parts = [_Part(elements, run, int(k)) for run, k in zip(runs, kind)]
-        self._held: np.ndarray | None = None
+        self._prescribed: np.ndarray | None = None
 
-    def change(self, held: np.ndarray) -> None:
-        """From now on the unknowns ``held`` (n,) bool are zero; a coarse component is, where most of its nodes are."""
-        if not self.n or (self._held is not None and np.array_equal(self._held, held)):
+    def change(self, prescribed: np.ndarray) -> None:
+        """From now on the unknowns ``prescribed`` (n,) bool are zero; a coarse component is, where most of its nodes are."""
+        if not self.n or (self._prescribed is not None and np.array_equal(self._prescribed, prescribed)):
             return
-        self._held = held.copy()
-        most = np.array([held[part.unknowns].mean(axis=1) > 0.5 for part in self._parts])
+        self._prescribed = prescribed.copy()
+        most = np.array([prescribed[part.unknowns].mean(axis=1) > 0.5 for part in self._parts])
         self._free = ~np.repeat(most.ravel(), ORDER + 1)
         self._factor = Factor(self._matrix[np.ix_(self._free, self._free)], "coarse elements leave a part without hold")
 
@@ -70,14 +70,14 @@ class CoarseLevel:
         for part, own, w in zip(self._parts, smooth.reshape(shape), density.reshape(shape)):
             rest[part.unknowns] -= own @ part.at_nodes.T
             out[part.unknowns] = w @ part.density.T
-        out[self._held] = rest[self._held] = 0.0
+        out[self._prescribed] = rest[self._prescribed] = 0.0
         return out, rest
 
     def split_transposed(self, smooth: np.ndarray, rest: np.ndarray) -> np.ndarray:
         """`split` as a matrix of two parts, transposed: (n,) from what multiplies either of its results."""
         if not self.n:
             return rest
-        smooth, out = np.where(self._held, 0.0, smooth), np.where(self._held, 0.0, rest)
+        smooth, out = np.where(self._prescribed, 0.0, smooth), np.where(self._prescribed, 0.0, rest)
         density = np.concatenate([(smooth[part.unknowns] @ part.density).ravel() for part in self._parts])
         own = np.zeros_like(density)
         own[self._free] = self._factor.solve(density[self._free], transposed=True)

@@ -149,20 +149,20 @@ class IterativeCrackSystem:
             own = out[self._first :]
             own[moving] += rows.mixed[moving] * own[moving + rows.per]
             own -= rows.spring * v[self._first :]
-            own[rows.held] = 0.0
+            own[rows.prescribed] = 0.0
             return out
 
         def of_cracks(v: np.ndarray) -> np.ndarray:
-            smooth, rest = self._coarse.split(np.where(rows.held, 0.0, v))
+            smooth, rest = self._coarse.split(np.where(rows.prescribed, 0.0, v))
             return smooth + self._patches.solve(rest)
 
         def roughly(v: np.ndarray) -> np.ndarray:
             return of_cracks(v) if self._coupled is None else self._coupled.roughly(v, of_cracks, False)
 
         self._patches.change(rows)
-        self._coarse.change(rows.held)
-        right = np.concatenate([np.zeros(self._first), np.where(rows.held, 0.0, right)])
-        found, n = gmres(times, right, roughly, self._guess(right, rows.held), scale=self._scale)
+        self._coarse.change(rows.prescribed)
+        right = np.concatenate([np.zeros(self._first), np.where(rows.prescribed, 0.0, right)])
+        found, n = gmres(times, right, roughly, self._guess(right, rows.prescribed), scale=self._scale)
         self.products += n
         self._last = right, found
         return found[self._first :]
@@ -180,24 +180,24 @@ class IterativeCrackSystem:
             else:
                 out = self._coupled.times(mixed, transposed=True)
             out[self._first :] -= rows.spring * before
-            out[self._first :][rows.held] = 0.0
+            out[self._first :][rows.prescribed] = 0.0
             return out
 
         def of_cracks(v: np.ndarray) -> np.ndarray:
-            v = np.where(rows.held, 0.0, v)
+            v = np.where(rows.prescribed, 0.0, v)
             return self._coarse.split_transposed(v, self._patches.solve_transposed(v))
 
         def roughly(v: np.ndarray) -> np.ndarray:
             return of_cracks(v) if self._coupled is None else self._coupled.roughly(v, of_cracks, True)
 
         self._patches.change(rows)
-        self._coarse.change(rows.held)
-        right = np.concatenate([np.zeros(self._first), np.where(rows.held, 0.0, right)])
+        self._coarse.change(rows.prescribed)
+        right = np.concatenate([np.zeros(self._first), np.where(rows.prescribed, 0.0, right)])
         found, n = gmres(times, right, roughly, scale=self._scale)
         self.products += n
         return found[self._first :]
 
-    def _guess(self, right: np.ndarray, held: np.ndarray) -> np.ndarray | None:
+    def _guess(self, right: np.ndarray, prescribed: np.ndarray) -> np.ndarray | None:
         """The last solution, as much of it as its right-hand side is in this one."""
         if self._last is None:
             return None
@@ -206,12 +206,12 @@ class IterativeCrackSystem:
         if not size:
             return None
         guess = float(before @ right) / size * w
-        guess[self._first :][held] = 0.0
+        guess[self._first :][prescribed] = 0.0
         return guess
 
     def changed(self, rows: Rows) -> tuple[np.ndarray, Iterated]:
         """As `crack_system.CrackSystem.changed`."""
-        return np.flatnonzero(~rows.held), Iterated(self, rows)
+        return np.flatnonzero(~rows.prescribed), Iterated(self, rows)
 
     def rcond(self, closed: np.ndarray) -> float:
         """Reciprocal condition of the patches solved with, the worst one: of the whole, none is known."""
@@ -231,7 +231,7 @@ class Iterated:
 
     def __init__(self, system: IterativeCrackSystem, rows: Rows):
         self._system, self._rows = system, rows
-        self._free = np.flatnonzero(~rows.held)
+        self._free = np.flatnonzero(~rows.prescribed)
 
     @property
     def rcond(self) -> float:

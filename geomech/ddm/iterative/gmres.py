@@ -163,8 +163,8 @@ class Patches:
         """From now on the equations are those of ``rows``; only patches to which that is news are factored."""
         for k, (elements, own) in enumerate(self._patches):
             unknowns = self._elements.unknowns(elements)
-            held, mixed, spring = rows.held[unknowns], rows.mixed[unknowns], rows.spring[unknowns]
-            key = held.tobytes() + mixed.tobytes() + spring.tobytes()
+            prescribed, mixed, spring = rows.prescribed[unknowns], rows.mixed[unknowns], rows.spring[unknowns]
+            key = prescribed.tobytes() + mixed.tobytes() + spring.tobytes()
             known = self._factors[k]
             if known is not None and known[0] == key:
                 continue
@@ -172,9 +172,9 @@ class Patches:
             moving = np.flatnonzero(mixed)
             matrix[moving] += mixed[moving, None] * matrix[moving + rows.per]
             matrix -= np.diag(spring)
-            if held.any():
-                matrix = matrix[np.ix_(~held, ~held)]
-            free = unknowns[~held]
+            if prescribed.any():
+                matrix = matrix[np.ix_(~prescribed, ~prescribed)]
+            free = unknowns[~prescribed]
             kept = np.flatnonzero(np.isin(free, own))
             self._factors[k] = key, free, kept, free[kept], Factor(matrix, "cracks cut a part of the body off")
 

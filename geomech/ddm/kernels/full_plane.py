@@ -1,20 +1,20 @@
-"""Influence of straight elements, in closed form near and by series far: everything that is compiled for statics.
+"""Influence of straight elements in the infinite plane: closed forms nearby, series far away. All compiled.
 
-With t on the element, w(t) its weight (`shape_functions`) and ζ the field point in half lengths c about the middle, all fields
-of an element follow from the Cauchy moments and their derivatives
+With t on the element, w(t) its weight (`shape_functions`) and ζ the field point relative to the midpoint, in half
+lengths c, all fields of an element follow from the Cauchy moments and their derivatives
 
     A_k(ζ) = ∫ w(t) t^k / (ζ − t) dt,   A_k = ζ A_{k−1} − m_{k−1},   m_j = ∫ w t^j dt,
 
-because G' = A, G'' = A'/c, G''' = A''/c² for G(z) = ∫ N log(z − t) dt (Crouch & Starfield 1983, ch. 5). The
-recurrence runs upwards near the element; far away it would lose |ζ|^(k+1) in digits, so there A_p comes from its series
-in 1/ζ and the same recurrence runs downwards, where it is stable.
+because G' = A, G'' = A'/c, G''' = A''/c² for G(z) = ∫ N log(z − t) dt (Crouch & Starfield 1983, ch. 5). The recurrence
+runs upwards near the element. Far away it would lose |ζ|^(k+1) digits; there A_p comes from its series in 1/ζ, and the
+same recurrence runs downwards, where it is stable.
 
-Densities are jumps u⁺ − u⁻ times 2μ (so a crack's slip and opening, a boundary's own displacement when the rock lies
-on the left) and line forces. A point on the element's line is seen from the side that the sign of y (±0.0 included)
-tells.
+Densities are jumps u⁺ − u⁻ times 2μ (slip and opening of a crack; the displacement of a boundary with the rock on its
+left) and line forces. On the line of an element, the sign of y (±0.0 included) selects the side from which a point is
+seen.
 
-Points are sorted by distance, element by element, and taken eight of a class at a time (`simd`): a pair's value is
-that of its lane, whatever stands beside it, so it does not depend on what else is asked for, nor on threads.
+Points are sorted by distance, element by element, and evaluated in groups of eight of one distance class (`simd`). The
+value for a pair depends on that pair alone, not on other points or on the number of threads.
 """
 
 from __future__ import annotations
@@ -50,15 +50,15 @@ from .simd import (
     value,
 )
 
-#: |ζ| from which each class of distance reaches, and the terms its series needs. Below the first is the closed form of
-#: orders above 5, below the second that of orders up to 5: upward steps lose a factor |ζ| each, six at 2.2 two digits,
-#: and so do eleven at 1.5. The terms left out are below 1e-17 of the first.
+#: Lower bounds |ζ| of the distance classes; each has as many series terms as it needs. Below the first bound the closed
+#: form is used for orders above 5, below the second for orders up to 5: each upward step loses a factor |ζ|, so that
+#: six steps at 2.2, or eleven at 1.5, lose two digits. Omitted terms are below 1e-17 of the first.
 _REACH = np.array([1.5, 2.2, 2.6, 3.2, 4.2, 6.0, 9.0, 15.0, 30.0, 100.0, 1e3, 1e5])
 
 
 def _terms(reach: float) -> int:
     n = 1
-    # The second derivative's coefficients grow as j²/2, the moments fall as 1/j.
+    # The coefficients of the second derivative grow as j²/2, the moments fall as 1/j.
     while 0.5 * (n + 2) * reach**-n > 1e-17:
         n += 1
     return n + n % 2
@@ -68,15 +68,15 @@ _TERMS = np.array([_terms(r) for r in _REACH])
 _REACH_SQUARED = _REACH**2
 _CLASSES = len(_REACH) + 1
 
-#: Points sorted at a time.
+#: Number of points sorted at a time.
 _TILE = 256
 _ROW = _TILE + WIDTH
-#: Where A', A'' and the next order stand behind A.
+#: Offsets of A', A'' and the next order behind A.
 _B, _D, _STEP = 2 * WIDTH, 4 * WIDTH, 6 * WIDTH
 
 _jit = kept(fastmath=False, error_model="numpy", nogil=True)
 _part = part(fastmath=False, error_model="numpy", nogil=True)
-#: What stands in the kernel itself, so that its products and the sums behind them are fused as if written there.
+#: Inlined into the calling kernel, so that products and sums are fused as if written there.
 _inlined = part(fastmath=False, error_model="numpy", nogil=True, forceinline=True)
 
 
@@ -89,8 +89,8 @@ class Elements(NamedTuple):
 
 
 class Kernel(NamedTuple):
-    """Of elements in rock of Poisson's ratio ``nu``: jumps, or line forces (``force``); a point within ``tol`` m of an
-    open one is on it, on the given ``side``."""
+    """Type of source: Poisson's ratio ``nu`` of the rock; jumps, or line forces (``force``); points within ``tol`` m of
+    an open element lie on it and are seen from ``side``."""
 
     nu: float
     tol: float
@@ -100,7 +100,7 @@ class Kernel(NamedTuple):
 
 @_part
 def _square_root(z):
-    """The principal root, above or below its cut by the sign of Im z."""
+    """Principal square root; on the cut the sign of Im z selects the side."""
     r = root(norm(z))
     large = root(0.5 * (r + size(re(z))))
     small = 0.5 * size(im(z)) / large
@@ -124,12 +124,12 @@ def _first_moment(kind, zp, zm):
     v = s
     y = im(s)
     if kind == 0:
-        # Ratios of distances as one plus what is known to full relative accuracy, from the nearer end.
+        # Ratios of distances as 1 + x, with x accurate to full relative precision, from the nearer end.
         way, more = re(s + s1), size(re(s + s1)) / less(norm(s), norm(s1), norm(s), norm(s1))
         up, below = -2.0 * y, 2.0 * (re(s) * re(s1) + y * y)
     else:
         v = _square_root(s)
-        # |v|² − 1 and |v − 1| written through s − 1, which is known to full relative accuracy near the far end.
+        # |v|² − 1 and |v − 1| from s − 1, which is accurate to full relative precision near the far end.
         way, more = re(v), 4.0 * re(v) * norm(v + 1.0) / norm(s1)
         up, below = -2.0 * im(v), (re(s1) * (re(s) + 1.0) + y * y) / (root(norm(s)) + 1.0)
     # log((ζ+1)/(ζ−1)), or log((v+1)/(v−1)).
@@ -149,7 +149,8 @@ def _first_moment(kind, zp, zm):
 
 @_part
 def _moments(kind, distance, zp, zm, order, table, w):
-    """A_k, A_k', A_k'' for k = 0 … order, eight points of one class, into ``w``, ``_STEP`` numbers an order."""
+    """A_k, A_k', A_k'' for k = 0 … order at eight points of one distance class, into ``w``, ``_STEP`` numbers per
+    order."""
     z = 0.5 * (zp + zm)
     if distance == 0 or (distance == 1 and order <= 5):
         a, b, d = _first_moment(kind, zp, zm)
@@ -163,7 +164,7 @@ def _moments(kind, distance, zp, zm, order, table, w):
         return
     i = 1.0 / z
     n = _TERMS[distance - 1]
-    # Odd moments vanish where the weight is even.
+    # Odd moments vanish for even weights.
     even = kind == 0 or kind == 3
     first, step, q, lead = 0, 1, i, i
     if even:
@@ -196,7 +197,7 @@ def _moments(kind, distance, zp, zm, order, table, w):
 
 @_jit
 def moments(kind, xp, xm, y, order, table, a, b, d):
-    """A_k, A_k', A_k'' for k = 0 … order into ``a``, ``b``, ``d`` (n, order+1) at ζ + 1 = xp + iy, ζ − 1 = xm + iy,
+    """A_k, A_k', A_k'' for k = 0 … order into ``a``, ``b``, ``d`` (n, order+1), at ζ + 1 = xp + iy, ζ − 1 = xm + iy,
     (n,) each."""
     w = np.empty((MAX_ORDER + 1) * _STEP)
     for i in range(len(y)):
@@ -213,14 +214,14 @@ def moments(kind, xp, xm, y, order, table, a, b, d):
 
 @_part
 def _sort(points, first, n, elements, e, tol, side, tile, chosen, count):
-    """Points ``first`` … + n in the frame of element ``e``, lengths in half lengths c, sorted by distance.
+    """Transform points ``first`` … + n to the frame of element ``e``, in half lengths c, and sort them by distance.
 
     ``points`` x … y … flat, each padded to whole lanes; ``tile``: x + 1, x − 1, y (``_TILE`` each, a fourth is
-    scratch); ``chosen`` (_CLASSES rows of _ROW) the points of a class, ``count`` of them, the last repeated so that it
-    fills lanes. Returns (c, tx, ty).
+    scratch); ``chosen`` (_CLASSES rows of _ROW): points of each class, ``count`` of them, the last repeated to fill the
+    lanes. Returns (c, tx, ty).
 
-    A point within ``tol`` of the open element is put on it, on the given side; one that meets an end is moved off by
-    1e-14 along the normal, so that what is infinite there stays finite.
+    A point within ``tol`` of the open element is moved onto it, on the given side. A point at an end is moved by 1e-14
+    along the normal, so that singular values stay finite.
     """
     sx, sy, ex, ey = elements.start[e, 0], elements.start[e, 1], elements.end[e, 0], elements.end[e, 1]
     lx, ly = ex - sx, ey - sy
@@ -232,7 +233,7 @@ def _sort(points, first, n, elements, e, tol, side, tile, chosen, count):
         px, py = load(points, first + i), load(points, first + i + below)
         ax, ay, bx, by = px - sx, py - sy, px - ex, py - ey
         xp, xm = ax * tx + ay * ty, bx * tx + by * ty
-        # From the nearer end, so that y keeps its digits close to either.
+        # From the nearer end, which keeps the digits of y close to both.
         y = less(size(xp), size(xm), ay * tx - ax * ty, by * tx - bx * ty)
         on = less(tol, size(y), y, signed(splat(0.0), splat(side)))
         y = less(0.0, xp, less(xm, 0.0, on, y), y)
@@ -262,10 +263,10 @@ def _sort(points, first, n, elements, e, tol, side, tile, chosen, count):
     return c, tx, ty
 
 
-@_part
+@_inlined
 def _force_tractions(w, n1, factor, nu, y, turn, parts):
-    """Traction along the normal + i times that along the tangent, of line forces along and across an element, into
-    ``parts``: half the deviator (σyy − σxx)/2 + i shear, turned, and half the trace."""
+    """Traction (normal + i tangential) of line forces along and across an element, into ``parts``: half the deviator
+    (σyy − σxx)/2 + i shear, rotated, plus half the trace."""
     for k in range(n1):
         at = k * _STEP
         a, b = -factor * load_complex(w, at), (-factor * y) * load_complex(w, at + _B)
@@ -274,9 +275,9 @@ def _force_tractions(w, n1, factor, nu, y, turn, parts):
         store(parts, at + _B, (b + (1.0 - 2.0 * nu) * times_i(a)) * turn - im(a))
 
 
-@_part
+@_inlined
 def _jump_tractions(w, n1, f2, y, turn, parts):
-    """The same of jumps."""
+    """Traction (normal + i tangential) of displacement jumps along and across an element."""
     f3 = f2 * y
     for k in range(n1):
         at = k * _STEP
@@ -285,13 +286,25 @@ def _jump_tractions(w, n1, f2, y, turn, parts):
         store(parts, at + _B, times_i(d) - re(b))
 
 
+@_inlined
+def nodal_sums(parts, step, nodal, source, j, n1):
+    """Tractions of the nodal density ``j`` along and across an element: Σ_k nodal[source, k, j] times those of the
+    monomials in ``parts``, ``step`` numbers an order."""
+    along, normal = both(splat(0.0), splat(0.0)), both(splat(0.0), splat(0.0))
+    for k in range(n1):
+        t = nodal[source, k, j]
+        along = along + t * load_complex(parts, k * step)
+        normal = normal + t * load_complex(parts, k * step + _B)
+    return along, normal
+
+
 @_jit
 def tractions(points, tangents, per, first, last, elements, order, kernel, table, nodal, out):
-    """Traction (along the tangent, along the normal left of it) at points from unit densities.
+    """Traction (along the tangent, along the normal to its left) at points, from unit densities.
 
-    ``points``, ``tangents`` flat (`lanes_of`), ``per`` of the points an element; those from ``first`` to ``last`` are
-    done. Sources: `Elements`, which act as the `Kernel` says. ``nodal`` (4, p+1, p+1) turns the monomials of each kind
-    into unknowns. ``out`` flat, (2(p+1)m, 2n): rows run element, component (along, normal), unknown; columns element,
+    ``points``, ``tangents`` flat (`lanes_of`), ``per`` points per element; those from ``first`` to ``last`` are
+    computed. Sources: `Elements` of the `Kernel` type. ``nodal`` (4, p+1, p+1) converts the monomials of each kind to
+    nodal unknowns. ``out`` flat, (2(p+1)m, 2n): rows element, component (along, normal), unknown; columns element,
     component, node.
     """
     nu, n1 = kernel.nu, order + 1
@@ -322,8 +335,8 @@ def tractions(points, tangents, per, first, last, elements, order, kernel, table
                     # Twice the angle from the element to the target.
                     turn = both(ux * tx + uy * ty, uy * tx - ux * ty)
                     turn = turn * turn
-                    # Traction along the normal + i times that along the tangent, from what acts along and across the
-                    # element: (half the deviator (σyy − σxx)/2 + i shear), turned, and half the trace.
+                    # Normal + i tangential traction: (half the deviator (σyy − σxx)/2 + i shear), rotated, plus half
+                    # the trace.
                     if kernel.force:
                         _force_tractions(w, n1, factor, nu, y, turn, parts)
                     else:
@@ -331,12 +344,8 @@ def tractions(points, tangents, per, first, last, elements, order, kernel, table
                     for k in range(WIDTH):
                         lane_places[k] = places[chosen[batch + k]]
                     for j in range(n1):
-                        along, normal = both(splat(0.0), splat(0.0)), both(splat(0.0), splat(0.0))
-                        for k in range(n1):
-                            t = nodal[source, k, j]
-                            along = along + t * load_complex(parts, k * _STEP)
-                            normal = normal + t * load_complex(parts, k * _STEP + _B)
-                        # Lanes that repeat a point write the same number to the same place.
+                        along, normal = nodal_sums(parts, _STEP, nodal, source, j, n1)
+                        # Lanes with the same point write the same number to the same place.
                         at = (2 * e * n1 + j) * height
                         scatter(out, at + per, lane_places, 0, re(along))
                         scatter(out, at, lane_places, 0, im(along))
@@ -347,7 +356,7 @@ def tractions(points, tangents, per, first, last, elements, order, kernel, table
 
 @_part
 def _fold(p, q, moments, n, folded_p, folded_q):
-    """The first ``n`` multipoles of an element with the monomial densities ``p`` and ``q`` (p+1,), of the ``moments`` of
+    """The first ``n`` multipoles of an element with monomial densities ``p`` and ``q`` (p+1,), from the ``moments`` of
     its weight."""
     for j in range(n):
         folded_p[j] = 0.0
@@ -359,7 +368,7 @@ def _fold(p, q, moments, n, folded_p, folded_q):
 
 @_inlined
 def _near_sums(kind, zp, zm, p, q, moments, force):
-    """The moments, their two derivatives and, for forces, logarithms, each summed with ``p`` and with ``q``: closed
+    """Moments, their two derivatives and, for forces, logarithms, each summed with ``p`` and with ``q``: closed
     form."""
     nothing = splat(0.0)
     zero = both(nothing, nothing)
@@ -393,7 +402,7 @@ def _near_sums(kind, zp, zm, p, q, moments, force):
 
 @_inlined
 def _far_sums(zp, zm, last, folded_p, folded_q, force):
-    """The same by the multipoles up to the number ``last``."""
+    """The same from the multipoles up to number ``last``."""
     nothing = splat(0.0)
     zero = both(nothing, nothing)
     ap, aq, bp, bq, dp, dq, lp, lq = zero, zero, zero, zero, zero, zero, zero, zero
@@ -426,8 +435,7 @@ def _far_sums(zp, zm, last, folded_p, folded_q, force):
 
 @_inlined
 def _of_forces(sums, y, c, nu, p, q, moments):
-    """Half the trace, half the deviator (σyy − σxx)/2 with i times the shear, and 2μ times the displacement, of line
-    forces."""
+    """Half the trace, half the deviator (σyy − σxx)/2 + i shear, and 2μ times the displacement, of line forces."""
     ap, aq, bp, bq, _, _, log_p, log_q = sums
     half = re(ap) - im(aq)
     deviator = y * (bq - times_i(bp)) - 2.0 * (1.0 - nu) * ap + (1.0 - 2.0 * nu) * times_i(aq)
@@ -442,7 +450,7 @@ def _of_forces(sums, y, c, nu, p, q, moments):
 
 @_inlined
 def _of_jumps(sums, y, c, nu):
-    """The same of jumps."""
+    """The same for displacement jumps."""
     ap, aq, bp, bq, dp, dq, _, _ = sums
     half = -(im(bp) + re(bq)) / c
     deviator = (y * (dp + times_i(dq)) - times_i(bp)) / c
@@ -455,8 +463,9 @@ def _of_jumps(sums, y, c, nu):
 
 @_jit
 def fields(points, first, last, elements, order, density, kernel, table, out):
-    """Add stress (xx, yy, xy) and 2μ times displacement (x, y) of `Elements` with monomial densities (m, 2, p+1), local
-    components, that act as the `Kernel` says, to ``out`` (5, n) at ``points`` (flat, `lanes_of`). Line forces are on
+    """Add stress (xx, yy, xy) and 2μ times displacement (x, y) of `Elements` of the `Kernel` type to ``out`` (5, n).
+
+    ``points`` flat (`lanes_of`); ``density`` (m, 2, p+1): monomial densities, local components. Line forces act on
     ordinary elements only."""
     nu, force, n1 = kernel.nu, kernel.force, order + 1
     highest = order + 1 if force else order
@@ -480,7 +489,7 @@ def fields(points, first, last, elements, order, density, kernel, table, out):
             for k in range(n1):
                 p[k] = factor * density[e, 0, k]
                 q[k] = factor * density[e, 1, k]
-            # As many multipoles as the element's nearest points by series ask for.
+            # As many multipoles as the nearest point of the series needs.
             nearest = 1
             while nearest < _CLASSES - 1 and count[nearest] == 0:
                 nearest += 1
@@ -503,7 +512,7 @@ def fields(points, first, last, elements, order, density, kernel, table, out):
                         half, deviator, moved = _of_jumps(sums, y, c, nu)
                     deviator = deviator * turn
                     moved = moved * along
-                    # Lanes that repeat a point write the same sum to the same place.
+                    # Lanes with the same point write the same sum to the same place.
                     pile(total, 0, chosen, batch, half - re(deviator))
                     pile(total, _TILE, chosen, batch, half + re(deviator))
                     pile(total, 2 * _TILE, chosen, batch, im(deviator))
@@ -515,7 +524,7 @@ def fields(points, first, last, elements, order, density, kernel, table, out):
 
 
 def lanes_of(points: np.ndarray) -> np.ndarray:
-    """``points`` (n, 2) as the kernels read them: all x, all y, each with room for whole lanes."""
+    """``points`` (n, 2) in the layout of the kernels: all x, all y, each padded to whole lanes."""
     flat = np.zeros((2, len(points) + WIDTH))
     flat[:, : len(points)] = points.T
     return flat.ravel()

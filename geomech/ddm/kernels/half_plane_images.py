@@ -1,7 +1,8 @@
-"""What a free surface adds to the influence of straight elements: compiled, in closed form near and by series far.
+"""Contribution of a free surface to the influence of straight elements (half-plane): closed forms and series. All
+compiled.
 
-The rock lies below y = 0, which bears no traction. With φ₀, ψ₀ the Kolosov potentials of a source in the infinite
-plane, Muskhelishvili's continuation (1953, §§ 92–93) gives those of what the surface adds,
+The rock lies below the traction-free surface y = 0. With φ₀, ψ₀ the Kolosov potentials of a source in the infinite
+plane, Muskhelishvili's continuation (1953, §§ 92–93) gives those of the contribution of the surface,
 
     φ₁(z) = −z φ̄₀'(z) − ψ̄₀(z),   ψ₁(z) = −φ̄₀(z) − z φ₁'(z),   φ̄(z) = conj φ(conj z),
 
@@ -9,26 +10,24 @@ plane, Muskhelishvili's continuation (1953, §§ 92–93) gives those of what th
     (σyy − σxx)/2 + i σxy     −2i y φ₁'' − φ₁' − φ̄₀'
     2μ (u_x + i u_y)          κ φ₁ − 2i y conj φ₁' + φ₀(conj z),   κ = 3 − 4ν.
 
-Points of the rock see the element's mirror image, so that all follows from the moments A_k of `full_plane` at ζ, the
-mirror image of the point in the element's frame. Depths y of the source are a polynomial on it, which asks for one
-order more, and a jump's stress for A'''. With E the conjugate of the element's tangent, s its slope, η the depth of its
-middle in half lengths c and W = η A_k + s A_{k+1},
+The sources appear at their mirror images, so that everything follows from the moments A_k of `full_plane` at ζ, the
+mirror image of the field point in the frame of the element. The depth of the source varies linearly along it, which
+needs one order more, and the stress of a jump needs A'''. With E the conjugate of the element's tangent, s its slope, η
+the depth of its midpoint in half lengths c and W = η A_k + s A_{k+1},
 
     slip       conj φ₁' = f/c (i/2 A' + E W''),            conj φ₁'' = f/c² (i/2 E A'' + E² W'''),   conj φ̄₀' = i f/2c
-               A'
-    opening    i times that, + f/c E² A',                  the same + f/c² E³ A'',                   i times that
+    A' opening    i times that, + f/c E² A',                  the same + f/c² E³ A'',                   i times that
     force      f/2 (2i E W' − κ E² A)                      f/2c (2i E² W'' − κ E³ A')                −f/2 A
 
-along the element, and (iκE²A − 2EW') f/2, (iκE³A' − 2E²W'') f/2c, −i A f/2 across it; f = 1/4π(1−ν). No term is larger
-than the whole by more than the point is nearer to the image than to the source, so digits are those of the infinite
-plane.
+along the element, and (iκE²A − 2EW') f/2, (iκE³A' − 2E²W'') f/2c, −i A f/2 across it; f = 1/4π(1−ν). No term exceeds
+the sum by more than the ratio of the distances to source and image, so that the accuracy is that of the infinite plane.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from .full_plane import _CLASSES, _ROW, _TERMS, _TILE, _first_moment, _inlined, _jit, _part, _sort
+from .full_plane import _CLASSES, _ROW, _TERMS, _TILE, _first_moment, _inlined, _jit, _part, _sort, nodal_sums
 from .shape_functions import MAX_ORDER
 from .simd import (
     WIDTH,
@@ -48,15 +47,15 @@ from .simd import (
     value,
 )
 
-#: Where A', A'', A''' and the next order stand behind A.
+#: Offsets of A', A'', A''' and the next order behind A.
 _B, _D, _T, _STEP = 2 * WIDTH, 4 * WIDTH, 6 * WIDTH, 8 * WIDTH
-#: One order more than the density's.
+#: One order more than that of the density.
 _ROOM = (MAX_ORDER + 2) * _STEP
 
 
 @_part
 def _third(kind, zp, zm, b, d):
-    """A_0''' from A_0' and A_0'': what comes of differentiating the closed forms of `full_plane`."""
+    """A_0''' from A_0' and A_0'', by differentiation of the closed forms of `full_plane`."""
     if kind == 3:
         z, gap = 0.5 * (zp + zm), zp * zm
         # A_0'' = π (ζ² − 1)^(−3/2).
@@ -73,8 +72,8 @@ def _third(kind, zp, zm, b, d):
 
 @_part
 def _moments(kind, distance, zp, zm, highest, table, w):
-    """A_k and three derivatives for k = 0 … highest, eight points of one class, into ``w``, ``_STEP`` numbers an
-    order."""
+    """A_k and three derivatives for k = 0 … highest at eight points of one distance class, into ``w``, ``_STEP``
+    numbers per order."""
     z = 0.5 * (zp + zm)
     if distance == 0 or (distance == 1 and highest <= 5):
         a, b, d = _first_moment(kind, zp, zm)
@@ -91,7 +90,7 @@ def _moments(kind, distance, zp, zm, highest, table, w):
         return
     i = 1.0 / z
     n = _TERMS[distance - 1]
-    # Odd moments vanish where the weight is even.
+    # Odd moments vanish for even weights.
     first, step, q, lead = 0, 1, i, i
     if kind == 0 or kind == 3:
         first, step, q = highest % 2, 2, i * i
@@ -127,10 +126,9 @@ def _moments(kind, distance, zp, zm, highest, table, w):
             t = (t - 3.0 * d) * i
 
 
-@_part
+@_inlined
 def _force_tractions(w, n1, g, kappa, eta, ty, conj, turn, lift, parts):
-    """Traction along the normal + i times that along the tangent, of line forces along and across an element, into
-    ``parts``."""
+    """Traction (normal + i tangential) of line forces along and across an element, into ``parts``."""
     conj2 = conj * conj
     conj3 = conj2 * conj
     for k in range(n1):
@@ -148,9 +146,9 @@ def _force_tractions(w, n1, g, kappa, eta, ty, conj, turn, lift, parts):
         store(parts, at + _B, whole + (2.0 * g) * re(half))
 
 
-@_part
+@_inlined
 def _jump_tractions(w, n1, g, eta, ty, conj, turn, lift, parts):
-    """The same of jumps."""
+    """Traction (normal + i tangential) of displacement jumps along and across an element."""
     conj2 = conj * conj
     conj3 = conj2 * conj
     for k in range(n1):
@@ -170,11 +168,10 @@ def _jump_tractions(w, n1, g, eta, ty, conj, turn, lift, parts):
 
 @_jit
 def tractions(points, tangents, per, first, last, elements, order, kernel, table, nodal, out):
-    """Add to ``out`` what the free surface y = 0 adds to `full_plane.tractions`.
+    """Add the contribution of the free surface y = 0 to `full_plane.tractions` in ``out``.
 
-    ``points`` are the mirror images of the rock's, all else as there; everything in the frame of the surface. An
-    element that lies on the surface, as forces may, has the rock on its left and the images of points on it on its
-    right.
+    ``points``: mirror images of the field points; other arguments as there; everything in the frame of the surface. An
+    element on the surface (forces only) has the rock on its left, and the images of points on it on its right.
     """
     nu, n1 = kernel.nu, order + 1
     w, parts = np.empty(_ROOM), np.empty(_ROOM)
@@ -205,7 +202,7 @@ def tractions(points, tangents, per, first, last, elements, order, kernel, table
                     ux, uy = gather(tangents, begin, chosen, batch), gather(tangents, begin + below, chosen, batch)
                     turn = both(ux, -uy)
                     turn = turn * turn
-                    # The point's own y is minus its image's; 2i y φ'' c.
+                    # The y of the point is minus that of its image; 2i y φ'' c.
                     lift = times_i(turn) * ((-2.0 / c) * gather(points, begin + height_at, chosen, batch))
                     if kernel.force:
                         _force_tractions(w, n1, 0.5 * f, kappa, eta, ty, conj, turn, lift, parts)
@@ -214,11 +211,7 @@ def tractions(points, tangents, per, first, last, elements, order, kernel, table
                     for k in range(WIDTH):
                         lane_places[k] = places[chosen[batch + k]]
                     for j in range(n1):
-                        along, normal = both(splat(0.0), splat(0.0)), both(splat(0.0), splat(0.0))
-                        for k in range(n1):
-                            t = nodal[source, k, j]
-                            along = along + t * load_complex(parts, k * _STEP)
-                            normal = normal + t * load_complex(parts, k * _STEP + _B)
+                        along, normal = nodal_sums(parts, _STEP, nodal, source, j, n1)
                         at = (2 * e * n1 + j) * height
                         pile(out, at + per, lane_places, 0, re(along))
                         pile(out, at, lane_places, 0, -im(along))
@@ -229,7 +222,7 @@ def tractions(points, tangents, per, first, last, elements, order, kernel, table
 
 @_inlined
 def _of_forces(w, density, half_f, kappa, eta, c, ty, own, conj, zm, moments):
-    """conj φ₁', conj φ₁'', conj φ̄₀', and the displacement but for what is with the depth, of line forces."""
+    """conj φ₁', conj φ₁'', conj φ̄₀', and the displacement without its term in the depth, of line forces."""
     conj2 = conj * conj
     zero = both(splat(0.0), splat(0.0))
     half, bent, back, moved = zero, zero, zero, zero
@@ -263,7 +256,7 @@ def _of_forces(w, density, half_f, kappa, eta, c, ty, own, conj, zm, moments):
 
 @_inlined
 def _of_jumps(w, density, f, kappa, eta, c, ty, own, conj):
-    """The same of jumps."""
+    """The same for displacement jumps."""
     conj2 = conj * conj
     zero = both(splat(0.0), splat(0.0))
     half, bent, back, moved = zero, zero, zero, zero
@@ -286,7 +279,8 @@ def _of_jumps(w, density, f, kappa, eta, c, ty, own, conj):
 
 @_jit
 def fields(points, first, last, elements, order, density, kernel, table, out):
-    """Add to ``out`` (5, n) what the free surface y = 0 adds to `full_plane.fields`; ``points`` are mirror images."""
+    """Add the contribution of the free surface y = 0 to `full_plane.fields` in ``out`` (5, n); ``points``: mirror
+    images."""
     nu = kernel.nu
     w = np.empty(_ROOM)
     tile = np.empty(4 * _TILE)
@@ -313,7 +307,7 @@ def fields(points, first, last, elements, order, density, kernel, table, out):
                     y = gather(tile, 2 * _TILE, chosen, batch)
                     zp, zm = both(gather(tile, 0, chosen, batch), y), both(gather(tile, _TILE, chosen, batch), y)
                     _moments(source, distance, zp, zm, order + 1, table, w)
-                    # The point's own y is minus its image's.
+                    # The y of the point is minus that of its image.
                     depth = -gather(points, begin + height_at, chosen, batch)
                     if kernel.force:
                         half, bent, back, moved = _of_forces(

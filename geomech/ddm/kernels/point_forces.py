@@ -1,4 +1,4 @@
-"""Fields of point loads: Kelvin's inside the rock, that of a loaded wedge on the boundary."""
+"""Fields of point forces: Kelvin's inside the rock, a loaded wedge on its boundary."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from ..mesh.half_plane import HalfPlane
 class KelvinLoad:
     """A force (2,) N/m at ``point`` (2,) of the infinite plane (Kelvin 1848; Crouch & Starfield 1983, §4.2).
 
-    Logarithms in displacement are of distances in units of ``unit`` (m). Nearer than ``core`` m the force counts as
-    spread, evenly to both sides: no stress.
+    Logarithms in the displacement are of distances in units of ``unit`` (m). Within ``core`` m the force counts as
+    distributed evenly to both sides: no stress.
     """
 
     point: np.ndarray
@@ -60,13 +60,14 @@ class KelvinLoad:
 
 @dataclass(frozen=True, eq=False)
 class MelanLoad(KelvinLoad):
-    """The same below the free surface of ``half_plane`` (Melan 1932), by the potentials of `half_plane_images`. Where
-    displacement is zero is arbitrary, as it grows like a logarithm."""
+    """The same below the free surface of ``half_plane`` (Melan 1932), by the potentials of `half_plane_images`. The
+    origin of the displacement is arbitrary, as it grows logarithmically."""
 
     half_plane: HalfPlane = field(kw_only=True)
 
     def _image(self, points: np.ndarray) -> tuple[np.ndarray, ...]:
-        """κ, the strength q of the force, distance w from its image, its height times −2i, y, φ₁' at ``points``."""
+        """κ, strength q of the force, distance w from its image, height of the image times −2i, y, φ₁' at
+        ``points``."""
         rock, nu = self.half_plane, self.material.effective_poissons_ratio
         z, t = (rock.frame(x) @ np.array([1.0, 1j]) for x in (points, self.point))
         kappa, q = 3 - 4 * nu, complex(*rock.turned(self.force)) / (8 * np.pi * (1 - nu))
@@ -84,7 +85,7 @@ class MelanLoad(KelvinLoad):
     def displacement(self, points: np.ndarray) -> np.ndarray:
         """(n, 2) m."""
         kappa, q, w, depth, y, half = self._image(points)
-        # The image is above all points: no cut of the logarithm lies between them.
+        # The image is above all points, so that no cut of the logarithm lies between them.
         logs = np.log(1j * w / self.unit) - 0.5j * np.pi
         moved = kappa * np.conj(q) * (1 + depth / w) - kappa**2 * q * logs - 2j * y * np.conj(half) - q * np.conj(logs)
         own = np.column_stack([moved.real, moved.imag]) / (2 * self.material.shear_modulus)

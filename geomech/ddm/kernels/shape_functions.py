@@ -1,10 +1,10 @@
-"""Shape functions of crack and boundary elements: polynomials times the square root that a crack tip asks for.
+"""Shape functions of crack and boundary elements: polynomials times the square root of a crack tip.
 
-An element carries, on its own coordinate t ∈ [−1, 1], the density
+An element has, on its own coordinate t ∈ [−1, 1], the density
 
     N(t) = w(t) Σ_k c_k t^k,   k = 0 … p,
 
-where the weight w holds the behaviour at a crack tip (Crouch & Starfield 1983, §5.5, there with one term):
+where the weight w is the behaviour at a crack tip (Crouch & Starfield 1983, §5.5, there with one term):
 
     ORDINARY    1
     TIP_START   √((1+t)/2)      D ~ √r at the start
@@ -25,7 +25,8 @@ from ...model.problem import HIGHEST_ORDER as MAX_ORDER
 
 ORDINARY, TIP_START, TIP_END, TIP_BOTH = 0, 1, 2, 3
 
-#: Terms of the moment tables: the far series of `full_plane` at its inner radius, behind twice the highest order.
+#: Terms of the moment tables: those of the far series of `full_plane` at its inner radius, plus twice the highest
+#: order.
 N_MOMENTS = 140
 
 
@@ -47,7 +48,7 @@ def nodes(family: str, order: int) -> np.ndarray:
         t = -1 + (2 * np.arange(n) + 1) / n
     else:
         raise ValueError(f'collocation nodes must be "chebyshev", "gauss" or "equal", got {family!r}')
-    # Exact symmetry, so that mirrored bodies give mirrored answers.
+    # Exact symmetry, so that mirrored bodies give mirrored results.
     return 0.5 * (t - t[::-1])
 
 
@@ -78,7 +79,7 @@ def at(family: str, order: int, kind: int, t: np.ndarray) -> np.ndarray:
 
 @lru_cache
 def leading(family: str, order: int, kind: int, at_end: bool) -> np.ndarray:
-    """(p+1,) weights of the nodal values in the tip coefficient d·√L of D ≈ d √r, L the element's length."""
+    """(p+1,) weights of the nodal values in the tip coefficient d·√L of D ≈ d √r, with L the length of the element."""
     sign = 1.0 if at_end else -1.0
     value = sign ** np.arange(order + 1) @ to_monomials(family, order, kind)
     # √(1−t²) → √(4 r/L) at either end, where the one-sided weights give √(r/L).

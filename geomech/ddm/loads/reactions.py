@@ -46,7 +46,7 @@ def reactions(body: CrackedBody, density: np.ndarray, particular: Particular) ->
         [stress[0] * out[:, 0] + stress[2] * out[:, 1], stress[2] * out[:, 0] + stress[1] * out[:, 1]], axis=1
     )
     local = np.stack([np.sum(carried * s.tangent, axis=1), np.sum(carried * s.normal, axis=1)], axis=1)
-    turned = np.einsum("hjc,hc->hj", holds.directions, local) * holds.held
+    turned = np.einsum("hjc,hc->hj", holds.directions, local) * holds.supported
     local = density.reshape(s.n, 2, s.per) + np.einsum("hjc,hj->hc", holds.directions, turned)[:, :, None]
     traction = local[:, 0, :, None] * s.tangent[:, None] + local[:, 1, :, None] * s.normal[:, None]
     weighted = traction * s.quadrature[:, :, None]

@@ -175,17 +175,19 @@ class _Faces:
     def settled(self, gives: np.ndarray, still: np.ndarray, right: np.ndarray) -> np.ndarray | None:
         """(n,) the pressures under which nothing pulls and nothing enters its base: Newton's method for what presses
         where, one node at a time once it does not get on; None where even that ends nowhere."""
-        n, held = len(still), self.resultants
-        size = np.abs(still).max() + np.abs(gives).max() * np.abs(right).max() / np.abs(held).max()
+        n, resultants = len(still), self.resultants
+        size = np.abs(still).max() + np.abs(gives).max() * np.abs(right).max() / np.abs(resultants).max()
         presses, fewest, patience = np.ones(n, bool), n + 1, 5
         for _ in range(_CHANGES):
             on = np.flatnonzero(presses)
             matrix = np.zeros((len(on) + len(right),) * 2)
             matrix[: len(on), : len(on)] = gives[np.ix_(on, on)]
-            matrix[: len(on), len(on) :] = -held[:, on].T
-            matrix[len(on) :, : len(on)] = held[:, on]
+            matrix[: len(on), len(on) :] = -resultants[:, on].T
+            matrix[len(on) :, : len(on)] = resultants[:, on]
             # Unknowns and equations of one size each.
-            scale = np.concatenate([np.full(len(on), np.sqrt(np.abs(gives).max())), np.abs(held[:, on]).max(axis=1)])
+            scale = np.concatenate(
+                [np.full(len(on), np.sqrt(np.abs(gives).max())), np.abs(resultants[:, on]).max(axis=1)]
+            )
             scale[len(on) :] /= scale[0] or 1.0
             known = np.concatenate([-still[on], right])
             try:
@@ -194,7 +196,7 @@ class _Faces:
                 return None
             pressure = np.zeros(n)
             pressure[on] = x[: len(on)]
-            gap = held.T @ x[len(on) :] - gives @ pressure - still
+            gap = resultants.T @ x[len(on) :] - gives @ pressure - still
             wrong = presses & (pressure < -_NOTHING * np.abs(pressure).max()) | ~presses & (gap < -_NOTHING * size)
             if not wrong.any():
                 pressure[pressure < 0] = 0.0

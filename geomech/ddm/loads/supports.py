@@ -150,26 +150,26 @@ class Holds:
         self.number = np.full(boundary.n, -1)
         self.number[self.elements] = np.arange(len(self.elements))
         self.directions = np.tile(np.eye(2), (len(self.elements), 1, 1))
-        self.held = np.zeros((len(self.elements), 2), bool)
+        self.supported = np.zeros((len(self.elements), 2), bool)
         axes = {"x": (1.0, 0.0), "y": (0.0, 1.0)}
         for k, support in enumerate(supports):
             here = self.support == k
             if support.hold in ("both", "normal", "tangent"):
-                self.held[here] = (support.hold != "normal", support.hold != "tangent")
+                self.supported[here] = (support.hold != "normal", support.hold != "tangent")
                 continue
             way = np.array(axes.get(support.hold, support.hold))
             along, across = self.sources.tangent[here] @ way, self.sources.normal[here] @ way
             self.directions[here] = np.stack(
                 [np.stack([along, across], axis=1), np.stack([-across, along], axis=1)], axis=1
             )
-            self.held[here] = (True, False)
+            self.supported[here] = (True, False)
 
     @property
     def unknowns(self) -> np.ndarray:
         """(n_unknowns,) bool: which unknowns of the boundary are reactions."""
         b = self.boundary
         out = np.zeros((b.n, 2, b.per), bool)
-        out[self.elements] = self.held[:, :, None]
+        out[self.elements] = self.supported[:, :, None]
         return out.ravel()
 
     def turned(self, local: np.ndarray) -> np.ndarray:
@@ -211,7 +211,7 @@ class Holds:
         columns = matrix.T.reshape(-1, 2, per, rows)
         force = force.T.reshape(len(which), 2, per, rows) / self.sources.length[at][:, None, None, None]
         pair = np.einsum("hjc,fhcnr->fhjnr", self.directions[at], np.stack([columns[which], force]))
-        columns[which] = np.where(self.held[at][:, :, None, None], pair[1], pair[0])
+        columns[which] = np.where(self.supported[at][:, :, None, None], pair[1], pair[0])
 
     def known(self, targets: ElementSet, nu: float, tol: float) -> np.ndarray:
         """(targets.n_unknowns, h_unknowns) traction on ``targets`` from displacement of the held elements, local."""
@@ -221,7 +221,7 @@ class Holds:
         """(h_unknowns,) the held part of ``displacement`` (h, p+1, 2) at the held elements' nodes, local components."""
         s = self.sources
         local = np.stack([np.einsum("hnc,hc->hn", displacement, axis) for axis in (s.tangent, s.normal)], axis=1)
-        turned = np.einsum("hjc,hcn->hjn", self.directions, local) * self.held[:, :, None]
+        turned = np.einsum("hjc,hcn->hjn", self.directions, local) * self.supported[:, :, None]
         return np.einsum("hjc,hjn->hcn", self.directions, turned).ravel()
 
     def split(self, x: np.ndarray, imposed: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -230,9 +230,9 @@ class Holds:
         b = self.boundary
         rows = x.reshape(b.n, 2, b.per)
         mine, free = rows[self.elements], rows.copy()
-        free[self.elements] = np.einsum("hjc,hjn->hcn", self.directions, mine * ~self.held[:, :, None])
+        free[self.elements] = np.einsum("hjc,hjn->hcn", self.directions, mine * ~self.supported[:, :, None])
         free[self.elements] += imposed.reshape(mine.shape)
-        reaction = np.einsum("hjc,hjn->hcn", self.directions, mine * self.held[:, :, None])
+        reaction = np.einsum("hjc,hjn->hcn", self.directions, mine * self.supported[:, :, None])
         reaction /= self.sources.length[:, None, None]
         return free.ravel(), reaction.ravel()
 
@@ -243,16 +243,16 @@ class Holds:
         out = self.turned(displacement).reshape(b.n, 2, b.per)
         own = np.einsum("hjc,hcn->hjn", self.directions, reactions.reshape(-1, 2, b.per))
         own /= self.sources.length[:, None, None]
-        out[self.elements] = np.where(self.held[:, :, None], own, out[self.elements])
+        out[self.elements] = np.where(self.supported[:, :, None], own, out[self.elements])
         return out.ravel()
 
     def free_motions(self, modes: np.ndarray) -> np.ndarray:
         """(3, k) the combinations of rigid ``modes`` (n_unknowns, 3), local, that no support resists."""
-        held = self.turned(modes)[self.unknowns]
+        supported = self.turned(modes)[self.unknowns]
         # Each row by the root of the boundary it stands for, so that the measure does not depend on the mesh.
         b = self.boundary
         share = np.broadcast_to(b.quadrature[:, None, :], (b.n, 2, b.per)).ravel()[self.unknowns]
-        _, size, ways = np.linalg.svd(np.sqrt(np.abs(share) / b.length.sum())[:, None] * held)
+        _, size, ways = np.linalg.svd(np.sqrt(np.abs(share) / b.length.sum())[:, None] * supported)
         size = np.concatenate([size, np.zeros(3 - len(size))])
         return ways[size <= _HELD].T
 

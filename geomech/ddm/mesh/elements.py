@@ -348,7 +348,7 @@ def _node_layers(cracks: Cracks, size: np.ndarray, grading: Grading, edges: np.n
             if closed[s] and closed[r]:
                 deep = grading.at_closed_kink(turn)
             else:
-                deep = grading.at_kink(turn, KINK < turn and _forgotten(cracks, first, ends, here))
+                deep = grading.at_kink(turn, turn > KINK and _forgotten(cracks, first, ends, here))
             if deep:
                 layers[s, e] = layers[r, f] = deep
         least = min(float(size[s]) for s, _ in here)

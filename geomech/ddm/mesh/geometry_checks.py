@@ -8,7 +8,7 @@ import numpy as np
 
 from ...model import Cracks
 from ...model.blocks.polygon import signed_area
-from .geometry_prefilter import plainly_well
+from .geometry_prefilter import clearly_valid
 from .point_location import inside, outlined
 
 #: Coordinates must resolve a segment to this part of its length: K is off by some fifty times that (its elements are
@@ -90,7 +90,7 @@ def check_cracks(cracks: Cracks, edges: np.ndarray, loops: list[np.ndarray], fre
     if n == 0:
         return
     fresh = np.ones(n, bool) if fresh is None else fresh
-    if np.count_nonzero(fresh) * (n + len(edges)) <= _EACH_WITH_ALL and plainly_well(
+    if np.count_nonzero(fresh) * (n + len(edges)) <= _EACH_WITH_ALL and clearly_valid(
         np.ascontiguousarray(cracks.nodes, dtype=float),
         np.ascontiguousarray(cracks.segments, dtype=np.int64),
         np.ascontiguousarray(cracks.surface, dtype=bool),

@@ -21,7 +21,7 @@ _part = part(error_model="numpy", nogil=True)
 
 
 @_jit
-def plainly_well(nodes, segments, surface, aperture, fresh, edges, n_rock, outlined):
+def clearly_valid(nodes, segments, surface, aperture, fresh, edges, n_rock, outlined):
     """Whether no rule of `validity.check_cracks` can be broken.
 
     ``nodes`` (n, 2), ``segments`` (m, 2), ``surface`` (n,), ``aperture`` and ``fresh`` (m,): of the network and which

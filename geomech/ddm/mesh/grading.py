@@ -133,7 +133,7 @@ class Grading:
 
     def at_closed_kink(self, turn: float) -> int:
         """At a kink by ``turn`` of a crack that was drawn closed; no fewer than at an open one."""
-        if turn < CLOSED_KINK or self.target is None and not self.layers:
+        if turn < CLOSED_KINK or (self.target is None and not self.layers):
             return self.at_kink(turn, False)
         error = CLOSED_ERROR * min(1.0, turn / CLOSED_TURN) / (KINK_ERROR if self.target is None else self.target)
         layers = self._layers_for(math.log(max(error, 1.0)) / CLOSED_EXPONENT)
@@ -145,7 +145,7 @@ class Grading:
         """At a kink of a crack by ``turn``; one that growth has left behind is ``forgotten`` unless it is sharp."""
         if self.target is not None:
             return self.needed(math.pi + turn, "crack")
-        if turn <= KINK or forgotten and turn <= SHARP_KINK or not self.layers:
+        if turn <= KINK or (forgotten and turn <= SHARP_KINK) or not self.layers:
             return 0
         return max(1, self._at_kink(turn, KINK_ERROR) + self.layers - KINK_LAYERS)
 

@@ -1,13 +1,13 @@
-"""The crack unknowns' matrix while cracks grow: factored once, then bordered with what is new.
+"""Matrix and factors of the crack unknowns while cracks grow: factored once, then bordered by the new unknowns.
 
-Unknowns are kept in the order in which they came (`growing_lu`), so that a body that grows shares the matrix and
-all factors with the one before, which stays what it was, and pays for rows and columns of new elements alone. Elements
-at tips are replaced in the next increment: they are a last, loose border of the body's own. Their rows outlast them, as
-a tip's element that becomes an ordinary one has other shape functions and the same collocation points. An element that
-goes from elsewhere stays, with its equation given up for w = 0 by one more unknown in it (Woodbury's formula).
+Unknowns are kept in the order in which they came (`growing_lu`). A body that grows shares matrix and factors with its
+predecessor, which stays valid, and computes only the rows and columns of new elements. Elements at tips are replaced in
+the next increment: they are a last, loose border of each body. Their rows are reused, since a tip element that becomes
+an ordinary one has other shape functions but the same collocation points. An element removed elsewhere stays in the
+matrix, and one more unknown replaces its equation by w = 0 (Woodbury's formula).
 
-Elimination in the order of arrival pivots inside what came together only and loses ‖L‖ ‖U‖ / ‖S‖ in accuracy over one
-that pivots freely (Higham 2002, §13.2). S is factored anew where that would be felt, and when much of it is gone.
+Elimination in order of arrival pivots only within each group, and loses a factor ‖L‖ ‖U‖ / ‖S‖ in accuracy against free
+pivoting (Higham 2002, §13.2). S is factored again where that loss matters, and when much of it has been removed.
 """
 
 from __future__ import annotations
@@ -22,24 +22,24 @@ from .dense_lu import Factor
 from .growing_lu import Border, GrowingFactor, Known, loss
 from .influence_matrix import ElementSet, unknowns_of
 
-#: All is factored anew when more than this part of the elements is gone: they take their share of time.
+#: Fraction of removed elements above which S is factored again: they take their share of time.
 GONE = 0.25
-#: Bodies that grow from one in several ways keep what they have of their own loose, up to this part of the unknowns;
-#: from there they get a copy of what they share.
+#: Bodies that grow from one in several ways keep their own unknowns loose, up to this fraction; beyond it they copy the
+#: shared part.
 LOOSE = 0.15
-#: Fewer unknowns are factored in less time than borders take.
+#: Number of unknowns below which factoring takes less time than bordering.
 SMALLEST = 200
-#: Loss of accuracy, ‖L‖ ‖U‖ / ‖S‖ over the reciprocal condition, from which all is factored anew: K then still
-#: agrees with that of factors made anew to 1e-10.
+#: Loss of accuracy, ‖L‖ ‖U‖ / ‖S‖ over the reciprocal condition, above which S is factored again: K then still agrees
+#: with that of new factors to 1e-10.
 LOSS = 5e6
-#: What it means when there are no factors.
+#: Meaning of a singular matrix.
 SINGULAR = "cracks cut a part of the body off"
 
 
 class Bordered:
-    """S between crack ``elements``: of the ``firm`` matrix the first ``n_firm`` unknowns, and behind them a ``loose``
-    border. ``at`` (n_places,) are the numbers of the elements in this order, −1 for one that is gone and for the giving
-    up of its equation. Of a whole matrix the border is empty and ``firm`` is made when it grows."""
+    """S of the crack ``elements``: the first ``n_firm`` unknowns of the ``firm`` matrix, and behind them a ``loose``
+    border. ``at`` (n_places,): numbers of the elements in this order, −1 for a removed element and for the unknown that
+    replaces its equation. A matrix that has not grown has an empty border, and ``firm`` is made when it grows."""
 
     def __init__(
         self,
@@ -51,10 +51,10 @@ class Bordered:
         together: tuple[Border, int] | None = None,
     ):
         self.elements, self.firm, self.n_firm, self.at, self.loose = elements, firm, n_firm, at, loose
-        #: The loose border and before it, of so many unknowns, what became firm with it.
+        #: The loose border and, before it, the groups that became firm together.
         self.together = together
         self.n = elements.n_unknowns
-        #: L (transposed) and U of the loose border, once it is eliminated.
+        #: L (transposed) and U of the loose border, after its elimination.
         self.eliminated: tuple[np.ndarray, np.ndarray] | None = None
 
     @staticmethod
@@ -66,7 +66,7 @@ class Bordered:
 
     @property
     def unfactored(self) -> bool:
-        """Whether asking for factors will make those of a whole matrix."""
+        """Whether asking for factors will compute those of a whole matrix."""
         return self.firm.unfactored
 
     def grown(
@@ -76,9 +76,8 @@ class Bordered:
         seen: np.ndarray,
         compute: Callable[[np.ndarray, np.ndarray], np.ndarray],
     ) -> Bordered | WholeMatrix:
-        """S between ``elements``, of which ``was`` (n,) are the numbers here, −1 where new, and ``seen`` (n,) those of
-        elements in their place, whose rows are theirs; ``compute(rows, columns)`` makes blocks of it between
-        elements."""
+        """S of ``elements``. ``was`` (n,): their numbers here, −1 where new; ``seen`` (n,): numbers of elements at the
+        same place, whose rows are reused; ``compute(rows, columns)``: computes blocks between elements."""
         if np.array_equal(was, np.arange(self.elements.n)):
             return self
         out = self._changed(elements, was, seen, compute)
@@ -89,7 +88,7 @@ class Bordered:
     def _changed(self, elements: ElementSet, was: np.ndarray, seen: np.ndarray, compute) -> Bordered:
         width = 2 * elements.per
         n_places = self.n_firm // width
-        now = np.full(self.elements.n + 1, -1)  # its end stands for what had gone before
+        now = np.full(self.elements.n + 1, -1)  # the last entry stands for elements removed before
         now[was[was >= 0]] = np.flatnonzero(was >= 0)
         firm, loose = now[self.at[:n_places]], self.at[n_places:]
         given_up = np.flatnonzero((self.at[:n_places] >= 0) & (firm < 0))
@@ -98,7 +97,7 @@ class Bordered:
         came, at_tip = np.flatnonzero(~settled), _at_tips(elements, settled)
         came = np.concatenate([came[~at_tip[came]], came[at_tip[came]]])
         n_inner = len(came) - int(at_tip[came].sum())
-        # Where they stood in the loose border: as they are, or in another kind, with rows that are the same.
+        # Places in the loose border: of unchanged elements, and of elements of another kind with the same rows.
         place = np.full(self.elements.n + 1, -1)
         place[loose] = np.arange(len(loose))
         column, row = place[was[came]], place[seen[came]]
@@ -114,7 +113,7 @@ class Bordered:
         n_new, together = len(inner.corner), None
         if n_new:
             if base.n > n and not base.went_on(n, n_new, names):
-                # Others have grown from here another way.
+                # Another body has grown from here in another way.
                 if width * len(came) < LOOSE * n and not given_up.size:
                     inner, outer = _parted(border, 0, None, self._known(row, column, width))
                     names, n_inner, n_new = [], 0, 0
@@ -128,8 +127,8 @@ class Bordered:
         return Bordered(elements, base, n + n_new, at, outer, together)
 
     def _border(self, elements, came, firm, row, column, compute) -> Border:
-        """Rows and columns of the elements that ``came`` (k,), against those at the places ``firm``; ``row`` and
-        ``column`` (k,) say where they are in the loose border, −1 where they are computed."""
+        """Rows and columns of the elements that ``came`` (k,), against those at the places ``firm``. ``row`` and
+        ``column`` (k,): places in the loose border, −1 where they are computed."""
         width = 2 * elements.per
         every, (old, fresh) = np.arange(elements.n), (np.flatnonzero(row >= 0), np.flatnonzero(row < 0))
         old_c, new_c = np.flatnonzero(column >= 0), np.flatnonzero(column < 0)
@@ -147,7 +146,7 @@ class Bordered:
             corner[np.ix_(r_old, c_old)] = self.loose.corner[np.ix_(from_r, from_c)]
         if len(new_c):
             values = compute(every, came[new_c])
-            # Column-major: transposed, copying goes along memory.
+            # Column-major: transposed, copying runs along memory.
             right.T[c_new] = values.T[:, numbers]
             corner[:, c_new] = values[here]
         if len(fresh):
@@ -161,8 +160,8 @@ class Bordered:
         return Border(down, right, corner, scale, None)
 
     def _known(self, row: np.ndarray, column: np.ndarray, width: int, first: int = 0, end: int | None = None):
-        """What is known of the factors of the elements that were ``row`` and ``column`` in the loose border, where it
-        was eliminated; of the unknowns from ``first`` to ``end``."""
+        """Known factors of the elements at ``row`` and ``column`` of the eliminated loose border; unknowns from
+        ``first`` to ``end``."""
         if self.eliminated is None:
             return None
         row, column = (x[first // width : None if end is None else end // width] for x in (row, column))
@@ -172,9 +171,8 @@ class Bordered:
         return Known(at[0], at[1], lower, at[2], at[3], upper)
 
     def _giving_up(self, places: np.ndarray, n: int, n_between: int) -> Border:
-        """The unknowns that stand for the equations of the elements at ``places``, and w = 0 there, behind ``n`` others
-        and ``n_between`` more; with tractions of the size of the equations, so that these unknowns are of the size of
-        jumps."""
+        """The unknowns that replace the equations of the elements at ``places`` by w = 0, behind ``n`` and
+        ``n_between`` others; scaled so that they are of the size of jumps."""
         width = 2 * self.elements.per
         at = unknowns_of(places, width)
         k = len(at)
@@ -185,7 +183,7 @@ class Bordered:
 
     @cached_property
     def places(self) -> np.ndarray:
-        """(n_unknowns,) where the unknowns are in the order of arrival."""
+        """(n_unknowns,) places of the unknowns in order of arrival."""
         out, there = np.empty(self.elements.n, int), np.flatnonzero(self.at >= 0)
         out[self.at[there]] = there
         return unknowns_of(out, 2 * self.elements.per)
@@ -229,7 +227,7 @@ class Bordered:
 
 
 class WholeMatrix:
-    """The ``matrix`` (n, n) between crack ``elements`` that none has grown from yet; as `Bordered`."""
+    """The ``matrix`` (n, n) of crack ``elements`` before any growth; interface of `Bordered`."""
 
     is_whole = True
 
@@ -268,15 +266,15 @@ class WholeMatrix:
 
 
 class BorderedFactor:
-    """Factors of the `Bordered` matrix ``of``; see `Factor`. ``rcond`` is the worst one of the diagonal blocks,
-    ``growth`` the loss of accuracy, as the module has it."""
+    """Factors of the `Bordered` matrix ``of``; see `Factor`. ``rcond``: worst of the diagonal blocks; ``growth``: loss
+    of accuracy as described at the top."""
 
     def __init__(self, of: Bordered):
         self.n, self._places, self._firm, self._n_firm = of.n, of.places, of.firm, of.n_firm
         firm, n = of.firm, of.n_firm
         border, m = of.together or (None, 0)
         if m and firm.is_next(n - m, m):
-            # In one go: triangles are solved with for forty columns in hardly more time than for twenty.
+            # At once: triangular solutions with forty columns take hardly more time than with twenty.
             self._lower, self._upper, t = firm.eliminate_with(n - m, border, m, SINGULAR)
             self.rcond, self.growth = firm.eliminate(n, SINGULAR)
         else:
@@ -290,7 +288,7 @@ class BorderedFactor:
     def solve(self, right: np.ndarray, transposed: bool = False) -> np.ndarray:
         """Solution for ``right`` (n,) or (n, k), of the ``transposed`` system if asked."""
         n = self._n_firm
-        # Transposed, gathering goes along memory.
+        # Transposed, gathering runs along memory.
         x = np.zeros((*right.shape[1:], n + len(self._scale))).T
         x.T[..., self._places] = right.T
         beside, below = (self._lower, self._upper) if transposed else (self._upper, self._lower)
@@ -310,8 +308,8 @@ def _entries(matrix: np.ndarray, rows: np.ndarray, columns: np.ndarray) -> np.nd
 
 
 def _at_tips(elements: ElementSet, settled: np.ndarray) -> np.ndarray:
-    """(n,) which elements lie on a segment that ends at a tip, none of whose elements are ``settled``: they are tried,
-    bent, and graded as they turn."""
+    """(n,) bool: elements on a segment that ends at a tip and of which none is ``settled``: these are tried, bent, and
+    graded as they turn."""
     source = elements.source
     ends, stands = np.zeros((2, int(source.max(initial=0)) + 1), bool)
     ends[source[elements.kind != shape_functions.ORDINARY]], stands[source[settled]] = True, True
@@ -319,7 +317,7 @@ def _at_tips(elements: ElementSet, settled: np.ndarray) -> np.ndarray:
 
 
 def _parted(border: Border, m: int, known: Known | None, known_after: Known | None) -> tuple[Border, Border]:
-    """The first ``m`` unknowns of a border, and what follows them, with what is ``known`` of them."""
+    """A border divided: its first ``m`` unknowns and the rest, with what is ``known`` of them."""
     down, right, corner, scale, _ = border
     return (
         Border(down[:m], right[:, :m], corner[:m, :m], scale[:m], known),
@@ -334,7 +332,7 @@ def _parted(border: Border, m: int, known: Known | None, known_after: Known | No
 
 
 def _followed(border: Border, other: Border) -> Border:
-    """The ``border`` and the ``other``, which follows, as one."""
+    """The ``border`` followed by the ``other``, as one."""
     n = border.down.shape[1]
     return Border(
         np.concatenate([border.down, other.down[:, :n]]),
@@ -346,7 +344,7 @@ def _followed(border: Border, other: Border) -> Border:
 
 
 def _pushed(border: Border, k: int) -> Border:
-    """The ``border`` behind ``k`` unknowns more that it has nothing to do with."""
+    """The ``border`` behind ``k`` more unknowns, with zero coupling to them."""
     nothing = np.zeros((len(border.corner), k))
     return border._replace(
         down=np.concatenate([border.down, nothing], axis=1), right=np.concatenate([border.right, nothing.T])

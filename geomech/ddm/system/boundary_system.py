@@ -1,8 +1,8 @@
-"""The boundary's side of a body's equations: A_ΓΓ with its rigid motions lifted, and its factors.
+"""The boundary equations of a body: A_ΓΓ with its rigid motions removed, and its factors.
 
-Unknown is the boundary's displacement, or, where a support holds it, the reaction (see `supports`). What the supports
-of a loop leave free of its rigid motions is without stress and spans the null space of A_ΓΓ. With R these motions and Q
-their mean over the loop, A_ΓΓ + R Qᵀ/extent is regular and Qᵀu = 0 follows for loads in equilibrium.
+Unknown is the displacement of the boundary, or the reaction where it is supported (see `supports`). The rigid motions
+of a loop that its supports leave free cause no stress and span the null space of A_ΓΓ. With R these motions and Q their
+mean over the loop, A_ΓΓ + R Qᵀ/extent is regular, and Qᵀu = 0 follows for loads in equilibrium.
 """
 
 from __future__ import annotations
@@ -20,27 +20,25 @@ from ..mesh.elements import Mesh
 from .dense_lu import Factor
 from .influence_matrix import ElementSet, influence, reuse
 
-#: From so many bodies in a row on, the inverse of up to so many unknowns pays for itself.
+#: The inverse of up to INVERTED unknowns is computed once OFTEN bodies have used the same boundary.
 OFTEN, INVERTED = 8, 800
 
 
 class BoundarySystem:
-    """A_ΓΓ of ``mesh.boundary``, what is unchanged since ``previous`` (with the same supports) taken over from it.
+    """A_ΓΓ of ``mesh.boundary``; parts unchanged since ``previous`` (with the same supports) are taken from it.
 
-    elements      the boundary's elements
-    holds         which of them supports hold, or None
-    matrix        (n, n) traction seen from outside from the displacement (times 2μ) or reaction of the boundary; an
-                  operator where it is ``iterated`` upon
-    known         (n, h) the same from the displacement of held elements
-    rigid         (n, k) rigid motions of every loop that no support resists, nodal values
-    weights       (k, n) their mean over the loop
-    free_motions  those of the whole body, None when nothing is held
-    anchors       of the holes that are held, or None: they add to the boundary's rows, of ``matrix`` and of all loads
-    factor        of ``matrix`` with the rigid motions lifted
-    unchanged     whether all is ``previous``'s; ``at_old`` (n_elements,) the elements' numbers there, −1 where new
+    elements      the boundary elements
+    holds         the supported ones, or None
+    matrix        (n, n) traction, seen from outside, from displacement (times 2μ) or reaction of the boundary; an
+                  operator where it is ``iterated``
+    known         (n, h) the same from the displacement of supported elements rigid         (n, k) rigid motions of
+    every loop that no support resists, nodal values weights       (k, n) their mean over the loop free_motions  those
+    of the whole body, None without supports anchors       of supported holes, or None: terms added to the boundary rows
+    of ``matrix`` and of all loads factor        of ``matrix`` with the rigid motions removed unchanged     whether
+    everything is that of ``previous``; ``at_old`` (n_elements,) element numbers there, −1 where new
 
-    ``iterated``: not to be factored (`boundary_iteration.is_iterated`). Raises numpy.linalg.LinAlgError when the
-    equations are singular.
+    ``iterated``: solved iteratively, not factored (`boundary_gmres.is_iterated`). Raises numpy.linalg.LinAlgError when
+    the equations are singular.
     """
 
     def __init__(
@@ -65,7 +63,7 @@ class BoundarySystem:
             and g.n == previous.elements.n
             and np.array_equal(at_old, np.arange(g.n))
         )
-        #: How many bodies in a row have grown on this boundary.
+        #: Number of bodies, one after the other, that have used this boundary unchanged.
         self.generation = previous.generation + 1 if self.unchanged else 0
         if self.unchanged:
             self.elements, self.holds, self.extent = previous.elements, previous.holds, previous.extent
@@ -87,7 +85,7 @@ class BoundarySystem:
 
             self.factor = IteratedBoundary(g, self.matrix, self.rigid, self.weights, extent, nu, tol, between)
             return
-        # With holes anchored, the old matrix is not one of tractions alone.
+        # With anchored holes, the old matrix does not contain tractions alone.
         dense = previous is not None and previous.anchors is None and not previous.iterated
         known = previous.matrix if dense else None
         self.matrix = reuse(known, at_old, at_old, g, g, lambda r, k: self.influence_on(g.take(r), k))
@@ -106,37 +104,37 @@ class BoundarySystem:
         self.factor = Factor(self.matrix + lifted, "the boundary equations are singular")
 
     def _hold_motions(self, mesh: Mesh) -> None:
-        """Keep of the rigid motions those that are free, and anchor holes by the others."""
+        """Keep the rigid motions that are free, and anchor holes against the others."""
         holds, g = self.holds, self.elements
         loop_of = mesh.edge_loop[g.source]
-        _, centre, radius = middle_of(g.take(np.flatnonzero(loop_of == 0)))
+        _, centre, radius = outline_centroid(g.take(np.flatnonzero(loop_of == 0)))
         whole, _ = rigid_motions(g, np.zeros_like(mesh.edge_loop), (centre, radius))
         self.free_motions = FreeMotions(centre, radius, holds.free_motions(whole))
         keep = ~holds.unknowns
         modes, means, anchors = [], [], Anchors(self._nu, self.extent)
         for k in range(int(mesh.edge_loop.max()) + 1):
             motions, weights = self.rigid[:, 3 * k : 3 * k + 3], self.weights[3 * k : 3 * k + 3]
-            # The outline goes where the whole body goes; a hole's own boundary is free as far as nothing holds that
-            # hole.
+            # The outline moves with the whole body; the motions of a hole's own boundary are free unless a support of
+            # that hole resists them.
             free = self.free_motions.combinations if k == 0 else holds.free_motions(motions)
             modes.append(motions @ free)
             means.append(holds.turned((free.T @ weights).T).T * keep)
             if k and free.shape[1] < 3:
-                held = np.linalg.svd(free.T)[2][free.shape[1] :].T
-                _, middle, size = middle_of(g.take(np.flatnonzero(loop_of == k)))
+                blocked = np.linalg.svd(free.T)[2][free.shape[1] :].T
+                _, middle, size = outline_centroid(g.take(np.flatnonzero(loop_of == k)))
                 hole = mesh.edges[mesh.edge_loop == k, 0]
-                anchors.add(motions @ held / self.extent, held, middle, size, hole)
+                anchors.add(motions @ blocked / self.extent, blocked, middle, size, hole)
         self.rigid, self.weights = np.hstack(modes), np.concatenate(means)
         self.anchors = anchors if anchors.number else None
 
     def anchored(self, rows: np.ndarray, motions: np.ndarray) -> np.ndarray:
-        """``rows`` (n_elements' rows, k) of the boundary with what sources that give held holes ``motions`` (r, k) add,
-        in place."""
+        """Add to ``rows`` (boundary rows, k), in place, the effect of the sources that give supported holes ``motions``
+        (r, k)."""
         rows += self.anchors.rows @ motions
         return rows
 
     def influence_on(self, targets: ElementSet, elements: np.ndarray) -> np.ndarray:
-        """(targets.n_unknowns, …) traction on ``targets`` from the unknowns of the boundary's ``elements``."""
+        """(targets.n_unknowns, …) traction on ``targets`` from the unknowns of the boundary ``elements``."""
         matrix = influence(targets, self.elements.take(elements), self._nu, self._tol)
         return matrix if self.holds is None else self.holds.swapped(targets, elements, matrix, self._nu, self._tol)
 
@@ -153,14 +151,14 @@ class BoundarySystem:
         return np.matmul(self.factor.inverse, np.asfortranarray(right), out=np.empty(right.shape, order="F"))
 
     def times(self, u: np.ndarray, lifted: np.ndarray) -> np.ndarray:
-        """A_ΓΓ ``u``, and what the lifted rigid motions of ``lifted`` add."""
+        """A_ΓΓ ``u``, plus the terms that remove the rigid motions, from ``lifted``."""
         return self.matrix @ u + self.rigid @ (self.weights @ lifted) / self.extent
 
 
 @dataclass(frozen=True, eq=False)
 class FreeMotions:
-    """Rigid motions that no support resists: columns of ``combinations`` (3, k), x, y and the turn that moves points at
-    ``radius`` from ``centre`` (2,) by one."""
+    """Rigid motions that no support resists: columns of ``combinations`` (3, k) of x, y and the rotation that moves
+    points at ``radius`` from ``centre`` (2,) by one."""
 
     centre: np.ndarray
     radius: float
@@ -175,7 +173,7 @@ class FreeMotions:
         return np.array([x, y]), turn * self.radius + arm[0] * y - arm[1] * x
 
 
-def middle_of(g: ElementSet) -> tuple[float, np.ndarray, float]:
+def outline_centroid(g: ElementSet) -> tuple[float, np.ndarray, float]:
     """Length of ``g``, mean (2,) of its points and their root mean square distance from it."""
     x, ds = g.nodes, g.quadrature
     perimeter = ds.sum()
@@ -187,16 +185,16 @@ def middle_of(g: ElementSet) -> tuple[float, np.ndarray, float]:
 def rigid_motions(
     g: ElementSet, edge_loop: np.ndarray, about: tuple[np.ndarray, float] | None = None
 ) -> tuple[np.ndarray, np.ndarray]:
-    """(n, 3L) rigid motions of every loop in nodal unknowns and (3L, n) their mean over the loop; ``edge_loop`` (m,)
-    the loop of every edge. The turn is ``about`` a centre and moves points at a radius by one; those of the loop if
-    left out."""
+    """Rigid motions of every loop in nodal unknowns (n, 3L), and their mean over the loop (3L, n). ``edge_loop`` (m,):
+    loop of every edge. The rotation is ``about`` a centre and moves points at a radius by one; by default those of the
+    loop."""
     n_loops = int(edge_loop.max()) + 1 if len(edge_loop) else 0
     modes = np.zeros((g.n, 2, g.per, 3 * n_loops))
     weights = np.zeros_like(modes)
     loop_of = edge_loop[g.source] if g.n else np.empty(0, int)
     for k in range(n_loops):
         here = np.flatnonzero(loop_of == k)
-        perimeter, middle, radius = middle_of(g.take(here))
+        perimeter, middle, radius = outline_centroid(g.take(here))
         if about is not None:
             middle, radius = about
         rel, ds = g.nodes[here] - middle, g.quadrature[here]

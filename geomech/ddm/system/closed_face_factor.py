@@ -42,21 +42,21 @@ class HeldFactor:
         what: str,
     ):
         self.open, self._inverse = open_factor, inverse
-        self._free, self._held = np.flatnonzero(~rows.held), np.flatnonzero(rows.held)
+        self._free, self._prescribed = np.flatnonzero(~rows.prescribed), np.flatnonzero(rows.prescribed)
         along = np.flatnonzero(rows.mixed)
         across, mixed = along + rows.per, rows.mixed[along]
         # Of sliding nodes whose equation across is none of those given up it is added to the right side.
-        loose = ~rows.held[across]
+        loose = ~rows.prescribed[across]
         self._loose = along[loose], across[loose], mixed[loose]
-        at = np.full(len(rows.held), -1)
-        at[self._held] = np.arange(len(self._held))
+        at = np.full(len(rows.prescribed), -1)
+        at[self._prescribed] = np.arange(len(self._prescribed))
         self._slides = along[~loose], at[across[~loose]], mixed[~loose]
         of, into, factor = self._slides
-        needed = np.concatenate([self._held, of])
+        needed = np.concatenate([self._prescribed, of])
         columns = inverse.inverse_columns(needed)
-        self._response = columns[:, : len(self._held)].copy(order="F")
-        self._response[:, into] -= columns[:, len(self._held) :] * factor
-        self._small = Factor(self._response[self._held], what)
+        self._response = columns[:, : len(self._prescribed)].copy(order="F")
+        self._response[:, into] -= columns[:, len(self._prescribed) :] * factor
+        self._small = Factor(self._response[self._prescribed], what)
         self.rcond = min(open_factor.rcond, self._small.rcond)
 
     def respond(self, opened: np.ndarray, shear: np.ndarray, fixed: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -69,28 +69,28 @@ class HeldFactor:
         if len(pushed):
             w += self._inverse.inverse_columns(pushed) @ shear[pushed]
         missing = np.zeros_like(w)
-        missing[self._held] = self._small.solve(w[self._held] - fixed[self._held])
-        w -= self._response @ missing[self._held]
-        w[self._held] = fixed[self._held]
+        missing[self._prescribed] = self._small.solve(w[self._prescribed] - fixed[self._prescribed])
+        w -= self._response @ missing[self._prescribed]
+        w[self._prescribed] = fixed[self._prescribed]
         return w, missing
 
     def solve(self, right: np.ndarray, transposed: bool = False) -> np.ndarray:
         """Solution (n_free,) or (n_free, k) for ``right``, of the ``transposed`` system if asked."""
-        whole = np.zeros((len(self._free) + len(self._held), *right.shape[1:]), order="F")
+        whole = np.zeros((len(self._free) + len(self._prescribed), *right.shape[1:]), order="F")
         whole[self._free] = right
         along, across, mixed = self._loose
         mixed = mixed if right.ndim == 1 else mixed[:, None]
         if not transposed:
             whole[along] -= mixed * whole[across]
             x = self.open.solve(whole)
-            x -= self._response @ self._small.solve(x[self._held])
+            x -= self._response @ self._small.solve(x[self._prescribed])
             return x[self._free]
         x = self.open.solve(whole, transposed=True)
         of, into, factor = self._slides
-        pull = x[self._held]
+        pull = x[self._prescribed]
         pull[into] -= (factor if right.ndim == 1 else factor[:, None]) * x[of]
         whole[:] = 0.0
-        whole[self._held] = self._small.solve(pull, transposed=True)
+        whole[self._prescribed] = self._small.solve(pull, transposed=True)
         x -= self.open.solve(whole, transposed=True)
         x[across] -= mixed * x[along]
         return x[self._free]

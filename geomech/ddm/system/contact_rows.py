@@ -1,4 +1,4 @@
-"""How contact of crack faces changes the equations of the crack unknowns."""
+"""Changes of the crack equations by contact of the crack faces."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ import numpy as np
 
 @dataclass(frozen=True, eq=False)
 class Rows:
-    """How contact changes the equations S w = right. Unknowns that are ``held`` (n,) bool are zero and have no
-    equation; ``mixed`` (n,) times the equation across a node is added to that along it, ``per`` places before;
-    ``spring`` (n,) is taken off the diagonal."""
+    """Contact as a change of the equations S w = right. ``prescribed`` (n,) bool: unknowns with a given value and no
+    equation; ``mixed`` (n,): factor with which the equation across a node is added to that along it, ``per`` places
+    before; ``spring`` (n,): subtracted from the diagonal."""
 
-    held: np.ndarray
+    prescribed: np.ndarray
     mixed: np.ndarray
     spring: np.ndarray
     per: int

@@ -1,8 +1,9 @@
-"""The crack unknowns' own equations S w = right, some of them held: all that contact, compliance and adjoints need.
+"""The equations of the crack unknowns, S w = right, some of them prescribed: the basis of contact, compliance and
+adjoints.
 
-S is the Schur complement of slip and opening (`body`). One factorisation of it serves all contact states: holding k
-unknowns is a k × k system in columns of S⁻¹. Where cracks cut a part off that only closed faces hold, S is singular,
-and the equations of the free unknowns are factored instead.
+S = A_CC − A_CΓ A_ΓΓ⁻¹ A_ΓC is the Schur complement of slip and opening (`body`). One factorisation of it serves all
+contact states: prescribing k unknowns needs a k × k system in columns of S⁻¹. Where cracks cut off a part that only
+closed faces support, S is singular, and the equations of the free unknowns are factored instead.
 """
 
 from __future__ import annotations
@@ -18,22 +19,22 @@ from .contact_rows import Rows
 from .dense_lu import Factor
 from .updated_factor import BaseOf, ContactBase, UpdatedFactor
 
-#: Reciprocal condition of S below which contact is not built on its inverse.
+#: Reciprocal condition of S below which contact is not based on its inverse.
 _SAFE = 1e-11
-#: From so many unknowns on contact goes by factors that outlast its states: where less than this part of the unknowns is
-#: held those of S, else those of other states (`updated_factor`).
-WORTHWHILE, MOST_HELD = 400, 0.05
-#: Factors for so many sets of free unknowns are kept.
+#: Number of unknowns from which factors of other contact states are reused: those of S where less than this fraction of
+#: the unknowns is prescribed, else those of other states (`updated_factor`).
+WORTHWHILE, MOST_PRESCRIBED = 400, 0.05
+#: Number of sets of free unknowns whose factors are kept.
 _KEPT = 8
-#: Factors of so many states are there for others to go by: those of faces that slip, and of faces that stick where the load
-#: falls, have little in common.
+#: Number of states whose factors are kept for use by others: slipping faces, and faces that stick under falling load,
+#: have little in common.
 _BASES = 3
 
 
 class CrackSystem:
-    """``matrix`` is S; factors and columns of its inverse are made when first asked for, and kept. ``before``: that
-    of the cracks before they grew, whose elements had the numbers ``was`` (n_elements,), −1 where new: states of contact go
-    on by its factors."""
+    """``matrix`` is S; factors and columns of its inverse are computed on first use and kept. ``before``: the system
+    before the last growth, in which the elements had the numbers ``was`` (n_elements,), −1 where new; its factors are
+    reused."""
 
     def __init__(
         self,
@@ -45,15 +46,15 @@ class CrackSystem:
         self.matrix, self._work = matrix, Work() if work is None else work
         self.n = matrix.n
         grown = [] if before is None else [base.grown(matrix, was) for base in before.bases]
-        #: What states of contact go by, the last used one at the end.
+        #: Factors on which contact states are based, the last used one at the end.
         self.bases: list[BaseOf] = [base for base in grown if base is not None]
         self._factors: dict[bytes, tuple[np.ndarray, Factor]] = {}
         self._column_at = np.full(self.n, -1)
         self._columns = np.empty((self.n, 0))
-        self._held_now: tuple[bytes, np.ndarray, Factor] | None = None
+        self._prescribed_factor: tuple[bytes, np.ndarray, Factor] | None = None
 
     def opened(self, right: np.ndarray) -> np.ndarray:
-        """S⁻¹ ``right``; zeros where it is not to be used (no `open_factor`)."""
+        """S⁻¹ ``right``; zeros where S⁻¹ is not to be used (no `open_factor`)."""
         if self.open_factor is None:
             return np.zeros_like(right)
         self._work.back_substitutions += 1 if right.ndim == 1 else right.shape[1]
@@ -62,17 +63,17 @@ class CrackSystem:
     def constrained(
         self, right: np.ndarray, closed: np.ndarray, fixed: np.ndarray, opened: np.ndarray | None = None
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Jumps w (n,) or (n, k) with w = ``fixed`` where ``closed``, S w = ``right`` elsewhere, and what is missing in
-        the closed rows, right − S w. ``opened``: S⁻¹ right, if it is known.
+        """Jumps w (n,) or (n, k) with w = ``fixed`` where ``closed`` and S w = ``right`` elsewhere, and the reaction
+        right − S w in the closed rows. ``opened``: S⁻¹ right, if known.
 
-        Raises LinAlgError when cracks cut a part off and closed faces do not hold it.
+        Raises LinAlgError when cracks cut off a part that closed faces do not support.
         """
         at = np.flatnonzero(closed)
         reaction = np.zeros_like(right)
         if self.open_factor is not None:
             w = self.opened(right) if opened is None else opened.copy()
             if len(at):
-                columns, factor = self._held_columns(at)
+                columns, factor = self._prescribed_columns(at)
                 reaction[at] = factor.solve(w[at] - fixed[at])
                 w -= columns @ reaction[at]
                 w[at] = fixed[at]
@@ -86,12 +87,12 @@ class CrackSystem:
         return w, reaction
 
     def changed(self, rows: Rows) -> tuple[np.ndarray, Factor | BorderedFactor | HeldFactor | UpdatedFactor]:
-        """The unknowns that are not held (indices) and factors of their equations."""
-        free, moving = np.flatnonzero(~rows.held), np.flatnonzero(rows.mixed)
+        """The free unknowns (indices) and the factors of their equations."""
+        free, moving = np.flatnonzero(~rows.prescribed), np.flatnonzero(rows.mixed)
         if len(free) == self.n and not len(moving) and not rows.spring.any() and self.open_factor is not None:
             return free, self.open_factor
         lasting = self.n >= WORTHWHILE and not rows.spring.any()
-        if lasting and self.n - len(free) < MOST_HELD * self.n and self.open_factor is not None:
+        if lasting and self.n - len(free) < MOST_PRESCRIBED * self.n and self.open_factor is not None:
             return free, HeldFactor(rows, self.open_factor, self, SINGULAR)
         updated = self._updated(rows) if lasting else None
         if updated is not None:
@@ -113,7 +114,7 @@ class CrackSystem:
         return free, factor
 
     def _updated(self, rows: Rows) -> UpdatedFactor | None:
-        """Factors by those of the states that are most like ``rows``; None where these are too unlike."""
+        """Factors based on those of the most similar state; None where none is similar enough."""
         borders = [base.border(rows) for base in self.bases]
         if not borders:
             return None
@@ -124,12 +125,12 @@ class CrackSystem:
         return updated
 
     def rcond(self, closed: np.ndarray) -> float:
-        """Reciprocal condition of the matrix solved with when ``closed`` (n,) bool are held."""
+        """Reciprocal condition of the matrix solved when ``closed`` (n,) bool are prescribed."""
         return (self.open_factor or self._free_factor(closed)[1]).rcond
 
     @cached_property
     def open_factor(self) -> Factor | BorderedFactor | None:
-        """Factors of S with all faces open; None when only closed faces hold a part of the body."""
+        """Factors of S with all faces open; None when only closed faces support a part of the body."""
         if not self.matrix.is_whole:
             try:
                 self._work.crack_borderings += 1
@@ -139,7 +140,7 @@ class CrackSystem:
                     return factor
             except np.linalg.LinAlgError:
                 pass
-            # Only pivoting in the whole matrix tells.
+            # Only pivoting in the whole matrix can tell.
             self.matrix = Bordered.whole(self.matrix.elements, self.matrix.dense)
         try:
             self._work.crack_factorisations += 1
@@ -162,10 +163,10 @@ class CrackSystem:
         return self._factors[key]
 
     def inverse_columns(self, unknowns: np.ndarray) -> np.ndarray:
-        """(n, len(unknowns)) columns of S⁻¹; they outlast the load."""
+        """(n, len(unknowns)) columns of S⁻¹, kept beyond the present load."""
         missing = unknowns[self._column_at[unknowns] < 0]
         if len(missing):
-            # Of whole elements: many columns take little more time than one, and neighbours will be asked for.
+            # Whole elements: many columns take hardly more time than one, and neighbours will be needed.
             width = 2 * self.matrix.elements.per
             missing = (np.unique(missing // width)[:, None] * width + np.arange(width)).ravel()
             missing = missing[self._column_at[missing] < 0]
@@ -175,11 +176,11 @@ class CrackSystem:
             self._columns = np.hstack([self._columns, self.opened(right)])
         return self._columns[:, self._column_at[unknowns]]
 
-    def _held_columns(self, at: np.ndarray) -> tuple[np.ndarray, Factor]:
-        """Columns ``at`` of S⁻¹ and the factors of their rows ``at``; mostly the same faces stay closed for long."""
+    def _prescribed_columns(self, at: np.ndarray) -> tuple[np.ndarray, Factor]:
+        """Columns ``at`` of S⁻¹ and the factors of their rows ``at``; kept, as the same faces often stay closed."""
         key = at.tobytes()
-        if self._held_now is None or self._held_now[0] != key:
+        if self._prescribed_factor is None or self._prescribed_factor[0] != key:
             columns = self.inverse_columns(at)
             factor = Factor(columns[at], "closed faces leave a part of the body without hold")
-            self._held_now = key, columns, factor
-        return self._held_now[1:]
+            self._prescribed_factor = key, columns, factor
+        return self._prescribed_factor[1:]

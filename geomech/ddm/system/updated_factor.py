@@ -103,7 +103,7 @@ class Border:
     ``gone`` in the base whose unknown is held or no longer there; unknowns ``turned`` whose equation is another."""
 
     def __init__(self, of: BaseOf, rows: Rows):
-        free = ~rows.held
+        free = ~rows.prescribed
         known = free & (of.at >= 0)
         self.free, self.kept = np.flatnonzero(free), np.flatnonzero(known)
         self.places = of.at[self.kept]
@@ -135,11 +135,11 @@ class UpdatedFactor:
             values[slides] += rows.mixed[own[slides], None] * matrix.entries(across, every)
         self._down = np.zeros((len(own), base.n))
         self._down[:, border.places] = values[:, : len(border.kept)]
-        a, g = len(new), len(border.gone)
-        self._parts = slice(a), slice(a, a + g), slice(a + g, border.n)
+        a = len(new)
+        of_new, _, of_turned = self._parts
         t = -self._times(self._z)
-        t[self._parts[0], :a] += values[:a, len(border.kept) :]
-        t[self._parts[2], :a] += values[a:, len(border.kept) :]
+        t[of_new, :a] += values[:a, len(border.kept) :]
+        t[of_turned, :a] += values[a:, len(border.kept) :]
         size = np.abs(t).max(axis=0, initial=0.0)
         self._scale = np.ldexp(1.0, -np.frexp(np.where(size > 0, size, 1.0))[1])
         self._small = Factor(t * self._scale, what)
@@ -152,6 +152,12 @@ class UpdatedFactor:
     def trusted(self) -> bool:
         """Whether the border's equations lose no digits that matter."""
         return self._small.rcond > TRUSTED
+
+    @property
+    def _parts(self) -> tuple[slice, slice, slice]:
+        """Rows of the border that are of new unknowns, of those that are gone and of turned equations."""
+        a, g = len(self._border.new), len(self._border.gone)
+        return slice(a), slice(a, a + g), slice(a + g, self._border.n)
 
     def _times(self, x: np.ndarray) -> np.ndarray:
         """C ``x``, (n_border, k) for (n_base, k)."""
@@ -193,7 +199,8 @@ class _Columns:
     """Columns (n,) that are known by a number, made when first asked for."""
 
     def __init__(self, n: int):
-        self.n, self._at, self._values = n, {}, np.empty((n, 0), order="F")
+        self.n, self._values = n, np.empty((n, 0), order="F")
+        self._at: dict[int, int] = {}
 
     def of(self, numbers: np.ndarray, make) -> np.ndarray:
         """(n, k) those of ``numbers`` (k,); ``make(missing)`` makes what is not there."""

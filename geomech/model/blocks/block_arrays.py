@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -40,6 +41,8 @@ class Blocks:
         fixed         (n_blocks,)       True: the block does not move
         held          (n_blocks, 6)     True: that unknown (u0, v0, r0, εx, εy, γxy) of the block is constrained to
                                         zero, as for a guided platen; None: no moving block is constrained
+        order         (n_blocks,)       p of the complete polynomial that is a block's displacement, 1 to 8; None: all are
+                                        of first order
         edge_name     (n_vertices,)     index into ``edge_names`` (0: the empty name, unnamed)
         edge_names    tuple of str      e.g. ("", "load:top", "joint:set1")
         names         tuple of str      one name per block, for messages and files
@@ -53,7 +56,8 @@ class Blocks:
     edge_name: np.ndarray
     edge_names: tuple[str, ...] = ("",)
     names: tuple[str, ...] = ()
-    held: np.ndarray | None = None
+    constrained: np.ndarray | None = None
+    order: np.ndarray | None = None
 
     @classmethod
     def from_polygons(
@@ -62,20 +66,31 @@ class Blocks:
         *,
         material: Sequence[int] | None = None,
         fixed: Sequence[bool] | None = None,
-        held: Sequence[Sequence[bool]] | None = None,
+        constrained: Sequence[Sequence[bool]] | None = None,
         edge_names: Sequence[Sequence[Sequence[str]]] | None = None,
         names: Sequence[str] | None = None,
+        order: Sequence[int] | None = None,
+        held: Sequence[Sequence[bool]] | None = None,
     ) -> Blocks:
         """Build from ``polygons[block][loop]`` = (n, 2) vertices, m, without repeating the first.
 
         A bare (n, 2) array is a block without holes. ``edge_names[block][loop][edge]`` names edges. Outlines are made
-        counter-clockwise, holes clockwise.
+        counter-clockwise, holes clockwise. ``held`` is the deprecated name of ``constrained``.
 
         Raises ValueError that names the block for loops of fewer than three vertices, repeated vertices, non-finite
         coordinates, crossing edges, zero area, and holes that leave the outline or overlap; and for lists whose length
-        is not the number of blocks."""
+        is not the number of blocks.
+
+        >>> blocks = Blocks.from_polygons([np.array([[0, 0], [2, 0], [2, 1], [0, 1]])])
+        >>> blocks.n_blocks, float(blocks.areas()[0])
+        (1, 2.0)
+        """
         n_blocks = len(polygons)
-        given = {"material": material, "fixed": fixed, "held": held, "edge_names": edge_names, "names": names}
+        if held is not None:
+            _warn_held()
+            constrained = held
+        given = {"material": material, "fixed": fixed, "held": constrained, "edge_names": edge_names, "names": names,
+                 "order": order}  # fmt: skip
         _refuse_lengths(n_blocks, given)
         names = tuple(names) if names is not None else tuple(f"block {b}" for b in range(n_blocks))
         loops, block_loop = [], [0]
@@ -119,8 +134,17 @@ class Blocks:
             edge_name=edge_name,
             edge_names=tuple(known),
             names=names,
-            held=np.asarray(held, dtype=bool) if held is not None and np.any(held) else None,
+            constrained=np.asarray(constrained, dtype=bool)
+            if constrained is not None and np.any(constrained)
+            else None,
+            order=None if order is None else np.asarray(order, dtype=int),
         )
+
+    @property
+    def held(self) -> np.ndarray | None:
+        """Deprecated name of ``constrained``."""
+        _warn_held()
+        return self.constrained
 
     @property
     def n_blocks(self) -> int:
@@ -282,10 +306,10 @@ def _refuse_lengths(n_blocks: int, given: dict[str, Sequence | None]) -> None:
     for what, entries in given.items():
         if entries is not None and len(entries) != n_blocks:
             raise ValueError(f"{what} needs an entry for each of {n_blocks} blocks, got {len(entries)}")
-    held = given["held"]
-    if held is not None and np.shape(held) != (n_blocks, 6) and n_blocks:
+    constrained = given["held"]
+    if constrained is not None and np.shape(constrained) != (n_blocks, 6) and n_blocks:
         raise ValueError(
-            f"held needs six entries a block (u0, v0, r0, εx, εy, γxy), got an array of shape {np.shape(held)}"
+            f"held needs six entries a block (u0, v0, r0, εx, εy, γxy), got an array of shape {np.shape(constrained)}"
         )
     material = given["material"]
     if material is not None and n_blocks:
@@ -368,3 +392,7 @@ def _refuse_shared(holes: list[np.ndarray], name: str) -> None:
                     f"{name}: holes {m + 1} and {k + 1} overlap at ({shared[0]:g}, {shared[1]:g}): draw what they take out "
                     "together as one hole"
                 )
+
+
+def _warn_held() -> None:
+    warnings.warn("Blocks.held is now Blocks.constrained", DeprecationWarning, stacklevel=3)

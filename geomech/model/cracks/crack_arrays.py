@@ -63,7 +63,12 @@ class Cracks:
         join                  True: coincident points, of one crack or several, become one node, so that cracks meet,
                               cross and branch there. Crossings between points are not noded
 
-        Raises ValueError that names the crack for fewer than two points, non-finite points and zero-length segments."""
+        Raises ValueError that names the crack for fewer than two points, non-finite points and zero-length segments.
+
+        >>> cracks = Cracks.from_polylines([np.array([[0, 0], [3, 0], [3, 4]])], names=["kinked"])
+        >>> cracks.n_cracks, float(cracks.lengths.sum())
+        (1, 7.0)
+        """
         n = len(polylines)
         names = tuple(names) if names is not None else tuple(f"crack {k}" for k in range(n))
         blocks = np.broadcast_to(np.asarray(block, dtype=int), (n,))

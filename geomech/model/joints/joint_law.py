@@ -94,6 +94,9 @@ class JointLaw:
                                 1; None: what springs and time integration leave of the speed
 
     Raises ValueError that names the joint.
+
+    >>> JointLaw("bedding", friction_angle=np.radians(25), cohesion=20e3, tensile_strength=5e3).cohesion
+    20000.0
     """
 
     name: str

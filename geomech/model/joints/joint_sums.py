@@ -88,8 +88,8 @@ def reactions(blocks: Blocks, contacts: np.ndarray) -> dict[int, np.ndarray]:
     N and N m per metre of thickness; the moment is about the mean of the block's reference vertices. The support's
     reaction is the opposite."""
     supports = np.asarray(blocks.fixed, dtype=bool).copy()
-    if blocks.held is not None:
-        supports |= blocks.held.any(axis=1)
+    if blocks.constrained is not None:
+        supports |= blocks.constrained.any(axis=1)
     out = {int(b): np.zeros(3) for b in np.flatnonzero(supports)}
     about = blocks.mean_vertices(blocks.vertices)
     normal = contacts["normal"]

@@ -93,6 +93,10 @@ class History:
     wave    added sinusoid; None: none
 
     Raises ValueError for times that do not ascend, and for values that are not finite or not as many.
+
+    >>> load = History(np.array([0.0, 10.0]), np.array([[0.0, 0.0], [0.0, -2e6]]))
+    >>> load.at(5.0).tolist()
+    [0.0, -1000000.0]
     """
 
     times: np.ndarray

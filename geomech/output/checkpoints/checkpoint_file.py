@@ -45,7 +45,7 @@ _ALLOWED = plain_data.Allowed(
     classes=(
         "geomech.output.tables.deepest_penetration:Deepest", "geomech.output.vtk.grids:CrackLines", "geomech.output.vtk.grids:KeyBlocks",
         "geomech.output.tables.histories:TableEnd", "geomech.output.vtk.interior_fields:InteriorMeshes", "geomech.output.vtk.interior_fields:_Kept",
-        "geomech.output.vtk.series:SeriesTime", "geomech.output.vtk.triangulate:Triangles",
+        "geomech.output.vtk.series:SeriesTime", "geomech.output.vtk.structures:BoltLines", "geomech.output.vtk.triangulate:Triangles",
         "geomech.shapes.meshing:InteriorMesh",
     ),
     methods=("geomech.model.problem:Problem.joint_index",),

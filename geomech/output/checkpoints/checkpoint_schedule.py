@@ -22,6 +22,8 @@ log = logging.getLogger(__name__)
 INTERVAL = 30.0
 #: … and as late as keeps what checkpoints cost below this part of the run's time.
 SHARE = 0.02
+#: A run that has ended keeps checkpoints up to this size, MB: factors of a specimen with grown cracks take a hundred.
+KEPT_MB = 16.0
 #: Keys of a scene that name files.
 _NAMING_FILES = ("model", "file")
 
@@ -31,14 +33,18 @@ class Checkpoints:
     cycles.
 
     ``every`` counts cycles between two, 0 for none at all; None leaves it to `INTERVAL` and `SHARE`. ``scene`` is the
-    resolved scene, which a resumed run must still have. That a checkpoint cannot be written is told to the log and ends
+    resolved scene, which a resumed run must still have. ``kept_mb``: of a run that has come to its end, checkpoints larger
+    than this are removed. That a checkpoint cannot be written is told to the log and ends
     nothing.
     """
 
-    def __init__(self, *, every: int | None = None, scene: Mapping[str, Any] | None = None) -> None:
+    def __init__(
+        self, *, every: int | None = None, scene: Mapping[str, Any] | None = None, kept_mb: float = KEPT_MB
+    ) -> None:
         if every is not None and every < 0:
             raise ValueError(f"checkpoints come every n-th cycle, or never with 0; got {every}")
         self.every, self.scene = every, None if scene is None else dict(scene)
+        self.kept_mb = kept_mb
         self.seconds = 0.0
 
     def on_start(self, problem: Problem, folder: Path) -> None:
@@ -90,6 +96,18 @@ class Checkpoints:
 
     def on_end(self, summary: dict[str, Any], error: BaseException | None = None) -> None:
         summary.setdefault("seconds", {})["writing checkpoints"] = round(self.seconds, 4)
+        if error is None and self.wanted:
+            self._remove_large(summary)
+
+    def _remove_large(self, summary: dict[str, Any]) -> None:
+        stored = checkpoint_file.found(self._folder)
+        size = max((path.stat().st_size for path in stored), default=0) / 1e6
+        if size <= self.kept_mb:
+            return
+        for path in stored:
+            path.unlink()
+        summary["checkpoint_not_kept_mb"] = round(size, 1)
+        log.info("its state at the end, %.0f MB, is not kept: output.checkpoint_kept_mb is %g", size, self.kept_mb)
 
 
 def digests(scene: Mapping[str, Any]) -> dict[str, str]:

@@ -21,6 +21,7 @@ from ..checkpoints import checkpoint_file
 from ..tables.deepest_penetration import limits_line
 from ..tables.motion_state import closing, told
 from ..units import length_text, stress_text
+from .at_work import spoken
 
 #: So many warnings of a run are shown at its end, each this long at most.
 SHOWN_WARNINGS, WIDTH = 3, 400
@@ -149,7 +150,10 @@ class Progress:
             # The text is made only as often as the bar is drawn.
             if now - self._said >= self._bar.mininterval:
                 self._said = now
-                self._bar.set_postfix_str(_told(cycle) + self._left(cycle), refresh=False)
+                # What is left comes first: a narrow terminal cuts the end off.
+                said = f"{self._left(cycle).removeprefix(', ')}, {_told(cycle)}"
+                self._bar.set_postfix_str(said.removeprefix(", "), refresh=False)
+                spoken()
             with suppress(OSError):  # of a terminal that is gone
                 self._bar.update(max(0.0, min(cycle.state.time, self._end) - self._bar.n))
         elif now - self._said >= self.interval:
@@ -187,6 +191,7 @@ class Progress:
     def _say(self, text: str) -> None:
         if self._out is None:
             return
+        spoken()
         try:
             self._out.write(text + "\n")
             self._out.flush()
@@ -226,8 +231,18 @@ def closing_lines(summary: dict[str, Any], folder: Path) -> list[str]:
     if "mechanism" in summary.get("first", {}):
         lines.append(f"  {NO_ANSWER}")
     if summary.get("end") in STOPS and summary["end"] != "mechanism":
-        lines.append(f"  to go on beyond it: geomech resume {folder} --set 'run.stop_at=[]'")
+        lines.append(_way_on(summary, folder))
     return [*lines, f"  {folder}"]
+
+
+def _way_on(summary: dict[str, Any], folder: Path) -> str:
+    """How a run goes on beyond the event that ended it."""
+    size = summary.get("checkpoint_not_kept_mb")
+    if size is None:
+        return f"  to go on beyond it: geomech resume {folder} --set 'run.stop_at=[]'"
+    return (
+        f"  to go on beyond it: run again with --set output.checkpoint_kept_mb={math.ceil(size)}, then geomech resume"
+    )
 
 
 def _told(cycle: Cycle) -> str:

@@ -1,7 +1,8 @@
 """A cycle as grids of points, cells and fields: blocks, cracks, tips and contacts.
 
-``configuration`` is "reference" (coordinates of the reference, ``displacement`` beside them) or "current" (coordinates
-as they are now; ``displacement`` is written all the same). All grids of a run share it, so they lie on one another.
+One rule holds for all files of a run: where a point is now = points + REFERENCE × displacement. With ``configuration``
+"reference" (REFERENCE = 1 in the field data) files hold the coordinates of the reference, and warping by displacement
+moves them; with "current" (REFERENCE = 0) the coordinates are those of now, and warping would move them twice.
 """
 
 from __future__ import annotations
@@ -56,12 +57,12 @@ def blocks_grid(
     cells, owner = triangles.of(blocks)
     stress = six_components(state.stress, blocks.material, materials)
     return Grid(
-        points=blocks.vertices if configuration == "reference" else state.vertices,
+        points=blocks.vertices if configuration == "reference" else cycle.placed,
         connectivity=cells.ravel(),
         offsets=np.arange(3, 3 * len(cells) + 1, 3),
         types=np.full(len(cells), TRIANGLE),
         point_data={
-            "displacement": state.vertices - blocks.vertices,
+            "displacement": cycle.moved,
             "velocity": vertex_velocity(blocks, state),
         },
         cell_data={
@@ -170,6 +171,8 @@ def tips_grid(cycle: Cycle, motion: Motion, configuration: str) -> Grid:
             "growth_direction": growth,
             "grown": tips["grown"],
             "crack_id": tips["crack"],
+            "end": tips["end"],
+            "tip_id": tips["node"],
             "block_id": tips["block"],
         },
     )
@@ -184,7 +187,7 @@ def contacts_grid(cycle: Cycle, configuration: str) -> Grid:
     return _cloud(
         reference if configuration == "reference" else contacts["point"],
         {
-            "displacement": cycle.state.vertices[contacts["vertex"]] - reference,
+            "displacement": cycle.moved[contacts["vertex"]],
             "force": force,
             "normal_force": contacts["normal_force"],
             "shear_force": contacts["shear_force"],

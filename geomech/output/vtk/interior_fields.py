@@ -10,16 +10,20 @@ from typing import Any
 import numpy as np
 
 from geomech.conventions import rotate_stress
-from geomech.model import Cracks, Cycle, Material
+from geomech.model import OPEN, Cracks, Cycle, Material
 from geomech.model.blocks.block_motion import Motion
 
-from .block_motion import rotation
+from .block_motion import displacement, rotation
 from .grids import principal_stresses, six_components, von_mises
 from .triangulate import Triangles
 from .vtu import TRIANGLE, Grid
 
 #: A node on a crack face is evaluated this far inside its own side, relative to its shortest triangle edge.
 _ASIDE = 1e-5
+#: Triangles of a block of higher order, at least, and of all of them together, about.
+_FEWEST, _OF_BENT = 60, 40_000
+#: Displacement is tied to the block's own within this part of its size (√area) about a contact.
+_TIED = 0.25
 #: Cracks that turn by more than this are sharp there: stress is singular, rad.
 _SHARP = math.radians(20)
 
@@ -52,14 +56,22 @@ class InteriorMeshes:
         self._cracked_materials: set[int] = set()
         self._triangles = Triangles()
 
+    def note_cracked(self, cycle: Cycle) -> None:
+        """Take the materials that hold cracks at ``cycle`` for those that crack, before an earlier cycle is drawn."""
+        self._cracked_materials |= {int(cycle.blocks.material[b]) for b in cycle.inside}
+
     def grid(self, cycle: Cycle, materials: Sequence[Material], motion: Motion, configuration: str) -> Grid:
         """The rock of ``cycle`` as one grid; empty until some block holds a crack."""
         blocks = cycle.blocks
-        self._cracked_materials |= {int(blocks.material[b]) for b in cycle.bodies}
+        self.note_cracked(cycle)
         whole = np.isin(blocks.material, [*self._cracked_materials]) & ~blocks.fixed
-        whole[[*cycle.bodies]] = False
+        whole[[*cycle.inside]] = False
         before, self._kept = self._kept, {}
-        parts = [self._block(cycle, b, body, motion, before) for b, body in sorted(cycle.bodies.items())]
+        parts = [self._block(cycle, b, body, motion, before) for b, body in sorted(cycle.inside.items())]
+        # Blocks whose cracks nobody has solved for yet: before the first step.
+        waiting = np.intersect1d(np.flatnonzero(whole), cycle.cracks.block).tolist()
+        whole[waiting] = False
+        parts += [self._waiting_block(cycle, b, motion, before) for b in waiting]
         parts += [self._whole_blocks(cycle, whole)] if whole.any() else []
         first = np.cumsum([0, *(len(p["points"]) for p in parts)])
 
@@ -101,14 +113,30 @@ class InteriorMeshes:
         for k in range(3):
             mean = np.bincount(kept.owner, weights=stress[n:, k], minlength=n)
             stress[singular, k] = mean[singular] / count[singular]
+        moved = _placed(
+            kept.mesh.points, kept.areas, own[:n], motion.reference_centre[b], motion.centre[b], gradient, turn
+        )
+        at = _contact_points(cycle, b)
+        as_block = displacement(motion, np.full(len(at), b), at)
+        reach = _TIED * math.sqrt(kept.areas.sum())
         return {
             "owner": np.full(n, b),
             "points": kept.mesh.points,
             "triangles": kept.mesh.triangles,
-            "moved": _placed(
-                kept.mesh.points, kept.areas, own[:n], motion.reference_centre[b], motion.centre[b], gradient, turn
-            ),
+            "moved": _tied(kept.mesh.points, moved, at, as_block, reach),
             "stress": rotate_stress(stress[:n], turn),
+        }
+
+    def _waiting_block(self, cycle: Cycle, b: int, motion: Motion, before: dict[bytes, _Kept]) -> dict[str, np.ndarray]:
+        """A block with cracks before they are solved for: the one stress and the motion that it has as a block."""
+        kept = self._mesh(cycle, b, before)
+        owner = np.full(len(kept.points), b)
+        return {
+            "owner": owner,
+            "points": kept.mesh.points,
+            "triangles": kept.mesh.triangles,
+            "moved": displacement(motion, owner, kept.mesh.points),
+            "stress": cycle.state.stress[owner],
         }
 
     def _whole_blocks(self, cycle: Cycle, whole: np.ndarray) -> dict[str, np.ndarray]:
@@ -133,12 +161,18 @@ class InteriorMeshes:
         if kept is None:
             from geomech.shapes.meshing import mesh_interior
 
-            size = math.sqrt(cycle.blocks.areas()[b] / (0.433 * self.n_triangles))
+            size = math.sqrt(cycle.blocks.areas()[b] / (0.433 * self._triangles_of(cycle, b)))
             mesh = mesh_interior(loops, cracks, size, size / self.tip_ratio)
             look_from = mesh.points + _ASIDE * _local_size(mesh)[:, None] * mesh.side
             kept = _Kept(mesh, look_from, _node_areas(mesh), *_about_singular(mesh, cracks))
         self._kept[key] = kept
         return kept
+
+    def _triangles_of(self, cycle: Cycle, b: int) -> int:
+        """About how many triangles block ``b`` gets: fewer where many blocks bend, whose stress is smooth."""
+        if b not in cycle.bent:
+            return self.n_triangles
+        return max(_FEWEST, min(self.n_triangles, _OF_BENT // len(cycle.bent)))
 
 
 def _singular_nodes(cracks: Cracks) -> np.ndarray:
@@ -186,6 +220,35 @@ def _node_areas(mesh: Any) -> np.ndarray:
     u, v = b - a, c - a
     third = np.abs(u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]) / 6
     return np.bincount(mesh.triangles.ravel(), weights=np.repeat(third, 3), minlength=len(mesh.points))
+
+
+def _contact_points(cycle: Cycle, b: int) -> np.ndarray:
+    """(n, 2) m in the reference: where closed contacts press on block ``b``, its own vertices or feet on its edges."""
+    contacts, blocks = cycle.state.contacts, cycle.blocks
+    closed = contacts[contacts["state"] != OPEN]
+    own, other = closed[closed["block"] == b], closed[closed["other"] == b]
+    first, share = other["edge"], other["position"][:, None]
+    feet = (1 - share) * blocks.vertices[first] + share * blocks.vertices[blocks.next_vertex[first]]
+    return np.unique(np.concatenate([blocks.vertices[own["vertex"]], feet]), axis=0)
+
+
+def _tied(points: np.ndarray, moved: np.ndarray, at: np.ndarray, as_block: np.ndarray, reach: float) -> np.ndarray:
+    """``moved`` (n, 2) m at ``points``, as the block moves (``as_block``) at the contacts ``at`` (k, 2) m, and as it was
+    beyond ``reach`` m of them.
+
+    The neighbour that presses there has met the block, which has one strain. The rock inside is also dented under the
+    load, by several times the block's shortening where the load is nearly a point: without this it would be drawn away
+    from its platens. What is added is continuous (Shepard's weights), so that cracks open and slip as before."""
+    if not len(at):
+        return moved
+    nearest = np.array([np.argmin(((points - place) ** 2).sum(axis=1)) for place in at])
+    lacks = as_block - moved[nearest]
+    square = ((points[:, None] - at) ** 2).sum(axis=2)
+    near = np.maximum(0.0, 1.0 - square / reach**2) ** 2
+    weights = near / np.maximum(square, (1e-6 * reach) ** 2)
+    total = weights.sum(axis=1)
+    mean = weights @ lacks / np.maximum(total, np.finfo(float).tiny)[:, None]
+    return moved + near.max(axis=1)[:, None] * mean
 
 
 def _placed(

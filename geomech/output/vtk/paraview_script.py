@@ -7,9 +7,11 @@ from typing import Any
 
 from geomech.model import Cycle, Problem
 
-_SCRIPT = '''"""Opens this run in ParaView: `paraview --script=view.py`, or headless `pvbatch view.py --picture view.png --state view.pvsm`.
+_SCRIPT = '''"""Opens this run in ParaView: `paraview --script=view.py`, File > Load State, or without a screen
+`pvbatch view.py --picture view.png --state view.pvsm`.
 
-Written by geomech beside the run's series; change it as you like. Coordinates are the {configuration} ones{warped}.
+Written by geomech beside the run's series; change it as you like. Where a point is now = points + REFERENCE x
+displacement: coordinates are the {configuration} ones{warped}.
 """
 
 import argparse
@@ -27,12 +29,48 @@ REFERENCE = {reference}
 
 def series(name):
     """The reader of the series `name`, at its last time; None where the run has not written it."""
-    path = HERE / (name + ".pvd")
-    if not path.is_file():
+    listed, one = HERE / (name + ".pvd"), HERE / (name + ".vtkhdf")
+    if listed.is_file():
+        source = pv.PVDReader(registrationName=name, FileName=str(listed))
+    elif one.is_file():
+        source = pv.OpenDataFile(str(one), registrationName=name)
+    else:
         return None
-    source = pv.PVDReader(registrationName=name, FileName=str(path))
     source.UpdatePipeline(source.TimestepValues[-1] if len(source.TimestepValues) else 0.0)
     return source
+
+
+def span(source, place, array, component=None):
+    """The range of an array without the outermost 0.7 % at either end: stress at a crack tip is singular."""
+    import numpy as np
+    from vtkmodules.util.numpy_support import vtk_to_numpy
+
+    data = pv.servermanager.Fetch(source)
+    held = (data.GetPointData() if place == "POINTS" else data.GetCellData()).GetArray(array)
+    if held is None or not held.GetNumberOfTuples():
+        return 0.0, 1.0
+    values = vtk_to_numpy(held)
+    if values.ndim > 1:
+        values = np.linalg.norm(values, axis=1) if component is None else values[:, component]
+    values = values[np.isfinite(values)]
+    if not len(values):
+        return 0.0, 1.0
+    low, high = np.percentile(values, [0.7, 99.3])
+    # A uniform field gets a band about its value, or colours would show round-off.
+    band = max(0.5 * (high - low), 0.05 * max(abs(low), abs(high)), 1e-30)
+    return float(0.5 * (low + high) - band), float(0.5 * (low + high) + band)
+
+
+def names(source, array):
+    """The names that a file holds in its field data, one a line."""
+    data = pv.servermanager.Fetch(source).GetFieldData().GetArray(array)
+    return [] if data is None else bytes(int(data.GetValue(k)) for k in range(data.GetNumberOfTuples())).decode().split("\\n")
+
+
+def named(array, known):
+    """Colours of `array`, a number each, with the names that stand for them."""
+    colours = pv.GetColorTransferFunction(array)
+    colours.Annotations = [text for k, name in enumerate(known) for text in (str(k), name)]
 
 
 def magnification(blocks):
@@ -72,9 +110,22 @@ def coloured(source, view, place, array, preset="Cool to Warm", bar=True):
     if bar:
         legend = pv.GetScalarBar(colours, view)
         legend.TitleColor = legend.LabelColor = [0.1, 0.1, 0.1]
-        legend.TitleFontSize, legend.LabelFontSize = 14, 12
-        legend.Orientation, legend.WindowLocation = "Horizontal", "Lower Center"
+        legend.TitleFontSize, legend.LabelFontSize = 9, 8
+        legend.Orientation, legend.WindowLocation = "Vertical", "Any Location"
+        legend.Position, legend.ScalarBarLength = [0.82, 0.3], 0.45
     return display
+
+
+def arrows(source, view, name, direction, size, rock):
+    """Arrows of `size` along `direction` at the points of `source`: the longest is a tenth of the model."""
+    glyph = pv.Glyph(registrationName=name, Input=source, GlyphType="Arrow")
+    glyph.OrientationArray = ["POINTS", direction]
+    glyph.ScaleArray = ["POINTS", size]
+    glyph.GlyphMode = "All Points"
+    largest = span(source, "POINTS", size)[1]
+    bounds = rock.GetDataInformation().GetBounds()
+    glyph.ScaleFactor = 0.1 * max(bounds[1] - bounds[0], bounds[3] - bounds[2]) / (abs(largest) or 1.0)
+    return pv.Show(glyph, view)
 
 
 def main():
@@ -92,61 +143,73 @@ def main():
 
     rock = series("blocks")
     scale = magnification(rock)
-    sources = dict((name, moved(series(name), name, scale)) for name in ("interior", "cracks", "tips", "contacts"))
+    known = ("outlines", "interior", "cracks", "tips", "contacts", "bolts", "water")
+    sources = dict((name, moved(series(name), name, scale)) for name in known)
+    outlines, interior, cracks, tips, contacts, bolts, water = (sources[name] for name in known)
     blocks = moved(rock, "blocks", scale)
     if blocks is not None:
-        display = coloured(blocks, view, "POINTS", "displacement", preset="Viridis (matplotlib)")
+        display = coloured(blocks, view, "POINTS", "displacement", preset="Viridis (matplotlib)", bar=interior is None)
         display.SetRepresentationType("Surface")
         display.Ambient, display.Diffuse = 1.0, 0.0
-        surface = pv.ExtractSurface(registrationName="surface", Input=blocks)
-        outlines = pv.FeatureEdges(registrationName="outlines", Input=surface)
-        outlines.FeatureEdges = 0
-        outlines.ManifoldEdges = 0
-        outlines.NonManifoldEdges = 0
+    if interior is not None:
+        # Compression is negative: the last of the principal stresses is the largest compression.
+        shown = coloured(interior, view, "POINTS", "principal_stress", preset="Viridis (matplotlib)")
+        pv.ColorBy(shown, ("POINTS", "principal_stress", "S3"))
+        legend = pv.GetScalarBar(pv.GetColorTransferFunction("principal_stress"), view)
+        legend.Title, legend.ComponentTitle = "S3, Pa (tension positive)", ""
+        shown.Ambient, shown.Diffuse = 1.0, 0.0
+        pv.ColorBy(display, None)
+        display.AmbientColor = display.DiffuseColor = [0.85, 0.85, 0.83]
+    if outlines is not None:
         lines = pv.Show(outlines, view)
         lines.ColorArrayName = [None, ""]
         lines.AmbientColor = lines.DiffuseColor = [0.2, 0.2, 0.2]
-    interior, cracks, tips, contacts = (sources[name] for name in ("interior", "cracks", "tips", "contacts"))
-    if interior is not None:
-        shown = coloured(interior, view, "POINTS", "von_mises", bar=False)
-        shown.Visibility = 0
     if cracks is not None:
         lines = coloured(cracks, view, "CELLS", "birth_cycle", preset="Inferno (matplotlib)", bar=False)
         lines.LineWidth = 3.0
     if tips is not None:
+        named("crack_id", names(tips, "CRACK_NAMES"))
         points = coloured(tips, view, "POINTS", "K_eq", preset="Inferno (matplotlib)", bar=False)
-        points.PointSize = 8.0
+        points.PointSize = 6.0
+        arrows(tips, view, "K at the tips", "growth_direction", "K_eq", rock).Visibility = 0
     if contacts is not None:
-        forces = pv.Glyph(registrationName="contact forces", Input=contacts, GlyphType="Arrow")
-        forces.OrientationArray = ["POINTS", "force"]
-        forces.ScaleArray = ["POINTS", "force"]
-        forces.GlyphMode = "All Points"
-        contacts.UpdatePipeline()
-        largest = 0.0
-        if "force" in contacts.PointData.keys() and contacts.PointData["force"].GetNumberOfTuples():
-            largest = max(abs(end) for k in (0, 1) for end in contacts.PointData["force"].GetRange(k))
-        bounds = contacts.GetDataInformation().GetBounds()
-        if largest > 0.0:
-            forces.ScaleFactor = 0.1 * max(bounds[1] - bounds[0], bounds[3] - bounds[2]) / largest
-        pv.Show(forces, view).Visibility = 0
+        arrows(contacts, view, "contact forces", "force", "force", rock).Visibility = 0
+    if bolts is not None:
+        shown = coloured(bolts, view, "CELLS", "force", preset="Cividis", bar=False)
+        shown.LineWidth = 4.0
+    if water is not None:
+        shown = pv.Show(water, view)
+        shown.ColorArrayName = [None, ""]
+        shown.AmbientColor = shown.DiffuseColor = [0.18, 0.5, 0.82]
+        shown.LineWidth = 2.0
     clock = pv.AnnotateTimeFilter(registrationName="time", Input=blocks) if blocks is not None else None
     if clock is not None:
         clock.Format = "t = {{time:.6g}} s" + ("" if scale == 1.0 else ", displacements x %g" % scale)
         label = pv.Show(clock, view)
-        label.Color, label.FontSize = [0.1, 0.1, 0.1], 14
+        label.Color, label.FontSize = [0.1, 0.1, 0.1], 9
+        bar = pv.Show(pv.TimeStepProgressBar(registrationName="time bar", Input=blocks), view)
+        bar.ProgressBarColor = [0.35, 0.4, 0.45]
+        bar.Position, bar.Position2 = [0.02, 0.02], [0.78, 0.02]
     steps = pv.GetAnimationScene()
     steps.UpdateAnimationUsingDataTimeSteps()
     steps.GoToLast()
-    for source in [each for each in (blocks, interior, cracks, tips) if each is not None]:
-        display = pv.GetDisplayProperties(source, view)
-        if display.ColorArrayName[1]:
-            display.RescaleTransferFunctionToDataRange(False, True)
+    for source, place, array in (
+        (blocks, "POINTS", "displacement"), (cracks, "CELLS", "birth_cycle"), (tips, "POINTS", "K_eq"),
+        (bolts, "CELLS", "force"),
+    ):
+        if source is not None:
+            pv.GetColorTransferFunction(array).RescaleTransferFunction(*span(source, place, array))
     if interior is not None:
-        # Stress is singular at crack tips: colours reach a third of its largest value.
-        largest = interior.PointData["von_mises"].GetRange(0)[1]
-        pv.GetColorTransferFunction("von_mises").RescaleTransferFunction(0.0, largest / 3.0 or 1.0)
+        pv.GetColorTransferFunction("principal_stress").RescaleTransferFunction(
+            *span(interior, "POINTS", "principal_stress", 2)
+        )
     pv.ResetCamera(view)
-    view.CameraParallelScale *= 1.2
+    # Room on the right for the legend.
+    view.CameraParallelScale *= 1.25
+    for point in ("CameraPosition", "CameraFocalPoint"):
+        at = list(getattr(view, point))
+        at[0] += 0.15 * view.CameraParallelScale
+        setattr(view, point, at)
     pv.Render(view)
     if options.state:
         pv.SaveState(os.path.abspath(options.state))

@@ -1,22 +1,29 @@
-"""The ParaView series of a run: one PVD a kind of thing, its files under ``vtk/``, readable after every cycle."""
+"""The ParaView series of a run, one a kind of thing, readable after every cycle: which cycles are written, and what of
+them."""
 
 from __future__ import annotations
 
 import math
 import time
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
 from geomech.model import CHANGES, Cycle, Problem, Skip
 
-from ..background_jobs import Beside
+from ..background_jobs import BackgroundJobs
 from ..checkpoints.checkpoint_file import FilesChanged
-from ..fields import SERIES
 from ..tables.skipped_work import told
 from . import grids
 from .interior_fields import InteriorMeshes
+from .structures import BoltLines, WaterLine, outlines_grid
 from .triangulate import Triangles
-from .vtu import Collection, Grid, GridFiles, world_origin
+from .vtkhdf import HdfStore
+from .vtu import Grid, nothing, world_origin
+from .vtu_store import VtuStore
+
+#: What `output.format` names.
+FORMATS = {"vtu": VtuStore, "vtkhdf": HdfStore}
 
 #: Growth passes share the time of their load step; each is written this fraction of a step later than the one before.
 PASS_OFFSET = 1e-6
@@ -27,8 +34,8 @@ QUIET = 10
 
 #: What a `Series` knows of the run so far, besides what it has listed.
 _REMEMBERED = (
-    "_triangles", "_lines", "_meshes", "_keys", "_time", "_pending", "_last_interior", "_segments_then", "seconds",
-    "_cycles", "_cracked", "_interior_seconds", "_series_seconds",
+    "_triangles", "_lines", "_meshes", "_keys", "_bolts", "_time", "_pending", "_first", "_last_interior",
+    "_segments_then", "seconds", "_cycles", "_cracked", "_interior_seconds", "_series_seconds",
 )  # fmt: skip
 
 #: Grids with more bytes of fields than these take longer to pack (some 20 ms a MB) than to hand over to another thread.
@@ -36,79 +43,77 @@ LARGE = 1 << 19
 
 
 class Series:
-    """Observer that writes ``blocks``, ``cracks``, ``tips``, ``contacts`` and ``interior_fields``.
+    """Observer that writes ``blocks``, ``outlines``, ``cracks``, ``tips``, ``contacts`` and ``interior``, and where a
+    scene has them ``bolts`` and ``water``. All begin with the first cycle and last to the end.
 
     ``every`` counts cycles between written ones; cycles in which a tip grew or something happened, the first and the
     last are always written. ``interior_every`` counts cycles between interior fields while cracks grow; while none does
     they come `QUIET` times as rarely, since there they mostly scale with the load. They also come with the first load,
-    with every event, before and after blocks are cut and at the end; 0 leaves them out. Raises ValueError for an
-    unknown ``configuration``.
+    with every event, before and after blocks are cut and at the end; 0 leaves them out. ``format`` is "vtu" (a file a
+    cycle, PVD lists) or "vtkhdf" (one file a series). Raises ValueError for an unknown ``configuration`` or ``format``.
     """
 
-    def __init__(self, *, every: int = 1, interior_every: int = 5, configuration: str = "reference") -> None:
+    def __init__(
+        self, *, every: int = 1, interior_every: int = 5, configuration: str = "reference", format: str = "vtu"
+    ) -> None:
         if configuration not in grids.CONFIGURATIONS:
             raise ValueError(f"configuration must be one of {grids.CONFIGURATIONS}, got {configuration!r}")
+        if format not in FORMATS:
+            raise ValueError(f"format must be one of {tuple(FORMATS)}, got {format!r}")
         if every < 1 or interior_every < 0:
             raise ValueError("every counts from 1, interior_every from 0")
         self.every, self.interior_every, self.configuration = every, interior_every, configuration
-        self.seconds = 0.0
+        self.format, self.seconds = format, 0.0
 
     def on_start(self, problem: Problem, folder: Path) -> None:
         self._triangles, self._lines, self._meshes = Triangles(), grids.CrackLines(), InteriorMeshes()
         self._keys = grids.KeyBlocks(problem)
+        self._bolts = BoltLines(problem.loads.bolts)
         self._time = SeriesTime()
         self._pending: tuple[Cycle, float, bool] | None = None
+        self._first: tuple[Cycle, float] | None = None
         self._last_interior, self._segments_then = -1, 0
         self._cycles = self._cracked = 0
         self._interior_seconds = self._series_seconds = 0.0
         self._open(problem, Path(folder), {})
-        # Files of a run before this one in the same folder are written over.
-        self._old = self._unlisted()
 
     def memory(self) -> dict[str, Any]:
-        self._beside.wait()
-        listed = {name: list(collection.entries) for name, collection in self._collections.items()}
-        return {"listed": listed, **{name: getattr(self, name) for name in _REMEMBERED}}
+        self._background.wait()
+        return {"listed": self._store.listed(), **{name: getattr(self, name) for name in _REMEMBERED}}
 
     def on_resume(self, problem: Problem, folder: Path, memory: dict[str, Any]) -> None:
         """Goes on with the files that were listed then; later ones are deleted. Raises FilesChanged when one is
         missing."""
         listed = memory["listed"]
         vars(self).update({name: memory[name] for name in _REMEMBERED})
-        missing = [file for entries in listed.values() for _, file in entries if not (Path(folder) / file).is_file()]
+        missing = FORMATS[self.format].missing(Path(folder), listed)
         if missing:
             raise FilesChanged(f"{len(missing)} files of its series are missing in {folder}, the first is {missing[0]}")
-        self._open(problem, Path(folder), listed)
-        for name in self._unlisted():
-            (self._vtk / name).unlink()
-        self._old: set[str] = set()
+        self._open(problem, Path(folder), listed, resumed=True)
 
-    def _open(self, problem: Problem, folder: Path, listed: dict[str, list[tuple[float, str]]]) -> None:
+    def _open(
+        self, problem: Problem, folder: Path, listed: dict[str, list[tuple[float, str]]], resumed: bool = False
+    ) -> None:
         self._materials, self._world = problem.materials, world_origin(problem)
-        self._folder, self._vtk = folder, folder / "vtk"
-        self._vtk.mkdir(parents=True, exist_ok=True)
+        self._water = WaterLine(problem) if problem.loads.water is not None else None
+        self._bolt_names = _names([bolt.name for bolt in problem.loads.bolts])
         inside = bool(self.interior_every or listed.get("interior"))
-        names = ["blocks", "cracks", "tips", "contacts"] + ["interior"] * inside
-        for name in set(SERIES) - set(names):
-            (folder / f"{name}.pvd").unlink(missing_ok=True)
-        self._collections = {name: Collection(folder / f"{name}.pvd", listed.get(name, ())) for name in names}
-        self._files = {name: GridFiles(name) for name in names}
-        self._beside, self._large = Beside(), set[str]()
-
-    def _unlisted(self) -> set[str]:
-        """The files of series in ``vtk`` that no collection lists."""
-        listed = {file for collection in self._collections.values() for _, file in collection.entries}
-        there = {path.name for name in SERIES for path in self._vtk.glob(f"{name}_[0-9]*.vtu")}
-        return {name for name in there if f"vtk/{name}" not in listed}
+        names = ["blocks", "outlines", "cracks", "tips", "contacts"] + ["interior"] * inside
+        names += ["bolts"] * bool(problem.loads.bolts) + ["water"] * (self._water is not None)
+        self._names = names
+        self._store = FORMATS[self.format](folder, names, listed, resumed=resumed)
+        self._background, self._large = BackgroundJobs(), set[str]()
 
     def on_cycle(self, cycle: Cycle) -> None:
         began = time.perf_counter()
         self._cycles += 1
-        self._cracked += bool(cycle.bodies)
+        self._cracked += bool(cycle.inside)
         if self._pending is not None and cycle.blocks.n_blocks != self._pending[0].blocks.n_blocks:
             self._write_last_interior()  # of the rock while it was whole
         # Every cycle takes its time, written or not, so that the times do not depend on what is left out.
         at = self._time.of(cycle)
+        if self._pending is None and cycle.number == 0:
+            self._first = (cycle, at)
         happened = bool(cycle.events) or bool((cycle.tips["grown"] > 0).any())
         wanted = cycle.number == 0 or cycle.number % self.every == 0 or happened
         if wanted:
@@ -126,13 +131,9 @@ class Series:
                 self._write(cycle, at)
             self._write_last_interior()
         try:
-            self._beside.close()
+            self._background.close()
         finally:
-            for collection in self._collections.values():
-                collection.close()
-            # A longer run before this one must not leave its last files among ours.
-            for name in self._old:
-                (self._vtk / name).unlink(missing_ok=True)
+            self._store.close()
         self.seconds += time.perf_counter() - began
         summary.setdefault("seconds", {})["writing series"] = round(self.seconds, 4)
         summary.setdefault("skipped", {}).update(
@@ -140,17 +141,16 @@ class Series:
         )
 
     def _skips(self) -> dict[str, Skip]:
-        """What was not written, beside what was; the first interior fields, for which Gmsh is loaded, are not timed."""
-        inside, all_of = (
-            len(self._collections[name].entries) if name in self._collections else 0 for name in ("interior", "blocks")
-        )
+        """What was not written, beside what was; the first interior fields, for which Gmsh is loaded, are not timed,
+        and those of the rock before the first load cost nothing."""
+        inside, all_of = max(0, self._store.count("interior") - 1), self._store.count("blocks")
         return {
             "interior fields": Skip(self._cracked - inside, inside - 1, self._interior_seconds),
             "series": Skip(self._cycles - all_of, all_of, self._series_seconds),
         }
 
     def _interior_wanted(self, cycle: Cycle) -> bool:
-        if not self.interior_every or cycle.number == 0 or not (cycle.bodies or self._last_interior >= 0):
+        if not self.interior_every or cycle.number == 0 or not (cycle.inside or self._last_interior >= 0):
             return False
         cut = self._pending is not None and cycle.blocks.n_blocks != self._pending[0].blocks.n_blocks
         if any(event.kind not in CHANGES for event in cycle.events) or cut or self._last_interior < 0:
@@ -161,39 +161,49 @@ class Series:
     def _write(self, cycle: Cycle, at: float) -> None:
         began, motion, shape = time.perf_counter(), cycle.motion, self.configuration
         self._save("blocks", cycle, at, grids.blocks_grid(cycle, self._materials, shape, self._triangles, self._keys))
+        self._save("outlines", cycle, at, outlines_grid(cycle, shape))
         self._save("cracks", cycle, at, grids.cracks_grid(cycle, motion, shape, self._lines))
         self._save("tips", cycle, at, grids.tips_grid(cycle, motion, shape))
         self._save("contacts", cycle, at, grids.contacts_grid(cycle, shape))
+        if "bolts" in self._names:
+            self._save("bolts", cycle, at, self._bolts.grid(cycle, motion, shape))
+        if self._water is not None:
+            self._save("water", cycle, at, self._water.grid(float(cycle.state.time)))
         self._series_seconds += time.perf_counter() - began
 
     def _write_last_interior(self) -> None:
         """The interior of the last cycle that came, unless it is written or there is none."""
         cycle, at, _ = self._pending
-        begun = bool(cycle.bodies) or self._last_interior >= 0
+        begun = bool(cycle.inside) or self._last_interior >= 0
         if self.interior_every and begun and cycle.number != self._last_interior:
             self._write_interior(cycle, at)
 
     def _write_interior(self, cycle: Cycle, at: float) -> None:
-        self._beside.do(self._interior, cycle, at)
+        if self._first is not None and self._last_interior < 0 and self._first[0] is not cycle:
+            # From the start on, so that all series of the run have one span of time.
+            self._meshes.note_cracked(cycle)
+            self._background.do(self._interior, *self._first)
+        self._first = None
+        self._background.do(self._interior, cycle, at)
         self._last_interior, self._segments_then = cycle.number, cycle.cracks.n_segments
 
     def _interior(self, cycle: Cycle, at: float) -> None:
         began = time.perf_counter()
         grid = self._meshes.grid(cycle, self._materials, cycle.motion, self.configuration)
+        timed = self._store.count("interior") > 1
         self._put("interior", cycle, at, grid)
-        self._interior_seconds += (time.perf_counter() - began) if self._collections["interior"].entries[1:] else 0.0
+        self._interior_seconds += (time.perf_counter() - began) if timed else 0.0
 
     def _save(self, name: str, cycle: Cycle, at: float, grid: Grid) -> None:
         """Small grids at once; large ones beside the run, which need not wait until they are packed. A series that has
         been large stays beside, so that its files are listed in their order."""
         if name in self._large or _size(grid) > LARGE:
             self._large.add(name)
-            self._beside.do(self._put, name, cycle, at, grid)
+            self._background.do(self._put, name, cycle, at, grid)
         else:
             self._put(name, cycle, at, grid)
 
     def _put(self, name: str, cycle: Cycle, at: float, grid: Grid) -> None:
-        file = f"{name}_{cycle.number:06d}.vtu"
         numbers = {
             "CYCLE": cycle.number,
             "TIME": float(cycle.state.time),
@@ -201,9 +211,21 @@ class Series:
             "REFERENCE": int(self.configuration == "reference"),  # 1: coordinates are the reference ones
             **self._world,
         }
-        self._files[name].write(f"{self._vtk}/{file}", grid, numbers)
-        self._old.discard(file)
-        self._collections[name].add(at, f"vtk/{file}")
+        if name in ("cracks", "tips"):
+            numbers["CRACK_NAMES"] = _names(cycle.cracks.names)
+        elif name == "outlines":
+            numbers["EDGE_NAMES"] = _names(cycle.blocks.edge_names)
+        elif name == "bolts":
+            numbers["BOLT_NAMES"] = self._bolt_names
+        if not len(grid.types):
+            vertices = cycle.blocks.vertices if self.configuration == "reference" else cycle.state.vertices
+            grid = nothing(name, vertices[0])
+        self._store.put(name, cycle.number, at, grid, numbers)
+
+
+def _names(names: Iterable[str]) -> bytes:
+    """Names as field data: UTF-8, one a line, in the order of their numbers."""
+    return "\n".join(names).encode()
 
 
 def _size(grid: Grid) -> int:

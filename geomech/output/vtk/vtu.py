@@ -21,10 +21,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..fields import ACTIVE, PREPARED, SERIES, declared
+from ..fields import ACTIVE, PREPARED, SERIES, Field, declared
 
 #: Cell types of the VTK file format.
-VERTEX, LINE, TRIANGLE = 1, 3, 5
+EMPTY, VERTEX, LINE, TRIANGLE = 0, 1, 3, 5
 
 _TYPE = {"f8": "Float64", "f4": "Float32", "i8": "Int64", "i4": "Int32", "u1": "UInt8"}
 _TAIL = b"\n</AppendedData>\n</VTKFile>\n"
@@ -52,6 +52,21 @@ class Grid:
     cell_data: Mapping[str, np.ndarray] = field(default_factory=dict)
 
 
+def nothing(series: str, at: np.ndarray) -> Grid:
+    """A grid of the ``series`` that draws nothing: one cell of VTK's empty type and, at ``at`` (2,) m, one point.
+
+    ParaView drops the arrays of a grid without points, and with them every colour and glyph that was chosen. Vectors
+    and displacements are 0, other floats nan, whole numbers −1."""
+
+    def blank(f: Field) -> np.ndarray:
+        fill = -1 if f.dtype.startswith("int") else 0.0 if f.components[:1] == ("X",) else np.nan
+        return np.full((1, *f.shape), fill, f.dtype)
+
+    data = {place: {f.name: blank(f) for f in SERIES[series] if f.place == place} for place in ("point", "cell")}
+    points = np.asarray(at, dtype=float).reshape(1, 2)
+    return Grid(points, np.empty(0, int), np.zeros(1, int), np.array([EMPTY]), data["point"], data["cell"])
+
+
 def world_origin(problem: Any) -> dict[str, float]:
     """Field data that place a grid in the world: what is to be added to x and y, m. Empty where that is nothing."""
     x, y = problem.origin
@@ -69,20 +84,18 @@ class GridFiles:
         self.series = series
         self._layout: _Layout | None = None
 
-    def write(self, path: Path | str, grid: Grid, numbers: Mapping[str, float | int]) -> None:
-        """Write ``grid`` as the file ``path``, with ``numbers`` as field data.
+    def write(self, path: Path | str, grid: Grid, numbers: Mapping[str, float | int | bytes]) -> None:
+        """Write ``grid`` as the file ``path``, with ``numbers`` (and texts, as bytes of UTF-8) as field data.
 
         Raises ValueError when an array is not as `geomech.output.fields` declares it."""
         n_points, n_cells = len(grid.points), len(grid.types)
         data = declared(self.series, "point", n_points, grid.point_data)
         data |= declared(self.series, "cell", n_cells, grid.cell_data)
         # Numbers not as text: VTK's parser stops at "nan", which is the load of a scene that has no leading one.
-        data |= numbers
+        data |= {name: field_array(value) for name, value in numbers.items()}
         data["Points"], data["connectivity"] = grid.points, grid.connectivity
         data["offsets"], data["types"] = grid.offsets, grid.types
-        kinds = tuple(
-            [(name, "i8" if isinstance(value, (int, np.integer)) else "f8") for name, value in numbers.items()]
-        )
+        kinds = tuple([(name, data[name].dtype.str[1:], len(data[name])) for name in numbers])
         key = (n_points, n_cells, len(grid.connectivity), kinds)
         if self._layout is None or self._layout.key != key:
             self._layout = _Layout(self.series, *key)
@@ -104,11 +117,12 @@ class _Column(NamedTuple):
 
 
 class _Layout:
-    """The file of a grid of so many points, cells and corners, with field data ``numbers`` (name, dtype)."""
+    """The file of a grid of so many points, cells and corners, with field data ``numbers`` (name, dtype,
+    length)."""
 
     def __init__(self, series: str, n_points: int, n_cells: int, n_corners: int, numbers: tuple) -> None:
         self.key, self._series = (n_points, n_cells, n_corners, numbers), series
-        columns = [_Column("FieldData", name, dtype, (1,)) for name, dtype in numbers]
+        columns = [_Column("FieldData", name, dtype, (count,)) for name, dtype, count in numbers]
         for section, place, count in (("PointData", "point", n_points), ("CellData", "cell", n_cells)):
             columns += [
                 _Column(section, f.name, np.dtype(f.dtype).str[1:], (count, *f.shape), f.components)
@@ -159,7 +173,7 @@ class _Layout:
         tags: dict[str, list[str]] = {name: [] for name in ("FieldData", "PointData", "CellData", "Points", "Cells")}
         at = 0
         for column, size in zip(self._columns, sizes, strict=True):
-            tuples = 'NumberOfTuples="1" ' if column.section == "FieldData" else ""
+            tuples = f'NumberOfTuples="{column.shape[0]}" ' if column.section == "FieldData" else ""
             attributes = f'type="{_TYPE[column.dtype]}" Name="{column.name}" format="appended"'
             attributes += f' NumberOfComponents="{column.shape[1]}"' if len(column.shape) > 1 else ""
             attributes += "".join(f' ComponentName{k}="{c}"' for k, c in enumerate(column.components))
@@ -180,6 +194,13 @@ class _Layout:
             f'<Piece NumberOfPoints="{n_points}" NumberOfCells="{n_cells}">\n{"".join(text.values())}</Piece>\n'
             '</UnstructuredGrid>\n<AppendedData encoding="raw">\n_'
         ).encode()
+
+
+def field_array(value: float | int | bytes) -> np.ndarray:
+    """One value of field data as an array: a whole number, a float, or the bytes of a text."""
+    if isinstance(value, bytes):
+        return np.frombuffer(value, np.uint8)
+    return np.array([value], np.int64 if isinstance(value, (int, np.integer)) else np.float64)
 
 
 def _fill(place: np.ndarray, value: Any) -> None:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from geomech.output.reading import Run
+from geomech.output.reading import Run, read_grid
 
 if TYPE_CHECKING:
     import pyvista as pv
@@ -40,16 +40,14 @@ def values(grid: pv.UnstructuredGrid, component: str) -> np.ndarray:
 def interior_grid(run: Run, cycle: int) -> pv.UnstructuredGrid | None:
     """The interior at ``cycle``: as it was written, or, between two that were written of the same cracks, interpolated
     in time, or else the last one before. None without one."""
-    import pyvista
-
     files = run.grids("interior")
     before = [number for number in files if number <= cycle]
     if not before:
         return None
-    grid = pyvista.read(files[max(before)])
+    grid = read_grid(files[max(before)])
     if max(before) != cycle and (pair := _around(run, files, cycle)) is not None:
         first, second = pair
-        following = pyvista.read(files[second])
+        following = read_grid(files[second])
         times = [float(run.at(number)["time"]) for number in (first, cycle, second)]
         if grid.n_points == following.n_points and times[2] > times[0]:
             share = (times[1] - times[0]) / (times[2] - times[0])

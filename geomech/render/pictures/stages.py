@@ -18,9 +18,14 @@ MOST = 4
 def stages(run: Run, folder: Path, *, width: int = 560) -> list[tuple[Path, str, int]]:
     """(PNG file in ``folder``, what it shows, cycle) of every stage, in the same colours throughout; [] of a run that
     wrote no blocks. Raises RenderingUnavailable where VTK can open no window."""
+    from ..fields.draw import usual_field
+
     shown = moments(run)
     if not shown:
         return []
+    field = usual_field(run)
+    if field is not None:
+        return _moving(run, folder, field, shown, width)
     asked, last = run.scene.get("render", {}), max(shown)
     fixed = look(
         run,
@@ -39,6 +44,22 @@ def stages(run: Run, folder: Path, *, width: int = 560) -> list[tuple[Path, str,
             painter.draw(cycle)
             painter.save(path)
             out.append((path, told, cycle))
+    return out
+
+
+def _moving(run: Run, folder: Path, field: str, shown: dict[int, str], width: int) -> list[tuple[Path, str, int]]:
+    """The stages ``shown`` of a run whose blocks move, in one ``field``."""
+    from ..fields.painter import FieldPainter, view
+    from ..fields.quantity import quantity
+
+    what = quantity(run, field)
+    scale = run.scene.get("render", {}).get("deformation_scale")
+    painter = FieldPainter(run, what, view(run, what, scale=scale, size=(width, None)))
+    folder.mkdir(parents=True, exist_ok=True)
+    out = []
+    for cycle, told in shown.items():
+        painter.draw(painter.frames.cycle_time(cycle))
+        out.append((painter.save(folder / f"stage_{cycle:06d}.png"), told, cycle))
     return out
 
 

@@ -41,7 +41,7 @@ def with_marks(
         changes["loads"] = tables.loads.model_copy(update={"bolts": bolts, "water": water, "forces": forces})
     if tables.monitors is not None:
         changes["monitors"] = work.monitors(tables.monitors, came_from)
-    work.tell_idle(tables)
+    work.warn_of_idle(tables)
 
     def placed(path: Path) -> str:
         # Longest first: an end of a drawn bolt stands where the name of its line does.
@@ -200,7 +200,7 @@ class _Matching:
             found.append(MonitorTable(name=own, at=at))
         return tuple(found)
 
-    def tell_idle(self, tables: SceneTables) -> None:
+    def warn_of_idle(self, tables: SceneTables) -> None:
         """Warn of what is drawn and does nothing."""
         for name in self.marks:
             kind = name.partition(":")[0]

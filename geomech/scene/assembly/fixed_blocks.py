@@ -12,13 +12,13 @@ from ..tables import SceneTables
 #: x.
 FIXED, GUIDED = "fixed", "guided"
 #: What a block keeps that is guided along an axis: it moves along it, turns, and strains across nothing.
-_HELD = {"x": [1, 2, 5], "y": [0, 2, 5]}
+_CONSTRAINED = {"x": [1, 2, 5], "y": [0, 2, 5]}
 
 
 def holds(name: str) -> bool:
     """Whether edges of this ``name`` hold the blocks they are on."""
     parts = name.split(":")
-    return parts[0] == FIXED or (parts[0] == GUIDED and len(parts) > 1 and parts[1] in _HELD)
+    return parts[0] == FIXED or (parts[0] == GUIDED and len(parts) > 1 and parts[1] in _CONSTRAINED)
 
 
 def fixed_blocks(tables: SceneTables, drawing: Drawing) -> np.ndarray:
@@ -43,23 +43,31 @@ def first_velocities(tables: SceneTables, drawing: Drawing) -> np.ndarray | None
     return found if found.any() else None
 
 
-def held_unknowns(tables: SceneTables, drawing: Drawing) -> np.ndarray | None:
+def constrained_unknowns(tables: SceneTables, drawing: Drawing) -> np.ndarray | None:
     """(n_blocks, 6) which unknowns of guided blocks stay zero; None where no block is guided."""
-    held = np.zeros((len(drawing.zones), 6), bool)
+    constrained = np.zeros((len(drawing.zones), 6), bool)
     zones = tables.zones or {}
     for block, zone in enumerate(drawing.zones):
         if zone in zones and zones[zone].guided is not None:
-            held[block, _HELD[zones[zone].guided]] = True
+            constrained[block, _CONSTRAINED[zones[zone].guided]] = True
     for name in drawing.blocks.edge_names:
         if holds(name) and name.split(":")[0] == GUIDED:
             blocks = np.unique(drawing.blocks.vertex_block[drawing.blocks.edges_named(name)])
-            held[np.ix_(blocks, _HELD[name.split(":")[1]])] = True
-    return held if held.any() else None
+            constrained[np.ix_(blocks, _CONSTRAINED[name.split(":")[1]])] = True
+    return constrained if constrained.any() else None
+
+
+def block_orders(tables: SceneTables, drawing: Drawing) -> np.ndarray | None:
+    """(n_blocks,) the order of each block's displacement, 1 where it stands still; None where all are of first order."""
+    zones = tables.zones or {}
+    order = np.array([zones[zone].order if zone in zones else 1 for zone in drawing.zones], dtype=int)
+    order[fixed_blocks(tables, drawing)] = 1
+    return order if (order > 1).any() else None
 
 
 def check_holding(c: Check) -> None:
     """Edges that would guide must say along what."""
-    for name in c.drawing.blocks.edge_names:
+    for name in c.blocks.edge_names:
         if name.partition(":")[0] == GUIDED and not holds(name):
             c.refuse(
                 ("geometry",),
@@ -70,7 +78,7 @@ def check_holding(c: Check) -> None:
 
 def check_borne(c: Check) -> None:
     """Weight wants something that bears it: without it all blocks fall together, and nothing else happens."""
-    t, blocks = c.tables, c.drawing.blocks
+    t, blocks = c.tables, c.blocks
     if t.loads is None or t.zones is None or not any(t.loads.gravity_m_s2):
         return
     loads = t.loads
@@ -78,7 +86,7 @@ def check_borne(c: Check) -> None:
         loads.tractions or loads.forces or loads.motions or loads.point_motions or loads.bolts
         or loads.viscous_boundaries or loads.water is not None
     )  # fmt: skip
-    if pushed or fixed_blocks(t, c.drawing).any() or held_unknowns(t, c.drawing) is not None:
+    if pushed or fixed_blocks(t, c.drawn).any() or constrained_unknowns(t, c.drawn) is not None:
         return
     lowest = int(blocks.vertex_block[np.argmin(blocks.vertices @ -np.array(loads.gravity_m_s2))])
     others = blocks.n_blocks - 1

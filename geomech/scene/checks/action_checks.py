@@ -54,7 +54,7 @@ def _records(c: Check) -> None:
 
 
 def _zones(c: Check) -> None:
-    known = list(dict.fromkeys(c.drawing.zones))
+    known = list(dict.fromkeys(c.drawn.zones))
     for k, motion in enumerate(c.tables.loads.motions):
         if motion.zone not in known:
             c.refuse(
@@ -70,7 +70,7 @@ def _zones(c: Check) -> None:
         if excavation.polygon is not None and not excavation.zones:
             import shapely
 
-            blocks = c.drawing.blocks
+            blocks = c.blocks
             centres = np.array([blocks.area_moments(b)[1] for b in range(blocks.n_blocks)])
             inside = shapely.contains_xy(shapely.Polygon(excavation.polygon), centres[:, 0], centres[:, 1])
             if not inside.any():
@@ -88,19 +88,19 @@ def _zones(c: Check) -> None:
 
 
 def _points(c: Check) -> None:
-    fixed = fixed_blocks(c.tables, c.drawing)
+    fixed = fixed_blocks(c.tables, c.drawn)
     for k, motion in enumerate(c.tables.loads.point_motions):
         place = ("loads", "point_motions", k, "at")
         block = carrier(c, place, "the point that is moved", motion.at, motion.zone)
         if block >= 0 and fixed[block]:
             c.refuse(
-                place, f"the point lies in the fixed zone {c.drawing.zones[block]!r}",
+                place, f"the point lies in the fixed zone {c.drawn.zones[block]!r}",
                 "move the zone itself by [[loads.motions]], or let it move",
             )  # fmt: skip
 
 
 def _bolts(c: Check) -> None:
-    fixed = fixed_blocks(c.tables, c.drawing)
+    fixed = fixed_blocks(c.tables, c.drawn)
     for k, table in enumerate(c.tables.loads.bolts):
         try:
             bolts = bolts_of(c, k, table)
@@ -118,7 +118,7 @@ def _bolts(c: Check) -> None:
 
 def _water(c: Check) -> None:
     water = c.tables.loads.water
-    known = [name for name in c.drawing.blocks.edge_names if name]
+    known = [name for name in c.blocks.edge_names if name]
     for k, edge in enumerate(() if water is None else water.dry_edges):
         if edge not in known:
             c.refuse(("loads", "water", "dry_edges", k), f"no edge is called {edge!r}", nearest(edge, known))
@@ -133,7 +133,7 @@ def _base(c: Check) -> None:
             ("loads", "base"), "the base shakes, but the run is static: inertia takes no part",
             "set dda.dynamic_factor = 1",
         )  # fmt: skip
-    if not fixed_blocks(c.tables, c.drawing).any():
+    if not fixed_blocks(c.tables, c.drawn).any():
         c.refuse(
             ("loads", "base"), "nothing is fixed, so there is no base to shake",
             "fix the zone that the others stand on ([zones.NAME] fixed = true)",

@@ -10,13 +10,14 @@ from ..errors import Fault
 from ..locator import Path
 
 if TYPE_CHECKING:
+    from ...model import Blocks, Cracks
     from ..drawing import Drawing
     from ..tables import SceneTables
 
 
 @dataclass(frozen=True, eq=False)
 class Check:
-    """What the checks see: tables (a section is None where it is faulty), the names in the file, the drawing."""
+    """Input of the checks: tables (a faulty section is None), the data of the file, the drawing; and their results."""
 
     tables: SceneTables
     data: dict[str, Any]
@@ -24,6 +25,23 @@ class Check:
     place: Callable[[Path], str]
     faults: list[Fault]
     warnings: list[Fault]
+
+    @property
+    def drawn(self) -> Drawing:
+        """The drawing, for checks that come after those of the drawing itself."""
+        if self.drawing is None:
+            raise ValueError("the scene has no drawing")
+        return self.drawing
+
+    @property
+    def blocks(self) -> Blocks:
+        """The drawn blocks."""
+        return self.drawn.assembled()[0]
+
+    @property
+    def cracks(self) -> Cracks:
+        """The drawn cracks."""
+        return self.drawn.assembled()[1]
 
     def refuse(self, path: Path, message: str, way_out: str) -> None:
         self.faults.append(Fault(self.place(path), message, way_out))

@@ -15,6 +15,7 @@ from ..tables import SceneTables
 from ..validation import nearest
 from .check import Check
 from .edges import check_edges
+from .higher_order import check_orders
 
 #: No tip advances by less, in units of the rock's largest side: coordinates of a drawing keep twelve digits.
 SHORTEST_ADVANCE = 1e-9
@@ -36,6 +37,7 @@ def check(c: Check) -> None:
         check_holding(c)
         check_borne(c)
         check_edges(c)
+        check_orders(c)
         _points(c)
         _toughness(c)
         _strength(c)
@@ -145,7 +147,7 @@ def _growth_lengths(c: Check) -> None:
             'leave it out, or set growth.criterion = "f"',
         )
     if growth is not None and c.drawing is not None and c.drawing.blocks is not None:
-        size = float(np.ptp(c.drawing.blocks.vertices, axis=0).max())
+        size = float(np.ptp(c.blocks.vertices, axis=0).max())
         for key in ("increment_m", "min_increment_m"):
             value = getattr(growth, key)
             if value is not None and value < SHORTEST_ADVANCE * size:
@@ -189,7 +191,7 @@ def _material_names_exist(c: Check) -> None:
 
 
 def _zones(c: Check) -> None:
-    known, materials = list(dict.fromkeys(c.drawing.zones)), _material_names(c)
+    known, materials = list(dict.fromkeys(c.drawn.zones)), _material_names(c)
     given = c.tables.zones
     if given is None:
         return
@@ -226,8 +228,8 @@ def _zones(c: Check) -> None:
 def _cracks(c: Check) -> None:
     given = c.tables.cracks or {}
     for name in given:
-        if name != "default" and name not in c.drawing.cracks_drawn:
-            known = list(c.drawing.cracks_drawn)
+        if name != "default" and name not in c.drawn.cracks_drawn:
+            known = list(c.drawn.cracks_drawn)
             free = [crack for crack in known if crack not in given]
             c.refuse(
                 ("cracks", name), f"the geometry has no crack {name!r}", nearest(name, free) if free else _are(known)
@@ -260,10 +262,10 @@ def _are(known: list[str]) -> str:
 
 def _whole(c: Check) -> None:
     """What drawn cracks enclose is a block of its own, and must be drawn as one."""
-    for crack, block in cutting_cracks(c.drawing.blocks, c.drawing.cracks):
+    for crack, block in cutting_cracks(c.blocks, c.cracks):
         c.refuse(
-            c.drawing.path_of_crack(c.drawing.cracks.names[crack]),
-            f"crack {c.drawing.cracks.names[crack]!r} cuts a piece off zone {c.drawing.zones[block]!r}, alone or with "
+            c.drawn.path_of_crack(c.cracks.names[crack]),
+            f"crack {c.cracks.names[crack]!r} cuts a piece off zone {c.drawn.zones[block]!r}, alone or with "
             "the cracks before it",
             "draw the pieces as zones of their own: blocks part along their outlines",
         )
@@ -280,23 +282,23 @@ def blocks_at(blocks: Blocks, point: tuple[float, float]) -> list[int]:
 
 def carrier(c: Check, path: Path, what: str, point, zone: str | None, among: list[int] | None = None) -> int:
     """The block that carries ``point``; −1 after saying why there is none."""
-    known = list(dict.fromkeys(c.drawing.zones))
+    known = list(dict.fromkeys(c.drawn.zones))
     if zone is not None and zone not in known:
         c.refuse(path[:-1] + ("zone",), f"the geometry has no zone {zone!r}", nearest(zone, known))
         return -1
-    at = blocks_at(c.drawing.blocks, point)
-    origin = np.array(c.drawing.origin)
+    at = blocks_at(c.blocks, point)
+    origin = np.array(c.drawn.origin)
     x, y = np.add(point, origin)
     here = f"({x:.10g}, {y:.10g})" if origin.any() else f"({x:g}, {y:g})"
     if zone is not None:
-        inside, at = at, [b for b in at if c.drawing.zones[b] == zone]
+        inside, at = at, [b for b in at if c.drawn.zones[b] == zone]
         if inside and not at:
             c.refuse(path, f"{what} {here} is not in zone {zone!r}", "move it, or name its own zone")
             return -1
     if among is not None and len(at) > 1:
         at = [b for b in at if b in among] or at
     if not at:
-        low, high = (end(c.drawing.blocks.vertices, axis=0) + origin for end in (np.min, np.max))
+        low, high = (end(c.blocks.vertices, axis=0) + origin for end in (np.min, np.max))
         digits = ".10g" if origin.any() else "g"
         c.refuse(
             path,
@@ -306,8 +308,8 @@ def carrier(c: Check, path: Path, what: str, point, zone: str | None, among: lis
         )
         return -1
     if len(at) > 1:
-        names = [c.drawing.blocks.names[b] for b in at]
-        way = 'add zone = "…"' if len({c.drawing.zones[b] for b in at}) > 1 else "move it into one of them"
+        names = [c.blocks.names[b] for b in at]
+        way = 'add zone = "…"' if len({c.drawn.zones[b] for b in at}) > 1 else "move it into one of them"
         c.refuse(path, f"{what} {here} lies where blocks {', '.join(names)} touch", way)
         return -1
     return at[0]
@@ -321,7 +323,7 @@ def gauge_carriers(c: Check) -> tuple[int, int] | None:
     if gauge.start == gauge.to:
         c.refuse(("gauge", "to"), "both ends of the gauge are the same point", "give two different points")
         return None
-    both = [set(blocks_at(c.drawing.blocks, p)) for p in (gauge.start, gauge.to)]
+    both = [set(blocks_at(c.blocks, p)) for p in (gauge.start, gauge.to)]
     common = sorted(both[0] & both[1])
     return (
         carrier(c, ("gauge", "from"), "the gauge's end", gauge.start, gauge.zone, common),
@@ -369,12 +371,12 @@ def _rigid(c: Check) -> None:
     t = c.tables
     if t.materials is None or t.zones is None:
         return
-    for block in dict.fromkeys(c.drawing.cracks.block.tolist()):
-        name = material_of(t, c.drawing.zones[block])
+    for block in dict.fromkeys(c.cracks.block.tolist()):
+        name = material_of(t, c.drawn.zones[block])
         if name in t.materials and t.materials[name].rigid:
             c.refuse(
                 ("materials", name, "rigid"),
-                f"zone {c.drawing.zones[block]!r} holds a crack, but its material {name!r} is rigid",
+                f"zone {c.drawn.zones[block]!r} holds a crack, but its material {name!r} is rigid",
                 "take rigid = true away, or give the zone a material of its own",
             )
 
@@ -384,14 +386,14 @@ def _block_or_zone(t: SceneTables, zone: str) -> str:
 
 
 def _toughness(c: Check) -> None:
-    t, cracks = c.tables, c.drawing.cracks
+    t, cracks = c.tables, c.cracks
     if t.growth is None or t.materials is None or t.zones is None:
         return
     needy: dict[str, str] = {}
-    fixed = fixed_blocks(t, c.drawing)
+    fixed = fixed_blocks(t, c.drawn)
     # Of a crack that several segments make, one warning.
     for k, b in dict.fromkeys(zip(cracks.crack.tolist(), cracks.block.tolist())):
-        zone = c.drawing.zones[b]
+        zone = c.drawn.zones[b]
         name = material_of(t, zone)
         if name in t.materials and t.materials[name].k_ic_pa_sqrt_m is None:
             needy.setdefault(name, cracks.names[k])

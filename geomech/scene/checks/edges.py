@@ -23,13 +23,13 @@ def check_edges(c: Check) -> None:
 
 
 def _edge_names(c: Check) -> list[str]:
-    return [name for name in c.drawing.blocks.edge_names if name]
+    return [name for name in c.blocks.edge_names if name]
 
 
 def _tractions(c: Check) -> None:
     if c.tables.loads is None:
         return
-    known, blocks = _edge_names(c), c.drawing.blocks
+    known, blocks = _edge_names(c), c.blocks
     taken = {traction.edge for traction in c.tables.loads.tractions}
     for k, traction in enumerate(c.tables.loads.tractions):
         if traction.edge not in known:
@@ -45,7 +45,7 @@ def _tractions(c: Check) -> None:
                 f"the geometry has no edge {boundary.edge!r}",
                 _edge_hint(c, boundary.edge, known, set()),
             )
-        elif fixed_blocks(c.tables, c.drawing)[blocks.vertex_block[blocks.edges_named(boundary.edge)]].all():
+        elif fixed_blocks(c.tables, c.drawn)[blocks.vertex_block[blocks.edges_named(boundary.edge)]].all():
             c.refuse(
                 ("loads", "viscous_boundaries", k, "edge"),
                 f"the edges {boundary.edge!r} belong to fixed blocks: nothing there moves that could be braked",
@@ -69,17 +69,15 @@ def _tractions(c: Check) -> None:
 
 def _moved_edges(c: Check) -> set[str]:
     """Names of the edges of zones that are moved."""
-    moved, blocks = {motion.zone for motion in c.tables.loads.motions}, c.drawing.blocks
-    owner = {
-        name: {c.drawing.zones[b] for b in blocks.vertex_block[blocks.edges_named(name)]} for name in _edge_names(c)
-    }
+    moved, blocks = {motion.zone for motion in c.tables.loads.motions}, c.blocks
+    owner = {name: {c.drawn.zones[b] for b in blocks.vertex_block[blocks.edges_named(name)]} for name in _edge_names(c)}
     return {name for name, zones in owner.items() if zones & moved}
 
 
 def _edge_hint(c: Check, name: str, known: list[str], taken: set[str]) -> str:
     """What edge may be meant by ``name``. Never one that another traction acts on: two opposite loads on one edge
     cancel. Nor one of another kind: a traction on "contact:bottom" would act between blocks."""
-    brought = c.drawing.choices_with_edge(name)
+    brought = c.drawn.choices_with_edge(name)
     kind, colon, _ = name.rpartition(":")
     alike = [edge for edge in known if edge not in taken and edge.startswith(kind + colon)]
     close = difflib.get_close_matches(name, alike, 1, cutoff=0.6) if not brought else []
@@ -87,11 +85,11 @@ def _edge_hint(c: Check, name: str, known: list[str], taken: set[str]) -> str:
     hint = (f"did you mean {close[0]!r}? " if close else "") + (
         f"edges are {listed}" if known else "no edge has a name"
     )
-    if c.drawing.model is None:
+    if c.drawn.model is None:
         return f"{hint}; name edges by [[geometry.edges]]"
     if brought:
         return f"the model has it with geometry.parameters.{brought}; now its {hint}"
-    if c.drawing.parameters:
+    if c.drawn.parameters:
         hint += "; edge names may depend on the model's parameters"
     return f"{hint}; the model names edges by physical curves"
 
@@ -99,7 +97,7 @@ def _edge_hint(c: Check, name: str, known: list[str], taken: set[str]) -> str:
 def _unused(c: Check) -> None:
     """Names that the model gives and the scene never says: a load that is missing, or a crack without its prefix."""
     t = c.tables
-    from_files = c.drawing.model is not None or (t.geometry is not None and t.geometry.traces)
+    from_files = c.drawn.model is not None or (t.geometry is not None and t.geometry.traces)
     if not from_files or t.loads is None or t.joints is None:
         return
     used = {load.edge for load in (*t.loads.tractions, *t.loads.viscous_boundaries)}
@@ -110,7 +108,7 @@ def _unused(c: Check) -> None:
     idle = [name for name in _edge_names(c) if name not in used and not name.startswith(JOINT) and not holds(name)]
     if idle:
         c.warn(
-            ("geometry", "model" if c.drawing.model is not None else "traces"),
+            ("geometry", "model" if c.drawn.model is not None else "traces"),
             f"no load and no joint names the edges {', '.join(map(repr, idle))}",
             f'they carry nothing, and follow the default joint where they touch; a crack is called "{CRACK}NAME"',
         )
@@ -131,7 +129,7 @@ def contact_names(drawing: Drawing) -> list[str]:
 def _joints(c: Check) -> None:
     if c.tables.joints is None:
         return
-    known = contact_names(c.drawing)
+    known = contact_names(c.drawn)
     owner: dict[tuple[str, str], str] = {}
 
     def claim(pair: tuple[str, str], law: str, path: Path) -> None:
@@ -163,7 +161,7 @@ def _joints(c: Check) -> None:
                 if edge not in known:
                     c.refuse(("joints", name, "between", k, n), f"no edge is called {edge!r}", nearest(edge, known))
             claim(tuple(sorted(pair)), name, ("joints", name, "between", k))
-    if c.drawing.blocks.n_blocks > 1 and "default" not in c.tables.joints:
+    if c.blocks.n_blocks > 1 and "default" not in c.tables.joints:
         c.warn(
             ("joints",),
             "there is no default joint: contacts that no joint names have neither friction nor cohesion",

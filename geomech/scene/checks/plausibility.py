@@ -9,7 +9,7 @@ from ...model import counted
 from ...model.blocks.corners import LARGEST_SHARE, corner_lengths
 from ...model.blocks.polygon import distance_to_edges
 from ...shapes.block_cutting.rock_outline import ground_of
-from ..assembly.fixed_blocks import fixed_blocks, held_unknowns
+from ..assembly.fixed_blocks import constrained_unknowns, fixed_blocks
 from ..assembly.load_functions import traction_history
 from ..tables import SceneTables
 from ..tables.loads import TractionTable
@@ -82,11 +82,11 @@ def _materials(c: Check) -> None:
 
 def _slivers(c: Check) -> None:
     """Small blocks beside large ones, which shorten the steps of a dynamic run."""
-    blocks = c.drawing.blocks
+    blocks = c.blocks
     if c.tables.dda.dynamic_factor == 0 or blocks.n_blocks < 3:
         return
     areas = blocks.areas()
-    free = ~fixed_blocks(c.tables, c.drawing)
+    free = ~fixed_blocks(c.tables, c.drawn)
     if not free.any():
         return
     usual = float(np.median(areas[free]))
@@ -108,7 +108,7 @@ def _rounding(c: Check) -> None:
     """A rounding length that was asked for and that the edges beside corners are too short for."""
     if "corner_rounding" not in c.tables.dda.model_fields_set:
         return
-    blocks, share = c.drawing.blocks, c.tables.dda.corner_rounding
+    blocks, share = c.blocks, c.tables.dda.corner_rounding
     rounding, longest = corner_lengths(blocks, share)
     short = np.flatnonzero(longest < rounding)
     if not len(short):
@@ -126,8 +126,8 @@ def _rounding(c: Check) -> None:
 
 def _free_back(c: Check) -> None:
     """A slope whose back is no rock: blocks leave it there as well as at the face."""
-    blocks, t = c.drawing.blocks, c.tables
-    fixed = fixed_blocks(t, c.drawing)
+    blocks, t = c.blocks, c.tables
+    fixed = fixed_blocks(t, c.drawn)
     if not any(t.loads.gravity_m_s2) or blocks.n_blocks < 3 or not fixed.any() or fixed.all():
         return
     ground, low = ground_of(blocks), float(blocks.vertices[:, 1].min())
@@ -138,8 +138,8 @@ def _free_back(c: Check) -> None:
     x = float(ground[side, 0])
     starts, ends = blocks.vertices, blocks.vertices[blocks.next_vertex]
     loaded = {load.edge for load in (*t.loads.tractions, *t.loads.viscous_boundaries)}
-    held = held_unknowns(t, c.drawing)
-    free = ~fixed if held is None else ~fixed & ~held.any(axis=1)
+    constrained = constrained_unknowns(t, c.drawn)
+    free = ~fixed if constrained is None else ~fixed & ~constrained.any(axis=1)
     near = 1e-6 * float(np.ptp(blocks.vertices, axis=0).max())
     on = free[blocks.vertex_block] & (np.abs(starts[:, 0] - x) < near) & (np.abs(ends[:, 0] - x) < near)
     on &= ~np.isin(blocks.edge_name, [k for k, name in enumerate(blocks.edge_names) if name in loaded])
@@ -147,7 +147,7 @@ def _free_back(c: Check) -> None:
     if height < SLOPES * abs(rise):
         return
     count = len(np.unique(blocks.vertex_block[on]))
-    x += c.drawing.origin[0]
+    x += c.drawn.origin[0]
     c.warn(
         ("geometry",),
         f"nothing holds the back of the slope: {counted(count, 'block')} that may move {'is' if count == 1 else 'are'} free "
@@ -167,10 +167,10 @@ def _gravity(c: Check) -> None:
 
 def _increment(c: Check) -> None:
     """An advance that crosses a block at a stroke has no path."""
-    increment, blocks = c.tables.growth.increment_m, c.drawing.blocks
+    increment, blocks = c.tables.growth.increment_m, c.blocks
     if increment is None:
         return
-    for b in np.unique(c.drawing.cracks.block).tolist():
+    for b in np.unique(c.cracks.block).tolist():
         own = blocks.vertices[blocks.vertex_start[b] : blocks.vertex_start[b + 1]]
         largest = float(np.ptp(own, axis=0).max())
         if increment > largest:
@@ -197,7 +197,7 @@ def _weightless(c: Check) -> None:
 def _sudden_weight(c: Check) -> None:
     """Rock bridges that feel all their weight, and in dynamics up to twice of it, in the first steps."""
     t = c.tables
-    loads, bridges = t.loads, len(c.drawing.cracks.names) - len(t.geometry.cracks)
+    loads, bridges = t.loads, len(c.cracks.names) - len(t.geometry.cracks)
     tough = all(m.k_ic_pa_sqrt_m is None for m in t.materials.values()) or not t.growth.enabled
     eased = loads.gravity_ramp_s > 0 or loads.in_situ is not None or t.dda.equilibrium
     if t.geometry.dead_ends != "cracks" or not t.geometry.joint_sets or bridges <= 0 or tough or eased:
@@ -214,10 +214,10 @@ def _sudden_weight(c: Check) -> None:
 
 
 def _shallow(c: Check) -> None:
-    blocks = c.drawing.blocks
-    fixed = fixed_blocks(c.tables, c.drawing)
+    blocks = c.blocks
+    fixed = fixed_blocks(c.tables, c.drawn)
     base = np.flatnonzero(fixed[blocks.vertex_block])
-    cracked = [b for b in np.unique(c.drawing.cracks.block).tolist() if not fixed[b]]
+    cracked = [b for b in np.unique(c.cracks.block).tolist() if not fixed[b]]
     # In dynamics blocks come down on corners and edges: how they would rest is not what loads their cracks.
     if not (len(base) and cracked) or c.tables.dda.dynamic_factor > 0 or c.tables.run.boundary_stress == "bases":
         return
@@ -260,9 +260,9 @@ def _overlap(a: np.ndarray, b: np.ndarray, starts: np.ndarray, ends: np.ndarray)
 
 
 def _size(c: Check) -> None:
-    low, high = c.drawing.blocks.vertices.min(axis=0), c.drawing.blocks.vertices.max(axis=0)
+    low, high = c.blocks.vertices.min(axis=0), c.blocks.vertices.max(axis=0)
     size = (high - low).max()
-    if c.drawing.cracks.n_segments and not SIZES[0] <= size <= SIZES[1]:
+    if c.cracks.n_segments and not SIZES[0] <= size <= SIZES[1]:
         c.warn(
             ("geometry",),
             f"the drawing is {high[0] - low[0]:g} × {high[1] - low[1]:g} m",
@@ -271,7 +271,7 @@ def _size(c: Check) -> None:
 
 
 def _near_misses(c: Check) -> None:
-    blocks, cracks = c.drawing.blocks, c.drawing.cracks
+    blocks, cracks = c.blocks, c.cracks
     length = np.bincount(cracks.crack, cracks.lengths) if cracks.n_segments else np.empty(0)
     owner = dict(zip(cracks.segments.ravel().tolist(), np.repeat(np.arange(cracks.n_segments), 2).tolist()))
     for tip in cracks.tips.tolist():
@@ -281,7 +281,7 @@ def _near_misses(c: Check) -> None:
         if gap < NEAR_MISS * length[crack]:
             x, y = cracks.nodes[tip]
             c.warn(
-                c.drawing.path_of_crack(cracks.names[crack]),
+                c.drawn.path_of_crack(cracks.names[crack]),
                 f"crack {cracks.names[crack]!r} ends at ({x:g}, {y:g}), {gap:.2g} m from the outline of "
                 f"{blocks.names[block]!r}, without touching it",
                 "end it on the outline if it reaches the surface; the bridge left is very thin",
@@ -289,8 +289,8 @@ def _near_misses(c: Check) -> None:
 
 
 def _strain(c: Check) -> None:
-    t, blocks = c.tables, c.drawing.blocks
-    concerned = set(c.drawing.cracks.block.tolist())
+    t, blocks = c.tables, c.blocks
+    concerned = set(c.cracks.block.tolist())
     worst, at = 0.0, 0
     for k, traction in enumerate(t.loads.tractions):
         concerned.update(blocks.vertex_block[blocks.edges_named(traction.edge)].tolist())
@@ -298,7 +298,7 @@ def _strain(c: Check) -> None:
         worst, at = (stress, k) if stress > worst else (worst, at)
     if worst == 0.0:
         return
-    names = {material_of(t, c.drawing.zones[block]) for block in concerned}
+    names = {material_of(t, c.drawn.zones[block]) for block in concerned}
     softest = min(names, key=lambda name: t.materials[name].youngs_modulus_pa)
     modulus = t.materials[softest].youngs_modulus_pa
     if worst > LARGEST_STRAIN * modulus:

@@ -18,10 +18,10 @@ def check_loads(c: Check) -> None:
     """Loads on blocks that nothing fixes must balance; blocks that may move must have a mass."""
     if c.drawing is None or c.drawing.blocks is None:
         return
-    t, blocks = c.tables, c.drawing.blocks
+    t, blocks = c.tables, c.blocks
     if t.zones is None or t.materials is None or endless_zone(t) is not None:
         return
-    fixed = fixed_blocks(t, c.drawing)
+    fixed = fixed_blocks(t, c.drawn)
     if t.loads is not None and not records_are_sound(c):
         return
     acts = t.loads is not None and bool(
@@ -32,7 +32,7 @@ def check_loads(c: Check) -> None:
     if fixed.all():
         c.warn(("zones",), "all blocks are fixed: nothing moves", "let a zone move")
         return
-    for zone in dict.fromkeys(z for z, f in zip(c.drawing.zones, fixed) if not f):
+    for zone in dict.fromkeys(z for z, f in zip(c.drawn.zones, fixed) if not f):
         name = material_of(t, zone)
         if name in t.materials and t.materials[name].density_kg_m3 == 0:
             c.refuse(
@@ -69,18 +69,18 @@ def check_loads(c: Check) -> None:
 
 def _loads_are_lost(c: Check, fixed: np.ndarray) -> bool:
     """Refuse a scene whose loads all act on fixed blocks (then True); say which tractions do, or cancel one another."""
-    t, blocks = c.tables, c.drawing.blocks
+    t, blocks = c.tables, c.blocks
     if any(traction.edge not in blocks.edge_names for traction in t.loads.tractions):
         return False
     on = [np.unique(blocks.vertex_block[blocks.edges_named(traction.edge)]) for traction in t.loads.tractions]
     carried = [np.array(blocks_at(blocks, f.at), int) for f in t.loads.forces]
     loaded = [*on, *carried, *([np.arange(blocks.n_blocks)] if any(t.loads.gravity_m_s2) else [])]
     if loaded and all(len(at) and fixed[at].all() for at in loaded):
-        zone = c.drawing.zones[int(loaded[0][0])]
+        zone = c.drawn.zones[int(loaded[0][0])]
         c.refuse(
             ("zones", zone, "fixed"),
             "every load acts on fixed blocks "
-            f"({', '.join(sorted({c.drawing.zones[b] for at in loaded for b in at}))}): nothing would be strained",
+            f"({', '.join(sorted({c.drawn.zones[b] for at in loaded for b in at}))}): nothing would be strained",
             "fix what the specimen stands on, never the specimen; a block alone is held by loads that balance",
         )
         return True

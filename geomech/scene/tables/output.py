@@ -50,8 +50,19 @@ class OutputTable(Table):
         description="store the run for `geomech resume` every n cycles, 0 never (unset: every half minute, less often "
         "where that takes more than a fiftieth of the time); at the end and after Ctrl-C too, if not 0",
     )
+    checkpoint_kept_mb: NotNegative = Field(
+        16.0,
+        description="a run that has ended keeps its checkpoint, to go on beyond the end, up to this size, MB; one that was "
+        "stopped or failed keeps it whatever its size",
+    )
+    format: Literal["vtu", "vtkhdf"] = Field(
+        "vtu",
+        description='series as "vtu" (a file a cycle, listed by .pvd) or as "vtkhdf" (one file, run.vtkhdf; needs h5py and '
+        "ParaView 5.13 or newer)",
+    )
     configuration: Literal["reference", "current"] = Field(
-        "reference", description='coordinates in files: "reference" with displacement, or "current"'
+        "reference",
+        description='coordinates in files: "reference", to be warped by displacement, or "current", not to be warped',
     )
 
 

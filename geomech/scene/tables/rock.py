@@ -49,6 +49,11 @@ class ZoneTable(Table):
     velocity_m_s: Pair | None = Field(
         None, description="velocity of its blocks at the start of a dynamic run, [x, y], m/s (unset: at rest)"
     )
+    order: Annotated[int, Field(ge=1, le=8)] = Field(
+        1,
+        description="order of the polynomial that is the displacement of each of its blocks, 1 to 8: 1 is uniform strain, "
+        "from 2 on blocks bend, and their faces bear stress that varies along them",
+    )
     body: Literal["block", "plane", "half-plane"] = Field(
         "block",
         description='"plane" or "half-plane": rock without an end, of which the zone is the piece that is seen; its holes are '

@@ -15,7 +15,8 @@ class Curves:
     """Curves of the current model as polylines, each with the tags of the points it joins."""
 
     def __init__(self, gmsh, chord: float) -> None:
-        self.gmsh, self.chord, self.known = gmsh, chord, {}
+        self.gmsh, self.chord = gmsh, chord
+        self.known: dict = {}
         self.bent: dict[int, float] = {}  # how far each curve that is not straight may leave its chords, m
 
     def chords(self) -> Chords:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from geomech.coupling import cycles
-from geomech.coupling.crack_compliance.load_extrapolation import Answer, Foretold
+from geomech.coupling.crack_compliance.load_extrapolation import Answer, LoadExtrapolation
 from geomech.model import (
     Blocks,
     Cracks,
@@ -41,23 +41,23 @@ def answer(time: float, systems: tuple, softer: float = 1.0) -> Answer:
 
 def test_a_third_load_lies_on_the_line_through_two():
     systems = object(), object()
-    foretold = Foretold()
-    foretold.take((4, 9), answer(1.0, systems))
-    foretold.take((4, 9), answer(2.0, systems))
-    known, beyond, s = foretold.at(loads(5.0), (4, 9), systems)
+    extrapolation = LoadExtrapolation()
+    extrapolation.take((4, 9), answer(1.0, systems))
+    extrapolation.take((4, 9), answer(2.0, systems))
+    known, beyond, s = extrapolation.at(loads(5.0), (4, 9), systems)
     assert known.all() and np.array_equal(s, answer(5.0, systems).compliance)
     assert beyond == pytest.approx(answer(5.0, systems).beyond(s), rel=1e-12)
     # Beside the line the nearest load is all that is known.
-    beside = foretold.at(loads(5.0, aside=1.0), (4, 9), systems)[1]
+    beside = extrapolation.at(loads(5.0, aside=1.0), (4, 9), systems)[1]
     assert beside == pytest.approx(answer(2.0, systems).beyond(s), rel=1e-12)
     # Faces of the second block have changed: of it the nearest load is all that is known.
-    foretold.take((4, 9), answer(3.0, systems, softer=1.5))
-    known, beyond, s = foretold.at(loads(5.0), (4, 9), systems)
+    extrapolation.take((4, 9), answer(3.0, systems, softer=1.5))
+    known, beyond, s = extrapolation.at(loads(5.0), (4, 9), systems)
     assert beyond[0] == pytest.approx(answer(5.0, systems).beyond(s)[0], rel=1e-12)
     assert beyond[1] == pytest.approx(answer(3.0, systems, softer=1.5).beyond(s)[1], rel=1e-12)
     # Its cracks have grown: of them nothing is.
-    assert foretold.at(loads(5.0), (4, 9), (systems[0], object()))[0].tolist() == [True, False]
-    assert not foretold.at(loads(5.0), (4, 8), systems)[0].any()
+    assert extrapolation.at(loads(5.0), (4, 9), (systems[0], object()))[0].tolist() == [True, False]
+    assert not extrapolation.at(loads(5.0), (4, 8), systems)[0].any()
 
 
 def bench(**changes) -> Problem:

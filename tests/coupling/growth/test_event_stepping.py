@@ -1,6 +1,7 @@
 """Steps to the very load at which tips reach their toughness, held against the crack solver alone, fixed steps, closed
 forms."""
 
+import copy
 from dataclasses import replace
 
 import numpy as np
@@ -178,6 +179,53 @@ def test_dynamic_runs_and_relaxed_ones_are_refused():
             next(cycles(replace(plate(), dda=dda)))
     with pytest.raises(ValueError, match='needs stepping "events"'):
         next(cycles(plate(stepping="fixed", control="toughness")))
+
+
+@pytest.mark.parametrize(
+    "run", [{"stepping": "fixed"}, {}, {"control": "toughness"}], ids=["fixed", "events", "toughness"]
+)
+def test_events_of_growth_between_passes_are_reported_once(run, monkeypatch):
+    """Two slots coalesce and cut the plate through. What `take_growth` returns between two passes (coalescence,
+    daylighting, split) is in the next recorded cycle, each event once and in order, also within one load step."""
+    returned, take = [], cycle_module.take_growth
+
+    def taken(*arguments):
+        events = take(*arguments)
+        returned.extend(events)
+        return events
+
+    monkeypatch.setattr(cycle_module, "take_growth", taken)
+    lines = [np.array([[-0.02, 0.0], [-0.007, 0.0]]), np.array([[0.004, 0.0], [0.018, 0.0]])]
+    settings = GrowthSettings(increment=4e-3, max_passes=200)
+    seen = list(cycles(plate(lines, growth=settings, stop_at=("split",), rate=1e6, end_time=60.0, **run)))
+    kinds = {event.kind for event in returned}
+    reported = [event for cycle in seen for event in cycle.events if event.kind in kinds]
+    assert kinds == {"coalescence", "daylighting", "split"}
+    assert [(e.kind, e.detail) for e in reported] == [(e.kind, e.detail) for e in returned]
+    if not run.get("control"):
+        assert any(event.kind == "coalescence" for cycle in seen if cycle.growth_pass for event in cycle.events)
+
+
+def test_events_of_growth_are_kept_when_a_run_is_stored_between_passes():
+    """The events of growth that a load step in progress has not yet reported belong to its stored state."""
+    lines = [np.array([[-0.02, 0.0], [-0.007, 0.0]]), np.array([[0.004, 0.0], [0.018, 0.0]])]
+    settings = GrowthSettings(increment=8e-3, max_passes=200)
+    coupling = cycle_module.Coupling(
+        plate(lines, growth=settings, stop_at=("split",), rate=1e6, end_time=60.0, stepping="fixed")
+    )
+    stored = []
+
+    def store():
+        if coupling.under_way is not None and coupling.under_way.pending and not stored:
+            stored.append((coupling.now.number, copy.deepcopy(coupling)))
+
+    coupling.between = store
+    events = {cycle.number: cycle.events for cycle in coupling.cycles()}
+    number, resumed = stored[0]
+    assert any(event.kind == "coalescence" for event in events[number + 1])
+    assert {cycle.number: cycle.events for cycle in resumed.load_steps()} == {
+        later: found for later, found in events.items() if later > number
+    }
 
 
 @pytest.mark.parametrize("stepping", ["fixed", "events"])

@@ -60,7 +60,7 @@ def plate(stress, friction, line=None, platen=False, aperture=0.0, **settings):
     law = JointLaw("crack", friction_angle=np.arctan(friction))
     return Problem(
         title="plate",
-        blocks=Blocks.from_polygons(polygons, fixed=fixed, held=held, edge_names=[[n] for n in names]),
+        blocks=Blocks.from_polygons(polygons, fixed=fixed, constrained=held, edge_names=[[n] for n in names]),
         cracks=Cracks.from_polylines(
             [np.array([[-0.5, -0.5 * SLOPE], [0.0, 0.0], [REACH, REACH * SLOPE]] if line is None else line)],
             surface=[(True, False)],

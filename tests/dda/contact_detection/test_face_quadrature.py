@@ -56,7 +56,7 @@ def pressed(system: dda.BlockSystem, eccentricity: float, thrust: float = THRUST
 @pytest.mark.parametrize(
     ("turn", "back", "beside"), [(0.0, False, 0.5), (0.6, True, 0.5), (2.0, False, 0.0), (3.0, True, 0.3)]
 )
-def test_rotation_on_an_elastic_bed_with_and_without_lift_off(turn, back, beside):
+def test_rotation_on_an_elastic_bed_with_and_without_lift_off(verified, turn, back, beside):
     errors, parts = [], []
     for eccentricity in (0.1, -0.3, FACE / 6, 0.5, -0.7, 0.9):
         result, rotation = pressed(on_a_bed(turn=turn, back=back, beside=beside), eccentricity)
@@ -70,6 +70,11 @@ def test_rotation_on_an_elastic_bed_with_and_without_lift_off(turn, back, beside
         if abs(eccentricity) > FACE / 6 + 1e-9:
             assert parts[-1] == pytest.approx(3 * (FACE / 2 - abs(eccentricity)), rel=1e-3)
     print("rotation off by", " ".join(f"{e:.1e}" for e in errors), "; length in contact", np.round(parts, 4))
+    verified(
+        "joint with a stiffness under an eccentric thrust, within and beyond the kern: rotation",
+        np.abs(errors).max(),
+        "elastic bed without tension",
+    )
     # The part in contact is known to 1e-3 of itself, forces to the square of it; the block has turned by up to 2e-3.
     assert np.abs(errors).max() < 2e-5
 
@@ -107,8 +112,8 @@ def test_faces_that_do_not_fit_each_other_press_where_they_meet(eccentricity):
     found = system.contacts_near(state)
     some, none = np.flatnonzero(found.geometry[:, 4] > 0), np.zeros(2)
     assert len(some) == 2
-    told = dda.ToldContacts(which=some, normal=np.full(2, 1.0), shear=none, gap=none, slip=none)
-    state = replace(state, contacts=system.told(state, found, told))
+    told = dda.InheritedContacts(which=some, normal=np.full(2, 1.0), shear=none, gap=none, slip=none)
+    state = replace(state, contacts=system.inherited_contacts(state, found, told))
     loads = Loads(
         point_loads=(
             PointLoad(1, (1.0 + eccentricity, askew * (1.0 + eccentricity)), History.constant([0.0, -THRUST])),

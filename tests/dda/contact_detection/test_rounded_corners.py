@@ -58,10 +58,10 @@ def turned(polygon: np.ndarray, angle: float) -> np.ndarray:
     return polygon @ np.array([[c, s], [-s, c]])
 
 
-def system_of(polygons, fixed, friction_deg=0.0, law=None, held=None, **settings) -> dda.BlockSystem:
+def system_of(polygons, fixed, friction_deg=0.0, law=None, constrained=None, **settings) -> dda.BlockSystem:
     law = law or JointLaw("joint", friction_angle=np.radians(friction_deg))
     return dda.BlockSystem(
-        Blocks.from_polygons(polygons, fixed=fixed, held=held), [ROCK], [law],
+        Blocks.from_polygons(polygons, fixed=fixed, constrained=constrained), [ROCK], [law],
         settings=DdaSettings(**{"dynamic_factor": 1.0, "max_displacement_ratio": 0.05, **settings}),
     )  # fmt: skip
 
@@ -181,8 +181,8 @@ def climbed(dt: float, depth: float, speed: float, rounding: float = 0.05):
     lean = np.arccos(1 - depth / radius)
     x = radius * np.array([1 - np.sin(lean), np.cos(lean) - 1])
     polygons = [rectangle(0, -1, 1, 0), rectangle(-1, 0, 0, 1) + x]
-    held = [[False] * 6, [False, False, True, False, False, False]]
-    system = system_of(polygons, [True, False], held=held, corner_rounding=rounding)
+    constrained = [[False] * 6, [False, False, True, False, False, False]]
+    system = system_of(polygons, [True, False], constrained=constrained, corner_rounding=rounding)
     # At a time when what overlaps is not what was drawn.
     state, budget = replace(State.at_rest(system.blocks), time=1.0), dda.EnergyBudget()
     state.velocity[1, :2] = speed * np.cos(lean), speed * np.sin(lean)

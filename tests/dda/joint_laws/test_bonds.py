@@ -72,7 +72,7 @@ def limit(holds, low: float, high: float, rounds: int = 16) -> float:
 @pytest.mark.parametrize(
     ("splits", "turn", "back"), [(1, 0.0, False), (1, 0.6, True), (1, 3.0, False), (3, 1.7, False)]
 )
-def test_a_pulled_face_fails_at_its_extreme_fibre(splits, turn, back):
+def test_a_pulled_face_fails_at_its_extreme_fibre(verified, splits, turn, back):
     """P/ℓ + 6 P e/ℓ² = σ_t (Navier), whichever way the face looks, by whichever of its ends."""
     errors = []
     for eccentricity in (0.0, 0.2, -0.7, 3.0, -50.0):
@@ -87,12 +87,13 @@ def test_a_pulled_face_fails_at_its_extreme_fibre(splits, turn, back):
 
         errors.append(limit(holds, 0.5 * expected, 1.5 * expected) / expected - 1)
     print(f"splits {splits}, turned by {turn}: strength off by", " ".join(f"{e:.1e}" for e in errors))
+    verified("pulled face, five eccentricities, four ways to cut and turn it: strength", np.abs(errors).max(), "Navier")
     # What inertia bears.
     assert np.abs(errors).max() < 1e-4
 
 
 @pytest.mark.parametrize("law", [GLUE, JointLaw("no tension", FRICTION, COHESION)], ids=["glue", "no tension"])
-def test_a_sheared_face_holds_as_much_wherever_it_is_pressed(law):
+def test_a_sheared_face_holds_as_much_wherever_it_is_pressed(verified, law):
     """c ℓ + N tan φ, the resultant N anywhere within the kern."""
     thrust = 3e6
     expected = COHESION * FACE + thrust * np.tan(FRICTION)
@@ -105,10 +106,13 @@ def test_a_sheared_face_holds_as_much_wherever_it_is_pressed(law):
 
         errors.append(limit(holds, 0.5 * expected, 1.5 * expected) / expected - 1)
     print("shear strength off by", " ".join(f"{e:.1e}" for e in errors))
+    verified(
+        "sheared face, four eccentricities, with and without tensile strength", np.abs(errors).max(), "c ℓ + N tan φ"
+    )
     assert np.abs(errors).max() < 2e-5
 
 
-def test_a_cantilever_of_blocks_breaks_at_its_root_as_a_beam():
+def test_a_cantilever_of_blocks_breaks_at_its_root_as_a_beam(verified):
     """σ = 3 ρ g L²/D, the bending stress at the root under the beam's own weight."""
     blocks = Blocks.from_polygons(
         [np.array([[-1.0, -1], [0, -1], [0, 2], [-1, 2]])]
@@ -132,6 +136,7 @@ def test_a_cantilever_of_blocks_breaks_at_its_root_as_a_beam():
         return not len(lost)
 
     found = 1.0 / limit(lambda part: holds(expected / part), 0.7, 1.3, 14)
+    verified("cantilever of glued blocks: stress at which its root breaks", found - 1, "3 ρ g L² / D")
     print(f"root breaks at {found:.5f} of the beam's stress")
     # Inertia of a step of 0.1 s bears 2/(ω dt)² = 3e-4 of the load, ω = 800/s.
     assert found == pytest.approx(1.0, rel=1e-3)

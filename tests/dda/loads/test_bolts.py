@@ -86,9 +86,9 @@ def test_pretension_across_the_joint_holds_to_its_factor_of_safety(safety):
 
 def test_a_bolt_yields_keeps_what_it_yielded_and_unloads_elastically():
     blocks = Blocks.from_polygons([rectangle(0, 0, 1, 1)], names=["block"])
-    held = np.zeros((1, 6), bool)
-    held[0, [0, 2]] = True
-    blocks = Blocks.from_polygons([rectangle(0, 0, 1, 1)], held=held)
+    constrained = np.zeros((1, 6), bool)
+    constrained[0, [0, 2]] = True
+    blocks = Blocks.from_polygons([rectangle(0, 0, 1, 1)], constrained=constrained)
     system = dda.BlockSystem(blocks, [ROCK], settings=DdaSettings(max_displacement_ratio=1.0))
     pull = History.table([0, 10, 20, 40], [[0.0, 0.0], [0.0, -0.9e6], [0.0, 0.0], [0.0, 0.0]])
     k, limit = 1e8, 1e6
@@ -243,9 +243,9 @@ def test_faulty_bolts_are_refused_by_name():
 
 
 def test_a_bolt_does_not_move_what_is_held():
-    held = np.zeros((1, 6), bool)
-    held[0, [0, 2, 3, 4, 5]] = True
-    blocks = Blocks.from_polygons([rectangle(0, 0, 1, 1)], held=held)
+    constrained = np.zeros((1, 6), bool)
+    constrained[0, [0, 2, 3, 4, 5]] = True
+    blocks = Blocks.from_polygons([rectangle(0, 0, 1, 1)], constrained=constrained)
     system = dda.BlockSystem(blocks, [ROCK], settings=DdaSettings(max_displacement_ratio=1.0))
     bolt = Bolt(0, (0.9, 0.2), GROUND, (2.9, 2.2), 1e6, shear_stiffness=1e5)
     loads = Loads(gravity=GRAVITY, bolts=(bolt,))

@@ -132,11 +132,11 @@ def test_a_point_goes_round_a_circle():
 
 
 def test_a_held_platen_moves_along_its_guide_only():
-    held = np.zeros((3, 6), bool)
-    held[2, [0, 2, 5]] = True
+    constrained = np.zeros((3, 6), bool)
+    constrained[2, [0, 2, 5]] = True
     blocks = Blocks.from_polygons(
         [rectangle(-1, -1, 1, 0), rectangle(-1, 0, 1, 2), rectangle(-1.5, 2, 1, 3)], fixed=[True, False, False],
-        held=held,
+        constrained=constrained,
         names=NAMES,
     )  # fmt: skip
     system = dda.BlockSystem(blocks, [ROCK], [JointLaw("smooth")], settings=DdaSettings(max_displacement_ratio=1.0))

@@ -157,8 +157,8 @@ def test_held_boundaries_are_solved_as_factored_ones(few, supports):
 
 def test_held_holes_and_small_boundaries_are_factored(few, monkeypatch):
     supports = (ddm.Support(0), ddm.Support(len(OUTLINE)))
-    held = ddm.Body([OUTLINE], network(1), ROCK, holes=[HOLE], supports=supports)
-    assert not held._outside.iterated
+    prescribed = ddm.Body([OUTLINE], network(1), ROCK, holes=[HOLE], supports=supports)
+    assert not prescribed._outside.iterated
     assert not boundary_gmres.is_iterated("auto", 99)
     monkeypatch.setattr(boundary_gmres, "MOST_REACTIONS", 100)
     many = ddm.Body([OUTLINE], network(1), ROCK, supports=supports[:1])

@@ -24,7 +24,7 @@ def verdicts(cracks, loops, fresh, monkeypatch) -> tuple[bool, bool]:
     """Whether ``cracks`` are taken as plainly well, and whether a close look finds nothing."""
     seen = []
     edges = outline_edges(loops)[0]
-    plain = geometry_checks.plainly_well
+    plain = geometry_checks.clearly_valid
     with monkeypatch.context() as patch:
         patch.setattr(geometry_checks, "plainly_well", lambda *given: seen.append(plain(*given)) and False)
         try:

@@ -20,13 +20,13 @@ def a_problem():
     matrix = rng.normal(size=(n, n)) + 8 * np.eye(n)
     unknowns = np.arange(n).reshape(n_elements, 2, per)
     along, across = unknowns[:, 0].ravel(), unknowns[:, 1].ravel()
-    held, mixed = np.zeros(n, bool), np.zeros(n)
-    held[across[::3]] = held[along[::6]] = True
+    prescribed, mixed = np.zeros(n, bool), np.zeros(n)
+    prescribed[across[::3]] = prescribed[along[::6]] = True
     mixed[along[3::6]], mixed[along[1::12]] = 0.4, 0.3
-    free, slides = np.flatnonzero(~held), np.flatnonzero(mixed)
+    free, slides = np.flatnonzero(~prescribed), np.flatnonzero(mixed)
     own = matrix.copy()
     own[slides] += mixed[slides, None] * matrix[slides + per]
-    return matrix, Rows(held, mixed, np.zeros(n), per), own[np.ix_(free, free)], rng
+    return matrix, Rows(prescribed, mixed, np.zeros(n), per), own[np.ix_(free, free)], rng
 
 
 class Inverse:
@@ -40,11 +40,11 @@ class Inverse:
 @pytest.mark.parametrize("transposed", [False, True])
 def test_solutions(transposed):
     matrix, rows, own, rng = a_problem()
-    held = HeldFactor(rows, Factor(matrix, "open"), Inverse(matrix), "held")
+    prescribed = HeldFactor(rows, Factor(matrix, "open"), Inverse(matrix), "held")
     right = rng.normal(size=(len(own), 3))
     expected = np.linalg.solve(own.T if transposed else own, right)
-    np.testing.assert_allclose(held.solve(right, transposed), expected, atol=1e-10)
-    np.testing.assert_allclose(held.solve(right[:, 0], transposed), expected[:, 0], atol=1e-10)
+    np.testing.assert_allclose(prescribed.solve(right, transposed), expected, atol=1e-10)
+    np.testing.assert_allclose(prescribed.solve(right[:, 0], transposed), expected[:, 0], atol=1e-10)
 
 
 def flaws(aperture):

@@ -166,7 +166,7 @@ def told(problem):
         points,
         forces,
         problem.blocks.fixed.tolist(),
-        problem.blocks.held.tolist(),
+        problem.blocks.constrained.tolist(),
     )
 
 
@@ -178,7 +178,7 @@ def test_what_is_drawn_is_what_numbers_say(scene, tmp_path):
     blocks = found.problem().blocks
     below = [k for k in range(4) if blocks.loops(k)[0][:, 1].min() == 0.0]
     assert np.flatnonzero(blocks.fixed).tolist() == below and len(below) == 2
-    assert blocks.held[:, 0].sum() == 2 and not blocks.held[:, 1].any()
+    assert blocks.constrained[:, 0].sum() == 2 and not blocks.constrained[:, 1].any()
     assert any("2 blocks by edges" in line or "3 blocks by edges" in line for line in found.overview())
 
 

@@ -110,27 +110,32 @@ class CentralPath:
         self._pattern, self._matrix, self._right = pattern, matrix, right
         self._n, self.bonded = len(found), bonded
         slipped = bonded == SLIPPED
-        some, held = (np.flatnonzero(which) for which in ((bonded == 0) | slipped, (bonded > 0) & ~slipped))
+        some, bonded_rows = (np.flatnonzero(which) for which in ((bonded == 0) | slipped, (bonded > 0) & ~slipped))
         order = pattern.order
         if pattern.n >= THREADED:
             # Beyond what caches hold, in the order of their blocks: what contacts need of one another then lies near.
             one, two = order[found.block[some]], order[found.other[some]]
             some = some[np.argsort(np.maximum(one, two) * pattern.n + np.minimum(one, two), kind="stable")]
-        self._some, self._held = some, held
+        self._some, self._bonded = some, bonded_rows
 
         def at(rows: np.ndarray) -> tuple[np.ndarray, ...]:
             return found.block[rows], found.other[rows], order, np.ascontiguousarray(vectors[rows])
 
-        self._at, self._held_at = at(some), at(held)
-        self._all_at = at(np.concatenate([some, held])) if len(held) else self._at
+        self._at, self._bonded_at = at(some), at(bonded_rows)
+        self._all_at = at(np.concatenate([some, bonded_rows])) if len(bonded_rows) else self._at
         self._sides = assembly.sides_of(pattern.n, order, *self._all_at[:2])
         blocks, others, _, directions = self._at
         self._steps = PathSteps(pattern.n, order[blocks], order[others], directions, springs.lift[some])
         self._upper, self._lower, self._all_lift = (
-            np.concatenate([array[some], array[held]]) for array in (pattern.upper, pattern.lower, springs.lift)
+            np.concatenate([array[some], array[bonded_rows]]) for array in (pattern.upper, pattern.lower, springs.lift)
         )
         # Bonds are springs either way.
-        self._bonds = springs.normal[held], springs.shear[held], gap[held], found.shear[held]
+        self._bonds = (
+            springs.normal[bonded_rows],
+            springs.shear[bonded_rows],
+            gap[bonded_rows],
+            found.shear[bonded_rows],
+        )
         self._kn, self._ks = springs.normal[some], springs.shear[some]
         slides = found.state[some] == SLIP
         friction = np.where(slides, springs.friction[some], springs.peak[some])
@@ -232,14 +237,18 @@ class CentralPath:
         )
         epsilon = total / float((1 + 2 * self._rough).sum())
         residual, laws = steps.residual, steps.laws
-        kn_held, ks_held, gap_held, before_held = self._bonds
+        kn_bonded, ks_bonded, gap_bonded, before_bonded = self._bonds
         springs = list(np.ascontiguousarray(laws.T[1:]))
-        if len(kn_held):
-            held = moved(self._unknowns, *self._held_at, self._all_lift[len(self._kn) :])
-            pulled, sheared = -kn_held * (gap_held + held[:, 0]), before_held - ks_held * held[:, 1]
-            add_forces(residual, *self._held_at, pulled, sheared)
+        if len(kn_bonded):
+            bonded_rows = moved(self._unknowns, *self._bonded_at, self._all_lift[len(self._kn) :])
+            pulled, sheared = (
+                -kn_bonded * (gap_bonded + bonded_rows[:, 0]),
+                before_bonded - ks_bonded * bonded_rows[:, 1],
+            )
+            add_forces(residual, *self._bonded_at, pulled, sheared)
             springs = [
-                np.concatenate(pair) for pair in zip(springs, (kn_held, ks_held, np.zeros(len(kn_held))), strict=True)
+                np.concatenate(pair)
+                for pair in zip(springs, (kn_bonded, ks_bonded, np.zeros(len(kn_bonded))), strict=True)
             ]
         stiff, stiff_along, slope = springs
         data = np.empty(pattern.size) if self._room is None else self._room()
@@ -311,7 +320,7 @@ class CentralPath:
         sliding = np.where(self._ks * self._slip[0] > above, 1.0, np.where(self._ks * self._slip[1] > below, -1.0, 0.0))
         closed = np.where(self._rough & (sliding == 0.0), STICK, SLIP)
         state, direction = np.full(self._n, OPEN), np.zeros(self._n)
-        state[self._held] = STICK
+        state[self._bonded] = STICK
         state[self._some] = np.where(self._kn * self._width > self._normal, OPEN, closed)
         direction[self._some] = np.where(self._rough & (state[self._some] == SLIP), sliding, 0.0)
         return state, direction

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...compiled import kept
+from ..compiled import kept
 
 
 @kept(fastmath=False, error_model="numpy", nogil=True)

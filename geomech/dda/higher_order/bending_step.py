@@ -1,0 +1,314 @@
+"""One step of blocks of unlike order: `Attempt` with deflection.
+
+The unknowns of deflection stand beside the six first ones in one system (`six_row_system`), integrated in time by the
+same scheme in the frame that rotates with the block,
+
+    2 M/dt² Δq = 2 M q̇/dt + f − K q − θ K Δq − c K Δq/dt + contacts,
+
+where c is the damping of the block's mean strain. Contacts along faces are points, each with its state
+(`face_points`).
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from ...model import OPEN
+from ..kinematics.midpoint_configuration import MidpointConfiguration
+from ..open_close.contact_set import ContactSet
+from ..open_close.equations import Unsettled
+from ..out_of_balance import imbalance
+from ..results import StepResult
+from ..time_step import Attempt
+from .deflected_blocks import DeflectedBlocks
+from .deflection_basis import n_deflections
+from .equations import HigherOrderEquations
+from .face_points import FaceContacts
+from .six_row_system import moved
+
+
+class BendingAttempt(Attempt):
+    """As `Attempt`, of a system with ``deflected`` blocks; ``found`` are contacts at corners."""
+
+    def __init__(self, system, state, vertices, carried, moments, loads, dt, crack, found, cuts, load_time) -> None:
+        self.blocks: DeflectedBlocks = system.deflected
+        known = self.blocks.at_rest() if state.deflection is None else state.deflection
+        self.deflection = np.ascontiguousarray(known[:, 0])
+        #: (k,) m/s of deflection that the step begins with.
+        self.rates = system.settings.dynamic_factor * known[:, 1]
+        super().__init__(
+            system, state, vertices, carried, moments, loads, dt, crack,
+            self._on_faces(system, state, vertices, found), cuts, load_time,
+        )  # fmt: skip
+
+    def _on_faces(self, system, state, vertices: np.ndarray, corners: ContactSet) -> FaceContacts:
+        """The contacts found at ``corners``, with points along faces and what deflection adds to their gaps."""
+        finder = system.finder
+        by_length = finder.stiff_laws[corners.law], finder.stiff_along_laws[corners.law]
+        found = FaceContacts.along_faces(corners, self.blocks.order, state.face_points, by_length)
+        self.touching = self._material_points(found, vertices)
+        if not self.deflection.any():
+            return replace(found, deflected=np.zeros(len(found)))
+        return replace(found, deflected=self._gaps(found.geometry[:, 1:3], found, state.rotation, self.deflection))
+
+    def _material_points(self, found: ContactSet, vertices: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """(n, 2) twice: the undeformed points of the vertices' blocks and of the edges' that touch."""
+        geometry = found.geometry
+        foot = geometry[:, 5:7] - geometry[:, 3:4] * geometry[:, 1:3]
+        return (
+            self.blocks.material_points(vertices, geometry[:, 5:7], found.block),
+            self.blocks.material_points(vertices, foot, found.other),
+        )
+
+    def _gaps(self, normal: np.ndarray, found: ContactSet, angle: np.ndarray, q: np.ndarray) -> np.ndarray:
+        """(n,) m that deflections ``q`` (k,) open contacts by across ``normal`` (n, 2)."""
+        padded, out = self.blocks.padded(q), np.zeros(len(found))
+        for owner, points, sign in zip((found.block, found.other), self.touching, (1.0, -1.0), strict=True):
+            matrix = self.blocks.directions(points, owner, angle)
+            out += sign * np.einsum("na,naj,nj->n", normal, matrix, padded[owner], optimize=True)
+        return out
+
+    def _assemble(self) -> None:
+        super()._assemble()
+        system, scheme, blocks, dt = self.system, self.system.scheme, self.blocks, self.dt
+        self.angle = self.state.rotation + self.turn
+        inertia = 2.0 * self.heavier / (dt * dt) + scheme.mass_damping / dt
+        drag = scheme.stiffness_damping + 2.0 * scheme.block_damping * np.sqrt(
+            self.density * self.moments[:, 0] / (12.0 * system.stiffness[:, 0, 0])
+        )
+        size = np.sqrt(self.moments[:, 0])
+        # Strains and deflection share inertia on the axes of the start, on which strains are unknowns.
+        self.shared = self.density[:, None, None] * blocks.coupling(self.state.rotation) / size[:, None, None]
+        self.bending_load = blocks.loads(self.points, self.edges, self.midpoint.vertices, self.angle)
+        stored, rates = blocks.stiffness_times(self.deflection), blocks.padded(self.rates)
+        spin = self.density * self.carried[:, 2] ** 2
+        own = self.bending_load - stored
+        own += spin[:, None] * (blocks.basis.coupling[:, 0] + blocks.basis.coupling[:, 1])
+        by_rate = 2.0 * self.heavier / dt
+        own += by_rate * (self.density * blocks.basis.area)[:, None] * rates
+        own += by_rate * np.einsum("bej,be->bj", self.shared, size[:, None] * self.carried[:, 3:])
+        self.coupled_right = by_rate * np.einsum("bej,bj->be", self.shared, rates)
+        self.own_right = own
+        bending = (scheme.weight + drag / dt)[:, None, None] * blocks.stiffness
+        self._own_matrices(bending, inertia * self.shared, inertia * self.density * blocks.basis.area)
+
+    def _own_matrices(self, bending: np.ndarray, shared: np.ndarray, mass: np.ndarray) -> None:
+        """The blocks' own matrices, one after the other: ``bending`` (n_blocks, m, m) stiffness of deflection, what it
+        has in common with strains, ``shared`` (n_blocks, 3, m), and its ``mass`` (n_blocks,) on the diagonal."""
+        blocks, moving = self.blocks, self.system.moving
+        self.own_at, pieces, at = np.full(len(self.order), -1), [], 0
+        for order in np.unique(blocks.order[moving]).tolist():
+            some = moving[blocks.order[moving] == order]
+            m, width = int(n_deflections(order)), 6 * int(blocks.rows[some[0]])
+            own = np.zeros((len(some), width, width))
+            own[:, :6, :6] = self.matrix[self.order[some]]
+            if m:
+                own[:, 3:6, 6 : 6 + m] = shared[some, :, :m]
+                own[:, 6 : 6 + m, 3:6] = np.swapaxes(shared[some, :, :m], 1, 2)
+                own[:, 6 : 6 + m, 6 : 6 + m] = bending[some, :m, :m]
+                diagonal, spare = np.arange(6, 6 + m), np.arange(6 + m, width)
+                own[:, diagonal, diagonal] += mass[some, None]
+                own[:, spare, spare] = own[:, diagonal, diagonal].mean(axis=1, keepdims=True)
+            self.own_at[some] = at + np.arange(len(some)) * width * width
+            at += own.size
+            pieces.append(own.ravel())
+        self.own = np.concatenate(pieces) if pieces else np.zeros(0)
+
+    def _settled(self, pattern, matrix, right, found, gap, vectors, springs, curved):
+        try:
+            return super()._settled(pattern, matrix, right, found, gap, vectors, springs, curved)
+        except Unsettled as failure:
+            # Others know contacts by their corners.
+            if failure.contact < 0:
+                raise
+            raise Unsettled(str(failure), found.points.corner_of(failure.contact)) from failure
+
+    def _equations(self, pattern, matrix, right, contacts, vectors, springs, gap, slack, curved):
+        blocks, moving, own = self.blocks, self.system.moving, self.own
+        full = np.zeros((pattern.n, 6))
+        full[: self.n_free] = right
+        full[self.order[moving], 3:6] += self.coupled_right[moving]
+        full.ravel()[self._deflection_at(pattern)] = self.own_right[blocks.owner, blocks.which]
+        if self._constrained() is not None:
+            # What is held has changed the six first rows and columns.
+            own = own.copy()
+            for b in moving.tolist():
+                width = 6 * int(blocks.rows[b])
+                own[self.own_at[b] : self.own_at[b] + width * width].reshape(width, width)[:6, :6] = matrix[
+                    self.order[b]
+                ]
+        return HigherOrderEquations(
+            pattern, matrix, full, contacts, vectors, springs, gap, slack, curved,
+            self.system.scheme.static, own=own, own_at=self.own_at, rows=self._rows(contacts, vectors),
+        )  # fmt: skip
+
+    def _deflection_at(self, pattern) -> np.ndarray:
+        """(k,) where the unknowns of deflection stand among all."""
+        return 6 * pattern.more[self.blocks.owner] + self.blocks.which
+
+    def _rows(self, found: ContactSet, vectors: np.ndarray) -> np.ndarray:
+        """(n, 2, 2, w): way, side, the contacts' motion per unit of all unknowns of the side's block."""
+        blocks, n = self.blocks, len(found)
+        out = np.zeros((n, 2, 2, max(blocks.width, 6)))
+        out[..., :6] = vectors.reshape(n, 2, 2, 6)
+        geometry = self.midpoint.contacts(found.geometry, found.block, found.other, self._along(found))
+        normal = geometry[:, 1:3]
+        ways = np.stack([normal, np.stack([-normal[:, 1], normal[:, 0]], axis=1)], axis=1)
+        for side, (owner, points, sign) in enumerate(
+            zip((found.block, found.other), self.touching, (1.0, -1.0), strict=True)
+        ):
+            matrix = blocks.directions(points, owner, self.angle)
+            m = matrix.shape[2]
+            out[:, :, side, 6 : 6 + m] = sign * np.einsum("nwa,naj->nwj", ways, matrix, optimize=True)
+        return out
+
+    def _bent(self) -> bool:
+        """As `Attempt._bent`: whether the step is to be solved again with gaps that follow the arcs of its motion."""
+        system, found = self.system, self.found
+        if not len(found) or not self.n_free:
+            return False
+        known = (1e-3 if system.scheme.static else 0.1) * found.precision
+        increment = self._increment(self.unknowns)
+        if 2.0 * np.abs(increment[:, 2]).max() * system.step_limit < known.min():
+            return False
+        before, settled = found.arc + np.zeros(len(found)), self.settled
+        vertices = self._advanced(increment)[0]
+        if not system.scheme.static:
+            self._place(increment)
+        self._follow(increment, vertices)
+        if not (np.abs(self.found.arc - before) > known)[settled.state != OPEN].any():
+            self.found = found
+            return False
+        self.found = self.found.trying_again(settled)
+        return True
+
+    def _follow(self, increment: np.ndarray, vertices: np.ndarray) -> None:
+        """Let the contacts follow the arcs of ``increment`` (n_blocks, 6), with which deflection turns."""
+        super()._follow(increment, vertices)
+        found, system, start = self.found, self.system, self.state.rotation
+        change = self._deflected_by()
+        end = MidpointConfiguration.of(increment, 1.0, self.vertices, system.owner, self.moments)
+        normal = end.contacts(found.geometry, found.block, found.other, self._along(found))[:, 1:3]
+        acting = self.midpoint.contacts(found.geometry, found.block, found.other, self._along(found))[:, 1:3]
+        extra = []
+        for turned in (lambda n: n, lambda n: np.stack([-n[:, 1], n[:, 0]], axis=1)):
+            went = self._gaps(turned(normal), found, start + increment[:, 2], self.deflection + change)
+            went -= self._gaps(turned(found.geometry[:, 1:3]), found, start, self.deflection)
+            extra.append(went - self._gaps(turned(acting), found, start + self.turn, change))
+        self.found = replace(found, arc=found.arc + extra[0], swing=found.swing + extra[1])
+
+    def _deflected_by(self) -> np.ndarray:
+        """(k,) m of deflection in the step, as it was solved last."""
+        return self.unknowns.ravel()[self._deflection_at(self.pattern)]
+
+    def _move(self) -> None:
+        super()._move()
+        blocks, static = self.blocks, self.system.scheme.static
+        change = self.bent_by = self._deflected_by()
+        # At rest there is no rate; in motion that of the step's end, in the frame of the block.
+        self.new_rates = np.zeros_like(change) if static else 2.0 * change / self.dt - self.rates
+        mean = blocks.padded(2.0 / self.dt**2 * (change - self.dt * self.rates))
+        blocks.acceleration = np.sqrt((mean * mean).sum(axis=1))
+        self.largest = max(self.largest, float(blocks.largest(change)[0].max()))
+        if self.n_free:
+            found = self.found
+            rows = self._rows(found, self.vectors)
+            pattern = self.pattern
+            self.slid = moved(
+                self.unknowns.ravel(), (found.block, found.other, pattern.order), (pattern.more, pattern.rows), rows
+            )[:, 1]
+
+    def path(self, after: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        blocks, q, turned = self.blocks, self.deflection, self.state.rotation + self.increment[:, 2]
+        finder = self.system.finder
+        finder.sag = np.maximum(finder.sag, blocks.largest(q + self.bent_by)[1])
+        return (
+            blocks.corners(self.vertices, self.state.rotation, q),
+            blocks.corners(after, turned, q + self.bent_by),
+        )
+
+    def _stop(self, imposed) -> None:
+        """Contacts of blocks that bend keep the speeds that the step gives them."""
+
+    def _imbalance(self, right: np.ndarray, load: np.ndarray, largest: float) -> tuple[float, float]:
+        found, settled, n = self.found, self.settled, self.n_free
+        right = right.copy()
+        inertia = 2.0 * self.heavier / self.dt**2 + self.system.scheme.mass_damping / self.dt
+        bent = inertia * np.einsum("bej,bj->be", self.shared, self.blocks.padded(self.bent_by))
+        moving = self.system.moving
+        right[self.order[moving], 3:6] += (self.coupled_right - bent)[moving]
+        return imbalance(
+            self.matrix, right, self.vectors, found.block, found.other, self.order, settled.unknowns[:n],
+            settled.normal_force, settled.shear_force, self.acceleration, self.density, self.moments, self.gravity,
+            load, largest,
+        )  # fmt: skip
+
+    def _energy(self, load: np.ndarray, end_shear: np.ndarray):
+        energy = super()._energy(load, end_shear)
+        blocks, scheme, state, dt = self.blocks, self.system.scheme, self.state, self.dt
+        begun = blocks.at_rest() if state.deflection is None else state.deflection
+        density = np.where(self.system.fixed, 0.0, self.density)
+        angle, change = state.rotation, self.bent_by
+        end = angle + self.increment[:, 2]
+        after = blocks.kinetic(self.new_rates, self.velocity[:, 3:], end, density)
+        had = blocks.kinetic(begun[:, 1], state.velocity[:, 3:], angle, density)
+        kept = blocks.kinetic(self.rates, self.carried[:, 3:], angle, density)
+        u0, u1 = blocks.elastic_energy(self.deflection), blocks.elastic_energy(self.deflection + change)
+        padded = blocks.padded(change)
+        worked = float((self.bending_load * padded).sum())
+        # Work of inertia, with the mean acceleration of the step: of deflection on itself, and what strains share.
+        rate = 2.0 / dt**2 * (change - dt * self.rates)
+        mean = self.acceleration[:, 3:]
+        inertia = float(density @ (blocks.basis.area * (padded * blocks.padded(rate)).sum(axis=1)))
+        coupling = blocks.coupling(angle)
+        inertia += float(np.einsum("b,be,bej,bj->", density, mean, coupling, padded, optimize=True))
+        inertia += float(
+            np.einsum("b,be,bej,bj->", density, self.increment[:, 3:], coupling, blocks.padded(rate), optimize=True)
+        )
+        spun = density * self.carried[:, 2] ** 2
+        inertia -= float(
+            np.einsum("b,bj,bj->", spun, blocks.basis.coupling[:, 0] + blocks.basis.coupling[:, 1], padded)
+        )
+        strained = float((padded * blocks.stiffness_times(self.deflection + scheme.weight * change)).sum())
+        drag = scheme.stiffness_damping + 2.0 * scheme.block_damping * np.sqrt(
+            self.density * self.moments[:, 0] / (12.0 * self.system.stiffness[:, 0, 0])
+        )
+        bent = blocks.stiffness_times(change)
+        damped = float((drag / dt) @ (bent * padded).sum(axis=1))
+        damped += scheme.mass_damping / dt * self._mass_of(change, padded, coupling, density)
+        lost = inertia - (after - kept) + strained - (u1 - u0)
+        stored = after + u1 - had - u0
+        return energy._replace(
+            kinetic=energy.kinetic + after,
+            elastic=energy.elastic + u1,
+            before=energy.before + had + u0,
+            load_work=energy.load_work + worked,
+            damping=energy.damping + damped,
+            scheme=energy.scheme + lost,
+            carried=energy.carried + had - kept,
+            residual=energy.residual + stored - (worked - damped - lost - (had - kept)),
+        )
+
+    def _mass_of(self, change: np.ndarray, padded: np.ndarray, coupling: np.ndarray, density: np.ndarray) -> float:
+        """Δuᵀ M Δu of deflection on itself and with strains, twice the latter."""
+        own = density @ (self.blocks.basis.area * (padded * padded).sum(axis=1))
+        shared = np.einsum("b,be,bej,bj->", density, self.increment[:, 3:], coupling, padded, optimize=True)
+        return float(own + 2.0 * shared)
+
+    def result(self) -> StepResult:
+        result = super().result()
+        deflection = np.stack([self.deflection + self.bent_by, self.new_rates], axis=1)
+        memory = self.found.memory(self.settled, self._end_shear(), self._points_at_the_end())
+        return replace(result, state=replace(result.state, deflection=deflection, face_points=memory))
+
+    def _points_at_the_end(self) -> np.ndarray:
+        """(n, 2) m: the contacts' points of the vertices' blocks at the end of the step."""
+        blocks = self.system.blocks
+        mean = blocks.mean_vertices(self.new_vertices)
+        reference, weights = blocks.affine_fit
+        arm = self.new_vertices - mean[blocks.vertex_block]
+        gradient = np.add.reduceat(arm[:, :, None] * weights[:, None, :], blocks.vertex_start[:-1], axis=0)
+        owner, points = self.found.block, self.touching[0]
+        return mean[owner] + np.einsum("nab,nb->na", gradient[owner], points - reference[owner])

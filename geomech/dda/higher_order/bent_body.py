@@ -1,0 +1,56 @@
+"""Displacement and stress inside a block of higher order, for writers and pictures."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...conventions import rotate_stress
+from ...model import Motion, State
+from .deflected_blocks import DeflectedBlocks, rotation_of
+
+
+@dataclass(frozen=True, eq=False)
+class BentBody:
+    """A ``block`` of the ``deflected`` blocks, with its deflection ``q`` (m,), mean ``strain`` (3,) and mean ``stress`` (3,)
+    Pa in its own frame, which has turned by ``angle`` (rad)."""
+
+    deflected: DeflectedBlocks
+    block: int
+    q: np.ndarray
+    strain: np.ndarray
+    stress: np.ndarray
+    angle: float
+
+    def fields(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Stress (n, 3), Pa, and displacement (n, 2), m, without the block's rigid motion, at undeformed ``points``
+        (n, 2), in the block's frame."""
+        basis = self.deflected.basis
+        m = len(self.q)
+        bent = basis.strain(points, self.block)[..., :m] @ self.q
+        arm = points - basis.centroid[self.block]
+        x, y, (ex, ey, gamma) = arm[:, 0], arm[:, 1], self.strain
+        own = np.stack([ex * x + 0.5 * gamma * y, ey * y + 0.5 * gamma * x], axis=1)
+        own += basis.displacement(points, self.block)[..., :m] @ self.q
+        return self.stress + bent @ self.deflected.elastic[self.block].T, own
+
+    def deflection(self, points: np.ndarray) -> np.ndarray:
+        """(n, 2) m by which undeformed ``points`` (n, 2) lie off where the block's vertices say, in fixed axes."""
+        moved = self.deflected.basis.displacement(points, self.block)[..., : len(self.q)] @ self.q
+        return moved @ rotation_of(np.array(self.angle)).T
+
+
+def bent_bodies(deflected: DeflectedBlocks | None, state: State, motion: Motion) -> dict[int, BentBody]:
+    """block → its body, of all blocks of higher order in ``state``, whose affine ``motion`` is known."""
+    if deflected is None:
+        return {}
+    known = deflected.at_rest() if state.deflection is None else state.deflection
+    out = {}
+    for b in deflected.bending.tolist():
+        angle = float(state.rotation[b])
+        stretch = rotation_of(np.array(-angle)) @ motion.gradient[b] - np.eye(2)
+        strain = np.array([stretch[0, 0], stretch[1, 1], stretch[0, 1] + stretch[1, 0]])
+        stress = rotate_stress(state.stress[b], -angle)
+        out[b] = BentBody(deflected, b, known[deflected.basis.of_block(b), 0], strain, stress, angle)
+    return out

@@ -1,0 +1,231 @@
+"""Blocks that deflect: their inertia and stiffness, where their deflection is felt, and the loads on it.
+
+With the mean strain rates ε̇ and the deflection q of one block (`deflection_basis`), in the frame that rotates with it,
+
+    kinetic energy  ½ ρ (A q̇² + 2 ε̇ᵀ Q G q̇),   elastic energy  ½ qᵀ K q,   work  ∫ tᵀ R P dq ds,
+
+besides those of its six first unknowns; G = ∫ (∂u/∂ε)ᵀ P dA, and Q takes strains to the block's frame. The weight does
+no work on deflection. A block that spins at ω is bent by centrifugal forces, ρ ω² (G₁ + G₂).
+"""
+
+from __future__ import annotations
+
+import logging
+from functools import cached_property
+
+import numpy as np
+
+from ...model import Blocks, State
+from ..results import NotConverged
+from .deflection_basis import HIGHEST, DeflectionBasis, n_deflections
+from .polygon_quadrature import gauss_points
+
+log = logging.getLogger(__name__)
+
+#: rad by which deflection turns a block's outline, or strain: beyond the first small displacements are off by a thousandth
+#: and the block is reported, beyond the second the run ends.
+LARGE, TOO_LARGE = 0.05, 0.5
+
+
+def rotation_of(angle: np.ndarray) -> np.ndarray:
+    """(n, 2, 2) rotation matrices of ``angle`` (n,) rad."""
+    c, s = np.cos(angle), np.sin(angle)
+    return np.stack([np.stack([c, -s], axis=-1), np.stack([s, c], axis=-1)], axis=-2)
+
+
+def strain_turned_back(angle: np.ndarray) -> np.ndarray:
+    """(n, 3, 3) Q: strains (εx, εy, γxy) on fixed axes → on axes turned by ``angle`` (n,) rad."""
+    c, s = np.cos(angle), np.sin(angle)
+    return np.stack(
+        [
+            np.stack([c * c, s * s, s * c], axis=-1),
+            np.stack([s * s, c * c, -s * c], axis=-1),
+            np.stack([-2 * s * c, 2 * s * c, c * c - s * s], axis=-1),
+        ],
+        axis=-2,
+    )
+
+
+class DeflectedBlocks:
+    """The ``blocks`` of a system of which some have an order above 1; ``order`` (n_blocks,) is 1 where they do not bend.
+
+    ``rows`` (n_blocks,) of six unknowns each, 0 of ``fixed`` blocks; ``density`` (n_blocks,) kg/m³ and ``elastic``
+    (n_blocks, 3, 3) Pa, of the undeformed blocks."""
+
+    def __init__(self, blocks: Blocks, fixed: np.ndarray, density: np.ndarray, elastic: np.ndarray) -> None:
+        self.blocks = blocks
+        self.order = np.where(fixed, 1, blocks.order).astype(np.int64)
+        self.basis = DeflectionBasis.of(blocks.vertices, blocks.next_vertex, blocks.vertex_start, self.order)
+        self.rows = np.where(fixed, 0, 1 + -(-n_deflections(self.order) // 6)).astype(np.int64)
+        self.bending = np.flatnonzero(self.order > 1)
+        self.mass_density, self.elastic = density, elastic
+        #: (n_blocks,) m/s²: the mean acceleration of deflection in the last step.
+        self.acceleration = np.zeros(blocks.n_blocks)
+        #: The largest slope of a deflection that was reported.
+        self.reported = 0.0
+        #: Width of a contact's row of one block.
+        self.width = 6 * int(self.rows.max(initial=1))
+        end = blocks.vertices[blocks.next_vertex]
+        most = self.basis.coupling.shape[2]
+        #: (n_blocks, m, m) K, Pa, zeros beyond a block's own unknowns.
+        self.stiffness = np.zeros((blocks.n_blocks, most, most))
+        for b in self.bending.tolist():
+            some = slice(blocks.vertex_start[b], blocks.vertex_start[b + 1])
+            own = self.basis.stiffness(b, blocks.vertices[some], end[some], elastic[b])
+            self.stiffness[b, : len(own), : len(own)] = own
+        #: (k,) of each unknown its block, and which it is of this one's.
+        self.owner = np.repeat(np.arange(blocks.n_blocks), np.diff(self.basis.start))
+        self.which = np.arange(self.n_unknowns) - self.basis.start[self.owner]
+
+    @property
+    def n_unknowns(self) -> int:
+        return self.basis.n_unknowns
+
+    def at_rest(self) -> np.ndarray:
+        """(k, 2) no deflection."""
+        return np.zeros((self.n_unknowns, 2))
+
+    def padded(self, values: np.ndarray) -> np.ndarray:
+        """(n_blocks, m) of the unknowns of all blocks ``values`` (k,), zeros beyond a block's own."""
+        out = np.zeros((len(self.order), self.basis.coupling.shape[2]))
+        out[self.owner, self.which] = values
+        return out
+
+    def material_points(self, vertices: np.ndarray, points: np.ndarray, owner: np.ndarray) -> np.ndarray:
+        """(n, 2) where ``points`` (n, 2) of the blocks ``owner`` (n,) lie in the undeformed block, its ``vertices``
+        (n_vertices, 2) being those of its strained shape."""
+        blocks = self.blocks
+        reference, weights = blocks.affine_fit
+        mean = blocks.mean_vertices(vertices)
+        start = blocks.vertex_start[:-1]
+        arm = vertices - mean[blocks.vertex_block]
+        gradient = np.add.reduceat(arm[:, :, None] * weights[:, None, :], start, axis=0)
+        back = np.linalg.inv(gradient)
+        return reference[owner] + np.einsum("nab,nb->na", back[owner], points - mean[owner])
+
+    def directions(self, points: np.ndarray, owner: np.ndarray, angle: np.ndarray) -> np.ndarray:
+        """R P (n, 2, m) at undeformed ``points`` (n, 2) of blocks ``owner`` (n,) that have turned by ``angle``
+        (n_blocks,)."""
+        return np.einsum("nab,nbj->naj", rotation_of(angle[owner]), self.basis.displacement(points, owner))
+
+    def displaced(self, vertices: np.ndarray, points: np.ndarray, owner: np.ndarray, angle: np.ndarray, q: np.ndarray):
+        """(n, 2) m: what deflections ``q`` (k,) move ``points`` (n, 2) by, of blocks ``owner`` (n,) with these strained
+        ``vertices`` that have turned by ``angle`` (n_blocks,)."""
+        undeformed = self.material_points(vertices, points, owner)
+        return np.einsum("naj,nj->na", self.directions(undeformed, owner, angle), self.padded(q)[owner])
+
+    @cached_property
+    def _outline(self) -> tuple[np.ndarray, np.ndarray]:
+        """P (n, k, 2, m) at k undeformed points of n edges of bending blocks, both ends among them, and the blocks
+        (n,)."""
+        blocks = self.blocks
+        some = np.flatnonzero(self.order[blocks.vertex_block] > 1)
+        at = np.linspace(0.0, 1.0, HIGHEST + 1)
+        start, end = blocks.vertices[some], blocks.vertices[blocks.next_vertex[some]]
+        points = start[:, None] + at[:, None] * (end - start)[:, None]
+        owner = blocks.vertex_block[some]
+        matrix = self.basis.displacement(points.reshape(-1, 2), np.repeat(owner, len(at)))
+        return matrix.reshape(len(some), len(at), 2, -1), owner
+
+    def largest(self, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """(n_blocks,) twice, m: how far deflections ``q`` (k,) move a point of the outline at most, and how far off the
+        straight line between the ends of its edge."""
+        out, sag = np.zeros(len(self.order)), np.zeros(len(self.order))
+        if q.any():
+            matrix, owner = self._outline
+            moved = np.einsum("nkaj,nj->nka", matrix, self.padded(q)[owner])
+            np.maximum.at(out, owner, np.hypot(moved[..., 0], moved[..., 1]).max(axis=1))
+            at = np.linspace(0.0, 1.0, moved.shape[1])[:, None]
+            off = moved - (moved[:, :1] + at * (moved[:, -1:] - moved[:, :1]))
+            np.maximum.at(sag, owner, np.hypot(off[..., 0], off[..., 1]).max(axis=1))
+        return out, sag
+
+    def corners(self, vertices: np.ndarray, angle: np.ndarray, q: np.ndarray) -> np.ndarray:
+        """(n_vertices, 2) m where corners are, from the strained ``vertices`` of blocks that have turned by ``angle``
+        (n_blocks,), with deflections ``q`` (k,)."""
+        if not q.any():
+            return vertices
+        some = np.flatnonzero(self.order[self.blocks.vertex_block] > 1)
+        matrix, owner = self._outline
+        out = vertices.copy()
+        out[some] += np.einsum("nab,nbj,nj->na", rotation_of(angle[owner]), matrix[:, 0], self.padded(q)[owner])
+        return out
+
+    @cached_property
+    def _slopes(self) -> tuple[np.ndarray, np.ndarray]:
+        """∇P (n, 4, m) at the ends and the middles of all edges of bending blocks, and the blocks (n,)."""
+        blocks = self.blocks
+        some = np.flatnonzero(self.order[blocks.vertex_block] > 1)
+        start, end = blocks.vertices[some], blocks.vertices[blocks.next_vertex[some]]
+        owner = np.concatenate([blocks.vertex_block[some]] * 2)
+        return self.basis.gradient(np.concatenate([start, 0.5 * (start + end)]), owner), owner
+
+    def check_small(self, state: State) -> None:
+        """Log a warning that names a block where deflection turns or strains its outline by more than `LARGE`, and each
+        time that has doubled; raise `NotConverged` beyond `TOO_LARGE`."""
+        if state.deflection is None or not state.deflection[:, 0].any():
+            return
+        matrix, owner = self._slopes
+        slope = np.abs(np.einsum("ngj,nj->ng", matrix, self.padded(state.deflection[:, 0])[owner])).max(axis=1)
+        worst = int(slope.argmax())
+        most, name = float(slope[worst]), repr(self.blocks.names[owner[worst]])
+        if most > TOO_LARGE:
+            raise NotConverged(
+                f"{name} is bent by {most:.3g} rad at t = {state.time:g} s: its deflection is that of small "
+                "displacements. Its loads are beyond its stiffness, or it is to be drawn as several blocks"
+            )
+        if most > LARGE and most >= 2.0 * self.reported:
+            self.reported = most
+            log.warning(
+                "t = %g s: %s is bent by %.2g rad, and its deflection is that of small displacements: off by about half the "
+                "square of that; draw it as several blocks",
+                state.time, name, most,
+            )  # fmt: skip
+
+    def deflection_of(self, state: State) -> tuple[np.ndarray, np.ndarray]:
+        """As `largest` of the deflections of ``state``."""
+        return self.largest(self.at_rest()[:, 0] if state.deflection is None else state.deflection[:, 0])
+
+    def loads(self, points: np.ndarray, edges: np.ndarray, vertices: np.ndarray, angle: np.ndarray) -> np.ndarray:
+        """(n_blocks, m) generalised forces of POINT_FORCE rows ``points`` and EDGE_FORCE rows ``edges``, N, on blocks with
+        these strained ``vertices`` that have turned by ``angle`` (n_blocks,)."""
+        out = np.zeros((len(self.order), self.basis.coupling.shape[2]))
+        points, edges = points[self.order[points["block"]] > 1], edges[self.order[edges["block"]] > 1]
+        if len(points):
+            matrix = self.directions(np.ascontiguousarray(points["at"]), points["block"], angle)
+            np.add.at(out, points["block"], np.einsum("na,naj->nj", points["force"], matrix))
+        if len(edges):
+            at, weight = gauss_points((HIGHEST + 3) // 2)
+            start, along = edges["start"][:, None], (edges["end"] - edges["start"])[:, None]
+            where = start + at[:, None] * along
+            length = np.hypot(along[..., 0], along[..., 1])
+            first, second = edges["traction"][:, :1], edges["traction"][:, 1:]
+            force = (first + at[:, None] * (second - first)) * (length * weight)[..., None]
+            owner = np.repeat(edges["block"], len(at))
+            undeformed = self.material_points(vertices, where.reshape(-1, 2), owner)
+            matrix = self.directions(undeformed, owner, angle)
+            np.add.at(out, owner, np.einsum("na,naj->nj", force.reshape(-1, 2), matrix))
+        return out
+
+    def kinetic(self, rates: np.ndarray, strain_rates: np.ndarray, angle: np.ndarray, density: np.ndarray) -> float:
+        """J/m that ``rates`` (k,) of deflection add to the kinetic energy of blocks with these ``strain_rates``
+        (n_blocks, 3), turned by ``angle`` (n_blocks,), of ``density`` (n_blocks,)."""
+        q = self.padded(rates)
+        shared = np.einsum("bi,bij,bjm,bm->b", strain_rates, self._shared(angle), self.basis.coupling, q, optimize=True)
+        return float(density @ (0.5 * self.basis.area * (q * q).sum(axis=1) + shared))
+
+    def elastic_energy(self, q: np.ndarray) -> float:
+        """J/m of deflections ``q`` (k,)."""
+        return 0.5 * float((self.padded(q) * self.stiffness_times(q)).sum())
+
+    def stiffness_times(self, q: np.ndarray) -> np.ndarray:
+        """(n_blocks, m) N: K q of deflections ``q`` (k,)."""
+        return np.einsum("bij,bj->bi", self.stiffness, self.padded(q))
+
+    def coupling(self, angle: np.ndarray) -> np.ndarray:
+        """(n_blocks, 3, m) Qᵀ G of blocks turned by ``angle`` (n_blocks,), m³."""
+        return np.einsum("bij,bjm->bim", self._shared(angle), self.basis.coupling)
+
+    @staticmethod
+    def _shared(angle: np.ndarray) -> np.ndarray:
+        return np.swapaxes(strain_turned_back(angle), 1, 2)

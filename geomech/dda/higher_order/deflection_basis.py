@@ -1,0 +1,236 @@
+"""Deflection of blocks of order p: what a complete polynomial displacement has beyond Shi's six unknowns.
+
+The displacement of a block of order p is
+
+    u(X) = T(X) d + R P(X) q,
+
+with Shi's T and d = (u0, v0, r0, εx, εy, γxy), the block's rotation R and its deflection q of (p + 1)(p + 2) − 6
+unknowns (m). X are coordinates of the undeformed block. The columns of P are polynomials of degree 2 to p and an affine
+part such that
+
+    ∫ P dA = 0,   ∫ X × P dA = 0,   ∫ ε(P) dA = 0,   ∫ Pᵢ · Pⱼ dA = A δᵢⱼ:
+
+deflection carries neither momentum nor mean strain, and d keeps the meaning it has in a block of first order: its
+strains are the mean strains of the block, and stress and stiffness of first order are those of the mean. The mass
+matrix of q is ρ A times the identity; strain rates and deflection share inertia (`DeflectionBasis.coupling`), but no
+stiffness.
+
+Products of Legendre polynomials in the block's principal axes, scaled to its bounding box, and Cholesky's factors of
+their Gram matrix, taken twice, keep the basis orthonormal to round-off up to p = 8.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...compiled import kept, part
+from ..kinematics.displacement_matrix import displacement_matrix
+from .polygon_quadrature import polygon_points
+
+#: The highest order of a block.
+HIGHEST = 8
+
+
+def n_deflections(order: np.ndarray | int) -> np.ndarray | int:
+    """How many unknowns of deflection a block of this ``order`` has."""
+    return (order + 1) * (order + 2) - 6
+
+
+@part(fastmath=False, error_model="numpy", nogil=True)
+def _legendre(x, order, value, slope):
+    """Legendre polynomials of degree 0 to ``order`` at ``x`` and their derivatives, into ``value`` and ``slope``."""
+    value[0], slope[0] = 1.0, 0.0
+    value[1], slope[1] = x, 1.0
+    for n in range(2, order + 1):
+        value[n] = ((2 * n - 1) * x * value[n - 1] - (n - 1) * value[n - 2]) / n
+        slope[n] = slope[n - 2] + (2 * n - 1) * value[n - 1]
+
+
+@kept(fastmath=False, error_model="numpy", nogil=True)
+def _evaluate(owner, points, order, centre, to_box, coefficients, gradients):
+    """Displacement (n, 2, m) of unit deflections at ``points`` (n, 2) of the blocks ``owner`` (n,), or, if
+    ``gradients``, its derivatives (n, 4, m): ∂ux/∂x, ∂ux/∂y, ∂uy/∂x, ∂uy/∂y."""
+    n, most = len(owner), coefficients.shape[3]
+    out = np.zeros((n, 4 if gradients else 2, most))
+    size = 2
+    for b in range(len(order)):
+        size = max(size, order[b] + 1)
+    px, py, dx, dy = np.empty(size), np.empty(size), np.empty(size), np.empty(size)
+    for i in range(n):
+        b = owner[i]
+        p = order[b]
+        if p < 2:
+            continue
+        x, y = points[i, 0] - centre[b, 0], points[i, 1] - centre[b, 1]
+        _legendre(to_box[b, 0, 0] * x + to_box[b, 0, 1] * y, p, px, dx)
+        _legendre(to_box[b, 1, 0] * x + to_box[b, 1, 1] * y, p, py, dy)
+        own = (p + 1) * (p + 2) - 6
+        term = 0
+        for degree in range(p + 1):
+            for k in range(degree + 1):
+                f = px[degree - k] * py[k]
+                fx, fy = dx[degree - k] * py[k], px[degree - k] * dy[k]
+                gx = fx * to_box[b, 0, 0] + fy * to_box[b, 1, 0]
+                gy = fx * to_box[b, 0, 1] + fy * to_box[b, 1, 1]
+                for way in range(2):
+                    given = coefficients[b, term, way]
+                    if gradients:
+                        for j in range(own):
+                            out[i, 2 * way, j] += gx * given[j]
+                            out[i, 2 * way + 1, j] += gy * given[j]
+                    else:
+                        for j in range(own):
+                            out[i, way, j] += f * given[j]
+                term += 1
+    return out
+
+
+def _principal_box(loop: np.ndarray, points: np.ndarray, weights: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Centre (2,) and matrix (2, 2) to the square [−1, 1]² of the bounding box of the vertices ``loop`` (n, 2) along
+    the principal axes of the area with these ``points`` and ``weights``."""
+    area = weights.sum()
+    arm = points - weights @ points / area
+    second = np.einsum("k,ka,kb->ab", weights, arm, arm)
+    # No axes are principal for a square or a disc: those of the coordinates are as good.
+    deviator = 0.5 * (second[0, 0] - second[1, 1]), second[0, 1]
+    even = np.hypot(*deviator) <= 1e-9 * (second[0, 0] + second[1, 1])
+    angle = 0.0 if even else 0.5 * np.arctan2(deviator[1], deviator[0])
+    axes = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
+    along = loop @ axes.T
+    low, high = along.min(axis=0), along.max(axis=0)
+    return 0.5 * (low + high) @ axes, axes * (2.0 / (high - low))[:, None]
+
+
+@dataclass(frozen=True, eq=False)
+class DeflectionBasis:
+    """The basis of deflection of blocks, of each its own order.
+
+    order         (n_blocks,)            p; 1: the block has no deflection
+    start         (n_blocks + 1,)        where the unknowns of each block begin among those of all
+    area          (n_blocks,)            m², undeformed
+    centroid      (n_blocks, 2)          m, undeformed
+    centre        (n_blocks, 2)          of the box in which the polynomials are Legendre's, m
+    to_box        (n_blocks, 2, 2)       from X − centre to the square [−1, 1]²
+    coefficients  (n_blocks, k, 2, m)    of the products of Legendre polynomials; zeros beyond a block's own
+    coupling      (n_blocks, 3, m)       ∫ (∂u/∂ε)ᵀ P dA, the inertia that strain rates and deflection share, m³
+    """
+
+    order: np.ndarray
+    start: np.ndarray
+    area: np.ndarray
+    centroid: np.ndarray
+    centre: np.ndarray
+    to_box: np.ndarray
+    coefficients: np.ndarray
+    coupling: np.ndarray
+
+    @classmethod
+    def of(
+        cls, vertices: np.ndarray, next_vertex: np.ndarray, vertex_start: np.ndarray, order: np.ndarray
+    ) -> DeflectionBasis:
+        """The basis of undeformed blocks with ``vertices`` (n_vertices, 2), the next of each ``next_vertex``, those of a
+        block from ``vertex_start`` on, and this ``order`` (n_blocks,). Raises ValueError for an order that is not 1 to
+        8."""
+        order = np.ascontiguousarray(order, np.int64)
+        if len(order) and not (order.min() >= 1 and order.max() <= HIGHEST):
+            raise ValueError(f"the order of a block is 1 to {HIGHEST}, got {order.min()} to {order.max()}")
+        n, highest = len(order), int(order.max(initial=1))
+        own = n_deflections(order)
+        terms, most = (highest + 1) * (highest + 2) // 2, int(own.max(initial=0))
+        basis = cls(
+            order=order,
+            start=np.concatenate([[0], np.cumsum(own)]),
+            area=np.zeros(n),
+            centroid=np.zeros((n, 2)),
+            centre=np.zeros((n, 2)),
+            to_box=np.zeros((n, 2, 2)),
+            coefficients=np.zeros((n, terms, 2, most)),
+            coupling=np.zeros((n, 3, most)),
+        )
+        for b in range(n):
+            some = np.arange(vertex_start[b], vertex_start[b + 1])
+            points, weights = polygon_points(
+                vertices[some], vertices[next_vertex[some]], vertices[some].mean(axis=0), 2 * int(order[b])
+            )
+            basis.area[b] = weights.sum()
+            basis.centroid[b] = weights @ points / weights.sum()
+            basis.centre[b], basis.to_box[b] = _principal_box(vertices[some], points, weights)
+            if order[b] > 1:
+                basis._orthonormalise(b, points, weights)
+        return basis
+
+    @property
+    def n_unknowns(self) -> int:
+        return int(self.start[-1])
+
+    def of_block(self, block: int) -> slice:
+        """Where the deflection of ``block`` stands among that of all."""
+        return slice(int(self.start[block]), int(self.start[block + 1]))
+
+    def displacement(self, points: np.ndarray, owner: np.ndarray | int) -> np.ndarray:
+        """P (n, 2, m) at undeformed ``points`` (n, 2) of the blocks ``owner``; zeros beyond a block's own unknowns."""
+        return self._evaluated(points, owner, False)
+
+    def strain(self, points: np.ndarray, owner: np.ndarray | int) -> np.ndarray:
+        """ε(P) (n, 3, m), engineering shear strain, 1/m, arguments as of `displacement`."""
+        slope = self._evaluated(points, owner, True)
+        return np.stack([slope[:, 0], slope[:, 3], slope[:, 1] + slope[:, 2]], axis=1)
+
+    def gradient(self, points: np.ndarray, owner: np.ndarray | int) -> np.ndarray:
+        """∇P (n, 4, m), 1/m: ∂ux/∂x, ∂ux/∂y, ∂uy/∂x, ∂uy/∂y; arguments as of `displacement`."""
+        return self._evaluated(points, owner, True)
+
+    def stiffness(self, block: int, start: np.ndarray, end: np.ndarray, elastic: np.ndarray) -> np.ndarray:
+        """(m, m) ∫ ε(P)ᵀ C ε(P) dA of ``block``, Pa, with edges from ``start`` to ``end`` (n, 2) and C ``elastic``
+        (3, 3) Pa."""
+        points, weights = polygon_points(start, end, self.centroid[block], 2 * int(self.order[block]) - 2)
+        strain = self.strain(points, block)[..., : n_deflections(int(self.order[block]))]
+        out = np.einsum("k,kaj,ab,kbi->ji", weights, strain, elastic, strain, optimize=True)
+        return 0.5 * (out + out.T)
+
+    def _evaluated(self, points: np.ndarray, owner: np.ndarray | int, gradients: bool) -> np.ndarray:
+        points = np.ascontiguousarray(points, float).reshape(-1, 2)
+        owner = np.ascontiguousarray(np.broadcast_to(owner, len(points)), np.int64)
+        return _evaluate(owner, points, self.order, self.centre, self.to_box, self.coefficients, gradients)
+
+    def _orthonormalise(self, block: int, points: np.ndarray, weights: np.ndarray) -> None:
+        """Fill the coefficients of ``block`` and its coupling, with ``points`` and ``weights`` exact for degree 2 p."""
+        order, coefficients = int(self.order[block]), self.coefficients[block]
+        own, area = int(n_deflections(order)), self.area[block]
+        for j in range(own):
+            # Terms of first order, 3 of them, come last, as the affine part.
+            coefficients[3 + j // 2, j % 2, j] = 1.0
+        for _ in range(2):
+            self._without_affine_part(block, points, weights)
+            values = self.displacement(points, block)[..., :own]
+            gram = np.einsum("k,kai,kaj->ij", weights, values, values, optimize=True) / area
+            factor = np.linalg.cholesky(gram)
+            coefficients[..., :own] = np.linalg.solve(factor, coefficients[..., :own].reshape(-1, own).T).T.reshape(
+                coefficients[..., :own].shape
+            )
+        values = self.displacement(points, block)
+        by_strain = displacement_matrix(points, self.centroid[block])[..., 3:]
+        self.coupling[block] = np.einsum("k,kae,kaj->ej", weights, by_strain, values, optimize=True)
+
+    def _without_affine_part(self, block: int, points: np.ndarray, weights: np.ndarray) -> None:
+        """Take the rigid motion, by mass, and the mean strain off the columns of ``block``."""
+        matrix = displacement_matrix(points, self.centroid[block])
+        values, strain = self.displacement(points, block), self.strain(points, block)
+        mean = np.einsum("k,kej->ej", weights, strain) / self.area[block]
+        values = values - np.einsum("kae,ej->kaj", matrix[..., 3:], mean)
+        rigid = matrix[..., :3]
+        mass = np.einsum("k,kai,kaj->ij", weights, rigid, rigid)
+        motion = np.linalg.solve(mass, np.einsum("k,kai,kaj->ij", weights, rigid, values))
+        # The affine field T(X) (motion, mean) in terms of 1, ξ, η of the box, about its centre.
+        gradient = np.array(
+            [[mean[0], 0.5 * mean[2] - motion[2]], [0.5 * mean[2] + motion[2], mean[1]]]
+        )  # (2, 2, m): ∂u_a/∂x_b
+        shift = self.centre[block] - self.centroid[block]
+        constant = motion[:2] + np.einsum("abj,b->aj", gradient, shift)
+        slopes = np.einsum("abj,bc->acj", gradient, np.linalg.inv(self.to_box[block]))
+        coefficients = self.coefficients[block]
+        coefficients[0] -= constant
+        coefficients[1] -= slopes[:, 0]
+        coefficients[2] -= slopes[:, 1]

@@ -1,0 +1,435 @@
+"""Contact along faces of blocks of higher order: integration points, each with its own state of contact.
+
+Where two straight sides touch, their contact stress is integrated with the Gauss–Lobatto rule,
+
+    ∫ f ds ≈ ℓ Σ wᵢ f(sᵢ),   exact for polynomials of degree 2n − 3 with n = p + 2 points, p the higher order of both,
+
+so that a uniform and, with it, any stress of a degree up to p + 1 loads every deflection as its integral does (patch
+test). Joints with a stiffness kₙ (Pa/m) have springs kₙ ℓ wᵢ; penalty springs are proportional to wᵢ and, at both ends of
+a face, as stiff as those of a corner (`penalty_springs`): the points at which a block tips over do not give way by more
+than corners do, and a corner that stays in contact when its face parts keeps its spring and its force. Each point
+opens, sticks and slides by itself.
+
+The gap at a point is that of the strained blocks, linear between the ends of the face, and n · (u_a − u_b) of their
+deflections. CONTACT rows, one at each end of a face, carry the resultant and the moment of its points; what points
+remember from step to step are FACE_POINT rows of the state.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields, replace
+from functools import cached_property
+
+import numpy as np
+
+from ...model import CONTACT, FACE_POINT, OPEN, SLIP, STICK
+from ..contact_detection.contact_records import fill
+from ..joint_laws.bonds import WITHOUT_GAPS, on_lines
+from ..joint_laws.penalty_springs import Springs
+from ..open_close.contact_set import ContactSet
+from ..open_close.settled_states import Settled
+from .polygon_quadrature import lobatto_points
+
+#: Memory of a `ContactSet` by the names of FACE_POINT rows.
+_MEMORY = {"state": "state", "bonded": "bonded", "normal": "normal_force", "shear": "shear_force", "slip": "slip",
+           "wear": "wear", "lift": "lift"}  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class Faces:
+    """Faces (m,) among the contacts at corners, and their points among all contacts.
+
+    ends     (m, 2)  rows of the corners
+    length   (m,)    m, between the ends
+    inner    (k,)    rows of corners between the ends, of vertices within a straight side: they bear nothing by themselves
+    inner_at (k,)    the point nearest to each of these, among all contacts
+    lone     (k,)    rows of the corners that belong to no face; they come first among all contacts
+    first    (m,)    where the points of each face begin among all contacts
+    count    (m,)    how many there are
+    place    (n,)    of all contacts, along the face from 0 to 1; 0 of lone ones
+    face     (n,)    of all contacts; −1 of lone ones
+    share    (n,)    part of the face that each has
+    stiffer  (n,)    by how much penalty springs are stiffer than shares of two corners, so that those at the ends of a face
+                     are as stiff as a corner's
+    swapped  (m,)    the vertex at the second end belongs to the block whose edge is touched at the first
+    corners  (n_corners, 7)   geometry of the corners
+    """
+
+    ends: np.ndarray
+    length: np.ndarray
+    inner: np.ndarray
+    inner_at: np.ndarray
+    lone: np.ndarray
+    first: np.ndarray
+    count: np.ndarray
+    place: np.ndarray
+    face: np.ndarray
+    share: np.ndarray
+    stiffer: np.ndarray
+    swapped: np.ndarray
+    corners: np.ndarray
+
+    @classmethod
+    def of(cls, found: ContactSet, order: np.ndarray) -> Faces:
+        """The faces of the contacts ``found`` at corners; ``order`` (n_blocks,) of the blocks, 1 of those that do not
+        bend."""
+        geometry = found.geometry
+        some = np.flatnonzero((geometry[:, 4] > 0) & (found.corner < 0))
+        ends, length, inner = np.zeros((0, 2), np.int64), np.zeros(0), np.zeros((0, 3))
+        if len(some) > 1:
+            ends, length, inner = _whole_sides(found, *on_lines(found.block, found.other, geometry, some))
+        lone = np.setdiff1d(np.arange(len(found)), np.concatenate([ends.ravel(), inner[:, 0].astype(np.int64)]))
+        highest = np.maximum(order[found.block], order[found.other]) + 2
+        count = highest[ends[:, 0]]
+        rules = {n: lobatto_points(n) for n in np.unique(highest).tolist()}
+        first = len(lone) + np.cumsum(count) - count
+        of_inner = inner[:, 1].astype(np.int64)
+        nearest = [
+            int(np.abs(rules[n][0] - place).argmin())
+            for n, place in zip(count[of_inner].tolist(), inner[:, 2].tolist(), strict=True)
+        ]
+        return cls(
+            ends=ends,
+            length=length,
+            inner=inner[:, 0].astype(np.int64),
+            inner_at=first[of_inner] + np.array(nearest, np.int64),
+            lone=lone,
+            first=first,
+            count=count,
+            place=np.concatenate([np.zeros(len(lone)), *(rules[n][0] for n in count.tolist())]),
+            face=np.concatenate([np.full(len(lone), -1), np.repeat(np.arange(len(ends)), count)]),
+            share=np.concatenate(
+                [
+                    np.array([2.0 * rules[n][1][0] for n in highest[lone].tolist()]),
+                    *(rules[n][1] for n in count.tolist()),
+                ]
+            ),
+            stiffer=0.5
+            / np.concatenate(
+                [
+                    np.array([rules[n][1][0] for n in highest[lone].tolist()]),
+                    *(np.full(n, rules[n][1][0]) for n in count.tolist()),
+                ]
+            ),
+            swapped=found.block[ends[:, 0]] != found.block[ends[:, 1]],
+            corners=geometry,
+        )
+
+    @cached_property
+    def inside(self) -> np.ndarray:
+        """(k,) all contacts that are points of faces."""
+        return np.flatnonzero(self.face >= 0)
+
+    def _both(self, value: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """``value`` (n_corners, …) at both ends of the face of each point."""
+        at = self.ends[self.face[self.inside]]
+        return value[at[:, 0]], value[at[:, 1]]
+
+    def corner_of(self, contact: int) -> int:
+        """The row of a corner of the face of a ``contact``."""
+        face = int(self.face[contact])
+        return int(self.lone[contact]) if face < 0 else int(self.ends[face, 0])
+
+    def between(self, value: np.ndarray) -> np.ndarray:
+        """(n,) of all contacts, linear between the corners' ``value`` (n_corners,)."""
+        at_first, at_second = self._both(value)
+        place = self.place[self.inside]
+        return np.concatenate([value[self.lone], at_first + place * (at_second - at_first)])
+
+    def spread(self, force: np.ndarray) -> np.ndarray:
+        """(n,) forces of all contacts, of faces the linear stress whose resultant and moment the ``force`` (n_corners,) at
+        their ends has."""
+        first, second = self._both(force)
+        place = self.place[self.inside]
+        linear = (4.0 * first - 2.0 * second) * (1.0 - place) + (4.0 * second - 2.0 * first) * place
+        return np.concatenate([force[self.lone], self.share[self.inside] * linear])
+
+    def at_corners(self, force: np.ndarray) -> np.ndarray:
+        """(n_corners,) forces with the resultant and the moment of the ``force`` (n,) of all contacts."""
+        out = np.zeros(len(self.corners))
+        out[self.lone] = force[: len(self.lone)]
+        some, place = force[self.inside], self.place[self.inside]
+        at = self.ends[self.face[self.inside]]
+        np.add.at(out, at[:, 0], (1.0 - place) * some)
+        np.add.at(out, at[:, 1], place * some)
+        return out
+
+    def of_corners(self, value: np.ndarray) -> np.ndarray:
+        """(n_corners,) the ``value`` (n,) at the points that lie on the corners."""
+        out = np.empty(len(self.corners), np.asarray(value).dtype)
+        out[self.lone] = value[: len(self.lone)]
+        out[self.ends[:, 0]] = value[self.first]
+        out[self.ends[:, 1]] = value[self.first + self.count - 1]
+        out[self.inner] = value[self.inner_at]
+        return out
+
+    def least(self, value: np.ndarray) -> np.ndarray:
+        """(n_corners,) the least ``value`` (n,) of a corner's face."""
+        out = self.of_corners(value)
+        lowest = np.full(len(self.ends), np.inf)
+        np.minimum.at(lowest, self.face[self.inside], value[self.inside])
+        out[self.ends] = lowest[:, None]
+        out[self.inner] = lowest[self.face[self.inner_at]]
+        return out
+
+    def geometry(self) -> np.ndarray:
+        """(n, 7) geometry of all contacts, of points of faces that of the edge at the first end; the position along the
+        edge stands for that of the corner."""
+        out = np.empty((len(self.face), 7))
+        out[: len(self.lone)] = self.corners[self.lone]
+        first, second = self._both(self.corners)
+        place, swapped = self.place[self.inside, None], self.swapped[self.face[self.inside], None]
+        gap = first[:, 3:4] + place * (second[:, 3:4] - first[:, 3:4])
+        # Where the vertex at the far end belongs to the edge's block, the other block's point is its foot there.
+        far = np.where(swapped, second[:, 5:7] - second[:, 3:4] * second[:, 1:3], second[:, 5:7])
+        inside = out[len(self.lone) :]
+        inside[:, 0] = first[:, 0]
+        inside[:, 1:3], inside[:, 3:4] = first[:, 1:3], gap
+        inside[:, 5:7] = first[:, 5:7] + place * (far - first[:, 5:7])
+        inside[:, 4] = self.share[self.inside] * self.length[self.face[self.inside]]
+        return out
+
+    def springs(self, corner: Springs, by_length: tuple[np.ndarray, np.ndarray]) -> Springs:
+        """The springs of all contacts from those of the corners; ``by_length`` (n_corners,) twice: which of them have a
+        stiffness by the length of their face, across it and along it."""
+        first, second = self._both(self.corners[:, 4])
+        # Corners within a side have a part of its length, but add no penalty springs.
+        whole = np.concatenate([np.ones(len(self.lone)), self.length[self.face[self.inside]] / (first + second)])
+
+        def shared(value: np.ndarray, which: np.ndarray) -> np.ndarray:
+            first, second = self._both(value)
+            sums = np.concatenate([value[self.lone], first + second]) * self.share
+            return np.where(same(which), whole, self.stiffer) * sums
+
+        def same(value: np.ndarray) -> np.ndarray:
+            return np.concatenate([value[self.lone], self._both(value)[0]])
+
+        own = {field.name: same(getattr(corner, field.name)) for field in fields(corner)}
+        for name, which in zip(("normal", "shear"), by_length, strict=True):
+            own[name] = shared(getattr(corner, name), which)
+        strength, always = np.where(self.face < 0, 1.0 / self.share, 1.0), np.ones(len(self.corners), bool)
+        for name in ("sliding", "hold", "cohesion", "tension"):
+            own[name] = shared(getattr(corner, name), always) * strength
+        return Springs(**own)
+
+    def share_shear(self, vectors: np.ndarray, block: np.ndarray) -> None:
+        """Points of faces slide where they are."""
+
+
+@dataclass(frozen=True, eq=False)
+class FaceContacts(ContactSet):
+    """Contacts with integration points along faces (``points``), the corners in ``lumped``; ``deflected`` (n,) m is what
+    deflections of the blocks add to the gaps as the step begins."""
+
+    deflected: np.ndarray | float = 0.0
+
+    @classmethod
+    def along_faces(
+        cls, corners: ContactSet, order: np.ndarray, memory: np.ndarray | None, by_length: tuple[np.ndarray, np.ndarray]
+    ) -> FaceContacts:
+        """The contacts found at ``corners``, with points along whole faces, which remember the FACE_POINT rows
+        ``memory``; ``by_length`` as of `Faces.springs`."""
+        faces = Faces.of(corners, order)
+        own = {}
+        for field in fields(ContactSet):
+            value = getattr(corners, field.name)
+            if isinstance(value, np.ndarray) and field.name not in ("geometry", "cohesive"):
+                own[field.name] = np.concatenate([value[faces.lone], faces._both(value)[0]])
+            else:
+                own[field.name] = value
+        own |= {
+            "geometry": faces.geometry(), "springs": faces.springs(corners.springs, by_length), "points": faces,
+            "lumped": corners, "faces": None, "whole": None, "tried": None,
+            "lift": faces.between(corners.lift), "arc": 0.0, "swing": 0.0,
+            "inset": np.zeros(len(faces.face), bool),
+        }  # fmt: skip
+        out = cls(**own)
+        return out._as_the_ends_say()._remembering(memory)
+
+    def _as_the_ends_say(self) -> FaceContacts:
+        """Points that remember nothing: closed where both ends of their face are, bonded where both are, under the linear
+        stress with the forces of the ends."""
+        faces, corners, inside = self.points, self.lumped, self.points.inside
+        state, bonded = self.state.copy(), self.bonded.copy()
+        first, second = faces._both(corners.state)
+        both = (first != OPEN) & (second != OPEN)
+        state[inside] = np.where(both, np.where((first == SLIP) & (second == SLIP), SLIP, STICK), OPEN)
+        one, two = faces._both(corners.bonded)
+        bonded[inside] = np.where((one > 0) & (two > 0), one, 0)
+        normal, shear = faces.spread(corners.normal), faces.spread(corners.shear)
+        return replace(
+            self, state=state, bonded=bonded, normal=normal, shear=shear, slip=faces.between(corners.slip),
+            wear=faces.between(corners.wear), stretch=np.zeros(len(state)),
+            direction=np.where(state == SLIP, np.sign(shear), 0.0),
+        )._tried_as_friction_has_it()  # fmt: skip
+
+    def _remembering(self, memory: np.ndarray | None) -> FaceContacts:
+        """With what the FACE_POINT rows ``memory`` say of the same places of the same two blocks."""
+        if memory is None or not len(memory):
+            return self
+        own = {name: getattr(self, name).copy() for name in _MEMORY}
+        length = self.geometry[:, 4]
+        at = _matching(self, memory)
+        known = np.flatnonzero(at >= 0)
+        rows = memory[at[known]]
+        for name, column in _MEMORY.items():
+            own[name][known] = rows[column]
+        # Points of another part of the face bear the stress that there was.
+        inside = self.points.face[known] >= 0
+        ratio = np.where(inside & (rows["length"] > 0), length[known] / np.maximum(rows["length"], 1e-300), 1.0)
+        for name in ("normal", "shear"):
+            own[name][known] *= ratio
+        own["bonded"] = np.where((self.springs.cohesion == 0) & (self.springs.tension == 0), 0, own["bonded"])
+        own["direction"] = np.where(own["state"] == SLIP, np.sign(own["shear"]), 0.0)
+        return replace(self, **own)._tried_as_friction_has_it()
+
+    def _tried_as_friction_has_it(self) -> FaceContacts:
+        rough = (self.springs.peak > 0) | (self.bonded > 0)
+        state = self.state.copy()
+        state[(state == SLIP) & rough & (self.direction == 0)] = STICK
+        state[(state == STICK) & ~rough] = SLIP
+        return replace(self, state=state)
+
+    @cached_property
+    def gap_before(self) -> np.ndarray:
+        return self.geometry[:, 3] + self.deflected - self.lift
+
+    def placed(self, points) -> FaceContacts:
+        raise TypeError("points of faces stand where they are")
+
+    def along(self, arc: np.ndarray, swing: np.ndarray) -> FaceContacts:
+        faces = self.points
+        corners = replace(self.lumped, arc=arc, swing=swing)
+        return replace(self, lumped=corners, arc=faces.between(arc), swing=faces.between(swing))
+
+    def misplaced(self, settled: Settled) -> None:
+        return None
+
+    def sharing_cohesion(self, state: np.ndarray, bonded: np.ndarray) -> FaceContacts:
+        return self
+
+    def like(self, rows: np.ndarray) -> FaceContacts:
+        return self
+
+    def trying(self, rows: np.ndarray, without_lost: bool = False) -> FaceContacts:
+        return self
+
+    def of_rows(self, value: np.ndarray) -> np.ndarray:
+        return self.points.least(value)
+
+    def shear_of_rows(self, shear: np.ndarray) -> np.ndarray:
+        return self.points.at_corners(shear)
+
+    def rows(self, settled: Settled, acting: np.ndarray | None = None) -> np.ndarray:
+        """CONTACT rows at the corners, with the resultant and moment of the points of their faces."""
+        faces, corners = self.points, self.lumped
+        closed = settled.state != OPEN
+        state = np.where(closed, np.where(settled.state == SLIP, 1.0, 0.0), 2.0)
+        kind = np.array([STICK, SLIP, OPEN])[faces.least(state).astype(int)]
+        rows = np.empty(len(corners), CONTACT)
+        bonded = np.where(settled.bonded > 0, settled.bonded, 9).astype(float)
+        lowest = faces.least(bonded)
+        fill(
+            rows, corners.vertex, corners.edge, corners.block, corners.other, corners.law, corners.inset, kind,
+            np.where(lowest > 8, 0, lowest).astype(np.int64), faces.of_corners(settled.gap),
+            faces.at_corners(settled.normal_force), faces.at_corners(settled.shear_force),
+            faces.of_corners(self.slip), faces.of_corners(self.wear), faces.of_corners(settled.slip),
+            faces.of_corners(self.lift), faces.of_corners(settled.lifted),
+            corners.geometry if acting is None else acting, np.ascontiguousarray(corners.geometry[:, 4]),
+            corners.tilt, corners.springs.normal,
+        )  # fmt: skip
+        return rows
+
+    def memory(self, settled: Settled, shear: np.ndarray, points: np.ndarray) -> np.ndarray:
+        """FACE_POINT rows as the step, so ``settled``, leaves the contacts, with ``shear`` (n,) N as it ends, where their
+        ``points`` (n, 2) m are then."""
+        rows = np.zeros(len(self), FACE_POINT)
+        faces, corners = self.points, self.lumped
+        rows["block"], rows["other"] = self.block, self.other
+        rows["vertex"], rows["edge"] = self.vertex, self.edge
+        rows["far_vertex"], rows["far_edge"] = -1, -1
+        inside = faces.inside
+        far = faces.ends[faces.face[inside], 1]
+        rows["far_vertex"][inside], rows["far_edge"][inside] = corners.vertex[far], corners.edge[far]
+        rows["place"], rows["length"], rows["point"] = faces.place, self.geometry[:, 4], points
+        rows["state"], rows["bonded"] = settled.state, settled.bonded
+        rows["normal_force"], rows["shear_force"], rows["gap"] = settled.normal_force, shear, settled.gap
+        rows["slip"], rows["wear"] = self.slip + settled.slip, self.wear + np.abs(settled.slip)
+        rows["lift"] = np.maximum(self.lift + settled.lifted, np.minimum(self.lift, 0.0))
+        return rows
+
+
+def _whole_sides(
+    found: ContactSet, some: np.ndarray, start: np.ndarray, along: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Sides that touch all along among the contacts ``some`` (k,), face by face from ``start`` (m + 1,), ``along`` (k,) m:
+    rows of their ends (m, 2), lengths (m,), and rows, faces and places (0 to 1) of corners between the ends (n, 3)."""
+    ends, length, inner = [], [], []
+    for first, last in zip(start[:-1].tolist(), start[1:].tolist(), strict=True):
+        if last - first < 2:
+            continue
+        rows, at = some[first:last], along[first:last]
+        if last - first > 2:
+            order = np.argsort(at, kind="stable")
+            rows, at = rows[order], at[order]
+        extent = abs(float(at[-1] - at[0]))
+        sums = float(found.geometry[rows, 4].sum())
+        if abs(sums - extent) > WITHOUT_GAPS * extent or (found.law[rows] != found.law[rows[0]]).any():
+            continue
+        share = (at - at[0]) / (at[-1] - at[0])
+        inner += [(row, len(ends), place) for row, place in zip(rows[1:-1].tolist(), share[1:-1].tolist(), strict=True)]
+        ends.append((rows[0], rows[-1]))
+        length.append(extent)
+    return (
+        np.array(ends, np.int64).reshape(-1, 2), np.array(length), np.array(inner, float).reshape(-1, 3),
+    )  # fmt: skip
+
+
+def _matching(found: FaceContacts, memory: np.ndarray) -> np.ndarray:
+    """(n,) the row of ``memory`` of each contact of ``found``, −1 where there is none: the same point, a corner that was
+    the end of a face, or the nearest point between the same two sides."""
+    faces, corners = found.points, found.lumped
+    far = np.full((len(found), 2), -1)
+    inside = faces.inside
+    ends = faces.ends[faces.face[inside], 1]
+    far[inside] = np.stack([corners.vertex[ends], corners.edge[ends]], axis=1)
+    same = len(memory) == len(found) and np.array_equal(memory["place"], faces.place)
+    for name, mine in (
+        ("vertex", found.vertex),
+        ("edge", found.edge),
+        ("far_vertex", far[:, 0]),
+        ("far_edge", far[:, 1]),
+    ):
+        same = same and np.array_equal(memory[name], mine)
+    if same:
+        return np.arange(len(found))
+    known: dict[tuple[int, ...], int] = {}
+    by_corner: dict[tuple[int, int], int] = {}
+    by_pair: dict[tuple[int, int], list[int]] = {}
+    for k, row in enumerate(memory):
+        v, e, w, f = (int(row[name]) for name in ("vertex", "edge", "far_vertex", "far_edge"))
+        place = round(float(row["place"]) * 1e6)
+        known[v, e, w, f, place] = k
+        if w < 0 or place == 0:
+            by_corner[v, e] = k
+        elif place == 1000000:
+            by_corner[w, f] = k
+        if w >= 0:
+            by_pair.setdefault((int(row["block"]), int(row["other"])), []).append(k)
+    out = np.full(len(found), -1)
+    for c in range(len(found)):
+        v, e, place = int(found.vertex[c]), int(found.edge[c]), round(float(faces.place[c]) * 1e6)
+        k = known.get((v, e, int(far[c, 0]), int(far[c, 1]), place), -1)
+        if k < 0 and (faces.face[c] < 0 or place == 0):
+            k = by_corner.get((v, e), -1)
+        if k < 0 and place == 1000000:
+            k = by_corner.get((int(far[c, 0]), int(far[c, 1])), -1)
+        if k < 0 and faces.face[c] >= 0:
+            pair = int(found.block[c]), int(found.other[c])
+            near = by_pair.get(pair) or by_pair.get(pair[::-1])
+            if near:
+                apart = np.hypot(*(memory["point"][near] - found.geometry[c, 5:7]).T)
+                best = int(np.argmin(apart))
+                k = near[best] if apart[best] <= memory["length"][near[best]] + found.geometry[c, 4] else -1
+        out[c] = k
+    return out

@@ -1,0 +1,69 @@
+"""A run's series as one .vtu file a cycle and series under ``vtk/``, listed by one PVD a series."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+from ..fields import SERIES
+from .vtu import Collection, Grid, GridFiles
+
+#: Entries of a series: (time in the PVD, file below the run folder).
+Listed = dict[str, list[tuple[float, str]]]
+
+
+class VtuStore:
+    """Writes the grids of ``names`` below ``folder``; goes on from what is ``listed`` (empty: from the start).
+
+    The files of an earlier run are written over and what is left of them is deleted at the end; with ``resumed`` later
+    ones than those listed are deleted at once.
+    """
+
+    def __init__(self, folder: Path, names: Sequence[str], listed: Listed, *, resumed: bool = False) -> None:
+        self._vtk = folder / "vtk"
+        self._vtk.mkdir(parents=True, exist_ok=True)
+        for name in set(SERIES) - set(names):
+            (folder / f"{name}.pvd").unlink(missing_ok=True)
+        for name in SERIES:
+            (folder / f"{name}.vtkhdf").unlink(missing_ok=True)
+        self._collections = {name: Collection(folder / f"{name}.pvd", listed.get(name, ())) for name in names}
+        self._files = {name: GridFiles(name) for name in names}
+        self._old = self._unlisted()
+        if resumed:
+            for name in self._old:
+                (self._vtk / name).unlink()
+            self._old = set()
+
+    @staticmethod
+    def missing(folder: Path, listed: Listed) -> list[str]:
+        """Files that are listed and not there."""
+        return [file for entries in listed.values() for _, file in entries if not (folder / file).is_file()]
+
+    def _unlisted(self) -> set[str]:
+        """The files of series in ``vtk`` that no collection lists."""
+        listed = {file for entries in self.listed().values() for _, file in entries}
+        there = {path.name for name in SERIES for path in self._vtk.glob(f"{name}_[0-9]*.vtu")}
+        return {name for name in there if f"vtk/{name}" not in listed}
+
+    def listed(self) -> Listed:
+        """What has been written, by series."""
+        return {name: list(collection.entries) for name, collection in self._collections.items()}
+
+    def count(self, name: str) -> int:
+        """How many cycles of the series ``name`` have been written; 0 where it is not written at all."""
+        return len(self._collections[name].entries) if name in self._collections else 0
+
+    def put(self, name: str, cycle: int, at: float, grid: Grid, numbers: Mapping[str, float | int]) -> None:
+        """Write ``grid`` as the series ``name`` at ``cycle``, listed at the time ``at``, s, with ``numbers`` as field
+        data."""
+        file = f"{name}_{cycle:06d}.vtu"
+        self._files[name].write(f"{self._vtk}/{file}", grid, numbers)
+        self._old.discard(file)
+        self._collections[name].add(at, f"vtk/{file}")
+
+    def close(self) -> None:
+        """Give the files back; a longer run before this one must not leave its last files among ours."""
+        for collection in self._collections.values():
+            collection.close()
+        for name in self._old:
+            (self._vtk / name).unlink(missing_ok=True)

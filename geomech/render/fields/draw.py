@@ -1,0 +1,92 @@
+"""Pictures and a movie of one field, of one run or of several in the same colours."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from geomech.output.reading import Run
+
+from .even_movie import even_movie
+from .frame import Frames, drawn
+from .painter import FieldPainter, view
+from .quantity import limits, quantity
+
+#: A run is shown by its motion where blocks move by more than this part of the model.
+MOVES = 0.03
+
+
+@dataclass(frozen=True)
+class Wish:
+    """What a picture of a field is to be like; None: as suits the run.
+
+    ``cycle`` or ``time`` (s): the end; ``span``: (lowest, highest) in the field's SI unit; ``scale``: factor on
+    displacements; ``size``: pixels, (width, height or None); ``suffix``: format of the picture; ``movies``: formats of
+    the movies.
+    """
+
+    field: str = "displacement"
+    cycle: int | None = None
+    time: float | None = None
+    span: tuple[float, float] | None = None
+    scale: float | None = None
+    size: tuple[int, int | None] = (800, None)
+    compression_positive: bool = False
+    suffix: str = ".png"
+    movies: tuple[str, ...] = ()
+    frames_per_second: float = 10.0
+
+
+def usual_field(run: Run) -> str | None:
+    """The field that shows what a run is: displacement where its blocks move or nothing is solved inside; None where
+    stress inside cracked rock is the subject."""
+    if not run.series("interior"):
+        return "displacement"
+    frames = Frames(run)
+    last = frames.grid("blocks", frames.span()[1])
+    extent = float(np.ptp(drawn(last, 0.0), axis=0).max())
+    return "displacement" if np.abs(np.asarray(last["displacement"])).max() > MOVES * extent else None
+
+
+def draw_field(runs: Sequence[Run], wish: Wish, out: Path | None = None) -> list[Path]:
+    """Draw ``wish.field`` of ``runs``, in colours that mean the same in all of them, into ``out`` (default: ``pictures``
+    in each run folder); the paths. Raises UnknownField, NoEncoder, KeyError for a cycle or time before the first, and
+    ValueError for a run without blocks."""
+    for run in runs:
+        if not run.series("blocks"):
+            raise ValueError(f"{run.folder}: the run has written no blocks yet: let it go on, then draw it")
+    wanted = {run: quantity(run, wish.field, compression_positive=wish.compression_positive) for run in runs}
+    if wish.span is None and len(runs) > 1:
+        spans = [limits([run], wanted[run]) for run in runs]
+        wish = replace(wish, span=(min(low for low, _ in spans), max(high for _, high in spans)))
+    paths = []
+    for run in runs:
+        folder = run.folder / "pictures" if out is None else out if len(runs) == 1 else out / run.folder.name
+        folder.mkdir(parents=True, exist_ok=True)
+        fixed = view(run, wanted[run], scale=wish.scale, span=wish.span, size=wish.size)
+        painter = FieldPainter(run, wanted[run], fixed)
+        name = wish.field.replace("/", "_")
+        if wish.cycle is not None:
+            name += f"_{wish.cycle:06d}"
+        elif wish.time is not None:
+            name += f"_{wish.time:g}s"
+        painter.draw(_time(painter, wish))
+        paths.append(painter.save(folder / f"{name}{wish.suffix}"))
+        if wish.movies:
+            files = [folder / f"{wish.field}{suffix}" for suffix in wish.movies]
+            paths += even_movie(painter, files, frames_per_second=wish.frames_per_second)
+    return paths
+
+
+def _time(painter: FieldPainter, wish: Wish) -> float:
+    first, last = painter.frames.span()
+    if wish.cycle is not None:
+        return painter.frames.cycle_time(wish.cycle)
+    if wish.time is None:
+        return last
+    if not first <= wish.time <= last * (1 + 1e-9):
+        raise KeyError(f"{painter.run.folder} was written from t = {first:g} s to {last:g} s, not at {wish.time:g} s")
+    return wish.time

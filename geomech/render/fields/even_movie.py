@@ -1,0 +1,63 @@
+"""A movie of a field, even in time: every frame stands for as much of the run's time as any other."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from .painter import FieldPainter
+
+#: The last frame of a GIF stays for this long, ms.
+LAST = 2500
+
+
+class NoEncoder(RuntimeError):
+    """MP4 needs an encoder that is not installed; the message says which."""
+
+
+def even_movie(
+    painter: FieldPainter, paths: list[Path], *, frames: int = 48, frames_per_second: float = 10.0
+) -> list[Path]:
+    """Draw the whole run with ``painter`` into every one of ``paths``, .gif or .mp4. Raises NoEncoder for an MP4 where
+    imageio-ffmpeg is not installed."""
+    first, last = painter.frames.span()
+    if not last > first:
+        return []
+    images = []
+    for time in np.linspace(first, last, frames):
+        painter.draw(float(time))
+        images.append(painter.image())
+    for path in paths:
+        (_mp4 if path.suffix == ".mp4" else _gif)(path, images, frames_per_second)
+    return paths
+
+
+def _gif(path: Path, images: list[np.ndarray], frames_per_second: float) -> None:
+    from PIL import Image
+
+    # One palette for all frames, or they would flicker: that of the first, the middle and the last together.
+    shown = [images[0], images[len(images) // 2], images[-1]]
+    found = Image.fromarray(np.concatenate(shown)).quantize(256, dither=Image.Dither.NONE).getpalette()
+    colours = np.array(found).reshape(-1, 3)
+    colours[(colours >= 243).all(axis=1)] = 255  # paper stays white
+    palette = Image.new("P", (1, 1))
+    palette.putpalette(colours.ravel().tolist())
+    frames = [Image.fromarray(image).quantize(palette=palette, dither=Image.Dither.NONE) for image in images]
+    stay = [10 * round(100 / frames_per_second)] * (len(frames) - 1) + [LAST]
+    frames[0].save(path, save_all=True, append_images=frames[1:], duration=stay, loop=0, optimize=False)
+
+
+def _mp4(path: Path, images: list[np.ndarray], frames_per_second: float) -> None:
+    import imageio
+
+    try:
+        import imageio_ffmpeg  # noqa: F401
+    except ModuleNotFoundError:
+        raise NoEncoder("an MP4 needs imageio-ffmpeg, which is not installed: pip install 'geomech[movie]'") from None
+    tall, wide = (size - size % 2 for size in images[0].shape[:2])  # H.264 wants even sizes
+    with imageio.get_writer(path, fps=frames_per_second, codec="libx264", quality=8, macro_block_size=2) as writer:
+        for image in images:
+            writer.append_data(image[:tall, :wide])
+        for _ in range(round(frames_per_second)):
+            writer.append_data(images[-1][:tall, :wide])

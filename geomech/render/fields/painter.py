@@ -1,0 +1,371 @@
+"""One picture of any field of a run, drawn with Matplotlib: rock, field, cracks, marks, scale bar, legend beside."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from geomech.output.reading import Run
+from geomech.output.units import length_unit, stress_text
+
+from .frame import Frames, drawn
+from .marks import Marks
+from .quantity import Quantity, limits, readable
+
+if TYPE_CHECKING:
+    import pyvista as pv
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+ROCK, STANDS, INK, SOFT, CRACK = "#efe9dd", "#dcdcd8", "#33363b", "#5a5f66", "#111214"
+#: The page, inches: its width, and what surrounds the model on it.
+PAGE, LEFT, RIGHT, TOP, BOTTOM, ROW = 4.8, 0.52, 1.15, 0.52, 0.5, 0.15
+#: The model is at least and at most so tall, inches.
+SHORTEST, TALLEST = 1.3, 5.5
+#: The largest force is drawn this long, and principal stresses so, in parts of the model.
+_ARROW, _CROSS = 0.09, 0.03
+#: So many crosses of principal stress across the model.
+_CROSSES = 26
+
+
+@dataclass(frozen=True)
+class View:
+    """What stays the same from frame to frame: the span of the field in its own unit, (x0, x1, y0, y1) m as drawn, the
+    factor on displacements, the picture's width and, where it is given, height in pixels."""
+
+    limits: tuple[float, float]
+    bounds: tuple[float, float, float, float]
+    scale: float
+    width: int = 800
+    height: int | None = None
+
+
+def view(
+    run: Run,
+    what: Quantity,
+    *,
+    scale: float | None = None,
+    span: tuple[float, float] | None = None,
+    size: tuple[int, int | None] = (800, None),
+) -> View:
+    """The view that suits ``what`` over the whole of ``run``; ``scale``, ``span`` and ``size`` are as asked for, or
+    found: a scale at which displacements are seen and blocks do not lie inside others."""
+    from ..pictures.look import _magnification, final_cycle
+
+    frames, last = Frames(run), final_cycle(run)
+    start, end = frames.span()
+    first, final = frames.grid("blocks", start), frames.grid("blocks", frames.cycle_time(last))
+    if scale is None:
+        shown = [grid for grid in (final, frames.grid("interior", end)) if grid is not None and grid.n_cells]
+        extent = max(np.ptp(drawn(first, 0.0), axis=0))
+        scale = _magnification(shown, float(extent)) if int(final.field_data["REFERENCE"][0]) else 1.0
+    middle = frames.grid("blocks", 0.5 * (start + end))
+    points = np.concatenate([drawn(grid, scale) for grid in (first, middle, final)])
+    (x0, y0), (x1, y1) = points.min(axis=0), points.max(axis=0)
+    return View(limits([run], what) if span is None else span, (x0, x1, y0, y1), scale, *size)
+
+
+class FieldPainter:
+    """Draws ``what`` of a run at any time, in the ``view`` that its pictures share."""
+
+    def __init__(self, run: Run, what: Quantity, fixed: View) -> None:
+        self.run, self.what, self.view = run, what, fixed
+        self.frames = Frames(run)
+        x0, x1, y0, y1 = fixed.bounds
+        self.size = max(x1 - x0, y1 - y0)
+        self.marks = Marks(self.frames, fixed.scale, self.size)
+        unit, self.unit_size = readable(what.unit, max(abs(end) for end in fixed.limits))
+        self.unit = unit
+        self.figure: Figure | None = None
+
+    # -- frames --------------------------------------------------------------------------------------------------
+
+    def draw(self, time: float) -> None:
+        """Draw the run at ``time`` s of its series, between two written cycles too."""
+        self.figure, axes, bar, strip = self._page()
+        blocks, interior = self.frames.grid("blocks", time), self.frames.grid("interior", time)
+        interior = interior if interior is not None and interior.n_cells else None
+        shown = self._rock(axes, blocks, interior)
+        shown = self._field(axes, blocks, interior, time) or shown
+        self._lines(axes, blocks, interior, time)
+        keys = self.marks.draw(axes, time)
+        self._bar(bar, shown)
+        self._words(axes, strip, keys, time)
+
+    def image(self) -> np.ndarray:
+        """(height, width, 3) of 8 bits."""
+        self.figure.canvas.draw()
+        return np.asarray(self.figure.canvas.buffer_rgba())[..., :3].copy()
+
+    def save(self, path: Path) -> Path:
+        """Write what was drawn last; the ending says the format: .png, .pdf or .svg."""
+        self.figure.savefig(path, dpi=self.figure.dpi, facecolor="white")
+        return path
+
+    # -- page ----------------------------------------------------------------------------------------------------
+
+    def _page(self) -> tuple[Figure, Axes, Axes, Axes]:
+        from matplotlib.backends.backend_agg import FigureCanvasAgg
+        from matplotlib.figure import Figure
+
+        x0, x1, y0, y1 = self.view.bounds
+        pad = 0.07 * self.size
+        low, high = np.array([x0 - pad, y0 - pad]), np.array([x1 + pad, y1 + pad])
+        wide, tall = high - low
+        across = PAGE - LEFT - RIGHT
+        strip = 2 * ROW + 0.05
+        up = float(np.clip(across * tall / wide, SHORTEST, TALLEST))
+        if self.view.height is not None:
+            up = max(0.5, PAGE * self.view.height / self.view.width - TOP - BOTTOM - strip)
+        page = up + TOP + BOTTOM + strip
+        page = round(page * self.view.width / PAGE) * PAGE / self.view.width  # whole pixels
+        figure = Figure(figsize=(PAGE, page), dpi=self.view.width / PAGE, facecolor="white")
+        FigureCanvasAgg(figure)
+        axes = figure.add_axes((LEFT / PAGE, (BOTTOM + strip) / page, across / PAGE, up / page))
+        bar = figure.add_axes(((PAGE - RIGHT + 0.14) / PAGE, (BOTTOM + strip) / page, 0.13 / PAGE, up / page))
+        legend = figure.add_axes((0, 0, 1, strip / page))
+        legend.set_axis_off()
+        # Equal scales in both directions: the shorter one shows more than the model.
+        metres = max(wide / across, tall / up)
+        for name, k, inches in (("xlim", 0, across), ("ylim", 1, up)):
+            middle = 0.5 * (low[k] + high[k])
+            axes.set(**{name: (middle - 0.5 * metres * inches, middle + 0.5 * metres * inches)})
+        axes.tick_params(labelsize=7, colors=SOFT, length=2.5, width=0.6)
+        for side, spine in axes.spines.items():
+            spine.set_visible(side in ("left", "bottom"))
+            spine.set_color("#b9bcc2")
+            spine.set_linewidth(0.6)
+        return figure, axes, bar, legend
+
+    def _bar(self, axes: Axes, shown: Any) -> None:
+        if shown is None:
+            axes.set_axis_off()
+            return
+        extend = "both" if self.what.stress else "max" if self.what.clipped else "neither"
+        bar = self.figure.colorbar(shown, cax=axes, extend=extend, extendfrac=0.03)
+        bar.ax.tick_params(labelsize=7, colors=SOFT, length=2.5, width=0.6)
+        bar.outline.set_linewidth(0.4)
+        name = f"{self.what.title}, {self.unit}" if self.unit else self.what.title
+        # Long names turn into two lines beside the bar.
+        bar.set_label(_folded(name, 34), fontsize=7.5, color=INK)
+
+    def _words(self, axes: Axes, strip: Axes, keys: list[Any], time: float) -> None:
+        figure = self.figure
+        height = figure.get_size_inches()[1]
+        title = self.run.title
+        figure.text(0.1 / PAGE, 1 - 0.2 / height, title, fontsize=min(9.5, 9.5 * 62 / max(len(title), 1)), color=INK,
+                    weight="bold", va="center")  # fmt: skip
+        figure.text(0.1 / PAGE, 1 - 0.38 / height, self._told(time), fontsize=7.5, color=SOFT, va="center")
+        x0, x1 = axes.get_xlim()
+        length = _round_length(0.22 * (x1 - x0))
+        # The scale bar stands under the axis, where nothing is drawn.
+        at = axes.get_xaxis_transform()
+        y = -0.36 / (axes.get_position().height * height)
+        axes.plot([x1 - length, x1], [y, y], color=INK, lw=2.0, transform=at, clip_on=False, solid_capstyle="butt")
+        axes.text(x1 - length - 0.01 * (x1 - x0), y, _length(length), transform=at, ha="right", va="center", fontsize=7,
+                  color=INK)  # fmt: skip
+        unit, size = length_unit(max(map(abs, self.view.bounds)))
+        for axis, name in ((axes.xaxis, "x"), (axes.yaxis, "y")):
+            axis.set_major_formatter(lambda value, _: f"{value / size:.6g}".replace("-", "\N{MINUS SIGN}"))
+            axis.set_label_text(f"{name}, {unit}", fontsize=7, color=SOFT)
+            axis.labelpad = 1
+        axes.xaxis.set_label_coords(0.05, 0.6 * y)
+        if keys:
+            strip.legend(handles=keys, loc="center", ncols=min(len(keys), 3), frameon=False, fontsize=7, labelcolor=INK,
+                         handlelength=1.8, columnspacing=1.4, borderpad=0, labelspacing=0.3)  # fmt: skip
+
+    def _told(self, time: float) -> str:
+        times = [at for at, _ in self.run.series("blocks")]
+        cycles = list(self.run.grids("blocks"))
+        k = max(0, int(np.searchsorted(times, time * (1 + 1e-12), side="right")) - 1)
+        row = self.run.at(cycles[k])
+        said = [f"t = {time:.5g} s"]
+        if self.run.led and np.isfinite(row["load"]):
+            said.append(f"load {stress_text(row['load'])}" + (" in tension" if row["load"] < 0 else ""))
+        if abs(times[k] - time) <= 1e-9 * max(1.0, abs(time)):
+            said.append(f"cycle {cycles[k]}")
+        if self.view.scale not in (0.0, 1.0):
+            said.append(f"displacements × {self.view.scale:g}")
+        return "    ".join(said)
+
+    # -- what is drawn -------------------------------------------------------------------------------------------
+
+    def _style(self) -> dict[str, Any]:
+        from matplotlib import colormaps
+        from matplotlib.colors import Normalize, TwoSlopeNorm
+
+        low, high = (end / self.unit_size for end in self.view.limits)
+        if low < 0 < high and min(-low, high) > 0.1 * max(-low, high):
+            return {"cmap": colormaps["RdBu_r"], "norm": TwoSlopeNorm(0.0, -max(-low, high), max(-low, high))}
+        # Monotone in lightness, so that it can be read in grey and by all kinds of eyes.
+        return {"cmap": colormaps["cividis" if high > abs(low) else "cividis_r"], "norm": Normalize(low, high)}
+
+    def _rock(self, axes: Axes, blocks: pv.UnstructuredGrid, interior: pv.UnstructuredGrid | None) -> None:
+        from matplotlib.collections import PolyCollection
+
+        here = _there(blocks, interior)
+        corners = drawn(blocks, self.view.scale)[blocks.cells.reshape(-1, 4)[:, 1:]][here]
+        colours = np.where(np.asarray(blocks["fixed"])[here] == 1, STANDS, ROCK)
+        axes.add_collection(PolyCollection(corners, facecolors=colours, edgecolors=colours, linewidths=0.3, zorder=1))
+        if interior is not None:
+            corners = drawn(interior, self.view.scale)[interior.cells.reshape(-1, 4)[:, 1:]]
+            axes.add_collection(PolyCollection(corners, facecolors=ROCK, edgecolors=ROCK, linewidths=0.3, zorder=1))
+
+    def _field(self, axes: Axes, blocks: pv.UnstructuredGrid, interior: pv.UnstructuredGrid | None, time: float) -> Any:
+        shown = None
+        for name in reversed(self.what.series):
+            grid = blocks if name == "blocks" else interior if name == "interior" else self.frames.grid(name, time)
+            if grid is None or not grid.n_cells:
+                continue
+            values, at_points = self.what.values(name, grid)
+            values = values / self.unit_size
+            if name in ("blocks", "interior"):
+                use = _there(blocks, interior) if name == "blocks" else np.ones(grid.n_cells, bool)
+                if name == "blocks" and self.what.stress and interior is not None:
+                    continue  # platens have a stress each that takes attention off the specimen's
+                if name == "blocks" and (use & (np.asarray(grid["fixed"]) == 0)).any():
+                    use = use & (np.asarray(grid["fixed"]) == 0)
+                shown = self._area(axes, grid, values, at_points, use) or shown
+                if self.what.name == "principal":
+                    self._crosses(axes, grid, use)
+            elif self.what.name == "force":
+                shown = self._arrows(axes, grid, values)
+            elif grid.celltypes[0] == _LINE:
+                shown = self._coloured_lines(axes, grid, values, at_points)
+            else:
+                shown = self._points(axes, grid, values, name)
+        return shown
+
+    def _area(self, axes: Axes, grid: pv.UnstructuredGrid, values: np.ndarray, at_points: bool, use: np.ndarray) -> Any:
+        from matplotlib.collections import PolyCollection
+
+        if not use.any():
+            return None
+        points, triangles = drawn(grid, self.view.scale), grid.cells.reshape(-1, 4)[:, 1:][use]
+        if at_points:
+            return axes.tripcolor(*points.T, triangles, values, shading="gouraud", zorder=2, rasterized=True,
+                                  **self._style())  # fmt: skip
+        area = PolyCollection(points[triangles], array=values[use], edgecolors="face", linewidths=0.2, zorder=2,
+                              **self._style())  # fmt: skip
+        return axes.add_collection(area)
+
+    def _crosses(self, axes: Axes, grid: pv.UnstructuredGrid, use: np.ndarray) -> None:
+        """Short lines along the principal stresses in the plane, as long as they are large; tension in red."""
+        from matplotlib.collections import LineCollection
+
+        triangles = grid.cells.reshape(-1, 4)[:, 1:]
+        middle = drawn(grid, self.view.scale)[triangles].mean(axis=1)
+        data = grid.cell_data if "stress" in grid.cell_data else None
+        stress = np.asarray(
+            grid.cell_data["stress"] if data is not None else np.asarray(grid["stress"])[triangles].mean(axis=1)
+        )
+        low = middle.min(axis=0)
+        place = np.floor((middle - low) / (self.size / _CROSSES)).astype(int)
+        rows = np.flatnonzero(use)
+        _, first = np.unique(place[rows], axis=0, return_index=True)
+        rows = rows[first]
+        xx, yy, xy = stress[rows][:, 0], stress[rows][:, 1], stress[rows][:, 3]
+        turn = 0.5 * np.arctan2(2 * xy, xx - yy)
+        mean, half = 0.5 * (xx + yy), np.hypot(0.5 * (xx - yy), xy)
+        largest = np.percentile(np.abs(np.concatenate([mean + half, mean - half])), 95) or 1.0
+        for value, angle in ((mean + half, turn), (mean - half, turn + 0.5 * np.pi)):
+            arm = 0.5 * _CROSS * self.size * np.clip(np.abs(value) / largest, 0, 1.3)[:, None]
+            arm = arm * np.stack([np.cos(angle), np.sin(angle)], axis=1)
+            lines = np.stack([middle[rows] - arm, middle[rows] + arm], axis=1)
+            colours = np.where(value > 0, "#c1121f", "#15161a")
+            axes.add_collection(LineCollection(lines, colors=colours, linewidths=0.8, zorder=4))
+
+    def _arrows(self, axes: Axes, grid: pv.UnstructuredGrid, values: np.ndarray) -> Any:
+        """Forces at contacts as lines through them, their width and colour by their size."""
+        from matplotlib.collections import LineCollection
+
+        force = np.asarray(grid["force"], float)[:, :2]
+        acts = values > 1e-3 * (self.view.limits[1] / self.unit_size)
+        middle = drawn(grid, self.view.scale)[acts]
+        share = values[acts] * self.unit_size / (self.view.limits[1] or 1.0)
+        arm = (
+            0.5
+            * _ARROW
+            * self.size
+            * (share / np.maximum(values[acts] * self.unit_size, 1e-300))[:, None]
+            * force[acts]
+        )
+        order = np.argsort(share)
+        lines = LineCollection(np.stack([middle - arm, middle + arm], axis=1)[order], array=values[acts][order],
+                               linewidths=0.7 + 1.6 * share[order], zorder=4, capstyle="round", **self._style())  # fmt: skip
+        return axes.add_collection(lines)
+
+    def _coloured_lines(self, axes: Axes, grid: pv.UnstructuredGrid, values: np.ndarray, at_points: bool) -> Any:
+        from matplotlib.collections import LineCollection
+
+        ends = grid.cells.reshape(-1, 3)[:, 1:]
+        lines = drawn(grid, self.view.scale)[ends]
+        axes.add_collection(LineCollection(lines, colors="white", linewidths=4.2, zorder=5.8, capstyle="round"))
+        values = values[ends].mean(axis=1) if at_points else values
+        drawn_lines = LineCollection(lines, array=values, linewidths=2.6, zorder=6.2, capstyle="round", **self._style())
+        return axes.add_collection(drawn_lines)
+
+    def _points(self, axes: Axes, grid: pv.UnstructuredGrid, values: np.ndarray, name: str) -> Any:
+        """Contacts and tips as dots; what is zero is left out, so that the rest is seen."""
+        keep = np.isfinite(values) & (
+            np.abs(values) > (1e-3 * self.view.limits[1] / self.unit_size if name == "contacts" else -1)
+        )
+        order = np.flatnonzero(keep)[np.argsort(np.abs(values[keep]))]
+        size = 34 if name == "tips" else float(np.clip(2e4 / max(len(values), 1), 3, 22))
+        return axes.scatter(*drawn(grid, self.view.scale)[order].T, c=values[order], s=size, zorder=6.5,
+                            edgecolors=INK if name == "tips" else "none", linewidths=0.6, **self._style())  # fmt: skip
+
+    def _lines(
+        self, axes: Axes, blocks: pv.UnstructuredGrid, interior: pv.UnstructuredGrid | None, time: float
+    ) -> None:
+        """Outlines of the blocks, thinner where there are many, and cracks."""
+        from matplotlib.collections import LineCollection
+
+        many = int(np.asarray(blocks["block_id"]).max()) + 1
+        thin = float(np.clip(1.0 / (max(many, 10) / 10) ** 0.3, 0.2, 1.0))
+        here = _there(blocks, interior)
+        for grid, use in ((blocks, here), (interior, None)):
+            if grid is not None:
+                lines = drawn(grid, self.view.scale)[_edges(grid, use)]
+                axes.add_collection(LineCollection(lines, colors=INK, linewidths=thin, zorder=5, capstyle="round"))
+        cracks = self.frames.grid("cracks", time)
+        if cracks is not None and cracks.n_cells and interior is None:
+            lines = drawn(cracks, self.view.scale)[cracks.cells.reshape(-1, 3)[:, 1:]]
+            axes.add_collection(LineCollection(lines, colors=CRACK, linewidths=1.8 * max(thin, 0.5), zorder=6))
+
+
+_LINE = 3
+
+
+def _there(blocks: pv.UnstructuredGrid, interior: pv.UnstructuredGrid | None) -> np.ndarray:
+    """(n_cells,) True for triangles of blocks that are there, and not drawn from inside."""
+    there = np.asarray(blocks["removed"]) == 0
+    return there if interior is None else there & ~np.isin(blocks["block_id"], np.unique(interior["block_id"]))
+
+
+def _edges(grid: pv.UnstructuredGrid, use: np.ndarray | None) -> np.ndarray:
+    """(n, 2) point indices of the edges of one triangle only."""
+    triangles = grid.cells.reshape(-1, 4)[:, 1:]
+    triangles = triangles if use is None else triangles[use]
+    edges = np.sort(triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
+    found, count = np.unique(edges, axis=0, return_counts=True)
+    return found[count == 1]
+
+
+def _folded(text: str, most: int) -> str:
+    if len(text) <= most or "," not in text:
+        return text
+    head, _, tail = text.partition(", ")
+    return f"{head},\n{tail}"
+
+
+def _round_length(about: float) -> float:
+    power = 10.0 ** np.floor(np.log10(about))
+    return float(power * max(digit for digit in (1, 2, 5) if digit * power <= about * (1 + 1e-9)))
+
+
+def _length(metres: float) -> str:
+    return f"{metres:g} m" if metres >= 1 else f"{1e2 * metres:g} cm" if metres >= 0.05 else f"{1e3 * metres:g} mm"

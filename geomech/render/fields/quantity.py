@@ -1,0 +1,174 @@
+"""What a picture shows: a field by its name, its unit, and its values on the grids of a run."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from geomech.output.fields import SERIES
+from geomech.output.reading import Run
+
+if TYPE_CHECKING:
+    import pyvista as pv
+
+#: Stress components by name → (array, column, label).
+STRESSES = {
+    "xx": ("stress", 0, "σxx"),
+    "yy": ("stress", 1, "σyy"),
+    "zz": ("stress", 2, "σzz"),
+    "xy": ("stress", 3, "σxy"),
+    "principal_max": ("principal_stress", 0, "σ₁"),
+    "principal_min": ("principal_stress", 2, "σ₃"),
+    "von_mises": ("von_mises", None, "von Mises stress"),
+}
+#: Fields with a name of their own → (series that hold it, array, column, label). Vectors show their magnitude.
+NAMED = {
+    "displacement": (("interior", "blocks"), "displacement", None, "displacement"),
+    "velocity": (("blocks",), "velocity", None, "velocity"),
+    "slip": (("contacts", "cracks"), "slip", None, "slip"),
+    "opening": (("contacts", "cracks"), "opening", None, "opening"),
+    "force": (("contacts",), "force", None, "contact force"),
+    "K": (("tips",), "K_eq", None, "K_eq"),
+    "principal": (("interior", "blocks"), "principal_stress", 2, "σ₃ and directions"),
+}
+#: Where a few values are far above all others, colours leave out this much of them at either end, per cent.
+CLIPPED = 0.7
+_PREFIXES = ((1e9, "G"), (1e6, "M"), (1e3, "k"), (1.0, ""), (1e-3, "m"), (1e-6, "µ"), (1e-9, "n"))
+
+
+class UnknownField(KeyError):
+    """A field that the run has not written; the message names those that it has."""
+
+    def __str__(self) -> str:
+        return str(self.args[0])
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """A field that can be drawn. ``series`` that hold the ``array``; ``column`` of it, None for its magnitude;
+    ``turned`` −1 where compression is shown positive."""
+
+    name: str
+    series: tuple[str, ...]
+    array: str
+    column: int | None
+    label: str
+    unit: str
+    turned: int = 1
+
+    @property
+    def stress(self) -> bool:
+        """Whether it is a stress, which has a sign convention and singular points."""
+        return self.unit == "Pa" and "traction" not in self.array
+
+    @property
+    def clipped(self) -> bool:
+        """Whether a few values may be far above all others: stress at crack tips, slip and gaps at single corners."""
+        return self.stress or (self.series[:1] == ("contacts",) and self.name != "force")
+
+    @property
+    def title(self) -> str:
+        """What the legend says besides the unit."""
+        if not self.stress or self.array == "von_mises":
+            return self.label
+        return self.label + (", compression positive" if self.turned < 0 else ", tension positive")
+
+    def values(self, name: str, grid: pv.UnstructuredGrid) -> tuple[np.ndarray, bool]:
+        """(values, whether one a point and not one a cell) on a ``grid`` of the series ``name``."""
+        if self.array == "opening" and name == "contacts":
+            return np.maximum(np.asarray(grid.point_data["gap"], float), 0.0), True
+        if self.array == "von_mises" and self.array not in grid.point_data:
+            s1, s2, s3 = np.asarray(grid.cell_data["principal_stress"], float).T
+            return np.sqrt(0.5 * ((s1 - s2) ** 2 + (s2 - s3) ** 2 + (s3 - s1) ** 2)), False
+        at_points = self.array in grid.point_data
+        values = np.asarray((grid.point_data if at_points else grid.cell_data)[self.array], float)
+        if self.array == "slip":
+            values = np.abs(values)
+        if values.ndim > 1:
+            values = np.hypot(*values[:, :2].T) if self.column is None else values[:, self.column]
+        return (self.turned * values if self.stress and self.array != "von_mises" else values), at_points
+
+
+def quantity(run: Run, name: str, *, compression_positive: bool = False) -> Quantity:
+    """The field ``name`` of ``run``: one of `NAMED` or `STRESSES`, or any array that was written, as "velocity",
+    "velocity.X" or "contacts.gap". Raises UnknownField that says which there are."""
+    written = [series for series in SERIES if run.series(series)]
+    turned = -1 if compression_positive else 1
+    if name in STRESSES:
+        array, column, label = STRESSES[name]
+        series = tuple(each for each in ("interior", "blocks") if each in written)
+        return Quantity(name, series, array, column, label, "Pa", turned)
+    if name in NAMED:
+        wanted, array, column, label = NAMED[name]
+        series = tuple(each for each in wanted if each in written)
+        if not series or (name == "K" and not len(run.tips)):
+            raise _unknown(run, name, written)
+        units = {"displacement": "m", "slip": "m", "opening": "m", "velocity": "m/s", "force": "N/m"}
+        unit = units.get(name, "Pa √m" if name == "K" else "Pa")
+        return Quantity(name, series, array, column, label, unit, turned)
+    series_name, _, rest = name.rpartition(".") if name.count(".") == 2 else ("", "", name)
+    parts = rest.split(".")
+    if not series_name and parts[0] in SERIES:
+        series_name, parts = parts[0], parts[1:]
+    for each in [series_name] if series_name else written:
+        if each not in written:
+            break
+        for field in SERIES[each]:
+            if parts and field.name == parts[0]:
+                column = field.components.index(parts[1]) if len(parts) > 1 and parts[1] in field.components else None
+                if len(parts) > 1 and column is None:
+                    raise UnknownField(f"{field.name} has the components {', '.join(field.components) or 'none'}")
+                if len(field.components) > 3 and column is None:
+                    raise UnknownField(f"{field.name} is a tensor: say which, as {field.name}.{field.components[0]}")
+                label = ".".join(parts).replace("_", " ")
+                return Quantity(name, (each,), field.name, column, label, field.unit, turned)
+    raise _unknown(run, name, written)
+
+
+def _unknown(run: Run, name: str, written: list[str]) -> UnknownField:
+    known = [*NAMED, *STRESSES]
+    arrays = [f"{series}.{field.name}" for series in written for field in SERIES[series]]
+    return UnknownField(f"{run.folder} has no field {name!r}; there are {', '.join(known)}; and {', '.join(arrays)}")
+
+
+def limits(runs: Iterable[Run], what: Quantity, cycles: int = 6) -> tuple[float, float]:
+    """The span of ``what`` over all ``runs``, in its own unit, from up to so many of their cycles; stresses, and what
+    contacts have but forces, without the outermost 0.7 % at either end. From zero for what has no sign."""
+    low, high = np.inf, -np.inf
+    for run in runs:
+        for name in what.series:
+            written = list(run.grids(name))
+            rows = np.unique(np.linspace(0, len(written) - 1, min(cycles, len(written))).round().astype(int))
+            for cycle in (written[k] for k in rows):
+                grid = run.grid(name, cycle)
+                if not grid.n_points or (what.stress and name == "blocks" and "interior" in what.series):
+                    continue  # the platens of a specimen
+                values = what.values(name, grid)[0]
+                values = values[np.isfinite(values)]
+                if len(values):
+                    ends = (
+                        np.percentile(values, [CLIPPED, 100 - CLIPPED])
+                        if what.clipped
+                        else (values.min(), values.max())
+                    )
+                    low, high = min(low, float(ends[0])), max(high, float(ends[1]))
+    if not np.isfinite(low):
+        return 0.0, 1.0
+    if low >= 0 and not what.stress:
+        low = 0.0
+    if high - low <= 1e-9 * max(abs(low), abs(high)):
+        half = max(0.05 * abs(high), 1e-30)
+        return (low - half, high + half) if low or high else (0.0, 1.0)
+    return low, high
+
+
+def readable(unit: str, largest: float) -> tuple[str, float]:
+    """(unit with a prefix, its size) in which the ``largest`` value is a number between 1 and 1000."""
+    if unit in ("-", "deg", "m²") or not np.isfinite(largest) or largest == 0:
+        return ("" if unit == "-" else unit), 1.0
+    known = [pair for pair in _PREFIXES if not (unit.startswith("m") and pair[0] > 1)]
+    size, letter = next((pair for pair in known if abs(largest) >= pair[0]), known[-1])
+    return letter + unit, size

@@ -1,0 +1,76 @@
+"""What blocks of higher order ([zones.NAME] order) cannot be part of yet, refused by name."""
+
+from __future__ import annotations
+
+from .check import Check
+
+#: Of [loads]: what moves, holds or strains blocks in ways that deflection does not know.
+_LOADS = {
+    "bolts": "bolts", "motions": "prescribed motion", "point_motions": "prescribed motion of points",
+    "viscous_boundaries": "viscous boundaries", "excavations": "excavations",
+    "in_situ": "in-situ stress",
+}  # fmt: skip
+
+
+def check_orders(c: Check) -> None:
+    """Refuse what blocks of order 2 and more do not support."""
+    t = c.tables
+    zones = {name: zone for name, zone in (t.zones or {}).items() if zone.order > 1}
+    for name, zone in zones.items():
+        path = ("zones", name, "order")
+
+        def refuse(why: str, way_out: str, path=path, zone=zone) -> None:
+            c.refuse(path, f"order = {zone.order}: {why}", way_out)
+
+        if zone.fixed or zone.guided is not None or zone.body != "block":
+            refuse("rock that is fixed, guided or without an end does not bend", "leave `order` out")
+        material = (t.materials or {}).get(zone.material or next(iter(t.materials or {}), ""))
+        if material is not None and material.rigid:
+            refuse("a rigid material does not bend", "leave `order` out, or `rigid`")
+        _check_cracks(c, refuse)
+        _check_joints(c, refuse)
+        _check_solver(c, refuse)
+        for key, what in _LOADS.items():
+            if t.loads is not None and getattr(t.loads, key):
+                refuse(f"{what} ([loads] {key}) beside blocks of higher order are not supported yet", "leave out one")
+        if t.loads is not None and t.loads.base is not None and t.loads.base.frame == "ground":
+            refuse('a base that shakes in the frame "ground" is not supported yet', 'say frame = "base"')
+
+
+def _check_cracks(c: Check, refuse) -> None:
+    t = c.tables
+    if c.drawing is not None and c.drawing.cracks is not None and c.drawing.cracks.n_segments:
+        refuse("blocks of higher order cannot be cut by cracks yet", "leave `order` out, or the cracks")
+    if t.growth is not None and t.growth.initiation:
+        refuse(
+            "cracks cannot begin in blocks of higher order yet", "say growth.initiation = false, or leave `order` out"
+        )
+
+
+def _check_joints(c: Check, refuse) -> None:
+    for name, joint in (c.tables.joints or {}).items():
+        curved = joint.jrc is not None or joint.max_closure_m is not None or joint.dilation_angle_deg > 0
+        softens = joint.residual_friction_angle_deg is not None or joint.residual_cohesion_pa or joint.softening_slip_m
+        if curved or softens:
+            refuse(
+                f"faces of higher order take straight Coulomb laws yet, and [joints.{name}] softens, dilates or closes "
+                "along a curve",
+                "leave these keys out",
+            )
+        if joint.restitution is not None:
+            refuse(f"[joints.{name}] restitution is not supported yet", "leave it out")
+
+
+def _check_solver(c: Check, refuse) -> None:
+    dda = c.tables.dda
+    if dda is None:
+        return
+    beta, gamma = dda.newmark
+    if dda.dynamic_factor > 0 and (dda.spectral_radius is not None or abs(gamma - 2 * beta) > 1e-12):
+        refuse("it moves by Newmark's scheme with gamma = 2 beta only", "say newmark = [0.5, 1.0] or [0.25, 0.5]")
+    if dda.contact != "penalty" or dda.springs != "stiff":
+        refuse(
+            'its faces take stiff penalty springs or the stiffness of their joint, dda.contact = "penalty" and '
+            'dda.springs = "stiff"',
+            "leave these keys out",
+        )

@@ -1,0 +1,111 @@
+"""The upper bound by admissible contact forces, beside the factor that the deformation of the blocks brings about."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from geomech import dda
+from geomech.bench.safety.factor_scenes import random_slope
+from geomech.bench.slopes.drawn_slopes import problem_of
+from geomech.dda.statics.admissible_forces import AdmissibleForces
+from geomech.model import Blocks, History, JointLaw, Loads, Material, State
+
+GRAVITY = 9.81
+WEIGHT = Loads(gravity=History.constant([0.0, -GRAVITY]))
+ROCK = Material("rock", 20e9, 0.25, density=2600.0)
+DIP = math.radians(30)
+
+
+def rectangle(x0: float, y0: float, x1: float, y1: float, turn: float) -> np.ndarray:
+    points = np.array([[x0, y0], [x1, y0], [x1, y1], [x0, y1]], float)
+    return points @ np.array([[math.cos(turn), math.sin(turn)], [-math.sin(turn), math.cos(turn)]])
+
+
+def plane(cohesion: float = 0.0, **law) -> tuple[dda.BlockSystem, State, list[JointLaw]]:
+    """A block of 2 × 1 m at rest on a plane at 30° with φ = 40°."""
+    blocks = Blocks.from_polygons([rectangle(-6, -3, 8, 0, DIP), rectangle(0, 0, 2, 1, DIP)], fixed=[True, False])
+    joints = [JointLaw("plane", math.radians(40), cohesion, **law)]
+    system = dda.BlockSystem(blocks, [ROCK], joints)
+    return system, dda.equilibrium(system, State.at_rest(blocks), WEIGHT).state, joints
+
+
+@pytest.mark.parametrize("cohesion", [0.0, 5e3])
+def test_the_bound_of_a_block_on_a_plane_is_limit_equilibrium(cohesion):
+    system, state, joints = plane(cohesion)
+    rest = State.at_rest(system.blocks)
+    forces = AdmissibleForces.of(system, state, rest, joints, ["plane"])
+    weight = 2600.0 * GRAVITY * 2.0
+    expected = (cohesion * 2.0 + weight * math.cos(DIP) * math.tan(math.radians(40))) / (weight * math.sin(DIP))
+    assert forces.balance(0.999 * expected) and not forces.balance(1.001 * expected)
+    assert forces.largest_factor(0.9 * expected, 1e-2) == pytest.approx(expected, rel=1e-3)
+    assert forces.largest_factor(expected, 1e-2) is None
+    # What is not reduced holds at any factor.
+    kept = AdmissibleForces.of(system, state, rest, joints, [])
+    assert math.isinf(kept.largest_factor(1.0, 1e-2))
+
+
+def test_no_bound_is_given_where_strength_is_no_cone():
+    system, state, _ = plane()
+    for law in (
+        JointLaw("plane", 0.7, 1e4, 1e4),
+        JointLaw("plane", 0.7, residual_friction_angle=0.5),
+        JointLaw("plane", 0.7, 1e4, residual_cohesion=5e3),
+    ):
+        assert AdmissibleForces.of(system, state, State.at_rest(system.blocks), [law], ["plane"]) is None
+
+
+def test_a_toppling_row_whose_factor_depends_on_how_it_is_wedged_is_reported():
+    """Seven columns, the second one twice as high as the first: friction admits forces up to 1.5228 (the programme of
+    `slope_limits`, set up without the engine), the deformation of the columns brings about what fails at 1.409."""
+    slope = random_slope(69)
+    problem = problem_of(slope.scene)
+    found = dda.factor_of_safety(
+        problem.blocks, problem.materials, problem.joints, problem.loads, problem.dda, joint_index=problem.joint_index
+    )
+    assert found.factor < 0.95 * slope.bound
+    assert found.admissible == pytest.approx(slope.bound, rel=2e-3)
+    assert f"up to a factor of {found.admissible:.4f}, which is an upper bound" in found.warnings[-1]
+    assert found.as_dict(problem.blocks)["largest_factor_with_admissible_forces"] == found.admissible
+
+
+def test_a_row_that_reaches_its_bound_needs_no_warning():
+    slope = random_slope(19)
+    problem = problem_of(slope.scene)
+    found = dda.factor_of_safety(
+        problem.blocks, problem.materials, problem.joints, problem.loads, problem.dda, joint_index=problem.joint_index
+    )
+    assert found.factor == pytest.approx(slope.bound, rel=1e-3) and found.admissible is None and not found.warnings
+
+
+@pytest.mark.parametrize("bend_deg", [0.0, 0.5, 1.25, 2.5, 6.0])
+def test_a_bent_plane_counts_its_length_once(bend_deg):
+    """A polyline whose chords lean to one another by a little: tributary lengths add up to its length."""
+    at = [(0.0, 0.0)]
+    for k in range(8):
+        angle = math.radians(20 + k * bend_deg)
+        at.append((at[-1][0] + math.cos(angle), at[-1][1] + math.sin(angle)))
+    (x, y), top = at[-1], at[-1][1] + 2.0
+    base = [(-5, -8), (x + 9, -8), (x + 9, y), *at[::-1], (-5, 0)]
+    for way in (1.0, -1.0):
+        polygons = [np.array(p) * [way, 1.0] for p in (base, [*at, (x, top), (1.0, top)])]
+        blocks = Blocks.from_polygons([p[:: int(way)] for p in polygons], fixed=[True, False])
+        near = dda.BlockSystem(blocks, [ROCK], [JointLaw("plane", 0.5, 1e4)]).contacts_near(State.at_rest(blocks))
+        assert near.geometry[:, 4].sum() == pytest.approx(8.0, rel=2e-3)
+
+
+@pytest.mark.parametrize("rim", [0.02, 0.2, 1.0])
+def test_a_rim_that_holds_a_toe_is_named_with_the_factor_without_it(rim):
+    foot = (20.0, 20.0 * math.tan(math.radians(35)))
+    base = [(-30, -15), (80, -15), (80, foot[1]), foot, (0, 0), (0, rim), (-30, rim)]
+    block = [(0, 0), foot, (9, 22), (0, rim)]
+    blocks = Blocks.from_polygons([np.array(base, float), np.array(block, float)], fixed=[True, False])
+    found = dda.factor_of_safety(blocks, [ROCK], [JointLaw("plane", math.radians(33))], WEIGHT)
+    expected = math.tan(math.radians(33)) / math.tan(math.radians(35))
+    print(rim, found.factor, found.warnings)
+    assert found.factor > 1.5 * expected and found.toes_hold
+    assert found.other_factor == pytest.approx(expected, rel=1e-3)
+    assert "toe of 'block 1' touches 'block 0' at x = 0" in found.warnings[0]
+    assert f"without it the factor is {found.other_factor:.4f}" in found.warnings[0]

@@ -1,0 +1,82 @@
+"""Static steps by themselves: what their pseudo-inertia takes, dilation to and fro, soft bolts."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from geomech import dda
+from geomech.model import (
+    GROUND,
+    BlockMotion,
+    Blocks,
+    Bolt,
+    DdaSettings,
+    EdgeTraction,
+    History,
+    JointLaw,
+    Loads,
+    Material,
+    State,
+)
+
+DILATION = math.radians(10)
+JOINT = JointLaw("joint", math.radians(35), dilation_angle=DILATION)
+
+
+def sheared(motion: History, dt: float, end: float, density: float = 2600.0, equilibrium: str = ""):
+    """States and step results of a block of 1 × 0.5 m, pressed by 1 MPa, that moves along a joint with dilation."""
+    blocks = Blocks.from_polygons(
+        [np.array([[-1, -0.5], [2, -0.5], [2, 0], [-1, 0]]), np.array([[0, 0], [1, 0], [1, 0.5], [0, 0.5]])],
+        fixed=[True, False], edge_names=[[[""] * 4], [["", "", "top", ""]]],
+    )  # fmt: skip
+    loads = Loads(
+        edge_tractions=(EdgeTraction("top", History.constant([0.0, -1e6])),),
+        block_motions=(BlockMotion(1, motion, ("u0", "r0")),),
+    )
+    settings = DdaSettings(max_displacement_ratio=0.5, dynamic_factor=0.0, time_step=dt, equilibrium=equilibrium)
+    results: list[dda.StepResult] = []
+    rock = Material("rock", 20e9, 0.25, density=density)
+    states = list(dda.run(blocks, [rock], [JOINT], loads, settings, end, watch=results.append))
+    return states, results
+
+
+@pytest.mark.parametrize("dt", [0.05, 0.0125])
+def test_what_dilation_lifts_is_pressed_by_the_inertia_of_static_steps(dt):
+    """2M d/dt² for the lift d = v dt tan ψ of a step: higher the shorter the step, and none in equilibrium."""
+    speed, mass = 0.1, 2600.0 * 0.5
+    inertia = 2.0 * mass * speed * dt * math.tan(DILATION) / dt**2
+    _, results = sheared(History.ramp([speed, 0.0]), dt, 8 * dt)
+    normal = results[-1].contacts["normal_force"].sum()
+    assert normal - 1e6 == pytest.approx(inertia, rel=1e-4)
+    assert results[-1].statistics["unbalanced_ratio"] > 1e-3
+    _, results = sheared(History.ramp([speed, 0.0]), dt, 8 * dt, equilibrium="loads")
+    assert results[-1].contacts["normal_force"].sum() == pytest.approx(1e6, rel=1e-9)
+
+
+def test_the_lift_of_a_dilating_joint_comes_back():
+    way = np.array([0.0, 10e-3, -10e-3, 0.0, 10e-3, -10e-3, 0.0])
+    motion = History.table([0, 1, 3, 4, 5, 7, 8], np.stack([way, np.zeros(7)], axis=1))
+    states, _ = sheared(motion, 0.1, 8.0, density=1.0)
+    lifts = np.array([state.contacts["lift"].max(initial=0.0) for state in states])
+    assert lifts.max() == pytest.approx(10e-3 * math.tan(DILATION), rel=5e-3)
+    assert lifts[-1] < 5e-6
+
+
+@pytest.mark.parametrize("dt", [1e-2, 1e-3, 1e-5])
+def test_a_block_on_a_soft_bolt_goes_on_at_any_step_and_is_told_to_be_out_of_balance(dt):
+    blocks = Blocks.from_polygons(
+        [np.array([[-5, -5], [5, -5], [5, -4], [-5, -4]]), np.array([[0, -1], [1, -1], [1, 0], [0, 0]])],
+        fixed=[True, False],
+    )
+    bolt = Bolt(1, (0.5, 0.0), GROUND, (0.5, 3.0), 1e3)
+    system = dda.BlockSystem(blocks, [Material("rock", 20e9, 0.25, density=2600.0)], [JointLaw("joint", 0.5)])
+    state, loads = State.at_rest(blocks), Loads(gravity=History.constant([0.0, -9.81]), bolts=(bolt,))
+    for _ in range(3):
+        result = system.step(state, loads, dt)
+        state = result.state
+    assert result.dt == dt and result.statistics["unbalanced_ratio"] > 0.9
+    # Each step falls as far as inertia and bolt allow: d = m g/(2m/dt² + k).
+    assert blocks.vertices[4, 1] - state.vertices[4, 1] == pytest.approx(3 * 9.81 * dt**2 / 2, rel=2e-2)

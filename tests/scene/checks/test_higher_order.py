@@ -1,0 +1,74 @@
+"""Blocks of higher order in scenes: what they cannot do yet is refused by name, what they can reaches the files."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from small_scenes import block
+
+from geomech.output import Run
+from geomech.pipeline import run
+from geomech.resumption import resume
+from geomech.scene import SceneError, load_scene
+
+BENDING = block("A block that bends", moving=True) + "[zones.block]\norder = 4\n"
+
+
+def scene(tmp_path, *more: str, text: str = BENDING):
+    path = tmp_path / "scene.toml"
+    path.write_text(text + "".join(more), encoding="utf-8")
+    return path
+
+
+@pytest.mark.parametrize(
+    ("more", "message"),
+    [
+        ("[joints.default]\nfriction_angle_deg = 30\nrestitution = 0.4\n", r"\[joints.default\] restitution"),
+        ("[joints.default]\nfriction_angle_deg = 30\njrc = 8\njcs_pa = 1e8\n", "softens, dilates or closes"),
+        ('[[loads.viscous_boundaries]]\nedge = "x"\n', r"viscous boundaries \(\[loads\] viscous_boundaries\)"),
+        ("[loads.in_situ]\nsurface_m = 1.0\nunit_weight_n_per_m3 = 2e4\nk0 = 1.0\n", "in-situ stress"),
+        ('[[loads.motions]]\nzone = "block"\nvelocity_m_per_s = [0, -1]\n', r"prescribed motion"),
+    ],
+)
+def test_what_is_not_supported_is_refused_at_its_key(tmp_path, more, message):
+    with pytest.raises(SceneError, match=message) as error:
+        load_scene(scene(tmp_path, more))
+    assert "zones.block.order" in str(error.value) and "order = 4: " in str(error.value)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("order = 4", "order = 9", "9"),
+        ("[zones.ground]\nfixed = true", "[zones.ground]\nfixed = true\norder = 2", "does not bend"),
+        ("dynamic_factor = 1.0", "dynamic_factor = 1.0\nspectral_radius = 0.8", "gamma = 2 beta"),
+        ("dynamic_factor = 1.0", 'dynamic_factor = 1.0\ncontact = "augmented"', "stiff penalty springs"),
+    ],
+)
+def test_settings_that_do_not_go_with_it_are_refused(tmp_path, old, new, message):
+    assert old in BENDING
+    with pytest.raises(SceneError, match=message):
+        load_scene(scene(tmp_path, text=BENDING.replace(old, new)))
+
+
+def test_stress_inside_and_bent_outlines_are_written_and_a_run_resumes(tmp_path):
+    """A block under its weight: what is written of its inside has the mean stress of the block, and varies. A run that goes
+    on from its checkpoint writes what one that was not broken off does."""
+    more = '[[monitors]]\nname = "top"\nat = [1.5, 0.9]\n[output]\ncheckpoint_every = 1\n'
+    folder = tmp_path / "run"
+    run(load_scene(scene(tmp_path, more)), folder)
+    results = Run(folder)
+    inside, blocks = results.grid("interior", 3), results.grid("blocks", 3)
+    stress = np.asarray(inside["stress"])[:, 1]
+    mean = np.asarray(blocks["stress"])[np.asarray(blocks["block_id"]) == 1][0, 1]
+    assert stress.min() < mean < stress.max() <= 0.02 * -stress.min()
+    assert results.grid("outlines", 3).n_cells == 4 + 4 * 12
+    moved = results.history["top_uy"]
+    assert moved[-1] < 0
+    # Resumed at a later end, and run to it at once.
+    whole = tmp_path / "whole"
+    resume(folder, ("run.end_time_s=0.05",), quiet=True)
+    run(load_scene(scene(tmp_path, more), ("run.end_time_s=0.05",)), whole)
+    for name in ("history.csv", "contacts.pvd"):
+        assert (folder / name).read_bytes() == (whole / name).read_bytes()
+    assert np.array_equal(Run(folder).grid("interior", 5)["stress"], Run(whole).grid("interior", 5)["stress"])
