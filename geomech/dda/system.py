@@ -291,6 +291,8 @@ class BlockSystem:
                         crossed = self.limits.pressed_apart(attempt, result)
                     if crossed is None:
                         self._refuse_crushed(result.state)
+                        if self.deflected is not None:
+                            self.deflected.check_small(result.state)
                         self.limits.warn_of_penetration(result)
                         if failed:
                             log.info("step at t = %g s cut from %.4g to %.4g s: %s", state.time, asked, dt, failed)

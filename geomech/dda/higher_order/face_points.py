@@ -5,8 +5,10 @@ Where two straight sides touch, their contact stress is integrated with the Gaus
     ∫ f ds ≈ ℓ Σ wᵢ f(sᵢ),   exact for polynomials of degree 2n − 3 with n = p + 2 points, p the higher order of both,
 
 so that a uniform and, with it, any stress of a degree up to p + 1 loads every deflection as its integral does (patch
-test), and springs kₙ ℓ wᵢ at the points are the springs of the face. Both ends are among the points: a corner that
-stays in contact when its face parts keeps its spring and its force. Each point opens, sticks and slides by itself.
+test). Joints with a stiffness kₙ (Pa/m) have springs kₙ ℓ wᵢ; penalty springs are proportional to wᵢ and, at both ends of
+a face, as stiff as those of a corner (`penalty_springs`): the points at which a block tips over do not give way by more
+than corners do, and a corner that stays in contact when its face parts keeps its spring and its force. Each point
+opens, sticks and slides by itself.
 
 The gap at a point is that of the strained blocks, linear between the ends of the face, and n · (u_a − u_b) of their
 deflections. CONTACT rows, one at each end of a face, carry the resultant and the moment of its points; what points
@@ -38,23 +40,32 @@ class Faces:
     """Faces (m,) among the contacts at corners, and their points among all contacts.
 
     ends     (m, 2)  rows of the corners
+    length   (m,)    m, between the ends
+    inner    (k,)    rows of corners between the ends, of vertices within a straight side: they bear nothing by themselves
+    inner_at (k,)    the point nearest to each of these, among all contacts
     lone     (k,)    rows of the corners that belong to no face; they come first among all contacts
     first    (m,)    where the points of each face begin among all contacts
     count    (m,)    how many there are
     place    (n,)    of all contacts, along the face from 0 to 1; 0 of lone ones
     face     (n,)    of all contacts; −1 of lone ones
-    share    (n,)    part of the face's springs that each has
+    share    (n,)    part of the face that each has
+    stiffer  (n,)    by how much penalty springs are stiffer than shares of two corners, so that those at the ends of a face
+                     are as stiff as a corner's
     swapped  (m,)    the vertex at the second end belongs to the block whose edge is touched at the first
     corners  (n_corners, 7)   geometry of the corners
     """
 
     ends: np.ndarray
+    length: np.ndarray
+    inner: np.ndarray
+    inner_at: np.ndarray
     lone: np.ndarray
     first: np.ndarray
     count: np.ndarray
     place: np.ndarray
     face: np.ndarray
     share: np.ndarray
+    stiffer: np.ndarray
     swapped: np.ndarray
     corners: np.ndarray
 
@@ -64,32 +75,40 @@ class Faces:
         bend."""
         geometry = found.geometry
         some = np.flatnonzero((geometry[:, 4] > 0) & (found.corner < 0))
-        ends, length = np.zeros((0, 2), np.int64), np.zeros(0)
+        ends, length, inner = np.zeros((0, 2), np.int64), np.zeros(0), np.zeros((0, 3))
         if len(some) > 1:
-            some, start, along = on_lines(found.block, found.other, geometry, some)
-            two = np.flatnonzero(np.diff(start) == 2)
-            ends = some[start[two, None] + [0, 1]]
-            length = np.abs(along[start[two] + 1] - along[start[two]])
-            whole = np.abs(geometry[ends, 4].sum(axis=1) - length) <= WITHOUT_GAPS * length
-            whole &= found.law[ends[:, 0]] == found.law[ends[:, 1]]
-            ends, length = ends[whole], length[whole]
-        lone = np.setdiff1d(np.arange(len(found)), ends)
+            ends, length, inner = _whole_sides(found, *on_lines(found.block, found.other, geometry, some))
+        lone = np.setdiff1d(np.arange(len(found)), np.concatenate([ends.ravel(), inner[:, 0].astype(np.int64)]))
         highest = np.maximum(order[found.block], order[found.other]) + 2
         count = highest[ends[:, 0]]
         rules = {n: lobatto_points(n) for n in np.unique(highest).tolist()}
         first = len(lone) + np.cumsum(count) - count
+        of_inner = inner[:, 1].astype(np.int64)
+        nearest = [
+            int(np.abs(rules[n][0] - place).argmin())
+            for n, place in zip(count[of_inner].tolist(), inner[:, 2].tolist(), strict=True)
+        ]
         return cls(
             ends=ends,
+            length=length,
+            inner=inner[:, 0].astype(np.int64),
+            inner_at=first[of_inner] + np.array(nearest, np.int64),
             lone=lone,
             first=first,
             count=count,
             place=np.concatenate([np.zeros(len(lone)), *(rules[n][0] for n in count.tolist())]),
             face=np.concatenate([np.full(len(lone), -1), np.repeat(np.arange(len(ends)), count)]),
-            # A lone corner has the springs that it has as the end of a face.
             share=np.concatenate(
                 [
                     np.array([2.0 * rules[n][1][0] for n in highest[lone].tolist()]),
                     *(rules[n][1] for n in count.tolist()),
+                ]
+            ),
+            stiffer=0.5
+            / np.concatenate(
+                [
+                    np.array([rules[n][1][0] for n in highest[lone].tolist()]),
+                    *(np.full(n, rules[n][1][0]) for n in count.tolist()),
                 ]
             ),
             swapped=found.block[ends[:, 0]] != found.block[ends[:, 1]],
@@ -141,6 +160,7 @@ class Faces:
         out[self.lone] = value[: len(self.lone)]
         out[self.ends[:, 0]] = value[self.first]
         out[self.ends[:, 1]] = value[self.first + self.count - 1]
+        out[self.inner] = value[self.inner_at]
         return out
 
     def least(self, value: np.ndarray) -> np.ndarray:
@@ -149,6 +169,7 @@ class Faces:
         lowest = np.full(len(self.ends), np.inf)
         np.minimum.at(lowest, self.face[self.inside], value[self.inside])
         out[self.ends] = lowest[:, None]
+        out[self.inner] = lowest[self.face[self.inner_at]]
         return out
 
     def geometry(self) -> np.ndarray:
@@ -165,26 +186,30 @@ class Faces:
         inside[:, 0] = first[:, 0]
         inside[:, 1:3], inside[:, 3:4] = first[:, 1:3], gap
         inside[:, 5:7] = first[:, 5:7] + place * (far - first[:, 5:7])
-        length = first[:, 4] + second[:, 4]
-        inside[:, 4] = self.share[self.inside] * length
+        inside[:, 4] = self.share[self.inside] * self.length[self.face[self.inside]]
         return out
 
-    def springs(self, corner: Springs) -> Springs:
-        """The springs of all contacts from those of the corners."""
+    def springs(self, corner: Springs, by_length: tuple[np.ndarray, np.ndarray]) -> Springs:
+        """The springs of all contacts from those of the corners; ``by_length`` (n_corners,) twice: which of them have a
+        stiffness by the length of their face, across it and along it."""
+        first, second = self._both(self.corners[:, 4])
+        # Corners within a side have a part of its length, but add no penalty springs.
+        whole = np.concatenate([np.ones(len(self.lone)), self.length[self.face[self.inside]] / (first + second)])
 
-        def shared(value: np.ndarray) -> np.ndarray:
+        def shared(value: np.ndarray, which: np.ndarray) -> np.ndarray:
             first, second = self._both(value)
-            return np.concatenate([value[self.lone], first + second]) * self.share
+            sums = np.concatenate([value[self.lone], first + second]) * self.share
+            return np.where(same(which), whole, self.stiffer) * sums
 
         def same(value: np.ndarray) -> np.ndarray:
             return np.concatenate([value[self.lone], self._both(value)[0]])
 
         own = {field.name: same(getattr(corner, field.name)) for field in fields(corner)}
-        for name in ("normal", "shear"):
-            own[name] = shared(getattr(corner, name))
-        strength = np.where(self.face < 0, 1.0 / self.share, 1.0)
+        for name, which in zip(("normal", "shear"), by_length, strict=True):
+            own[name] = shared(getattr(corner, name), which)
+        strength, always = np.where(self.face < 0, 1.0 / self.share, 1.0), np.ones(len(self.corners), bool)
         for name in ("sliding", "hold", "cohesion", "tension"):
-            own[name] = shared(getattr(corner, name)) * strength
+            own[name] = shared(getattr(corner, name), always) * strength
         return Springs(**own)
 
     def share_shear(self, vectors: np.ndarray, block: np.ndarray) -> None:
@@ -199,9 +224,11 @@ class FaceContacts(ContactSet):
     deflected: np.ndarray | float = 0.0
 
     @classmethod
-    def along_faces(cls, corners: ContactSet, order: np.ndarray, memory: np.ndarray | None) -> FaceContacts:
+    def along_faces(
+        cls, corners: ContactSet, order: np.ndarray, memory: np.ndarray | None, by_length: tuple[np.ndarray, np.ndarray]
+    ) -> FaceContacts:
         """The contacts found at ``corners``, with points along whole faces, which remember the FACE_POINT rows
-        ``memory``."""
+        ``memory``; ``by_length`` as of `Faces.springs`."""
         faces = Faces.of(corners, order)
         own = {}
         for field in fields(ContactSet):
@@ -211,7 +238,7 @@ class FaceContacts(ContactSet):
             else:
                 own[field.name] = value
         own |= {
-            "geometry": faces.geometry(), "springs": faces.springs(corners.springs), "points": faces,
+            "geometry": faces.geometry(), "springs": faces.springs(corners.springs, by_length), "points": faces,
             "lumped": corners, "faces": None, "whole": None, "tried": None,
             "lift": faces.between(corners.lift), "arc": 0.0, "swing": 0.0,
             "inset": np.zeros(len(faces.face), bool),
@@ -330,6 +357,32 @@ class FaceContacts(ContactSet):
         rows["slip"], rows["wear"] = self.slip + settled.slip, self.wear + np.abs(settled.slip)
         rows["lift"] = np.maximum(self.lift + settled.lifted, np.minimum(self.lift, 0.0))
         return rows
+
+
+def _whole_sides(
+    found: ContactSet, some: np.ndarray, start: np.ndarray, along: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Sides that touch all along among the contacts ``some`` (k,), face by face from ``start`` (m + 1,), ``along`` (k,) m:
+    rows of their ends (m, 2), lengths (m,), and rows, faces and places (0 to 1) of corners between the ends (n, 3)."""
+    ends, length, inner = [], [], []
+    for first, last in zip(start[:-1].tolist(), start[1:].tolist(), strict=True):
+        if last - first < 2:
+            continue
+        rows, at = some[first:last], along[first:last]
+        if last - first > 2:
+            order = np.argsort(at, kind="stable")
+            rows, at = rows[order], at[order]
+        extent = abs(float(at[-1] - at[0]))
+        sums = float(found.geometry[rows, 4].sum())
+        if abs(sums - extent) > WITHOUT_GAPS * extent or (found.law[rows] != found.law[rows[0]]).any():
+            continue
+        share = (at - at[0]) / (at[-1] - at[0])
+        inner += [(row, len(ends), place) for row, place in zip(rows[1:-1].tolist(), share[1:-1].tolist(), strict=True)]
+        ends.append((rows[0], rows[-1]))
+        length.append(extent)
+    return (
+        np.array(ends, np.int64).reshape(-1, 2), np.array(length), np.array(inner, float).reshape(-1, 3),
+    )  # fmt: skip
 
 
 def _matching(found: FaceContacts, memory: np.ndarray) -> np.ndarray:
