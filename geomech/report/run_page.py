@@ -119,11 +119,11 @@ def add_warnings(page: Page, run: Run) -> None:
     """Warnings and errors of the run's log."""
     path = run.folder / "run.log"
     text = path.read_text(encoding="utf-8", errors="replace") if path.is_file() else ""
-    told = [" ".join(words.split()) for level, words in _RECORD.findall(text) if level in ("WARNING", "ERROR")]
-    if not told:
+    lines = [" ".join(words.split()) for level, words in _RECORD.findall(text) if level in ("WARNING", "ERROR")]
+    if not lines:
         return
     page.section("Warnings")
-    for words in list(dict.fromkeys(told))[:LISTED]:
+    for words in list(dict.fromkeys(lines))[:LISTED]:
         page.warning(words)
     if run.summary.get("error"):
         page.warning(str(run.summary["error"]))
@@ -178,7 +178,7 @@ def add_pictures(page: Page, run: Run) -> None:
         if not shown:
             return
         page.section("Pictures")
-        page.figures([(path, f"{told[0].upper()}{told[1:]}: {_moment(run, cycle)}") for path, told, cycle in shown])
+        page.figures([(path, f"{lines[0].upper()}{lines[1:]}: {_moment(run, cycle)}") for path, lines, cycle in shown])
 
 
 def _moment(run: Run, cycle: int) -> str:

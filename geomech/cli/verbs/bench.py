@@ -100,7 +100,7 @@ def _bench(options: argparse.Namespace) -> int:
             "of processor": figures.processor_seconds() - began[1],
         }
         print(found[name].text, end="\n\n", flush=True)
-    print(figures.told_times(spent), end="\n\n")
+    print(figures.times_text(spent), end="\n\n")
     print(figures.write(out, found, quick=options.quick, unit=unit, spent=spent))
     if before is None:
         return DONE

@@ -44,6 +44,6 @@ def _resume(options: argparse.Namespace) -> int:
     except Finished as nothing_left:
         say(f"{options.run}: {nothing_left}")
     except NotResumable as error:
-        told = str(error)
-        raise BadInput(told if str(options.run) in told else f"{options.run}: {told}") from error
+        reason = str(error)
+        raise BadInput(reason if str(options.run) in reason else f"{options.run}: {reason}") from error
     return DONE

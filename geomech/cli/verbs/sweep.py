@@ -113,7 +113,7 @@ def _sweep(options: argparse.Namespace) -> int:
         else:
             plan = plan_of(
                 options.scene, given, overrides=options.overrides, variant=options.variant, table=options.table,
-                limit=options.limit, told="--",
+                limit=options.limit, source="--",
             )  # fmt: skip
             folder = options.out or default_folder(plan.scene)
         if options.plan:

@@ -1,13 +1,13 @@
-"""Open–close iteration: contact states that agree with the motion they produce.
+"""Open–close iteration: contact states that are consistent with the motion they produce.
 
-A set of states makes the step linear; its solution is checked against them (`coulomb_return`). Every contact that fails
-is switched and the step is solved again: a semismooth Newton method, which ends in two or three iterations where few
-contacts change. Bonds, lost for good, break only when all else is right.
+Given contact states make the step linear. Its solution is checked against them (`coulomb_return`), every inconsistent
+contact is switched, and the step is solved again: a semismooth Newton method, which converges in two or three
+iterations where few contacts change. Bonds, whose loss is final, break only when everything else is consistent.
 
-Where the number of wrong contacts does not fall, those that are left are settled on the blocks about them alone
-(`block_patches`), if they are few; else the interior-point method (`CentralPath`) proposes states from which Newton's
-goes on. Where neither leads on, the step is cut. Laws that are curved are lines within an iteration, which goes on until
-lines and laws agree on the forces. All that is tuned stands in `ContactSolver`.
+If the number of inconsistent contacts does not fall, they are solved on the surrounding blocks alone (`block_patches`),
+if they are few; otherwise the interior-point method (`CentralPath`) proposes states from which Newton's method
+continues. If that fails, the step is cut. Nonlinear joint laws are linearised within an iteration, which continues
+until the laws agree with their linearisation. All parameters are in `ContactSolver`.
 """
 
 from __future__ import annotations
