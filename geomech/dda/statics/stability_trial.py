@@ -27,7 +27,7 @@ _FALLING, _STEPS = 0.8, 6
 #: No trial is called unstable before it has made so many steps.
 _LEAST_STEPS = 10
 #: A trial whose unbalanced force does not tell goes on with steps this many times as long, so many of them.
-_LONGER, _MORE_STEPS = 4.0, 30
+_LONGER, _MORE_STEPS = 2.0, 30
 #: … and so many once contacts let them grow no longer.
 _SHORT_STEPS = 6
 #: An unbalanced force that falls with the way is taken to last as far as a straight line says, if that is so many times
