@@ -25,7 +25,6 @@ NOT_REMADE: set[str] = {
     "random_slope.png",
     "stability.png",
     "stability_cracks.png",
-    "step_path_slope.png",
 }
 
 PICTURES = gallery.pictures()
