@@ -20,7 +20,6 @@ NOT_REMADE: set[str] = {
     "bench_ddm.png",
     "bench_geometry.png",
     "bench_solvers.png",
-    "flexural_toppling.png",
     "jointed_slope.png",
     "random_slope.png",
     "stability.png",
