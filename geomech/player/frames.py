@@ -52,6 +52,7 @@ class Frames:
             self._contacts(made, contacts, blocks)
         self._cracks(made, cycle, interior)
         self._tips(made, cycle)
+        self._water(made, cycle)
         return record | made.record()
 
     def _grid(self, series: str, cycle: int) -> pv.UnstructuredGrid | None:
@@ -200,6 +201,16 @@ class Frames:
         crack = np.asarray(grid["crack_id"])
         made.whole("t_crack", crack)
         made.whole("t_end", self._ends(cycle, crack))
+
+    def _water(self, made: Block, cycle: int) -> None:
+        grid = self._grid("water", cycle)
+        if grid is None or not grid.n_cells:
+            return
+        places = self._places(grid.points)
+        for axis in range(2):
+            made.single(f"w_{'xy'[axis]}", places[:, axis])
+            made.single(f"w_u{'xy'[axis]}", grid["displacement"][:, axis])
+        made.whole("w_lines", grid.cells.reshape(-1, 3)[:, 1:])
 
     def _ends(self, cycle: int, crack: np.ndarray) -> np.ndarray:
         """0 for tips that grew from their crack's start, 1 from its end: ``tips.csv`` lists them in the same order."""

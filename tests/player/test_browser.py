@@ -209,11 +209,16 @@ def test_new_cycles_appear_while_the_run_goes_on(opened, tmp_path):
         observer.on_start(made.problem(), folder)
         for each in cycles[:3]:
             observer.on_cycle(each)
+    # At first there are no contacts.
+    pvd = folder / "contacts.pvd"
+    pvd.rename(folder / "hidden")
     viewer = Viewer([folder]).start()
     try:
         page = opened(viewer.address)
         until(page, "geomechPlayer.count === 3")
         page.evaluate("geomechPlayer.go(1)")
+        assert page.locator("[data-role=joints]").count() == 0
+        (folder / "hidden").rename(pvd)
         for observer in watching:
             for each in cycles[3:]:
                 observer.on_cycle(each)
@@ -221,6 +226,7 @@ def test_new_cycles_appear_while_the_run_goes_on(opened, tmp_path):
         until(page, "geomechPlayer.count === 7")
         assert page.evaluate("geomechPlayer.at") == 1
         assert page.evaluate("geomechPlayer.chart.lines[0].x.length") == 7
+        assert page.locator("[data-role=joints]").count() == 1 and page.locator("[data-role=field]").count() == 1
         page.goto("about:blank")
     finally:
         viewer.close()

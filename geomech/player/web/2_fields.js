@@ -194,6 +194,8 @@ function percentiles(pairs, tail, field) {
   if (field && !field.signed && field.point === Math.hypot) low = 0;
   if (low > 0 && low < 0.5 * high) low = 0;
   if (high < 0 && high > 0.5 * low) high = 0;
+  if (low < 0 && -low < 0.03 * high) low = 0;
+  if (high > 0 && high < -0.03 * low) high = 0;
   if (!(high - low > 1e-6 * Math.max(Math.abs(low), Math.abs(high), 1e-30))) {
     const middle = 0.5 * (low + high), half = Math.max(0.05 * Math.abs(middle), 1e-30);
     return middle ? [middle - half, middle + half] : [0, 1e-30];

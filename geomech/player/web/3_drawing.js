@@ -132,6 +132,7 @@ class Drawing {
     if (look.joints.key !== "none" && frame.get("faces") && frame.blocks) this.joints();
     if (look.shown.cracks) this.cracks();
     if (look.shown.forces && frame.get("c_fx")) this.forces();
+    if (look.shown.water && frame.get("w_x")) this.water();
     if (look.shown.bolts) this.bolts();
     if (look.shown.events) this.eventsHere();
     if (look.shown.tips) this.tips();
@@ -349,6 +350,13 @@ class Drawing {
       // The arrow pushes the block that owns the corner: its point is at the corner.
       arrow(c, p[2 * at[k]] - dx * length, p[2 * at[k] + 1] - dy * length, p[2 * at[k]], p[2 * at[k] + 1], 4 * r);
     }
+  }
+  water() {
+    const { frame, look } = this, lines = frame.get("w_lines"), found = [];
+    const p = this.placed(frame.get("w_x"), frame.get("w_y"), frame.get("w_ux"), frame.get("w_uy"), look.scale);
+    for (let k = 0; k < lines.length; k += 2) found.push(p[2 * lines[k]], p[2 * lines[k] + 1], p[2 * lines[k + 1]], p[2 * lines[k + 1] + 1]);
+    this.strokes(new Map([[look.ink.halo, found]]), 4.5);
+    this.strokes(new Map([[look.ink.water, found]]), 2);
   }
   bolts() {
     const { frame, look, context: c, ratio: r } = this;

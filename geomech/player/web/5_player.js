@@ -8,7 +8,7 @@ const HELP = [["Space", "play, pause"], ["← →", "one cycle back, on"], ["Shi
 
 function inks(element) {
   const style = getComputedStyle(element), ink = {};
-  for (const name of ["page", "text", "soft", "line", "card", "outline", "idle", "halo", "crack", "growing", "force", "select"])
+  for (const name of ["page", "text", "soft", "line", "card", "outline", "idle", "halo", "crack", "growing", "force", "select", "water"])
     ink[name] = style.getPropertyValue(`--gm-${name}`).trim();
   ink.curves = Array.from({ length: INKS }, (_, k) => style.getPropertyValue(`--gm-curve-${k}`).trim());
   return ink;
@@ -32,7 +32,7 @@ class Player {
     for (const run of this.runs) this.prepare(run);
     this.field = FIELDS.find((f) => f.key === this.startField()) || FIELDS[0];
     this.joints = JOINT_FIELDS[0]; this.cracks = CRACK_FIELDS[0];
-    this.shown = { outlines: true, cracks: true, tips: true, labels: false, forces: false, bolts: true, monitors: true, events: false, reference: false };
+    this.shown = { outlines: true, cracks: true, tips: true, labels: false, forces: false, bolts: true, water: true, monitors: true, events: false, reference: false };
     this.scale = this.defaultScale(); this.flip = false; this.selected = null;
     this.build();
     this.say("");
@@ -144,7 +144,13 @@ class Player {
     this.hint = el("p", { class: "gm-hint" }, "Click a block, joint, crack, tip, bolt or monitor in the drawing: its history appears here.");
     this.charts.append(this.chart.element, el("div", {}, this.history.element, this.hint));
     this.root.replaceChildren(this.message, el("div", { class: "gm-main" },
-      el("div", { class: "gm-left" }, this.stage, this.legend, this.transport()), this.controls()), this.charts, this.help());
+      el("div", { class: "gm-left" }, this.stage, this.legend, this.transport()), this.panel = this.controls()), this.charts, this.help());
+    this.featuresOf = this.features();
+  }
+  // What there is to choose from: a run that goes on comes to have contacts, cracks and columns that it had not.
+  features() {
+    const names = ["vx", "c_gap", "k_x", "t_x", "c_fx", "w_x"].filter((name) => this.runs.some((run) => run.has(name)));
+    return [...names, this.runs.some((run) => run.events.length), ...this.runs.flatMap((run) => [!!run.joints, ...Object.keys(run.units)])].join();
   }
   button(text, label, action) { return el("button", { type: "button", "aria-label": label, title: label, onclick: action }, text); }
   transport() {
@@ -235,7 +241,7 @@ class Player {
     }
     rows.push(el("div", { class: "gm-checks" }, this.check("outlines", "outlines"), this.check("reference", "undeformed"), this.check("cracks", "cracks", has("k_x")),
       this.check("tips", "tips", has("t_x")), this.check("labels", "K at tips", has("t_x")), this.check("forces", "contact forces", has("c_fx")),
-      this.check("bolts", "bolts", this.runs.some((run) => (run.bolts || []).length)), this.check("monitors", "monitors", this.runs.some((run) => run.monitors.length)),
+      this.check("bolts", "bolts", this.runs.some((run) => (run.bolts || []).length)), this.check("water", "water table", has("w_x")), this.check("monitors", "monitors", this.runs.some((run) => run.monitors.length)),
       this.check("events", "events", this.runs.some((run) => run.events.length))));
     rows.push(el("div", { class: "gm-row gm-tools" }, this.button("whole model", "show the whole model (0)", () => { this.fit(); this.redraw(); }),
       this.button("save picture", "save what is shown as a PNG", () => this.save()), this.button("light / dark", "change between light and dark", () => this.theme()),
@@ -422,7 +428,7 @@ class Player {
   }
 
   // -- curves --------------------------------------------------------------------------------------------------
-  buildCurveChoice() {
+  buildCurveChoice(before = null) {
     const columns = new Map();
     for (const run of this.runs) for (const name of Object.keys(run.units)) if (name !== "time") columns.set(name, run.units[name]);
     const has = (...names) => names.filter((name) => columns.has(name)), single = this.runs.length === 1;
@@ -445,7 +451,7 @@ class Player {
     this.curveOptions = options;
     if (!options.length) return;
     const wanted = this.runs[0].led ? ["load_strain", "load"] : ["monitors", "kinetic_energy", "crack_length"];
-    const first = wanted.map((key) => options.find((o) => o.key === key)).find(Boolean) || options[0];
+    const first = options.find((o) => o.key === before) || wanted.map((key) => options.find((o) => o.key === key)).find(Boolean) || options[0];
     const choice = this.select("", options, first.key, (key) => this.setCurve(key), true);
     choice.input.setAttribute("aria-label", "curve"); choice.input.dataset.role = "curve";
     this.chart.heading.replaceChildren(choice.input);
@@ -644,7 +650,15 @@ class Player {
     this.setTimeline();
     this.slider.max = String(this.count - 1);
     this.markEvents();
-    if (this.curve) this.setCurve(this.curve, false);
+    if (this.featuresOf !== this.features()) {
+      this.featuresOf = this.features();
+      const fresh = this.controls();
+      fresh.open = this.panel.open;
+      this.panel.replaceWith(fresh);
+      this.panel = fresh;
+      this.buildCurveChoice(this.curve);
+      this.chosen();
+    } else if (this.curve) this.setCurve(this.curve, false);
     if (follows && !this.playing) this.at = this.count - 1;
     this.slider.value = String(this.at);
     if (this.drawings.every((d) => d.fitted)) { this.layout(); this.fit(); }
