@@ -116,7 +116,7 @@ class CoupledRun:
 
     It begins at the start of ``problem``, or where ``stored``, the content of a checkpoint, was written (it is used
     up), with the title and the settings of the run that ``problem`` has now. A first interrupt ends it between two
-    cycles.
+    cycles, or in the middle of one that lasts (`geomech.interruption.PATIENCE`).
     """
 
     def __init__(
@@ -196,6 +196,8 @@ class CoupledRun:
             self.before_the_last = last
         # (Between the passes of the last step there is one already, from before it.)
         due = self.checkpoints is not None and self.checkpoints.due
+        if self.interruption.asked:
+            self.interruption.wait()
         if self.interruption.asked or last or (due and not self.before_the_last):
             self._store(coupling)
         if self.interruption.asked:

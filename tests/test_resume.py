@@ -11,6 +11,7 @@ import sys
 import threading
 import time
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -19,6 +20,7 @@ from small_scenes import PLATE
 
 from geomech import cli
 from geomech.bench.cost.block_scenes import cracked_wall
+from geomech.interruption import Interruption
 from geomech.model import RunSettings
 from geomech.output import (
     Checkpoints,
@@ -490,6 +492,37 @@ def test_a_second_interrupt_stops_at_once(write, tmp_path):
     assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
     assert checkpoint_file.read_header(checkpoint_file.found(out / checkpoint_file.FOLDER)[0])["cycle"] == 3
     assert resume(out, quiet=True)["end"] == "end of the scene"
+
+
+@pytest.mark.other_machines
+def test_a_cycle_that_lasts_is_broken_off(write, tmp_path, monkeypatch):
+    """Nobody waits minutes for a cycle to end; what was stored goes on to the end of the scene."""
+
+    class Lasts(Breaks):
+        def on_cycle(self, cycle) -> None:
+            super().on_cycle(cycle)
+            if cycle.number == self.cycle:
+                time.sleep(60.0)
+
+    monkeypatch.setattr("geomech.pipeline.Interruption", partial(Interruption, patience=0.2))
+    scene, out = load_scene(write(SLIDING), ["output.checkpoint_every=2"]), tmp_path / "out"
+    began = time.monotonic()
+    with pytest.raises(KeyboardInterrupt):
+        run(scene, out, [*standard_observers(scene, quiet=True), Lasts(5)])
+    assert time.monotonic() - began < 50.0
+    assert {signal.getsignal(n) for n in (signal.SIGINT, signal.SIGALRM)} == {
+        signal.default_int_handler, signal.SIG_DFL,
+    }  # fmt: skip
+    assert json.loads((out / "summary.json").read_text())["end"] == "interrupted"
+    assert resume(out, quiet=True)["end"] == "end of the scene"
+
+
+def test_what_is_stored_after_an_interrupt_may_take_its_time():
+    with Interruption(patience=0.05) as interruption:
+        os.kill(os.getpid(), signal.SIGINT)
+        interruption.wait()
+        time.sleep(0.2)
+    assert interruption.asked
 
 
 def test_a_full_disk_is_told_and_what_was_written_is_kept(write, tmp_path, monkeypatch, capfd):

@@ -457,6 +457,16 @@ class ContactFinder:
                     remembered[name][c] = row[name]
 
     @property
+    def stiff_laws(self) -> np.ndarray:
+        """(n_laws,) which laws have a normal stiffness of their own."""
+        return self._stiff
+
+    @property
+    def stiff_along_laws(self) -> np.ndarray:
+        """(n_laws,) which laws have a shear stiffness of their own."""
+        return self._stiff_along
+
+    @property
     def closure(self) -> np.ndarray:
         """(n_laws,) m: the closure that each law tends to; infinite for a straight spring."""
         return self._table.closure

@@ -45,7 +45,9 @@ class BendingAttempt(Attempt):
 
     def _on_faces(self, system, state, vertices: np.ndarray, corners: ContactSet) -> FaceContacts:
         """The contacts found at ``corners``, with points along faces and what deflection adds to their gaps."""
-        found = FaceContacts.along_faces(corners, self.blocks.order, state.face_points)
+        finder = system.finder
+        by_length = finder.stiff_laws[corners.law], finder.stiff_along_laws[corners.law]
+        found = FaceContacts.along_faces(corners, self.blocks.order, state.face_points, by_length)
         self.touching = self._material_points(found, vertices)
         if not self.deflection.any():
             return replace(found, deflected=np.zeros(len(found)))
@@ -207,6 +209,8 @@ class BendingAttempt(Attempt):
         change = self.bent_by = self._deflected_by()
         # At rest there is no rate; in motion that of the step's end, in the frame of the block.
         self.new_rates = np.zeros_like(change) if static else 2.0 * change / self.dt - self.rates
+        mean = blocks.padded(2.0 / self.dt**2 * (change - self.dt * self.rates))
+        blocks.acceleration = np.sqrt((mean * mean).sum(axis=1))
         self.largest = max(self.largest, float(blocks.largest(change)[0].max()))
         if self.n_free:
             found = self.found

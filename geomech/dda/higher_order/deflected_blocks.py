@@ -10,13 +10,21 @@ no work on deflection. A block that spins at ω is bent by centrifugal forces, �
 
 from __future__ import annotations
 
+import logging
 from functools import cached_property
 
 import numpy as np
 
 from ...model import Blocks, State
+from ..results import NotConverged
 from .deflection_basis import HIGHEST, DeflectionBasis, n_deflections
 from .polygon_quadrature import gauss_points
+
+log = logging.getLogger(__name__)
+
+#: rad by which deflection turns a block's outline, or strain: beyond the first small displacements are off by a thousandth
+#: and the block is reported, beyond the second the run ends.
+LARGE, TOO_LARGE = 0.05, 0.5
 
 
 def rotation_of(angle: np.ndarray) -> np.ndarray:
@@ -51,6 +59,10 @@ class DeflectedBlocks:
         self.rows = np.where(fixed, 0, 1 + -(-n_deflections(self.order) // 6)).astype(np.int64)
         self.bending = np.flatnonzero(self.order > 1)
         self.mass_density, self.elastic = density, elastic
+        #: (n_blocks,) m/s²: the mean acceleration of deflection in the last step.
+        self.acceleration = np.zeros(blocks.n_blocks)
+        #: The largest slope of a deflection that was reported.
+        self.reported = 0.0
         #: Width of a contact's row of one block.
         self.width = 6 * int(self.rows.max(initial=1))
         end = blocks.vertices[blocks.next_vertex]
@@ -138,6 +150,37 @@ class DeflectedBlocks:
         out = vertices.copy()
         out[some] += np.einsum("nab,nbj,nj->na", rotation_of(angle[owner]), matrix[:, 0], self.padded(q)[owner])
         return out
+
+    @cached_property
+    def _slopes(self) -> tuple[np.ndarray, np.ndarray]:
+        """∇P (n, 4, m) at the ends and the middles of all edges of bending blocks, and the blocks (n,)."""
+        blocks = self.blocks
+        some = np.flatnonzero(self.order[blocks.vertex_block] > 1)
+        start, end = blocks.vertices[some], blocks.vertices[blocks.next_vertex[some]]
+        owner = np.concatenate([blocks.vertex_block[some]] * 2)
+        return self.basis.gradient(np.concatenate([start, 0.5 * (start + end)]), owner), owner
+
+    def check_small(self, state: State) -> None:
+        """Log a warning that names a block where deflection turns or strains its outline by more than `LARGE`, and each
+        time that has doubled; raise `NotConverged` beyond `TOO_LARGE`."""
+        if state.deflection is None or not state.deflection[:, 0].any():
+            return
+        matrix, owner = self._slopes
+        slope = np.abs(np.einsum("ngj,nj->ng", matrix, self.padded(state.deflection[:, 0])[owner])).max(axis=1)
+        worst = int(slope.argmax())
+        most, name = float(slope[worst]), repr(self.blocks.names[owner[worst]])
+        if most > TOO_LARGE:
+            raise NotConverged(
+                f"{name} is bent by {most:.3g} rad at t = {state.time:g} s: its deflection is that of small "
+                "displacements. Its loads are beyond its stiffness, or it is to be drawn as several blocks"
+            )
+        if most > LARGE and most >= 2.0 * self.reported:
+            self.reported = most
+            log.warning(
+                "t = %g s: %s is bent by %.2g rad, and its deflection is that of small displacements: off by about half the "
+                "square of that; draw it as several blocks",
+                state.time, name, most,
+            )  # fmt: skip
 
     def deflection_of(self, state: State) -> tuple[np.ndarray, np.ndarray]:
         """As `largest` of the deflections of ``state``."""

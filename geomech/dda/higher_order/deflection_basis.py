@@ -178,6 +178,10 @@ class DeflectionBasis:
         slope = self._evaluated(points, owner, True)
         return np.stack([slope[:, 0], slope[:, 3], slope[:, 1] + slope[:, 2]], axis=1)
 
+    def gradient(self, points: np.ndarray, owner: np.ndarray | int) -> np.ndarray:
+        """∇P (n, 4, m), 1/m: ∂ux/∂x, ∂ux/∂y, ∂uy/∂x, ∂uy/∂y; arguments as of `displacement`."""
+        return self._evaluated(points, owner, True)
+
     def stiffness(self, block: int, start: np.ndarray, end: np.ndarray, elastic: np.ndarray) -> np.ndarray:
         """(m, m) ∫ ε(P)ᵀ C ε(P) dA of ``block``, Pa, with edges from ``start`` to ``end`` (n, 2) and C ``elastic``
         (3, 3) Pa."""

@@ -5,8 +5,10 @@ Where two straight sides touch, their contact stress is integrated with the Gaus
     ∫ f ds ≈ ℓ Σ wᵢ f(sᵢ),   exact for polynomials of degree 2n − 3 with n = p + 2 points, p the higher order of both,
 
 so that a uniform and, with it, any stress of a degree up to p + 1 loads every deflection as its integral does (patch
-test), and springs kₙ ℓ wᵢ at the points are the springs of the face. Both ends are among the points: a corner that
-stays in contact when its face parts keeps its spring and its force. Each point opens, sticks and slides by itself.
+test). Joints with a stiffness kₙ (Pa/m) have springs kₙ ℓ wᵢ; penalty springs are proportional to wᵢ and, at both ends of
+a face, as stiff as those of a corner (`penalty_springs`): the points at which a block tips over do not give way by more
+than corners do, and a corner that stays in contact when its face parts keeps its spring and its force. Each point
+opens, sticks and slides by itself.
 
 The gap at a point is that of the strained blocks, linear between the ends of the face, and n · (u_a − u_b) of their
 deflections. CONTACT rows, one at each end of a face, carry the resultant and the moment of its points; what points
@@ -32,29 +34,41 @@ from .polygon_quadrature import lobatto_points
 _MEMORY = {"state": "state", "bonded": "bonded", "normal": "normal_force", "shear": "shear_force", "slip": "slip",
            "wear": "wear", "lift": "lift"}  # fmt: skip
 
+#: Places of points along faces are told apart to this part of them.
+_NAMED = 1_000_000
+
 
 @dataclass(frozen=True, eq=False)
 class Faces:
     """Faces (m,) among the contacts at corners, and their points among all contacts.
 
     ends     (m, 2)  rows of the corners
+    length   (m,)    m, between the ends
+    inner    (k,)    rows of corners between the ends, of vertices within a straight side: they bear nothing by themselves
+    inner_at (k,)    the point nearest to each of these, among all contacts
     lone     (k,)    rows of the corners that belong to no face; they come first among all contacts
     first    (m,)    where the points of each face begin among all contacts
     count    (m,)    how many there are
     place    (n,)    of all contacts, along the face from 0 to 1; 0 of lone ones
     face     (n,)    of all contacts; −1 of lone ones
-    share    (n,)    part of the face's springs that each has
+    share    (n,)    part of the face that each has
+    stiffer  (n,)    by how much penalty springs are stiffer than shares of two corners, so that those at the ends of a face
+                     are as stiff as a corner's
     swapped  (m,)    the vertex at the second end belongs to the block whose edge is touched at the first
     corners  (n_corners, 7)   geometry of the corners
     """
 
     ends: np.ndarray
+    length: np.ndarray
+    inner: np.ndarray
+    inner_at: np.ndarray
     lone: np.ndarray
     first: np.ndarray
     count: np.ndarray
     place: np.ndarray
     face: np.ndarray
     share: np.ndarray
+    stiffer: np.ndarray
     swapped: np.ndarray
     corners: np.ndarray
 
@@ -64,32 +78,40 @@ class Faces:
         bend."""
         geometry = found.geometry
         some = np.flatnonzero((geometry[:, 4] > 0) & (found.corner < 0))
-        ends, length = np.zeros((0, 2), np.int64), np.zeros(0)
+        ends, length, inner = np.zeros((0, 2), np.int64), np.zeros(0), np.zeros((0, 3))
         if len(some) > 1:
-            some, start, along = on_lines(found.block, found.other, geometry, some)
-            two = np.flatnonzero(np.diff(start) == 2)
-            ends = some[start[two, None] + [0, 1]]
-            length = np.abs(along[start[two] + 1] - along[start[two]])
-            whole = np.abs(geometry[ends, 4].sum(axis=1) - length) <= WITHOUT_GAPS * length
-            whole &= found.law[ends[:, 0]] == found.law[ends[:, 1]]
-            ends, length = ends[whole], length[whole]
-        lone = np.setdiff1d(np.arange(len(found)), ends)
+            ends, length, inner = _whole_sides(found, *on_lines(found.block, found.other, geometry, some))
+        lone = np.setdiff1d(np.arange(len(found)), np.concatenate([ends.ravel(), inner[:, 0].astype(np.int64)]))
         highest = np.maximum(order[found.block], order[found.other]) + 2
         count = highest[ends[:, 0]]
         rules = {n: lobatto_points(n) for n in np.unique(highest).tolist()}
         first = len(lone) + np.cumsum(count) - count
+        of_inner = inner[:, 1].astype(np.int64)
+        nearest = [
+            int(np.abs(rules[n][0] - place).argmin())
+            for n, place in zip(count[of_inner].tolist(), inner[:, 2].tolist(), strict=True)
+        ]
         return cls(
             ends=ends,
+            length=length,
+            inner=inner[:, 0].astype(np.int64),
+            inner_at=first[of_inner] + np.array(nearest, np.int64),
             lone=lone,
             first=first,
             count=count,
             place=np.concatenate([np.zeros(len(lone)), *(rules[n][0] for n in count.tolist())]),
             face=np.concatenate([np.full(len(lone), -1), np.repeat(np.arange(len(ends)), count)]),
-            # A lone corner has the springs that it has as the end of a face.
             share=np.concatenate(
                 [
                     np.array([2.0 * rules[n][1][0] for n in highest[lone].tolist()]),
                     *(rules[n][1] for n in count.tolist()),
+                ]
+            ),
+            stiffer=0.5
+            / np.concatenate(
+                [
+                    np.array([rules[n][1][0] for n in highest[lone].tolist()]),
+                    *(np.full(n, rules[n][1][0]) for n in count.tolist()),
                 ]
             ),
             swapped=found.block[ends[:, 0]] != found.block[ends[:, 1]],
@@ -105,6 +127,13 @@ class Faces:
         """``value`` (n_corners, …) at both ends of the face of each point."""
         at = self.ends[self.face[self.inside]]
         return value[at[:, 0]], value[at[:, 1]]
+
+    def far_ends(self, corners: ContactSet) -> np.ndarray:
+        """(n, 2) vertex and edge at the far end of the face of each contact; −1 of lone ones."""
+        out = np.full((len(self.face), 2), -1)
+        ends = self.ends[self.face[self.inside], 1]
+        out[self.inside] = np.stack([corners.vertex[ends], corners.edge[ends]], axis=1)
+        return out
 
     def corner_of(self, contact: int) -> int:
         """The row of a corner of the face of a ``contact``."""
@@ -141,6 +170,7 @@ class Faces:
         out[self.lone] = value[: len(self.lone)]
         out[self.ends[:, 0]] = value[self.first]
         out[self.ends[:, 1]] = value[self.first + self.count - 1]
+        out[self.inner] = value[self.inner_at]
         return out
 
     def least(self, value: np.ndarray) -> np.ndarray:
@@ -149,6 +179,7 @@ class Faces:
         lowest = np.full(len(self.ends), np.inf)
         np.minimum.at(lowest, self.face[self.inside], value[self.inside])
         out[self.ends] = lowest[:, None]
+        out[self.inner] = lowest[self.face[self.inner_at]]
         return out
 
     def geometry(self) -> np.ndarray:
@@ -165,26 +196,30 @@ class Faces:
         inside[:, 0] = first[:, 0]
         inside[:, 1:3], inside[:, 3:4] = first[:, 1:3], gap
         inside[:, 5:7] = first[:, 5:7] + place * (far - first[:, 5:7])
-        length = first[:, 4] + second[:, 4]
-        inside[:, 4] = self.share[self.inside] * length
+        inside[:, 4] = self.share[self.inside] * self.length[self.face[self.inside]]
         return out
 
-    def springs(self, corner: Springs) -> Springs:
-        """The springs of all contacts from those of the corners."""
+    def springs(self, corner: Springs, by_length: tuple[np.ndarray, np.ndarray]) -> Springs:
+        """The springs of all contacts from those of the corners; ``by_length`` (n_corners,) twice: which of them have a
+        stiffness by the length of their face, across it and along it."""
+        first, second = self._both(self.corners[:, 4])
+        # Corners within a side have a part of its length, but add no penalty springs.
+        whole = np.concatenate([np.ones(len(self.lone)), self.length[self.face[self.inside]] / (first + second)])
 
-        def shared(value: np.ndarray) -> np.ndarray:
+        def shared(value: np.ndarray, which: np.ndarray) -> np.ndarray:
             first, second = self._both(value)
-            return np.concatenate([value[self.lone], first + second]) * self.share
+            sums = np.concatenate([value[self.lone], first + second]) * self.share
+            return np.where(same(which), whole, self.stiffer) * sums
 
         def same(value: np.ndarray) -> np.ndarray:
             return np.concatenate([value[self.lone], self._both(value)[0]])
 
         own = {field.name: same(getattr(corner, field.name)) for field in fields(corner)}
-        for name in ("normal", "shear"):
-            own[name] = shared(getattr(corner, name))
-        strength = np.where(self.face < 0, 1.0 / self.share, 1.0)
+        for name, which in zip(("normal", "shear"), by_length, strict=True):
+            own[name] = shared(getattr(corner, name), which)
+        strength, always = np.where(self.face < 0, 1.0 / self.share, 1.0), np.ones(len(self.corners), bool)
         for name in ("sliding", "hold", "cohesion", "tension"):
-            own[name] = shared(getattr(corner, name)) * strength
+            own[name] = shared(getattr(corner, name), always) * strength
         return Springs(**own)
 
     def share_shear(self, vectors: np.ndarray, block: np.ndarray) -> None:
@@ -199,9 +234,11 @@ class FaceContacts(ContactSet):
     deflected: np.ndarray | float = 0.0
 
     @classmethod
-    def along_faces(cls, corners: ContactSet, order: np.ndarray, memory: np.ndarray | None) -> FaceContacts:
+    def along_faces(
+        cls, corners: ContactSet, order: np.ndarray, memory: np.ndarray | None, by_length: tuple[np.ndarray, np.ndarray]
+    ) -> FaceContacts:
         """The contacts found at ``corners``, with points along whole faces, which remember the FACE_POINT rows
-        ``memory``."""
+        ``memory``; ``by_length`` as of `Faces.springs`."""
         faces = Faces.of(corners, order)
         own = {}
         for field in fields(ContactSet):
@@ -211,7 +248,7 @@ class FaceContacts(ContactSet):
             else:
                 own[field.name] = value
         own |= {
-            "geometry": faces.geometry(), "springs": faces.springs(corners.springs), "points": faces,
+            "geometry": faces.geometry(), "springs": faces.springs(corners.springs, by_length), "points": faces,
             "lumped": corners, "faces": None, "whole": None, "tried": None,
             "lift": faces.between(corners.lift), "arc": 0.0, "swing": 0.0,
             "inset": np.zeros(len(faces.face), bool),
@@ -317,13 +354,10 @@ class FaceContacts(ContactSet):
         """FACE_POINT rows as the step, so ``settled``, leaves the contacts, with ``shear`` (n,) N as it ends, where their
         ``points`` (n, 2) m are then."""
         rows = np.zeros(len(self), FACE_POINT)
-        faces, corners = self.points, self.lumped
+        faces = self.points
         rows["block"], rows["other"] = self.block, self.other
         rows["vertex"], rows["edge"] = self.vertex, self.edge
-        rows["far_vertex"], rows["far_edge"] = -1, -1
-        inside = faces.inside
-        far = faces.ends[faces.face[inside], 1]
-        rows["far_vertex"][inside], rows["far_edge"][inside] = corners.vertex[far], corners.edge[far]
+        rows["far_vertex"], rows["far_edge"] = faces.far_ends(self.lumped).T
         rows["place"], rows["length"], rows["point"] = faces.place, self.geometry[:, 4], points
         rows["state"], rows["bonded"] = settled.state, settled.bonded
         rows["normal_force"], rows["shear_force"], rows["gap"] = settled.normal_force, shear, settled.gap
@@ -332,51 +366,76 @@ class FaceContacts(ContactSet):
         return rows
 
 
+def _whole_sides(
+    found: ContactSet, some: np.ndarray, start: np.ndarray, along: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Sides that touch all along among the contacts ``some`` (k,), face by face from ``start`` (m + 1,), ``along`` (k,) m:
+    rows of their ends (m, 2), lengths (m,), and rows, faces and places (0 to 1) of corners between the ends (n, 3)."""
+    ends, length, inner = [], [], []
+    for first, last in zip(start[:-1].tolist(), start[1:].tolist(), strict=True):
+        if last - first < 2:
+            continue
+        rows, at = some[first:last], along[first:last]
+        if last - first > 2:
+            order = np.argsort(at, kind="stable")
+            rows, at = rows[order], at[order]
+        extent = abs(float(at[-1] - at[0]))
+        sums = float(found.geometry[rows, 4].sum())
+        if abs(sums - extent) > WITHOUT_GAPS * extent or (found.law[rows] != found.law[rows[0]]).any():
+            continue
+        share = (at - at[0]) / (at[-1] - at[0])
+        inner += [(row, len(ends), place) for row, place in zip(rows[1:-1].tolist(), share[1:-1].tolist(), strict=True)]
+        ends.append((rows[0], rows[-1]))
+        length.append(extent)
+    return (
+        np.array(ends, np.int64).reshape(-1, 2), np.array(length), np.array(inner, float).reshape(-1, 3),
+    )  # fmt: skip
+
+
 def _matching(found: FaceContacts, memory: np.ndarray) -> np.ndarray:
     """(n,) the row of ``memory`` of each contact of ``found``, −1 where there is none: the same point, a corner that was
     the end of a face, or the nearest point between the same two sides."""
-    faces, corners = found.points, found.lumped
-    far = np.full((len(found), 2), -1)
-    inside = faces.inside
-    ends = faces.ends[faces.face[inside], 1]
-    far[inside] = np.stack([corners.vertex[ends], corners.edge[ends]], axis=1)
-    same = len(memory) == len(found) and np.array_equal(memory["place"], faces.place)
-    for name, mine in (
-        ("vertex", found.vertex),
-        ("edge", found.edge),
-        ("far_vertex", far[:, 0]),
-        ("far_edge", far[:, 1]),
-    ):
-        same = same and np.array_equal(memory[name], mine)
-    if same:
-        return np.arange(len(found))
-    known: dict[tuple[int, ...], int] = {}
-    by_corner: dict[tuple[int, int], int] = {}
-    by_pair: dict[tuple[int, int], list[int]] = {}
-    for k, row in enumerate(memory):
-        v, e, w, f = (int(row[name]) for name in ("vertex", "edge", "far_vertex", "far_edge"))
-        place = round(float(row["place"]) * 1e6)
-        known[v, e, w, f, place] = k
-        if w < 0 or place == 0:
-            by_corner[v, e] = k
-        elif place == 1000000:
-            by_corner[w, f] = k
-        if w >= 0:
-            by_pair.setdefault((int(row["block"]), int(row["other"])), []).append(k)
-    out = np.full(len(found), -1)
-    for c in range(len(found)):
-        v, e, place = int(found.vertex[c]), int(found.edge[c]), round(float(faces.place[c]) * 1e6)
-        k = known.get((v, e, int(far[c, 0]), int(far[c, 1]), place), -1)
-        if k < 0 and (faces.face[c] < 0 or place == 0):
-            k = by_corner.get((v, e), -1)
-        if k < 0 and place == 1000000:
-            k = by_corner.get((int(far[c, 0]), int(far[c, 1])), -1)
-        if k < 0 and faces.face[c] >= 0:
-            pair = int(found.block[c]), int(found.other[c])
-            near = by_pair.get(pair) or by_pair.get(pair[::-1])
-            if near:
+    faces, n = found.points, len(found)
+    far = faces.far_ends(found.lumped)
+    # Places along a face, in millionths, are names.
+    mine = np.column_stack([found.vertex, found.edge, far, np.round(faces.place * _NAMED)]).astype(np.int64)
+    names = [memory[name] for name in ("vertex", "edge", "far_vertex", "far_edge")]
+    theirs = np.column_stack([*names, np.round(memory["place"] * _NAMED)]).astype(np.int64)
+    if mine.shape == theirs.shape and np.array_equal(mine, theirs):
+        return np.arange(n)
+    number = np.unique(np.concatenate([mine, theirs]), axis=0, return_inverse=True)[1].ravel()
+    row = np.full(int(number.max()) + 1, -1)
+    row[number[n:]] = np.arange(len(memory))
+    out = row[number[:n]]
+    unknown = np.flatnonzero(out < 0)
+    if len(unknown):
+        out[unknown] = _nearest(found, memory, mine, theirs, unknown)
+    return out
+
+
+def _nearest(
+    found: FaceContacts, memory: np.ndarray, mine: np.ndarray, theirs: np.ndarray, unknown: np.ndarray
+) -> np.ndarray:
+    """(k,) as `_matching` for the contacts ``unknown`` (k,), which ``memory`` does not know by the names ``mine`` (n, 5) and
+    ``theirs``: corners by their vertex and edge, other points by where they lie."""
+    alone, place = theirs[:, 2] < 0, theirs[:, 4]
+    corner = {}
+    for rows, ends in ((alone | (place == 0), theirs[:, :2]), (~alone & (place == _NAMED), theirs[:, 2:4])):
+        corner |= dict(zip(map(tuple, ends[rows].tolist()), np.flatnonzero(rows).tolist(), strict=True))
+    low, high = np.minimum(memory["block"], memory["other"]), np.maximum(memory["block"], memory["other"])
+    out = np.full(len(unknown), -1)
+    for k, c in enumerate(unknown.tolist()):
+        v, e, w, f, at = mine[c].tolist()
+        known = corner.get((v, e), -1) if w < 0 or at == 0 else -1
+        if known < 0 and at == _NAMED:
+            known = corner.get((w, f), -1)
+        if known < 0 and w >= 0:
+            one, two = sorted((int(found.block[c]), int(found.other[c])))
+            near = np.flatnonzero((low == one) & (high == two) & ~alone)
+            if len(near):
                 apart = np.hypot(*(memory["point"][near] - found.geometry[c, 5:7]).T)
                 best = int(np.argmin(apart))
-                k = near[best] if apart[best] <= memory["length"][near[best]] + found.geometry[c, 4] else -1
-        out[c] = k
+                if apart[best] <= memory["length"][near[best]] + found.geometry[c, 4]:
+                    known = int(near[best])
+        out[k] = known
     return out
