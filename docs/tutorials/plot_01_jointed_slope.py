@@ -173,7 +173,7 @@ terminal("geomech run my_slope.toml")
 # and a film of the motion; ``outputs/my_slope/blocks.pvd`` opens in :doc:`ParaView </start/paraview>`.
 
 terminal("geomech render outputs/my_slope --no-gif")
-Path("outputs/my_slope/pictures/specimen.png").rename("shown/end.png")
+Path("outputs/my_slope/pictures/displacement.png").rename("shown/end.png")
 
 # %%
 # Is it right? On a plane at 30° with 24° of friction a rigid slab moves by

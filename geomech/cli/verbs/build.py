@@ -20,8 +20,8 @@ def declare(verbs: Verbs) -> None:
         "geomech build slope.toml\ngeomech build slope.toml --set geometry.seed=7 --out /tmp/seed7",
     )  # fmt: skip
     build.description = str(build.description) + (
-        " Joint sets are told as they were asked for and as they came out (block_system.json), with a picture of block"
-        " sizes, directions, trace lengths and nodes beside the blocks' own (joint_statistics.png)."
+        " block_system.json compares the joint sets as specified with those generated; joint_statistics.png shows block"
+        " sizes, directions, trace lengths and nodes."
     )
     scene_arguments(build)
     build.add_argument("--out", type=Path, metavar="DIR", help="folder (default outputs/NAME[/VARIANT]/build)")

@@ -19,8 +19,8 @@ def declare(verbs: Verbs) -> None:
         "geomech resume outputs/two_cracks/phi_30\ngeomech resume outputs/slope --set run.end_time_s=20",
     )  # fmt: skip
     resume.description = str(resume.description) + (
-        " What is written is bit for bit what the run would have left uninterrupted. A run ends its cycle and stores "
-        "itself on Ctrl-C or SIGTERM; a second one ends it at once. A run that a "
+        " The results are the same to the last bit as without the interruption. A run ends its cycle and stores "
+        "its state on Ctrl-C or SIGTERM; a second one ends it at once. A run that a "
         "script has put in the background ignores Ctrl-C and ends on SIGTERM (`kill`)."
     )
     resume.add_argument("run", type=Path, metavar="RUN", help="run folder")
