@@ -254,11 +254,11 @@ class _KernelCompiler(Compiler):
     """Numba's own, into a `_Kernel`."""
 
     library = _Kernel
-    told = "compiling %s"
+    message = "compiling %s"
 
     def compile_extra(self, function: Callable):
-        if self.told:
-            log.debug(self.told, function.__qualname__)
+        if self.message:
+            log.debug(self.message, function.__qualname__)
         if self.state.library is None:
             self.state.library = self.library(self.state.targetctx.codegen(), function.__qualname__)
             self.state.library.enable_object_caching()
@@ -270,7 +270,7 @@ class _PartCompiler(_KernelCompiler):
     """Numba's own, into a `_Part`."""
 
     library = _Part
-    told = ""
+    message = ""
 
 
 class _CacheFile(IndexDataCacheFile):

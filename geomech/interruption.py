@@ -13,21 +13,21 @@ from typing import Any, Self
 #: A cycle that lasts longer than this after the first interrupt is broken off, s. What is lost is the cycle and what came
 #: since the last checkpoint, which is written every half a minute.
 PATIENCE = 5.0
-_TOLD = f"stopping when this cycle is done, or in {PATIENCE:g} s; once more to stop at once"
+_MESSAGE = f"stopping when this cycle is done, or in {PATIENCE:g} s; once more to stop at once"
 
 
 class Interruption:
     """While this context lasts, a first interrupt only sets ``asked``; the next raises KeyboardInterrupt, as all do
-    outside. ``told`` is what a first one is answered with. ``patience`` seconds after the first one KeyboardInterrupt
-    is raised by itself, unless `wait` has been called; None: never.
+    outside. ``message``: the answer to a first one. ``patience`` seconds after the first one KeyboardInterrupt is raised
+    by itself, unless `wait` has been called; None: never.
 
     SIGTERM and SIGHUP are taken the same way where they raise KeyboardInterrupt already, as on the command line. What is
     ignored stays ignored: a shell script starts its background jobs so, in order that a Ctrl-C meant for another
     program leaves them alone. In other threads than the main one, where signals do not arrive, nothing changes.
     """
 
-    def __init__(self, told: str = _TOLD, patience: float | None = PATIENCE) -> None:
-        self.asked, self.told, self.patience = False, told, patience
+    def __init__(self, message: str = _MESSAGE, patience: float | None = PATIENCE) -> None:
+        self.asked, self.message, self.patience = False, message, patience
         self._before: dict[int, Any] = {}
 
     def __enter__(self) -> Self:
@@ -57,4 +57,4 @@ class Interruption:
             self._before[signal.SIGALRM] = signal.signal(signal.SIGALRM, self._take)
             signal.setitimer(signal.ITIMER_REAL, self.patience)
         with suppress(OSError):  # of a terminal that is gone
-            os.write(2, f"\n{self.told}\n".encode())
+            os.write(2, f"\n{self.message}\n".encode())

@@ -95,9 +95,9 @@ def _resumed(wish: _Wish) -> dict[str, Any]:
     _refuse_other_sources(header, path)
     scene = None if header["scene"] is None else wish.scene()
     changes = {} if scene is None else _changes(header, scene.resolved())
-    told = _told_end(folder)
-    if told is not None:
-        _refuse_finished(told, changes, header, scene)
+    reason = _end_reason(folder)
+    if reason is not None:
+        _refuse_finished(reason, changes, header, scene)
     stored = checkpoint_file.read(path)
     problem = stored["coupling"].problem
     if scene is not None:
@@ -144,9 +144,9 @@ def _changes(header: Mapping[str, Any], resolved: Mapping[str, Any]) -> dict[str
     }
     forbidden = [key for key in changes if not any(key == name or key.startswith(f"{name}.") for name in ALLOWED)]
     if forbidden:
-        told = "; ".join(f"{key} was {changes[key][0]!r}, is now {changes[key][1]!r}" for key in forbidden[:6])
+        reason = "; ".join(f"{key} was {changes[key][0]!r}, is now {changes[key][1]!r}" for key in forbidden[:6])
         raise NotResumable(
-            f"this would change what has happened in the run: {told}. Set it back, or run the changed scene into "
+            f"this would change what has happened in the run: {reason}. Set it back, or run the changed scene into "
             f"another folder. What may be changed: {', '.join(ALLOWED)}"
         )
     files = digests(resolved)
@@ -167,7 +167,7 @@ def _flat(node: Any, path: str = "") -> dict[str, Any]:
     return {path: node}
 
 
-def _told_end(folder: Path) -> str | None:
+def _end_reason(folder: Path) -> str | None:
     """Why the run ended by itself, as its summary has it; None where it did not."""
     path = folder / "summary.json"
     if not path.is_file():
@@ -198,7 +198,7 @@ def _refuse_finished(end: str, changes: Mapping[str, Any], header: Mapping[str, 
 
 def _begin_again(wish: _Wish) -> dict[str, Any]:
     folder = wish.folder
-    end = _told_end(folder)
+    end = _end_reason(folder)
     if end is not None:
         raise Finished(
             f"the run has ended ({end}), and it has no checkpoint: run the scene anew to let it go on, with a larger "

@@ -59,7 +59,9 @@ def test_the_lowest_versions_that_are_said_to_do_run_draw_and_read(tmp_path):
     venv.create(tmp_path / "low", with_pip=True)
     python = tmp_path / "low" / "bin" / "python"
     got = subprocess.run([python, "-m", "pip", "install", "-q", *lowest], check=False, capture_output=True, text=True)
-    if got.returncode and re.search("connection|resolution|network|timed out", got.stderr, re.IGNORECASE):
+    # Not "resolution": pip says that too of bounds that contradict each other.
+    unreached = "Temporary failure in name resolution|NewConnectionError|Network is unreachable|timed out"
+    if got.returncode and "ResolutionImpossible" not in got.stderr and re.search(unreached, got.stderr):
         pytest.skip("no package registry can be reached")
     assert got.returncode == 0, got.stderr
     (tmp_path / "scene.toml").write_text(PLATE)

@@ -126,7 +126,7 @@ def processor_seconds() -> float:
     return spent.user + spent.system + spent.children_user + spent.children_system
 
 
-def told_times(spent: Mapping[str, Mapping[str, float]]) -> str:
+def times_text(spent: Mapping[str, Mapping[str, float]]) -> str:
     """The table of what every topic took, and all of them."""
     rows = [(name, took["seconds"], took["of processor"]) for name, took in spent.items()]
     rows.append(("all", sum(row[1] for row in rows), sum(row[2] for row in rows)))
@@ -158,7 +158,7 @@ def write(
 ) -> Path:
     """``topics`` as JSON; ``unit`` is the yardstick's time, ``spent`` what the topics took."""
     path.parent.mkdir(parents=True, exist_ok=True)
-    told = {
+    record = {
         "machine": machine(),
         "quick": quick,
         "yardstick_s": unit,
@@ -168,7 +168,7 @@ def write(
             for name, found in topics.items()
         },
     }
-    write_json(path, told)
+    write_json(path, record)
     return path
 
 
@@ -176,15 +176,15 @@ def read(path: Path, *, quick: bool | None = None) -> dict:
     """What `write` wrote. Raises FileNotFoundError, and ValueError for a file of something else, or of a run that was
     ``quick`` where this one is not (or the other way round): figures of the same name are then of other sizes."""
     try:
-        told = json.loads(Path(path).read_text(encoding="utf-8"))
+        record = json.loads(Path(path).read_text(encoding="utf-8"))
     except json.JSONDecodeError as error:
         raise ValueError(f"{path} is no JSON ({error}); give a file that `geomech bench` wrote") from error
-    if not isinstance(told, dict) or not {"topics", "yardstick_s"} <= set(told):
+    if not isinstance(record, dict) or not {"topics", "yardstick_s"} <= set(record):
         raise ValueError(f"{path} holds no figures of a benchmark; give a file that `geomech bench` wrote")
-    if quick is not None and bool(told.get("quick")) != quick:
+    if quick is not None and bool(record.get("quick")) != quick:
         this, other = ("this run is quick", "was not") if quick else ("this run is not quick", "was")
         raise ValueError(f"{this}, that of {path} {other}: compare quick with quick, and full with full")
-    return told
+    return record
 
 
 @dataclass(frozen=True)

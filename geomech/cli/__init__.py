@@ -1,4 +1,4 @@
-"""The command line: ``geomech examples | new | check | build | run | resume | safety | sweep | render | report | bench | doctor``.
+"""The command line: ``geomech examples | new | check | build | run | resume | safety | sweep | render | view | report | bench | doctor``.
 
 Exit codes: 0 done, 1 the run failed (what was written stays readable), 2 bad input, 3 interrupted (Ctrl-C or SIGTERM).
 Each verb is a module: ``declare`` says its arguments, and nothing heavy is imported before the verb is asked for.

@@ -59,7 +59,7 @@ def crack_cost(problem: Problem) -> CrackCost:
     return CrackCost(cracked, on_sides, on_cracks, sides, memory, seconds)
 
 
-def told(problem: Problem) -> list[str]:
+def cost_lines(problem: Problem) -> list[str]:
     """Lines that tell the `crack_cost` of ``problem``; none without cracked blocks."""
     if not problem.cracks.n_cracks or problem.endless is not None:
         return []

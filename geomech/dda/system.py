@@ -327,6 +327,7 @@ class BlockSystem:
             if cuts > self.settings.max_step_cuts:
                 raise NotConverged(
                     f"the block step at t = {state.time:g} s failed after {cuts - 1} cuts (dt = {dt:.3g} s): {reason}"
+                    f"{self._way_out}"
                 )
             self.limits.shortens(*guilty)
             log.debug("step at t = %g s cut from %.4g to %.4g s: %s", state.time, dt, shorter, reason)
@@ -435,6 +436,13 @@ class BlockSystem:
                 "no block is fixed, so that under gravity all of them fall and statics finds no equilibrium: fix a "
                 "block, or let velocity be carried (dynamic_factor = 1)"
             )
+
+    @property
+    def _way_out(self) -> str:
+        """What may help a run in motion whose steps fail."""
+        if self.scheme.static or self.settings.springs == "resolved":
+            return ""
+        return '; dda.springs = "resolved" may go on, with contacts no stiffer than the time step resolves'
 
     def _refuse_crushed(self, state: State) -> None:
         area = block_moments(state.vertices, self.next, self.vertex_start)[:, 0]

@@ -13,7 +13,7 @@ from .console.progress import Progress
 from .observer import Group, Observer
 from .reading import Run
 from .run_folder import RunFolder
-from .run_record import RunLog, SceneCopy
+from .run_record import Places, RunLog, SceneCopy
 from .tables.histories import Histories
 from .tables.joint_histories import JointHistories
 from .tables.summary import Summary
@@ -26,6 +26,7 @@ __all__ = [
     "Histories",
     "JointHistories",
     "Observer",
+    "Places",
     "Progress",
     "Run",
     "RunFolder",
@@ -49,7 +50,7 @@ def standard_observers(scene: Any = None, *, quiet: bool = False) -> list[Observ
     if resolved is not None:
         # Before the folder is cleared: what then breaks off can begin again.
         watchers.append(SceneCopy(resolved))
-    watchers += [RunFolder(), RunLog()]
+    watchers += [RunFolder(), RunLog(), Places()]
     interior_every = getattr(output, "interior_every", 5) if getattr(output, "interior", True) else 0
     return [
         *watchers,

@@ -29,6 +29,7 @@ class Run:
 
     def __init__(self, folder: Path | str) -> None:
         self.folder = Path(folder)
+        self._files: dict[str, dict[int, Path | HdfStep]] = {}
         if not (self.folder / "history.csv").is_file():
             raise FileNotFoundError(f"{self.folder} holds no run: history.csv is missing")
 
@@ -81,10 +82,12 @@ class Run:
 
     def grids(self, name: str) -> dict[int, Path | HdfStep]:
         """cycle number → file (or step) of the series ``name``, in order."""
-        return {
-            file.cycle if isinstance(file, HdfStep) else int(file.stem.rpartition("_")[2]): file
-            for _, file in self.series(name)
-        }
+        if name not in self._files:
+            self._files[name] = {
+                file.cycle if isinstance(file, HdfStep) else int(file.stem.rpartition("_")[2]): file
+                for _, file in self.series(name)
+            }
+        return self._files[name]
 
     def grid(self, name: str, cycle: int) -> pyvista.UnstructuredGrid:
         """The series ``name`` at ``cycle``, or at the last cycle written before it. Raises KeyError without one."""

@@ -78,7 +78,7 @@ class RunLock:
                 locked = _locked(handle)
                 found = _read(handle)
                 if locked is False or (locked is None and found and _alive(found)):
-                    raise FolderInUse(f"{self.folder} is in use by {_told(found)}{self._way_out(locked)}")
+                    raise FolderInUse(f"{self.folder} is in use by {_holder_text(found)}{self._way_out(locked)}")
                 # Whoever had it may have removed the file between opening and locking: then it locks nobody out.
                 if locked and not _is_still(handle, path):
                     os.close(handle)
@@ -89,7 +89,7 @@ class RunLock:
             break
         self._file = handle
         if found:
-            self.stale = f"{self.folder} was left without a word by {_told(found)}, which is gone: taken over"
+            self.stale = f"{self.folder} was left without a word by {_holder_text(found)}, which is gone: taken over"
         text = json.dumps(
             {"process": os.getpid(), "host": platform.node(), "since": f"{datetime.now():%Y-%m-%d %H:%M:%S}"}
         ).encode()
@@ -144,7 +144,7 @@ def _read(handle: int) -> dict[str, Any]:
     return found if isinstance(found, dict) else {"process": "?"}
 
 
-def _told(found: dict[str, Any]) -> str:
+def _holder_text(found: dict[str, Any]) -> str:
     who = f"process {found.get('process', '?')}"
     if found.get("host"):
         who += f" on {found['host']}"

@@ -1,17 +1,21 @@
-"""What a run folder says about its origin: the log and the scene as it was understood."""
+"""What a run folder says about its origin: the log, the scene as it was understood, the places of monitors and bolts."""
 
 from __future__ import annotations
 
+import json
 import logging
 import os
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from geomech.model import Cycle, Problem, counted
+from geomech.model import GROUND, Cycle, Problem, counted
 
 from .units import stress_text
 from .unreached import unreached
+
+#: The file with the places of monitors and bolts.
+PLACES = "places.json"
 
 _log = logging.getLogger("geomech.run")
 
@@ -89,6 +93,42 @@ class SceneCopy:
         beside = folder / "scene.toml.part"
         beside.write_text(tomli_w.dumps(_without_none(self.resolved)), encoding="utf-8")
         os.replace(beside, folder / "scene.toml")
+
+    def on_cycle(self, cycle: Cycle) -> None:
+        pass
+
+    def on_end(self, summary: dict[str, Any], error: BaseException | None = None) -> None:
+        pass
+
+
+class Places:
+    """Observer that writes `PLACES`: where monitors and bolts are in the reference, m, which the scene may leave to its
+    drawing."""
+
+    def on_start(self, problem: Problem, folder: Path) -> None:
+        folder = Path(folder)
+        folder.mkdir(parents=True, exist_ok=True)
+        places = {
+            "monitors": {name: [float(x) for x in point] for name, (_, point) in problem.monitors.items()},
+            "bolts": [
+                {
+                    "name": bolt.name,
+                    "from": [float(x) for x in bolt.start],
+                    "to": [float(x) for x in bolt.end],
+                    "ground": bolt.other == GROUND,
+                }
+                for bolt in problem.loads.bolts
+            ],
+        }
+        (folder / PLACES).write_text(json.dumps(places, indent=1), encoding="utf-8")
+
+    def memory(self) -> None:
+        """Nothing: the places are those of the reference."""
+
+    def on_resume(self, problem: Problem, folder: Path, memory: None) -> None:
+        """The file stays; the model may have lost bolts meanwhile."""
+        if not (Path(folder) / PLACES).is_file():
+            self.on_start(problem, folder)
 
     def on_cycle(self, cycle: Cycle) -> None:
         pass

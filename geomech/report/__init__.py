@@ -11,10 +11,10 @@ from .table import COLUMNS, as_csv, as_text, table
 __all__ = ["COLUMNS", "as_csv", "as_text", "is_benchmark", "table", "write_page", "write_sweep_page"]
 
 
-def write_page(folder: Path, runs: Sequence[Run], path: Path | None = None) -> Path:
+def write_page(folder: Path, runs: Sequence[Run], path: Path | None = None, *, play: bool = True) -> Path:
     """Write the page of ``runs``, which lie in ``folder`` (one: in it), or with none of the benchmark there; the file,
     by default ``report.html`` in ``folder``, or ``runs.html`` where runs are below it: there a study leaves its own
-    ``report.html``."""
+    ``report.html``. With ``play`` the cycles of runs can be played in the page."""
     if not runs:
         from .benchmark_page import page_of_benchmark
 
@@ -22,11 +22,11 @@ def write_page(folder: Path, runs: Sequence[Run], path: Path | None = None) -> P
     elif len(runs) == 1:
         from .run_page import page_of_run
 
-        made = page_of_run(runs[0])
+        made = page_of_run(runs[0], play)
     else:
         from .comparison_page import page_of_runs
 
-        made = page_of_runs(runs, folder)
+        made = page_of_runs(runs, folder, play)
     below = any(run.folder.resolve() != folder.resolve() for run in runs)
     return made.write(folder / ("runs.html" if below else "report.html") if path is None else path)
 

@@ -10,20 +10,22 @@ from typing import Any
 
 from ..output.reading import Run
 from .page import Page
-from .run_page import LISTED
+from .run_page import LISTED, add_player
 from .table import shown, table
 
 #: Keys of a scene that say where it lies, not what it is.
-_NOT_TOLD = ("title", "geometry.model")
+_NOT_COMPARED = ("title", "geometry.model")
 #: So many runs are shown in pictures.
 PICTURED = 12
 
 
-def page_of_runs(runs: Sequence[Run], folder: Path) -> Page:
-    """The page of ``runs``, which lie in ``folder``."""
+def page_of_runs(runs: Sequence[Run], folder: Path, play: bool = True) -> Page:
+    """The page of ``runs``, which lie in ``folder``; with ``play`` their cycles can be played."""
     page = Page(_title(runs), f"{len(runs)} runs in {folder}")
     page.section("Side by side")
     add_table(page, runs)
+    if play:
+        add_player(page, runs)
     different = differences(runs)
     if different:
         page.section("What differs between their scenes")
@@ -63,7 +65,7 @@ def add_table(page: Page, runs: Sequence[Run]) -> None:
 def differences(runs: Sequence[Run]) -> dict[str, list[Any]]:
     """Key of the scene → its value in every run (None: not there), for keys whose values are not all the same."""
     flat = [dict(_leaves(run.scene)) for run in runs]
-    keys = dict.fromkeys(key for leaves in flat for key in leaves if not key.startswith(_NOT_TOLD))
+    keys = dict.fromkeys(key for leaves in flat for key in leaves if not key.startswith(_NOT_COMPARED))
     found = {key: [leaves.get(key) for leaves in flat] for key in keys}
     return {key: values for key, values in found.items() if any(value != values[0] for value in values)}
 

@@ -1,6 +1,7 @@
 """A self-contained HTML page: text, tables and pictures in one file, to be read on a phone, at a desk or on paper.
 
-Nothing is fetched: pictures are data in the page, there is no script, and letters are the reader's own.
+Nothing is fetched: pictures are data in the page, and letters are the reader's own. The one script is the player of
+`geomech.player`; a content security policy lets no other run and asks for nothing from elsewhere.
 """
 
 from __future__ import annotations
@@ -13,8 +14,11 @@ from pathlib import Path
 from string import Template
 from typing import Any
 
+from ..player.page import player, policy
 from .table import is_number
 
+#: What a page without a player may do: show its own pictures.
+_PLAIN = "default-src 'none'; style-src 'unsafe-inline'; img-src data:; base-uri 'none'; form-action 'none'"
 _KINDS = {".png": "image/png", ".svg": "image/svg+xml", ".gif": "image/gif", ".jpg": "image/jpeg"}
 _RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
@@ -24,6 +28,7 @@ _PAGE = Template("""\
 <head>
 <meta charset="utf-8">
 <meta name="viewport" content="width=device-width, initial-scale=1">
+<meta http-equiv="Content-Security-Policy" content="$policy">
 <title>$title</title>
 <style>
 $style
@@ -43,10 +48,19 @@ $body
 """)
 
 _STYLE = """\
-:root { --ink: #1d2026; --soft: #5d636e; --line: #d9dade; --tint: #f4f5f6; --accent: #1f6f8b; }
+:root { --ink: #1d2026; --soft: #5d636e; --line: #d9dade; --tint: #f4f5f6; --accent: #1f6f8b;
+  --paper: #fff; color-scheme: light; }
+:root[data-theme="dark"] { --ink: #e8e9ec; --soft: #a2a8b3; --line: #3a3e46; --tint: #1f2228; --accent: #6fc0dc;
+  --paper: #16181c; color-scheme: dark; }
+@media screen and (prefers-color-scheme: dark) {
+  :root:not([data-theme="light"]) { --ink: #e8e9ec; --soft: #a2a8b3; --line: #3a3e46; --tint: #1f2228;
+    --accent: #6fc0dc; --paper: #16181c; color-scheme: dark; }
+}
+@media print { :root[data-theme="dark"] { --ink: #1d2026; --soft: #5d636e; --line: #d9dade; --tint: #f4f5f6;
+  --accent: #1f6f8b; --paper: #fff; } }
 * { box-sizing: border-box; }
 html { -webkit-text-size-adjust: 100%; }
-body { margin: 0 auto; padding: 1.5rem 1.1rem 4rem; max-width: 62rem; color: var(--ink); background: #fff;
+body { margin: 0 auto; padding: 1.5rem 1.1rem 4rem; max-width: 62rem; color: var(--ink); background: var(--paper);
   font: 1rem/1.5 system-ui, -apple-system, "Segoe UI", Roboto, "Helvetica Neue", Arial, sans-serif; }
 h1 { font-size: 1.65rem; line-height: 1.2; margin: 0 0 .4rem; }
 h2 { font-size: 1.2rem; line-height: 1.25; margin: 2.4rem 0 .6rem; padding-bottom: .25rem;
@@ -71,7 +85,8 @@ td.told { text-align: left; min-width: 11rem; }
 .figures { display: grid; grid-template-columns: repeat(auto-fit, minmax(min(100%, var(--least, 17rem)), 1fr));
   gap: 1rem; margin: 1rem 0; }
 figure { margin: 0; min-width: 0; }
-figure img { max-width: 100%; height: auto; display: block; }
+figure img { max-width: 100%; height: auto; display: block; background: #fff; border-radius: .3rem; }
+.playing { width: min(96vw, 88rem); margin-left: 50%; transform: translateX(-50%); }
 figcaption { color: var(--soft); font-size: .88rem; margin-top: .3rem; }
 pre { background: var(--tint); border-radius: .35rem; padding: .7rem .9rem; overflow-x: auto; font-size: .85rem;
   line-height: 1.4; }
@@ -83,6 +98,7 @@ td.bar span { display: block; height: .7rem; border-radius: .15rem; background: 
 .warning { border-left: 3px solid #c8553d; padding-left: .7rem; overflow-wrap: anywhere; }
 @page { size: A4; margin: 16mm 15mm; }
 @media print {
+  .playing { width: auto; margin: 0; transform: none; }
   body { max-width: none; padding: 0; font-size: 10pt; }
   nav, summary { display: none; }
   h2 { break-after: avoid; margin-top: 1.4rem; }
@@ -102,6 +118,7 @@ class Page:
         self._lead = lead
         self._body: list[str] = []
         self._sections: list[str] = []
+        self._plays = False
 
     def section(self, title: str) -> None:
         self._sections.append(title)
@@ -170,6 +187,13 @@ class Page:
         if shown:
             self._body.append(f'<div class="figures" style="{size}">{"".join(shown)}</div>')
 
+    def play(self, records: Sequence[Mapping[str, Any]]) -> None:
+        """The player of runs (`geomech.player.page.records_of`), wider than the text; a page has one."""
+        if self._plays:
+            raise ValueError(f"{self.title}: a page plays its runs in one place")
+        self._plays = True
+        self._body.append(f'<div class="playing">{player(records)}</div>')
+
     def code(self, text: str) -> None:
         self._body.append(f"<pre>{html.escape(text)}</pre>")
 
@@ -182,6 +206,7 @@ class Page:
         return _PAGE.substitute(
             title=html.escape(self.title),
             style=_STYLE,
+            policy=policy() if self._plays else _PLAIN,
             lead=f'<p class="lead">{html.escape(self._lead)}</p>' if self._lead else "",
             contents=f"<nav>{' '.join(links)}</nav>" if len(links) > 2 else "",
             body="\n".join(self._body),

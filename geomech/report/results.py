@@ -18,6 +18,8 @@ if TYPE_CHECKING:
     import pandas
     import pyvista
 
+    from ..player.widget import RunPlayer
+
 #: Entries of the summary that a notebook shows, where the run has them.
 _SHOWN = ("end", "time_s", "peak_load_pa", "wall_s")
 
@@ -124,6 +126,16 @@ class RunResults:
         from ..render import draw
 
         return draw(self._run, out, **options)
+
+    def view(self, *others: RunResults, height: int = 760, megabytes: float = 4.0) -> RunPlayer:
+        """The run as a notebook plays it, cycle by cycle, ``others`` beside it with one range of colours; as far as it has
+        come. Raises ValueError where nothing was written that could be drawn.
+
+        >>> geomech.open_run("outputs/two_cracks/phi_30").view()      # doctest: +SKIP
+        """
+        from ..player.widget import RunPlayer
+
+        return RunPlayer([self._run, *(other._run for other in others)], height, megabytes)
 
     def _repr_html_(self) -> str:
         rows = [("folder", str(self.folder)), ("cycles", str(len(self._run.history)))]

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import re
 import tempfile
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +14,7 @@ import numpy as np
 from ..output.console.progress import NO_ANSWER
 from ..output.reading import Run
 from ..output.units import largest_of, length_text, length_unit, stress_text, stress_unit
+from ..player.page import records_of
 from .energy_tables import add_energy
 from .page import Page, written
 
@@ -38,12 +39,14 @@ _JOINT = {
 }
 
 
-def page_of_run(run: Run) -> Page:
-    """The page of ``run``, pictures and curves drawn on the way."""
+def page_of_run(run: Run, play: bool = True) -> Page:
+    """The page of ``run``, pictures and curves drawn on the way; with ``play`` its cycles can be played."""
     summary = run.summary
     page = Page(run.title, f"{_ended(summary)} · run folder {run.folder}")
     page.facts(key_results(run))
     add_warnings(page, run)
+    if play:
+        add_player(page, [run])
     page.section("What was run")
     add_scene(page, run)
     add_pictures(page, run)
@@ -55,6 +58,20 @@ def page_of_run(run: Run) -> Page:
     page.section("How to make it again")
     add_remaking(page, run)
     return page
+
+
+def add_player(page: Page, runs: Sequence[Run]) -> None:
+    """The cycles of ``runs`` with a slider over them, where they have been drawn."""
+    records = records_of(runs)
+    if not records:
+        return
+    page.section("The run, cycle by cycle" if len(runs) == 1 else "The runs, side by side")
+    page.play(records)
+    thinned = [f"{r['name']} {len(r['frames'])} of {r['of']}" for r in records if len(r["frames"]) < r["of"]]
+    notes = [f"Cycles that the page holds: {', '.join(thinned)}."] if thinned else []
+    if len(runs) > len(records):
+        notes.append(f"{len(records)} of {len(runs)} runs play here; `geomech report RUN RUN` takes those you name.")
+    page.text(*notes)
 
 
 def key_results(run: Run) -> dict[str, Any]:
@@ -102,11 +119,11 @@ def add_warnings(page: Page, run: Run) -> None:
     """Warnings and errors of the run's log."""
     path = run.folder / "run.log"
     text = path.read_text(encoding="utf-8", errors="replace") if path.is_file() else ""
-    told = [" ".join(words.split()) for level, words in _RECORD.findall(text) if level in ("WARNING", "ERROR")]
-    if not told:
+    lines = [" ".join(words.split()) for level, words in _RECORD.findall(text) if level in ("WARNING", "ERROR")]
+    if not lines:
         return
     page.section("Warnings")
-    for words in list(dict.fromkeys(told))[:LISTED]:
+    for words in list(dict.fromkeys(lines))[:LISTED]:
         page.warning(words)
     if run.summary.get("error"):
         page.warning(str(run.summary["error"]))
@@ -161,7 +178,7 @@ def add_pictures(page: Page, run: Run) -> None:
         if not shown:
             return
         page.section("Pictures")
-        page.figures([(path, f"{told[0].upper()}{told[1:]}: {_moment(run, cycle)}") for path, told, cycle in shown])
+        page.figures([(path, f"{lines[0].upper()}{lines[1:]}: {_moment(run, cycle)}") for path, lines, cycle in shown])
 
 
 def _moment(run: Run, cycle: int) -> str:
@@ -177,6 +194,8 @@ _CURVES = {
     "crack_length": "Length of all cracks.",
     "energy": "What the work done went into.",
     "monitors": "Ways of the monitored points.",
+    "joints": "Mean slip of the joints that slipped farthest.",
+    "bolts": "Forces of the bolts that carry most.",
 }
 
 

@@ -21,7 +21,7 @@ from ..model import OPEN, SLIP, Problem, counted
 #: turns by more than the second, about a point no farther off than two of its sizes; between, it does both.
 SLIDES, TOPPLES = 0.05, 0.5
 #: So many blocks and joints are told in words; files hold all of them.
-_TOLD = 8
+_LISTED = 8
 
 
 @dataclass(frozen=True)
@@ -132,7 +132,7 @@ class SafetyReport:
         moving = self.moving()
         if moving:
             lines.append(f"mechanism: {self.mechanism}, moving at failure:")
-            lines += [f"  {each}" for each in moving[:_TOLD]] + _more(len(moving), f"of {len(names)} blocks")
+            lines += [f"  {each}" for each in moving[:_LISTED]] + _more(len(moving), f"of {len(names)} blocks")
         lines += self._joint_lines()
         if found.anchors:
             lines.append("anchors at the factor:")
@@ -167,7 +167,7 @@ class SafetyReport:
             f"  {'joint':24}{'length m':>9}{'normal kN/m':>13}{'shear kN/m':>12}{'strength':>11}{'mobilised':>11}"
             f"{'slides':>8}{'parted':>8}",
         ]
-        for each in joints[:_TOLD]:
+        for each in joints[:_LISTED]:
             name = each.joint.removeprefix("joint:") or each.law
             name += "" if name == each.law or each.law.endswith(name) else f" ({each.law})"
             name += "" if each.reduced else ", whole"
@@ -226,4 +226,4 @@ class SafetyReport:
 
 
 def _more(number: int, of: str) -> list[str]:
-    return [f"  and {number - _TOLD} more {of}"] if number > _TOLD else []
+    return [f"  and {number - _LISTED} more {of}"] if number > _LISTED else []

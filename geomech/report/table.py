@@ -76,8 +76,8 @@ def shown(rows: Sequence[dict[str, Any]]) -> list[list[str | None]]:
         value = row[name]
         return None if value is None else COLUMNS[name].format(value * (1e6 / size) if name in loads else value)
 
-    told = [f"{name.removesuffix(_MPA)} {unit}" if name in loads else name for name in headers]
-    return [told, *([cell(row, name) for name in headers] for row in rows)]
+    names = [f"{name.removesuffix(_MPA)} {unit}" if name in loads else name for name in headers]
+    return [names, *([cell(row, name) for name in headers] for row in rows)]
 
 
 def as_text(rows: Sequence[dict[str, Any]]) -> str:

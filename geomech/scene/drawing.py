@@ -295,7 +295,7 @@ def _assembled(
             message = f"{at}: {flaw.message}" if at else flaw.message
             faults.append(Fault(place(path), message, flaw.way_out + counted_from))
         return drawing
-    mended = cut.told("listed by geomech build")
+    mended = cut.repair_lines("listed by geomech build")
     warnings += [Fault(place(("geometry",)), f"{MENDED}: {text}", "") for text in mended]
     joints = tuple(joint.name for joint in cut.joints)
     return replace(

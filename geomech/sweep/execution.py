@@ -76,23 +76,23 @@ class Sweep:
 
     def text(self) -> str:
         """What it came to, for the terminal."""
-        told = [
+        lines = [
             f"{len(self.rows)} runs in {self.folder}" + ("" if self.complete else f", of {self._asked}: not complete")
         ]
-        told.append(f"  {self.rare if self.rare is not None else self.probability} ({self.plan.fails})")
+        lines.append(f"  {self.rare if self.rare is not None else self.probability} ({self.plan.fails})")
         result = self.plan.result
         values = self.column(result)
         values = values[np.isfinite(values)]
         if len(values) and self.rare is None:
             low, middle, high = np.quantile(values, (0.05, 0.5, 0.95))
-            told.append(
+            lines.append(
                 f"  {result}: mean {values.mean():.4g}, standard deviation "
                 f"{values.std(ddof=1) if len(values) > 1 else 0:.3g}, "
                 f"5 % {low:.4g}, median {middle:.4g}, 95 % {high:.4g}"
             )
         for each in counted_by_reason(self.rows):
-            told.append(f"  {each['runs']} {each['status']}: {each['reason'][:120]} (run {each['run']})")
-        return "\n".join(told)
+            lines.append(f"  {each['runs']} {each['status']}: {each['reason'][:120]} (run {each['run']})")
+        return "\n".join(lines)
 
     @property
     def _asked(self) -> int:
@@ -250,7 +250,7 @@ class _Conduct:
         self.warm: set[tuple[str, int]] = set()
         self.settled = False
         self.began = time.monotonic()
-        self.told = self.began
+        self.last_report = self.began
         self.written, self.cost = self.began, 0.0
         self.fresh = 0
         self.total = len(plan.table) if not plan.settings["rare"] else 0
@@ -349,8 +349,8 @@ class _Conduct:
         if row["status"] != DONE and self.telling.log:
             say(f"  {row['status']}: {row['reason']}\n  again: {self.plan.how_to_repeat(values)}")
         now = time.monotonic()
-        if now - self.told >= self.telling.seconds or len(self.journal.rows) == self.total:
-            self.told = now
+        if now - self.last_report >= self.telling.seconds or len(self.journal.rows) == self.total:
+            self.last_report = now
             say(self._progress())
 
     def _progress(self) -> str:

@@ -75,7 +75,7 @@ def carry_out(job: Job) -> dict[str, Any]:
             row |= {"status": FAILED, "reason": str(error)}
         except Exception as error:
             refused = any(kind.__name__ in _REFUSALS for kind in type(error).__mro__)
-            row |= {"status": REFUSED if refused else FAILED, "reason": _told(error)}
+            row |= {"status": REFUSED if refused else FAILED, "reason": _error_text(error)}
     row["warnings"] = len(heard)
     row["first_warnings"] = [text[:_REASON] for text in heard[:_WARNED]]
     row["fails"] = _fails(job, row)
@@ -132,7 +132,7 @@ def kind_of_reason(reason: str) -> str:
     return _OWN.sub("#", reason.splitlines()[0] if reason else "")
 
 
-def _told(error: Exception) -> str:
+def _error_text(error: Exception) -> str:
     faults = getattr(error, "errors", None)
     if isinstance(faults, list) and faults and hasattr(faults[0], "message"):
         text = f"{faults[0].place}: {faults[0].message}"

@@ -128,12 +128,12 @@ def plan_of(
     variant: str | None = None,
     table: str | Path | None = None,
     limit: int | None = None,
-    told: str = "",
+    source: str = "",
     alone: bool = False,
 ) -> Plan:
     """The plan of a sweep over ``scene`` with the ``given`` settings, those of the file ``table`` (by default
     sweep.toml beside the scene, where there is one) and those of the scene's [sweep]; the first that says something
-    counts, of `vary`, `derive` and `columns` name by name. ``limit``: more runs are refused (default 10 000). ``told``
+    counts, of `vary`, `derive` and `columns` name by name. ``limit``: more runs are refused (default 10 000). ``source``
     stands before the names of given settings in messages ("--"). ``alone``: the given settings are all there are.
 
     Raises SceneError with every fault: unknown keys, empty ranges, distributions beyond a key's bounds …
@@ -141,7 +141,7 @@ def plan_of(
     path = Path(scene)
     path = path / SCENE_FILE if path.is_dir() else path
     base = load_scene(path, overrides, variant, to_run=False)
-    merged, place, faults = _merged(base, Path(table) if table else None, dict(given or {}), told, alone)
+    merged, place, faults = _merged(base, Path(table) if table else None, dict(given or {}), source, alone)
     settings, wrong = validate_sweep(merged, place)
     if settings is None or faults:
         raise SceneError([*faults, *wrong])
@@ -168,7 +168,7 @@ def read_plan(data: Mapping[str, Any]) -> Plan:
     )
 
 
-def _merged(base: Any, table: Path | None, given: dict[str, Any], told: str, alone: bool):
+def _merged(base: Any, table: Path | None, given: dict[str, Any], source: str, alone: bool):
     """The settings from all three places, a function that says where each stands, and faults."""
     sources: list[tuple[dict[str, Any], Any]] = []
     faults: list[Fault] = []
@@ -187,7 +187,7 @@ def _merged(base: Any, table: Path | None, given: dict[str, Any], told: str, alo
             sources.append((data, lambda path: _in_file(file, lines, path[1:])))
         except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
             faults.append(Fault(str(file), f"it cannot be read: {error}", "write the keys of [sweep] as TOML"))
-    sources.append((given, lambda path: told + " ".join(map(str, path[1:]))))
+    sources.append((given, lambda path: source + " ".join(map(str, path[1:]))))
     merged: dict[str, Any] = {}
     places: dict[tuple[str, ...], Any] = {}
     for data, where in sources:

@@ -8,7 +8,7 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parent))
 from compare_toppling_slope import check, draw, report
-from toppling import at_rest, factor_of_safety, forces, last, limit_friction, modes, run, slope
+from toppling import at_rest, factor_of_safety, forces, last, limit_friction, modes, run, slope, written
 
 FRICTION, SECONDS = 0.65, 3.0  # of the slope that comes down
 #: Where forces are taken, of the limit: everything that must slide does, so that friction leaves no force open, and
@@ -24,8 +24,9 @@ def main(folder: Path, out: Path, overrides=(), variants=(), quiet: bool = False
     limit = limit_friction(rest)
     table = forces(last(run(slope(MOBILISED * limit), rest, 1.5)))
     falling = slope(FRICTION)
-    early = last(run(falling, rest, 0.5)).state
-    fallen = last(run(falling, early, SECONDS)).state
+    steps = written(falling, rest, run(falling, rest, SECONDS), Path(out) / "fall")
+    early = next(step.state for step in steps if step.state.time >= 0.5 * (1 - 1e-12))
+    fallen = last(steps).state
     done = modes(falling, rest, early)
     safety = SAFE, factor_of_safety(SAFE)
     text = report(limit, table, FRICTION, done, safety)

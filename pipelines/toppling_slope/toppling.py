@@ -3,11 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from pathlib import Path
 
 import numpy as np
 
 from geomech import dda
-from geomech.model import OPEN, Blocks, DdaSettings, History, JointLaw, Loads, Material, State
+from geomech.model import (
+    OPEN,
+    TIP,
+    Blocks,
+    Cracks,
+    Cycle,
+    DdaSettings,
+    History,
+    JointLaw,
+    Loads,
+    Material,
+    Problem,
+    State,
+)  # fmt: skip
+from geomech.output import Group, Histories, RunFolder, SceneCopy, Series, Summary, ViewScript
 from geomech.reference.slopes import toppling_slope as published
 
 #: Stiff rock: the published calculation knows rigid blocks, and the columns lean by their elastic give.
@@ -41,6 +56,30 @@ def run(system: dda.BlockSystem, state: State, end: float) -> Iterator[dda.StepR
         result = system.step(state, WEIGHT, min(system.settings.time_step, end - state.time))
         state = result.state
         yield result
+
+
+def written(
+    system: dda.BlockSystem, rest: State, results: Iterator[dda.StepResult], folder: Path
+) -> Iterator[dda.StepResult]:
+    """``results`` from ``rest`` on, written as a run in ``folder``: series for ParaView and `geomech render`, history."""
+    none = Cracks.from_polylines([])
+    problem = Problem(
+        "A slope of sixteen blocks topples", system.blocks, none, system.materials, system.joints, loads=WEIGHT
+    )
+    watch = Group([RunFolder(), SceneCopy({"title": problem.title}), Histories(), Series(every=5, interior_every=0),
+                   ViewScript(), Summary()])  # fmt: skip
+    watch.on_start(problem, folder)
+    number, summary = 0, {"title": problem.title, "end": "end of the run"}
+
+    def cycle(state: State) -> Cycle:
+        return Cycle(number, number, 0, 0.0, np.nan, system.blocks, state, none, np.zeros(0, TIP))
+
+    watch.on_cycle(cycle(rest))
+    for result in results:
+        number += 1
+        watch.on_cycle(cycle(result.state))
+        yield result
+    watch.on_end(summary)
 
 
 def creep(friction: float, rest: State) -> float:

@@ -294,17 +294,21 @@ def test_refusals_say_what_is_wrong(platens):
         dda.CrackResponse(np.zeros((3, 3)), np.zeros((3, 3)))
 
 
-def test_failure_names_the_reason_and_the_contact():
+@pytest.mark.parametrize("factor", [0.0, 1.0])
+def test_failure_names_the_reason_the_contact_and_in_motion_a_way_out(factor):
     blocks = Blocks.from_polygons(
         [rectangle(-5, -1, 5, 0), rectangle(0, 0, 1, 1)], fixed=[True, False], names=["ground", "box"]
     )
-    settings = DdaSettings(max_open_close_iterations=1, max_step_cuts=2, max_displacement_ratio=0.1)
+    settings = DdaSettings(
+        max_open_close_iterations=1, max_step_cuts=2, max_displacement_ratio=0.1, dynamic_factor=factor
+    )
     system = dda.BlockSystem(
         blocks, [Material("rock", 10e9, 0.25, density=2600.0)], [JointLaw("j", friction_angle=0.1)], settings=settings
     )
     loads = Loads(gravity=GRAVITY, point_loads=(PointLoad(1, (0.5, 0.1), History.constant([1e5, 0.0])),))
-    with pytest.raises(dda.NotConverged, match=r"2 cuts.*open-close.*'box' on 'ground'"):
+    with pytest.raises(dda.NotConverged, match=r"2 cuts.*open-close.*'box' on 'ground'") as refused:
         system.step(State.at_rest(blocks), loads, 1.0)
+    assert ('dda.springs = "resolved"' in str(refused.value)) == bool(factor)
 
 
 def test_a_step_that_is_cut_tells_the_log_why(caplog):

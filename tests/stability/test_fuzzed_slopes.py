@@ -60,7 +60,7 @@ def test_what_once_went_wrong(seed):
     found = watched(seed, seconds=60.0)
     assert found.verdict in (RIGHT, REPORTED, LONG) and not found.faults
     assert MENDED[seed] not in found.message
-    assert not any(MENDED[seed] in what for what in found.told)
+    assert not any(MENDED[seed] in what for what in found.reported)
 
 
 def test_faces_that_no_state_fits_are_told_and_do_not_end_a_run():
@@ -76,10 +76,10 @@ def test_what_does_not_hold_is_wrong_unless_a_warning_says_so(monkeypatch):
     monkeypatch.setitem(INVARIANTS, "strain", tight)
     found = watched(34)
     assert found.verdict == WRONG and "strain" in found.faults[0] and "cycle 1:" in found.faults[0]
-    monkeypatch.setattr(limited_runs.Heard, "said", [f"t = 0 s: rock and cracks {tight.told[0]}"], raising=False)
+    monkeypatch.setattr(limited_runs.Heard, "said", [f"t = 0 s: rock and cracks {tight.reported[0]}"], raising=False)
     monkeypatch.setattr(limited_runs.Heard, "__init__", lambda self: super(type(self), self).__init__())
     found = watched(34)
-    assert found.verdict == REPORTED and not found.faults and "strain" in found.told[0]
+    assert found.verdict == REPORTED and not found.faults and "strain" in found.reported[0]
 
 
 def test_time_that_is_up_in_a_compiled_function_is_no_error(monkeypatch):

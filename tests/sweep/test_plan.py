@@ -12,7 +12,7 @@ FRICTION, COHESION = "joints.default.friction_angle_deg", "joints.default.cohesi
 
 def refused(scene, given, **how) -> str:
     with pytest.raises(SceneError) as error:
-        plan_of(scene, given, told="--", **how)
+        plan_of(scene, given, source="--", **how)
     return str(error.value)
 
 

@@ -44,8 +44,8 @@ def measure(quick: bool = False) -> Measured:
 
     points = list(_points(2 if quick else None))
     FOLDER.mkdir(parents=True, exist_ok=True)
-    told = {"points": [asdict(p) for p in points], "quick": quick}
-    write_json(FOLDER / "work_precision.json", told)
+    record = {"points": [asdict(p) for p in points], "quick": quick}
+    write_json(FOLDER / "work_precision.json", record)
     if not quick:
         draw(
             points, METHODS, FOLDER / "work_precision.png", (2, 2), lambda p: f"{p.size:g}",

@@ -162,7 +162,7 @@ def measure(quick: bool = False) -> Measured:
     elements = [dict(zip(("phi_deg", "error_k_i", "error_k_ii"), (phi, *paper_elements(phi)))) for phi in angles]
     points = by_order(PHI_DEG[0], (2, 4, 6) if quick else (2, 3, 4, 6, 8))
     FOLDER.mkdir(parents=True, exist_ok=True)
-    told = {
+    record = {
         "routes": rows, "quadratic_elements": elements, "time and error by order": [asdict(p) for p in points],
         "quick": quick,
     }  # fmt: skip
@@ -171,7 +171,7 @@ def measure(quick: bool = False) -> Measured:
             points, ROUTES, FOLDER / "work_precision.png", (1, 2), lambda p: f"p = {p.size}",
             ("largest error of a stress intensity factor, better to the right", "a load step, bodies made anew, ms"), None,
         )  # fmt: skip
-    write_json(FOLDER / "boundary.json", told)
+    write_json(FOLDER / "boundary.json", record)
     lines = [
         "How contact forces reach the cracks: errors of K against the crack solver alone under the exact tractions",
         f"{'stress MPa':>10}{'φ':>5}  {'route':<22}{'K_I':>10}{'K_II':>10}",

@@ -158,8 +158,8 @@ def measure(quick: bool = False, blocks: int | None = None) -> Measured:
         cost, others = _measured(name, SCENES[name](n), LONGEST[not quick], jacobi, domains)
         costs.append(cost)
         for other in others:
-            told = {key: getattr(other, key) for key in ("method", "iterations", "seconds", "residual")}
-            iterated.append({"scene": name, "blocks": cost.blocks, **told})
+            found = {key: getattr(other, key) for key in ("method", "iterations", "seconds", "residual")}
+            iterated.append({"scene": name, "blocks": cost.blocks, **found})
     # Behind all others, for static steps of very many blocks take more memory.
     for k, (n, name) in enumerate(scenes):
         if n <= SETTLES if quick else (name == "wall" or n <= SLOPES_SETTLE):

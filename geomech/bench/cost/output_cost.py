@@ -75,11 +75,11 @@ def measure(quick: bool = False) -> Measured:
     share, at_rest = (found.processor / (found.processor + step) for step in (moving, last))
     writers = {name: statistics.median(times) for name, times in _writers(problem, cycle, 3 if quick else 5).items()}
     FOLDER.mkdir(parents=True, exist_ok=True)
-    told = {
+    record = {
         "series": asdict(found), "steps_s": spent, "share of a step": share, "share of the last step": at_rest,
         "writers_s": writers, "quick": quick,
     }  # fmt: skip
-    write_json(FOLDER / "output.json", told)
+    write_json(FOLDER / "output.json", record)
     ours = writers[OURS]
     spent_on = {f"one file of the blocks: {name}": 1e3 * spent for name, spent in writers.items()}
     spent_on |= {"all series, a cycle": 1e3 * found.processor, "a step after sudden weight": 1e3 * moving}

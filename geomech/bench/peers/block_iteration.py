@@ -58,7 +58,7 @@ def refactored(solver: BlockSolver, points: np.ndarray, data: np.ndarray, right:
     spent_on = stopwatch()
     another.factor(data)
     x = another.solve(data, right)
-    return _told("direct, all factored anew", solver, data, right, x, 1, spent_on())
+    return _row("direct, all factored anew", solver, data, right, x, 1, spent_on())
 
 
 def pardiso(solver: BlockSolver, data: np.ndarray, right: np.ndarray) -> Iterated:
@@ -76,7 +76,7 @@ def pardiso(solver: BlockSolver, data: np.ndarray, right: np.ndarray) -> Iterate
         method._call_pardiso(matrix, right)
         method.set_phase(33)
         x = method._call_pardiso(matrix, right)
-        return _told("PARDISO of MKL", solver, data, right, x, 1, spent_on())
+        return _row("PARDISO of MKL", solver, data, right, x, 1, spent_on())
     finally:
         method.free_memory(everything=True)
 
@@ -100,7 +100,7 @@ def block_jacobi(
         count[0] += 1
 
     x, _ = bicgstab(matrix, right, rtol=tolerance, maxiter=most, M=behind, callback=tell)
-    return _told("block Jacobi", solver, data, right, x, count[0], spent_on())
+    return _row("block Jacobi", solver, data, right, x, count[0], spent_on())
 
 
 def two_levels(
@@ -142,7 +142,7 @@ def two_levels(
         return (z + np.einsum("nab,nb->na", fields, coarse.substitute(total.ravel()).reshape(-1, 6)[of])).ravel()
 
     x, iterations = _flexible_gmres(lambda x: solver.multiply(data, x), behind, right, tolerance)
-    return _told("two levels of domains", solver, data, right, x, iterations, spent_on())
+    return _row("two levels of domains", solver, data, right, x, iterations, spent_on())
 
 
 def _flexible_gmres(
@@ -168,7 +168,7 @@ def _flexible_gmres(
     return np.column_stack(directions) @ y, len(directions)
 
 
-def _told(method: str, solver: BlockSolver, data, right, x, iterations: int, seconds: float) -> Iterated:
+def _row(method: str, solver: BlockSolver, data, right, x, iterations: int, seconds: float) -> Iterated:
     rest = float(np.linalg.norm(right - solver.multiply(data, x)) / np.linalg.norm(right))
     return Iterated(method, iterations, seconds, rest, x)
 

@@ -223,6 +223,7 @@ SWITCHED: dict[str, dict[str, Any]] = {
     "as it is": {},
     "no central path": {"central_path": False},
     "no patches": {"patches": False},
+    "no operator splitting": {"splitting": False},
     "no more iterations where few are wrong": {"newton_tries_if_few": 1},
     "no correctors of the path": {"path_correctors": 0},
     "contacts never centred again": {"path_recentred": 0},

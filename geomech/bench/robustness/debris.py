@@ -110,11 +110,11 @@ def follow(system: dda.BlockSystem, loads: Loads, seconds: float) -> Followed:
     seen = Followed(State.at_rest(blocks), dda.EnergyBudget())
     while seen.state.time < seconds * (1 - 1e-12):
         result = system.step(seen.state, loads, min(STEP, seconds - seen.state.time))
-        told = result.statistics
+        found = result.statistics
         seen.state, seen.budget = result.state, seen.budget.after(result.energy, result.state.time)
-        seen.steps, seen.cuts = seen.steps + 1, seen.cuts + int(told["step_cuts"])
-        seen.penetration = max(seen.penetration, told["worst_penetration"] / size)
-        seen.unbalanced = max(seen.unbalanced, told["unbalanced"])
+        seen.steps, seen.cuts = seen.steps + 1, seen.cuts + int(found["step_cuts"])
+        seen.penetration = max(seen.penetration, found["worst_penetration"] / size)
+        seen.unbalanced = max(seen.unbalanced, found["unbalanced"])
         if seen.steps % LOOKED_FOR == 0:
             moments = block_moments(seen.state.vertices, blocks.next_vertex, blocks.vertex_start)
             seen.overlap = max(seen.overlap, deepest_overlap(blocks, seen.state.vertices, moments)[3])

@@ -36,14 +36,14 @@ _MODULES = ("fuzzed_slopes", "limited_runs", "random_slopes", "slope_invariants"
 @dataclass(frozen=True)
 class Watched:
     """What became of a ``seed``: ``reason`` is the name of that of a refusal, ``message`` the error's; ``faults`` (in
-    silence) and ``told`` (a warning says so) name the cycle; ``worst`` of every invariant's quantity."""
+    silence) and ``reported`` (a warning says so) name the cycle; ``worst`` of every invariant's quantity."""
 
     seed: int
     verdict: str
     reason: str = ""
     message: str = ""
     faults: tuple[str, ...] = ()
-    told: tuple[str, ...] = ()
+    reported: tuple[str, ...] = ()
     warnings: tuple[str, ...] = ()
     blocks: int = 0
     tips: int = 0
@@ -58,8 +58,8 @@ class Watched:
         """A line on what did not hold, why it was refused, or what happened."""
         if self.verdict == WRONG and not self.faults:
             return self.message.strip().splitlines()[-1]
-        if self.faults or self.told:
-            return "; ".join((*self.faults, *self.told)[:2])
+        if self.faults or self.reported:
+            return "; ".join((*self.faults, *self.reported)[:2])
         if self.reason:
             return f"{self.reason}: {self.message.strip().splitlines()[0]}"
         return ", ".join(f"{count} {kind}" for kind, count in sorted(self.events.items()))
@@ -91,15 +91,15 @@ def watched(seed: int, seconds: float = LIMIT, text: str | None = None) -> Watch
 
     ended = limited(run, seconds)
     verdict = ended.verdict
-    faults, told, worst = (), (), {}
+    faults, reported, worst = (), (), {}
     if invariants is not None:
-        faults, told, worst = tuple(invariants.faults), tuple(invariants.told), invariants.worst
+        faults, reported, worst = tuple(invariants.faults), tuple(invariants.reported), invariants.worst
     if faults:
         verdict = WRONG
-    elif told and verdict == RIGHT:
+    elif reported and verdict == RIGHT:
         verdict = REPORTED
     return Watched(
-        seed, verdict, ended.reason, ended.message, faults, told, ended.warnings, blocks, tips, ended.cycles,
+        seed, verdict, ended.reason, ended.message, faults, reported, ended.warnings, blocks, tips, ended.cycles,
         dict(events), worst, ended.seconds,
     )  # fmt: skip
 

@@ -93,7 +93,7 @@ BOUNDS = {
     },
 }
 #: Words of warnings by which a run says that its result is not to be relied on.
-WARNED = ("nothing holds", *sorted({words for invariant in INVARIANTS.values() for words in invariant.told}))
+WARNED = ("nothing holds", *sorted({words for invariant in INVARIANTS.values() for words in invariant.reported}))
 _MODULES = (
     "drawn_slopes", "limited_runs", "moved_mass", "random_slopes", "refusals", "slope_invariance", "slope_invariants",
 )  # fmt: skip
@@ -255,10 +255,10 @@ class _Compared:
         self.long |= ended.verdict == LONG
         if ended.verdict != RIGHT or last is None:
             return _Run(ended)
-        told = last.statistics
-        energies = [told.get(f"{name}_energy", 0.0) for name in ("kinetic", "elastic", "contact")]
+        statistics = last.statistics
+        energies = [statistics.get(f"{name}_energy", 0.0) for name in ("kinetic", "elastic", "contact")]
         at = BlockDisplacements.of(problem, last.blocks, last.state)
-        return _Run(ended, at, np.array([told.get("gravity_work", 0.0), *energies]))
+        return _Run(ended, at, np.array([statistics.get("gravity_work", 0.0), *energies]))
 
     def _both(self, what: str, one: _Run, other: _Run) -> bool:
         """Whether both came to their end; one refused, or in error, where the other is not, is told of."""

@@ -18,11 +18,11 @@ from ...model import OPEN, Cycle, Problem
 @dataclass(frozen=True)
 class Invariant:
     """``bound`` of a quantity that is relative to what ``meaning`` says; a run that goes beyond it is wrong, unless a
-    warning with one of the words ``told`` says so: in this step or the one before, or (``lasting``) in any before."""
+    warning with one of the words ``reported`` says so: in this step or the one before, or (``lasting``) in any before."""
 
     meaning: str
     bound: float
-    told: tuple[str, ...] = ()
+    reported: tuple[str, ...] = ()
     lasting: bool = True
 
 
@@ -72,13 +72,13 @@ INVARIANTS = {
 
 class Invariants:
     """The cycles so far: ``worst`` of every quantity, ``faults`` of what went beyond its bound without a word, and
-    those that a warning ``told`` of. ``heard`` gives the warnings so far."""
+    those that a warning ``reported`` of. ``heard`` gives the warnings so far."""
 
     def __init__(self, problem: Problem, heard: Callable[[], list[str]]) -> None:
         self.heard = heard
         self.worst = dict.fromkeys(INVARIANTS, 0.0)
         self.faults: list[str] = []
-        self.told: list[str] = []
+        self.reported: list[str] = []
         self._static = problem.dda.dynamic_factor == 0.0
         # Corners that pass each other within their rounding lie in each other by a part of it.
         self._rounded = ROUNDED_OVERLAP * problem.dda.corner_rounding
@@ -115,8 +115,8 @@ class Invariants:
         bound = invariant.bound + {"balance": self._strain, "overlap": self._rounded}.get(name, 0.0)
         if value > bound:
             lines = self.heard()[0 if invariant.lasting else self._heard_at[0] :]
-            said = any(words in line for words in invariant.told for line in lines)
-            (self.told if said else self.faults).append(f"{where}: {name} {value:.2g}")
+            said = any(words in line for words in invariant.reported for line in lines)
+            (self.reported if said else self.faults).append(f"{where}: {name} {value:.2g}")
 
     def _blocks(self, cycle: Cycle) -> Iterator[tuple[str, float, str]]:
         blocks, vertices = cycle.blocks, cycle.state.vertices
@@ -133,19 +133,19 @@ class Invariants:
         yield "overlap", share, f"{blocks.names[a]} and {blocks.names[b]}"
 
     def _balance(self, cycle: Cycle) -> Iterator[tuple[str, float, str]]:
-        told = cycle.statistics
-        yield "motion", told.get("unbalanced", 0.0), "the blocks"
+        reported = cycle.statistics
+        yield "motion", reported.get("unbalanced", 0.0), "the blocks"
         # Contacts that are pressed in, or stand apart, act off the outlines by as much; strained blocks, by their
         # corners' angles. (Found: up to 0.5 of the strain at the start of the step.)
-        yield "balance", told.get("traction_imbalance", 0.0), "cracked blocks"
-        yield "agreement", told.get("compliance_mismatch", 0.0), "cracked blocks"
+        yield "balance", reported.get("traction_imbalance", 0.0), "cracked blocks"
+        yield "agreement", reported.get("compliance_mismatch", 0.0), "cracked blocks"
         # As the budget counts it: works, or what is stored where next to nothing moves.
         works, stores = ("gravity_work", "load_work", "crack_work", "friction_loss"), ("kinetic", "elastic", "contact")
-        turned = sum(abs(told.get(name, 0.0)) for name in works)
-        turned = max(turned, sum(told.get(f"{name}_energy", 0.0) for name in stores))
+        turned = sum(abs(reported.get(name, 0.0)) for name in works)
+        turned = max(turned, sum(reported.get(f"{name}_energy", 0.0) for name in stores))
         if turned > 0:
-            yield "energy", abs(told.get("energy_residual", 0.0)) / turned, "the blocks"
-        yield "budget", abs(told.get("budget_residual", 0.0)), "blocks and cracks"
+            yield "energy", abs(reported.get("energy_residual", 0.0)) / turned, "the blocks"
+        yield "budget", abs(reported.get("budget_residual", 0.0)), "blocks and cracks"
 
     def _growth(self, cycle: Cycle) -> Iterator[tuple[str, float, str]]:
         # Whether the tips of a cycle stand is known when the next one is that of another load.

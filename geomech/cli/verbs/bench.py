@@ -18,8 +18,8 @@ def declare(verbs: Verbs) -> None:
     )  # fmt: skip
     bench.add_argument("topics", nargs="*", metavar="TOPIC", help=f"{', '.join(TOPICS)} (default: all)")
     bench.add_argument(
-        "--quick", action="store_true", help="smaller sizes and fewer of them, hardly a picture, nothing compiled "
-                                             "anew: a minute for all (else a quarter of an hour)"
+        "--quick", action="store_true", help="fewer and smaller sizes, few pictures, no new "
+                                             "compilation: a minute for all (otherwise a quarter of an hour)"
     )  # fmt: skip
     bench.add_argument(
         "--out", type=Path, metavar="FILE", help="where the figures go, JSON (default outputs/bench/figures.json)"
@@ -100,7 +100,7 @@ def _bench(options: argparse.Namespace) -> int:
             "of processor": figures.processor_seconds() - began[1],
         }
         print(found[name].text, end="\n\n", flush=True)
-    print(figures.told_times(spent), end="\n\n")
+    print(figures.times_text(spent), end="\n\n")
     print(figures.write(out, found, quick=options.quick, unit=unit, spent=spent))
     if before is None:
         return DONE

@@ -20,8 +20,8 @@ def declare(verbs: Verbs) -> None:
         "geomech build slope.toml\ngeomech build slope.toml --set geometry.seed=7 --out /tmp/seed7",
     )  # fmt: skip
     build.description = str(build.description) + (
-        " Joint sets are told as they were asked for and as they came out (block_system.json), with a picture of block"
-        " sizes, directions, trace lengths and nodes beside the blocks' own (joint_statistics.png)."
+        " block_system.json compares the joint sets as specified with those generated; joint_statistics.png shows block"
+        " sizes, directions, trace lengths and nodes."
     )
     scene_arguments(build)
     build.add_argument("--out", type=Path, metavar="DIR", help="folder (default outputs/NAME[/VARIANT]/build)")
@@ -58,20 +58,28 @@ def _build(options: argparse.Namespace) -> int:
     for name, scene in scenes.items():
         folder = options.out or (default_folder(options.scene) / (name or "") / "build")
         folder = folder / name if options.out and name and len(scenes) > 1 else folder
-        told = write_block_system(scene, folder)
+        statistics = write_block_system(scene, folder)
         picture = options.picture or folder / "blocks.png"
-        draw_block_map(scene, told, picture)
+        draw_block_map(scene, statistics, picture)
         pictures = str(picture)
-        if told["sets"]:
+        if statistics["sets"]:
             from ...render.pictures.network_statistics import draw_network_statistics
 
-            pictures += f", {draw_network_statistics(scene, told, folder / 'joint_statistics.png').name}"
+            pictures += f", {draw_network_statistics(scene, statistics, folder / 'joint_statistics.png').name}"
         if options.export:
             target = options.export if len(scenes) == 1 else options.export.with_stem(f"{options.export.stem}_{name}")
             export = partial(export_blocks, scene.problem(), scene.drawing.zones, target, options.mesh_size)
             exported = _refused(export)
-            told["lines"].append(f"  exported  {exported}")
-        print("\n".join([f"{told['title']}: {told['summary']}", *told["lines"], f"  written   {folder}, {pictures}"]))
+            statistics["lines"].append(f"  exported  {exported}")
+        print(
+            "\n".join(
+                [
+                    f"{statistics['title']}: {statistics['summary']}",
+                    *statistics["lines"],
+                    f"  written   {folder}, {pictures}",
+                ]
+            )
+        )
     return DONE
 
 

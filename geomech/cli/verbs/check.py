@@ -35,7 +35,9 @@ def _check(options: argparse.Namespace) -> int:
         tips = f" with {counted(len(problem.cracks.tips), 'tip')}" if problem.cracks.n_cracks else ""
         print("\n".join([f"{problem.title}: {problem.inventory}{tips}: no errors", *scene.overview()]))
         print(
-            "".join(f"  {'elements' if k == 0 else '':<9} {line}\n" for k, line in enumerate(crack_cost.told(problem))),
+            "".join(
+                f"  {'elements' if k == 0 else '':<9} {line}\n" for k, line in enumerate(crack_cost.cost_lines(problem))
+            ),
             end="",
         )
     if first.variants and not options.variants:

@@ -1,18 +1,22 @@
-"""``geomech report``: a table of runs, and a page with tables, curves and pictures."""
+"""Pages of runs: ``geomech report``, a table and a page with tables, curves and pictures; ``geomech view``, runs in the
+browser, cycle by cycle, while they last."""
 
 from __future__ import annotations
 
 import argparse
 import os
+import sys
+import webbrowser
 from pathlib import Path
 
 from ..messages import say
 from ..runs import open_run, run_folders
-from ..verb import DONE, Verbs, add_verb, check_writable
+from ..verb import DONE, BadInput, Verbs, add_verb, check_writable
 
 
 def declare(verbs: Verbs) -> None:
-    """The verb's arguments."""
+    """The verbs' arguments."""
+    _declare_view(verbs)
     report = add_verb(
         verbs, "report", _report, "tabulate what runs came to, and write a page with tables, curves and pictures",
         "geomech report outputs/two_cracks/phi_0\ngeomech report outputs/two_cracks\ngeomech report outputs/bench_ddm\n"
@@ -32,7 +36,34 @@ def declare(verbs: Verbs) -> None:
         metavar="FILE",
         help="where the page goes (default report.html in RUN, runs.html where RUN holds several)",
     )
+    report.add_argument(
+        "--play", action=argparse.BooleanOptionalAction, default=True, help="a slider over the cycles in the page"
+    )
     report.add_argument("--page", action=argparse.BooleanOptionalAction, default=True, help="write the page")
+
+
+def _declare_view(verbs: Verbs) -> None:
+    view = add_verb(
+        verbs, "view", _view, "play runs in the browser, cycle by cycle, also while they last",
+        "geomech view outputs/two_cracks/phi_30\ngeomech view outputs/two_cracks/phi_0 outputs/two_cracks/phi_30\n"
+        "geomech view outputs/slope --out slope.html",
+    )  # fmt: skip
+    view.add_argument("runs", nargs="+", type=Path, metavar="RUN", help="run folders, up to four side by side")
+    view.add_argument(
+        "--out", type=Path, metavar="FILE", help="write the page as one file that needs no server, and open nothing"
+    )
+    view.add_argument(
+        "--megabytes", type=float, default=8.0, metavar="N", help="size of that file, in which cycles are thinned (8)"
+    )
+    view.add_argument("--port", type=int, default=0, help="port of the server (default: any that is free)")
+    view.add_argument(
+        "--host",
+        default="127.0.0.1",
+        help="address to serve at (default: this machine alone); others need the token that is printed",
+    )
+    view.add_argument(
+        "--browser", action=argparse.BooleanOptionalAction, default=True, help="open the page in the browser"
+    )
 
 
 def _report(options: argparse.Namespace) -> int:
@@ -50,7 +81,7 @@ def _report(options: argparse.Namespace) -> int:
     if options.page and not options.csv:
         if len(options.runs) > 1:
             place = Path(os.path.commonpath([folder.resolve() for folder in folders]))
-        say(f"page: {write_page(place, runs, options.out)}")
+        say(f"page: {write_page(place, runs, options.out, play=options.play)}")
     return DONE
 
 
@@ -66,3 +97,69 @@ def _report_sweep(options: argparse.Namespace) -> int:
     if options.page:
         say(f"page: {write_sweep_page(found.folder, options.out)}")
     return DONE
+
+
+def _view(options: argparse.Namespace) -> int:
+    from ...player.page import MOST_RUNS
+
+    if not 0 <= options.port <= 65535:
+        raise BadInput(f"--port: {options.port} is no port; give 0 to 65535")
+    folders = [_only_run(place) for place in options.runs]
+    if len(folders) > MOST_RUNS:
+        raise BadInput(f"{len(folders)} runs are more than fit side by side; give up to {MOST_RUNS}")
+    return _write(options, folders) if options.out is not None else _serve(options, folders)
+
+
+def _only_run(place: Path) -> Path:
+    """The run in ``place``; the only one below it where it holds none itself."""
+    below = run_folders(place)
+    folder = below[0] if len(below) == 1 else place
+    open_run(folder)
+    return folder
+
+
+def _write(options: argparse.Namespace, folders: list[Path]) -> int:
+    from ...player.page import write_player
+    from ...player.recording import NothingToPlay
+
+    check_writable("--out", options.out)
+    if not 0.01 <= options.megabytes <= 1000:
+        raise BadInput(f"--megabytes: {options.megabytes:g} is no size of a page; give 0.01 to 1000")
+    try:
+        path = write_player([open_run(folder) for folder in folders], options.out, int(1e6 * options.megabytes))
+    except NothingToPlay as error:
+        raise BadInput(str(error)) from None
+    say(f"page: {path}, {path.stat().st_size / 1e6:.1f} MB")
+    return DONE
+
+
+def _serve(options: argparse.Namespace, folders: list[Path]) -> int:
+    from ...player.server import PortInUse, Viewer
+
+    try:
+        viewer = Viewer(folders, options.host, options.port)
+    except PortInUse as error:
+        raise BadInput(f"--port: {error}; leave it out, and a free one is taken") from None
+    except OSError as error:
+        raise BadInput(f"--host: {options.host} is no address of this machine ({error.strerror})") from None
+    say(f"{viewer.title}: {viewer.address}")
+    if not viewer.local:
+        say("whoever has this address can see the runs; it is not encrypted, so use it in a network you trust")
+    if options.browser and not _opened(viewer.address):
+        say("no browser could be opened here: open the address in yours; from another machine, first\n"
+            f"    ssh -L {viewer.port}:localhost:{viewer.port} THIS_MACHINE")  # fmt: skip
+    say("Ctrl-C ends it")
+    try:
+        viewer.serve()
+    except KeyboardInterrupt:
+        say("ended")
+    return DONE
+
+
+def _opened(address: str) -> bool:
+    if sys.platform.startswith("linux") and not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
+        return False  # what could open here would take the terminal
+    try:
+        return webbrowser.open(address)
+    except webbrowser.Error:
+        return False

@@ -19,8 +19,8 @@ def declare(verbs: Verbs) -> None:
         "geomech resume outputs/two_cracks/phi_30\ngeomech resume outputs/slope --set run.end_time_s=20",
     )  # fmt: skip
     resume.description = str(resume.description) + (
-        " What is written is bit for bit what the run would have left uninterrupted. A run ends its cycle and stores "
-        "itself on Ctrl-C or SIGTERM; a second one ends it at once. A run that a "
+        " The results are the same to the last bit as without the interruption. A run ends its cycle and stores "
+        "its state on Ctrl-C or SIGTERM; a second one ends it at once. A run that a "
         "script has put in the background ignores Ctrl-C and ends on SIGTERM (`kill`)."
     )
     resume.add_argument("run", type=Path, metavar="RUN", help="run folder")
@@ -44,6 +44,6 @@ def _resume(options: argparse.Namespace) -> int:
     except Finished as nothing_left:
         say(f"{options.run}: {nothing_left}")
     except NotResumable as error:
-        told = str(error)
-        raise BadInput(told if str(options.run) in told else f"{options.run}: {told}") from error
+        reason = str(error)
+        raise BadInput(reason if str(options.run) in reason else f"{options.run}: {reason}") from error
     return DONE

@@ -72,10 +72,12 @@ def _run_script(place: Path, options: argparse.Namespace) -> int:
             say_warnings(scenes_asked(first, options).values())
     elif "all" in variants:
         raise BadInput(f"{place} holds no scene.toml that says what its variants are: name them")
+    from ...output.console.at_work import AtWork
+
     script = _load_script(place / "run.py")
-    result = script.main(
-        place, options.out or default_folder(place), overrides=options.overrides, variants=variants, quiet=options.quiet
-    )
+    out = options.out or default_folder(place)
+    with AtWork(place.resolve().name, quiet=options.quiet):
+        result = script.main(place, out, overrides=options.overrides, variants=variants, quiet=options.quiet)
     return DONE if result is None else int(result)
 
 

@@ -68,7 +68,7 @@ def _safety(options: argparse.Namespace) -> int:
         report_compiling()
     scenes = scenes_asked(load_scene(options.scene, options.overrides, None), options)
     say_warnings(scenes.values())
-    told = {}
+    answers = {}
     for name, scene in scenes.items():
 
         def tell(trial) -> None:
@@ -85,7 +85,7 @@ def _safety(options: argparse.Namespace) -> int:
             raise BadInput(str(error)) from error
         title = "factor of the blocks without their cracks" if report.cracks else "factor of safety"
         print(f"{report.problem.title or options.scene}" + (f", {name}" if name else "") + f"\n{report.text(title)}")
-        answer = told[name or "scene"] = report.as_dict()
+        answer = answers[name or "scene"] = report.as_dict()
         if report.cracks:
             print(f"  {_caution(report.cracks)}")
             answer["factor_without_cracks"], answer["factor_of_safety"] = answer["factor_of_safety"], None
@@ -96,7 +96,7 @@ def _safety(options: argparse.Namespace) -> int:
         sys.stdout.flush()
     if options.out:
         options.out.parent.mkdir(parents=True, exist_ok=True)
-        write_json(options.out, told)
+        write_json(options.out, answers)
     return DONE
 
 

@@ -22,9 +22,8 @@ def declare(verbs: Verbs) -> None:
         "geomech sweep slope.toml --out outputs/slope_sweep --resume",
     )  # fmt: skip
     made.description = str(made.description) + (
-        " What varies, and all other settings, may stand in [sweep] of the scene or in a sweep.toml beside it; "
-        "what the "
-        "command line says goes before. One row a run goes to runs.csv and runs.parquet, a page to report.html."
+        " Variables and all other settings can be given in [sweep] of the scene or in a sweep.toml in its folder; options "
+        "on the command line take precedence. Results: one row per run in runs.csv and runs.parquet, a page report.html."
     )
     made.add_argument("scene", type=Path, metavar="SCENE", help="a scene.toml, or a folder that holds one")
     made.add_argument(
@@ -75,7 +74,7 @@ def declare(verbs: Verbs) -> None:
         help="stop a run that takes longer, and count it as failed (no limit)",
     )  # fmt: skip
     made.add_argument(
-        "--table", type=Path, metavar="FILE", help="settings as TOML (default sweep.toml beside the scene)"
+        "--table", type=Path, metavar="FILE", help="settings as TOML (default: sweep.toml in the folder of the scene)"
     )
     made.add_argument(
         "--set", action="append", default=[], metavar="KEY=VALUE", dest="overrides", help="override a key of the scene"
@@ -113,7 +112,7 @@ def _sweep(options: argparse.Namespace) -> int:
         else:
             plan = plan_of(
                 options.scene, given, overrides=options.overrides, variant=options.variant, table=options.table,
-                limit=options.limit, told="--",
+                limit=options.limit, source="--",
             )  # fmt: skip
             folder = options.out or default_folder(plan.scene)
         if options.plan:

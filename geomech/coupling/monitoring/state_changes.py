@@ -94,8 +94,8 @@ class Watched:
 
     def changes(self, now: CrackedBlocks, before: Watched) -> list[Change]:
         """Changes since ``before``. Contacts are compared only between the same blocks."""
-        told = self._of_contacts(now, before) if self.numbering == before.numbering else []
-        return told + self._of_faces(now, before)
+        changes = self._of_contacts(now, before) if self.numbering == before.numbering else []
+        return changes + self._of_faces(now, before)
 
     def _of_contacts(self, now: CrackedBlocks, before: Watched) -> list[Change]:
         rows, known = _found(self.key, before.key)
@@ -107,7 +107,7 @@ class Watched:
         gone = np.setdiff1d(np.flatnonzero(before.state != OPEN), rows)
         kept = ~self._taken_over(opens, closes, before, gone)
         changed = np.flatnonzero(((was != self.state) | lost) & kept)
-        told = []
+        changes = []
         for a, b in sorted(set(map(tuple, np.sort(self.pair[changed], axis=1).tolist()))):
             of = (np.sort(self.pair, axis=1) == (a, b)).all(axis=1)
             each = {"opening": opens, "closure": closes, "debonding": lost}
@@ -119,8 +119,8 @@ class Watched:
                 if len(own):
                     x, y = self.point[own].mean(axis=0).tolist()
                     detail = f"{now.blocks.names[b]} on {now.blocks.names[a]} {_DOES[kind]}"
-                    told.append(Change(kind, True, own, last, (x, y), detail))
-        return told
+                    changes.append(Change(kind, True, own, last, (x, y), detail))
+        return changes
 
     def _taken_over(self, opens: np.ndarray, closes: np.ndarray, before: Watched, gone: np.ndarray) -> np.ndarray:
         """(n,) bool: contacts that open or close next to one of the same blocks that does the opposite."""
@@ -147,15 +147,15 @@ class Watched:
         else:
             mine, theirs = _of_both(self.segment, before.segment)
             changed = mine
-        told = []
+        changes = []
         for c in np.unique(self.crack[changed]).tolist():
             here, then = mine & (self.crack == c), theirs & (before.crack == c)
             for kind, last in _turns(before.face_state[then], self.face_state[here]):
                 rows = np.flatnonzero(here & changed & np.isin(self.face_state, _TAKES[kind]))
                 if len(rows):
                     x, y = self.face_point[rows].mean(axis=0).tolist()
-                    told.append(Change(kind, False, rows, last, (x, y), f"{now.cracks.names[c]} {_DOES[kind]}"))
-        return told
+                    changes.append(Change(kind, False, rows, last, (x, y), f"{now.cracks.names[c]} {_DOES[kind]}"))
+        return changes
 
 
 def _faces(now: CrackedBlocks, solutions: dict) -> tuple[np.ndarray, ...]:

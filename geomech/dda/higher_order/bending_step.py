@@ -209,6 +209,8 @@ class BendingAttempt(Attempt):
         change = self.bent_by = self._deflected_by()
         # At rest there is no rate; in motion that of the step's end, in the frame of the block.
         self.new_rates = np.zeros_like(change) if static else 2.0 * change / self.dt - self.rates
+        mean = blocks.padded(2.0 / self.dt**2 * (change - self.dt * self.rates))
+        blocks.acceleration = np.sqrt((mean * mean).sum(axis=1))
         self.largest = max(self.largest, float(blocks.largest(change)[0].max()))
         if self.n_free:
             found = self.found

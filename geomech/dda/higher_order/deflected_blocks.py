@@ -59,6 +59,8 @@ class DeflectedBlocks:
         self.rows = np.where(fixed, 0, 1 + -(-n_deflections(self.order) // 6)).astype(np.int64)
         self.bending = np.flatnonzero(self.order > 1)
         self.mass_density, self.elastic = density, elastic
+        #: (n_blocks,) m/s²: the mean acceleration of deflection in the last step.
+        self.acceleration = np.zeros(blocks.n_blocks)
         #: The largest slope of a deflection that was reported.
         self.reported = 0.0
         #: Width of a contact's row of one block.

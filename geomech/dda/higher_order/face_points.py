@@ -34,6 +34,9 @@ from .polygon_quadrature import lobatto_points
 _MEMORY = {"state": "state", "bonded": "bonded", "normal": "normal_force", "shear": "shear_force", "slip": "slip",
            "wear": "wear", "lift": "lift"}  # fmt: skip
 
+#: Places of points along faces are told apart to this part of them.
+_NAMED = 1_000_000
+
 
 @dataclass(frozen=True, eq=False)
 class Faces:
@@ -124,6 +127,13 @@ class Faces:
         """``value`` (n_corners, …) at both ends of the face of each point."""
         at = self.ends[self.face[self.inside]]
         return value[at[:, 0]], value[at[:, 1]]
+
+    def far_ends(self, corners: ContactSet) -> np.ndarray:
+        """(n, 2) vertex and edge at the far end of the face of each contact; −1 of lone ones."""
+        out = np.full((len(self.face), 2), -1)
+        ends = self.ends[self.face[self.inside], 1]
+        out[self.inside] = np.stack([corners.vertex[ends], corners.edge[ends]], axis=1)
+        return out
 
     def corner_of(self, contact: int) -> int:
         """The row of a corner of the face of a ``contact``."""
@@ -344,13 +354,10 @@ class FaceContacts(ContactSet):
         """FACE_POINT rows as the step, so ``settled``, leaves the contacts, with ``shear`` (n,) N as it ends, where their
         ``points`` (n, 2) m are then."""
         rows = np.zeros(len(self), FACE_POINT)
-        faces, corners = self.points, self.lumped
+        faces = self.points
         rows["block"], rows["other"] = self.block, self.other
         rows["vertex"], rows["edge"] = self.vertex, self.edge
-        rows["far_vertex"], rows["far_edge"] = -1, -1
-        inside = faces.inside
-        far = faces.ends[faces.face[inside], 1]
-        rows["far_vertex"][inside], rows["far_edge"][inside] = corners.vertex[far], corners.edge[far]
+        rows["far_vertex"], rows["far_edge"] = faces.far_ends(self.lumped).T
         rows["place"], rows["length"], rows["point"] = faces.place, self.geometry[:, 4], points
         rows["state"], rows["bonded"] = settled.state, settled.bonded
         rows["normal_force"], rows["shear_force"], rows["gap"] = settled.normal_force, shear, settled.gap
@@ -388,48 +395,47 @@ def _whole_sides(
 def _matching(found: FaceContacts, memory: np.ndarray) -> np.ndarray:
     """(n,) the row of ``memory`` of each contact of ``found``, −1 where there is none: the same point, a corner that was
     the end of a face, or the nearest point between the same two sides."""
-    faces, corners = found.points, found.lumped
-    far = np.full((len(found), 2), -1)
-    inside = faces.inside
-    ends = faces.ends[faces.face[inside], 1]
-    far[inside] = np.stack([corners.vertex[ends], corners.edge[ends]], axis=1)
-    same = len(memory) == len(found) and np.array_equal(memory["place"], faces.place)
-    for name, mine in (
-        ("vertex", found.vertex),
-        ("edge", found.edge),
-        ("far_vertex", far[:, 0]),
-        ("far_edge", far[:, 1]),
-    ):
-        same = same and np.array_equal(memory[name], mine)
-    if same:
-        return np.arange(len(found))
-    known: dict[tuple[int, ...], int] = {}
-    by_corner: dict[tuple[int, int], int] = {}
-    by_pair: dict[tuple[int, int], list[int]] = {}
-    for k, row in enumerate(memory):
-        v, e, w, f = (int(row[name]) for name in ("vertex", "edge", "far_vertex", "far_edge"))
-        place = round(float(row["place"]) * 1e6)
-        known[v, e, w, f, place] = k
-        if w < 0 or place == 0:
-            by_corner[v, e] = k
-        elif place == 1000000:
-            by_corner[w, f] = k
-        if w >= 0:
-            by_pair.setdefault((int(row["block"]), int(row["other"])), []).append(k)
-    out = np.full(len(found), -1)
-    for c in range(len(found)):
-        v, e, place = int(found.vertex[c]), int(found.edge[c]), round(float(faces.place[c]) * 1e6)
-        k = known.get((v, e, int(far[c, 0]), int(far[c, 1]), place), -1)
-        if k < 0 and (faces.face[c] < 0 or place == 0):
-            k = by_corner.get((v, e), -1)
-        if k < 0 and place == 1000000:
-            k = by_corner.get((int(far[c, 0]), int(far[c, 1])), -1)
-        if k < 0 and faces.face[c] >= 0:
-            pair = int(found.block[c]), int(found.other[c])
-            near = by_pair.get(pair) or by_pair.get(pair[::-1])
-            if near:
+    faces, n = found.points, len(found)
+    far = faces.far_ends(found.lumped)
+    # Places along a face, in millionths, are names.
+    mine = np.column_stack([found.vertex, found.edge, far, np.round(faces.place * _NAMED)]).astype(np.int64)
+    names = [memory[name] for name in ("vertex", "edge", "far_vertex", "far_edge")]
+    theirs = np.column_stack([*names, np.round(memory["place"] * _NAMED)]).astype(np.int64)
+    if mine.shape == theirs.shape and np.array_equal(mine, theirs):
+        return np.arange(n)
+    number = np.unique(np.concatenate([mine, theirs]), axis=0, return_inverse=True)[1].ravel()
+    row = np.full(int(number.max()) + 1, -1)
+    row[number[n:]] = np.arange(len(memory))
+    out = row[number[:n]]
+    unknown = np.flatnonzero(out < 0)
+    if len(unknown):
+        out[unknown] = _nearest(found, memory, mine, theirs, unknown)
+    return out
+
+
+def _nearest(
+    found: FaceContacts, memory: np.ndarray, mine: np.ndarray, theirs: np.ndarray, unknown: np.ndarray
+) -> np.ndarray:
+    """(k,) as `_matching` for the contacts ``unknown`` (k,), which ``memory`` does not know by the names ``mine`` (n, 5) and
+    ``theirs``: corners by their vertex and edge, other points by where they lie."""
+    alone, place = theirs[:, 2] < 0, theirs[:, 4]
+    corner = {}
+    for rows, ends in ((alone | (place == 0), theirs[:, :2]), (~alone & (place == _NAMED), theirs[:, 2:4])):
+        corner |= dict(zip(map(tuple, ends[rows].tolist()), np.flatnonzero(rows).tolist(), strict=True))
+    low, high = np.minimum(memory["block"], memory["other"]), np.maximum(memory["block"], memory["other"])
+    out = np.full(len(unknown), -1)
+    for k, c in enumerate(unknown.tolist()):
+        v, e, w, f, at = mine[c].tolist()
+        known = corner.get((v, e), -1) if w < 0 or at == 0 else -1
+        if known < 0 and at == _NAMED:
+            known = corner.get((w, f), -1)
+        if known < 0 and w >= 0:
+            one, two = sorted((int(found.block[c]), int(found.other[c])))
+            near = np.flatnonzero((low == one) & (high == two) & ~alone)
+            if len(near):
                 apart = np.hypot(*(memory["point"][near] - found.geometry[c, 5:7]).T)
                 best = int(np.argmin(apart))
-                k = near[best] if apart[best] <= memory["length"][near[best]] + found.geometry[c, 4] else -1
-        out[c] = k
+                if apart[best] <= memory["length"][near[best]] + found.geometry[c, 4]:
+                    known = int(near[best])
+        out[k] = known
     return out

@@ -1,9 +1,9 @@
-"""Forces that contacts carry in given states, and the states that these forces call for.
+"""Coulomb return: contact forces in given states, and the states that these forces require.
 
-A closed contact must not pull beyond its tensile strength, an open one must not penetrate, a sticking one must hold
-less than its strength μN + cℓ, and a sliding one would carry more than it does if it stuck (the return mapping of an
-elastic-plastic spring, under which exactly one of the states fits a given motion; the sign of the sliding, which Shi
-1988 asks for, leaves cases in which none does).
+With gap g, motion n·Δu along the normal and t·Δu along the edge, N = −kₙ g and S = S₀ − kₛ t·Δu. A closed contact must
+not exceed its tensile strength, an open one must not overlap, a sticking one needs |S| < μN + cℓ, and a sliding one
+must have a trial force |S| > μN + cℓ. This is the return mapping of an elastic-plastic spring, under which exactly one
+state fits a given motion. (The criterion of Shi 1988, the sign of the sliding, leaves cases that fit none.)
 """
 
 from __future__ import annotations
@@ -13,8 +13,8 @@ import numpy as np
 from ...compiled import kept, part
 from ...model import OPEN, SLIP, STICK
 
-#: Strengths are known to this part of themselves; slip, which is counted from the step's start, to this part of the
-#: round-off of coordinates.
+#: Relative tolerance of strengths; tolerance of slip, counted from the start of the step, relative to the round-off of
+#: coordinates.
 _KNOWN, _OF_SLIP = 1e-9, 1e-3
 
 
@@ -24,7 +24,7 @@ _jit = kept(fastmath={"contract"}, error_model="numpy", nogil=True)
 
 @part(fastmath={"contract"}, error_model="numpy", nogil=True, inline="always")
 def _move(unknowns, block, other, order, vectors, c):
-    """Motion of contact ``c`` along the normal and along the edge. (Inlined: to call it takes twice as long as the
+    """Motion of contact ``c`` along the normal and along the edge. (Inlined: a call takes twice as long as the
     sums.)"""
     apart = along = 0.0
     i, j = order[block[c]], order[other[c]]
@@ -41,7 +41,7 @@ def _move(unknowns, block, other, order, vectors, c):
 
 @_jit
 def moved(unknowns, block, other, order, vectors, lift=None):
-    """(n, 2): motion in the step along the normal, without ``lift`` (n,) times that along the edge, and along the edge."""
+    """(n, 2): motion in the step along the normal, less ``lift`` (n,) times that along the edge, and along the edge."""
     out = np.empty((block.shape[0], 2))
     for c in range(block.shape[0]):
         out[c, 0], out[c, 1] = _move(unknowns, block, other, order, vectors, c)
@@ -88,10 +88,10 @@ def check_states(
     shear0,
     slack,
 ):
-    """The states that the ``forces`` (n, 4) of `contact_forces` call for.
+    """The states that the ``forces`` (n, 4) of `contact_forces` require.
 
-    Returns (new state; new direction; new bonded; violation (n,) N, 0 where the state stands). Gaps below the ``slack``
-    (n,) m, the round-off of coordinates, decide nothing, nor does what they make of friction.
+    Returns (new state; new direction; new bonded; violation (n,) N, 0 where the state is right). Gaps below ``slack``
+    (n,) m, the round-off of coordinates, and their effect on friction do not change a state.
     """
     n = state.shape[0]
     new_state, new_direction, new_bonded = state.copy(), direction.copy(), bonded.copy()
@@ -102,8 +102,8 @@ def check_states(
             if gap >= -slack[c]:
                 continue
             violation[c] = -normal[c] * gap
-            # The state to try is that of the springs under the motion at hand: sticking where it would have to slide, a
-            # contact may pull, open, close again and never come to sliding.
+            # The next state is that of the springs under the present motion. If it were to stick where it has to slide,
+            # a contact could pull, open and close again, and never start to slide.
             trial = shear0[c] - shear[c] * slide
             if abs(trial) > violation[c] * friction[c] + sliding[c] and bonded[c] == 0:
                 new_state[c], new_direction[c] = SLIP, np.sign(trial)
@@ -112,7 +112,7 @@ def check_states(
             continue
         pull = tension[c] if bonded[c] == 1 else 0.0
         if -forces[c, 0] > pull * (1.0 + _KNOWN) + normal[c] * slack[c]:
-            # What holds no pull opens without breaking: it may close again before the states are found.
+            # Without tensile strength it opens without breaking: it may close again before the states are found.
             new_state[c], new_bonded[c] = OPEN, (0 if pull > 0.0 else bonded[c])
             violation[c] = normal[c] * abs(gap)
         elif state[c] == STICK:
@@ -126,17 +126,18 @@ def check_states(
             strength = max(0.0, friction[c] * forces[c, 0] + sliding[c])
             trial = direction[c] * (shear0[c] - shear[c] * slide)
             if strength - trial > _KNOWN * strength + (_OF_SLIP * shear[c] + friction[c] * normal[c]) * slack[c]:
-                # By way of sticking even if it would slide back: turned about at once, two solutions may alternate.
+                # Through sticking, even if it would slide back: two solutions of opposite direction may alternate.
                 new_state[c] = STICK
                 violation[c] = strength - trial
     return new_state, new_direction, new_bonded, violation
 
 
 def reserves(state, bonded, normal_force, shear_force, gap, springs, slack) -> np.ndarray:
-    """(n,) N: how far contacts in these states are from leaving them, linear in the load while all states stand. Open
-    ones: the force that closing their gap would make; sticking ones: what is left of their strength, or of what presses
-    them; sliding ones the latter. They leave them where `check_states` says so, beyond what the rounding ``slack``
-    (n,) m of coordinates makes of forces: that is where nothing is left."""
+    """(n,) N: distance of contacts from a change of state, linear in the load at constant states.
+
+    Open contacts: the force of the spring if the gap closed; sticking ones: the remaining strength, or the normal
+    force; sliding ones: the normal force. Zero where `check_states` changes the state, including the effect of the
+    round-off ``slack`` (n,) m of coordinates."""
     rounding = springs.normal * slack
     pull = np.where(bonded == 1, springs.tension, 0.0)
     lifts = normal_force + pull * (1.0 + _KNOWN) + rounding

@@ -1,7 +1,7 @@
-"""The 6×6-block system of a step: the blocks' own equations, contact springs, and its solution.
+"""Assembly of the 6×6-block system of a step: the blocks' own equations and contact springs; and its solution.
 
-Unknowns are (u0, v0, h r0, h εx, h εy, h γxy) with h = √area, so that all six are lengths and the matrix stays well
-scaled. Free blocks only: a fixed block has no unknowns.
+Unknowns are (u0, v0, h r0, h εx, h εy, h γxy) with h = √area, so that all six are lengths and the matrix is well
+scaled. Fixed blocks have no unknowns.
 """
 
 from __future__ import annotations
@@ -16,18 +16,18 @@ from .block_solver import RESIDUAL, BlockSolver
 from .simd import load_six, minus_product, numbers, plus_product, product, spread, store, store_six, zeros
 from .task_pool import add_at_once, await_value, crew
 
-#: Up to this many free blocks a dense factorisation is quicker than a sparse one (measured on brick walls).
+#: Number of free blocks up to which a dense factorisation is faster than a sparse one (measured on brick walls).
 DENSE_BLOCKS = 60
-#: From so many blocks on, rows are filled on all cores, of so many at a time.
+#: Number of blocks from which rows are filled on all cores, and number of rows per task.
 THREADED, SHARE = 4000, 256
-#: Up to this part of the blocks, only the rows of those whose contacts have other laws are filled again.
+#: Fraction of blocks up to which only the rows of those with changed contact springs are filled again.
 FILLED_AGAIN = 0.25
 
 
 @dataclass(frozen=True, eq=False)
 class Links:
-    """What links blocks besides contacts: ``blocks`` (k, 6, 6) of the matrix at ``row`` and ``column`` (k,) of its 6×6
-    blocks, which stand at ``places`` (k, 6, 6) of the flat matrix."""
+    """Couplings of blocks other than contacts: ``blocks`` (k, 6, 6) of the matrix at ``row`` and ``column`` (k,) of its
+    6×6 blocks, at ``places`` (k, 6, 6) of the flat matrix."""
 
     row: np.ndarray
     column: np.ndarray
@@ -37,11 +37,11 @@ class Links:
 
 @dataclass(frozen=True, eq=False)
 class Pattern:
-    """Where each 6×6 block stands in the flat matrix: entry (a, b) of a block is data[base + a·stride[row] + b].
+    """Position of the 6×6 blocks in the flat matrix: entry (a, b) of a block is data[base + a·stride[row] + b].
 
     ``order`` (n_blocks,) is the number of each block's unknowns, −1 if fixed; those of one begin at ``begins``
     (n + 1,). ``solver`` is None for a dense matrix.
-    ``links`` are those that other things than contacts make, None without.
+    ``links``: couplings other than contacts, or None.
     """
 
     n: int
@@ -56,12 +56,12 @@ class Pattern:
     links: Links | None = None
 
     def add_links(self, data: np.ndarray) -> None:
-        """Add them to an assembled matrix."""
+        """Add the links to an assembled matrix."""
         if self.links is not None:
             np.add.at(data, self.links.places, self.links.blocks)
 
     def without_contacts(self, matrix: np.ndarray, unknowns: np.ndarray) -> np.ndarray:
-        """(n, 6) the product of the blocks' own ``matrix`` (n, 6, 6) and of the links with ``unknowns`` (6 n,)."""
+        """(n, 6) product of the blocks' own ``matrix`` (n, 6, 6) plus the links with ``unknowns`` (6 n,)."""
         rows = unknowns.reshape(-1, 6)
         out = np.einsum("bij,bj->bi", matrix, rows)
         if self.links is not None:
@@ -92,7 +92,7 @@ def sparse_pattern(
     """Pattern of a block-sparse matrix, its 6×6 blocks stored one after the other. ``points`` (n_blocks, 2) m:
     centroids.
 
-    The ``kept`` solver serves on as long as no two blocks meet that did not when it was made.
+    The ``kept`` solver is reused unless two blocks are in contact that were not when it was made.
     """
     n = int(order.max()) + 1
     i, j = order[block], order[other]
@@ -151,8 +151,8 @@ def contact_vectors(block, other, geometry, order, moments):
 
 @kept(fastmath=False, error_model="numpy", nogil=True)
 def sides_of(n, order, block, other):
-    """The sides of contacts that each of ``n`` blocks with unknowns has: (n + 1,) where they begin in (k,), 2 c for the
-    vertex of contact c and 2 c + 1 for its edge, ascending."""
+    """Contact sides of each of ``n`` free blocks: their begins (n + 1,) in (k,), where 2 c is the vertex of contact c
+    and 2 c + 1 its edge, ascending."""
     start = np.zeros(n + 2, np.int64)
     for c in range(len(block)):
         i, j = order[block[c]], order[other[c]]
@@ -187,8 +187,7 @@ def _put_block(where, at, stride, r0, r1, r2, r3, r4, r5):
 
 @part(error_model="numpy", nogil=True)
 def _add_pair(room, pull, across, r0, r1, r2, r3, r4, r5):
-    """The rows r and the 6 × 6 of push ⊗ ``pull`` + drag ⊗ ``across``, whose push and drag lie at 0 and 8 of the
-    ``room``."""
+    """The rows r and the 6 × 6 block push ⊗ ``pull`` + drag ⊗ ``across``; push and drag are at 0 and 8 of ``room``."""
     r0 = plus_product(plus_product(r0, spread(room, 0), pull), spread(room, 8), across)
     r1 = plus_product(plus_product(r1, spread(room, 1), pull), spread(room, 9), across)
     r2 = plus_product(plus_product(r2, spread(room, 2), pull), spread(room, 10), across)
@@ -203,10 +202,10 @@ def _fill_rows(
     first, last, start, side, data, matrix, begins, stride, diagonal, upper, lower, block, other, order, vectors,
     normal, shear, slope, lift,
 ):  # fmt: skip
-    """Fill the rows of blocks from ``first`` to before ``last``, see `assemble`; ``start`` and ``side`` from
-    `sides_of`. What is done for a block is its own: rows are the same to the bit whoever fills them.
+    """Fill the rows of blocks from ``first`` to before ``last`` (see `assemble`); ``start`` and ``side`` from
+    `sides_of`. The rows of a block are the same to the last bit whichever thread fills them.
 
-    A block's own 6 × 6, and that of the neighbour whose contacts are gone through, stay in registers."""
+    The block's own 6 × 6, and that of the neighbour being processed, stay in registers."""
     buffer = np.empty(16)
     room, into, given, along = numbers(buffer), numbers(data), numbers(matrix), numbers(vectors)
     kns, kss, frictions, rises = numbers(normal), numbers(shear), numbers(slope), numbers(lift)
@@ -234,7 +233,7 @@ def _fill_rows(
                     if at_hand >= 0:
                         _put_block(into, at_hand, step, p0, p1, p2, p3, p4, p5)
                     at_hand = their
-                    # What contacts before have made of it, for they need not stand together.
+                    # Sum of earlier contacts with this neighbour, which need not be consecutive.
                     p0, p1 = load_six(into, their), load_six(into, their + step)
                     p2, p3 = load_six(into, their + 2 * step), load_six(into, their + 3 * step)
                     p4, p5 = load_six(into, their + 4 * step), load_six(into, their + 5 * step)
@@ -243,17 +242,17 @@ def _fill_rows(
         if at_hand >= 0:
             _put_block(into, at_hand, step, p0, p1, p2, p3, p4, p5)
         _put_block(into, diagonal[b], step, d0, d1, d2, d3, d4, d5)
-    # What is found by its place is kept until here.
+    # Keeps the arrays alive, which are addressed by pointers above.
     return len(buffer) + len(data) + len(matrix) + len(vectors) + len(normal) + len(shear) + len(slope) + len(lift)
 
 
 @kept(fastmath=False, error_model="numpy", nogil=True)
 def _fill_shared(
-    claimed, told, share, start, side, data, matrix, begins, stride, diagonal, upper, lower, block, other, order,
+    claimed, done, share, start, side, data, matrix, begins, stride, diagonal, upper, lower, block, other, order,
     vectors, normal, shear, slope, lift,
 ):  # fmt: skip
-    """Fill the rows of ``share`` blocks at a time, by turns with other threads; ``claimed`` and ``told`` (1,) as for
-    the elimination of fronts."""
+    """Fill the rows of ``share`` blocks at a time, shared with other threads; ``claimed`` and ``done`` (1,) as for the
+    elimination of fronts."""
     n = len(matrix)
     shares = (n + share - 1) // share
     while True:
@@ -264,8 +263,8 @@ def _fill_shared(
             q * share, min(n, (q + 1) * share), start, side, data, matrix, begins, stride, diagonal, upper, lower,
             block, other, order, vectors, normal, shear, slope, lift,
         )  # fmt: skip
-        add_at_once(told, 0, 1)
-    await_value(told, 0, shares)
+        add_at_once(done, 0, 1)
+    await_value(done, 0, shares)
 
 
 @kept(fastmath=False, error_model="numpy", nogil=True)
@@ -273,8 +272,8 @@ def _fill_again(
     most, held, start, side, data, matrix, begins, stride, diagonal, upper, lower, block, other, order, vectors,
     normal, shear, slope, lift,
 ):  # fmt: skip
-    """Fill the rows of blocks whose contacts have other laws than those ``held`` (4 of (n_contacts,)), unless these are
-    more than ``most`` blocks; whether that is done."""
+    """Fill the rows of blocks whose contact springs differ from those ``held`` (4 of (n_contacts,)), unless these are
+    more than ``most`` blocks; returns whether they were filled."""
     n, rows = len(matrix), 0
     differs = np.zeros(n, np.bool_)
     for c in range(len(block)):
@@ -311,10 +310,10 @@ def assemble(
     sides: tuple[np.ndarray, np.ndarray] | None = None,
     held: tuple[np.ndarray, ...] | None = None,
 ) -> None:
-    """Fill ``data`` with the blocks' own part ``matrix`` (n, 6, 6) and contacts that answer a motion by dN =
-    −``normal`` (n − κ t)·Δu, κ the ``lift``, and dS = −``shear`` t·Δu + ``slope`` dN; ``upper`` and ``lower`` as in the
-    ``pattern``, for these contacts, whose ``sides`` may be known, as from `sides_of`. ``held``: the laws (``normal``,
-    ``shear``, ``slope``, ``lift``) with which ``data`` is filled already, all else the same."""
+    """Fill ``data`` with the blocks' own ``matrix`` (n, 6, 6) and the contact springs dN = −``normal`` (n − κ t)·Δu,
+    with κ the ``lift``, and dS = −``shear`` t·Δu + ``slope`` dN. ``upper`` and ``lower`` as in the ``pattern``, for
+    these contacts; ``sides`` as from `sides_of`, if known. ``held``: the springs (``normal``, ``shear``, ``slope``,
+    ``lift``) with which ``data`` has been filled, everything else being equal."""
     at = pattern.begins, pattern.stride, pattern.diagonal, upper, lower, block, other, order
     laws = vectors, normal, shear, slope, lift
     sides = sides_of(pattern.n, order, block, other) if sides is None else sides
@@ -323,8 +322,8 @@ def assemble(
     if pattern.n < THREADED:
         _fill_rows(0, pattern.n, *sides, data, matrix, *at, *laws)
         return
-    claimed, told = np.zeros(1, np.int64), np.zeros(1, np.int64)
-    crew().share(_fill_shared, claimed, told, SHARE, *sides, data, matrix, *at, *laws)
+    claimed, done = np.zeros(1, np.int64), np.zeros(1, np.int64)
+    crew().share(_fill_shared, claimed, done, SHARE, *sides, data, matrix, *at, *laws)
 
 
 @kept(fastmath=False, error_model="numpy", nogil=True)
@@ -332,8 +331,8 @@ def _springs(
     right, base_right, block, other, order, vectors, state, direction, gap, normal, shear, friction, sliding, lift,
     shear0,
 ):  # fmt: skip
-    """Fill ``right``, see `assemble_contacts`; (n,) the normal and shear stiffness of contacts in their states and how
-    much of the normal force slides, and whether the matrix is symmetric."""
+    """Fill ``right`` (see `assemble_contacts`). Returns (n,) normal and shear stiffness of the contacts in their
+    states, the ratio of shear to normal force of sliding ones, and whether the matrix is symmetric."""
     for b in range(base_right.shape[0]):
         for a in range(6):
             right[6 * b + a] = base_right[b, a]
@@ -381,11 +380,11 @@ def assemble_contacts(
     sides: tuple[np.ndarray, np.ndarray] | None = None,
     held: tuple[np.ndarray, ...] | None = None,
 ) -> tuple[bool, tuple[np.ndarray, ...]]:
-    """Fill ``data`` and ``right`` with the blocks' own part and the springs of closed contacts; True if symmetric, and
-    what ``data`` holds then, see `assemble`.
+    """Fill ``data`` and ``right`` with the blocks' own equations and the springs of closed contacts. Returns whether
+    the matrix is symmetric, and the springs in ``data`` (see `assemble`).
 
-    Normal force N = −kₙ(g + n·Δu − κ t·Δu), with the lift κ by sliding. Stick: S = S₀ − kₛ t·Δu. Slip: S = ± (μ N + c),
-    with N the unknown one, which makes the matrix unsymmetric but friction exact in one solution.
+    Normal force N = −kₙ(g + n·Δu − κ t·Δu), with dilation κ. Stick: S = S₀ − kₛ t·Δu. Slip: S = ± (μ N + c) with the
+    unknown N, which makes the matrix unsymmetric but friction exact in one solution.
     """
     at = block, other, order, vectors
     *laws, symmetric = _springs(
@@ -400,8 +399,8 @@ def solve(
     pattern: Pattern, data: np.ndarray, right: np.ndarray, symmetric: bool, force: float = 0.0, beside: bool = False,
     near: np.ndarray | None = None, within: float = RESIDUAL,
 ) -> np.ndarray:  # fmt: skip
-    """Unknowns (6 n,) in the pattern's order; ``force``, ``near`` and ``within`` as for `BlockSolver.solve`;
-    ``beside``: see there. Overwrites ``data`` when dense. Raises numpy.linalg.LinAlgError."""
+    """Unknowns (6 n,) in the pattern's order; ``force``, ``near``, ``within`` and ``beside`` as for
+    `BlockSolver.solve`. Overwrites ``data`` when dense. Raises numpy.linalg.LinAlgError."""
     pattern.add_links(data)
     if pattern.solver is None:
         from scipy.linalg.lapack import dgesv, dposv

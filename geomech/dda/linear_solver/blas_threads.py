@@ -1,5 +1,5 @@
-"""How many threads the BLAS of NumPy and of SciPy work on: sums come out in another order, and so rounded otherwise,
-with another number of them, and events of blocks and cracks tell last digits apart after a few steps."""
+"""Number of BLAS threads of NumPy and SciPy: it changes the order of sums and so their rounding, and after a few steps
+the events of blocks and cracks depend on last digits."""
 
 from __future__ import annotations
 
@@ -17,7 +17,8 @@ _Item = TypeVar("_Item")
 
 @cache
 def limits() -> tuple[Callable[[int], int], ...]:
-    """Each sets the number of threads of one of the libraries, and returns what it was; none where a library cannot."""
+    """Functions that set the number of threads of one library each and return the previous number; empty without
+    such."""
     found = []
     for package in ("numpy", "scipy"):
         site = Path(importlib.util.find_spec(package).origin).resolve().parent.parent
@@ -31,7 +32,8 @@ def limits() -> tuple[Callable[[int], int], ...]:
 
 @contextmanager
 def blas_threads(number: int) -> Iterator[None]:
-    """On so many threads. (Products of fronts handed out in pieces take forty times as long on a busy machine.)"""
+    """Use ``number`` threads within the context. (Distributed small products take forty times as long on a busy
+    machine.)"""
     before = [(limit, limit(number)) for limit in limits()]
     try:
         yield
@@ -41,7 +43,7 @@ def blas_threads(number: int) -> Iterator[None]:
 
 
 def asked_for() -> int:
-    """The number of threads that the environment asks for: one, where it says nothing, whatever the machine has."""
+    """The number of threads set in the environment; one by default, whatever the machine has."""
     try:
         return max(int(os.environ.get("OPENBLAS_NUM_THREADS", "1")), 1)
     except ValueError:
@@ -49,7 +51,7 @@ def asked_for() -> int:
 
 
 def alike(items: Iterator[_Item]) -> Iterator[_Item]:
-    """The ``items``, each worked out on as many threads as were asked for; between them BLAS is as it was."""
+    """The ``items``, each computed with the number of threads of `asked_for`; between them BLAS is as it was."""
     while True:
         with blas_threads(asked_for()):
             try:

@@ -1,13 +1,13 @@
-"""Solutions of one 6×6-block system after another, each with no more work than its difference from the last asks for.
+"""Solution of a sequence of 6×6-block systems, each with only the work that its difference from the last one needs.
 
 Where springs have changed since the last factorisation, only the fronts of their blocks and those above are eliminated
-again; where blocks have hardly moved, none. What is kept so, or factored in single precision, preconditions conjugate
-residuals (`conjugate_residuals`), which bring them down to round-off.
+again; where blocks have hardly moved, none. Reused or single-precision factors precondition conjugate residuals
+(`conjugate_residuals`), which reduce the residual to round-off.
 
-Chosen by measurement, on the last equations of walls of 990 and 10 010 bricks under sudden weight (CPU of one core for
-a factorisation and a substitution, ms): these factors 7.2 + 0.4 and 194 + 7, in single precision 4.2 + 0.2 and 102 + 3.6;
+Chosen by measurement, on the last equations of walls of 990 and 10 010 bricks under sudden weight (one core,
+factorisation and substitution, ms): these factors 7.2 + 0.4 and 194 + 7, in single precision 4.2 + 0.2 and 102 + 3.6;
 PARDISO of MKL 2026 11 to 19 + 6 and 245 to 478 + 61; an incomplete factorisation with GMRES 234 and 5400; smoothed
-aggregation (pyamg 5, six fields an aggregate) and block Jacobi do not come to 1e-10 in 500 iterations.
+aggregation (pyamg 5, six fields an aggregate) and block Jacobi do not reach 1e-10 in 500 iterations.
 """
 
 from __future__ import annotations
@@ -26,41 +26,42 @@ from .task_pool import add_at_once, await_value, crew
 
 _jit = kept(fastmath=False, error_model="numpy", nogil=True)
 
-#: The largest residual of a solution, relative to the largest force in the right-hand side (blocks at rest leave 3e-8 of
-#: it, the rounding of coordinates times stiff springs), …
+#: Largest residual, relative to the largest force in the right-hand side (at rest it is 3e-8 of the largest force in
+#: the system, from the rounding of coordinates times stiff springs), …
 RESIDUAL = 1e-12
-#: … or to the largest Σ|A||x| of a row, below which it is round-off.
+#: … or relative to the largest Σ|A||x| of a row: round-off.
 ROUND_OFF = 2e-15
-#: Residuals that are larger are hardly ever round-off.
+#: Residuals above this are hardly ever round-off.
 COARSE = 1e-6
-#: Refinements of a solution at most.
+#: Most refinements of a solution.
 REFINEMENTS = 3
-#: A 6×6 diagonal block has changed when one of its entries has by more than this part of the largest diagonal one: what stiff
-#: springs lose so stays below the inertia that holds a block against them (measured: 1e-3 takes twice the time at dt =
+#: A 6×6 diagonal block counts as changed when an entry differs by more than this fraction of the largest diagonal one:
+#: the error from stiff springs stays below the inertia that balances them (measured: 1e-3 takes twice the time at dt =
 #: 1 ms).
 CHANGED = 1e-6
-#: Solutions in a cycle of conjugate residuals at most.
+#: Most solutions in a cycle of conjugate residuals.
 TRIES = 16
-#: Where these bring a residual of single factors down to this part, others follow, so many times in all: they take less
-#: than factors in double, as long as 54 solutions (a slope of 107 720 blocks, 2.5 ms: eight decades in the first sixteen).
+#: If a cycle with single-precision factors reduces the residual by this factor, another follows, up to this number:
+#: cheaper than double factors up to 54 solutions (a slope of 107 720 blocks, 2.5 ms: eight decades in the first
+#: sixteen).
 FALLS, CYCLES = 1e-3, 4
-#: Where so many have changed, it is taken that as many will have the next time.
+#: Fraction of changed blocks from which the next matrix is expected to change as much.
 MOSTLY = 0.9
-#: Where fronts cannot be eliminated one by one, factors that differ in so few blocks are not made anew: of 100 000
-#: bricks they take as long as 27 substitutions, and where ten scattered contacts differ conjugate residuals take 7 to 19 more, of
-#: which this many are tried.
+#: Where fronts cannot be eliminated one by one, factors are reused if no more than this many blocks differ: with 100
+#: 000 bricks they cost 27 substitutions, and ten scattered contacts cost 7 to 19 more conjugate residuals; most of
+#: these.
 FEW, TRIES_OF_FEW = 30, 24
-#: Free blocks from which factors are in single precision: half the memory, and on walls of 10 000 bricks three quarters
-#: of the time although a solution takes two substitutions more; of 1 000 as quick.
+#: Number of free blocks from which factors are in single precision: half the memory, and three quarters of the time on
+#: walls of 10 000 bricks, although a solution takes two substitutions more; equally fast for 1 000.
 SINGLE = 4000
-#: Blocks from which products are formed on all cores, the rows of so many at a time.
+#: Number of blocks from which products are formed on all cores, and number of rows per task.
 SHARED, SHARE = 4000, 512
 
 
 @kept(fastmath={"reassoc", "contract", "nsz"}, error_model="numpy", nogil=True)
 def _multiply_rows(first, last, data, pointer, columns, x, out):
-    """A x for the rows of 6×6 blocks from ``first`` to before ``last``. (Written out, for only whole sums of six become
-    vector instructions: four times as fast as loops.)"""
+    """A x for the rows of 6×6 blocks from ``first`` to before ``last``. (Written out, since only whole sums of six
+    become vector instructions: four times as fast as loops.)"""
     for i in range(first, last):
         s0 = s1 = s2 = s3 = s4 = s5 = 0.0
         for k in range(pointer[i], pointer[i + 1]):
@@ -77,8 +78,8 @@ def _multiply_rows(first, last, data, pointer, columns, x, out):
 
 
 @kept(fastmath=False, error_model="numpy", nogil=True)
-def _multiply_shared(claimed, told, share, data, pointer, columns, x, out):
-    """The rows of ``share`` blocks at a time, by turns with other threads; ``claimed`` and ``told`` (1,) as for the
+def _multiply_shared(claimed, done, share, data, pointer, columns, x, out):
+    """The rows of ``share`` blocks at a time, shared with other threads; ``claimed`` and ``done`` (1,) as for the
     elimination of fronts."""
     n = len(pointer) - 1
     shares = (n + share - 1) // share
@@ -87,12 +88,12 @@ def _multiply_shared(claimed, told, share, data, pointer, columns, x, out):
         if q >= shares:
             break
         _multiply_rows(q * share, min(n, (q + 1) * share), data, pointer, columns, x, out)
-        add_at_once(told, 0, 1)
-    await_value(told, 0, shares)
+        add_at_once(done, 0, 1)
+    await_value(done, 0, shares)
 
 
 def multiply(data: np.ndarray, pointer: np.ndarray, columns: np.ndarray, x: np.ndarray) -> np.ndarray:
-    """A x for 6×6 blocks stored row by row; from many on by all cores, to the same bit."""
+    """A x for 6×6 blocks stored row by row; large systems on all cores, with the same bits."""
     out = np.empty(6 * (len(pointer) - 1))
     given = data, pointer, columns, x, out
     if len(pointer) <= SHARED:
@@ -118,8 +119,8 @@ def largest_terms(data, pointer, columns, x):
 
 @_jit
 def _changed(data, diagonal, factored, tolerance):
-    """(n,) whether a diagonal block of ``data`` differs from the one ``factored`` (n, 36) by more than this part of the
-    largest entry on its diagonal."""
+    """(n,) bool: diagonal blocks of ``data`` that differ from those ``factored`` (n, 36) by more than the
+    ``tolerance``, relative to the largest entry of their diagonal."""
     n = len(diagonal)
     out = np.zeros(n, np.bool_)
     for b in range(n):
@@ -127,7 +128,7 @@ def _changed(data, diagonal, factored, tolerance):
         for k in range(0, 36, 7):
             size = max(size, abs(here[k]))
         for k in range(36):
-            # Not a number has changed.
+            # (A NaN counts as changed.)
             if not abs(here[k] - factored[b, k]) <= tolerance * size:
                 out[b] = True
                 break
@@ -147,10 +148,10 @@ def _take(data, diagonal, changed, factored):
 class BlockSolver:
     """Solves A x = b for one pattern of 6×6 blocks and matrices that change from time to time.
 
-    ``points`` (n, 2) m, where the blocks lie; ``rows`` and ``columns`` (n_entries,) of the matrix's blocks, both
-    triangles and the diagonal, sorted by row then column. The order of elimination is internal, or that of a ``tree``
-    already planned for the same pattern. ``counts`` tells what was done; ``work`` counts it beside that of other solvers.
-    ``single_only``: a matrix beyond factors in single precision is given up, not factored in double.
+    ``points`` (n, 2) m: positions of the blocks; ``rows`` and ``columns`` (n_entries,) of the matrix blocks, both
+    triangles and the diagonal, sorted by row, then column. The order of elimination is internal, or that of a ``tree``
+    planned for the same pattern. ``counts``: operations of this solver; ``work``: counters shared with other solvers.
+    ``single_only``: a matrix that single-precision factors cannot solve is given up, not factored in double.
     """
 
     def __init__(self, points: np.ndarray, rows: np.ndarray, columns: np.ndarray, tree: Tree | None = None):
@@ -166,27 +167,28 @@ class BlockSolver:
         self._beside: BlockSolver | None = None
         self._rough_serves, self.single_only = True, False
         self._make_room_for_directions()
-        #: The largest entry of the last solution's residual.
+        #: Largest entry of the residual of the last solution.
         self.left = 0.0
-        #: ``shares``: factorisations, one that was done in part as that part.
+        #: ``shares``: number of factorisations, partial ones counted by their share.
         self.work = Work()
         self.counts = {"factorisations": 0, "shares": 0.0, "substitutions": 0}
 
     @property
     def points(self) -> np.ndarray:
-        """(n, 2) m: where the blocks lie."""
+        """(n, 2) m: positions of the blocks."""
         return self._pattern[0]
 
     @property
     def in_parts(self) -> bool:
-        """Whether a matrix that differs in some blocks from the last is factored for a part of the price."""
+        """Whether a matrix with few changed blocks is refactored for a fraction of the cost."""
         return self._factors.tree.kept
 
     @property
     def beside(self) -> BlockSolver:
-        """A solver of the same pattern for matrices of another kind, that come by turns with this one's: the factors of
-        each are made anew in part. This one where that is not done, or is of too many blocks to be done twice: two of
-        50 000 would take 3 GB, and without a second one steps that stop blocks take 4 % longer."""
+        """A second solver of the same pattern, for matrices of another kind that alternate with this one's, so that
+        each is refactored in part. This solver itself where partial factorisation is not available, or for so many
+        blocks that two would take too much memory: two of 50 000 take 3 GB, and without the second one steps that stop
+        blocks take 4 % longer."""
         if not self.in_parts or 2 * self._factors.tree.own_room_size > KEPT:
             return self
         if self._beside is None:
@@ -195,9 +197,8 @@ class BlockSolver:
         return self._beside
 
     def _make_room_for_directions(self) -> None:
-        """Those of rough solutions serve until the next matrix, whatever is solved between, but of so many blocks that
-        this takes other factors, too. Then both share a room, that in which the factors are made where it is idle: of
-        100 000 blocks they would be 400 MB."""
+        """Directions of coarse solutions, kept until the next matrix. For so many blocks that these use other factors,
+        both share the idle memory of the factorisation: for 100 000 blocks they would take 400 MB."""
         size, most, many = 6 * self.n, max(TRIES, TRIES_OF_FEW), self.n >= SINGLE
         idle = self._factors.idle_room
         self._directions = Directions(size, most, room=idle if many and len(idle) >= 2 * most * size else None)
@@ -215,9 +216,9 @@ class BlockSolver:
         self, data: np.ndarray, right: np.ndarray, within: float = RESIDUAL, force: float = 0.0,
         near: np.ndarray | None = None,
     ) -> np.ndarray:  # fmt: skip
-        """x (6n,) for the blocks ``data`` (36 n_entries,), each row by row, with a residual ``within`` that part of
-        ``right``, or of a larger ``force`` that others balance in it, or of round-off. ``near`` (6n,) may be known to
-        lie near x. Raises numpy.linalg.LinAlgError."""
+        """x (6n,) for the blocks ``data`` (36 n_entries,), each row by row. The residual is below ``within`` times
+        ``right`` (or a larger ``force`` that others balance in it), or is round-off. ``near`` (6n,): a known
+        approximation of x. Raises numpy.linalg.LinAlgError."""
         largest = float(np.abs(right).max(initial=0.0))
         target = within * max(force, largest)
         if largest > 0.0:
@@ -229,7 +230,7 @@ class BlockSolver:
                 x = None
             if x is not None:
                 return x
-            # Beyond single precision, as many sets of states are that are far from the right ones.
+            # Not solvable in single precision, as for many contact states that are far from the right ones.
             self._go_on_in_double()
         return self._solved(data, right, within, target, near)
 
@@ -240,7 +241,7 @@ class BlockSolver:
         self._hold(np.float64)
 
     def _hold(self, dtype: type) -> None:
-        """Go on with factors of this precision; those at hand make room first: of 100 000 blocks both would take 4.4
+        """Switch the precision of the factors; existing ones are freed first: for 100 000 blocks both would take 4.4
         GB."""
         tree, self._has_factors = self._factors.tree, False
         del self._factors, self._directions, self._shown
@@ -248,10 +249,12 @@ class BlockSolver:
         self._make_room_for_directions()
 
     def rough_solution(self, data: np.ndarray) -> Callable[..., np.ndarray]:
-        """What gives x (6n,) for one right side after the other, ``solution(right, within)``, with a residual ``within``
-        that part of it, from factors in single precision (half the time of double ones, where that is all the digits
-        asked for), which leave those of `solve` alone, unless they are of so many blocks that single ones take their
-        place. What one right side has shown of the matrix serves the next. Raises numpy.linalg.LinAlgError."""
+        """A function ``solution(right, within)`` that returns x (6n,) with a residual of at most ``within`` times
+        ``right``.
+
+        It uses factors in single precision (half the time of double ones, where their digits suffice) beside those of
+        `solve`, or in place of them for very many blocks. Search directions are kept for the next right-hand side.
+        Raises numpy.linalg.LinAlgError."""
 
         def exactly(right: np.ndarray, within: float) -> np.ndarray:
             return self.solve(data, right, within)
@@ -270,7 +273,7 @@ class BlockSolver:
             return exactly
 
         self._shown.forget()
-        # Those of `solve` are left to it: whoever kept them here would keep them beside double ones that follow.
+        # Those of `solve` are not referenced here, or they would be kept beside later double ones.
         own = None if factors is self._factors else factors
 
         def solution(right: np.ndarray, within: float) -> np.ndarray:
@@ -287,9 +290,23 @@ class BlockSolver:
 
         return solution
 
+    def corrections(self, data: np.ndarray) -> Callable[[np.ndarray], np.ndarray]:
+        """What gives, for one right side after the other, nearly the solution x (6n,) by one substitution, with the factors
+        of `rough_solution`: for iterations that correct themselves. Raises numpy.linalg.LinAlgError."""
+        factors = self._rough_factors()
+        if factors is None:
+            self.factor(data)
+            return self.substitute
+        if factors is self._factors:
+            self._bring(data, 0, rough=True)
+            return self.substitute
+        factors.factor(data)
+        self._count(1.0)
+        return lambda right: self.substitute(right, factors)
+
     def _rough_factors(self) -> Factors | None:
-        """Factors in single precision, with room of their own or, of many blocks, in the place of those of `solve`;
-        None where they do not serve."""
+        """Factors in single precision, in their own memory or, for many blocks, in place of those of `solve`; None if
+        they do not suffice."""
         if not self._rough_serves:
             return None
         if self.n >= SINGLE:
@@ -303,24 +320,23 @@ class BlockSolver:
     def _solved(
         self, data: np.ndarray, right: np.ndarray, within: float, target: float, near: np.ndarray | None
     ) -> np.ndarray | None:
-        """`solve` with the factors as they are, to residuals of ``target``; None where single precision does not
-        do."""
+        """`solve` with the present factors, to residuals of ``target``; None if single precision does not suffice."""
         if self._has_factors:
             fresh = self._bring(data, 0 if self._factors.tree.kept else FEW)
             tries = TRIES if fresh or self.in_parts else TRIES_OF_FEW
             found = self._iterate(data, right, within, target, self._factors, near, tries, fresh)
-            # Single precision knows no more of this matrix than that, in full or in part.
+            # New single-precision factors of this matrix would be no better.
             if found is not None or (fresh and self._factors.single):
                 return found
         self.factor(data)
         if self._factors.single:
             return self._iterate(data, right, within, target, self._factors, near)
-        x, told = self.substitute(right), False
+        x, at_roundoff = self.substitute(right), False
         for _ in range(REFINEMENTS):
             rest = right - self.multiply(data, x)
             self.left = largest = float(np.abs(rest).max())
-            if largest > target and not told:
-                target, told = max(target, self._round_off(data, x)), True
+            if largest > target and not at_roundoff:
+                target, at_roundoff = max(target, self._round_off(data, x)), True
             if not largest > target:
                 break
             x += self.substitute(rest)
@@ -331,8 +347,8 @@ class BlockSolver:
         return ROUND_OFF * largest_terms(data, self.pointer, self.columns, x)
 
     def _bring(self, data: np.ndarray, few: int, rough: bool = False) -> bool:
-        """Factor what has changed in the matrix of ``data`` where more than ``few`` blocks have; whether any was. Of
-        ``rough`` solutions' matrices mostly all has, and will have in the next one."""
+        """Refactor the changed part of the matrix of ``data`` if more than ``few`` blocks have changed; returns whether
+        it was. Of matrices of ``rough`` solutions mostly everything changes."""
         changed = _changed(data, self._diagonal, self._factored, CHANGED) if self._has_factors else None
         number = self.n if changed is None else np.count_nonzero(changed)
         if number <= few:
@@ -346,11 +362,11 @@ class BlockSolver:
         self.counts["shares"] += share
 
     def factor(self, data: np.ndarray, changed: np.ndarray | None = None, again: bool = True) -> None:
-        """Factor the matrix of ``data``, which may be known to have ``changed`` (n,) in these diagonal blocks only;
-        ``again``: see `Factors.factor`. Raises numpy.linalg.LinAlgError when it is singular."""
+        """Factor the matrix of ``data``, of which only the diagonal blocks ``changed`` (n,) may differ; ``again``: see
+        `Factors.factor`. Raises numpy.linalg.LinAlgError when it is singular."""
         self._has_factors, began = False, time.perf_counter()
         if self.n >= SINGLE:
-            # Where their room is that of the factorisation.
+            # Those directions may be in the memory of the factorisation.
             self._directions.forget()
             self._shown.forget()
         share = self._factors.factor(data, changed, again)
@@ -373,18 +389,18 @@ class BlockSolver:
         self, data: np.ndarray, right: np.ndarray, within: float, target: float, factors: Factors,
         near: np.ndarray | None = None, tries: int = TRIES, fresh: bool = True,
     ) -> np.ndarray | None:  # fmt: skip
-        """x (6n,) with a residual of ``target``, from ``factors`` that are nearly those of the matrix, and from ``near``
-        on if that is known; None when it takes more than so many ``tries``, solutions with them, and where they are
-        ``fresh`` single ones of this matrix more `CYCLES` of these."""
-        known, told = self._directions, False
+        """x (6n,) with a residual of ``target``, by ``factors`` of nearly the same matrix, starting from ``near`` if
+        given; None if it takes more than ``tries`` solutions with them, or, for ``fresh`` single-precision factors of
+        this matrix, more than `CYCLES` times that."""
+        known, at_roundoff = self._directions, False
         known.forget()
         x = self.substitute(right, factors) if near is None else near.copy()
         for cycle in range(CYCLES):
             rest = right - self.multiply(data, x)
             largest = float(np.abs(rest).max(initial=0.0))
-            # Round-off is asked for only where it may decide, once: the first x of a coarse solution need not know it.
-            if largest > target and not told and (cycle or within <= COARSE):
-                target, told = max(target, self._round_off(data, x)), True
+            # The round-off is computed only where it may decide, and once; a coarse solution need not know it.
+            if largest > target and not at_roundoff and (cycle or within <= COARSE):
+                target, at_roundoff = max(target, self._round_off(data, x)), True
             self.left = largest
             if largest <= target:
                 return x
@@ -397,8 +413,8 @@ class BlockSolver:
         self, data: np.ndarray, x: np.ndarray, rest: np.ndarray, largest: float, target: float, factors: Factors,
         known: Directions, tries: int,
     ) -> bool:  # fmt: skip
-        """Bring ``rest`` (6n,), the residual of ``x`` (6n,), and its ``largest`` entry down to ``target``, both in
-        place, by further ``known`` directions; False if that takes more than so many ``tries``."""
+        """Reduce ``rest`` (6n,), the residual of ``x`` (6n,), until its ``largest`` entry is below ``target``, both in
+        place, by further directions beside the ``known`` ones; False if that takes more than ``tries``."""
         for _ in range(tries):
             if largest <= target or not np.isfinite(largest):
                 break

@@ -1,9 +1,8 @@
-"""Solutions of one matrix A by generalised conjugate residuals (Eisenstat, Elman & Schultz 1983), right side after right
-side.
+"""Generalised conjugate residuals for one matrix A and several right-hand sides (Eisenstat, Elman & Schultz 1983).
 
-Every direction d that was tried is kept with its product A d, these orthonormal; a residual is first brought as low as
-the known directions can, then along new ones. In exact arithmetic that is GMRES (Saad & Schultz 1986) without
-restarts, and what nearly singular parts of A cost one right side its successors need not pay again.
+Every search direction d is kept with its product A d, the products orthonormal. A residual is first minimised along the
+known directions, then along new ones. In exact arithmetic this is GMRES (Saad & Schultz 1986) without restarts, and
+directions found for one right-hand side, as those of nearly singular parts of A, serve the next.
 """
 
 from __future__ import annotations
@@ -17,8 +16,8 @@ _jit = kept(fastmath={"reassoc", "contract", "nsz"}, error_model="numpy", nogil=
 
 @_jit
 def _project(directions, products, x, rest):
-    """Go from ``x`` (m,) with the residual ``rest`` (m,) to where it is least along the ``directions`` (k, m); the
-    largest entry that is left."""
+    """Minimise the residual ``rest`` (m,) of ``x`` (m,) along the ``directions`` (k, m), in place; returns its largest
+    entry."""
     shares = np.empty(len(directions))
     for k in range(len(directions)):
         product, share = products[k], 0.0
@@ -35,7 +34,7 @@ def _project(directions, products, x, rest):
 
 @_jit
 def _include(direction, product, directions, products, k, x, rest):
-    """Make a new ``direction`` (m,) and its ``product`` number ``k`` of the known ones, and go on along it, as in
+    """Add a new ``direction`` (m,) and its ``product`` as number ``k`` of the known ones, and minimise along it as in
     `_project`."""
     for j in range(k):
         known, theirs, share = directions[j], products[j], 0.0
@@ -48,7 +47,7 @@ def _include(direction, product, directions, products, k, x, rest):
     for i in range(len(rest)):
         size += product[i] * product[i]
         share += product[i] * rest[i]
-    # What has no product leads nowhere: not a number, which whoever asks takes for a failure.
+    # A direction with zero product is useless: NaN, which the caller takes as a failure.
     scale = 1.0 / np.sqrt(size) if size > 0.0 else np.nan
     share *= scale
     mine, its = directions[k], products[k]
@@ -71,14 +70,13 @@ def _largest(values):
 
 
 class Directions:
-    """Room for ``most`` directions of ``size`` unknowns, of which ``number`` are known, in the first numbers of ``room``
-    if some is given; or the first ``most`` of the room of others, ``sharing``: what one of the two adds, the other has
-    forgotten."""
+    """Memory for ``most`` directions of ``size`` unknowns, of which ``number`` are known; in ``room`` if given, or in
+    the memory of other directions, ``sharing``: adding to one of the two then invalidates the other."""
 
     def __init__(self, size: int, most: int, sharing: Directions | None = None, room: np.ndarray | None = None) -> None:
         self._sharing = sharing
         if sharing is None:
-            # Memory is taken as directions come.
+            # Memory pages are allocated only as directions are added.
             room = np.empty(2 * most * size) if room is None else room
             self._directions, self._products = room[: 2 * most * size].reshape(2, most, size)
         else:
@@ -90,17 +88,16 @@ class Directions:
         return len(self._directions)
 
     def forget(self) -> None:
-        """The matrix is another."""
+        """Drop all directions: the matrix has changed."""
         self.number = 0
 
     def project(self, x: np.ndarray, rest: np.ndarray) -> float:
-        """Take ``x`` (m,) and its residual ``rest`` (m,) as near as the known directions lead; the largest entry of the
-        residual."""
+        """Minimise the residual ``rest`` (m,) of ``x`` (m,) along the known directions; returns its largest entry."""
         return _project(self._directions[: self.number], self._products[: self.number], x, rest)
 
     def add(self, direction: np.ndarray, product: np.ndarray, x: np.ndarray, rest: np.ndarray) -> float:
-        """`project` along one more ``direction`` (m,) with the ``product`` A d; both are overwritten. The oldest are
-        forgotten where there is no room."""
+        """`project` along one more ``direction`` (m,) with the ``product`` A d; both are overwritten. The oldest
+        directions are dropped if there is no room."""
         if self.number == len(self):
             self.forget()
         if self._sharing is not None:

@@ -1,18 +1,18 @@
 """Elimination of dense fronts of 6×6 blocks, in double or single precision.
 
-A front F holds the rows of its own blocks P and of those B to which their elimination reaches. It is factored a panel
-of two blocks at a time,
+A front F holds the rows of its own blocks P and of the blocks B that their elimination reaches. It is factored in
+panels of two blocks,
 
     Z = F_kk⁻¹,   U = −Z F_k·,   F_ij ← F_ij + F_ik U_j,
 
-and what is left of F_BB is added into its parent's front (Duff & Reid 1983). Arrays of the tree are those of
-`dissection.Tree`; ``child`` and ``sibling`` (n_fronts,) chain the children of a front.
+and what remains of F_BB is added to the parent's front (Duff & Reid 1983). Arrays of the tree are those of
+`nested_dissection.Tree`; ``child`` and ``sibling`` (n_fronts,) chain the children of a front.
 
-Factors lie in the order in which `triangular_solve` reads them, first what it reads on its way up, then what it reads on
-its way back: one core reads so 28 GB/s, but 9 where it skips every other few kilobytes (measured). ``at`` and ``back``
-(n_fronts,) say where a front's begin: at ``at`` for every panel F_k·, then Z, and behind all panels F_BP; at ``back``
-U of every panel, the last first. Each is a number of *sixes*: six rows, first a register of the first, of the second,
-…, then the next register of each, and what is left of each.
+Factors are stored in the order in which `triangular_solve` reads them, first for the forward, then for the backward
+pass: one core then reads 28 GB/s, against 9 if it skips every few kilobytes (measured). ``at`` and ``back`` (n_fronts,)
+are the begins of each front: at ``at`` F_k· of every panel, then Z, and behind all panels F_BP; at ``back`` U of every
+panel, the last first. Each is a number of *sixes*: six rows interleaved register by register, and then their
+remainders.
 """
 
 from __future__ import annotations
@@ -37,20 +37,20 @@ from .simd import (
 )
 from .small_products import small_product
 
-#: Kept with the kernel that calls them only, for they are made of what stands in other files, too. Sums may be
-#: reordered and fused: the products of whole fronts are summed as BLAS likes, too.
+#: Cached only with the kernel that calls them, since they depend on other files. Sums may be reordered and fused, as in
+#: BLAS products of whole fronts.
 _jit = njit(fastmath={"reassoc", "contract", "nsz"}, error_model="numpy", nogil=True)
 
 #: Unknowns eliminated at a time.
 PANEL = 12
-#: What so many do to the rows and columns behind them is one product, of BLAS where these are many.
+#: Unknowns whose effect on the rows and columns behind them is one product; a BLAS product if these are many.
 STRIP = 96
-#: Rows in which a panel is inverted: whole registers of either precision.
+#: Rows in which a panel is inverted: whole registers in either precision.
 SIDE = 16
-#: Numbers of a product from which BLAS is quicker: they no longer lie in the second cache.
+#: Size of a product from which BLAS is faster: it no longer fits the second-level cache.
 LARGE = 300_000
 
-#: BLAS's general products, as Numba itself binds them for np.dot: here with strides, and added in place.
+#: The general product of BLAS, as Numba binds it for np.dot: here with strides, and added in place.
 _gemm = types.ExternalFunction(
     "numba_xxgemm",
     types.intc(
@@ -63,8 +63,8 @@ _gemm = types.ExternalFunction(
 
 @_jit
 def _add_product(a, at_a, row_a, b, at_b, row_b, c, at_c, row_c, rows, k, n, keep, width, units):
-    """C ← A B, or C + A B to ``keep`` C: ``rows`` × k times k × n numbers, where in the arrays a, b and c each matrix
-    begins, and how far apart its rows are; ``units`` (2,) are 1 and 0."""
+    """C ← A B, or C + A B to ``keep`` C: ``rows`` × k times k × n numbers, given by the begin of each matrix in the
+    arrays a, b and c and the distance of its rows; ``units`` (2,) are 1 and 0."""
     if rows * n < LARGE:
         place = numbers(c)
         small_product(place, at_c, row_c, numbers(a), at_a, row_a, numbers(b), at_b, row_b, rows, k, n, width, keep)
@@ -74,15 +74,15 @@ def _add_product(a, at_a, row_a, b, at_b, row_b, c, at_c, row_c, rows, k, n, kee
             100 if c.itemsize == 8 else 115, 78, 78, n, rows, k, units[0:].ctypes, b[at_b:].ctypes, row_b,
             a[at_a:].ctypes, row_a, units[0 if keep else 1 :].ctypes, c[at_c:].ctypes, row_c,
         )  # fmt: skip
-    # What is found by its place is kept until here.
+    # Keeps the arrays alive, which are addressed by pointers above.
     return len(a) + len(b) + len(c)
 
 
 @_jit
 def _invert(front, at, m, n, cell, others, swapped, width):
-    """Invert n × n numbers of a ``front`` with rows of m, from ``at`` on, in place: Gauss–Jordan with exchange of rows;
-    False if they are singular. ``cell`` (`SIDE`² + 1,) is room, ``others`` (`SIDE`²,) ones but for a diagonal of
-    zeros."""
+    """Invert n × n numbers of a ``front`` with rows of m, from ``at`` on, in place, by Gauss–Jordan elimination with
+    row exchanges; False if they are singular. ``cell`` (`SIDE`² + 1,): working space; ``others`` (`SIDE`²,): ones with
+    zeros on the diagonal."""
     whole, here, but = numbers(front), numbers(cell), numbers(others)
     for i in range(n):
         for q in range(0, SIDE, width):
@@ -120,7 +120,7 @@ def _invert(front, at, m, n, cell, others, swapped, width):
     for i in range(n):
         for q in range(0, n, width):
             store_first(whole, at + i * m + q, load(here, SIDE * i + q), min(n - q, width))
-    # What is found by its place is kept until here.
+    # Keeps the arrays alive, which are addressed by pointers above.
     return len(front) + len(cell) + len(others) > 0
 
 
@@ -132,8 +132,8 @@ def _clear(array):
 
 
 def places(own: np.ndarray, far: np.ndarray) -> tuple[np.ndarray, np.ndarray, int]:
-    """``at`` and ``back`` of fronts with so many blocks of their ``own`` and ``far`` ones (n_fronts,), and how many
-    numbers all factors are."""
+    """``at`` and ``back`` of fronts with these numbers of ``own`` and ``far`` blocks (n_fronts,), and the size of all
+    factors."""
     p, b = 6 * own, 6 * far
     panels, rest = p // PANEL, p % PANEL
     # Σ h e over the panels of h rows up to the row e.
@@ -144,7 +144,7 @@ def places(own: np.ndarray, far: np.ndarray) -> tuple[np.ndarray, np.ndarray, in
 
 @_jit
 def _leave_sixes(given, at, stride, rows, n, taken, to, width):
-    """Write ``rows`` so far apart, of n numbers each, as sixes; where they end."""
+    """Write ``rows`` at this distance, of n numbers each, as sixes; returns their end."""
     for i in range(at, at + rows * stride, 6 * stride):
         j = 0
         while j + width <= n:
@@ -161,7 +161,7 @@ def _leave_sixes(given, at, stride, rows, n, taken, to, width):
 
 @_jit
 def _leave(front, p, m, factors, at, back):
-    """Write the factors of a ``front`` to where they belong."""
+    """Write the factors of a ``front`` to their places."""
     if p == 0:
         return 0
     width = BYTES // front.itemsize
@@ -174,14 +174,14 @@ def _leave(front, p, m, factors, at, back):
     for start in range(PANEL * ((p - 1) // PANEL), -1, -PANEL):
         end = min(start + PANEL, p)
         back = _leave_sixes(here, start * m + end, m, end - start, m - end, there, back, width)
-    # What is found by its place is kept until here.
+    # Keeps the arrays alive, which are addressed by pointers above.
     return len(front) + len(factors)
 
 
 @_jit
 def _runs(met, own, begins):
-    """Where runs of blocks that stand side by side begin among the seats ``met`` (n,) in a front with ``own`` blocks:
-    in ``begins``, n behind the last; how many there are, and how many of them among its own."""
+    """Runs of consecutive seats among ``met`` (n,) in a front with ``own`` blocks: their begins in ``begins``, followed
+    by n; the number of runs, and the number within its own blocks."""
     runs = mine = 0
     for v in range(len(met)):
         if v == 0 or met[v] != met[v - 1] + 1 or met[v] == own:
@@ -194,8 +194,8 @@ def _runs(met, own, begins):
 
 @_jit
 def _add_runs(into, at, added, begin, met, begins, first, last, width):
-    """Add to the row of a front whose first number is ``into[at]`` the runs from ``first`` to before ``last`` of a
-    child's row that begins with ``added[begin]``."""
+    """Add to the row of a front that begins at ``into[at]`` the runs from ``first`` to before ``last`` of a child's row
+    that begins at ``added[begin]``."""
     for r in range(first, last):
         v, j = begin + 6 * begins[r], at + 6 * met[begins[r]]
         n = 6 * (begins[r + 1] - begins[r])
@@ -231,8 +231,7 @@ def eliminate(
     space,
 ):
     """Eliminate the ``touched`` (n_fronts,) fronts from ``first`` to before ``last``; False if one is singular.
-    ``stack`` (n_fronts,): where S are left in the ``room``; ``units`` are 1 and 0; ``space`` as from
-    `working_space`."""
+    ``stack`` (n_fronts,): places of S in the ``room``; ``units`` are 1 and 0; ``space`` as from `working_space`."""
     front, panel, begins, cell, others, swapped = space
     width = BYTES // front.itemsize
     here, further = numbers(front), numbers(room)
@@ -242,7 +241,7 @@ def eliminate(
         own, far = pivots[f + 1] - pivots[f], reach[f + 1] - reach[f]
         p, b = 6 * own, 6 * far
         m = p + b
-        # Rows of m of the own unknowns, then rows of p of the others; where F_BB is left.
+        # Rows of m of the own unknowns, then rows of p of the others; where F_BB is stored.
         lower, rest = p * m, stack[f]
         _clear(front[: p * m + b * p])
         for k in range(entries[f], entries[f + 1]):
@@ -253,7 +252,7 @@ def eliminate(
                 into = front[to + a * apart : to + a * apart + 6]
                 for c in range(6):
                     into[c] = block[6 * a + c]
-        # What children leave in the rows and columns that are eliminated here; the rest of it below.
+        # Contributions of children to the rows and columns eliminated here; the rest follows below.
         g = child[f]
         while g >= 0:
             met, n = seat[reach[g] : reach[g + 1]], 6 * (reach[g + 1] - reach[g])
@@ -273,7 +272,7 @@ def eliminate(
                 end = min(start + PANEL, stop)
                 h, k, known = end - start, start - begin, begin * m + start
                 if k > 0:
-                    # What this strip's panels before do to the rows of this one, and to the columns below.
+                    # Effect of this strip's earlier panels on the rows of this one, and on the columns below.
                     small_product(
                         here, start * m + start, m, here, start * m + begin, m, here, known, m, h, k, m - start, width,
                         True,
@@ -317,13 +316,13 @@ def eliminate(
                     to = rest + (i + a) * b - p
                     _add_runs(further, to, further, left + a * n, met, begins, mine, runs, width)
             g = sibling[g]
-    # What is found by its place is kept until here.
+    # Keeps the arrays alive, which are addressed by pointers above.
     return len(room) + len(front) + len(panel) > 0
 
 
 @_jit
 def working_space(pivots, reach, factors):
-    """What `eliminate` works in: room for a front but for its F_BB, for a panel, and for numbers."""
+    """Working space of `eliminate`: a front without its F_BB, a panel, and index arrays."""
     most, far, size = 0, 0, 0
     for f in range(len(reach) - 1):
         p, b = 6 * (pivots[f + 1] - pivots[f]), 6 * (reach[f + 1] - reach[f])

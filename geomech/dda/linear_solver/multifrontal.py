@@ -1,9 +1,9 @@
-"""Elimination of 6×6-block systems front by front, on all cores.
+"""Multifrontal elimination of 6×6-block systems on all cores (Duff & Reid 1983).
 
-Subtrees of the dissection know nothing of each other, so that fronts are work for several threads (`task_pool`);
-each is eliminated as it would be by one thread (`front_elimination`), and what comes out is the same to the bit. Pivots are sought
-within a panel only: the diagonal of a block system carries inertia and springs. What that, or single precision, costs
-in digits is won back by refinement.
+Subtrees of the nested dissection are independent and are eliminated by several threads (`task_pool`), each exactly as
+one thread would (`front_elimination`), so that the result is the same to the last bit. Pivots are chosen within a panel
+only: the diagonal of a block system contains inertia and springs. The digits that this, or single precision, loses are
+recovered by refinement.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from .triangular_solve import backward, forward
 
 _jit = kept(fastmath=False, error_model="numpy", nogil=True)
 
-#: Blocks from which they are factored, and solutions substituted, on all cores.
+#: Number of blocks from which they are factored, and solutions substituted, on all cores.
 THREADED, THREADED_SOLUTION = 500, 4000
 
 
@@ -29,7 +29,7 @@ THREADED, THREADED_SOLUTION = 500, 4000
 def _eliminate_shared(
     claimed,
     awaited,
-    told,
+    done,
     tasks,
     above,
     touched,
@@ -50,8 +50,8 @@ def _eliminate_shared(
     factors,
     units,
 ):
-    """Claim ``tasks`` by ``claimed`` (1,) until none are left, and wait until all are done; ``awaited`` (k,) says of
-    how many each still waits for what they pass on, ``told`` (2,) how many are done, and how many have failed."""
+    """Claim ``tasks`` by ``claimed`` (1,) until none are left, and wait until all are done. ``awaited`` (k,): number of
+    contributions each task still waits for; ``done`` (2,): number of finished and of failed tasks."""
     space = None
     while True:
         q = add_at_once(claimed, 0, 1)
@@ -64,11 +64,11 @@ def _eliminate_shared(
             tasks[q, 0], tasks[q, 1], touched, data, pivots, reach, seat, entries, entry, row, column, stack, at, back,
             child, sibling, room, factors, units, space,
         ):  # fmt: skip
-            add_at_once(told, 1, 1)
+            add_at_once(done, 1, 1)
         if above[q] >= 0:
             add_at_once(awaited, above[q], -1)
-        add_at_once(told, 0, 1)
-    await_value(told, 0, len(tasks))
+        add_at_once(done, 0, 1)
+    await_value(done, 0, len(tasks))
 
 
 @_jit
@@ -89,7 +89,7 @@ def _give(out, order, size, x):
 
 @_jit
 def _mark_above(touched, parent):
-    """Mark the parents of marked fronts, and theirs."""
+    """Mark all ancestors of marked fronts."""
     for f in range(len(parent)):
         if touched[f] and parent[f] >= 0:
             touched[parent[f]] = True
@@ -99,7 +99,7 @@ def _mark_above(touched, parent):
 def _substitute_shared(
     claimed,
     awaited,
-    told,
+    done,
     tasks,
     above,
     out,
@@ -114,8 +114,8 @@ def _substitute_shared(
     factors,
     passed,
 ):
-    """As `_eliminate_shared`: forward through the tasks in their order, then backward through them the other way, each
-    behind the one above it."""
+    """As `_eliminate_shared`: forward through the tasks in their order, then backward in reverse order, each after its
+    parent."""
     k = len(tasks)
     while True:
         q = add_at_once(claimed, 0, 1)
@@ -124,7 +124,7 @@ def _substitute_shared(
         if q < k:
             await_value(awaited, q, 0)
             forward(tasks[q, 0], tasks[q, 1], out, pivots, reach, seat, at, child, sibling, factors, passed)
-            # −1: this one has gone forward.
+            # −1: forward pass of this task done.
             add_at_once(awaited, q, -1)
             if above[q] >= 0:
                 add_at_once(awaited, above[q], -1)
@@ -135,18 +135,18 @@ def _substitute_shared(
             else:
                 await_value(awaited, q, -1)
             backward(tasks[q, 0], tasks[q, 1], out, pivots, reach, boundary, back, factors)
-            # −2: and back.
+            # −2: backward pass done.
             add_at_once(awaited, q, -1)
-        add_at_once(told, 0, 1)
-    await_value(told, 0, 2 * k)
+        add_at_once(done, 0, 1)
+    await_value(done, 0, 2 * k)
 
 
 class Factors:
     """The factors of one pattern of 6×6 blocks, in ``dtype`` float64 or float32.
 
-    ``points`` (n, 2) m, where the blocks lie; ``rows`` and ``columns`` (n_entries,) of the matrix's blocks, both
-    triangles and the diagonal, sorted by row then column. The order of elimination is internal, or that of a ``tree``
-    already planned for the same pattern. ``again``: whether fronts may be eliminated again one by one.
+    ``points`` (n, 2) m: positions of the blocks; ``rows`` and ``columns`` (n_entries,) of the matrix blocks, both
+    triangles and the diagonal, sorted by row, then column. The order of elimination is internal, or that of a ``tree``
+    planned for the same pattern. ``again``: whether fronts may be eliminated again one by one.
     """
 
     def __init__(
@@ -171,7 +171,7 @@ class Factors:
         self._awaited = np.bincount(above[above >= 0], minlength=len(above))
         self._at, self._back, size = places(np.diff(self.tree.pivots), np.diff(self.tree.reach))
         self._factors = np.empty(size, dtype)
-        # Whether factors may be made anew in part, and whether those at hand may: every S is where it was left.
+        # Whether partial refactorisation is possible, and now: every S is still in place.
         again = again and self.tree.kept
         self._room = np.empty(self.tree.own_room_size if again else self.tree.stack_size, dtype)
         self._again, self._left = again, False
@@ -185,15 +185,16 @@ class Factors:
 
     @property
     def idle_room(self) -> np.ndarray:
-        """(…,) float64 that nothing is kept in from one factorisation to the next, for others to use in between."""
+        """(…,) float64 memory that holds nothing between factorisations, for temporary use by others."""
         return self._room[: 0 if self._again else len(self._room) // 2 * 2].view(np.float64)
 
     def factor(self, data: np.ndarray, changed: np.ndarray | None = None, again: bool = True) -> float:
-        """Factor the matrix of the blocks ``data`` (36 n_entries,), each row by row; the share of it that was done.
+        """Factor the matrix of the blocks ``data`` (36 n_entries,), each row by row; returns the share of the work
+        done.
 
-        Where only rows and columns of the blocks ``changed`` (n,) differ from the matrix factored before, only their
-        fronts and those above are eliminated again, unless it was not to be done ``again``. Raises
-        numpy.linalg.LinAlgError when the matrix is singular.
+        Where only rows and columns of the blocks ``changed`` (n,) differ from the last factored matrix, only their
+        fronts and those above are eliminated again, unless ``again`` was False. Raises numpy.linalg.LinAlgError when
+        the matrix is singular.
         """
         t = self.tree
         touched = np.ones(len(t.parent), np.bool_)
@@ -203,36 +204,37 @@ class Factors:
             _mark_above(touched, t.parent)
         self._left = self._again and (again or not touched.all())
         with blas_threads(1):
-            told = self._shared(
+            done = self._shared(
                 _eliminate_shared, THREADED, touched, data, t.pivots, t.reach, t.seat, t.entries, t.entry, t.row,
-                t.column, t.own_room if self._left else t.stack, self._at, self._back, self._child, self._sibling, self._room,
-                self._factors, self._units,
+                t.column, t.own_room if self._left else t.stack, self._at, self._back, self._child, self._sibling,
+                self._room, self._factors, self._units,
             )  # fmt: skip
-        if told[1]:
+        if done[1]:
             raise np.linalg.LinAlgError("the block system is singular")
         return float(np.diff(t.at)[touched].sum() / max(1, t.at[-1]))
 
     def substitute(self, right: np.ndarray) -> np.ndarray:
         """The solution of the factored system for ``right`` (6n,)."""
         t = self.tree
-        # Single precision has no more than 38 decades: the right side is brought to its middle.
+        # Single precision spans 38 decades; the right-hand side is scaled to their centre.
         size = float(np.abs(right).max(initial=0.0)) or 1.0
         out, x = np.empty(len(right), self._factors.dtype), np.empty(len(right))
         _take(right, self._order, size, out)
         self._shared(
-            _substitute_shared, THREADED_SOLUTION, out, t.pivots, t.reach, t.seat, t.boundary, self._at, self._back, self._child,
-            self._sibling, self._factors, self._passed,
+            _substitute_shared, THREADED_SOLUTION, out, t.pivots, t.reach, t.seat, t.boundary, self._at, self._back,
+            self._child, self._sibling, self._factors, self._passed,
         )  # fmt: skip
         _give(out, self._order, size, x)
         return x
 
     def _shared(self, work: Callable, least: int, *given) -> np.ndarray:
-        """Do the ``work`` of all tasks, from ``least`` blocks on by all cores; how many are done, and have failed."""
+        """Do the ``work`` of all tasks, on all cores from ``least`` blocks on; returns numbers of finished and failed
+        tasks."""
         t = self.tree
-        told = np.zeros(2, np.int64)
-        task = np.zeros(1, np.int64), self._awaited.copy(), told, t.tasks, t.above
+        done = np.zeros(2, np.int64)
+        task = np.zeros(1, np.int64), self._awaited.copy(), done, t.tasks, t.above
         if len(t.rank) < least:
             work(*task, *given)
         else:
             crew().share(work, *task, *given)
-        return told
+        return done

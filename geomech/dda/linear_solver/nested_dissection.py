@@ -1,8 +1,8 @@
-"""The order in which a plane system of blocks is eliminated: nested dissection into fronts (George 1973).
+"""Order of elimination of a plane system of blocks: nested dissection into fronts (George 1973).
 
-Blocks touch their neighbours in a plane, so a line of blocks parts a system in two halves that know nothing of each
-other, and each half again. Eliminated leaves first and separators last, the matrix fills in as little as it can. A
-*front* holds the rows of its own blocks and of those to which its elimination reaches (Duff & Reid 1983).
+Blocks touch only their neighbours in the plane, so a line of blocks divides a system into two independent halves, and
+each half again. If the leaves are eliminated first and the separators last, fill-in is minimal. A *front* holds the
+rows of its own blocks and of those that their elimination reaches (Duff & Reid 1983).
 """
 
 from __future__ import annotations
@@ -13,36 +13,37 @@ import numpy as np
 
 from ...compiled import kept, part
 
-#: Blocks in a leaf of the dissection: smaller ones cost more calls, larger ones more arithmetic (measured on walls).
+#: Blocks in a leaf of the dissection: smaller leaves cost more calls, larger ones more arithmetic (measured on walls).
 LEAF = 10
-#: Neither part of a cut has less than this part of the blocks.
+#: Smallest share of the blocks in either part of a cut.
 _LEAST = 0.3
-#: Cuts are sought across these directions (2, k), from so many blocks on across more: joints may be inclined.
+#: Directions (2, k) across which cuts are searched, more of them from this number of blocks on: joints may be inclined.
 _LARGE = 200
 _TWO, _MANY = (np.stack([np.cos(t), np.sin(t)]) for t in (np.pi / 2 * np.arange(2), np.pi / 8 * np.arange(8)))
-#: Entries of all S together up to which they are kept: 1.2 GB in single precision, those of some fifty thousand blocks.
+#: Largest total number of entries of all S for which they are kept: 1.2 GB in single precision, some fifty thousand
+#: blocks.
 KEPT = 300_000_000
 
 
 @dataclass(frozen=True, eq=False)
 class Tree:
-    """The order of elimination. Fronts stand in postorder, blocks are numbered as they are eliminated.
+    """The order of elimination. Fronts are in postorder, blocks numbered in the order of elimination.
 
     rank          (n_blocks,)     the number of each block as given
     pivots        (n_fronts + 1,) first own block of every front
     parent        (n_fronts,)     −1 for a root
     reach         (n_fronts + 1,) first entry of every front in ``boundary``
     boundary      (…,)            blocks that a front's elimination reaches, ascending
-    seat          (…,)            where each of them stands in the parent's front
+    seat          (…,)            position of each of them in the parent's front
     entries       (n_fronts + 1,) first matrix block of every front in ``entry``
-    entry, row, column            the matrix block, and where it stands in the front
-    kept          whether every S may have a room of its own, so that fronts can be eliminated again one by one
-    own_room      (n_fronts,)     where the front leaves its S then, in a room of ``own_room_size``
-    stack         (n_fronts,)     where it leaves it in a room of ``stack_size`` that others use after it: what is used
-                                  again soon is still at hand, and need not come from memory
+    entry, row, column            matrix block, and its position in the front
+    kept          whether every S may have memory of its own, so that fronts can be eliminated again one by one
+    own_room      (n_fronts,)     place of the front's S in that case, in memory of ``own_room_size``
+    stack         (n_fronts,)     its place in memory of ``stack_size`` that later fronts reuse: recently used memory is
+                                  still in the cache
     at            (n_fronts + 1,) first entry of every front's factor
-    tasks         (k, 2)          ranges of fronts that are one thread's work at a time, each behind those it needs
-    above         (k,)            the task that needs what each task passes on, −1 without
+    tasks         (k, 2)          ranges of fronts that are one thread's work at a time, each after those it needs
+    above         (k,)            the task that needs the result of each task, −1 without
     """
 
     rank: np.ndarray
@@ -67,8 +68,8 @@ class Tree:
 
 @part(fastmath=False, error_model="numpy", nogil=True)
 def _best_cut(order, pointer, neighbour, place, least):
-    """(price, k, whether the first part gives the separator) of the cheapest cut of the blocks in ``order`` into the
-    first k and the rest, neither below ``least``; ``place`` (n,) is room, −1 all over, and left so."""
+    """(cost, k, whether the first part contains the separator) of the cheapest cut of the blocks in ``order`` into the
+    first k and the rest, neither below ``least``; ``place`` (n,): working space, −1 everywhere before and after."""
     m = len(order)
     for q in range(m):
         place[order[q]] = q
@@ -101,8 +102,8 @@ def _best_cut(order, pointer, neighbour, place, least):
 
 @part(fastmath=False, error_model="numpy", nogil=True)
 def _meets(order, at, mine, pointer, neighbour, place):
-    """(m,) whether each block in ``order`` is of the first ``at`` (or, not ``mine``, of the rest) and meets one on the
-    other side."""
+    """(m,) bool: blocks in ``order`` that belong to the first ``at`` (or, not ``mine``, to the rest) and touch one on
+    the other side."""
     m = len(order)
     out = np.zeros(m, np.bool_)
     for q in range(m):
@@ -190,8 +191,8 @@ def _dissected(orders, pointer, neighbour, leaf, large, least_part, across):
 
 
 def dissect(points: np.ndarray, pointer: np.ndarray, neighbour: np.ndarray) -> tuple[np.ndarray, ...]:
-    """The blocks (n,) front by front, where each front begins among them (n_fronts + 1,), and its parent (n_fronts,), in
-    postorder; ``points`` (n, 2) lie where the blocks do, ``pointer`` and ``neighbour`` say which meet.
+    """The blocks (n,) front by front, where each front begins among them (n_fronts + 1,), and its parent (n_fronts,),
+    in postorder; ``points`` (n, 2) lie where the blocks do, ``pointer`` and ``neighbour`` say which meet.
 
     Cut across one of several directions, where the separator, the smaller of the two rows of blocks along the cut, is
     smallest: bricks are many to a metre upwards and few along a course.

@@ -2,8 +2,8 @@
 
 Fronts are short (thirty to some hundred unknowns) and their rows begin anywhere: loops over them are mostly remainders,
 which a compiler leaves to single numbers. Here the remainder is a register of which the first few numbers count.
-Numbers are found by `numbers` of an array, which has no count of who refers to it: whoever asks for them keeps the array
-until they are done with.
+Numbers are found by `numbers` of an array, which has no count of who refers to it: whoever asks for them keeps the
+array until they are done with.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Products of small matrices whose rows come in sixes, as fronts are made of.
 
-A tile of C, six rows by two registers, stays in registers while it is summed. BLAS copies what it multiplies first, which
-pays in large products only.
+A tile of C, six rows by two registers, stays in registers while it is summed. BLAS copies what it multiplies first,
+which pays in large products only.
 """
 
 from __future__ import annotations
@@ -70,16 +70,16 @@ def _one_wide(c, at, row_c, a, at_a, row_a, b, at_b, row_b, k, n, width, keep):
 
 @_jit
 def small_product(c, at, row_c, a, at_a, row_a, b, at_b, row_b, rows, k, n, width, keep):
-    """C ← A B, or C + A B to ``keep`` C: ``rows`` (sixes) × k times k × n numbers. Each matrix by where its numbers lie,
-    its first and the distance of its rows; ``width`` numbers are a register."""
+    """C ← A B, or C + A B to ``keep`` C: ``rows`` (sixes) × k times k × n numbers. Each matrix by where its numbers
+    lie, its first and the distance of its rows; ``width`` numbers are a register."""
     j = 0
     while j < n:
         here = min(n - j, 2 * width)
         for i in range(0, rows, 6):
             if here > width:
                 _two_wide(
-                    c, at + i * row_c + j, row_c, a, at_a + i * row_a, row_a, b, at_b + j, row_b, k, here - width, width,
-                    keep,
+                    c, at + i * row_c + j, row_c, a, at_a + i * row_a, row_a, b, at_b + j, row_b, k, here - width,
+                    width, keep,
                 )  # fmt: skip
             else:
                 _one_wide(

@@ -1,9 +1,9 @@
-"""Tasks of a tree that several threads claim, from inside compiled code: what a thread waits for is another's result,
-never the interpreter.
+"""Tasks of a tree shared by several threads in compiled code, which wait for each other's results without the
+interpreter.
 
-Every thread claims the next task of one list, in which a task stands behind all it needs, and waits until these are
-done; so whoever holds the first task that is not done can go on, and one thread alone does them all. What a task does
-must not depend on who does it.
+Every thread claims the next task of one list, in which a task stands after all those it needs, and waits until these
+are done. The thread with the first unfinished task can therefore always continue, and one thread alone completes them
+all. The result of a task must not depend on the thread.
 """
 
 from __future__ import annotations
@@ -21,12 +21,12 @@ from numba.np.arrayobj import make_array
 
 from ...compiled import part
 
-#: Looks at what another thread is to finish, before this one sleeps for so many microseconds between them: where more
-#: threads want to run than there are cores, the other may have none.
+#: Number of checks for another thread's result before this one sleeps for this many microseconds between them: with
+#: more threads than cores the other one may not be running.
 _LOOKS, _SLEEP = 2000, 50
-#: Where a thread has done nothing for more than this part of the time, cores are busy with other things, and so many
-#: times it does all tasks of that kind alone: to wait for others to get a core takes many times as long as the work. (Of
-#: other kinds it does not: a product that has waited a millisecond would send the next factorisations to one core.)
+#: If a thread has been idle for more than this fraction of the time, the cores are busy with other work, and it then
+#: does all tasks of that kind alone for this number of times: waiting for a core takes many times as long as the work.
+#: (Other kinds are not affected: one product that waited a millisecond would put the next factorisations on one core.)
 _IDLE, _ALONE = 0.5, 20
 
 _usleep = types.ExternalFunction("usleep", types.intc(types.uint32))
@@ -59,7 +59,7 @@ def await_value(array, index, value):
 
 
 class Crew:
-    """The ``number`` of threads that come to help the caller's."""
+    """The ``number`` of threads that help the caller's thread."""
 
     def __init__(self, number: int) -> None:
         self.number = number
@@ -67,8 +67,8 @@ class Crew:
         self._alone: dict[Callable, int] = {}
 
     def share(self, work: Callable, *given) -> None:
-        """Let ``work(*given)`` claim tasks on all cores until none are left; it returns to the caller when all are
-        done. Threads that come when no task is left return at once: they are not waited for."""
+        """Let ``work(*given)`` claim tasks on all cores until none are left; returns when all are done. Threads that
+        start when no task is left return at once and are not waited for."""
         alone = self._alone.get(work, 0)
         if alone or not self.number:
             self._alone[work] = max(alone - 1, 0)
@@ -88,5 +88,5 @@ class Crew:
 
 @cache
 def crew() -> Crew:
-    """That of this process: one thread to each core beside the caller's."""
+    """The crew of this process: one thread per core beside the caller's."""
     return Crew(len(os.sched_getaffinity(0)) - 1)

@@ -1,7 +1,7 @@
-"""Substitution through the factors of dense fronts (`front_elimination`), at the speed at which they are read.
+"""Forward and backward substitution through the factors of dense fronts (`front_elimination`), at memory speed.
 
-All rows come in sixes, and six are multiplied at a time: what they are multiplied by is read once for all, and their
-sums, which would each take as long as a row of thirty, are formed together.
+Rows come in sixes, and six are multiplied at a time: their common factor is read once for all, and their sums, each as
+slow as a row of thirty by itself, are formed together.
 """
 
 from __future__ import annotations
@@ -64,7 +64,7 @@ def _longest(pivots, reach, first, last):
 @_jit
 def forward(first, last, out, pivots, reach, seat, at, child, sibling, factors, passed):
     """Forward substitution in ``out`` (6n,), in the order of elimination, through fronts from ``first`` to before
-    ``last``; ``passed`` holds what each front passes on."""
+    ``last``; ``passed`` holds the contribution of each front to its parent."""
     width = BYTES // out.itemsize
     known, part = np.empty(_longest(pivots, reach, first, last), out.dtype), np.empty(PANEL, out.dtype)
     x, y, solution, left, rows = numbers(known), numbers(part), numbers(out), numbers(passed), numbers(factors)
@@ -92,7 +92,7 @@ def forward(first, last, out, pivots, reach, seat, at, child, sibling, factors, 
         for i in range(p, m, 6):
             store_six(left, 6 * reach[f] + i - p, minus(load_six(x, i), _six(rows, here, x, 0, p, width)))
             here += 6 * p
-    # What is read by its place is kept until here.
+    # Keeps the arrays alive, which are addressed by pointers above.
     return len(known) + len(part) + len(out) + len(passed) + len(factors)
 
 

@@ -72,7 +72,8 @@ def settled_in_patch(
         settled = settle(
             Equations(
                 own, equations.matrix[inside], equations.right[inside], part, vectors, springs, gap,
-                equations.slack[rows], None, equations.statics, _of(equations.expected, inside),
+                equations.slack[rows], None, equations.statics,
+                None if equations.expected is None else _of(answer.unknowns, inside),
             )
         )  # fmt: skip
     except Unsettled:
@@ -82,6 +83,6 @@ def settled_in_patch(
     return States(state, direction, states.bonded), settled.iterations * float(inside.sum()) / n
 
 
-def _of(unknowns: np.ndarray | None, inside: np.ndarray) -> np.ndarray | None:
+def _of(unknowns: np.ndarray, inside: np.ndarray) -> np.ndarray:
     """(6 k,) of the ``unknowns`` (6 n,), those of the blocks ``inside`` (n,) bool."""
-    return None if unknowns is None else unknowns.reshape(-1, 6)[inside].ravel()
+    return unknowns.reshape(-1, 6)[inside].ravel()

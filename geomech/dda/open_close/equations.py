@@ -101,7 +101,7 @@ class Equations:
         self._held: tuple[np.ndarray, ...] | None = None
         self._near: np.ndarray | None = None
         self._force = float(np.abs(self.right).max(initial=0.0))
-        self._sides = assembly.sides_of(self.pattern.n, self.pattern.order, self.found.block, self.found.other)
+        self.sides = assembly.sides_of(self.pattern.n, self.pattern.order, self.found.block, self.found.other)
 
     def room(self) -> np.ndarray:
         """The flat matrix, for others to fill until the next answer: one of 100 000 blocks takes 200 MB."""
@@ -134,7 +134,7 @@ class Equations:
         return assembly.assemble_contacts(
             pattern, self._data, self._side, self.matrix, self.right, pattern.upper, pattern.lower, found.block,
             found.other, pattern.order, self.vectors, state, direction, gap, springs.normal, springs.shear,
-            springs.friction, springs.sliding, springs.lift, found.shear, self._sides, self._held,
+            springs.friction, springs.sliding, springs.lift, found.shear, self.sides, self._held,
         )  # fmt: skip
 
     def _forces(

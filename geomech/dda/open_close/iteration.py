@@ -1,13 +1,14 @@
-"""Open–close iteration: contact states that agree with the motion they produce.
+"""Open–close iteration: contact states that are consistent with the motion they produce.
 
-A set of states makes the step linear; its solution is checked against them (`coulomb_return`). Every contact that fails
-is switched and the step is solved again: a semismooth Newton method, which ends in two or three iterations where few
-contacts change. Bonds, lost for good, break only when all else is right.
+Given contact states make the step linear. Its solution is checked against them (`coulomb_return`), every inconsistent
+contact is switched, and the step is solved again: a semismooth Newton method, which converges in two or three
+iterations where few contacts change. Bonds, whose loss is final, break only when everything else is consistent.
 
-Where the number of wrong contacts does not fall, those that are left are settled on the blocks about them alone
-(`block_patches`), if they are few; else the interior-point method (`CentralPath`) proposes states from which Newton's
-goes on. Where neither leads on, the step is cut. Laws that are curved are lines within an iteration, which goes on until
-lines and laws agree on the forces. All that is tuned stands in `ContactSolver`.
+If the number of inconsistent contacts does not fall, operator splitting (`operator_splitting`) proposes states, once in
+a step in motion. Those that remain inconsistent are solved on the surrounding blocks alone (`block_patches`), if they
+are few; otherwise the interior-point method (`CentralPath`) proposes states from which Newton's method
+continues. If that fails, the step is cut. Nonlinear joint laws are linearised within an iteration, which continues
+until the laws agree with their linearisation. All parameters are in `ContactSolver`.
 """
 
 from __future__ import annotations
@@ -22,6 +23,7 @@ from ..contact_detection.contact_finder import ContactSet
 from .block_patches import settled_in_patch
 from .equations import Answer, Equations, States, Unsettled
 from .interior_point.central_path import CentralPath
+from .operator_splitting import can_split, split
 from .settled_states import Settled
 
 log = logging.getLogger(__name__)
@@ -88,7 +90,8 @@ def _with_bonds_restored(equations: Equations, effort: Effort, settled: Settled)
 class _Search:
     """The search for the contact states of one step's ``equations``.
 
-    ``newton`` counts iterations of Newton's method, ``spent`` those of the central path and of patches besides.
+    ``newton`` counts iterations of Newton's method, ``spent`` those of splitting, the central path and patches besides.
+    ``may_split``: operator splitting is still to be tried.
     """
 
     def __init__(self, equations: Equations, effort: Effort) -> None:
@@ -103,6 +106,7 @@ class _Search:
         self.seen: set[bytes] = set()
         self.offered: set[bytes] = set()
         self.patched = self.pivots = 0
+        self.may_split = self.solver.splitting and not effort.within_patch and can_split(self.equations)
         # What closes sticking, is pulled open by its own shear and closes again can only slide: neither fits.
         self.closed, self.sheared = np.zeros(n, np.int64), np.zeros(n)
         self._restart()
@@ -142,7 +146,8 @@ class _Search:
             if not self.equations.first_order:
                 self._pivot(answer, wrong, called, returned)
             elif returned or self.tries > self._most_tries(number):
-                self._by_path(answer)
+                if not self._by_splitting():
+                    self._by_path(answer)
             else:
                 self.states = self.states.switched(wrong, called)
 
@@ -185,20 +190,23 @@ class _Search:
             self.fewest, self.best = number, (self.states, answer, wrong)
 
     def _most_tries(self, number: int) -> int:
-        """How many iterations may go by without a reduction: none of a large system, whose factors are dear."""
+        """How many iterations may go by without a reduction: none of a large system, whose factors are dear, nor where
+        many are wrong that operator splitting finds for less."""
         few = number <= self.solver.few_wrong * len(self.found)
         solver = self.equations.pattern.solver
         if few and (solver is None or solver.in_parts):
             return self.solver.newton_tries_if_few
-        return -1 if self.large else self.solver.newton_tries
+        return -1 if self.large else 0 if self.may_split else self.solver.newton_tries
 
     def _by_patch(self, answer: Answer, wrong: np.ndarray, number: int) -> bool:
         """Whether the wrong contacts, few, were settled on the blocks about them alone, from the best states so far."""
         solver, effort = self.solver, self.effort
         if (
-            not self.equations.first_order
+            not solver.patches
+            or not self.equations.first_order
             or effort.within_patch
             or self.equations.pattern.solver is None
+            or self.may_split
             or self.patched >= solver.patch_tries
         ):
             return False
@@ -214,6 +222,22 @@ class _Search:
             self.proposed = False
             return False
         self.states = proposal
+        self._restart()
+        return True
+
+    def _by_splitting(self) -> bool:
+        """Whether operator splitting proposes states, which it does once. Raises `Unsettled`."""
+        if not self.may_split:
+            return False
+        self.may_split = False
+        try:
+            proposal = split(self.equations, self._bonds_on_path(), self.solver)
+        except np.linalg.LinAlgError as error:
+            raise Unsettled(str(error)) from error
+        self.spent += proposal.spent
+        if proposal.states is None or proposal.states.key in self.seen:
+            return False
+        self.states, self.most = proposal.states, max(self.most, self.newton + self.solver.newton_to_finish)
         self._restart()
         return True
 

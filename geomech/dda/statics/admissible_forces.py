@@ -66,7 +66,7 @@ class AdmissibleForces:
         drawn_on = (drawn.vertex * n_vertices + drawn.edge)[drawn.gap_before <= drawn.precision]
         touches = near.gap_before <= near.precision
         rows = np.flatnonzero(touches | np.isin(near.vertex * n_vertices + near.edge, drawn_on))
-        free = ~system.fixed if blocks.held is None else ~(system.fixed | blocks.held.any(axis=1))
+        free = ~system.fixed if blocks.constrained is None else ~(system.fixed | blocks.constrained.any(axis=1))
         number = np.where(free, np.cumsum(free) - 1, -1)
         loads = contact_resultants(state.contacts, blocks.n_blocks, centre)[free]
         unit = float(np.abs(loads).max(initial=0.0))

@@ -20,7 +20,7 @@ from .sharp_toes import FREE, Toe
 from .stability_trial import Trial
 
 #: So many blocks with toes are named.
-_TOLD = 8
+_LISTED = 8
 #: Toes bar the way of blocks that come nearer to what they touch by this part of the fastest block's way, and hold
 #: what is more than this part of their block's weight.
 _BARRED, _BEARS = 1e-3, 1e-3
@@ -91,8 +91,8 @@ def _of_toes(blocks: Blocks, toes: tuple[Toe, ...], other: FactorOfSafety | None
     )
     if not one:
         rest = list(dict.fromkeys(name(toe.block) for toe in toes if toe.block != first.block))
-        more = f" and {len(rest) - _TOLD} others" if len(rest) > _TOLD else ""
-        where += f" (so do those of {', '.join(rest[:_TOLD])}{more})"
+        more = f" and {len(rest) - _LISTED} others" if len(rest) > _LISTED else ""
+        where += f" (so do those of {', '.join(rest[:_LISTED])}{more})"
     if hold:
         without = "the blocks do not stand" if other is None else f"the factor is {factor(other)}"
         force = sum(toe.force for toe in toes) / 1e3

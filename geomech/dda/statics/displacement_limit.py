@@ -7,9 +7,9 @@ the size h = √area have therefore collapsed, wherever they end, once a vertex 
 
     h / 2000  +  five times the largest displacement were no joint to fail  +  what stretches a bolt to its yield force
 
-(the last at most h / 10, and nothing for a bolt that never yields: what it may take is a matter of how far blocks may move)
-and than any other block that has not. Blocks that were drawn apart from all that holds them first fall on it: their way
-counts from there.
+and twice what blocks of higher order deflect (what stretches a bolt counts h / 10 at most, and nothing for a bolt that
+never yields: what it may take is a matter of how far blocks may move), and than any other block that has not. Blocks
+that were drawn apart from all that holds them first fall on it: their way counts from there.
 """
 
 from __future__ import annotations
@@ -106,7 +106,7 @@ class DisplacementLimit:
         moved = self.moved(state.vertices)
         if not (moved > own)[~self._system.fixed].any():
             return own
-        own = own + self.elastic + self.stretching(state, moved)
+        own = own + self.elastic + self.stretching(state, moved) + self.bending(state)
         within = moved <= own
         return own + float(moved[within].max(initial=0.0))
 
@@ -135,6 +135,12 @@ class DisplacementLimit:
                 most[[b for b in (bolt.block, bolt.other) if b != GROUND]] = _STRETCHED * elastic
                 longest = np.maximum(longest, np.minimum(most, moved * elastic / (elastic + yielded)))
         return np.minimum(longest, _FARTHEST * self._size)
+
+    def bending(self, state: State) -> float:
+        """m: what deflections of blocks of higher order explain: a beam goes down by as much as it bends, and what lies on
+        it by twice that."""
+        deflected = self._system.deflected
+        return 0.0 if deflected is None else 2.0 * float(deflected.deflection_of(state)[0].max())
 
     @property
     def elastic(self) -> float:

@@ -59,9 +59,12 @@ def in_situ_state(
     ``tolerance`` of the unbalanced force as in `equilibrium`; the stress is given back until that changes it by less
     than ``stress_tolerance`` of itself. Where weight and supports ask for another stress than ``stress``, that one is
     what the blocks end with, and ``deviation`` says by how much; the part that nothing contradicts (as the horizontal
-    one between walls) stays. Raises `NoInSituEquilibrium` when the blocks do not come to rest.
+    one between walls) stays. Raises `NoInSituEquilibrium` when the blocks do not come to rest, and ValueError for blocks
+    of higher order.
     """
     blocks = system.blocks
+    if system.deflected is not None:
+        raise ValueError("in-situ stress is not supported in blocks of an order above 1 yet")
     centres = np.array([blocks.area_moments(b)[1] for b in range(blocks.n_blocks)])
     given = stress.at(centres)
     given[blocks.fixed] = 0.0

@@ -1,11 +1,11 @@
 """Static equilibrium found by itself: pseudo-time continuation of static steps.
 
-A static step, which carries no velocity, solves (2M/dt² + K) d = F: of what is out of balance its inertia takes the
-part 2M d/dt². Small dt moves blocks gently until contacts have found one another, large dt is Newton's method for
-statics. dt therefore starts at some transits of sound through a block and grows from step to step (pseudo-transient
-continuation: Mulder & van Leer 1985; Kelley & Keyes 1998), until 2M d/dt² is as small as asked for. Where
-nothing holds the blocks it never is, and they move on: a collapse. So is what comes to rest only after it has moved
-farther than strains, joints and bolts explain (`displacement_limit`): a block that slides until it lands on a floor.
+A static step, which carries no velocity over, solves (2M/dt² + K) d = F: of the unbalanced force, inertia takes 2M
+d/dt². With small dt the blocks move gently until their contacts have closed; large dt is Newton's method for statics.
+dt therefore starts at some transits of sound through a block and grows from step to step (pseudo-transient
+continuation: Mulder & van Leer 1985; Kelley & Keyes 1998), until 2M d/dt² is below the tolerance. If the blocks are
+unsupported it never is, and they keep moving: a collapse. Blocks that come to rest only after moving farther than
+strains, joints and bolts explain (`displacement_limit`), as a block that slides onto a floor, have collapsed as well.
 """
 
 from __future__ import annotations
@@ -36,16 +36,16 @@ RELAXATION_STEP = np.dtype(
     ]
 )
 #: The first step is this many transits of sound through the smallest block. A wall of a thousand bricks settles in 103,
-#: 69, 65, 51 and 55 open–close iterations from 10, 30, 100, 300 and 1000 of them, the last after one cut; much shorter
-#: steps change forces by so little that round-off decides about contacts.
+#: 69, 65, 51 and 55 open–close iterations from 10, 30, 100, 300 and 1000 of them, the last after one cut; in much
+#: shorter steps forces change so little that round-off decides about contacts.
 _FIRST_TRANSITS = 100.0
-#: dt grows by this factor from step to step, unless blocks already move nearly as far as a step may move them.
+#: dt grows by this factor from step to step, unless blocks already move nearly as far as allowed.
 _GROWTH, _NEARLY = 4.0, 0.3
-#: Blocks that have gone this part of their size √area, with no more balance after so many steps than before them, go
-#: on; what flies freely, with nearly all its weight to move it, may still land. Walls and slopes that stand take 3 to
-#: 15 steps.
+#: Blocks that have moved by this fraction of their size √area, and are no closer to balance after this number of steps,
+#: keep moving; a block in free flight (unbalanced by nearly its weight) may still land. Stable walls and slopes take 3
+#: to 15 steps.
 _GONE, _IN_VAIN, _FLYING = 0.05, 25, 0.99
-#: Inertia stays above this part of the contacts' stiffness, so that blocks that nothing pushes stay put.
+#: Inertia stays above this fraction of the contact stiffness, so that unloaded blocks stay in place.
 _LEAST_INERTIA = 1e-10
 #: Penalty over E', for that comparison.
 _PENALTY = 40.0
@@ -139,7 +139,7 @@ def equilibrium(
             result = static.step(state, loads, dt, crack, time)
         except NotConverged as failure:
             return answer(False, bool(gone), str(failure))
-        # Pseudo-time is no time: what the loads do at their times waits.
+        # Pseudo-time is not the time of the loads, which do not change here.
         state = replace(result.state, time=begin.time)
         statistics = result.statistics
         unbalanced = unbalanced_force(static, result)
@@ -206,21 +206,23 @@ def _centroids(system: BlockSystem, state: State) -> np.ndarray:
 
 
 def rounding_force(system: BlockSystem) -> float:
-    """What springs like the stiffest contacts' give for the rounding of coordinates, N/m."""
+    """Force of springs like the stiffest contacts' under the rounding of coordinates, N/m."""
     modulus = max((m.plane_modulus for m in system.materials if not m.rigid), default=0.0)
     return _PENALTY * modulus * system.rounding
 
 
 def unbalanced_force(system: BlockSystem, result: StepResult) -> float:
-    """Largest force (or moment over √area) out of balance on a free block in a static step: its inertia 2M d/dt², over
-    the mean of all forces on free blocks, contact forces and loads by their magnitudes; 0 where no force acts. What
-    contacts make of the rounding of coordinates is no force: blocks that have come apart without weight are at rest."""
+    """Largest unbalanced force (or moment over √area) on a free block in a static step: its inertia 2M d/dt², over the
+    mean magnitude of all forces, contact forces and loads, on free blocks; 0 without forces. Contact forces from the
+    rounding of coordinates do not count: separated blocks without weight are at rest."""
     free = ~system.blocks.fixed
     f, a = result.forces, result.acceleration
     h2 = f.area
     mass = f.inertia.density * f.area
-    # For a rotation the moment of inertia is of the order m h²/6: the bound is enough.
+    # For a rotation the moment of inertia is about m h²/6: the bound suffices.
     out = mass * np.maximum(np.hypot(a[:, 0], a[:, 1]), np.sqrt(h2) / 6 * np.abs(a[:, 2]))
+    if system.deflected is not None:
+        out = np.maximum(out, mass * system.deflected.acceleration)
     acting = mass * float(np.hypot(*f.inertia.gravity))
     for rows in (f.points, f.edges):
         np.add.at(acting, rows["block"], np.hypot(rows["force"][:, 0], rows["force"][:, 1]))

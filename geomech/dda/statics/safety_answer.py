@@ -13,7 +13,7 @@ from .stability_trial import Trial
 
 #: So many blocks of a mechanism are described; one that turns by more than this (rad) as it goes its own size is said
 #: to.
-_TOLD, _TURNS = 8, 0.05
+_LISTED, _TURNS = 8, 0.05
 
 
 @dataclass(frozen=True)
@@ -133,7 +133,7 @@ def mechanism_of(blocks: Blocks, trial: Trial, moving: tuple[int, ...]) -> tuple
     """A line for each of the fastest blocks."""
     fastest = float(np.hypot(*trial.displacement[list(moving[:1])].T).max()) if moving else 1.0
     lines = []
-    for block in moving[:_TOLD]:
+    for block in moving[:_LISTED]:
         (x, y), turn = trial.displacement[block], trial.rotation[block]
         far = math.hypot(x, y)
         name = blocks.names[block] if blocks.names else f"block {block}"
@@ -144,6 +144,6 @@ def mechanism_of(blocks: Blocks, trial: Trial, moving: tuple[int, ...]) -> tuple
             turned = f"{math.degrees(abs(turn)) * size / far:.0f}° while it goes its own size, √area"
             text += f", turning {'left' if turn > 0 else 'right'} by {turned}"
         lines.append(text)
-    if len(moving) > _TOLD:
-        lines.append(f"and {len(moving) - _TOLD} more of {blocks.n_blocks} blocks")
+    if len(moving) > _LISTED:
+        lines.append(f"and {len(moving) - _LISTED} more of {blocks.n_blocks} blocks")
     return tuple(lines)

@@ -1,10 +1,10 @@
-"""One reduced strength tried: do the blocks come to rest where they are, or move on?
+"""One trial of strength reduction: do the blocks come to rest, or do they keep moving?
 
-Static steps of the length dt leave out of balance what moves the blocks by a dt²/2. Where they stand, the unbalanced
-force falls to round-off within a few steps. Where it stays, steps show which way blocks go: they move on if nothing
-bars that way, and if what is left of the unbalanced force, as it falls with the way, lasts beyond the displacement that
-an equilibrium allows (`displacement_limit`). What these do not tell, as where a corner is about to touch, is followed
-with longer steps until it is at rest or has moved too far.
+In static steps of length dt an unbalanced acceleration a moves a block by a dt²/2. In a stable trial the unbalanced
+force falls to round-off within a few steps. If it remains, the steps show the direction of motion. The trial is
+unstable if no contact closes in that direction and the unbalanced force, extrapolated along the motion, lasts beyond
+the displacement that an equilibrium allows (`displacement_limit`). Undecided cases, as a corner about to touch, are
+continued with longer steps until the blocks are at rest or have moved too far.
 """
 
 from __future__ import annotations
@@ -20,31 +20,32 @@ from ..results import NotConverged, StepResult
 from ..system import BlockSystem
 from .displacement_limit import DisplacementLimit
 
-#: Free fall over a step takes a block this part of its size √area: long beside contact vibrations, short for geometry.
+#: Free fall in one step, as a fraction of a block's size √area: long against contact vibrations, small for the
+#: geometry.
 _FALL = 0.01
-#: An unbalanced force that has not fallen by this factor over so many steps does not fall.
+#: An unbalanced force that has not fallen by this factor in so many steps does not fall.
 _FALLING, _STEPS = 0.8, 6
-#: No trial is called unstable before it has made so many steps.
+#: Fewest steps before a trial is called unstable.
 _LEAST_STEPS = 10
-#: A trial whose unbalanced force does not tell goes on with steps this many times as long, so many of them.
+#: An undecided trial continues with steps longer by this factor, up to this number of them.
 _LONGER, _MORE_STEPS = 4.0, 30
-#: … and so many once contacts let them grow no longer.
+#: … or up to this number once contacts prevent longer ones.
 _SHORT_STEPS = 6
-#: An unbalanced force that falls with the way is taken to last as far as a straight line says, if that is so many times
-#: as far as blocks may move.
+#: An unbalanced force that falls along the motion is extrapolated linearly; it lasts too long if it lasts this many
+#: times as far as blocks may move.
 _BEYOND = 5.0
-#: Blocks are looked ahead for so many times as far as they may move.
+#: The motion is extrapolated to this many times the distance that blocks may move.
 _MARGIN = 2.0
-#: A contact bars the way if it closes by more than this part of the fastest block's way.
+#: A contact stops the motion if it closes by more than this fraction of the fastest block's displacement.
 _CLOSES = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
 class Trial:
-    """One reduced strength. ``factor`` F; ``stable``; static ``steps`` made; ``unbalanced`` the part of the forces on a
-    block that is left to move it, where it is largest; ``drift`` m/s², that block's acceleration; ``displacement``
-    (n_blocks, 2) m and ``rotation`` (n_blocks,) rad of the last step; ``moved`` (n_blocks,) m, how far each block has
-    come since the search began; ``reason`` in words."""
+    """Result for one reduced strength: ``factor`` F; ``stable``; number of static ``steps``; ``unbalanced``: largest
+    unbalanced force over the forces on its block; ``drift``: acceleration of that block, m/s²; ``displacement``
+    (n_blocks, 2) m and ``rotation`` (n_blocks,) rad of the last step; ``moved`` (n_blocks,) m: displacement of each
+    block since the beginning of the search; ``reason`` in words."""
 
     factor: float
     stable: bool
@@ -59,9 +60,9 @@ class Trial:
 
 @dataclass(frozen=True)
 class TrialLoads:
-    """What a trial stands under and by what it is judged: ``loads`` of ``time`` s; at rest below the part
-    ``unbalanced`` of the forces on any block; at most ``max_steps`` static steps of ``time_step`` s (None: by the
-    smallest block)."""
+    """Loads and criteria of a trial: ``loads`` at ``time`` s; at rest when the unbalanced force on every block is below
+    the fraction ``unbalanced``; at most ``max_steps`` static steps of ``time_step`` s (None: from the smallest
+    block)."""
 
     loads: Loads
     time: float
@@ -70,7 +71,7 @@ class TrialLoads:
     time_step: float | None
 
     def longest(self, system: BlockSystem) -> float:
-        """s, the length of a static step."""
+        """Length of a static step, s."""
         if self.time_step is not None:
             return float(self.time_step)
         blocks = system.blocks
@@ -82,8 +83,8 @@ class TrialLoads:
 def stability_trial(
     system: BlockSystem, state: State, under: TrialLoads, factor: float, limit: DisplacementLimit
 ) -> tuple[Trial, State]:
-    """Whether the blocks of ``system``, whose joints have their strength divided by ``factor``, come to rest from
-    ``state`` before they have moved farther than the ``limit`` allows; and where they are then, with no velocity."""
+    """Whether the blocks of ``system``, with joint strengths divided by ``factor``, come to rest from ``state`` within
+    the displacement ``limit``; and their final state, without velocity."""
     blocks, way = system.blocks, _Way(system, limit)
     longest = dt = under.longest(system)
     ratios: list[float] = []
@@ -106,20 +107,20 @@ def stability_trial(
             break
         slow = len(ratios) >= _LEAST_STEPS and ratios[-1] > _FALLING * ratios[-1 - _STEPS]
         if slow and told is None:
-            # What moves now tells of the mechanism, with the step's length that all trials have.
+            # The motion now shows the mechanism, with the step length of all trials.
             told = result
         if told is not None:
-            # Steps that contacts keep short bring blocks nowhere.
+            # Steps kept short by contacts do not move the blocks far.
             more += 1 if math.isinf(most) else _MORE_STEPS // _SHORT_STEPS
             if more > _MORE_STEPS or len(limit.beyond(state)) or way.goes_on(result, ratios):
                 reason = f"moves on after {way.of(state)}"
                 break
-            # Contacts that found no states in a longer step will hardly do so in the next.
+            # If contacts found no states in a longer step, they hardly will in the next.
             most = result.dt if result.statistics["step_cuts"] else most
             dt = min(most, _LONGER * result.dt)
             continue
-        # A step that was cut took less of the forces' time: go on with its length, and back to the full one by
-        # doubling.
+        # A step that was cut covered less of the time of the loads: continue with its length, and double it up to the
+        # full one.
         dt = result.dt if result.statistics["step_cuts"] else min(longest, 2.0 * result.dt)
     moved = limit.moved(state.vertices)
     if result is None:
@@ -136,13 +137,14 @@ def stability_trial(
 
 
 def _speeds(result: StepResult) -> np.ndarray:
-    """(n_blocks,) m/s², the acceleration of blocks in the step, or that of their rotation by √area if it is more."""
+    """(n_blocks,) m/s²: acceleration of the blocks in the step, or angular acceleration times √area if that is
+    larger."""
     a, h = result.acceleration, np.sqrt(result.forces.area)
     return np.maximum(np.hypot(a[:, 0], a[:, 1]), h * np.abs(a[:, 2]))
 
 
 class _Way:
-    """How far the blocks of a trial have gone, and how far they will go."""
+    """Displacement of the blocks in a trial, and its extrapolation."""
 
     def __init__(self, system: BlockSystem, limit: DisplacementLimit) -> None:
         self._system, self._limit = system, limit
@@ -153,15 +155,15 @@ class _Way:
         return f"{self._limit.moved(state.vertices)[self._free].max():.2g} m"
 
     def follow(self, result: StepResult) -> None:
-        """Count the way of the fastest block in the step."""
+        """Add the displacement of the fastest block in the step."""
         self._steps.append(0.5 * result.dt**2 * float(_speeds(result)[self._free].max()))
 
     def goes_on(self, result: StepResult, ratios: list[float]) -> bool:
-        """Whether the blocks move beyond all that an equilibrium allows: nothing bars the way that they go, and the
-        unbalanced force, as it has fallen over the last steps, lasts beyond it."""
+        """Whether the blocks will move beyond what an equilibrium allows: no contact stops them, and the unbalanced
+        force, extrapolated from the last steps, lasts longer."""
         speed = _speeds(result)
         speed[~self._free] = 0.0
-        # Until the first block has gone too far; those that barely move do so last.
+        # Until the first block has moved too far; slow ones reach that last.
         with np.errstate(divide="ignore"):
             reach = _MARGIN * float(np.min(self._limit.farthest() / speed))
         first, last, fastest = ratios[-1 - _STEPS], ratios[-1], float(speed.max())
@@ -170,7 +172,7 @@ class _Way:
         return not self._barred(result, reach, fastest)
 
     def _barred(self, result: StepResult, reach: float, fastest: float) -> bool:
-        """Whether a contact that is open would close while blocks go on at their speeds for the time ``reach``."""
+        """Whether an open contact would close if the blocks continued at their speeds for the time ``reach``."""
         system, state = self._system, result.state
         window = 2.0 * reach * fastest
         found = system.finder.find(state, np.ascontiguousarray(state.vertices), window, lumped=True)

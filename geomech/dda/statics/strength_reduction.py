@@ -1,15 +1,15 @@
-"""Factor of safety by strength reduction: how much weaker the joints may be before the blocks go.
+"""Factor of safety by strength reduction: the factor F by which the strength of the joints can be divided before
+failure.
 
 tan φ, cohesion and tensile strength of the joints are divided by F (Zienkiewicz, Humpheson & Lewis 1975; Matsui & San
-1992), and the blocks are asked for a static equilibrium, each trial beginning where the last one that held came to
-rest. The criterion is a force, not a displacement: a static step of length dt leaves out of balance what moves the
-blocks by a dt²/2. In a stable trial the unbalanced force falls to round-off within a few steps; in an unstable one it
-stays (`stability_trial`), and for sliding it grows as A − B/F. Two unstable trials thus point at the factor between
-them, and few more close in.
+1992), and static equilibrium is sought for each trial F, starting from that of the last stable trial. The criterion is
+a force, not a displacement: in a static step of length dt an unbalanced force moves a block of mass m by a dt²/2. In a
+stable trial it falls to round-off within a few steps; in an unstable one it remains (`stability_trial`), and for
+sliding it grows as A − B/F. Two unstable trials thus predict F, and a few more enclose it.
 
-Sharp toes in re-entrant corners are rounded (`sharp_toes`), and faces keep all their cohesion while they touch anywhere
-(`whole_faces`), as limit equilibrium has it: what the factor would be otherwise is told beside. So is the largest
-factor with any admissible contact forces, where the factor is clearly below it (`admissible_forces`).
+As in limit equilibrium, sharp toes in re-entrant corners are rounded (`sharp_toes`), and a face keeps its whole
+cohesion while any part of it is in contact (`whole_faces`). The factors without these assumptions are reported as well,
+and so is the largest factor with any admissible contact forces, where F is clearly below it (`admissible_forces`).
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, replace
 
 from ...model import Blocks, DdaSettings, JointLaw, Loads, Material, State
+from ...model.former_names import renamed_argument
 from ..joint_laws.reduced_strength import reduced
 from ..results import NotConverged
 from ..system import BlockSystem
@@ -44,24 +45,24 @@ from .stability_trial import Trial, TrialLoads, stability_trial
 
 log = logging.getLogger(__name__)
 
-#: So many steps of relaxation may go before the first trial.
+#: Most relaxation steps before the first trial.
 _RELAXING = 100
-#: What bounds the factor from above is tried again from just below it, if it was begun from farther than so many times
-#: the tolerance.
+#: An upper bound is tried again from just below if its trial started farther below than this many tolerances.
 _FROM_AFAR = 3.0
-#: The search for a trial that stands, and for one that does not, ends at this factor.
+#: Largest factor, and smallest inverse, of the search for a stable and an unstable trial.
 _FARTHEST = 64.0
-#: What contact forces could balance beyond the factor by more than this part of it is reported.
+#: Relative difference from the largest factor with admissible contact forces above which that is reported.
 _BEYOND = 1e-2
-#: From a factor that is known to be near, the search for one that stands goes down by this part of itself.
+#: Factor from step to step in the search for a stable trial near a known factor.
 _NEARBY = 0.85
 
 
 class NothingToReduce(ValueError):
-    """What was asked for has no factor of safety: no such strength, nothing that could fail, a load that statics do not
-    know."""
+    """There is no factor of safety: no such strength, nothing that could fail, or a load that statics does not
+    support."""
 
 
+@renamed_argument("compare_toes", "compare")
 def factor_of_safety(
     blocks: Blocks,
     materials: Sequence[Material],
@@ -84,21 +85,19 @@ def factor_of_safety(
 ) -> FactorOfSafety:
     """The factor F by which the strength of the joints can be divided before no static equilibrium is left.
 
-    Loads are those of ``load_time`` s, after excavations up to then. ``state`` is where the first trial begins
-    (default: blocks at rest). ``reduce`` names the joint laws that are weakened (default: all). The answer is bracketed
-    to ``tolerance`` (relative); a trial stands when no block has more than the part ``unbalanced`` of the forces on it
-    left to move it. Static steps are ``time_step`` s long (default: free fall over it is a hundredth of the smallest
-    block). ``watch`` sees every trial. ``toes`` are "rounded", "sharp" or "free", see `sharp_toes`; with
-    ``whole_faces`` a face keeps all its cohesion while it touches anywhere (`whole_faces`). With ``compare``, rounded
-    toes whose tips would hold, others that hold, and faces that have parted at one end, are told with the factor that
-    it would be otherwise.
+    Loads are those of ``load_time`` s, after excavations up to then. ``state``: start of the first trial (default:
+    blocks at rest). ``reduce``: names of the joint laws to weaken (default: all). F is enclosed to the relative
+    ``tolerance``. A trial is stable when the unbalanced force on every block is below the fraction ``unbalanced`` of
+    the forces on it. Static steps are ``time_step`` s long (default: free fall over a hundredth of the smallest block).
+    ``watch`` is called with every trial. ``toes``: "rounded", "sharp" or "free", see `sharp_toes`; ``whole_faces``: a
+    face keeps its whole cohesion while any part is in contact. With ``compare``, the answer reports the factors without
+    rounding of toes whose tips would hold, without toes that hold, and without faces that have parted at one end.
 
-    Coulomb friction does not settle the forces of a system uniquely: strengths are reduced step by step from what
-    stands, and another way there may find a factor that differs by some thousandths where contacts slide and stick
-    again.
+    With Coulomb friction the forces of a system are not unique: strengths are reduced step by step from an equilibrium,
+    and another path may give a factor that differs by some thousandths where contacts slide and stick again.
 
-    Raises `NothingToReduce` when there is no strength to reduce, nothing that moves, or a ground that does,
-    `NotConverged` when the blocks do not stand even with joints 64 times as strong.
+    Raises `NothingToReduce` without strength to reduce, without moving blocks, or with a moving ground; `NotConverged`
+    when the blocks are unstable even with joints 64 times as strong.
 
     >>> ground, square = np.array([[-1, -1], [2, -1], [2, 0], [-1, 0]]), np.array([[0, 0], [1, 0], [1, 1], [0, 1]])
     >>> blocks = Blocks.from_polygons([ground, square], fixed=[True, False])
@@ -142,8 +141,8 @@ def factor_of_safety(
 
 @dataclass(frozen=True)
 class Counted:
-    """What a factor counts on beside strength: ``toes`` that are "rounded", "sharp" or "free" (`sharp_toes`), and the
-    cohesion of ``whole_faces`` (`whole_faces`)."""
+    """Assumptions of a factor beside strength: ``toes`` "rounded", "sharp" or "free" (`sharp_toes`), and the cohesion
+    of ``whole_faces`` (`whole_faces`)."""
 
     toes: str = ROUNDED
     whole_faces: bool = True
@@ -151,7 +150,7 @@ class Counted:
 
 @dataclass(frozen=True, eq=False)
 class _Search:
-    """The search for a factor; arguments as for `factor_of_safety`, ``chosen`` the names of laws that are weakened."""
+    """The search for a factor; arguments as for `factor_of_safety`, ``chosen``: names of the laws to weaken."""
 
     blocks: Blocks
     materials: Sequence[Material]
@@ -171,7 +170,7 @@ class _Search:
         return system
 
     def answer(self, counted: Counted, watch: Callable[[Trial], None] | None) -> FactorOfSafety:
-        """The factor with what bolts hold, what toes do or would, and what faces count for that have parted."""
+        """The factor with bolt forces, the factors without toes, and those with parted faces counted otherwise."""
         try:
             found = self.run(counted, watch=watch)
         except NotConverged:
@@ -228,8 +227,8 @@ class _Search:
     def _otherwise(
         self, counted: Counted, first: float = 1.0, above: float = math.inf, stands: bool = False
     ) -> FactorOfSafety | None:
-        """The answer with something else ``counted``; arguments as for `run`. None where the blocks do not stand, or
-        the answer is not another."""
+        """The answer with other assumptions ``counted``; arguments as for `run`. None where the blocks are unstable, or
+        the answer is the same."""
         try:
             return self.run(counted, first, above, stands)
         except (NotConverged, _NoOther):
@@ -239,9 +238,9 @@ class _Search:
         self, counted: Counted, first: float = 1.0, above: float = math.inf, stands: bool = False,
         watch: Callable[[Trial], None] | None = None,
     ) -> FactorOfSafety:  # fmt: skip
-        """The bracket of the factor, from a trial at ``first`` on. Raises `_NoOther` where blocks stand there, if it is
-        asked whether any ``stands``, or do not stand at a factor ``above`` it, and `NotConverged` where they do at
-        none."""
+        """Enclose the factor, starting with a trial at ``first``. Raises `_NoOther` if blocks are stable there and it
+        was only asked whether any ``stands``, or if they are unstable at a factor ``above``; `NotConverged` if they are
+        stable at none."""
         bracket = _Bracket(self, counted, watch)
         near = stands or math.isfinite(above)
         trial = bracket.begin(first)
@@ -260,23 +259,23 @@ class _Search:
 
 
 class _NoOther(Exception):
-    """With something else counted, the factor is not another."""
+    """With other assumptions, the factor is the same."""
 
 
 class _Bracket:
-    """Trials of a ``search`` between which the factor lies."""
+    """Trials of a ``search`` that enclose the factor."""
 
     def __init__(self, search: _Search, counted: Counted, watch: Callable[[Trial], None] | None) -> None:
         self._search, self._counted, self._watch = search, counted, watch
         self._limit: DisplacementLimit | None = None
         self._state = search.rest
         self.trials: list[Trial] = []
-        # Of each trial, the factor from whose equilibrium it was begun.
+        # For each trial, the factor from whose equilibrium it started.
         self._began: dict[float, float] = {}
         self.lower = 0.0
 
     def begin(self, factor: float) -> Trial:
-        """Try a ``factor`` from where the blocks come to rest with it."""
+        """Try a ``factor`` from the equilibrium with that factor, found by relaxation."""
         search = self._search
         self._state, self._limit = _relaxed(search.system(factor, self._counted), search.under, search.rest)
         return self.tried(factor)
@@ -296,12 +295,12 @@ class _Bracket:
         return trial
 
     def _known(self) -> list[Trial]:
-        # What has failed from far below may stand when it is come to by small steps.
+        # A trial that failed from far below may be stable when approached in small steps.
         last = {t.factor: t for t in self.trials if t.stable or t.factor > self.lower}
         return list(last.values())
 
     def closed(self, tolerance: float) -> FactorOfSafety:
-        """The answer, once no factor lies between trials that are farther apart than the ``tolerance``."""
+        """The answer, once the trials enclose the factor to the ``tolerance``."""
         while True:
             known = self._known()
             upper = min((t.factor for t in known if not t.stable), default=math.inf)
@@ -319,8 +318,8 @@ class _Bracket:
             self.tried(factor)
 
     def _from_afar(self, known: list[Trial], upper: float, tolerance: float) -> bool:
-        """Whether what has failed at ``upper`` was begun from so far below that it may stand, unless the drift of
-        failures says that it does not."""
+        """Whether the failed trial at ``upper`` started so far below that it might be stable, unless the drift of
+        failed trials shows that it is not."""
         if self._began[upper] >= self.lower * (1.0 - _FROM_AFAR * tolerance):
             return False
         return _drift_ends(known, self.lower, upper) is None
@@ -335,8 +334,8 @@ class _Bracket:
 
 
 def _relaxed(system: BlockSystem, under: TrialLoads, state: State) -> tuple[State, DisplacementLimit]:
-    """Where the blocks come to rest from ``state``: what is dug out or bolted by the loads' time is so in the step that
-    follows; ``state`` itself if they do not. And how far they may move from there."""
+    """Equilibrium by relaxation from ``state``, after excavation and bolting up to the loads' time; ``state`` itself if
+    none is found. And the displacement limit from there."""
     limit = DisplacementLimit(system, state, under.loads, under.time)
     found = equilibrium(system, state, under.loads, load_time=under.time, max_steps=_RELAXING, limit=limit)
     if found.converged:
@@ -349,14 +348,15 @@ def _has_strength(law: JointLaw) -> bool:
 
 
 def _pointed_at(trials: Sequence[Trial], lower: float, upper: float) -> float:
-    """Where the drift of failures ends between ``lower`` and ``upper``; the middle where it does not say."""
+    """The factor at which the drift of failed trials vanishes, between ``lower`` and ``upper``; their mean if
+    unknown."""
     end = _drift_ends(trials, lower, upper)
     return 2.0 * lower * upper / (lower + upper) if end is None else end
 
 
 def _drift_ends(trials: Sequence[Trial], lower: float, upper: float) -> float | None:
-    """Where the drift of the two weakest failures goes to nothing, drift = A − B/F; None if that is not between
-    ``lower`` and ``upper``."""
+    """Factor at which the drift of the two weakest failures vanishes, drift = A − B/F; None if not between ``lower``
+    and ``upper``."""
     failed = sorted((t for t in trials if not t.stable and math.isfinite(t.drift)), key=lambda t: t.factor)[:2]
     if len(failed) < 2 or not failed[1].drift > failed[0].drift:
         return None
@@ -366,8 +366,7 @@ def _drift_ends(trials: Sequence[Trial], lower: float, upper: float) -> float | 
 
 
 def _next_factor(trials: Sequence[Trial], lower: float, upper: float, tolerance: float) -> float:
-    """The F to try: just beside where the drift points, on the side that is farther off; the middle when it does not
-    point."""
+    """The next F: close to the predicted factor, on the side that is farther away; the mean without a prediction."""
     middle = 2.0 * lower * upper / (lower + upper)
     failed = [t for t in trials if not t.stable and math.isfinite(t.drift)]
     if len(failed) < 2:

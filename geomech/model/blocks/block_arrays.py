@@ -10,6 +10,7 @@ from functools import cached_property
 import numpy as np
 
 from ...conventions import outward_normal_of
+from ..former_names import renamed_argument
 from .polygon import (
     area_moments,
     convex_and_simple,
@@ -60,6 +61,7 @@ class Blocks:
     order: np.ndarray | None = None
 
     @classmethod
+    @renamed_argument("held", "constrained")
     def from_polygons(
         cls,
         polygons: Sequence[Sequence[np.ndarray]],
@@ -75,7 +77,7 @@ class Blocks:
         """Build from ``polygons[block][loop]`` = (n, 2) vertices, m, without repeating the first.
 
         A bare (n, 2) array is a block without holes. ``edge_names[block][loop][edge]`` names edges. Outlines are made
-        counter-clockwise, holes clockwise. ``held`` is the deprecated name of ``constrained``.
+        counter-clockwise, holes clockwise.
 
         Raises ValueError that names the block for loops of fewer than three vertices, repeated vertices, non-finite
         coordinates, crossing edges, zero area, and holes that leave the outline or overlap; and for lists whose length
@@ -86,9 +88,6 @@ class Blocks:
         (1, 2.0)
         """
         n_blocks = len(polygons)
-        if held is not None:
-            _warn_held()
-            constrained = held
         given = {"material": material, "fixed": fixed, "held": constrained, "edge_names": edge_names, "names": names,
                  "order": order}  # fmt: skip
         _refuse_lengths(n_blocks, given)
@@ -142,8 +141,8 @@ class Blocks:
 
     @property
     def held(self) -> np.ndarray | None:
-        """Deprecated name of ``constrained``."""
-        _warn_held()
+        """Former name of ``constrained``."""
+        warnings.warn("Blocks.held is now Blocks.constrained", DeprecationWarning, stacklevel=2)
         return self.constrained
 
     @property
@@ -392,7 +391,3 @@ def _refuse_shared(holes: list[np.ndarray], name: str) -> None:
                     f"{name}: holes {m + 1} and {k + 1} overlap at ({shared[0]:g}, {shared[1]:g}): draw what they take out "
                     "together as one hole"
                 )
-
-
-def _warn_held() -> None:
-    warnings.warn("Blocks.held is now Blocks.constrained", DeprecationWarning, stacklevel=3)

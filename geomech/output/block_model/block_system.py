@@ -74,9 +74,9 @@ def write_block_system(scene: Any, folder: Path | str) -> dict[str, Any]:
     _write_msh(folder / "block_system.msh", blocks, cracks, cells, owner, names, zone)
     if scene.tables.geometry.traces or any(problem.origin):
         write_world_map(problem, zones, folder / "block_system.geojson", scene.drawing.crs)
-    told = _statistics(scene, problem, area, bridges, names, zone)
-    write_json(folder / "block_system.json", told)
-    return told
+    statistics = _statistics(scene, problem, area, bridges, names, zone)
+    write_json(folder / "block_system.json", statistics)
+    return statistics
 
 
 def _write_msh(
@@ -113,7 +113,7 @@ def _statistics(
     low, high = blocks.vertices.min(axis=0), blocks.vertices.max(axis=0)
     sizes = block_sizes(area[free], _PASSING)
     pond = deepest_pond(scene.tables, blocks)
-    told = {
+    statistics = {
         "title": problem.title,
         "summary": ", ".join(
             [
@@ -163,34 +163,36 @@ def _statistics(
         "edge_names": list(blocks.edge_names),
         "mended": mends,
     }
-    told["lines"] = _lines(told, jointed)
-    return told
+    statistics["lines"] = _lines(statistics, jointed)
+    return statistics
 
 
-def _lines(told: dict[str, Any], jointed: Any) -> list[str]:
+def _lines(statistics: dict[str, Any], jointed: Any) -> list[str]:
     """The statistics for people."""
-    size = told["blocks"]
+    size = statistics["blocks"]
     rows = [
         (
             f"  blocks    √area of 10, 50, 90 % of the rock at most {size['d10_m']:.3g}, {size['d50_m']:.3g}, "
             f"{size['d90_m']:.3g} m"
         )
     ]
-    if told["sets"]:
-        nodes, topology = told["nodes"], told["topology"]
+    if statistics["sets"]:
+        nodes, topology = statistics["nodes"], statistics["topology"]
         text = f"  nodes     I {nodes['I']}, Y {nodes['Y']}, X {nodes['X']}"
         if topology["connections_per_branch"] is not None:
             text += f"; {topology['connections_per_branch']:.2f} connections a branch"
         if topology["connections_per_line"] is not None:
             text += f", {topology['connections_per_line']:.3g} a line"
         rows.append(text)
-        rows += [f"  {row}" for row in table(told["sets"])]
-    x, y = told["world_origin_m"]
+        rows += [f"  {row}" for row in table(statistics["sets"])]
+    x, y = statistics["world_origin_m"]
     if x or y:
         rows.insert(0, f"  origin    ({x:.10g}, {y:.10g}) m: add it to every coordinate that is written")
-    if told["rock_bridges"]["number"]:
-        bridges = told["rock_bridges"]
+    if statistics["rock_bridges"]["number"]:
+        bridges = statistics["rock_bridges"]
         rows.append(
             f"  bridges   {bridges['number']}, mean {bridges['mean_m']:.3g} m, least {bridges['shortest_m']:.3g} m"
         )
-    return rows + [f"  mended    {text}" for text in (jointed.told("listed in block_system.json") if jointed else ())]
+    return rows + [
+        f"  mended    {text}" for text in (jointed.repair_lines("listed in block_system.json") if jointed else ())
+    ]

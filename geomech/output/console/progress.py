@@ -19,8 +19,9 @@ from geomech.model import STOPS, Cycle, Problem, counted
 
 from ..checkpoints import checkpoint_file
 from ..tables.deepest_penetration import limits_line
-from ..tables.motion_state import closing, told
+from ..tables.motion_state import closing, state_text
 from ..units import length_text, stress_text
+from .at_work import spoken
 
 #: So many warnings of a run are shown at its end, each this long at most.
 SHOWN_WARNINGS, WIDTH = 3, 400
@@ -149,7 +150,10 @@ class Progress:
             # The text is made only as often as the bar is drawn.
             if now - self._said >= self._bar.mininterval:
                 self._said = now
-                self._bar.set_postfix_str(_told(cycle) + self._left(cycle), refresh=False)
+                # What is left comes first: a narrow terminal cuts the end off.
+                said = f"{self._left(cycle).removeprefix(', ')}, {_cycle_text(cycle)}"
+                self._bar.set_postfix_str(said.removeprefix(", "), refresh=False)
+                spoken()
             with suppress(OSError):  # of a terminal that is gone
                 self._bar.update(max(0.0, min(cycle.state.time, self._end) - self._bar.n))
         elif now - self._said >= self.interval:
@@ -157,7 +161,7 @@ class Progress:
             if percent == self._percent and now - self._said < 2 * self.interval:
                 return
             self._said, self._percent = now, percent
-            self._say(f"  {percent:3d} %  {_told(cycle)}{self._left(cycle)}")
+            self._say(f"  {percent:3d} %  {_cycle_text(cycle)}{self._left(cycle)}")
 
     def on_end(self, summary: dict[str, Any], error: BaseException | None = None) -> None:
         self._warnings.end()
@@ -167,7 +171,7 @@ class Progress:
         if error is not None:
             # Why it stopped is the exception's own to say, to whoever catches it.
             last = self._last
-            where = "before the first cycle" if last is None else f"at {self._share(last)} %, {_told(last)}"
+            where = "before the first cycle" if last is None else f"at {self._share(last)} %, {_cycle_text(last)}"
             self._say(f"stopped {where}\n  what was written until then is in {self._folder}")
             if isinstance(error, (KeyboardInterrupt, OSError)) and checkpoint_file.found(
                 self._folder / checkpoint_file.FOLDER
@@ -187,6 +191,7 @@ class Progress:
     def _say(self, text: str) -> None:
         if self._out is None:
             return
+        spoken()
         try:
             self._out.write(text + "\n")
             self._out.flush()
@@ -240,9 +245,9 @@ def _way_on(summary: dict[str, Any], folder: Path) -> str:
     )
 
 
-def _told(cycle: Cycle) -> str:
+def _cycle_text(cycle: Cycle) -> str:
     if not cycle.cracks.n_cracks:
-        return f"t = {cycle.state.time:.4g} s, {told(cycle)}"
+        return f"t = {cycle.state.time:.4g} s, {state_text(cycle)}"
     growing = int(np.count_nonzero(cycle.tips["grown"] > 0))
     # A load that has not begun is that of a scene which has no leading one: it is driven by time.
     pulled = " in tension" if cycle.load < 0 else ""

@@ -25,7 +25,7 @@ def crack_trust(cycle: Cycle) -> dict[str, Any]:
     """The worst over the cracked blocks of ``cycle``: ``residual`` of equilibrium relative to the largest traction
     (at least `ROUND_OFF`), ``condition`` of the equations, and the estimated error of K relative to the largest K of
     its block, with the block it is of."""
-    told: dict[str, Any] = {
+    summary: dict[str, Any] = {
         "residual": _three_digits(max(ROUND_OFF, *(float(body.residual) for body in cycle.bodies.values()))),
         "condition": _three_digits(max(float(body.condition) for body in cycle.bodies.values())),
     }
@@ -40,8 +40,8 @@ def crack_trust(cycle: Cycle) -> dict[str, Any]:
         except (ValueError, RuntimeError, ArithmeticError, np.linalg.LinAlgError) as failure:
             _log.info("no error estimate for K in %s: %s", cycle.blocks.names[block], failure)
             continue
-        if error > told.get("k_error", -1.0):
-            told["k_error"], told["k_error_block"] = error, cycle.blocks.names[block]
-    if "k_error" in told:
-        told["k_error"] = _three_digits(told["k_error"])
-    return told
+        if error > summary.get("k_error", -1.0):
+            summary["k_error"], summary["k_error_block"] = error, cycle.blocks.names[block]
+    if "k_error" in summary:
+        summary["k_error"] = _three_digits(summary["k_error"])
+    return summary

@@ -15,7 +15,7 @@ class Deepest:
     """The deepest penetration relative to the smaller block's size, √area, that any cycle has shown."""
 
     share: float = 0.0
-    told: dict[str, Any] | None = None
+    summary: dict[str, Any] | None = None
 
     def look(self, cycle: Cycle) -> None:
         rows = cycle.state.contacts
@@ -29,7 +29,7 @@ class Deepest:
             return
         names = [cycle.blocks.names[int(rows[name][worst])] for name in ("block", "other")]
         self.share = float(share[worst])
-        self.told = {
+        self.summary = {
             "depth_m": float(deep[worst]), "over_block_size": self.share, "blocks": names,
             "point": rows["point"][worst].tolist(), "time_s": float(cycle.state.time),
         }  # fmt: skip

@@ -41,7 +41,7 @@ def condition(cycle: Cycle) -> str:
     return "sliding" if (closed["state"] == SLIP).any() and not alone.any() else "moving"
 
 
-def told(cycle: Cycle) -> str:
+def state_text(cycle: Cycle) -> str:
     """The state of motion of ``cycle`` for a progress line."""
     now = condition(cycle)
     if not now:

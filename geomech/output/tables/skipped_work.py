@@ -23,7 +23,7 @@ WORDS = {
 }
 
 
-def told(name: str, skip: Skip) -> dict[str, Any]:
+def skip_summary(name: str, skip: Skip) -> dict[str, Any]:
     """An entry of the summary: ``what`` was not done, its ``count``, and ``saved_s``, about how long it would have
     taken by the mean of those that were done, where some were."""
     entry: dict[str, Any] = {"what": WORDS[name], "count": skip.kept}
@@ -34,7 +34,7 @@ def told(name: str, skip: Skip) -> dict[str, Any]:
 
 def skipped(problem: Problem, last: Cycle) -> dict[str, dict[str, Any]]:
     """name → entry of all that the solvers of a run to its ``last`` cycle did not do."""
-    found = {name: told(name, skip) for name, skip in last.skips.items()}
+    found = {name: skip_summary(name, skip) for name, skip in last.skips.items()}
     if not last.work and not problem.cracks.n_cracks:
-        found["crack solver"] = told("crack solver", Skip(last.number + 1))
+        found["crack solver"] = skip_summary("crack solver", Skip(last.number + 1))
     return {name: found[name] for name in WORDS if name in found}

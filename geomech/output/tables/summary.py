@@ -87,7 +87,7 @@ class Summary:
         counts: dict[str, int] = {}
         for event in self._events:
             counts[event.kind] = counts.get(event.kind, 0) + 1
-            first.setdefault(event.kind, self._told(event))
+            first.setdefault(event.kind, self._event_row(event))
         summary["first"] = first
         summary["events"] = counts
         if last is not None:
@@ -101,8 +101,8 @@ class Summary:
             summary["crack_growth_m"] = self._grown
             summary["crack_length_m"] = float(last.cracks.lengths.sum())
             summary["blocks"] = last.blocks.n_blocks
-            if self._deepest.told is not None:
-                summary["deepest_penetration"] = self._deepest.told
+            if self._deepest.summary is not None:
+                summary["deepest_penetration"] = self._deepest.summary
             if last.shortened:
                 summary["shortened_steps"] = step_limits(last.shortened)
             if last.statistics:
@@ -120,17 +120,17 @@ class Summary:
         missed = "" if error is not None else unreached(self._problem, last, counts)
         if missed:
             summary["not_reached"] = missed
-        first_told = {name: summary[name] for name in ("title", "end", "not_reached") if name in summary}
-        write_json(self._path, first_told | summary)
+        leading = {name: summary[name] for name in ("title", "end", "not_reached") if name in summary}
+        write_json(self._path, leading | summary)
 
-    def _told(self, event: Event) -> dict[str, Any]:
-        told = {"load_pa": _finite(event.load), "time_s": event.time, "cycle": event.cycle, "point": list(event.point)}
+    def _event_row(self, event: Event) -> dict[str, Any]:
+        row = {"load_pa": _finite(event.load), "time_s": event.time, "cycle": event.cycle, "point": list(event.point)}
         if self._scale is not None:
             half_length, toughness = self._scale
-            told["load_normalised"] = _finite(abs(event.load) * math.sqrt(math.pi * half_length) / toughness)
+            row["load_normalised"] = _finite(abs(event.load) * math.sqrt(math.pi * half_length) / toughness)
         if event.detail:
-            told["detail"] = event.detail
-        return told
+            row["detail"] = event.detail
+        return row
 
 
 def normalisation(problem: Problem) -> tuple[float, float] | None:

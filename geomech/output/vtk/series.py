@@ -13,7 +13,7 @@ from geomech.model import CHANGES, Cycle, Problem, Skip
 
 from ..background_jobs import BackgroundJobs
 from ..checkpoints.checkpoint_file import FilesChanged
-from ..tables.skipped_work import told
+from ..tables.skipped_work import skip_summary
 from . import grids
 from .interior_fields import InteriorMeshes
 from .structures import BoltLines, WaterLine, outlines_grid
@@ -137,7 +137,7 @@ class Series:
         self.seconds += time.perf_counter() - began
         summary.setdefault("seconds", {})["writing series"] = round(self.seconds, 4)
         summary.setdefault("skipped", {}).update(
-            {name: told(name, skip) for name, skip in self._skips().items() if skip.kept > 0}
+            {name: skip_summary(name, skip) for name, skip in self._skips().items() if skip.kept > 0}
         )
 
     def _skips(self) -> dict[str, Skip]:

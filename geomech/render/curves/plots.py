@@ -14,6 +14,7 @@ from geomech.output.units import largest_of, length_unit
 
 from .crack_curves import crack_length, stress_intensity
 from .drive import COLOURS, SAME, drive, first_events, load_label, load_unit, sense, to_the_end
+from .structure_curves import bolt_curves, bolts, joint_curves, joints
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -42,7 +43,7 @@ _ENERGIES = {
 
 def plots(run: Run, folder: Path, *, suffix: str = ".png", more: bool = False) -> list[Path]:
     """Draw the curves that ``run`` has data for as files in ``folder``; their paths. ``suffix`` ".svg" draws lines that
-    stay sharp; ``more`` draws energies and monitors as well."""
+    stay sharp; ``more`` draws energies, monitors, joints and bolts as well."""
     history, tips = run.history, run.tips
     several = len(history) > 1
     wanted = {
@@ -51,6 +52,8 @@ def plots(run: Run, folder: Path, *, suffix: str = ".png", more: bool = False) -
         "crack_length": (crack_length, several and len(tips) > 0),
         "energy": (energies, more and bool(_energy_curves(run))),
         "monitors": (monitors, more and bool(_monitor_curves(run))),
+        "joints": (joints, more and bool(joint_curves(run))),
+        "bolts": (bolts, more and bool(bolt_curves(run))),
     }
     return [
         _save(curve, run, (folder / name).with_suffix(suffix)) for name, (curve, has_data) in wanted.items() if has_data

@@ -24,8 +24,8 @@ ROCKS = ("#efe6d5", "#dfe7e3", "#e8dce6", "#f3dfc9", "#dbe3ef")
 FIXED, INK, CRACK, BRIDGE, LOAD, WATER = "#b9bcc2", "#33363b", "#d7263d", "#ff7a1a", "#5b2a86", "#2f80d0"
 
 
-def draw_block_map(scene: Any, told: dict[str, Any], path: Path | str) -> Path:
-    """Draw the blocks of a loaded scene, with the statistics that `geomech.output.block_model.block_system` has ``told``, as a
+def draw_block_map(scene: Any, statistics: dict[str, Any], path: Path | str) -> Path:
+    """Draw the blocks of a loaded scene, with the ``statistics`` of `geomech.output.block_model.block_system`, as a
     PNG."""
     from matplotlib.figure import Figure
 
@@ -44,7 +44,7 @@ def draw_block_map(scene: Any, told: dict[str, Any], path: Path | str) -> Path:
     keys: list[Any] = []
     edges = np.stack([blocks.vertices, blocks.vertices[blocks.next_vertex]], axis=1)
     keys += _draw_rock(axes, problem)
-    keys += _draw_joints(axes, scene, blocks, told, thin)
+    keys += _draw_joints(axes, scene, blocks, statistics, thin)
     if cracks.n_segments:
         keys += _draw_cracks(axes, problem, thin, size)
     keys += _conditions(axes, scene, problem, edges, size)
@@ -57,7 +57,7 @@ def draw_block_map(scene: Any, told: dict[str, Any], path: Path | str) -> Path:
         side.set_visible(False)
     left = (0.55 + across + 0.15) / (across + 4.1)
     figure.text(0.35 / (across + 4.1), 1 - 0.36 / (up + 1.3), problem.title, fontsize=13, color=INK, weight="bold")
-    figure.text(0.35 / (across + 4.1), 1 - 0.6 / (up + 1.3), _said(told), fontsize=9, color="#4a4e55")
+    figure.text(0.35 / (across + 4.1), 1 - 0.6 / (up + 1.3), _said(statistics), fontsize=9, color="#4a4e55")
     figure.legend(
         handles=keys, loc="upper left", bbox_to_anchor=(left, 1 - 0.72 / (up + 1.3)), frameon=False, fontsize=9,
         labelcolor=INK, handlelength=1.9,
@@ -91,7 +91,7 @@ def _draw_rock(axes: Axes, problem: Problem) -> list[Any]:
     return keys
 
 
-def _draw_joints(axes: Axes, scene: Any, blocks: Blocks, told: dict[str, Any], thin: float) -> list[Any]:
+def _draw_joints(axes: Axes, scene: Any, blocks: Blocks, statistics: dict[str, Any], thin: float) -> list[Any]:
     """Outlines and joints, in lines as ``thin`` as this; what the sets of joints are called."""
     from matplotlib.collections import LineCollection
     from matplotlib.lines import Line2D
@@ -102,14 +102,14 @@ def _draw_joints(axes: Axes, scene: Any, blocks: Blocks, told: dict[str, Any], t
     joints = list(colour)
     plain = np.array([not name.startswith(JOINT) for name in blocks.edge_names])[blocks.edge_name]
     axes.add_collection(LineCollection(edges[plain], colors=INK, linewidths=max(0.6, 0.6 * thin), capstyle="round"))
-    statistics = {JOINT + entry["name"]: entry for entry in told["sets"]}
+    of_set = {JOINT + entry["name"]: entry for entry in statistics["sets"]}
     for name in joints:
         if name in blocks.edge_names:
             own = blocks.edge_name == blocks.edge_names.index(name)
             axes.add_collection(LineCollection(edges[own], colors=colour[name], linewidths=thin, capstyle="round"))
         label = name.removeprefix(JOINT)
-        if name in statistics:
-            angle, density = statistics[name]["mean_angle_deg"], statistics[name]["p21_per_m"]
+        if name in of_set:
+            angle, density = of_set[name]["mean_angle_deg"], of_set[name]["p21_per_m"]
             label += "  none in the rock" if angle is None else f"  {angle:.0f}°, P21 {density:.2g} m/m²"
         keys.append(Line2D([], [], color=colour[name], lw=2.2, label=f"joints {label}"))
     return keys
@@ -252,9 +252,9 @@ def _rgb(colour: str) -> tuple[float, float, float]:
     return tuple(int(colour[k : k + 2], 16) / 255 for k in (1, 3, 5))
 
 
-def _said(told: dict[str, Any]) -> str:
-    text = told["summary"]
-    if told["sets"]:
-        size = told["blocks"]["size_m_by_part_passing"]["0.5"]
+def _said(statistics: dict[str, Any]) -> str:
+    text = statistics["summary"]
+    if statistics["sets"]:
+        size = statistics["blocks"]["size_m_by_part_passing"]["0.5"]
         text += f"; half of the rock in blocks up to {size:.2g} m"
     return text

@@ -16,8 +16,8 @@ from .block_map import INK, SETS, joint_colours
 _SOFT = "#4a4e55"
 
 
-def draw_network_statistics(scene: Any, told: dict[str, Any], path: Path | str) -> Path:
-    """Draw what `geomech.output.block_model.block_system` has ``told`` of the joints of a loaded scene, as a PNG: the block-size
+def draw_network_statistics(scene: Any, statistics: dict[str, Any], path: Path | str) -> Path:
+    """Draw the joint ``statistics`` of `geomech.output.block_model.block_system` for a loaded scene, as a PNG: the block-size
     curve, a rose of directions by length, trace lengths beside the laws asked for, and Sanderson & Nixon's triangle of
     nodes."""
     from matplotlib.figure import Figure
@@ -25,12 +25,12 @@ def draw_network_statistics(scene: Any, told: dict[str, Any], path: Path | str) 
     figure = Figure(figsize=(11.4, 9.0), dpi=130)
     colour = joint_colours(scene)
     lines = {joint.name: list(joint.lines) for joint in network_of(scene).joints}
-    _block_sizes(figure.add_axes((0.07, 0.565, 0.4, 0.33)), told)
+    _block_sizes(figure.add_axes((0.07, 0.565, 0.4, 0.33)), statistics)
     _rose(figure.add_axes((0.56, 0.53, 0.36, 0.37), projection="polar"), lines, colour)
-    _lengths(figure.add_axes((0.07, 0.09, 0.4, 0.33)), told, lines, colour)
-    _triangle(figure.add_axes((0.56, 0.07, 0.38, 0.36)), told)
-    figure.text(0.035, 0.962, told["title"], fontsize=13, color=INK, weight="bold")
-    figure.text(0.035, 0.938, f"the joint network of {told['summary']}", fontsize=9, color=_SOFT)
+    _lengths(figure.add_axes((0.07, 0.09, 0.4, 0.33)), statistics, lines, colour)
+    _triangle(figure.add_axes((0.56, 0.07, 0.38, 0.36)), statistics)
+    figure.text(0.035, 0.962, statistics["title"], fontsize=13, color=INK, weight="bold")
+    figure.text(0.035, 0.938, f"the joint network of {statistics['summary']}", fontsize=9, color=_SOFT)
     path = Path(path)
     path.parent.mkdir(parents=True, exist_ok=True)
     figure.savefig(path, facecolor="white")
@@ -48,8 +48,8 @@ def _dressed(axes: Any, title: str, x: str, y: str) -> None:
         axes.spines[side].set_visible(False)
 
 
-def _block_sizes(axes: Any, told: dict[str, Any]) -> None:
-    blocks = told["blocks"]
+def _block_sizes(axes: Any, statistics: dict[str, Any]) -> None:
+    blocks = statistics["blocks"]
     curve = np.array(blocks["percent_passing_by_size_m"])
     _dressed(axes, "Block sizes", "block size √area, m", "% of the rock in blocks not larger")
     axes.step(np.append(curve[0, 0], curve[:, 0]), np.append(0, curve[:, 1]), where="post", color=INK, lw=1.8)
@@ -97,9 +97,9 @@ def _rose(axes: Any, lines: dict[str, list[np.ndarray]], colour: dict[str, str])
     axes.legend(frameon=False, fontsize=8, loc="upper left", bbox_to_anchor=(1.0, 1.08), labelcolor=INK)
 
 
-def _lengths(axes: Any, told: dict[str, Any], lines: dict[str, list[np.ndarray]], colour: dict[str, str]) -> None:
+def _lengths(axes: Any, statistics: dict[str, Any], lines: dict[str, list[np.ndarray]], colour: dict[str, str]) -> None:
     _dressed(axes, "Trace lengths, as drawn in the section", "length, m", "% of the traces not longer")
-    for entry in told["sets"]:
+    for entry in statistics["sets"]:
         name = JOINT + entry["name"]
         length = np.sort([float(np.hypot(*np.diff(line, axis=0).T).sum()) for line in lines[name]])
         if not len(length):
@@ -115,10 +115,10 @@ def _lengths(axes: Any, told: dict[str, Any], lines: dict[str, list[np.ndarray]]
     axes.legend(frameon=False, fontsize=8, labelcolor=INK, loc="best")
 
 
-def _triangle(axes: Any, told: dict[str, Any]) -> None:
+def _triangle(axes: Any, statistics: dict[str, Any]) -> None:
     """Shares of the three kinds of nodes (Manzocchi 2002), with lines of equal connections a branch (Sanderson & Nixon
     2015)."""
-    nodes, topology = told["nodes"], told["topology"]
+    nodes, topology = statistics["nodes"], statistics["topology"]
     corner = {"I": np.array([0.5, math.sqrt(0.75)]), "Y": np.array([0.0, 0.0]), "X": np.array([1.0, 0.0])}
 
     def place(i: float, y: float, x: float) -> np.ndarray:

@@ -39,11 +39,11 @@ def stages(run: Run, folder: Path, *, width: int = 560) -> list[tuple[Path, str,
     folder.mkdir(parents=True, exist_ok=True)
     out = []
     with Painter(run, fixed) as painter:
-        for cycle, told in shown.items():
+        for cycle, statistics in shown.items():
             path = folder / f"stage_{cycle:06d}.png"
             painter.draw(cycle)
             painter.save(path)
-            out.append((path, told, cycle))
+            out.append((path, statistics, cycle))
     return out
 
 

@@ -29,7 +29,7 @@ from ...shapes.parts import JOINT, Flaw, ShapeError, extent_of, grid_decimals
 from ..tables.geometry import Geometry, JointSetShape
 
 #: So many places of each kind of defect are told in full.
-_TOLD = 4
+_LISTED = 4
 #: More pieces of joints between one crossing and the next are not cut: 100 000 blocks have 250 000, and take seconds;
 #: ten times as many take a minute and 10 GB, and no solver here moves them. Nor are joints of which so many pairs lie
 #: beside each other.
@@ -45,7 +45,7 @@ class Jointed:
     cutting: Cutting
     cracks: Cracks
 
-    def told(self, others: str) -> list[str]:
+    def repair_lines(self, others: str) -> list[str]:
         """What was found and mended, a line a kind, with the first places and what meets there now; ``others`` says
         where the rest are listed."""
         kinds: dict[str, list[Mend]] = {}
@@ -55,9 +55,9 @@ class Jointed:
         for kind, own in kinds.items():
             unit = "m²" if kind in ("sliver", "small block kept") else "m"
             places = [
-                f"({mend.x:.6g}, {mend.y:.6g}){f' {mend.junction}' * bool(mend.junction)}" for mend in own[:_TOLD]
+                f"({mend.x:.6g}, {mend.y:.6g}){f' {mend.junction}' * bool(mend.junction)}" for mend in own[:_LISTED]
             ]
-            more = f" and {len(own) - _TOLD} more, {others}" if len(own) > _TOLD else ""
+            more = f" and {len(own) - _LISTED} more, {others}" if len(own) > _LISTED else ""
             size = max(mend.size for mend in own)
             lines.append(f"{len(own)} × {kind}, up to {size:.3g} {unit}, at {', '.join(places)}{more}")
         return lines

@@ -44,7 +44,7 @@ def check(c: Check) -> None:
         _rigid(c)
     _statics(c)
     _stepping(c)
-    _told(c)
+    _warned(c)
 
 
 def _times(c: Check) -> None:
@@ -122,7 +122,7 @@ def _stepping(c: Check) -> None:
             c.refuse(("run", key), f'run.{key} belongs to stepping "events"', 'set run.stepping = "events"')
 
 
-def _told(c: Check) -> None:
+def _warned(c: Check) -> None:
     """What ends a run has to be told of."""
     run = c.tables.run
     if run is None or (run.events is None and run.stepping == "events") or set(run.events or ()) - {"tips"}:
@@ -202,7 +202,7 @@ def _zones(c: Check) -> None:
             c.refuse(
                 ("zones", name),
                 f"the geometry has no zone {name!r}",
-                next((told for told in map(partial(nearest, name), (free, known)) if "did you" in told), _are(known)),
+                next((hint for hint in map(partial(nearest, name), (free, known)) if "did you" in hint), _are(known)),
             )
     if len(materials) > 1:
         for name in known:

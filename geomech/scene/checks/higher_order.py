@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from .check import Check
 
-#: Of [loads]: what moves or holds points of blocks.
+#: Of [loads]: what moves, holds or strains blocks in ways that deflection does not know.
 _LOADS = {
     "bolts": "bolts", "motions": "prescribed motion", "point_motions": "prescribed motion of points",
     "viscous_boundaries": "viscous boundaries", "excavations": "excavations",
+    "in_situ": "in-situ stress",
 }  # fmt: skip
 
 

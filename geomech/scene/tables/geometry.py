@@ -160,8 +160,8 @@ class TraceFile(Table):
     zones: Names = Field((), description="names of the zones that its joints cut (unset: all)")
     simplify_m: Positive | None = Field(
         None,
-        description="vertices of its joints and cracks within this of the line through the others are left out, m, and told; "
-        "ends go on meeting what they met. Every side of a cracked block, and of a crack, takes an element or more "
+        description="vertices of its joints and cracks within this distance, m, of the line through the others are removed and reported; "
+        "ends stay connected. Every side of a cracked block, and of a crack, needs at least one element "
         "(unset: lines as they were digitised)",
     )
     set_property: str = Field("set", description="property of GeoJSON features that names their set")
@@ -203,7 +203,7 @@ class Geometry(Table):
     dead_ends: Literal["cracks", "trim"] = Field(
         "cracks",
         description='joints that stop in rock: "cracks" before a rock bridge, or "trim" them off (a trace of which '
-        "nothing is left is told)",
+        "nothing is left is reported)",
     )
     shortest_crack_m: NotNegative = Field(0.0, description="dead ends shorter than this are trimmed, m")
     smallest_block_m2: NotNegative = Field(

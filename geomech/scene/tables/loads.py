@@ -375,11 +375,11 @@ class FluidTable(Rising):
         ("cracks",), description='"cracks", those that grow with them, "holes", or both'
     )
     cracks: Names = Field(
-        (), description='names of the cracks that it is pumped into, "*" matches anything (unset: it stands in all)'
+        (), description='names of the cracks that it is pumped into, "*" matches anything (unset: it fills all cracks)'
     )
     connected: bool | None = Field(
         None,
-        description="true: it also stands in what is connected with those `cracks`, and opens into holes that it fills, "
+        description="true: it also fills cracks connected with those `cracks`, or with holes that it fills, "
         "now or later (unset: where `cracks` are named)",
     )
     value_pa: Finite | None = Field(None, description="constant pressure, Pa")
@@ -393,7 +393,7 @@ class FluidTable(Rising):
         if self.cracks and "cracks" not in self.fills:
             raise ValueError('`cracks` names cracks that it fills: `fills` has to hold "cracks"')
         if self.connected and "cracks" in self.fills and not self.cracks:
-            raise ValueError("it stands in all cracks already: name those it is pumped into in `cracks`")
+            raise ValueError("it fills all cracks already: name those it is pumped into in `cracks`")
         return self
 
 

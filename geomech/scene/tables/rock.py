@@ -28,7 +28,7 @@ class MaterialTable(Table):
         None, description="cohesion of intact rock, Pa, for growth.initiation (unset: it does not shear)"
     )
     internal_friction_angle_deg: Annotated[float, Field(ge=0, lt=90)] = Field(
-        0.0, description="angle of internal friction of intact rock, beside its cohesion, degrees"
+        0.0, description="angle of internal friction of intact rock, used with its cohesion, degrees"
     )
     plane: Literal["strain", "stress"] = Field("strain", description='"strain" or "stress" in the plane')
     rigid: bool = Field(

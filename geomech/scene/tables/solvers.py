@@ -39,8 +39,8 @@ class DdaTable(Table):
     equilibrium: Literal["", "start", "loads"] = Field(
         "",
         description='when static equilibrium is sought, whatever the time step: "" never, "start" before the run begins, '
-        '"loads" at every load of a static run too; a run ends where there is none, or only where blocks have moved by more '
-        "than a two-thousandth of their size beside what elasticity explains",
+        '"loads" at every load of a static run too; a run ends if there is none, or only one after blocks have moved by '
+        "more than a two-thousandth of their size in addition to elastic displacements",
     )
     unbalanced_tolerance: Positive = Field(
         1e-6, description="equilibrium: largest unbalanced force on a block, over the mean force on blocks"
@@ -48,7 +48,7 @@ class DdaTable(Table):
     rayleigh_fractions: Annotated[tuple[NotNegative, NotNegative], Strict(False)] | None = Field(
         None,
         description="Rayleigh damping of dynamic steps: fractions of the critical one at `rayleigh_frequencies_hz`, "
-        "beside `damping`",
+        "in addition to `damping`",
     )
     rayleigh_frequencies_hz: Annotated[tuple[Positive, Positive], Strict(False)] | None = Field(
         None, description="the two frequencies of `rayleigh_fractions`, Hz"
@@ -209,10 +209,10 @@ class RunTable(Table):
     )
     events: Annotated[tuple[Literal["tips", "contacts", "faces"], ...], Strict(False)] | None = Field(
         None,
-        description='what steps of stepping "events" end at, and events.csv tells: tips that reach their toughness (always), crack '
-        "faces and contacts of blocks that open, close, slip, stick or lose their bond; loads are exact, of more than a hundred "
-        "contacts to 1e-3, and what comes in a rush is taken together (unset: tips and faces, and contacts of up to 30 blocks). "
-        "Fixed and dynamic steps tell of contacts and faces too, at the end of the step it happens in (unset: they do not)",
+        description='where steps of stepping "events" end, also listed in events.csv: tips that reach their toughness (always), crack '
+        "faces and contacts of blocks that open, close, slip, stick or lose their bond; loads are exact, with more than a hundred "
+        "contacts to 1e-3, and changes in rapid succession are taken together (unset: tips and faces, and contacts of up to 30 blocks). "
+        "Fixed and dynamic steps list contacts and faces, too, at the end of their step (unset: they do not)",
     )
     longest_step_s: Positive | None = Field(
         None,

@@ -14,7 +14,7 @@ from ..parts import Flaw, Joint, ShapeError, Zone
 #: Moving one near-miss may make another; more rounds than this mean that the tolerance is as large as the blocks.
 _ROUNDS = 20
 #: What moves by less than this part of the tolerance moves by round-off, which is nobody's mistake.
-_TOLD = 1e-4
+_REPORTED = 1e-4
 FREE, CORNER = -1, -2
 #: Cells along a side of the coarse grid that tells what is near to what has changed.
 _CELLS = 256
@@ -297,7 +297,7 @@ def _met(graph: Graph, fresh: np.ndarray, n_outlines: int, tolerance: float, rou
         follows |= np.hypot(*(nodes - nodes[chief]).T) <= roundoff
         for k in np.flatnonzero((chief != np.arange(n)) & follows):
             away = float(np.hypot(*(nodes[k] - graph.nodes[chief[k]])))
-            if away > _TOLD * tolerance:
+            if away > _REPORTED * tolerance:
                 mends.append(Mend("near corners", *graph.nodes[chief[k]].tolist(), away))
             nodes[k] = graph.nodes[chief[k]]
             settled[k] = settled[chief[k]] = True
@@ -329,7 +329,7 @@ def _met(graph: Graph, fresh: np.ndarray, n_outlines: int, tolerance: float, rou
             settled[k] = True
         # The edge is led through the node; one that has been moved onto it lies on it but for round-off.
         through.setdefault(e, []).append(k)
-        if away > _TOLD * tolerance:
+        if away > _REPORTED * tolerance:
             mends.append(Mend("near miss", *nodes[k].tolist(), away))
     if not merged and not through:
         return None

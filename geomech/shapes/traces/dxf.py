@@ -55,7 +55,7 @@ def read_dxf(path: Path, unit: str | None = None, chord_tolerance: float | None 
             # Some programs write what the format does not allow; what can be saved of it is read.
             with _Recoveries() as recoveries:
                 document, _ = recover.readfile(path)
-            warnings.append(recoveries.told(path, error))
+            warnings.append(recoveries.recovery_warnings(path, error))
     except (ezdxf.DXFError, OSError, *_DAMAGED) as error:
         raise FieldFileError(
             f"{path.name} cannot be read as DXF: {error or type(error).__name__}",
@@ -67,7 +67,7 @@ def read_dxf(path: Path, unit: str | None = None, chord_tolerance: float | None 
         entities = list(reader.entities())
         box = bbox.extents((entity for _, entity in entities), fast=True)
     except _DAMAGED as error:
-        raise FieldFileError(f"{path.name}: {reader.at}: {_told(error)}", _AGAIN) from error
+        raise FieldFileError(f"{path.name}: {reader.at}: {_error_text(error)}", _AGAIN) from error
     size = max(box.size.x, box.size.y) if box.has_data else 1.0
     chord = CHORD * size if chord_tolerance is None else chord_tolerance / factor
     lines, heights = [], []
@@ -101,7 +101,7 @@ def read_dxf(path: Path, unit: str | None = None, chord_tolerance: float | None 
                 "the rock is plane and z is left away: draw the section in x and y",
             )
         )
-    return FieldFile(tuple(lines), tuple(warnings + reader.told()))
+    return FieldFile(tuple(lines), tuple(warnings + reader.recovery_warnings()))
 
 
 def _factor(document: Any, path: Path, unit: str | None, warnings: list[tuple[str, str]]) -> float:
@@ -137,7 +137,7 @@ class _Recoveries(logging.Handler):
     def emit(self, record: logging.LogRecord) -> None:
         self.found.append(record.getMessage())
 
-    def told(self, path: Path, error: Exception) -> tuple[str, str]:
+    def recovery_warnings(self, path: Path, error: Exception) -> tuple[str, str]:
         made = f"; {len(self.found)} guesses were made, the first: {self.found[0]}" if self.found else ""
         return (
             f"{path.name} is no right DXF ({error or type(error).__name__}): what could be saved of it is read{made}",
@@ -195,7 +195,7 @@ class _Reader:
         try:
             points, closed, bent = _POINTS[entity.dxftype()](entity, chord)
         except _DAMAGED as error:
-            raise FieldFileError(f"{self.path.name}: {_named(entity)}: {_told(error)}", _AGAIN) from error
+            raise FieldFileError(f"{self.path.name}: {_named(entity)}: {_error_text(error)}", _AGAIN) from error
         points = np.array([tuple(point)[:3] for point in points], dtype=float).reshape(-1, 3)
         if not np.isfinite(points).all():
             raise FieldFileError(
@@ -204,7 +204,7 @@ class _Reader:
             )
         return points, closed, np.broadcast_to(np.asarray(bent, dtype=bool), len(points))
 
-    def told(self) -> list[tuple[str, str]]:
+    def recovery_warnings(self) -> list[tuple[str, str]]:
         warnings = []
         if self.hidden:
             listed = ", ".join(f"{name!r} ({number})" for name, number in sorted(self.hidden.items()))
@@ -224,7 +224,7 @@ def _named(entity: Any) -> str:
     return f"{entity.dxftype()} #{handle}" if handle else f"{entity.dxftype()} of a block"
 
 
-def _told(error: Exception) -> str:
+def _error_text(error: Exception) -> str:
     return f"what belongs to it is missing or spoilt ({error})"
 
 

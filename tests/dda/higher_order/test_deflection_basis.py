@@ -11,6 +11,8 @@ import pytest
 from scipy.linalg import eigh
 
 from geomech import dda
+from geomech.dda import EDGE_FORCE, POINT_FORCE
+from geomech.dda.higher_order.deflected_blocks import DeflectedBlocks
 from geomech.dda.higher_order.deflection_basis import DeflectionBasis, n_deflections
 from geomech.dda.higher_order.polygon_quadrature import gauss_points, lobatto_points, polygon_points
 from geomech.model import Blocks, Material
@@ -175,3 +177,33 @@ def test_vibrations_do_not_depend_on_how_the_block_lies():
     drawn = frequencies(L_SHAPE, 5, rock)
     assert frequencies(turned(L_SHAPE, 1.1, (40.0, 7.0)), 5, rock)[:10] == pytest.approx(drawn[:10], rel=1e-9)
     assert frequencies(turned(L_SHAPE * [-1, 1], 0.2)[::-1], 5, rock)[:10] == pytest.approx(drawn[:10], rel=1e-9)
+
+
+@pytest.mark.parametrize("angle", [0.0, 0.6])
+def test_pressure_and_point_loads_work_on_deflection(angle):
+    """A uniform pressure all around does no work on deflection, whose mean strain is zero; one that grows with depth, as
+    that of water, works −∫ p div P dA (Gauss), and a force F at a point F · R P."""
+    shape = turned(L_SHAPE, 0.3)
+    blocks = Blocks.from_polygons([shape], order=[4])
+    elastic = Material("rock", 2e10, 0.2, 2500.0).stiffness()[None]
+    deflected = DeflectedBlocks(blocks, np.array([False]), np.array([2500.0]), elastic)
+    moved = turned(shape, angle, (3.0, 5.0))
+    following = blocks.next_vertex
+    edges = np.zeros(len(shape), EDGE_FORCE)
+    edges["edge"], edges["start"], edges["end"] = np.arange(len(shape)), moved, moved[following]
+    along = moved[following] - moved
+    normal = np.stack([along[:, 1], -along[:, 0]], axis=1) / np.hypot(*along.T)[:, None]
+    none, turn = np.empty(0, POINT_FORCE), np.array([angle])
+    edges["traction"] = -1e6 * normal[:, None]
+    assert np.abs(deflected.loads(none, edges, moved, turn)).max() < 1e-7 * 1e6
+    pressure = 1e4 * (9.0 - np.stack([moved[:, 1], moved[following, 1]], axis=1))
+    edges["traction"] = -pressure[..., None] * normal[:, None]
+    points, weights = polygon_points(shape, shape[following], shape[0], 8)
+    height = (points @ turned(np.eye(2), angle))[:, 1] + 5.0
+    divergence = deflected.basis.strain(points, 0)[:, :2].sum(axis=1)
+    expected = -np.einsum("k,k,kj->j", weights, 1e4 * (9.0 - height), divergence)
+    assert deflected.loads(none, edges, moved, turn)[0] == pytest.approx(expected, abs=1e-8 * 1e5)
+    force = np.zeros(1, POINT_FORCE)
+    force["at"], force["force"] = shape[2], (3e3, -4e3)
+    given = turned(np.array([[3e3, -4e3]]), -angle)[0] @ deflected.basis.displacement(shape[2], 0)[0]
+    assert deflected.loads(force, edges[:0], moved, turn)[0] == pytest.approx(given, rel=1e-12)

@@ -12,7 +12,7 @@ import synthetic_run as made
 
 from geomech.output import JointHistories, standard_observers
 from geomech.output.fields import JOINTS, REACTIONS
-from geomech.output.tables.motion_state import closing, condition, told
+from geomech.output.tables.motion_state import closing, condition, state_text
 
 
 def rows_of(path) -> list[dict]:
@@ -34,7 +34,7 @@ def test_every_cycle_leaves_a_row_a_joint_and_a_support(tmp_path):
 def test_condition_is_read_from_the_unbalanced_force_and_the_contacts():
     cycle = made.cycle(1, 1, 0, 0)
     cycle = replace(cycle, blocks=replace(cycle.blocks, fixed=np.array([True, False, True])))
-    assert condition(cycle) == "" and told(cycle) == "starting"
+    assert condition(cycle) == "" and state_text(cycle) == "starting"
 
     def at(ratio: float):
         return replace(cycle, statistics={"unbalanced_ratio": ratio, "kinetic_energy": 12.0, "step_cuts": 3})
@@ -44,7 +44,9 @@ def test_condition_is_read_from_the_unbalanced_force_and_the_contacts():
     stored = replace(cycle, statistics={"unbalanced_ratio": 1e-6, "kinetic_energy": 1e-9, "elastic_energy": 1.0})
     assert condition(stored) == "at rest"
     assert condition(at(0.2)) == "sliding"
-    assert told(at(0.2)) == "sliding, unbalanced 2.0e-01, kinetic energy 12 J/m, 1 contacts slide, step cut 3 times"
+    assert (
+        state_text(at(0.2)) == "sliding, unbalanced 2.0e-01, kinetic energy 12 J/m, 1 contacts slide, step cut 3 times"
+    )
     contacts = cycle.state.contacts.copy()
     contacts["state"] = 0
     flying = replace(at(1.0), state=replace(cycle.state, contacts=contacts))

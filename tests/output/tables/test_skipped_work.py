@@ -102,8 +102,8 @@ def test_a_run_that_does_everything_anew_has_left_nothing_out(tmp_path):
 
 def test_what_was_saved_is_the_mean_of_what_was_done_times_what_was_not(tmp_path):
     from geomech.model import Skip
-    from geomech.output.tables.skipped_work import told
+    from geomech.output.tables.skipped_work import skip_summary
 
-    assert told("bodies", Skip(6, 3, 1.5)) == {**told("bodies", Skip(6)), "saved_s": pytest.approx(3.0)}
+    assert skip_summary("bodies", Skip(6, 3, 1.5)) == {**skip_summary("bodies", Skip(6)), "saved_s": pytest.approx(3.0)}
     written = ran(tmp_path, PLATE, "output.interior_every=2", "output.every=2")["skipped"]
     assert written["series"]["count"] == 3 and written["series"]["saved_s"] > 0  # of cycles 0 to 6: 1, 3, 5

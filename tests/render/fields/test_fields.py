@@ -138,3 +138,18 @@ def test_wishes_that_cannot_be_met_are_told(run, tmp_path, capsys):
         assert told in capsys.readouterr().err
     assert main(["render", str(tmp_path / "none"), "--field", "K"]) != 0
     assert "holds no run" in capsys.readouterr().err
+
+
+def test_bolts_and_joints_have_curves(run, tmp_path):
+    from geomech.render.curves.plots import plots
+    from geomech.render.curves.structure_curves import bolt_curves, joint_curves
+
+    (curve,) = bolt_curves(run).values()
+    assert curve[:4].tolist() == [[t, 1e-3 * made.RATE * t] for t in range(4)]
+    assert "bolts.png" in [path.name for path in plots(run, tmp_path, more=True)]
+    assert joint_curves(run) == {}  # the made-up run sums up no joints
+    (tmp_path / "history.csv").write_text((run.folder / "history.csv").read_text())
+    header = "cycle,time,joint,mean_slip\n"
+    (tmp_path / "joints.csv").write_text(header + "0,0,bedding,0\n0,0,fault,0\n1,0.5,bedding,1e-3\n1,0.5,fault,-2e-3\n")
+    curves = joint_curves(Run(tmp_path))
+    assert list(curves) == ["fault", "bedding"] and curves["fault"].tolist() == [[0.0, 0.0], [0.5, 2e-3]]

@@ -26,6 +26,7 @@ def scene(tmp_path, *more: str, text: str = BENDING):
         ("[joints.default]\nfriction_angle_deg = 30\nrestitution = 0.4\n", r"\[joints.default\] restitution"),
         ("[joints.default]\nfriction_angle_deg = 30\njrc = 8\njcs_pa = 1e8\n", "softens, dilates or closes"),
         ('[[loads.viscous_boundaries]]\nedge = "x"\n', r"viscous boundaries \(\[loads\] viscous_boundaries\)"),
+        ("[loads.in_situ]\nsurface_m = 1.0\nunit_weight_n_per_m3 = 2e4\nk0 = 1.0\n", "in-situ stress"),
         ('[[loads.motions]]\nzone = "block"\nvelocity_m_per_s = [0, -1]\n', r"prescribed motion"),
     ],
 )

@@ -1,0 +1,54 @@
+"""Studies without steps say that they are at work; runs that report their steps are not spoken over; bars keep the time
+that is left in sight."""
+
+import io
+import time
+from dataclasses import replace
+
+import numpy as np
+import synthetic_run as made
+
+from geomech.output import Progress
+from geomech.output.console.at_work import AtWork, spoken
+
+
+def test_a_silent_study_is_said_to_be_at_work():
+    out = io.StringIO()
+    with AtWork("toppling_slope", stream=out, silence=0.05):
+        time.sleep(0.3)
+    lines = out.getvalue().splitlines()
+    assert len(lines) >= 2 and all(line == "  toppling_slope: at work for 0 s" for line in lines)
+
+
+def test_nothing_is_said_beside_what_is_shown_nor_when_quiet():
+    out = io.StringIO()
+    with AtWork("study", stream=out, silence=0.5):
+        for _ in range(8):
+            spoken()
+            time.sleep(0.02)
+    with AtWork("study", stream=out, silence=0.01, quiet=True):
+        time.sleep(0.05)
+    assert out.getvalue() == ""
+
+
+def test_the_time_left_is_in_sight_at_80_columns(tmp_path, monkeypatch):
+    clock = iter(np.arange(0.0, 1e6, 1.0))
+    monkeypatch.setattr("geomech.output.console.progress.time.perf_counter", lambda: next(clock))
+    monkeypatch.setenv("COLUMNS", "80")
+
+    class Terminal(io.StringIO):
+        def isatty(self) -> bool:
+            return True
+
+    out = Terminal()
+    watch = Progress(stream=out)
+    watch.on_start(
+        replace(made.problem(), title="A title of more letters than a narrow terminal has room for"), tmp_path
+    )
+    watch._bar.dynamic_ncols, watch._bar.ncols, watch._bar.mininterval = None, 80, 0.0
+    for step in range(30):
+        watch.on_cycle(made.cycle(step, step, 0, 0))
+        watch._bar.refresh()
+    shown = out.getvalue().split("\r")[-1]
+    assert len(shown.rstrip()) <= 80 and "|" in shown
+    assert " left" in shown
