@@ -120,7 +120,7 @@ end_time_s = 1.5
 # The code below is only there to make this page: it saves both files in a temporary folder and types the commands for
 # you.
 
-import os
+import contextlib
 import shlex
 import tempfile
 from pathlib import Path
@@ -134,14 +134,14 @@ from geomech.render import sketch
 from geomech.scene import SceneError, load_scene
 
 work = Path(tempfile.mkdtemp(prefix="geomech-tutorial-"))
-os.chdir(work)
-Path("my_slope.geo").write_text(MODEL)
-Path("my_slope.toml").write_text(SCENE)
+(work / "my_slope.geo").write_text(MODEL)
+(work / "my_slope.toml").write_text(SCENE)
 
 
 def terminal(command: str) -> None:
     """Run a geomech command here, as a terminal would."""
-    main(shlex.split(command)[1:])
+    with contextlib.chdir(work):
+        main(shlex.split(command)[1:])
 
 
 # %%
@@ -173,14 +173,14 @@ terminal("geomech run my_slope.toml")
 # and a film of the motion; ``outputs/my_slope/blocks.pvd`` opens in :doc:`ParaView </start/paraview>`.
 
 terminal("geomech render outputs/my_slope --no-gif")
-Path("outputs/my_slope/pictures/specimen.png").rename("shown/end.png")
+(work / "outputs/my_slope/pictures/displacement.png").rename(work / "shown/end.png")
 
 # %%
 # Is it right? On a plane at 30° with 24° of friction a rigid slab moves by
 # :math:`\tfrac12 g (\sin 30° - \cos 30° \tan 24°)\,t^2`. Most of the rock should move like that. Blocks at the face
 # move farther, because they also topple.
 
-last = geomech.open_run("outputs/my_slope").mesh("blocks", time=1.5)
+last = geomech.open_run(work / "outputs/my_slope").mesh("blocks", time=1.5)
 moved = np.sort(np.linalg.norm(last.point_data["displacement"], axis=1))
 slab = 0.5 * 9.81 * (np.sin(np.radians(30)) - np.cos(np.radians(30)) * np.tan(np.radians(24))) * 1.5**2
 print(
@@ -265,8 +265,9 @@ attempt("title", "title", geo=("Line(7) = {6, 7};", ""))
 # **Joint sets that cut the base too**, because they name no zone. That is no error, but it is hardly meant: the base
 # falls into blocks that are fixed one by one and cost time.
 
-Path("cut_too.toml").write_text(SCENE.replace('zones = ["rock"]', ""))
-print(load_scene("my_slope.toml").problem().inventory, "→", load_scene("cut_too.toml").problem().inventory)
+(work / "cut_too.toml").write_text(SCENE.replace('zones = ["rock"]', ""))
+print(load_scene(work / "my_slope.toml").problem().inventory)
+print(load_scene(work / "cut_too.toml").problem().inventory)
 
 # %%
 # Mistakes that no check can see
@@ -279,10 +280,10 @@ print(load_scene("my_slope.toml").problem().inventory, "→", load_scene("cut_to
 # - **Beds that dip the wrong way.** Angles count counter-clockwise from x. In this drawing, whose face looks to the
 #   left, beds at +30° dip out of the slope and beds at −30° dip into it:
 
-Path("into.toml").write_text(SCENE.replace("angle_deg = 30", "angle_deg = -30").replace("112", "68"))
+(work / "into.toml").write_text(SCENE.replace("angle_deg = 30", "angle_deg = -30").replace("112", "68"))
 figure, (left, right) = plt.subplots(1, 2, figsize=(11, 3.6), layout="constrained")
-sketch(load_scene("my_slope.toml"), left).set_title("angle_deg = 30: out of the slope")
-sketch(load_scene("into.toml"), right).set_title("angle_deg = −30: into the slope")
+sketch(load_scene(work / "my_slope.toml"), left).set_title("angle_deg = 30: out of the slope")
+sketch(load_scene(work / "into.toml"), right).set_title("angle_deg = −30: into the slope")
 
 # %%
 # Next: :ref:`rock bridges <sphx_glr_gallery_plot_02_rock_bridges.py>`, where joints do not run through.

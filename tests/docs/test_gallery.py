@@ -20,12 +20,10 @@ NOT_REMADE: set[str] = {
     "bench_ddm.png",
     "bench_geometry.png",
     "bench_solvers.png",
-    "flexural_toppling.png",
     "jointed_slope.png",
     "random_slope.png",
     "stability.png",
     "stability_cracks.png",
-    "step_path_slope.png",
 }
 
 PICTURES = gallery.pictures()

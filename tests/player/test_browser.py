@@ -194,6 +194,7 @@ def test_on_a_phone_nothing_is_wider_than_the_screen(opened, address, scheme):
 
 def test_a_page_prints_in_light_colours_without_controls(opened, address):
     page = opened(address, color_scheme="dark")
+    page.evaluate("document.documentElement.dataset.theme = 'dark'")
     page.emulate_media(media="print", color_scheme="dark")
     page.evaluate("dispatchEvent(new Event('beforeprint'))")
     assert not page.locator(".gm-controls").is_visible() and not page.locator(".gm-slider").is_visible()

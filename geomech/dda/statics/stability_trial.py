@@ -28,7 +28,7 @@ _FALLING, _STEPS = 0.8, 6
 #: Fewest steps before a trial is called unstable.
 _LEAST_STEPS = 10
 #: An undecided trial continues with steps longer by this factor, up to this number of them.
-_LONGER, _MORE_STEPS = 4.0, 30
+_LONGER, _MORE_STEPS = 2.0, 30
 #: … or up to this number once contacts prevent longer ones.
 _SHORT_STEPS = 6
 #: An unbalanced force that falls along the motion is extrapolated linearly; it lasts too long if it lasts this many

@@ -226,8 +226,9 @@ class FieldPainter:
                 use = _there(blocks, interior) if name == "blocks" else np.ones(grid.n_cells, bool)
                 if name == "blocks" and self.what.stress and interior is not None:
                     continue  # platens have a stress each that takes attention off the specimen's
-                if name == "blocks" and (use & (np.asarray(grid["fixed"]) == 0)).any():
-                    use = use & (np.asarray(grid["fixed"]) == 0)
+                if name == "blocks":
+                    free = use & (np.asarray(grid["fixed"]) == 0)
+                    use = free if free.any() or interior is not None else use
                 shown = self._area(axes, grid, values, at_points, use) or shown
                 if self.what.name == "principal":
                     self._crosses(axes, grid, use)
