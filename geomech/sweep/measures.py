@@ -11,16 +11,14 @@ solvers gave up), and a reason. Masses and volumes are per metre of thickness.
 from __future__ import annotations
 
 import base64
-import ctypes
 import json
 import logging
 import os
 import re
 import shutil
 import socket
-import threading
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -68,11 +66,8 @@ def carry_out(job: Job) -> dict[str, Any]:
     row: dict[str, Any] = {"run": job.number, "status": DONE, "reason": ""}
     with _heard() as heard:
         try:
-            with time_limit(job.settings.get("run_limit_s")):
-                row |= _MEASURES[job.settings["measure"]](job)
-                row |= _columns(job, row)
-        except RunTooLong as error:
-            row |= {"status": FAILED, "reason": str(error)}
+            row |= _MEASURES[job.settings["measure"]](job)
+            row |= _columns(job, row)
         except Exception as error:
             refused = any(kind.__name__ in _REFUSALS for kind in type(error).__mro__)
             row |= {"status": REFUSED if refused else FAILED, "reason": _error_text(error)}
@@ -88,43 +83,6 @@ def carry_out(job: Job) -> dict[str, Any]:
         "host": socket.gethostname(), "process": os.getpid(),
     }  # fmt: skip
     return row
-
-
-class RunTooLong(BaseException):
-    """A run has reached its time limit. No `Exception`, so that no fallback of the solvers takes it for a failure of
-    its own."""
-
-
-@contextmanager
-def time_limit(seconds: float | None) -> Iterator[None]:
-    """Raise `RunTooLong` in this thread after ``seconds`` by the clock (None: never).
-
-    It is raised between two Python instructions: a compiled kernel or a system call under way ends first. Signals
-    would not do, because dask's workers make their runs in a thread.
-    """
-    if seconds is None:
-        yield
-        return
-    thread, lock, over = threading.get_ident(), threading.Lock(), False
-    text = f"stopped after {seconds:g} s, the time limit of a run"
-    raised = type("RunTooLong", (RunTooLong,), {"__str__": lambda self: text})
-
-    def stop() -> None:
-        with lock:
-            if not over:
-                ctypes.pythonapi.PyThreadState_SetAsyncExc(ctypes.c_ulong(thread), ctypes.py_object(raised))
-
-    timer = threading.Timer(seconds, stop)
-    timer.daemon = True
-    timer.start()
-    try:
-        yield
-    finally:
-        with lock:
-            over = True
-            # The limit was reached while the run ended: what has not been raised yet is withdrawn.
-            ctypes.pythonapi.PyThreadState_SetAsyncExc(ctypes.c_ulong(thread), None)
-        timer.cancel()
 
 
 def kind_of_reason(reason: str) -> str:

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-import threading
-import time
 
 import numpy as np
 import pytest
@@ -15,7 +13,7 @@ from geomech.reference.slopes.rock_slopes import plane_failure_factor
 from geomech.report import write_sweep_page
 from geomech.sweep.engine import LocalEngine
 from geomech.sweep.execution import carry_out_sweep, read_sweep
-from geomech.sweep.measures import Job, carry_out, moved_cells, places_of, time_limit
+from geomech.sweep.measures import Job, carry_out, moved_cells, places_of
 from geomech.sweep.plan import plan_of
 
 FRICTION = "joints.default.friction_angle_deg"
@@ -129,22 +127,3 @@ def test_places_are_those_inside_the_outlines():
     clear = np.abs(x + y - 4) > 1e-9
     assert np.array_equal(found[clear], (x + y < 4)[clear])
     assert not moved_cells(places_of([], (0, 0, 1, 1), (5, 3)), (5, 3)).any()
-
-
-@pytest.mark.parametrize("in_a_thread", [False, True])
-def test_a_run_that_takes_too_long_is_stopped_and_counted(plane, in_a_thread):
-    """A million steps are stopped after a tenth of a second, in the main thread and in another, as dask's workers
-    run; the limit of a run that has ended stops nothing that comes after it."""
-    settings = {**plan_of(plane, {"vary": {FRICTION: [20]}, "measure": "run", "run_limit_s": 0.1}).settings}
-    job = Job(0, str(plane), None, ("run.end_time_s=1e4", f"{FRICTION}=20"), settings, (0, 0, 10, 10), (4, 4))
-    rows = []
-    if in_a_thread:
-        thread = threading.Thread(target=lambda: rows.append(carry_out(job)))
-        thread.start()
-        thread.join(60)
-    else:
-        rows.append(carry_out(job))
-    assert rows[0]["status"] == "failed" and rows[0]["reason"] == "stopped after 0.1 s, the time limit of a run"
-    with time_limit(0.05):
-        pass
-    time.sleep(0.1)

@@ -70,10 +70,6 @@ def declare(verbs: Verbs) -> None:
     made.add_argument("--rare", choices=("subset", "importance"), help="method for probabilities below 1e-2")
     made.add_argument("--keep", choices=("none", "failed", "all"), help="whose run folders are kept (none)")
     made.add_argument(
-        "--run-limit", type=float, metavar="SECONDS", dest="run_limit_s",
-        help="stop a run that takes longer, and count it as failed (no limit)",
-    )  # fmt: skip
-    made.add_argument(
         "--table", type=Path, metavar="FILE", help="settings as TOML (default: sweep.toml in the folder of the scene)"
     )
     made.add_argument(
@@ -166,18 +162,7 @@ def _given(options: argparse.Namespace) -> dict[str, Any]:
     """The settings that the command line gives."""
     given: dict[str, Any] = {
         name: getattr(options, name)
-        for name in (
-            "seeds",
-            "runs",
-            "seed",
-            "measure",
-            "fails",
-            "along",
-            "without_cracks",
-            "rare",
-            "keep",
-            "run_limit_s",
-        )
+        for name in ("seeds", "runs", "seed", "measure", "fails", "along", "without_cracks", "rare", "keep")
         if getattr(options, name) is not None
     }
     if options.sampling:

@@ -60,9 +60,6 @@ class SweepTable(Table):
         0.01, description='of "run": a block that has moved by more than this part of its size √area counts as moving'
     )
     pause_s: NotNegative = Field(0.01, description='of "pause", which benchmarks time: what a run waits, s')
-    run_limit_s: Positive | None = Field(
-        None, description="a run that takes longer by the clock is stopped and counted as failed, s (unset: no limit)"
-    )
     keep: Literal["none", "failed", "all"] = Field(
         "none",
         description="whose run folders are kept: of none, of slopes that fail and runs that end in an error, of all",

@@ -1,4 +1,4 @@
-"""What is taken as plainly well is nothing that a close look would refuse."""
+"""What is taken as clearly valid is nothing that a close look would refuse."""
 
 import numpy as np
 import pytest
@@ -21,12 +21,12 @@ def random_network(rng, reach, points) -> Cracks:
 
 
 def verdicts(cracks, loops, fresh, monkeypatch) -> tuple[bool, bool]:
-    """Whether ``cracks`` are taken as plainly well, and whether a close look finds nothing."""
+    """Whether ``cracks`` are taken as clearly valid, and whether a close look finds nothing."""
     seen = []
     edges = outline_edges(loops)[0]
     plain = geometry_checks.clearly_valid
     with monkeypatch.context() as patch:
-        patch.setattr(geometry_checks, "plainly_well", lambda *given: seen.append(plain(*given)) and False)
+        patch.setattr(geometry_checks, "clearly_valid", lambda *given: seen.append(plain(*given)) and False)
         try:
             geometry_checks.check_cracks(cracks, edges, loops, fresh)
         except ValueError:
