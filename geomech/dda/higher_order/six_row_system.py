@@ -17,8 +17,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...compiled import kept, part
-from ...model import OPEN, SLIP, STICK
+from ...model import OPEN, SLIP
 from ..linear_solver import assembly
+from ..linear_solver.assembly import spring_in_state
 from ..linear_solver.block_solver import BlockSolver
 
 _jit = kept(fastmath={"contract"}, error_model="numpy", nogil=True)
@@ -185,11 +186,10 @@ def springs_in_states(right, blocks, rows, vectors, states, springs):
     for c in range(len(block)):
         if state[c] == OPEN:
             continue
-        given = shear0[c]
-        stiff[c], along[c] = normal[c], shear[c] if state[c] == STICK else 0.0
+        stiff[c], along[c], slope[c], given = spring_in_state(
+            state[c], direction[c], normal[c], shear[c], friction[c], sliding[c], shear0[c]
+        )
         if state[c] == SLIP:
-            slope[c] = direction[c] * friction[c]
-            given = direction[c] * sliding[c]
             symmetric = symmetric and slope[c] == 0.0 and lift[c] == 0.0
         pressed = normal[c] * gap[c]
         for side in range(2):

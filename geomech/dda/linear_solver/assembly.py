@@ -326,6 +326,15 @@ def assemble(
     crew().share(_fill_shared, claimed, done, SHARE, *sides, data, matrix, *at, *laws)
 
 
+@part(fastmath=False, error_model="numpy", nogil=True)
+def spring_in_state(state, direction, normal, shear, friction, sliding, shear0):
+    """A closed contact's stiffness across and along, the ratio of its shear to its normal force where it slides (0 where
+    it sticks), and the shear force that it bears without motion."""
+    if state == SLIP:
+        return normal, 0.0, direction * friction, direction * sliding
+    return normal, shear if state == STICK else 0.0, 0.0, shear0
+
+
 @kept(fastmath=False, error_model="numpy", nogil=True)
 def _springs(
     right, base_right, block, other, order, vectors, state, direction, gap, normal, shear, friction, sliding, lift,
@@ -340,11 +349,10 @@ def _springs(
     for c in range(block.shape[0]):
         if state[c] == OPEN:
             continue
-        given = shear0[c]
-        stiff[c], along[c] = normal[c], shear[c] if state[c] == STICK else 0.0
+        stiff[c], along[c], slope[c], given = spring_in_state(
+            state[c], direction[c], normal[c], shear[c], friction[c], sliding[c], shear0[c]
+        )
         if state[c] == SLIP:
-            slope[c] = direction[c] * friction[c]
-            given = direction[c] * sliding[c]
             symmetric = symmetric and slope[c] == 0.0 and lift[c] == 0.0
         pressed = normal[c] * gap[c]
         i, j = order[block[c]], order[other[c]]

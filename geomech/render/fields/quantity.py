@@ -11,19 +11,13 @@ import numpy as np
 from geomech.output.fields import SERIES
 from geomech.output.reading import Run
 
+from ..pictures.field import COMPONENTS
+
 if TYPE_CHECKING:
     import pyvista as pv
 
-#: Stress components by name → (array, column, label).
-STRESSES = {
-    "xx": ("stress", 0, "σxx"),
-    "yy": ("stress", 1, "σyy"),
-    "zz": ("stress", 2, "σzz"),
-    "xy": ("stress", 3, "σxy"),
-    "principal_max": ("principal_stress", 0, "σ₁"),
-    "principal_min": ("principal_stress", 2, "σ₃"),
-    "von_mises": ("von_mises", None, "von Mises stress"),
-}
+#: Stress components by name → (array, column, label), von Mises stress as it was written.
+STRESSES = {**COMPONENTS, "von_mises": ("von_mises", None, "von Mises stress")}
 #: Fields with a name of their own → (series that hold it, array, column, label). Vectors show their magnitude.
 NAMED = {
     "displacement": (("interior", "blocks"), "displacement", None, "displacement"),
