@@ -275,12 +275,14 @@ class _Contact:
         while True:
             w, reaction = self._respond(states, limit)
             new, changed, worst = self._next(states, w, reaction, limit)
+            disputed = changed & self.undecided
             changed &= ~self.undecided
             n = int(changed.sum())
             self.report = f"; {n} nodes are in violation, by {worst:.1e} of the largest stress"
             if n == 0:
-                if self.undecided.any():
-                    self.violation = worst
+                # Nodes that alternated earlier may have found their states since.
+                self.undecided = disputed
+                self.violation = worst if disputed.any() else 0.0
                 return states, w, reaction
             self.node = int(np.flatnonzero(changed)[-1])
             if n < best:
