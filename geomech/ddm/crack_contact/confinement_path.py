@@ -28,8 +28,8 @@ from .face_laws import FaceStates
 _SPARE, _UNEVEN = 1e-2, 0.2
 #: Friction coefficient below which cohesion is added in place of pressure.
 _LITTLE_FRICTION = 0.05
-#: Largest confinement, and most changes of state per node.
-_LARGEST, _CHANGES = 1e6, 8
+#: Largest confinement z (the start has 1), and most changes of state per node.
+_LARGEST, _CHANGES = 2.0, 8
 #: Rate of a margin that is zero but for round-off.
 _FLAT = 1e-13
 #: Margins of a node: of contact (pressure or gap), of slip against and along the tangent, of slip that would turn back,
@@ -150,7 +150,7 @@ class _Path:
             step = float(reach[law, node])
             if direction < 0.0 and step >= z:
                 return PathEnd(states, 0.0)
-            if not step < _LARGEST:
+            if not z + direction * step < _LARGEST:
                 return least
             z += direction * step
             slip = (1.0 - z) * bare.slip[node] + z * confined.slip[node]
