@@ -59,8 +59,9 @@ _FARTHEST = 64.0
 _BEYOND = 1e-2
 #: Factor from step to step in the search for a stable trial near a known factor; and of the first trial below a bound.
 _NEARBY, _BELOW = 0.85, 0.95
-#: Trials beside an expected factor are made so many tolerances from it.
-_BESIDE = 0.4
+#: Trials beside an expected factor are made so many tolerances from it; near a bound, a second one fails so much farther
+#: above the first that their drifts point at the factor.
+_BESIDE, _SECOND = 0.4, 0.01
 
 
 class NothingToReduce(ValueError):
@@ -335,6 +336,8 @@ class _Bracket:
                     return self._answer(self.lower, None)
                 beside = _beside(self._aim, self.lower, tolerance) if math.isfinite(self._aim) else None
                 factor = 2.0 * self.lower if beside is None else beside
+            elif self._aim and sum(not t.stable for t in known) == 1:
+                factor = upper * (1.0 + _SECOND)
             elif upper > self.lower * (1.0 + tolerance):
                 factor = _next_factor(known, self.lower, upper, tolerance)
             elif self._from_afar(known, upper, tolerance):
