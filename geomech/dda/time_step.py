@@ -15,7 +15,16 @@ import numpy as np
 from ..conventions import rotate_stress
 from ..model import OPEN, SLIP, STICK, Loads, State
 from .contact_detection.contact_records import copied
-from .energy_balance import StepEnergy, sliding, step_energies
+from .energy_balance import (
+    BlockMass,
+    ContactStep,
+    SchemeTerms,
+    StepEnergy,
+    StepMotion,
+    StepStress,
+    sliding,
+    step_energies,
+)
 from .impacts.restitution import Rebound, RigidBlocks, Striking
 from .joint_laws.coulomb_return import reserves
 from .joint_laws.friction_arrest import Stopped, Unresolved, contact_speeds, dissipating, kinetic_energy, stop
@@ -682,19 +691,21 @@ class Attempt:
         system, scheme, found, settled = self.system, self.system.scheme, self.found, self.settled
         weight = self.weight if isinstance(self.weight, np.ndarray) else np.full(len(found), self.weight)
         impact, velocity = self.impact, self.velocity if self.impact is None else self.impact.without
-        energy = StepEnergy(
-            *step_energies(
-                self.increment, self.state.velocity, self.carried, velocity, self.acceleration, self.dt,
-                self.gravity,
-                load, scheme.weight, scheme.block_damping, scheme.mass_damping, scheme.stiffness_damping, self.density,
-                self.moments, system.fixed, self.stress, self.tangent, self.stress0, system.compliance,
-                system.stiffness,
+        normal, shear = self._real_springs()
+        energies = step_energies(
+            StepMotion(self.increment, self.state.velocity, self.carried, velocity, self.acceleration, load),
+            StepStress(self.stress, self.tangent, self.stress0, system.compliance, system.stiffness),
+            BlockMass(self.density, self.moments, system.fixed),
+            SchemeTerms(scheme.weight, scheme.block_damping, scheme.mass_damping, scheme.stiffness_damping, self.dt),
+            self.gravity,
+            ContactStep(
                 found.state, settled.state, found.bonded, settled.bonded, found.gap_before, settled.gap,
-                found.arc + np.zeros(len(found)), settled.lifted,
-                settled.slip, self.slid, settled.normal_force, found.shear, settled.shear_force, end_shear,
-                *self._real_springs(), weight, found.law, system.finder.closure,
-            ).tolist()
+                found.arc + np.zeros(len(found)), settled.lifted, settled.slip, self.slid, settled.normal_force,
+                found.shear, settled.shear_force, end_shear, normal, shear, weight, found.law,
+            ),
+            system.finder.closure,
         )  # fmt: skip
+        energy = StepEnergy(*energies.tolist())
         if impact is not None:
             end = block_moments(self.new_vertices, system.next, system.vertex_start)
             kinetic = kinetic_energy(self.velocity, end, system) - kinetic_energy(velocity, end, system)
