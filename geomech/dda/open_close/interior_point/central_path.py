@@ -28,6 +28,7 @@ from ...contact_detection.contact_finder import ContactSet
 from ...joint_laws.coulomb_return import moved
 from ...joint_laws.penalty_springs import Springs
 from ...linear_solver import assembly
+from ...linear_solver.equation_records import ContactMotion, ContactStiffness
 from .contact_terms import LEAST_LEFT, SHORT_OF
 from .newton_steps import THREADED, PathSteps
 
@@ -253,8 +254,8 @@ class CentralPath:
         stiff, stiff_along, slope = springs
         data = np.empty(pattern.size) if self._room is None else self._room()
         assembly.assemble(
-            pattern, data, self._matrix, self._upper, self._lower, *self._all_at, stiff, stiff_along, slope,
-            self._all_lift, self._sides,
+            pattern, data, self._matrix, ContactMotion(*self._all_at),
+            ContactStiffness(stiff, stiff_along, slope, self._all_lift), (self._upper, self._lower), self._sides,
         )  # fmt: skip
         solution = solution_of(pattern, data)
 
