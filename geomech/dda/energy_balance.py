@@ -149,25 +149,6 @@ class StepStress(NamedTuple):
     stiffness: np.ndarray
 
 
-class BlockMass(NamedTuple):
-    """Mass of blocks as a step begins: ``density`` (n_blocks,) kg/m³, ``moments`` (n_blocks, 6) of the outline
-    (`block_moments`), and which blocks are ``fixed`` (n_blocks,)."""
-
-    density: np.ndarray
-    moments: np.ndarray
-    fixed: np.ndarray
-
-
-class SchemeTerms(NamedTuple):
-    """Of the time scheme (`TimeScheme`): weight θ of the step's end, and dampings; the step ``dt``, s."""
-
-    weight: float
-    block_damping: float
-    mass_damping: float
-    stiffness_damping: float
-    dt: float
-
-
 class ContactStep(NamedTuple):
     """Contacts (n,) in a step.
 

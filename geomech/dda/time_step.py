@@ -16,15 +16,14 @@ from ..conventions import rotate_stress
 from ..model import OPEN, SLIP, STICK, Loads, State
 from .contact_detection.contact_records import copied
 from .energy_balance import (
-    BlockMass,
     ContactStep,
-    SchemeTerms,
     StepEnergy,
     StepMotion,
     StepStress,
     sliding,
     step_energies,
 )
+from .equation_records import BlockEquations, ContactMotion
 from .impacts.restitution import Rebound, RigidBlocks, Striking
 from .joint_laws.coulomb_return import reserves
 from .joint_laws.friction_arrest import Stopped, Unresolved, contact_speeds, dissipating, kinetic_energy, stop
@@ -32,7 +31,16 @@ from .joint_laws.penalty_springs import Springs, end_of_step, over_a_step
 from .joint_laws.sheared_stick import settle_sheared_sticks
 from .kinematics.constraints import balanced, hold, with_rigid_motion
 from .kinematics.midpoint_configuration import MidpointConfiguration
-from .kinematics.newmark import advance, assemble_blocks, turned
+from .kinematics.newmark import (
+    BlockLoads,
+    BlockMass,
+    BlockStart,
+    CrackTerms,
+    Outlines,
+    advance,
+    assemble_blocks,
+    turned,
+)
 from .kinematics.rigid_blocks import mean_stress
 from .kinematics.roundoff import undecided_gaps, warn_of_roundoff
 from .kinematics.simplex_integration import block_moments
@@ -45,7 +53,7 @@ from .open_close.contact_set import ContactSet
 from .open_close.equations import Equations, Unsettled
 from .open_close.iteration import is_large, settle
 from .open_close.settled_states import Settled
-from .out_of_balance import imbalance
+from .out_of_balance import ContactForces, imbalance
 from .results import CrackResponse, StepResult
 
 if TYPE_CHECKING:
@@ -119,12 +127,15 @@ class Attempt:
         self.time = state.time + dt
         # Mass stays, whatever the strain does to the area.
         self.density = system.mass / moments[:, 0]
-        self.given, self.n_free = crack is not None, len(system.moving)
-        self.crack_compliance = (
-            np.ascontiguousarray(crack.compliance, dtype=float) if self.given else system.no_compliance
+        self.n_free = len(system.moving)
+        compliance, offset = (
+            (system.no_compliance, system.no_offset) if crack is None else (crack.compliance, crack.offset)
         )
-        self.crack_offset = np.ascontiguousarray(crack.offset, dtype=float) if self.given else system.no_offset
-        self.stress, self.crack_strain = np.array(state.stress), np.ascontiguousarray(state.crack_strain)
+        self.cracks = CrackTerms(
+            crack is not None, np.ascontiguousarray(state.crack_strain),
+            np.ascontiguousarray(compliance, dtype=float), np.ascontiguousarray(offset, dtype=float),
+        )  # fmt: skip
+        self.stress = np.array(state.stress)
         if system.taken_out is not None:
             # What blocks store goes with them, in the first step without them and not after it.
             self.stress[system.taken_out] = 0.0
@@ -206,11 +217,13 @@ class Attempt:
             # What is cut at the first sign needs no factors in double, of 100 000 blocks another 1.6 GB.
             self.pattern.solver.single_only = is_large(self.n_free, scheme.static, system.settings.contact_solver)
         self.matrix, self.right, self.tangent, self.stress0 = assemble_blocks(
-            self.order, self.moments, self.density, system.stiffness, system.compliance, self.begun, self.stress,
-            self.crack_strain, self.given, self.crack_compliance, self.crack_offset, self.gravity, self.load, dt,
-            self.heavier,
-            scheme.weight, scheme.block_damping, scheme.mass_damping, scheme.stiffness_damping, self.n_free,
+            self.order, self.n_free, self._mass, BlockStart(self.begun, self.stress, system.stiffness, system.compliance),
+            self.cracks, BlockLoads(self.gravity, self.load), scheme.terms(dt, self.heavier),
         )  # fmt: skip
+
+    @property
+    def _mass(self) -> BlockMass:
+        return BlockMass(self.density, self.moments, self.system.fixed)
 
     def _absorb(self, loads: Loads, load_time: float | None) -> None:
         """Add what viscous boundaries do."""
@@ -438,10 +451,10 @@ class Attempt:
     def _advanced(self, increment: np.ndarray):
         """As `advance` returns it."""
         system = self.system
+        outlines = Outlines(self.vertices, system.vertex_start, self.moments)
         return advance(
-            increment, self.carried, self.dt, system.scheme.static, self.vertices, system.vertex_start, self.moments,
-            self.tangent, self.stress0, self.crack_compliance, self.crack_offset, self.given, self.crack_strain,
-            system.turns,
+            increment, self.carried, outlines, self.tangent, self.stress0, self.cracks, system.turns, self.dt,
+            system.scheme.static,
         )  # fmt: skip
 
     def _move(self) -> None:
@@ -604,8 +617,8 @@ class Attempt:
                 # What holds the strains of a rigid block is its stress.
                 from_outside[:, 3:] -= reaction[:, 3:]
             new_stress[system.rigid] = mean_stress(
-                system.rigid, rows, from_outside, midpoint.moments, self.density, acceleration, self.carried[:, 2], self.turn,
-                turn,
+                system.rigid, rows, from_outside, BlockMass(self.density, midpoint.moments, system.fixed), acceleration,
+                self.carried[:, 2], self.turn, turn,
             )  # fmt: skip
         if scheme.mass_damping:
             acceleration = acceleration + scheme.mass_damping / dt * self.increment
@@ -672,9 +685,9 @@ class Attempt:
         """As `imbalance`."""
         found, settled = self.found, self.settled
         return imbalance(
-            self.matrix, right, self.vectors, found.block, found.other, self.order, settled.unknowns,
-            settled.normal_force, settled.shear_force, self.acceleration, self.density, self.moments, self.gravity,
-            load, largest,
+            BlockEquations(self.matrix, right), ContactMotion(found.block, found.other, self.order, self.vectors),
+            settled.unknowns, ContactForces(settled.normal_force, settled.shear_force), self.acceleration, self._mass,
+            BlockLoads(self.gravity, load), largest,
         )  # fmt: skip
 
     def _worst_overlap(self) -> tuple[float, int, int, float, float, float]:
@@ -695,8 +708,8 @@ class Attempt:
         energies = step_energies(
             StepMotion(self.increment, self.state.velocity, self.carried, velocity, self.acceleration, load),
             StepStress(self.stress, self.tangent, self.stress0, system.compliance, system.stiffness),
-            BlockMass(self.density, self.moments, system.fixed),
-            SchemeTerms(scheme.weight, scheme.block_damping, scheme.mass_damping, scheme.stiffness_damping, self.dt),
+            self._mass,
+            scheme.terms(self.dt),
             self.gravity,
             ContactStep(
                 found.state, settled.state, found.bonded, settled.bonded, found.gap_before, settled.gap,

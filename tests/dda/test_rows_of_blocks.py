@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from geomech.dda.equation_records import ContactMotion, ContactStiffness
 from geomech.dda.linear_solver import assembly
-from geomech.dda.linear_solver.equation_records import ContactMotion, ContactStiffness
 
 N_BLOCKS, N_CONTACTS = 30, 150
 

@@ -23,8 +23,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...model import OPEN, SLIP, STICK
+from ..equation_records import BlockEquations, ContactMotion, SpringsInStates
 from ..linear_solver import assembly
-from ..linear_solver.equation_records import BlockEquations, ContactMotion, SpringsInStates
 from ..open_close.contact_set import ContactSet
 from ..open_close.settled_states import Settled
 

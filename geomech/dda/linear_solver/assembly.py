@@ -12,8 +12,7 @@ import numpy as np
 
 from ...compiled import kept, part
 from ...model import OPEN, SLIP, STICK
-from .block_solver import RESIDUAL, BlockSolver
-from .equation_records import (
+from ..equation_records import (
     BlockEquations,
     ContactMotion,
     ContactSides,
@@ -21,6 +20,7 @@ from .equation_records import (
     MatrixPlaces,
     SpringsInStates,
 )
+from .block_solver import RESIDUAL, BlockSolver
 from .simd import load_six, minus_product, numbers, plus_product, product, spread, store, store_six, zeros
 from .task_pool import add_at_once, await_value, crew
 

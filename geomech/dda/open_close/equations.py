@@ -7,13 +7,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...model import OPEN, SLIP
+from ..equation_records import BlockEquations, ContactMotion, ContactStiffness, SpringsInStates
 from ..joint_laws.bonds import BondedFaces, FaceBonds, ForcesBefore, check_faces, first_to_break
 from ..joint_laws.coulomb_return import ContactStates, Strengths, check_states, contact_forces
 from ..joint_laws.nonlinear_laws import CurvedJoints
 from ..joint_laws.penalty_springs import Springs
 from ..linear_solver import assembly
 from ..linear_solver.block_solver import RESIDUAL
-from ..linear_solver.equation_records import BlockEquations, ContactMotion, ContactStiffness, SpringsInStates
 from .contact_set import ContactSet
 from .settled_states import Settled
 

@@ -24,8 +24,8 @@ import numpy as np
 
 from ...compiled import kept
 from ...model import OPEN, SLIP, STICK, ContactSolver
+from ..equation_records import ContactMotion, ContactStiffness
 from ..linear_solver import assembly
-from ..linear_solver.equation_records import ContactMotion, ContactStiffness
 from .equations import Equations, States
 from .interior_point.contact_terms import balance
 

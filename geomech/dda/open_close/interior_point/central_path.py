@@ -25,10 +25,10 @@ import numpy as np
 from ....compiled import kept
 from ....model import OPEN, SLIP, STICK, ContactSolver
 from ...contact_detection.contact_finder import ContactSet
+from ...equation_records import ContactMotion, ContactStiffness
 from ...joint_laws.coulomb_return import moved
 from ...joint_laws.penalty_springs import Springs
 from ...linear_solver import assembly
-from ...linear_solver.equation_records import ContactMotion, ContactStiffness
 from .contact_terms import LEAST_LEFT, SHORT_OF
 from .newton_steps import THREADED, PathSteps
 
