@@ -23,7 +23,7 @@ from ..open_close.contact_set import ContactSet
 from ..open_close.equations import Unsettled
 from ..out_of_balance import ContactForces, imbalance
 from ..results import StepResult
-from ..time_step import Attempt
+from ..time_step import Attempt, StepStart
 from .deflected_blocks import DeflectedBlocks
 from .deflection_basis import n_deflections
 from .equations import HigherOrderEquations
@@ -34,16 +34,14 @@ from .six_row_system import moved
 class BendingAttempt(Attempt):
     """As `Attempt`, of a system with ``deflected`` blocks; ``found`` are contacts at corners."""
 
-    def __init__(self, system, state, vertices, carried, moments, loads, dt, crack, found, cuts, load_time) -> None:
+    def __init__(self, system, start: StepStart, dt: float, found: ContactSet, cuts: int) -> None:
+        state = start.state
         self.blocks: DeflectedBlocks = system.deflected
         known = self.blocks.at_rest() if state.deflection is None else state.deflection
         self.deflection = np.ascontiguousarray(known[:, 0])
         #: (k,) m/s of deflection that the step begins with.
         self.rates = system.settings.dynamic_factor * known[:, 1]
-        super().__init__(
-            system, state, vertices, carried, moments, loads, dt, crack,
-            self._on_faces(system, state, vertices, found), cuts, load_time,
-        )  # fmt: skip
+        super().__init__(system, start, dt, self._on_faces(system, state, start.vertices, found), cuts)
 
     def _on_faces(self, system, state, vertices: np.ndarray, corners: ContactSet) -> FaceContacts:
         """The contacts found at ``corners``, with points along faces and what deflection adds to their gaps."""
