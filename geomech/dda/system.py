@@ -16,6 +16,7 @@ from .counters import Work
 from .excavation import Excavations, until_next_event
 from .higher_order.bending_step import BendingAttempt
 from .higher_order.deflected_blocks import DeflectedBlocks
+from .higher_order.order_choice import OrderChoice, relaid
 from .higher_order.six_row_system import six_row_pattern
 from .higher_order.unsupported import refuse_unsupported, refuse_unsupported_loads
 from .kinematics.midpoint_configuration import MidpointConfiguration
@@ -122,12 +123,13 @@ class BlockSystem:
         self.finder = ContactFinder(
             blocks, self.joints, joint_index, self.settings, modulus, rigid, self.mass, self.work
         )
-        self.deflected = None
+        self.deflected: DeflectedBlocks | None = None
+        #: What finds orders as the run goes; None where all are given.
+        self.order_choice: OrderChoice | None = None
         self._take_out(None, None)
-        if blocks.order is not None and (np.asarray(blocks.order) > 1)[~self.fixed].any():
+        if blocks.order is not None and (np.asarray(blocks.order) != 1)[~self.fixed].any():
             refuse_unsupported(blocks, self.materials, self.joints, self.settings)
-            self.deflected = DeflectedBlocks(blocks, self.fixed, self.density, self.stiffness)
-            self.finder.at_corners = True
+            self._choose_orders()
         rigid = rigid & ~self.fixed
         self.rigid = np.flatnonzero(rigid)
         self.compliance[rigid] = 0.0
@@ -166,6 +168,23 @@ class BlockSystem:
                 f"{self.finder.names[block]!r} may move, but its material {material!r} has no density: in dynamics "
                 "blocks without mass have no equation of motion"
             )
+
+    def _choose_orders(self) -> None:
+        """Blocks have the orders they are given, or those that their choice begins with."""
+        choice = OrderChoice(
+            self.blocks, self.fixed, self.density, self.stiffness, self.compliance, self.settings.order_target
+        )
+        self.order_choice = choice if choice.found.any() else None
+        self.order = np.ones(self.blocks.n_blocks, np.int64)
+        self._take_orders(choice, choice.first)
+
+    def _take_orders(self, choice: OrderChoice, order: np.ndarray) -> None:
+        """Go on with blocks of these ``order`` (n_blocks,)."""
+        if np.array_equal(order, self.order):
+            return
+        self.order, self.deflected, self._sparse = order, choice.deflected(order), None
+        self.finder.at_corners = self.deflected is not None
+        self.finder.deflection, self.finder.sag = np.zeros((2, self.blocks.n_blocks))
 
     @property
     def step_limit(self) -> float:
@@ -222,6 +241,25 @@ class BlockSystem:
         shorter one. Raises `NotConverged` after ``settings.max_step_cuts`` cuts, and ValueError when blocks overlap
         before they have moved, or when nothing holds them up in statics.
         """
+        choice = self.order_choice
+        if choice is None:
+            return self._step(state, loads, dt, crack, load_time, like)[1]
+        refuse_unsupported_loads(loads)
+        self._take_orders(choice, choice.first if state.order is None else np.asarray(state.order))
+        while True:
+            attempt, result = self._step(state, loads, dt, crack, load_time, like)
+            order = choice.raised(self.order, self.deflected, attempt)
+            if order is None:
+                return replace(result, state=replace(result.state, order=self.order))
+            if state.deflection is not None:
+                state = replace(state, deflection=relaid(state.deflection, self.order, order))
+            self._take_orders(choice, order)
+
+    def _step(
+        self, state: State, loads: Loads, dt: float | None, crack: CrackResponse | None, load_time: float | None,
+        like: StepResult | None,
+    ) -> tuple[Attempt, StepResult]:  # fmt: skip
+        """As `step`, with blocks of the orders that they have."""
         dt = self.settings.time_step if dt is None else float(dt)
         if not 0 < dt < np.inf:
             raise ValueError(f"a time step must be positive, got {dt!r} s")
@@ -297,7 +335,7 @@ class BlockSystem:
                         if failed:
                             log.info("step at t = %g s cut from %.4g to %.4g s: %s", state.time, asked, dt, failed)
                         result.statistics["limit_share"] = used.share
-                        return result
+                        return attempt, result
                     wider = search.near.widened(crossed.pairs, crossed.motion, self.blocks.n_blocks)
                     if farther < _FARTHER and wider.reaches_beyond(search.near):
                         # What went in met no contact: with it the step may be as long.
@@ -308,7 +346,7 @@ class BlockSystem:
                     if cuts >= self.settings.max_step_cuts and not crossed.through:
                         log.warning("step at t = %g s: %s, and no shorter step avoids it", state.time, crossed.reason)
                         result.statistics["limit_share"] = used.share
-                        return result
+                        return attempt, result
                     failed = reason = crossed.reason
                     guilty = CROSSING, *crossed.blocks
                     shorter, farther = 0.5 * dt, 0
