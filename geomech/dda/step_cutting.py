@@ -101,16 +101,16 @@ class StepCutting:
         #: Share of the limits that a step may use, and that the last attempt used.
         self.allowed_share, self.last_share = 1.0, np.inf
 
-    def result(self) -> StepResult:
-        """The first attempt that holds. Raises `NotConverged` after ``settings.max_step_cuts`` cuts."""
+    def until_it_holds(self) -> tuple[Attempt, StepResult]:
+        """The first attempt that holds, and its result. Raises `NotConverged` after ``settings.max_step_cuts`` cuts."""
         while True:
             # One attempt is freed before the next is made: its factors may be of other contacts.
-            result = self._attempt()
-            if result is not None:
-                return result
+            held = self._attempt()
+            if held is not None:
+                return held
 
-    def _attempt(self) -> StepResult | None:
-        """The result of one attempt; None where the step begins again."""
+    def _attempt(self) -> tuple[Attempt, StepResult] | None:
+        """One attempt and its result; None where the step begins again."""
         system, found = self.system, self.found
         kind = Attempt if system.deflected is None else BendingAttempt
         try:
@@ -125,7 +125,7 @@ class StepCutting:
         used = system.limits.used(attempt, result)
         self.reason = used.reason
         if used.share <= 1.0001 * self.allowed_share:
-            return self._unless_crossed(attempt, result, used)
+            return (attempt, result) if self._holds(attempt, result, used) else None
         if system.scheme.static and used.share > 0.9 * self.last_share:
             self._allow(used)
         else:
@@ -158,8 +158,8 @@ class StepCutting:
         self.redirected, self.found = self.redirected + 1, again
         return True
 
-    def _unless_crossed(self, attempt: Attempt, result: StepResult, used: Used) -> StepResult | None:
-        """The ``result`` of a step within its limits, unless something went into or through a block in it."""
+    def _holds(self, attempt: Attempt, result: StepResult, used: Used) -> bool:
+        """Whether an attempt within its limits holds: not if something went into or through a block in it."""
         system, state = self.system, self.start.state
         crossed = system.limits.crossed(attempt, result)
         if crossed is None and self.cuts < system.settings.max_step_cuts:
@@ -174,17 +174,17 @@ class StepCutting:
                     "step at t = %g s cut from %.4g to %.4g s: %s", state.time, self.asked, self.dt, self.failed
                 )  # fmt: skip
             result.statistics["limit_share"] = used.share
-            return result
+            return True
         if self._searched_farther(attempt, crossed):
-            return None
+            return False
         if self.cuts >= system.settings.max_step_cuts and not crossed.through:
             log.warning("step at t = %g s: %s, and no shorter step avoids it", state.time, crossed.reason)
             result.statistics["limit_share"] = used.share
-            return result
+            return True
         self.failed = self.reason = crossed.reason
         self.farther = 0
         self._cut(0.5 * self.dt, CROSSING, *crossed.blocks)
-        return None
+        return False
 
     def _searched_farther(self, attempt: Attempt, crossed: Crossed) -> bool:
         """Search farther for contacts, where that finds more: what went in met no contact, and with it the step may be

@@ -15,6 +15,7 @@ from .contact_detection.initial_overlap import refuse_overlap
 from .counters import Work
 from .excavation import Excavations, until_next_event
 from .higher_order.deflected_blocks import DeflectedBlocks
+from .higher_order.order_choice import OrderChoice, relaid
 from .higher_order.six_row_system import six_row_pattern
 from .higher_order.unsupported import refuse_unsupported, refuse_unsupported_loads
 from .kinematics.newmark import TimeScheme
@@ -29,7 +30,7 @@ from .results import CrackResponse, StepResult
 from .step_control.relative_motion import Windows
 from .step_control.step_limits import StepLimits
 from .step_cutting import StepCutting, windows_of
-from .time_step import StepStart
+from .time_step import Attempt, StepStart
 
 log = logging.getLogger(__name__)
 
@@ -94,12 +95,13 @@ class BlockSystem:
         self.finder = ContactFinder(
             blocks, self.joints, joint_index, self.settings, modulus, rigid, self.mass, self.work
         )
-        self.deflected = None
+        self.deflected: DeflectedBlocks | None = None
+        #: What finds orders as the run goes; None where all are given.
+        self.order_choice: OrderChoice | None = None
         self._take_out(None, None)
-        if blocks.order is not None and (np.asarray(blocks.order) > 1)[~self.fixed].any():
+        if blocks.order is not None and (np.asarray(blocks.order) != 1)[~self.fixed].any():
             refuse_unsupported(blocks, self.materials, self.joints, self.settings)
-            self.deflected = DeflectedBlocks(blocks, self.fixed, self.density, self.stiffness)
-            self.finder.at_corners = True
+            self._choose_orders()
         rigid = rigid & ~self.fixed
         self.rigid = np.flatnonzero(rigid)
         self.compliance[rigid] = 0.0
@@ -138,6 +140,23 @@ class BlockSystem:
                 f"{self.finder.names[block]!r} may move, but its material {material!r} has no density: in dynamics "
                 "blocks without mass have no equation of motion"
             )
+
+    def _choose_orders(self) -> None:
+        """Blocks have the orders they are given, or those that their choice begins with."""
+        choice = OrderChoice(
+            self.blocks, self.fixed, self.density, self.stiffness, self.compliance, self.settings.order_target
+        )
+        self.order_choice = choice if choice.found.any() else None
+        self.order = np.ones(self.blocks.n_blocks, np.int64)
+        self._take_orders(choice, choice.first)
+
+    def _take_orders(self, choice: OrderChoice, order: np.ndarray) -> None:
+        """Go on with blocks of these ``order`` (n_blocks,)."""
+        if np.array_equal(order, self.order):
+            return
+        self.order, self.deflected, self._sparse = order, choice.deflected(order), None
+        self.finder.at_corners = self.deflected is not None
+        self.finder.deflection, self.finder.sag = np.zeros((2, self.blocks.n_blocks))
 
     @property
     def step_limit(self) -> float:
@@ -194,6 +213,25 @@ class BlockSystem:
         shorter one. Raises `NotConverged` after ``settings.max_step_cuts`` cuts, and ValueError when blocks overlap
         before they have moved, or when nothing holds them up in statics.
         """
+        choice = self.order_choice
+        if choice is None:
+            return self._step(state, loads, dt, crack, load_time, like)[1]
+        refuse_unsupported_loads(loads)
+        self._take_orders(choice, choice.first if state.order is None else np.asarray(state.order))
+        while True:
+            attempt, result = self._step(state, loads, dt, crack, load_time, like)
+            order = choice.raised(self.order, self.deflected, attempt)
+            if order is None:
+                return replace(result, state=replace(result.state, order=self.order))
+            if state.deflection is not None:
+                state = replace(state, deflection=relaid(state.deflection, self.order, order))
+            self._take_orders(choice, order)
+
+    def _step(
+        self, state: State, loads: Loads, dt: float | None, crack: CrackResponse | None, load_time: float | None,
+        like: StepResult | None,
+    ) -> tuple[Attempt, StepResult]:  # fmt: skip
+        """As `step`, with blocks of the orders that they have."""
         dt = self.settings.time_step if dt is None else float(dt)
         if not 0 < dt < np.inf:
             raise ValueError(f"a time step must be positive, got {dt!r} s")
@@ -217,7 +255,7 @@ class BlockSystem:
             self._excavations.refuse(loads)
             self._refuse_unsupported(loads, state.time + dt if load_time is None else load_time)
         start = StepStart(state, vertices, carried, moments, loads.gravity.at(state.time + dt), loads, crack, load_time)
-        return StepCutting(self, start, dt, like).result()
+        return StepCutting(self, start, dt, like).until_it_holds()
 
     def contacts_near(self, state: State) -> ContactSet:
         """The contacts that a step from ``state`` would begin with, as CONTACT rows tell of them."""

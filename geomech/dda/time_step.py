@@ -267,7 +267,7 @@ class Attempt:
             striking = self._striking(found)
             if striking is not None:
                 gap = striking.apart(gap, self.system.half_diagonal)
-            geometry = midpoint.contacts(found.geometry, found.block, found.other, self._along(found))
+            geometry = midpoint.contacts(found.geometry, found.block, found.other, self.along_edges(found))
             vectors = assembly.contact_vectors(found.block, found.other, geometry, order, midpoint.moments)
             midpoint.turn_back(vectors, found.block, found.other, geometry)
             if found.points is not None:
@@ -365,7 +365,7 @@ class Attempt:
             return
         blocks, all_blocks = (found.block, found.other), np.arange(len(increment))
         scaled[:, 2:] *= np.sqrt(self.moments[:, :1])
-        along = self._along(found)
+        along = self.along_edges(found)
         geometry = self.midpoint.contacts(found.geometry, *blocks, along)
         vectors = assembly.contact_vectors(*blocks, geometry, all_blocks, self.midpoint.moments)
         self.midpoint.turn_back(vectors, *blocks, geometry)
@@ -375,7 +375,7 @@ class Attempt:
         arc = system.finder.gaps(vertices, self.vertices, found) - found.geometry[:, 3] - across
         self.found = self.found.along(arc, went * np.hypot(*along.T) - slid)
 
-    def _along(self, found: ContactSet) -> np.ndarray:
+    def along_edges(self, found: ContactSet) -> np.ndarray:
         """(n, 2) m: the edges of ``found``."""
         edge, along = self._edges_along
         if found.edge is not edge:
@@ -526,7 +526,7 @@ class Attempt:
         if not len(found):
             return
         end = MidpointConfiguration.of(self.increment, 1.0, self.vertices, system.owner, self.moments)
-        geometry = end.contacts(found.geometry, found.block, found.other, self._along(found))
+        geometry = end.contacts(found.geometry, found.block, found.other, self.along_edges(found))
         speeds = contact_speeds(found, geometry, velocity, end.centroid)
         stopped = Stopped.of(found, self.settled, self.slid, speeds[:, 1], mass, self.dt, system.rounding)
         unresolved = Unresolved.of(found, self.settled, self.slid, speeds, mass, self.dt)
@@ -592,7 +592,7 @@ class Attempt:
         if imposed is not None:
             inverse[imposed.driven] = 0.0
         end = MidpointConfiguration.of(increment, 1.0, self.vertices, system.owner, moments)
-        geometry = end.contacts(found.geometry, found.block, found.other, self._along(found))
+        geometry = end.contacts(found.geometry, found.block, found.other, self.along_edges(found))
         return RigidBlocks(
             end.centroid, inverse, self.velocity[:, :3], self.carried[:, :3], increment[:, 2], geometry[:, 1:3],
             geometry[:, 5:7],
@@ -605,7 +605,7 @@ class Attempt:
         acting = self.acting
         if found.points is not None:
             corners = found.lumped
-            acting = midpoint.contacts(found.points.corners, corners.block, corners.other, self._along(corners))
+            acting = midpoint.contacts(found.points.corners, corners.block, corners.other, self.along_edges(corners))
         rows = found.rows(settled, acting)
         reaction, acting_right, largest_force, acted = None, self.right, 0.0, {}
         points, load = self.points, self.load

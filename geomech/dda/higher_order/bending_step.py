@@ -48,19 +48,10 @@ class BendingAttempt(Attempt):
         finder = system.finder
         by_length = finder.stiff_laws[corners.law], finder.stiff_along_laws[corners.law]
         found = FaceContacts.along_faces(corners, self.blocks.order, state.face_points, by_length)
-        self.touching = self._material_points(found, vertices)
+        self.touching = self.blocks.touching(found, vertices)
         if not self.deflection.any():
             return replace(found, deflected=np.zeros(len(found)))
         return replace(found, deflected=self._gaps(found.geometry[:, 1:3], found, state.rotation, self.deflection))
-
-    def _material_points(self, found: ContactSet, vertices: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """(n, 2) twice: the undeformed points of the vertices' blocks and of the edges' that touch."""
-        geometry = found.geometry
-        foot = geometry[:, 5:7] - geometry[:, 3:4] * geometry[:, 1:3]
-        return (
-            self.blocks.material_points(vertices, geometry[:, 5:7], found.block),
-            self.blocks.material_points(vertices, foot, found.other),
-        )
 
     def _gaps(self, normal: np.ndarray, found: ContactSet, angle: np.ndarray, q: np.ndarray) -> np.ndarray:
         """(n,) m that deflections ``q`` (k,) open contacts by across ``normal`` (n, 2)."""
@@ -153,7 +144,7 @@ class BendingAttempt(Attempt):
         blocks, n = self.blocks, len(found)
         out = np.zeros((n, 2, 2, max(blocks.width, 6)))
         out[..., :6] = vectors.reshape(n, 2, 2, 6)
-        geometry = self.midpoint.contacts(found.geometry, found.block, found.other, self._along(found))
+        geometry = self.midpoint.contacts(found.geometry, found.block, found.other, self.along_edges(found))
         normal = geometry[:, 1:3]
         ways = np.stack([normal, np.stack([-normal[:, 1], normal[:, 0]], axis=1)], axis=1)
         for side, (owner, points, sign) in enumerate(
@@ -190,8 +181,8 @@ class BendingAttempt(Attempt):
         found, system, start = self.found, self.system, self.state.rotation
         change = self._deflected_by()
         end = MidpointConfiguration.of(increment, 1.0, self.vertices, system.owner, self.moments)
-        normal = end.contacts(found.geometry, found.block, found.other, self._along(found))[:, 1:3]
-        acting = self.midpoint.contacts(found.geometry, found.block, found.other, self._along(found))[:, 1:3]
+        normal = end.contacts(found.geometry, found.block, found.other, self.along_edges(found))[:, 1:3]
+        acting = self.midpoint.contacts(found.geometry, found.block, found.other, self.along_edges(found))[:, 1:3]
         extra = []
         for turned in (lambda n: n, lambda n: np.stack([-n[:, 1], n[:, 0]], axis=1)):
             went = self._gaps(turned(normal), found, start + increment[:, 2], self.deflection + change)
