@@ -125,7 +125,7 @@ def factor_of_safety(
         raise NothingToReduce("the joints have no friction, cohesion or tensile strength that could be reduced")
     if not 0 < tolerance < 1:
         raise NothingToReduce(f"the tolerance of the factor must lie between 0 and 1, got {tolerance!r}")
-    if blocks.order is not None and (blocks.order > 1).any():
+    if blocks.order is not None and (blocks.order != 1).any():
         raise NothingToReduce(
             "blocks of higher order ([zones.NAME] order) are not supported in the search for a factor of safety yet: "
             "leave `order` out"
