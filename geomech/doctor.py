@@ -50,7 +50,7 @@ class Check:
 
 def examine() -> list[Check]:
     """All checks, in the order a run meets them. Libraries that could take the process down load in another one."""
-    checks: list[Callable[[], Check]] = [_python, _packages, _gmsh, _numba, _rendering, _threads]
+    checks: list[Callable[[], Check]] = [_python, _packages, _gmsh, _numba, _threads]
     return [check() for check in checks]
 
 
@@ -140,15 +140,6 @@ def _numba() -> Check:
     if place.instead_of is not None:
         found += f", for {place.instead_of} cannot be written: {VARIABLE}=DIR names a folder that stays"
     return Check("numba cache", True, found)
-
-
-def _rendering() -> Check:
-    from .render.pictures.offscreen import APT_LINE, usable_window
-
-    window = usable_window()
-    if window is None:
-        return Check("rendering", False, "no off-screen window: no pictures, all else works", APT_LINE)
-    return Check("rendering", True, window)
 
 
 def _threads() -> Check:

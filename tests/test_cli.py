@@ -255,10 +255,6 @@ def test_report_of_a_folder_of_runs(finished, capsys):
 
 
 def test_render_prints_what_it_drew(finished, capsys):
-    from geomech.render.pictures import offscreen
-
-    if offscreen.usable_window() is None:
-        pytest.skip("no off-screen OpenGL here")
     assert main(["render", str(finished), "--no-gif", "--width", "300", "--component", "xx"]) == DONE
     paths = [Path(line) for line in capsys.readouterr().out.splitlines()]
     assert paths[0].name == "specimen.png"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shutil
 import tempfile
+import time
 from pathlib import Path
 from typing import Any
 
@@ -11,12 +12,13 @@ SUFFIXES = (".png", ".gif")
 
 
 class RunPictures:
-    """A scraper of sphinx-gallery: every PNG or GIF that the code above wrote into its working folder
-    (``geomech-tutorial-…`` below the system's folder for temporary files) in a subfolder called ``shown``, or that
-    `show` was told of, once."""
+    """A scraper of sphinx-gallery: every PNG or GIF that the code above wrote, since this build began, into its working
+    folder (``geomech-tutorial-…`` below the system's folder for temporary files) in a subfolder called ``shown``,
+    once."""
 
     def __init__(self) -> None:
         self.seen: set[Path] = set()
+        self.began = time.time()
 
     def __repr__(self) -> str:
         # Sphinx compares settings by their text.
@@ -29,7 +31,7 @@ class RunPictures:
         made = [
             path
             for path in root.glob("geomech-tutorial-*/shown/*")
-            if path.suffix in SUFFIXES and path not in self.seen
+            if path.suffix in SUFFIXES and path not in self.seen and path.stat().st_mtime >= self.began
         ]
         shown = []
         for path in sorted(made, key=lambda path: path.stat().st_mtime_ns):

@@ -1,6 +1,6 @@
 """Records that all solvers share: blocks, cracks, materials, joint laws, loads, settings, and the state of a run."""
 
-from .blocks.block_arrays import Blocks
+from .blocks.block_arrays import AUTO_ORDER, Blocks
 from .blocks.block_motion import Motion
 from .blocks.corners import corner_lengths
 from .contact_solver import ContactSolver
@@ -38,6 +38,7 @@ from .state import CONTACT, FACE_POINT, OPEN, SLIP, STICK, TIP, CrackFaces, Cycl
 from .unbounded_rock import EndlessRock, Fluid
 
 __all__ = [
+    "AUTO_ORDER",
     "BOLT",
     "CHANGES",
     "CONTACT",

@@ -34,6 +34,8 @@ class DdaSettings:
     contact              "penalty", or "augmented": multipliers are added to the springs until closed contacts
                          penetrate, and sticking ones slip, by less than ``penetration_tolerance`` times √area of the
                          smallest block, whatever the penalty
+    order_target         blocks whose order is found as the run goes (`AUTO_ORDER`) are raised while higher orders would take
+                         up more than this part of the energy of all such blocks (`dda.higher_order.order_choice`)
     corner_rounding      length over which two corners that meet are rounded, in units of √area of the smaller block, at
                          most a quarter of the shortest edge there. Corners that overlap by less slide over each other,
                          others hold (the UDEC manual advises a hundredth of an edge)
@@ -75,6 +77,7 @@ class DdaSettings:
     shear_penalty: float | None = None
     contact: str = "penalty"
     springs: str = "stiff"
+    order_target: float = 0.01
     corner_rounding: float = 0.01
     penetration_tolerance: float = 1e-8
     max_open_close_iterations: int = 60
@@ -117,6 +120,7 @@ _DDA_NUMBERS = {
     "normal_penalty": Number(closed=False, unit="Pa", optional=True),
     "shear_penalty": Number(closed=False, unit="Pa", optional=True),
     "penetration_tolerance": Number(most=1.0, closed=False),
+    "order_target": Number(most=1.0, closed=False),
     "corner_rounding": Number(most=LARGEST_CORNER),
     "max_open_close_iterations": Number(least=1, whole=True),
     "max_step_cuts": Number(whole=True),

@@ -165,13 +165,12 @@ def evenly(run: Run, cycles: Sequence[int], most: int) -> list[int]:
 
 def magnification(run: Run) -> float:
     """The factor by which pictures of the run magnify its displacements."""
-    from ..render.pictures.look import final_cycle, look
+    from ..render.fields.painter import suitable_scale
 
     asked = run.scene.get("render", {}).get("deformation_scale")
-    try:
-        return float(look(run, final_cycle(run), scale=asked).scale) if asked is None else float(asked)
-    except (KeyError, ValueError, ZeroDivisionError):
-        return 1.0
+    if asked is not None:
+        return float(asked)
+    return suitable_scale(run) if len(run.history) and run.series("blocks") else 1.0
 
 
 def quick_magnification(run: Run, cycle: int) -> float:

@@ -24,17 +24,15 @@ def draw(
 ) -> list[Path]:
     """Everything there is to see of ``run``, in the folder ``out`` (default: ``pictures`` in the run folder), and the
     curves; the paths of what was drawn. Of cracked rock that is the stress at the end and the growth of the cracks,
-    ``specimen.png`` and ``growth.gif``; where blocks move, or nothing is cracked, ``displacement.png`` and
-    ``displacement.gif``, and after an earthquake ``slip.png``.
+    ``specimen.png`` and ``growth.gif``, and where cracks have tips their stress intensity, ``K.png``; where blocks move,
+    or nothing is cracked, ``displacement.png`` and ``displacement.gif``, and after an earthquake ``slip.png``.
 
     What is not said here the scene's ``[render]`` table says, and where that is silent too, 800 pixels and a movie; a
-    ``component`` asks for stress whatever the run. `draw_field` draws any other field. Raises ValueError for a run without a cycle, KeyError for an unknown stress component, RenderingUnavailable
-    where VTK can open no window."""
+    ``component`` asks for stress whatever the run. `draw_field` draws any other field. Raises ValueError for a run
+    without a cycle, KeyError for an unknown stress component."""
     from .curves.plots import plots
-    from .fields.draw import usual_field
+    from .fields.draw import Wish, draw_end, draw_field, suited, usual_field
     from .movie import movie as draw_movie
-    from .pictures.look import final_cycle, look
-    from .pictures.picture import picture
 
     if not len(run.history):
         raise ValueError(
@@ -44,21 +42,15 @@ def draw(
     folder = run.folder / "pictures" if out is None else Path(out)
     if component is None and run.series("blocks") and usual_field(run) is not None:
         return [*_motion(run, folder, asked, width, movie), *plots(run, folder, more=True)]
-    last = final_cycle(run)
-    fixed = look(
-        run,
-        last,
-        component=component or asked.get("component", "yy"),
-        width=width or asked.get("width_px", 800),
-        scale=asked.get("deformation_scale"),
-        crack_colour=asked.get("crack_colour", "birth"),
-    )
+    painter = suited(run, component or asked.get("component", "yy"), width=width)
     folder.mkdir(parents=True, exist_ok=True)
-    paths = [picture(run, folder / "specimen.png", fixed, last)]
+    paths = [draw_end(painter, folder / "specimen.png")]
     if asked.get("gif", True) if movie is None else movie:
         pace = asked.get("frames_per_second", 10.0)
-        made = draw_movie(run, folder / "growth.gif", fixed, frames_per_second=pace)
+        made = draw_movie(painter, folder / "growth.gif", frames_per_second=pace)
         paths += [made] if made is not None else []
+    if len(run.tips):
+        paths += draw_field([run], Wish(field="K", scale=painter.view.scale, size=(painter.view.width, None)), folder)
     return [*paths, *plots(run, folder)]
 
 

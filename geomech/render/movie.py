@@ -8,39 +8,29 @@ import numpy as np
 
 from geomech.output.reading import Run
 
+from .fields.even_movie import LAST, write_gif
+from .fields.painter import FieldPainter
 from .pictures.field import agreeing
-from .pictures.legend import INK, SOFT_INK, crack_colours
-from .pictures.look import Look, final_cycle, spanning
-from .pictures.picture import IDLE, OLD_CRACK, ROCK_OUTLINE, Painter
+from .pictures.look import final_cycle
 
 #: A frame in which cracks grew stays so much longer than one of loading.
 LINGER = 2.0
 #: The shortest and the longest time of a frame, over the mean, where the run's time goes on between frames.
 PACES = 0.5, 4.0
-#: The last frame stays for this long, ms.
-LAST = 2500
 
 
-def movie(run: Run, path: Path, fixed: Look, *, frames: int = 48, frames_per_second: float = 10.0) -> Path | None:
-    """Draw the run's growth as the GIF ``path``: at most about ``frames`` cycles, those whose stress field is known
-    for their own cracks, up to the one that shows what the run came to. Colours span the stress of all of them. None
-    where there are not two cycles to show."""
-    from PIL import Image
-
-    shown = moments(run, frames)
+def movie(painter: FieldPainter, path: Path, *, frames: int = 48, frames_per_second: float = 10.0) -> Path | None:
+    """Draw the growth of the run of ``painter`` as the GIF ``path``: at most about ``frames`` cycles, those whose stress
+    field is known for their own cracks, up to the one that shows what the run came to. None where there are not two
+    cycles to show."""
+    shown = moments(painter.run, frames)
     if len(shown) < 2:
         return None
-    few = [shown[k] for k in np.unique(np.linspace(0, len(shown) - 1, 6).round().astype(int))]
-    fixed = spanning(fixed, run, few)
-    palette = _palette(fixed)
     images = []
-    with Painter(run, fixed) as painter:
-        for cycle in shown:
-            painter.draw(cycle)
-            image = Image.fromarray(painter.image())
-            images.append(image.quantize(palette=palette, dither=Image.Dither.NONE))
-    times = durations(run, shown, frames_per_second)
-    images[0].save(path, save_all=True, append_images=images[1:], duration=times, loop=0, optimize=False)
+    for cycle in shown:
+        painter.draw(painter.frames.cycle_time(cycle))
+        images.append(painter.image())
+    write_gif(path, images, durations(painter.run, shown, frames_per_second))
     return path
 
 
@@ -79,21 +69,3 @@ def moments(run: Run, frames: int) -> list[int]:
     few = frames if not len(growth) else min(frames // 3, max(6, len(growth) // 2))
     chosen = [*spread(loading, few), *spread(growth, frames - min(few, len(loading))), written[0], written[-1]]
     return sorted({int(c) for c in chosen})
-
-
-def _palette(fixed: Look):
-    """256 colours for all frames, those that pictures are made of: a GIF of frames with palettes of their own flickers
-    and is larger, and one that is found by statistics draws bands where colours are rare."""
-    from matplotlib.colors import to_rgb
-    from PIL import Image
-
-    rock, cracks = fixed.colours(np.linspace(0, 1, 150))[:, :3], crack_colours()(np.linspace(0, 1, 30))[:, :3]
-    named = np.array([to_rgb(c) for c in (INK, SOFT_INK, IDLE, OLD_CRACK, ROCK_OUTLINE)])
-    greys = np.repeat(np.linspace(0, 1, 31)[:, None], 3, axis=1)
-    # Where a line's edge is smoothed, what is beside it mixes with white (the halo) or with the line's own dark.
-    pale = 0.5 + 0.5 * rock[::7]
-    dark = 0.5 * rock[::9]
-    colours = np.concatenate([rock, cracks, named, greys, pale, dark])[:256]
-    palette = Image.new("P", (1, 1))
-    palette.putpalette((255 * colours).round().astype(np.uint8).ravel().tolist())
-    return palette

@@ -82,10 +82,8 @@ def _leaves(value: Any, place: str = "") -> Iterator[tuple[str, Any]]:
 
 
 def add_ends(page: Page, runs: Sequence[Run], title: str = "Pictures") -> None:
-    """How every run ended, in pictures, where a window can be opened to draw them."""
-    from ..render.pictures.look import final_cycle, look
-    from ..render.pictures.offscreen import RenderingUnavailable
-    from ..render.pictures.picture import picture
+    """How every run ended, in pictures."""
+    from ..render.fields.draw import draw_end, suited
 
     pictured = [run for run in runs if len(run.history) and run.grids("blocks")][:PICTURED]
     if not pictured:
@@ -94,13 +92,7 @@ def add_ends(page: Page, runs: Sequence[Run], title: str = "Pictures") -> None:
     with tempfile.TemporaryDirectory() as folder:
         shown = []
         for k, run in enumerate(pictured):
-            last = final_cycle(run)
-            asked = run.scene.get("render", {}).get("component", "yy")
-            try:
-                path = picture(run, Path(folder) / f"{k}.png", look(run, last, component=asked, width=560), last)
-            except RenderingUnavailable as missing:
-                page.text(f"No pictures: {missing}")
-                return
+            path = draw_end(suited(run, width=560), Path(folder) / f"{k}.png")
             shown.append((path, f"{run.folder.name}: {run.summary.get('end', 'not ended')}"))
         page.figures(shown, least_rem=13)
     if len(runs) > PICTURED:

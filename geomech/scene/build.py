@@ -226,6 +226,7 @@ def _dda(tables: SceneTables) -> DdaSettings:
         springs=d.springs,
         contact=d.contact,
         penetration_tolerance=d.penetration_tolerance,
+        order_target=d.order_target,
         corner_rounding=d.corner_rounding,
         max_open_close_iterations=d.max_open_close_iterations,
         max_step_cuts=d.max_step_cuts,

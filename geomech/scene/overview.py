@@ -69,7 +69,7 @@ def _zones(tables: SceneTables, drawing: Drawing) -> list[str]:
         text += f", {blocks} blocks" if blocks > 1 else ""
         if entry is not None and (entry.fixed or entry.guided):
             text += ", fixed" if entry.fixed else f", guided along {entry.guided}"
-        if entry is not None and entry.order > 1:
+        if entry is not None and entry.order != 1:
             text += f", order {entry.order}"
         if entry is not None and entry.velocity_m_s is not None:
             text += f", at ({entry.velocity_m_s[0]:g}, {entry.velocity_m_s[1]:g}) m/s to begin with"

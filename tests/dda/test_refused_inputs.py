@@ -60,6 +60,7 @@ SETTINGS = {
     "springs": ("soft",),
     "penetration_tolerance": (0.0, -1.0, 2.0, NAN),
     "corner_rounding": (-0.01, 0.3, NAN),
+    "order_target": (0.0, -1.0, 1.1, NAN),
     "max_open_close_iterations": (0, -1, 2.5, NAN),
     "max_step_cuts": (-1, 0.5, NAN),
 }

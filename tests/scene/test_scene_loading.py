@@ -140,6 +140,7 @@ shear_penalty_pa = 5e11
 contact = "augmented"
 penetration_tolerance = 1e-6
 corner_rounding = 0.02
+order_target = 0.03
 springs = "resolved"
 max_open_close_iterations = 9
 max_step_cuts = 5
@@ -210,6 +211,7 @@ def test_every_setting_arrives(scene_file):
         "contact": "augmented",
         "penetration_tolerance": 1e-6,
         "corner_rounding": 0.02,
+        "order_target": 0.03,
         "springs": "resolved",
         "max_open_close_iterations": 9,
         "max_step_cuts": 5,

@@ -10,7 +10,7 @@ from ..verb import DONE, FAILED, Verbs, add_verb
 def declare(verbs: Verbs) -> None:
     """The verb's arguments."""
     doctor = add_verb(
-        verbs, "doctor", _doctor, "check this machine: libraries, rendering, caches; say how to mend what is missing",
+        verbs, "doctor", _doctor, "check this machine: libraries, caches; say how to mend what is missing",
         "geomech doctor\ngeomech doctor --warm",
     )  # fmt: skip
     doctor.add_argument(

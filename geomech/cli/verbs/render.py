@@ -46,7 +46,7 @@ def declare(verbs: Verbs) -> None:
 
 
 def _render(options: argparse.Namespace) -> int:
-    from ...render.pictures.look import COMPONENTS
+    from ...render.pictures.field import COMPONENTS
 
     if options.component is not None and options.component not in COMPONENTS:
         raise BadInput(f"no stress component {options.component!r}; there are {', '.join(COMPONENTS)}")

@@ -117,7 +117,7 @@ class ContactFinder:
         self._bends = (np.diff(self._start) > 3) & ~rigid & ~blocks.fixed & (settings.contact == "penalty")
         if blocks.order is not None:
             # These bend themselves.
-            self._bends &= np.asarray(blocks.order) == 1
+            self._bends &= np.asarray(blocks.order) <= 1
         #: Whether contacts are found at the corners of faces only: points along faces are found from them.
         self.at_corners = False
         #: (n_blocks,) m: how far deflection moves a point of each block from where its vertices say, at most.

@@ -16,12 +16,14 @@ from dataclasses import replace
 import numpy as np
 
 from ...model import OPEN
+from ..equation_records import BlockEquations, ContactMotion
 from ..kinematics.midpoint_configuration import MidpointConfiguration
+from ..kinematics.newmark import BlockLoads
 from ..open_close.contact_set import ContactSet
 from ..open_close.equations import Unsettled
-from ..out_of_balance import imbalance
+from ..out_of_balance import ContactForces, imbalance
 from ..results import StepResult
-from ..time_step import Attempt
+from ..time_step import Attempt, StepStart
 from .deflected_blocks import DeflectedBlocks
 from .deflection_basis import n_deflections
 from .equations import HigherOrderEquations
@@ -32,35 +34,24 @@ from .six_row_system import moved
 class BendingAttempt(Attempt):
     """As `Attempt`, of a system with ``deflected`` blocks; ``found`` are contacts at corners."""
 
-    def __init__(self, system, state, vertices, carried, moments, loads, dt, crack, found, cuts, load_time) -> None:
+    def __init__(self, system, start: StepStart, dt: float, found: ContactSet, cuts: int) -> None:
+        state = start.state
         self.blocks: DeflectedBlocks = system.deflected
         known = self.blocks.at_rest() if state.deflection is None else state.deflection
         self.deflection = np.ascontiguousarray(known[:, 0])
         #: (k,) m/s of deflection that the step begins with.
         self.rates = system.settings.dynamic_factor * known[:, 1]
-        super().__init__(
-            system, state, vertices, carried, moments, loads, dt, crack,
-            self._on_faces(system, state, vertices, found), cuts, load_time,
-        )  # fmt: skip
+        super().__init__(system, start, dt, self._on_faces(system, state, start.vertices, found), cuts)
 
     def _on_faces(self, system, state, vertices: np.ndarray, corners: ContactSet) -> FaceContacts:
         """The contacts found at ``corners``, with points along faces and what deflection adds to their gaps."""
         finder = system.finder
         by_length = finder.stiff_laws[corners.law], finder.stiff_along_laws[corners.law]
         found = FaceContacts.along_faces(corners, self.blocks.order, state.face_points, by_length)
-        self.touching = self._material_points(found, vertices)
+        self.touching = self.blocks.touching(found, vertices)
         if not self.deflection.any():
             return replace(found, deflected=np.zeros(len(found)))
         return replace(found, deflected=self._gaps(found.geometry[:, 1:3], found, state.rotation, self.deflection))
-
-    def _material_points(self, found: ContactSet, vertices: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """(n, 2) twice: the undeformed points of the vertices' blocks and of the edges' that touch."""
-        geometry = found.geometry
-        foot = geometry[:, 5:7] - geometry[:, 3:4] * geometry[:, 1:3]
-        return (
-            self.blocks.material_points(vertices, geometry[:, 5:7], found.block),
-            self.blocks.material_points(vertices, foot, found.other),
-        )
 
     def _gaps(self, normal: np.ndarray, found: ContactSet, angle: np.ndarray, q: np.ndarray) -> np.ndarray:
         """(n,) m that deflections ``q`` (k,) open contacts by across ``normal`` (n, 2)."""
@@ -153,7 +144,7 @@ class BendingAttempt(Attempt):
         blocks, n = self.blocks, len(found)
         out = np.zeros((n, 2, 2, max(blocks.width, 6)))
         out[..., :6] = vectors.reshape(n, 2, 2, 6)
-        geometry = self.midpoint.contacts(found.geometry, found.block, found.other, self._along(found))
+        geometry = self.midpoint.contacts(found.geometry, found.block, found.other, self.along_edges(found))
         normal = geometry[:, 1:3]
         ways = np.stack([normal, np.stack([-normal[:, 1], normal[:, 0]], axis=1)], axis=1)
         for side, (owner, points, sign) in enumerate(
@@ -190,8 +181,8 @@ class BendingAttempt(Attempt):
         found, system, start = self.found, self.system, self.state.rotation
         change = self._deflected_by()
         end = MidpointConfiguration.of(increment, 1.0, self.vertices, system.owner, self.moments)
-        normal = end.contacts(found.geometry, found.block, found.other, self._along(found))[:, 1:3]
-        acting = self.midpoint.contacts(found.geometry, found.block, found.other, self._along(found))[:, 1:3]
+        normal = end.contacts(found.geometry, found.block, found.other, self.along_edges(found))[:, 1:3]
+        acting = self.midpoint.contacts(found.geometry, found.block, found.other, self.along_edges(found))[:, 1:3]
         extra = []
         for turned in (lambda n: n, lambda n: np.stack([-n[:, 1], n[:, 0]], axis=1)):
             went = self._gaps(turned(normal), found, start + increment[:, 2], self.deflection + change)
@@ -240,9 +231,9 @@ class BendingAttempt(Attempt):
         moving = self.system.moving
         right[self.order[moving], 3:6] += (self.coupled_right - bent)[moving]
         return imbalance(
-            self.matrix, right, self.vectors, found.block, found.other, self.order, settled.unknowns[:n],
-            settled.normal_force, settled.shear_force, self.acceleration, self.density, self.moments, self.gravity,
-            load, largest,
+            BlockEquations(self.matrix, right), ContactMotion(found.block, found.other, self.order, self.vectors),
+            settled.unknowns[:n], ContactForces(settled.normal_force, settled.shear_force), self.acceleration,
+            self._mass, BlockLoads(self.gravity, load), largest,
         )  # fmt: skip
 
     def _energy(self, load: np.ndarray, end_shear: np.ndarray):

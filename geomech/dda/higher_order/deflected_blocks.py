@@ -16,6 +16,7 @@ from functools import cached_property
 import numpy as np
 
 from ...model import Blocks, State
+from ..open_close.contact_set import ContactSet
 from ..results import NotConverged
 from .deflection_basis import HIGHEST, DeflectionBasis, n_deflections
 from .polygon_quadrature import gauss_points
@@ -50,11 +51,14 @@ class DeflectedBlocks:
     """The ``blocks`` of a system of which some have an order above 1; ``order`` (n_blocks,) is 1 where they do not bend.
 
     ``rows`` (n_blocks,) of six unknowns each, 0 of ``fixed`` blocks; ``density`` (n_blocks,) kg/m³ and ``elastic``
-    (n_blocks, 3, 3) Pa, of the undeformed blocks."""
+    (n_blocks, 3, 3) Pa, of the undeformed blocks; their order is that of the ``blocks`` unless another is given."""
 
-    def __init__(self, blocks: Blocks, fixed: np.ndarray, density: np.ndarray, elastic: np.ndarray) -> None:
+    def __init__(
+        self, blocks: Blocks, fixed: np.ndarray, density: np.ndarray, elastic: np.ndarray,
+        order: np.ndarray | None = None,
+    ) -> None:  # fmt: skip
         self.blocks = blocks
-        self.order = np.where(fixed, 1, blocks.order).astype(np.int64)
+        self.order = np.where(fixed, 1, blocks.order if order is None else order).astype(np.int64)
         self.basis = DeflectionBasis.of(blocks.vertices, blocks.next_vertex, blocks.vertex_start, self.order)
         self.rows = np.where(fixed, 0, 1 + -(-n_deflections(self.order) // 6)).astype(np.int64)
         self.bending = np.flatnonzero(self.order > 1)
@@ -102,6 +106,16 @@ class DeflectedBlocks:
         gradient = np.add.reduceat(arm[:, :, None] * weights[:, None, :], start, axis=0)
         back = np.linalg.inv(gradient)
         return reference[owner] + np.einsum("nab,nb->na", back[owner], points - mean[owner])
+
+    def touching(self, found: ContactSet, vertices: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """(n, 2) twice: the undeformed points of the vertices' blocks and of the edges' that touch in ``found`` (n,), the
+        strained vertices being at ``vertices`` (n_vertices, 2)."""
+        geometry = found.geometry
+        foot = geometry[:, 5:7] - geometry[:, 3:4] * geometry[:, 1:3]
+        return (
+            self.material_points(vertices, geometry[:, 5:7], found.block),
+            self.material_points(vertices, foot, found.other),
+        )
 
     def directions(self, points: np.ndarray, owner: np.ndarray, angle: np.ndarray) -> np.ndarray:
         """R P (n, 2, m) at undeformed ``points`` (n, 2) of blocks ``owner`` (n,) that have turned by ``angle``
@@ -195,7 +209,7 @@ class DeflectedBlocks:
             matrix = self.directions(np.ascontiguousarray(points["at"]), points["block"], angle)
             np.add.at(out, points["block"], np.einsum("na,naj->nj", points["force"], matrix))
         if len(edges):
-            at, weight = gauss_points((HIGHEST + 3) // 2)
+            at, weight = gauss_points((HIGHEST + 5) // 2)
             start, along = edges["start"][:, None], (edges["end"] - edges["start"])[:, None]
             where = start + at[:, None] * along
             length = np.hypot(along[..., 0], along[..., 1])

@@ -29,8 +29,8 @@ from ...compiled import kept, part
 from ..kinematics.displacement_matrix import displacement_matrix
 from .polygon_quadrature import polygon_points
 
-#: The highest order of a block.
-HIGHEST = 8
+#: The highest order of a block, and of a basis: what a higher order would take up is estimated by two more.
+HIGHEST, _HIGHEST_BASIS = 8, 10
 
 
 def n_deflections(order: np.ndarray | int) -> np.ndarray | int:
@@ -132,10 +132,10 @@ class DeflectionBasis:
     ) -> DeflectionBasis:
         """The basis of undeformed blocks with ``vertices`` (n_vertices, 2), the next of each ``next_vertex``, those of a
         block from ``vertex_start`` on, and this ``order`` (n_blocks,). Raises ValueError for an order that is not 1 to
-        8."""
+        10."""
         order = np.ascontiguousarray(order, np.int64)
-        if len(order) and not (order.min() >= 1 and order.max() <= HIGHEST):
-            raise ValueError(f"the order of a block is 1 to {HIGHEST}, got {order.min()} to {order.max()}")
+        if len(order) and not (order.min() >= 1 and order.max() <= _HIGHEST_BASIS):
+            raise ValueError(f"the order of a basis is 1 to {_HIGHEST_BASIS}, got {order.min()} to {order.max()}")
         n, highest = len(order), int(order.max(initial=1))
         own = n_deflections(order)
         terms, most = (highest + 1) * (highest + 2) // 2, int(own.max(initial=0))

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ...model import Blocks, DdaSettings, JointLaw, Loads, Material
+from ...model import AUTO_ORDER, Blocks, DdaSettings, JointLaw, Loads, Material
 from .deflection_basis import HIGHEST
 
 
@@ -15,15 +15,16 @@ def refuse_unsupported(
 ) -> None:
     """Raise ValueError where ``blocks``, of which some have an order above 1, ask for what these cannot do."""
     order = np.asarray(blocks.order)
-    if not ((order >= 1) & (order <= HIGHEST)).all():
+    if not (((order >= 1) & (order <= HIGHEST)) | (order == AUTO_ORDER)).all():
         raise ValueError(f"the order of a block is 1 to {HIGHEST}, got {order.min()} to {order.max()}")
-    bends = (order > 1) & ~blocks.fixed
+    bends = (order != 1) & ~blocks.fixed
     names = blocks.names or tuple(f"block {b}" for b in range(blocks.n_blocks))
 
     def refuse(which: np.ndarray, why: str) -> None:
         if which.any():
             block = int(np.argmax(which))
-            raise ValueError(f"{names[block]!r} has order {order[block]}: {why}")
+            said = '"auto"' if order[block] == AUTO_ORDER else order[block]
+            raise ValueError(f"{names[block]!r} has order {said}: {why}")
 
     refuse(bends & np.array([materials[m].rigid for m in blocks.material]), "a rigid block does not bend")
     if blocks.constrained is not None:

@@ -63,7 +63,7 @@ def in_situ_state(
     of higher order.
     """
     blocks = system.blocks
-    if system.deflected is not None:
+    if system.deflected is not None or system.order_choice is not None:
         raise ValueError("in-situ stress is not supported in blocks of an order above 1 yet")
     centres = np.array([blocks.area_moments(b)[1] for b in range(blocks.n_blocks)])
     given = stress.at(centres)

@@ -200,9 +200,10 @@ class StepLimits:
             of_block = np.zeros(len(self._size))
             for name in ("block", "other"):
                 np.maximum.at(of_block, rows[name], deep)
-            return np.repeat(of_block, np.diff(self._start))
-        for vertices in (rows["vertex"], rows["edge"], self._next[rows["edge"]]):
-            np.maximum.at(out, vertices, deep)
+            out = np.repeat(of_block, np.diff(self._start))
+        else:
+            for vertices in (rows["vertex"], rows["edge"], self._next[rows["edge"]]):
+                np.maximum.at(out, vertices, deep)
         if self._finder.at_corners:
             # Sides that bend lie off the straight lines between their corners.
             sag, both = self._finder.sag, np.zeros(len(self._size))

@@ -23,6 +23,8 @@ from .polygon import (
     winding_number,
 )
 
+#: Of `Blocks.order`: found as the run goes.
+AUTO_ORDER = 0
 #: Edges are collinear when the tangent of the angle between them is below this.
 STRAIGHT = 1e-6
 
@@ -42,8 +44,8 @@ class Blocks:
         fixed         (n_blocks,)       True: the block does not move
         held          (n_blocks, 6)     True: that unknown (u0, v0, r0, εx, εy, γxy) of the block is constrained to
                                         zero, as for a guided platen; None: no moving block is constrained
-        order         (n_blocks,)       p of the complete polynomial that is a block's displacement, 1 to 8; None: all are
-                                        of first order
+        order         (n_blocks,)       p of the complete polynomial that is a block's displacement, 1 to 8, or `AUTO_ORDER`:
+                                        found as the run goes; None: all are of first order
         edge_name     (n_vertices,)     index into ``edge_names`` (0: the empty name, unnamed)
         edge_names    tuple of str      e.g. ("", "load:top", "joint:set1")
         names         tuple of str      one name per block, for messages and files

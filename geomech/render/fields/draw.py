@@ -10,6 +10,8 @@ import numpy as np
 
 from geomech.output.reading import Run
 
+from ..pictures.field import COMPONENTS
+from ..pictures.look import final_cycle
 from .even_movie import even_movie
 from .frame import Frames, drawn
 from .painter import FieldPainter, view
@@ -23,7 +25,7 @@ MOVES = 0.03
 class Wish:
     """What a picture of a field is to be like; None: as suits the run.
 
-    ``cycle`` or ``time`` (s): the end; ``span``: (lowest, highest) in the field's SI unit; ``scale``: factor on
+    ``cycle`` or ``time`` (s): what the run came to (`final_cycle`); ``span``: (lowest, highest) in the field's SI unit; ``scale``: factor on
     displacements; ``size``: pixels, (width, height or None); ``suffix``: format of the picture; ``movies``: formats of
     the movies.
     """
@@ -38,6 +40,28 @@ class Wish:
     suffix: str = ".png"
     movies: tuple[str, ...] = ()
     frames_per_second: float = 10.0
+
+
+def suited(
+    run: Run, component: str | None = None, *, width: int | None = None, scale: float | None = None
+) -> FieldPainter:
+    """A painter of what suits the run (`usual_field`) or of a stress ``component``; what is not given here, the scene's
+    ``[render]`` table says, and where that is silent too, vertical stress and 800 pixels. Raises KeyError for an unknown
+    stress component or crack colour."""
+    asked = run.scene.get("render", {})
+    field = component or usual_field(run) or asked.get("component", "yy")
+    if component is not None and component not in COMPONENTS:
+        raise KeyError(f"no stress component {component!r}; there are {', '.join(COMPONENTS)}")
+    what = quantity(run, field)
+    scale = asked.get("deformation_scale") if scale is None else scale
+    fixed = view(run, what, scale=scale, size=(width or asked.get("width_px", 800), None))
+    return FieldPainter(run, what, fixed, asked.get("crack_colour", "birth"))
+
+
+def draw_end(painter: FieldPainter, path: Path) -> Path:
+    """The picture ``path`` of the cycle that shows what the run came to (`final_cycle`)."""
+    painter.draw(painter.frames.cycle_time(final_cycle(painter.run)))
+    return painter.save(path)
 
 
 def usual_field(run: Run) -> str | None:
@@ -67,7 +91,7 @@ def draw_field(runs: Sequence[Run], wish: Wish, out: Path | None = None) -> list
         folder = run.folder / "pictures" if out is None else out if len(runs) == 1 else out / run.folder.name
         folder.mkdir(parents=True, exist_ok=True)
         fixed = view(run, wanted[run], scale=wish.scale, span=wish.span, size=wish.size)
-        painter = FieldPainter(run, wanted[run], fixed)
+        painter = FieldPainter(run, wanted[run], fixed, run.scene.get("render", {}).get("crack_colour", "birth"))
         name = wish.field.replace("/", "_")
         if wish.cycle is not None:
             name += f"_{wish.cycle:06d}"
@@ -86,7 +110,7 @@ def _time(painter: FieldPainter, wish: Wish) -> float:
     if wish.cycle is not None:
         return painter.frames.cycle_time(wish.cycle)
     if wish.time is None:
-        return last
+        return painter.frames.cycle_time(final_cycle(painter.run))
     if not first <= wish.time <= last * (1 + 1e-9):
         raise KeyError(f"{painter.run.folder} was written from t = {first:g} s to {last:g} s, not at {wish.time:g} s")
     return wish.time

@@ -29,11 +29,16 @@ def even_movie(
         painter.draw(float(time))
         images.append(painter.image())
     for path in paths:
-        (_mp4 if path.suffix == ".mp4" else _gif)(path, images, frames_per_second)
+        if path.suffix == ".mp4":
+            _mp4(path, images, frames_per_second)
+        else:
+            stay = [10 * round(100 / frames_per_second)] * (len(images) - 1) + [LAST]
+            write_gif(path, images, stay)
     return paths
 
 
-def _gif(path: Path, images: list[np.ndarray], frames_per_second: float) -> None:
+def write_gif(path: Path, images: list[np.ndarray], durations: list[int]) -> None:
+    """``images`` (height, width, 3) of 8 bits as the GIF ``path``, each shown for its duration, ms."""
     from PIL import Image
 
     # One palette for all frames, or they would flicker: that of the first, the middle and the last together.
@@ -44,8 +49,7 @@ def _gif(path: Path, images: list[np.ndarray], frames_per_second: float) -> None
     palette = Image.new("P", (1, 1))
     palette.putpalette(colours.ravel().tolist())
     frames = [Image.fromarray(image).quantize(palette=palette, dither=Image.Dither.NONE) for image in images]
-    stay = [10 * round(100 / frames_per_second)] * (len(frames) - 1) + [LAST]
-    frames[0].save(path, save_all=True, append_images=frames[1:], duration=stay, loop=0, optimize=False)
+    frames[0].save(path, save_all=True, append_images=frames[1:], duration=durations, loop=0, optimize=False)
 
 
 def _mp4(path: Path, images: list[np.ndarray], frames_per_second: float) -> None:

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 INK, FIXED, LOAD, WATER, BOLT, BEFORE = "#1b1d21", "#8d9199", "#5b2a86", "#2f6fb5", "#1b1d21", "#7a7f87"
-#: At most so many bolts are labelled, those with the largest forces: more would cover the model.
+#: At most so many bolts, or tips, are labelled, those with the largest values: more would cover the model.
 LABELLED = 8
 
 
@@ -107,7 +107,7 @@ class Marks:
                 continue  # labels would cover one another
             labelled.append(middle)
             axes.annotate(f"{force[k] / 1e3:.3g}".replace("-", "\N{MINUS SIGN}"), middle, xytext=(3, 3), textcoords="offset points",
-                          fontsize=6.5, color=BOLT, zorder=9, bbox=_PAPER)  # fmt: skip
+                          fontsize=6.5, color=BOLT, zorder=9, bbox=PAPER)  # fmt: skip
         return [Line2D([], [], color=BOLT, lw=1.7, marker="s", ms=2.6, label="bolts, force in kN/m")]
 
     def _water(self, axes: Axes, time: float) -> list[Any]:
@@ -136,7 +136,8 @@ class Marks:
         return [Line2D([], [], label="monitors", **style)]
 
 
-_PAPER = {"boxstyle": "round,pad=0.15", "fc": "white", "ec": "none", "alpha": 0.8}
+#: What stands behind a label.
+PAPER = {"boxstyle": "round,pad=0.15", "fc": "white", "ec": "none", "alpha": 0.8}
 
 
 def _outer(blocks: Any) -> list[np.ndarray]:

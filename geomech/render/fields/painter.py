@@ -11,8 +11,10 @@ import numpy as np
 from geomech.output.reading import Run
 from geomech.output.units import length_unit, stress_text
 
+from ..pictures.look import CRACK_COLOURS, final_cycle, magnification, rock_colours
+from .crack_lines import CrackLines
 from .frame import Frames, drawn
-from .marks import Marks
+from .marks import LABELLED, PAPER, Marks
 from .quantity import Quantity, limits, readable
 
 if TYPE_CHECKING:
@@ -20,7 +22,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-ROCK, STANDS, INK, SOFT, CRACK = "#efe9dd", "#dcdcd8", "#33363b", "#5a5f66", "#111214"
+ROCK, STANDS, INK, SOFT = "#efe9dd", "#dcdcd8", "#33363b", "#5a5f66"
 #: The page, inches: its width, and what surrounds the model on it.
 PAGE, LEFT, RIGHT, TOP, BOTTOM, ROW = 4.8, 0.52, 1.15, 0.52, 0.5, 0.15
 #: The model is at least and at most so tall, inches.
@@ -53,27 +55,37 @@ def view(
 ) -> View:
     """The view that suits ``what`` over the whole of ``run``; ``scale``, ``span`` and ``size`` are as asked for, or
     found: a scale at which displacements are seen and blocks do not lie inside others."""
-    from ..pictures.look import _magnification, final_cycle
-
-    frames, last = Frames(run), final_cycle(run)
+    scale = suitable_scale(run) if scale is None else scale
+    frames = Frames(run)
     start, end = frames.span()
-    first, final = frames.grid("blocks", start), frames.grid("blocks", frames.cycle_time(last))
-    if scale is None:
-        shown = [grid for grid in (final, frames.grid("interior", end)) if grid is not None and grid.n_cells]
-        extent = max(np.ptp(drawn(first, 0.0), axis=0))
-        scale = _magnification(shown, float(extent)) if int(final.field_data["REFERENCE"][0]) else 1.0
+    end = min(end, frames.cycle_time(final_cycle(run)))
+    first, final = frames.grid("blocks", start), frames.grid("blocks", end)
     middle = frames.grid("blocks", 0.5 * (start + end))
     points = np.concatenate([drawn(grid, scale) for grid in (first, middle, final)])
     (x0, y0), (x1, y1) = points.min(axis=0), points.max(axis=0)
     return View(limits([run], what) if span is None else span, (x0, x1, y0, y1), scale, *size)
 
 
-class FieldPainter:
-    """Draws ``what`` of a run at any time, in the ``view`` that its pictures share."""
+def suitable_scale(run: Run) -> float:
+    """A factor at which the displacements at the end are seen, and blocks do not lie inside others; 1 where the run was
+    written as it has moved."""
+    frames = Frames(run)
+    end = frames.cycle_time(final_cycle(run))
+    blocks, interior = frames.grid("blocks", end), frames.grid("interior", end)
+    if not int(blocks.field_data["REFERENCE"][0]):
+        return 1.0
+    shown = [grid for grid in (blocks, interior) if grid is not None and grid.n_cells]
+    return magnification(shown, float(np.ptp(drawn(blocks, 0.0), axis=0).max()))
 
-    def __init__(self, run: Run, what: Quantity, fixed: View) -> None:
+
+class FieldPainter:
+    """Draws ``what`` of a run at any time, in the ``view`` that its pictures share. Where it is a stress, cracks are
+    coloured too, by ``cracks``: "birth" or "opening"."""
+
+    def __init__(self, run: Run, what: Quantity, fixed: View, cracks: str = "birth") -> None:
         self.run, self.what, self.view = run, what, fixed
         self.frames = Frames(run)
+        self.cracks = CrackLines(self.frames, fixed.scale, cracks if what.stress else None)
         x0, x1, y0, y1 = fixed.bounds
         self.size = max(x1 - x0, y1 - y0)
         self.marks = Marks(self.frames, fixed.scale, self.size)
@@ -86,13 +98,14 @@ class FieldPainter:
     def draw(self, time: float) -> None:
         """Draw the run at ``time`` s of its series, between two written cycles too."""
         self.figure, axes, bar, strip = self._page()
+        self.cycle = self._last_cycle(time)
         blocks, interior = self.frames.grid("blocks", time), self.frames.grid("interior", time)
         interior = interior if interior is not None and interior.n_cells else None
         shown = self._rock(axes, blocks, interior)
         shown = self._field(axes, blocks, interior, time) or shown
         self._lines(axes, blocks, interior, time)
         keys = self.marks.draw(axes, time)
-        self._bar(bar, shown)
+        self._bars(bar, shown)
         self._words(axes, strip, keys, time)
 
     def image(self) -> np.ndarray:
@@ -140,17 +153,35 @@ class FieldPainter:
             spine.set_linewidth(0.6)
         return figure, axes, bar, legend
 
-    def _bar(self, axes: Axes, shown: Any) -> None:
+    def _bars(self, axes: Axes, shown: Any) -> None:
+        """The legend of the field and, below it, that of the cracks where they have several colours."""
+        from matplotlib.cm import ScalarMappable
+
+        left, low, wide, tall = axes.get_position().bounds
+        inches = tall * self.figure.get_size_inches()[1]
+        share = 1.0
+        if self.cracks.legend:
+            share = 0.62
+            below = self.figure.add_axes((left, low, wide, 0.3 * tall))
+            bar = self.figure.colorbar(ScalarMappable(**self.cracks.style()), cax=below)
+            self._fine(bar, CRACK_COLOURS[self.cracks.colour], 0.3 * inches)
+            if self.cracks.colour == "birth":
+                bar.ax.yaxis.set_major_locator(_whole_numbers())
+            axes.set_position((left, low + (1 - share) * tall, wide, share * tall))
         if shown is None:
             axes.set_axis_off()
             return
         extend = "both" if self.what.stress else "max" if self.what.clipped else "neither"
         bar = self.figure.colorbar(shown, cax=axes, extend=extend, extendfrac=0.03)
+        name = f"{self.what.title}, {self.unit}" if self.unit else self.what.title
+        self._fine(bar, name, share * inches)
+
+    @staticmethod
+    def _fine(bar: Any, name: str, inches: float) -> None:
+        """Lines and letters of a legend ``inches`` tall, beside which long names turn into two lines."""
         bar.ax.tick_params(labelsize=7, colors=SOFT, length=2.5, width=0.6)
         bar.outline.set_linewidth(0.4)
-        name = f"{self.what.title}, {self.unit}" if self.unit else self.what.title
-        # Long names turn into two lines beside the bar.
-        bar.set_label(_folded(name, 34), fontsize=7.5, color=INK)
+        bar.set_label(_folded(name, int(inches / _LETTER)), fontsize=7.5, color=INK)
 
     def _words(self, axes: Axes, strip: Axes, keys: list[Any], time: float) -> None:
         figure = self.figure
@@ -178,30 +209,29 @@ class FieldPainter:
                          handlelength=1.8, columnspacing=1.4, borderpad=0, labelspacing=0.3)  # fmt: skip
 
     def _told(self, time: float) -> str:
-        times = [at for at, _ in self.run.series("blocks")]
-        cycles = list(self.run.grids("blocks"))
-        k = max(0, int(np.searchsorted(times, time * (1 + 1e-12), side="right")) - 1)
-        row = self.run.at(cycles[k])
+        row = self.run.at(self.cycle)
         said = [f"t = {time:.5g} s"]
         if self.run.led and np.isfinite(row["load"]):
             said.append(f"load {stress_text(row['load'])}" + (" in tension" if row["load"] < 0 else ""))
-        if abs(times[k] - time) <= 1e-9 * max(1.0, abs(time)):
-            said.append(f"cycle {cycles[k]}")
+        if abs(self.frames.cycle_time(self.cycle) - time) <= 1e-9 * max(1.0, abs(time)):
+            said.append(f"cycle {self.cycle}")
         if self.view.scale not in (0.0, 1.0):
             said.append(f"displacements × {self.view.scale:g}")
         return "    ".join(said)
 
+    def _last_cycle(self, time: float) -> int:
+        """The last cycle whose blocks were written up to ``time`` s."""
+        times = [at for at, _ in self.run.series("blocks")]
+        k = max(0, int(np.searchsorted(times, time * (1 + 1e-12), side="right")) - 1)
+        return list(self.run.grids("blocks"))[k]
+
     # -- what is drawn -------------------------------------------------------------------------------------------
 
     def _style(self) -> dict[str, Any]:
-        from matplotlib import colormaps
-        from matplotlib.colors import Normalize, TwoSlopeNorm
+        from matplotlib.colors import Normalize
 
         low, high = (end / self.unit_size for end in self.view.limits)
-        if low < 0 < high and min(-low, high) > 0.1 * max(-low, high):
-            return {"cmap": colormaps["RdBu_r"], "norm": TwoSlopeNorm(0.0, -max(-low, high), max(-low, high))}
-        # Monotone in lightness, so that it can be read in grey and by all kinds of eyes.
-        return {"cmap": colormaps["cividis" if high > abs(low) else "cividis_r"], "norm": Normalize(low, high)}
+        return {"cmap": rock_colours(low, high), "norm": Normalize(low, high)}
 
     def _rock(self, axes: Axes, blocks: pv.UnstructuredGrid, interior: pv.UnstructuredGrid | None) -> None:
         from matplotlib.collections import PolyCollection
@@ -315,9 +345,20 @@ class FieldPainter:
             np.abs(values) > (1e-3 * self.view.limits[1] / self.unit_size if name == "contacts" else -1)
         )
         order = np.flatnonzero(keep)[np.argsort(np.abs(values[keep]))]
+        if self.what.name == "K":
+            self._label(axes, drawn(grid, self.view.scale), values, order[::-1])
         size = 34 if name == "tips" else float(np.clip(2e4 / max(len(values), 1), 3, 22))
         return axes.scatter(*drawn(grid, self.view.scale)[order].T, c=values[order], s=size, zorder=6.5,
                             edgecolors=INK if name == "tips" else "none", linewidths=0.6, **self._style())  # fmt: skip
+
+    def _label(self, axes: Axes, at: np.ndarray, values: np.ndarray, order: np.ndarray) -> None:
+        """The values at points ``at``, in ``order``, as far as their numbers do not cover one another."""
+        labelled: list[np.ndarray] = []
+        for k in order:
+            if len(labelled) < LABELLED and all(np.hypot(*(at[k] - other)) > 0.06 * self.size for other in labelled):
+                labelled.append(at[k])
+                axes.annotate(f"{values[k]:.3g}", at[k], xytext=(5, 3), textcoords="offset points", fontsize=7, color=INK,
+                              zorder=9, bbox=PAPER)  # fmt: skip
 
     def _lines(
         self, axes: Axes, blocks: pv.UnstructuredGrid, interior: pv.UnstructuredGrid | None, time: float
@@ -330,15 +371,16 @@ class FieldPainter:
         here = _there(blocks, interior)
         for grid, use in ((blocks, here), (interior, None)):
             if grid is not None:
-                lines = drawn(grid, self.view.scale)[_edges(grid, use)]
+                edges = _edges(grid, use)
+                lines = drawn(grid, self.view.scale)[edges]
                 axes.add_collection(LineCollection(lines, colors=INK, linewidths=thin, zorder=5, capstyle="round"))
-        cracks = self.frames.grid("cracks", time)
-        if cracks is not None and cracks.n_cells and interior is None:
-            lines = drawn(cracks, self.view.scale)[cracks.cells.reshape(-1, 3)[:, 1:]]
-            axes.add_collection(LineCollection(lines, colors=CRACK, linewidths=1.8 * max(thin, 0.5), zorder=6))
+                self.cracks.draw_walls(axes, grid, edges, self.cycle)
+        self.cracks.draw(axes, time, interior)
 
 
 _LINE = 3
+#: A letter of a legend is so wide, inches.
+_LETTER = 0.055
 
 
 def _there(blocks: pv.UnstructuredGrid, interior: pv.UnstructuredGrid | None) -> np.ndarray:
@@ -361,6 +403,12 @@ def _folded(text: str, most: int) -> str:
         return text
     head, _, tail = text.partition(", ")
     return f"{head},\n{tail}"
+
+
+def _whole_numbers() -> Any:
+    from matplotlib.ticker import MaxNLocator
+
+    return MaxNLocator(nbins=4, integer=True)
 
 
 def _round_length(about: float) -> float:

@@ -28,6 +28,8 @@ NAMED = {
     "K": (("tips",), "K_eq", None, "K_eq"),
     "principal": (("interior", "blocks"), "principal_stress", 2, "σ₃ and directions"),
 }
+#: An end of a span that is nearer to zero than this part of the other end is zero.
+NEARLY = 0.03
 #: Where a few values are far above all others, colours leave out this much of them at either end, per cent.
 CLIPPED = 0.7
 _PREFIXES = ((1e9, "G"), (1e6, "M"), (1e3, "k"), (1.0, ""), (1e-3, "m"), (1e-6, "µ"), (1e-9, "n"))
@@ -129,34 +131,58 @@ def _unknown(run: Run, name: str, written: list[str]) -> UnknownField:
 
 
 def limits(runs: Iterable[Run], what: Quantity, cycles: int = 6) -> tuple[float, float]:
-    """The span of ``what`` over all ``runs``, in its own unit, from up to so many of their cycles; stresses, and what
-    contacts have but forces, without the outermost 0.7 % at either end. From zero for what has no sign."""
-    low, high = np.inf, -np.inf
-    for run in runs:
-        for name in what.series:
-            written = list(run.grids(name))
-            rows = np.unique(np.linspace(0, len(written) - 1, min(cycles, len(written))).round().astype(int))
-            for cycle in (written[k] for k in rows):
-                grid = run.grid(name, cycle)
-                if not grid.n_points or (what.stress and name == "blocks" and "interior" in what.series):
-                    continue  # the platens of a specimen
-                values = what.values(name, grid)[0]
-                values = values[np.isfinite(values)]
-                if len(values):
-                    ends = (
-                        np.percentile(values, [CLIPPED, 100 - CLIPPED])
-                        if what.clipped
-                        else (values.min(), values.max())
-                    )
-                    low, high = min(low, float(ends[0])), max(high, float(ends[1]))
-    if not np.isfinite(low):
+    """The span of ``what`` over all ``runs``, in its own unit, from up to so many of their cycles. Stresses, and what
+    contacts have but forces, go without the outermost 0.7 % at either end: of the rock's area in those cycles, or of
+    the number of contacts. A span that begins or ends near zero does so at zero."""
+    found = [_sampled(run, what, cycles) for run in runs]
+    values, weights = (np.concatenate(part) if part else np.empty(0) for part in zip(*found))
+    if not len(values):
         return 0.0, 1.0
-    if low >= 0 and not what.stress:
-        low = 0.0
-    if high - low <= 1e-9 * max(abs(low), abs(high)):
+    order = np.argsort(values)
+    values, weights = values[order], weights[order]
+    low, high = float(values[0]), float(values[-1])
+    if what.clipped:
+        share = (np.cumsum(weights) - 0.5 * weights) / weights.sum() * 100
+        low, high = (float(end) for end in np.interp([CLIPPED, 100 - CLIPPED], share, values))
+    if high - low <= 1e-6 * max(abs(low), abs(high)):
         half = max(0.05 * abs(high), 1e-30)
         return (low - half, high + half) if low or high else (0.0, 1.0)
+    if low > 0 and (low < 0.5 * high or not what.stress):
+        low = 0.0
+    if high < 0 and high > 0.5 * low:
+        high = 0.0
+    if low < 0 < high:
+        low, high = (low if -low >= NEARLY * high else 0.0), (high if high >= NEARLY * -low else 0.0)
     return low, high
+
+
+def _sampled(run: Run, what: Quantity, cycles: int) -> tuple[np.ndarray, np.ndarray]:
+    """(values, weights) of ``what`` in up to so many cycles of each series: of the rock's triangles their areas, of all
+    else 1."""
+    values, weights = [np.empty(0)], [np.empty(0)]
+    for name in what.series:
+        written = list(run.grids(name))
+        rows = np.unique(np.linspace(0, len(written) - 1, min(cycles, len(written))).round().astype(int))
+        for cycle in (written[k] for k in rows):
+            grid = run.grid(name, cycle)
+            if not grid.n_points or (what.stress and name == "blocks" and "interior" in what.series):
+                continue  # the platens of a specimen
+            own, at_points = what.values(name, grid)
+            weight = np.ones(len(own))
+            if what.clipped and name in ("blocks", "interior"):
+                triangles = grid.cells.reshape(-1, 4)[:, 1:]
+                own = own[triangles].mean(axis=1) if at_points else own
+                weight = _areas(np.asarray(grid.points)[:, :2][triangles])
+            finite = np.isfinite(own)
+            values.append(own[finite])
+            weights.append(weight[finite])
+    return np.concatenate(values), np.concatenate(weights)
+
+
+def _areas(corners: np.ndarray) -> np.ndarray:
+    """(n,) m² of triangles (n, 3, 2)."""
+    a, b = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+    return 0.5 * np.abs(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0])
 
 
 def readable(unit: str, largest: float) -> tuple[str, float]:

@@ -27,16 +27,6 @@ COMPONENTS = {
 _BATCH = 512
 
 
-def values(grid: pv.UnstructuredGrid, component: str) -> np.ndarray:
-    """MPa, at the points of an interior grid or the cells of a block grid."""
-    array, column, _ = COMPONENTS[component]
-    data = grid.cell_data if "stress" in grid.cell_data else grid.point_data
-    if not array:
-        s1, s2, s3 = np.asarray(data["principal_stress"], dtype=float).T
-        return np.sqrt(0.5 * ((s1 - s2) ** 2 + (s2 - s3) ** 2 + (s3 - s1) ** 2)) / 1e6
-    return np.asarray(data[array], dtype=float)[:, column] / 1e6
-
-
 def interior_grid(run: Run, cycle: int) -> pv.UnstructuredGrid | None:
     """The interior at ``cycle``: as it was written, or, between two that were written of the same cracks, interpolated
     in time, or else the last one before. None without one."""

@@ -1,16 +1,14 @@
-"""How a run is to be drawn: colours, span, frame and magnification, the same for all its pictures."""
+"""How a run is to be drawn, the same for all its pictures: colours, the cycle that shows its end, magnification."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from geomech.output.reading import Run
 
-from .field import COMPONENTS, interior_grid, values
 from .overlaps import overlap
 from .walls import Walls
 
@@ -25,46 +23,33 @@ CRACK_COLOURS = {"birth": "grown in cycle", "opening": "opening, µm"}
 DEFORMATION = 0.03
 #: Blocks may be drawn inside others by this fraction of the size: two pixels of a picture 800 wide.
 OVERLAP = 0.0025
-#: Stress at a crack tip is singular: the colours span these percentiles of the rock's area and end there.
-ROBUST = (0.7, 99.3)
 
 
-@dataclass(frozen=True)
-class Look:
-    """What stays the same from frame to frame. ``bounds`` (x0, x1, y0, y1) m as drawn; ``limits`` MPa, ``beyond``
-    whether there is stress below and above them; ``scale`` of the displacement; ``cracks`` the array that colours them
-    and ``crack_limits`` its span (equal: all the same); ``rock`` the materials that are filled with colour."""
+def rock_colours(low: float, high: float) -> Colormap:
+    """The colours of rock for values from ``low`` to ``high``; those of the page that plays as well. Where both signs
+    matter red is positive, blue negative, white zero, equally deep for equal size. Where one is everywhere the map runs
+    from light to dark, dark for the largest size, so that a grey print can be read too."""
+    import matplotlib
+    from matplotlib.colors import ListedColormap
 
-    component: str
-    bounds: tuple[float, float, float, float]
-    limits: tuple[float, float]
-    beyond: tuple[bool, bool]
-    scale: float
-    cracks: str
-    crack_limits: tuple[float, float]
-    rock: frozenset[int]
-    width: int
+    if two_signed(low, high):
+        # The outermost tenth of this map is nearly black on both sides.
+        at = 0.5 + 0.45 * np.linspace(low, high, 256) / max(-low, high)
+        return ListedColormap(matplotlib.colormaps["RdBu_r"](at))
+    name = "YlGnBu" if low + high >= 0 else "YlGnBu_r"
+    return ListedColormap(matplotlib.colormaps[name](np.linspace(0.04, 0.96, 256)))
 
-    @property
-    def upright(self) -> bool:
-        """The legend stands beside a tall drawing and lies below a wide one."""
-        x0, x1, y0, y1 = self.bounds
-        return (x1 - x0) <= 1.25 * (y1 - y0)
 
-    @property
-    def colours(self) -> Colormap:
-        """Where tension and compression both matter: red tension, blue compression, white none, equally deep for
-        equal stress. Where one is everywhere, several hues, since the whole span lies on one side of zero."""
-        import matplotlib
-        from matplotlib.colors import ListedColormap
+def two_signed(low: float, high: float) -> bool:
+    """Whether both signs matter between ``low`` and ``high``: the smaller side is more than a tenth of the larger."""
+    return low < 0 < high and min(-low, high) > 0.1 * max(-low, high)
 
-        low, high = self.limits
-        if low < 0 < high and min(-low, high) > 0.1 * max(-low, high):
-            # The outermost tenth of this map is nearly black on both sides.
-            at = 0.5 + 0.45 * np.linspace(low, high, 256) / max(-low, high)
-            return ListedColormap(matplotlib.colormaps["RdBu_r"](at))
-        name = "YlGnBu" if low + high > 0 else "YlGnBu_r"
-        return ListedColormap(matplotlib.colormaps[name](np.linspace(0.04, 0.96, 256)))
+
+def crack_colours() -> Colormap:
+    """From crimson to orange: apart from every colour that rock is filled with."""
+    from matplotlib.colors import LinearSegmentedColormap
+
+    return LinearSegmentedColormap.from_list("crack", ["#8f0d33", "#d7263d", "#ff7a1a", "#ffb01f"])
 
 
 def final_cycle(run: Run) -> int:
@@ -79,83 +64,13 @@ def final_cycle(run: Run) -> int:
     return int(before["cycle"]) if before["time"] == run.history["time"][-1] else last
 
 
-def look(
-    run: Run,
-    cycle: int,
-    *,
-    component: str = "yy",
-    width: int = 800,
-    scale: float | None = None,
-    crack_colour: str = "birth",
-) -> Look:
-    """Colours, frame and magnification that suit ``cycle``, for it and every one before it.
-
-    ``scale`` magnifies displacements (None: so that they are seen); ``crack_colour`` is "birth" (the cycle in which a
-    piece grew) or "opening". Raises KeyError for an unknown component or crack colour."""
-    if component not in COMPONENTS:
-        raise KeyError(f"no stress component {component!r}; there are {', '.join(COMPONENTS)}")
-    if crack_colour not in CRACK_COLOURS:
-        raise KeyError(f"no crack colour {crack_colour!r}; there are {', '.join(CRACK_COLOURS)}")
-    blocks = run.grid("blocks", cycle)
-    x0, x1, y0, y1 = blocks.bounds[:4]
-    if not int(blocks.field_data["REFERENCE"][0]):
-        scale = 0.0  # drawn where they are
-    interior = interior_grid(run, cycle)
-    shown = [grid for grid in (blocks, interior) if grid is not None]
-    if scale is None:
-        scale = _magnification(shown, max(x1 - x0, y1 - y0))
-    # The frame holds what there was at the start as well: rock that runs out leaves its place.
-    first = run.grid("blocks", min(run.grids("blocks")))
-    drawn = np.concatenate([grid.points[:, :2] + scale * grid["displacement"][:, :2] for grid in (first, *shown)])
-    (x0, y0), (x1, y1) = drawn.min(axis=0), drawn.max(axis=0)
-    rock = _rock(blocks, interior)
-    limits, beyond = _limits(interior if interior is not None else _filled(blocks, rock), component)
-    return Look(
-        component=component,
-        bounds=(x0, x1, y0, y1),
-        limits=limits,
-        beyond=beyond,
-        scale=scale,
-        cracks=crack_colour,
-        crack_limits=_crack_limits(run, cycle, crack_colour),
-        rock=rock,
-        width=width,
-    )
-
-
-def spanning(fixed: Look, run: Run, cycles: Iterable[int]) -> Look:
-    """``fixed`` with colours for all of ``cycles``: from rock at rest to the fullest span of any."""
-    low, high = fixed.limits
-    below, above = fixed.beyond
-    for cycle in cycles:
-        interior = interior_grid(run, cycle)
-        grid = interior if interior is not None else _filled(run.grid("blocks", cycle), fixed.rock)
-        (a, b), (under, over) = _limits(grid, fixed.component)
-        low, high, below, above = min(low, a), max(high, b), below or under, above or over
-    return replace(fixed, limits=(min(low, 0.0), max(high, 0.0)), beyond=(below, above))
-
-
-def _rock(blocks: pv.UnstructuredGrid, interior: pv.UnstructuredGrid | None) -> frozenset[int]:
-    """Beside a solved specimen, other materials (platens) only hold it: their stress would take attention off it.
-    Where nothing is solved, blocks that never move are what others rest on."""
-    if interior is not None:
-        shown = np.isin(blocks["block_id"], np.unique(interior["block_id"]))
-    else:
-        shown = np.asarray(blocks["fixed"]) == 0
-    return frozenset(np.unique(blocks["material"][shown if shown.any() else slice(None)]).tolist())
-
-
-def _filled(blocks: pv.UnstructuredGrid, rock: frozenset[int]) -> pv.UnstructuredGrid:
-    return blocks.extract_cells(filled_cells(blocks, rock))
-
-
-def filled_cells(blocks: pv.UnstructuredGrid, rock: frozenset[int]) -> np.ndarray:
-    """(n_cells,) True for what is filled with colour: blocks of ``rock`` that can move; all where there are none."""
-    moving = np.isin(blocks["material"], list(rock)) & (np.asarray(blocks["fixed"]) == 0)
-    return moving if moving.any() else np.ones(blocks.n_cells, bool)
-
-
-def _crack_limits(run: Run, cycle: int, colour: str) -> tuple[float, float]:
+def crack_limits(run: Run, cycle: int, colour: str) -> tuple[float, float]:
+    """The span of the colours of cracks up to ``cycle``: cycles, or µm of opening; (0, 0) where none has grown or the
+    run has written no cracks. Raises KeyError for an unknown ``colour``."""
+    if colour not in CRACK_COLOURS:
+        raise KeyError(f"no crack colour {colour!r}; there are {', '.join(CRACK_COLOURS)}")
+    if not run.series("cracks"):
+        return 0.0, 0.0
     cracks = run.grid("cracks", cycle)
     if colour == "birth":
         walls = Walls.of(run)
@@ -166,7 +81,7 @@ def _crack_limits(run: Run, cycle: int, colour: str) -> tuple[float, float]:
     return (0.0, float(np.percentile(opening, 98))) if len(opening) else (0.0, 0.0)
 
 
-def _magnification(shown: Sequence[pv.UnstructuredGrid], size: float) -> float:
+def magnification(shown: Sequence[pv.UnstructuredGrid], size: float) -> float:
     """A round factor by which displacements are seen, and blocks are not drawn inside others by
     more than the width of a line."""
     # A common translation shows nothing; what counts is how far points move against each other, and cracked blocks give
@@ -184,25 +99,3 @@ def _magnification(shown: Sequence[pv.UnstructuredGrid], size: float) -> float:
     while scale > 1.0 and overlap(shown, scale, OVERLAP * size):
         scale = max(1.0, float(f"{0.5 * scale:.1g}"))
     return scale
-
-
-def _limits(grid: pv.UnstructuredGrid, component: str) -> tuple[tuple[float, float], tuple[bool, bool]]:
-    """MPa between which colours span, and whether there are values below and above."""
-    shown = values(grid, component)
-    in_cells = len(shown) == grid.n_cells and "stress" in grid.cell_data
-    area = grid.compute_cell_sizes(length=False, volume=False)["Area"]
-    if in_cells:
-        weights = area
-    else:
-        corners = grid.cells.reshape(-1, 4)[:, 1:]
-        weights = np.bincount(corners.ravel(), weights=np.repeat(area / 3, 3), minlength=grid.n_points)
-    order = np.argsort(shown)
-    share = np.cumsum(weights[order]) / weights.sum() * 100
-    low, high = np.interp(ROBUST, share, shown[order])
-    if high - low < 1e-6 * max(abs(low), abs(high), 1e-9):
-        # A uniform field: a band about its value, or colours would show round-off.
-        middle, half = 0.5 * (low + high), max(0.05 * max(abs(low), abs(high)), 1e-9)
-        low, high = middle - half, middle + half
-    span = high - low
-    beyond = bool(shown.min() < low - 0.02 * span), bool(shown.max() > high + 0.02 * span)
-    return (float(low), float(high)), beyond

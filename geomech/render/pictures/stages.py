@@ -8,8 +8,7 @@ from geomech.model import CHANGES
 from geomech.output.reading import Run
 
 from .field import agreeing
-from .look import final_cycle, look, spanning
-from .picture import Painter
+from .look import final_cycle
 
 #: So many stages stand side by side.
 MOST = 4
@@ -17,44 +16,13 @@ MOST = 4
 
 def stages(run: Run, folder: Path, *, width: int = 560) -> list[tuple[Path, str, int]]:
     """(PNG file in ``folder``, what it shows, cycle) of every stage, in the same colours throughout; [] of a run that
-    wrote no blocks. Raises RenderingUnavailable where VTK can open no window."""
-    from ..fields.draw import usual_field
+    wrote no blocks."""
+    from ..fields.draw import suited
 
     shown = moments(run)
     if not shown:
         return []
-    field = usual_field(run)
-    if field is not None:
-        return _moving(run, folder, field, shown, width)
-    asked, last = run.scene.get("render", {}), max(shown)
-    fixed = look(
-        run,
-        last,
-        component=asked.get("component", "yy"),
-        width=width,
-        scale=asked.get("deformation_scale"),
-        crack_colour=asked.get("crack_colour", "birth"),
-    )
-    fixed = spanning(fixed, run, shown)
-    folder.mkdir(parents=True, exist_ok=True)
-    out = []
-    with Painter(run, fixed) as painter:
-        for cycle, statistics in shown.items():
-            path = folder / f"stage_{cycle:06d}.png"
-            painter.draw(cycle)
-            painter.save(path)
-            out.append((path, statistics, cycle))
-    return out
-
-
-def _moving(run: Run, folder: Path, field: str, shown: dict[int, str], width: int) -> list[tuple[Path, str, int]]:
-    """The stages ``shown`` of a run whose blocks move, in one ``field``."""
-    from ..fields.painter import FieldPainter, view
-    from ..fields.quantity import quantity
-
-    what = quantity(run, field)
-    scale = run.scene.get("render", {}).get("deformation_scale")
-    painter = FieldPainter(run, what, view(run, what, scale=scale, size=(width, None)))
+    painter = suited(run, width=width)
     folder.mkdir(parents=True, exist_ok=True)
     out = []
     for cycle, told in shown.items():

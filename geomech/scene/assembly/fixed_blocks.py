@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from geomech.model import AUTO_ORDER
+
 from ..checks.check import Check
 from ..drawing import Drawing
 from ..tables import SceneTables
@@ -58,11 +60,13 @@ def constrained_unknowns(tables: SceneTables, drawing: Drawing) -> np.ndarray | 
 
 
 def block_orders(tables: SceneTables, drawing: Drawing) -> np.ndarray | None:
-    """(n_blocks,) the order of each block's displacement, 1 where it stands still; None where all are of first order."""
+    """(n_blocks,) the order of each block's displacement, 1 where it stands still, `AUTO_ORDER` where it is to be found;
+    None where all are of first order."""
     zones = tables.zones or {}
-    order = np.array([zones[zone].order if zone in zones else 1 for zone in drawing.zones], dtype=int)
+    given = [zones[zone].order if zone in zones else 1 for zone in drawing.zones]
+    order = np.array([AUTO_ORDER if p == "auto" else p for p in given], dtype=int)
     order[fixed_blocks(tables, drawing)] = 1
-    return order if (order > 1).any() else None
+    return order if (order != 1).any() else None
 
 
 def check_holding(c: Check) -> None:

@@ -12,15 +12,20 @@ _LOADS = {
 }  # fmt: skip
 
 
+def quoted(order: int | str) -> str:
+    """As a scene says it."""
+    return f'"{order}"' if isinstance(order, str) else str(order)
+
+
 def check_orders(c: Check) -> None:
     """Refuse what blocks of order 2 and more do not support."""
     t = c.tables
-    zones = {name: zone for name, zone in (t.zones or {}).items() if zone.order > 1}
+    zones = {name: zone for name, zone in (t.zones or {}).items() if zone.order != 1}
     for name, zone in zones.items():
         path = ("zones", name, "order")
 
         def refuse(why: str, way_out: str, path=path, zone=zone) -> None:
-            c.refuse(path, f"order = {zone.order}: {why}", way_out)
+            c.refuse(path, f"order = {quoted(zone.order)}: {why}", way_out)
 
         if zone.fixed or zone.guided is not None or zone.body != "block":
             refuse("rock that is fixed, guided or without an end does not bend", "leave `order` out")

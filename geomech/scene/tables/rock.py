@@ -49,10 +49,11 @@ class ZoneTable(Table):
     velocity_m_s: Pair | None = Field(
         None, description="velocity of its blocks at the start of a dynamic run, [x, y], m/s (unset: at rest)"
     )
-    order: Annotated[int, Field(ge=1, le=8)] = Field(
+    order: Annotated[int, Field(ge=1, le=8)] | Literal["auto"] = Field(
         1,
         description="order of the polynomial that is the displacement of each of its blocks, 1 to 8: 1 is uniform strain, "
-        "from 2 on blocks bend, and their faces bear stress that varies along them",
+        'from 2 on blocks bend, and their faces bear stress that varies along them; "auto": each block begins with 1 and is '
+        "raised where that matters (`dda.order_target`)",
     )
     body: Literal["block", "plane", "half-plane"] = Field(
         "block",

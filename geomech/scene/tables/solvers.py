@@ -80,6 +80,11 @@ class DdaTable(Table):
         1e-8,
         description='what "augmented" contacts may still gape or give, in units of the smallest block\'s size, √area',
     )
+    order_target: Annotated[float, Field(gt=0, le=1)] = Field(
+        0.01,
+        description='blocks of zones with order = "auto" are raised while the next orders would take up more than this part '
+        "of the energy of all such blocks: what they store and move with, and friction takes",
+    )
     corner_rounding: Annotated[float, Field(ge=0, le=LARGEST_CORNER)] = Field(
         0.01,
         description="length over which two corners that meet are rounded, in units of the smaller block's size, √area "

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from small_scenes import block
 
+from geomech.model import AUTO_ORDER
 from geomech.output import Run
 from geomech.pipeline import run
 from geomech.resumption import resume
@@ -40,6 +41,12 @@ def test_what_is_not_supported_is_refused_at_its_key(tmp_path, more, message):
     ("old", "new", "message"),
     [
         ("order = 4", "order = 9", "9"),
+        ("order = 4", 'order = "high"', "auto"),
+        (
+            "order = 4",
+            'order = "auto"\n[loads.in_situ]\nsurface_m = 1.0\nunit_weight_n_per_m3 = 2e4\nk0 = 1.0',
+            'order = "auto": in-situ',
+        ),
         ("[zones.ground]\nfixed = true", "[zones.ground]\nfixed = true\norder = 2", "does not bend"),
         ("dynamic_factor = 1.0", "dynamic_factor = 1.0\nspectral_radius = 0.8", "gamma = 2 beta"),
         ("dynamic_factor = 1.0", 'dynamic_factor = 1.0\ncontact = "augmented"', "stiff penalty springs"),
@@ -72,3 +79,14 @@ def test_stress_inside_and_bent_outlines_are_written_and_a_run_resumes(tmp_path)
     for name in ("history.csv", "contacts.pvd"):
         assert (folder / name).read_bytes() == (whole / name).read_bytes()
     assert np.array_equal(Run(folder).grid("interior", 5)["stress"], Run(whole).grid("interior", 5)["stress"])
+
+
+def test_an_order_that_is_found_reaches_the_run(tmp_path):
+    """The only block of a scene stores all there is: it is raised, and what is inside it is written."""
+    text = BENDING.replace("order = 4", 'order = "auto"').replace("[dda]", "[dda]\norder_target = 0.02", 1)
+    loaded = load_scene(scene(tmp_path, text=text))
+    problem = loaded.problem()
+    assert problem.blocks.order.tolist() == [1, AUTO_ORDER] and problem.dda.order_target == 0.02
+    folder = tmp_path / "run"
+    run(loaded, folder)
+    assert np.ptp(np.asarray(Run(folder).grid("interior", 3)["stress"])[:, 1]) > 0

@@ -1,0 +1,135 @@
+"""Orders that are found as the run goes: the estimate against what higher orders bring, and who is raised."""
+
+from __future__ import annotations
+
+import logging
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scenes_of_bending import after, body_of, moved, rectangle, system_of
+
+from geomech import dda
+from geomech.bench.cost.block_scenes import wall
+from geomech.model import AUTO_ORDER, DdaSettings, EdgeTraction, History, JointLaw, Loads, Material, State
+
+WEIGHT = Loads(gravity=History.constant((0.0, -9.81)))
+GLUE = JointLaw("glue", 0.5, cohesion=1e12, tensile_strength=1e12, normal_stiffness=1e15, shear_stiffness=1e15)
+ROCK = Material("rock", 2e10, 0.0, 2500.0, plane="stress")
+
+
+def cantilever(order: int, **settings):
+    """A beam of slenderness 8 glued to fixed rock, under a traction at its end: its system and the end of three steps."""
+    polygons = [rectangle(-1, 0, 0, 1), rectangle(0, 0, 8, 1)]
+    system = system_of(polygons, [1, 0], [1, order], joint=GLUE, rock=ROCK, loaded=(1, 1), **settings)
+    loads = Loads(edge_tractions=(EdgeTraction("loaded", History.constant((0.0, -1e5))),))
+    return system, after(system, loads, 3)
+
+
+@pytest.mark.parametrize("target", [0.1, 0.01, 3e-4])
+def test_the_work_of_a_loaded_beam_is_within_the_target(target):
+    """What a load works is twice what the beam stores, so that its deflection is right to the target, too: against Timoshenko's
+    beam, from which a clamp without Poisson's ratio takes 1e-4."""
+    system, result = cantilever(AUTO_ORDER, order_target=target)
+    exact = 1e5 * (8**3 / (3 * 2e10 / 12) + 1.2 * 8 / 1e10)
+    assert -moved(system, result.state, 1, [8.0, 0.5])[1] == pytest.approx(exact, rel=target + 1e-4)
+    order = int(result.state.order[1])
+    assert order == {0.1: 3, 0.01: 3, 3e-4: 4}[target]
+    # It is the answer of a beam that has that order from the first.
+    given = cantilever(order)[1]
+    assert np.array_equal(given.state.vertices, result.state.vertices)
+    assert np.array_equal(given.state.deflection, result.state.deflection)
+
+
+def test_the_estimate_is_the_work_that_higher_orders_take_up(caplog):
+    """What a beam of order 5 stores more than one of order 3 is what is estimated of the latter, to a fifth: one block on
+    fixed rock is all of its patch. Of order 8 a beam that is asked to be exact tells what is left."""
+    stored = [sum(cantilever(order)[1].energy[:3]) for order in (3, 5)]
+    more = stored[1] / stored[0] - 1
+    for target, order in ((1.2 * more, 3), (0.8 * more, 4)):
+        system, _ = cantilever(AUTO_ORDER, order_target=target)
+        begun = replace(State.at_rest(system.blocks), order=np.array([1, 3]))
+        loads = Loads(edge_tractions=(EdgeTraction("loaded", History.constant((0.0, -1e5))),))
+        assert system.step(begun, loads).state.order[1] == order
+    with caplog.at_level(logging.WARNING):
+        cantilever(AUTO_ORDER, order_target=1e-9)
+    assert "'block 1' has order 8, the highest, and more would take up" in caplog.text
+
+
+def test_a_beam_that_orders_2_and_3_cannot_bend_is_raised_beyond_them():
+    """Glued at both ends: Timoshenko's deflection q L⁴ / 384 EI + q L² / 8 κ G A, of which orders 2 and 3 have 7 %."""
+    polygons = [rectangle(-1, 0, 0, 1), rectangle(10, 0, 11, 1), rectangle(0, 0, 10, 1)]
+    system = system_of(polygons, [1, 1, 0], [1, 1, AUTO_ORDER], joint=GLUE, rock=ROCK)
+    state = after(system, WEIGHT, 2).state
+    exact = 2500 * 9.81 * (10**4 / (384 * 2e10 / 12) + 10**2 / (8 * (5 / 6) * 1e10))
+    assert -moved(system, state, 2, [5.0, 0.5])[1] == pytest.approx(exact, rel=0.01)
+    assert state.order.tolist() == [1, 1, 6]
+
+
+def test_a_punch_presses_into_an_elastic_block(caplog):
+    """A stiff-cornered punch on a block six times as wide: uniformly strained blocks store two thirds of the work. The
+    energy of both at order 8 is reached to 3 %, and that polynomials do no better is told."""
+    polygons = [rectangle(-20, -3, 20, -2), rectangle(-3, -2, 3, 0), rectangle(-0.5, 0, 0.5, 1)]
+    joint = JointLaw("joint", 0.6, normal_stiffness=1e13, shear_stiffness=1e13)
+    loads = Loads(edge_tractions=(EdgeTraction("loaded", History.constant((0.0, -1e7))),))
+
+    def pressed(order: int):
+        rock = Material("rock", 2e10, 0.25, 2500.0)
+        return after(system_of(polygons, [1, 0, 0], [1, order, order], joint=joint, rock=rock, loaded=(2, 2)), loads, 2)
+
+    found, best = pressed(AUTO_ORDER), pressed(8)
+    assert pressed(1).energy.elastic < 0.7 * best.energy.elastic
+    assert found.energy.elastic == pytest.approx(best.energy.elastic, rel=0.03)
+    assert found.state.order[1] > found.state.order[2] > 1
+    assert "corners or ends of contacts" in caplog.text
+    # Corners that press into a face which has given way are no overlaps.
+    assert "no shorter step avoids it" not in caplog.text
+
+
+def test_a_re_entrant_block_that_converges_slowly_is_told(caplog):
+    frame = np.array([[0, 0], [1, 0], [1, 2], [3, 2], [3, 3], [0, 3.0]])
+    polygons = [rectangle(-1, -1, 4, 0), frame]
+    system = system_of(polygons, [1, 0], [1, AUTO_ORDER], joint=GLUE, loaded=(1, 3))
+    after(system, Loads(edge_tractions=(EdgeTraction("loaded", History.constant((0.0, -1e6))),)), 1)
+    assert "stress is singular at its re-entrant corner (1, 2)" in caplog.text
+    assert "Draw it as several blocks" in caplog.text
+
+
+def test_blocks_among_many_stay_of_first_order():
+    """A wall of a hundred bricks: its answer is that of first order, to the bit."""
+    drawn = wall(100)
+
+    def built(order):
+        blocks = replace(drawn, order=order)
+        settings = DdaSettings(dynamic_factor=0.0, time_step=10.0, max_displacement_ratio=1.0)
+        system = dda.BlockSystem(
+            blocks, [Material("rock", 2e10, 0.25, 2500.0)], [JointLaw("joint", 0.6)], settings=settings
+        )
+        return after(system, WEIGHT, 3).state
+
+    first, found = built(None), built(np.where(drawn.fixed, 1, AUTO_ORDER))
+    assert (found.order == 1).all() and found.deflection is None
+    assert np.array_equal(first.vertices, found.vertices)
+    assert np.array_equal(first.contacts["normal_force"], found.contacts["normal_force"])
+
+
+def test_a_beam_that_is_raised_in_motion_goes_on_where_it_was():
+    """A state tells the orders: another system goes on from it as the first does, and one that has gone on can begin
+    again."""
+    moving = {"dynamic_factor": 1.0, "newmark": (0.25, 0.5), "damping": 0.0, "time_step": 1e-3}
+
+    def beam():
+        polygons = [rectangle(-1, 0, 0, 1), rectangle(0, 0, 8, 1)]
+        return system_of(polygons, [1, 0], [1, AUTO_ORDER], joint=GLUE, rock=ROCK, **moving)
+
+    one = beam()
+    start = State.at_rest(one.blocks)
+    middle = after(one, WEIGHT, 4, start).state
+    last = after(one, WEIGHT, 4, middle).state
+    assert middle.order[1] >= 3
+    other = after(beam(), WEIGHT, 4, middle).state
+    again = after(one, WEIGHT, 8, start).state
+    for name in ("vertices", "velocity", "deflection", "order"):
+        assert np.array_equal(getattr(last, name), getattr(other, name))
+        assert np.array_equal(getattr(last, name), getattr(again, name))
+    assert body_of(one, last, 1).q.any()
