@@ -40,11 +40,12 @@ try:
     from numba.core.codegen import JITCodeLibrary
     from numba.core.compiler import Compiler
     from numba.core.dispatcher import Dispatcher
+    from numba.core.options import DefaultOptions
     from numba.core.targetconfig import ConfigStack, TargetConfig
     from numba.core.types.functions import BaseFunction
 except ImportError:  # told below
     IndexDataCacheFile = UserProvidedCacheLocator = JITCodeLibrary = Compiler = object
-    ConfigStack = TargetConfig = BaseFunction = object
+    ConfigStack = TargetConfig = BaseFunction = DefaultOptions = object
     Dispatcher = type(njit(lambda: None))
 
 #: What of Numba's inner parts is relied on; they may move in any version.
@@ -78,6 +79,11 @@ if kernel_place().instead_of is not None:
         "%s cannot be written: compiled kernels are kept in %s (NUMBA_CACHE_DIR names another folder)",
         kernel_place().instead_of, kernel_place().folder,
     )  # fmt: skip
+
+
+#: Further options of `kept` and `part` for kernels that make no arrays and call none that do: Numba then does not count
+#: who holds an array, which in loops that hand arrays to many small functions takes most of the time.
+UNCOUNTED = {"_nrt": False} if hasattr(DefaultOptions, "_nrt") else {}
 
 
 def kept(**options) -> Callable:

@@ -287,6 +287,11 @@ def _parsed(path: FilePath) -> tuple[dict[str, Any], str]:
                 )
             ]
         ) from error
+    except ValueError as error:
+        # Python reads no integers of more digits than `sys.get_int_max_str_digits`.
+        line = max(enumerate(text.split("\n"), 1), key=lambda found: sum(map(str.isdigit, found[1])))[0]
+        fault = Fault(f"{path}:{line}", f"no number: {error}", "write large numbers as 1e9")
+        raise SceneError([fault]) from error
 
 
 def _is_deep(data: Any) -> bool:

@@ -18,7 +18,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...compiled import kept, part
+from ...compiled import UNCOUNTED, kept, part
 from .neighbour_search import boxes
 from .rounded_corners import EASED, meeting, rounding_length
 
@@ -47,14 +47,14 @@ _HASTE = 2.0
 _MATING = 0.9986
 
 
-@part(fastmath=False, error_model="numpy", nogil=True)
+@part(fastmath=False, error_model="numpy", nogil=True, **UNCOUNTED)
 def _dot_to(vertices, origin, target, nx, ny):
     """Component along (nx, ny) of the unit vector from vertex ``origin`` to vertex ``target``."""
     dx, dy = vertices[target, 0] - vertices[origin, 0], vertices[target, 1] - vertices[origin, 1]
     return (dx * nx + dy * ny) / np.sqrt(dx * dx + dy * dy)
 
 
-@part(fastmath=False, error_model="numpy", nogil=True)
+@part(fastmath=False, error_model="numpy", nogil=True, **UNCOUNTED)
 def _against(vertices, next_vertex, previous_vertex, vertex, edge):
     """Vertex against edge: (by how much its neighbours point away from the edge, as a sine, outward normal x, y, gap,
     distance along, length)."""
@@ -70,7 +70,7 @@ def _against(vertices, next_vertex, previous_vertex, vertex, edge):
     return away, ty, -tx, px * ty - py * tx, px * tx + py * ty, length
 
 
-@part(fastmath=False, error_model="numpy", nogil=True)
+@part(fastmath=False, error_model="numpy", nogil=True, **UNCOUNTED)
 def _may_turn_to(vertices, next_vertex, previous_vertex, vertex, nx, ny, gap, window):
     """Whether a ``vertex`` outside an edge of the normal (nx, ny) by this ``gap``, with neighbours outside as well, may
     be turned to it though one is nearer, in a step in which corners come nearer by the ``window`` at most."""
@@ -82,7 +82,7 @@ def _may_turn_to(vertices, next_vertex, previous_vertex, vertex, nx, ny, gap, wi
     return True
 
 
-@part(fastmath=False, error_model="numpy", nogil=True)
+@part(fastmath=False, error_model="numpy", nogil=True, **UNCOUNTED)
 def _nearer(vertices, here, one, other):
     """True if vertex ``here`` is nearer to vertex ``one`` than to ``other``."""
     ax, ay = vertices[here, 0] - vertices[one, 0], vertices[here, 1] - vertices[one, 1]
@@ -90,14 +90,14 @@ def _nearer(vertices, here, one, other):
     return ax * ax + ay * ay < (bx * bx + by * by) * (1.0 - _NEARER)
 
 
-@part(fastmath=False, error_model="numpy", nogil=True)
+@part(fastmath=False, error_model="numpy", nogil=True, **UNCOUNTED)
 def _by(vertices, v, w, window):
     """Whether two corners are so near that their lines may come within the ``window`` of both."""
     dx, dy = vertices[v, 0] - vertices[w, 0], vertices[v, 1] - vertices[w, 1]
     return dx * dx + dy * dy <= (_CORNERS * window) ** 2
 
 
-@part(fastmath=False, error_model="numpy", nogil=True)
+@part(fastmath=False, error_model="numpy", nogil=True, **UNCOUNTED)
 def _meet(vertices, next_vertex, previous_vertex, v, w):
     """True if corners ``v`` and ``w`` meet: neither is nearer to a neighbour of the other along its outline."""
     return not (
@@ -108,7 +108,7 @@ def _meet(vertices, next_vertex, previous_vertex, v, w):
     )
 
 
-@part(fastmath=False, error_model="numpy", nogil=True)
+@part(fastmath=False, error_model="numpy", nogil=True, **UNCOUNTED)
 def _shallower(vertices, next_vertex, previous_vertex, vertex, gap, other):
     """Whether an edge with this ``gap`` is what ``vertex`` meets at a corner, rather than the corner's ``other``
     edge."""
@@ -116,7 +116,7 @@ def _shallower(vertices, next_vertex, previous_vertex, vertex, gap, other):
     return away < -_ANGLE or gap >= beside
 
 
-@part(fastmath=False, error_model="numpy", nogil=True)
+@part(fastmath=False, error_model="numpy", nogil=True, **UNCOUNTED)
 def _place(keys, key):
     """Index of ``key`` in the sorted ``keys``, −1 if absent."""
     low, high = 0, keys.shape[0]
@@ -129,7 +129,7 @@ def _place(keys, key):
     return low if low < keys.shape[0] and keys[low] == key else -1
 
 
-@part(fastmath=False, error_model="numpy", nogil=True)
+@part(fastmath=False, error_model="numpy", nogil=True, **UNCOUNTED)
 def _add(table, count, first, vertex, edge):
     """Row of (vertex, edge) among the rows from ``first`` on, appended if new; ``table`` must have room."""
     for row in range(first, count):
@@ -176,9 +176,10 @@ def find_contacts(
     """
     box = boxes(outlines.vertices, outlines.vertex_start[:-1])
     room, windows = 32 + 8 * len(box), _each(window, len(pairs))
+    lines = _Lines(np.empty(4, np.int64), np.empty(4, np.int64), np.empty(4, np.int64), np.empty((4, 7)), np.empty(5))
     while True:
         table, met = np.empty((room, 4), np.int64), np.zeros((room, 3))
-        count = _look_at(_Rows(table, met), box, pairs, windows, outlines, old_keys, corners)
+        count = _look_at(_Rows(table, met), lines, box, pairs, windows, outlines, old_keys, corners)
         if count >= 0:
             return table[:count], met[:count]
         room *= 2
@@ -216,12 +217,13 @@ class _Rows(NamedTuple):
 class _Lines(NamedTuple):
     """The entrance lines of two corners, four at most: the ``vertex`` and the ``edge`` that stand for each, its ``twin``,
     the line of the other end of the same face (−1: none), and ``shape`` (4, 7): normal that pushes the first block (2), gap,
-    distance outside the edge, edge length, distance inside, sine away from it."""
+    distance outside the edge, edge length, distance inside, sine away from it; ``places`` (5,), as `meeting` needs them."""
 
     vertex: np.ndarray
     edge: np.ndarray
     twin: np.ndarray
     shape: np.ndarray
+    places: np.ndarray
 
 
 class _Near(NamedTuple):
@@ -237,15 +239,14 @@ class _Near(NamedTuple):
     y_hi: float
 
 
-@kept(fastmath=False, error_model="numpy", nogil=True)
-def _look_at(rows, box, pairs, windows, outlines, old_keys, corners):
+@kept(fastmath=False, error_model="numpy", nogil=True, **UNCOUNTED)
+def _look_at(rows, lines, box, pairs, windows, outlines, old_keys, corners):
     """Fill ``rows`` with the contacts of ``pairs`` within ``windows`` (k,) and return their number, or −1 when they have
     no room for them.
 
     ``box`` (n_blocks, 4) is the blocks' least x, y and greatest x, y.
     """
     count, start = 0, outlines.vertex_start
-    lines = _Lines(np.empty(4, np.int64), np.empty(4, np.int64), np.empty(4, np.int64), np.empty((4, 7)))
     for pair in range(pairs.shape[0]):
         a, b = pairs[pair, 0], pairs[pair, 1]
         # Where corners are rounded their lines do not act by themselves.
@@ -272,7 +273,7 @@ def _look_at(rows, box, pairs, windows, outlines, old_keys, corners):
     return count
 
 
-@part(fastmath=False, error_model="numpy", nogil=True)
+@part(fastmath=False, error_model="numpy", nogil=True, **UNCOUNTED)
 def _corners_on_corners(rows, lines, first, near, outlines, old_keys, corners):
     """Add the contacts of corners that meet corners to ``rows`` that end at ``first``; how many rows there are then, −1
     where they have no room."""
@@ -294,13 +295,13 @@ def _corners_on_corners(rows, lines, first, near, outlines, old_keys, corners):
     return count
 
 
-@part(fastmath=False, error_model="numpy", nogil=True)
+@part(fastmath=False, error_model="numpy", nogil=True, **UNCOUNTED)
 def _in_strip(near, x, y):
     """Whether (x, y) may be in reach of both blocks."""
     return near.x_lo <= x <= near.x_hi and near.y_lo <= y <= near.y_hi
 
 
-@part(fastmath=False, error_model="numpy", nogil=True)
+@part(fastmath=False, error_model="numpy", nogil=True, **UNCOUNTED)
 def _entrance_lines(lines, outlines, old_keys, v, w):
     """Find the ``lines`` through which corner ``v`` can enter corner ``w``, and their number."""
     vertices, next_vertex, previous_vertex = outlines.vertices, outlines.next_vertex, outlines.previous_vertex
@@ -341,7 +342,7 @@ def _entrance_lines(lines, outlines, old_keys, v, w):
     return n_lines
 
 
-@part(fastmath=False, error_model="numpy", nogil=True)
+@part(fastmath=False, error_model="numpy", nogil=True, **UNCOUNTED)
 def _stands_better(lines, same, old_keys, n_vertices, vertex, edge, away, outside, length):
     """Whether ``vertex`` and ``edge`` stand better for the line ``same`` than those that do."""
     shape = lines.shape
@@ -356,7 +357,7 @@ def _stands_better(lines, same, old_keys, n_vertices, vertex, edge, away, outsid
     return outside < shape[same, 3] - near
 
 
-@part(fastmath=False, error_model="numpy", nogil=True)
+@part(fastmath=False, error_model="numpy", nogil=True, **UNCOUNTED)
 def _least_crossed(lines, n_lines):
     """The line that is least crossed, and of those in other directions the one that is; −1 for none."""
     one, two, shape = -1, -1, lines.shape
@@ -369,7 +370,7 @@ def _least_crossed(lines, n_lines):
     return one, two
 
 
-@part(fastmath=False, error_model="numpy", nogil=True)
+@part(fastmath=False, error_model="numpy", nogil=True, **UNCOUNTED)
 def _add_corners(rows, first, count, lines, n_lines, near, vertices, v, w, corners):
     """Add the contacts of the corners ``v`` and ``w`` to ``rows``, of which those of the pair begin at ``first``; how many
     rows there are then."""
@@ -385,7 +386,7 @@ def _add_corners(rows, first, count, lines, n_lines, near, vertices, v, w, corne
         ux, uy = corners.motion[v, 0] - corners.motion[w, 0], corners.motion[v, 1] - corners.motion[w, 1]
         mx, my, gap, line = meeting(
             dx, dy, ux, uy, shape[one, 0], shape[one, 1], shape[one, 2], shape[two, 0], shape[two, 1], shape[two, 2],
-            length,
+            length, lines.places,
         )  # fmt: skip
         reach = min(window, _HASTE * np.sqrt(ux * ux + uy * uy) + corners.margin)
         if line == 0:
@@ -416,7 +417,7 @@ def _add_corners(rows, first, count, lines, n_lines, near, vertices, v, w, corne
     return count
 
 
-@part(fastmath=False, error_model="numpy", nogil=True)
+@part(fastmath=False, error_model="numpy", nogil=True, **UNCOUNTED)
 def _corners_on_edges(rows, first, count, near, outlines, convex):
     """Add the contacts of corners that meet edges or lie in re-entrant corners to ``rows``, of which those of the pair
     begin at ``first``; how many rows there are then, −1 where they have no room."""
@@ -435,7 +436,7 @@ def _corners_on_edges(rows, first, count, near, outlines, convex):
     return count
 
 
-@part(fastmath=False, error_model="numpy", nogil=True)
+@part(fastmath=False, error_model="numpy", nogil=True, **UNCOUNTED)
 def _meets_edge(outlines, convex, window, v, edge):
     """Whether corner ``v`` meets this ``edge``, not one of the corners at its ends."""
     vertices, next_vertex, previous_vertex = outlines.vertices, outlines.next_vertex, outlines.previous_vertex
@@ -468,7 +469,7 @@ def _meets_edge(outlines, convex, window, v, edge):
     return not at_end or (not along > length and _is_met_beside(outlines, v, gap, end, end))
 
 
-@part(fastmath=False, error_model="numpy", nogil=True)
+@part(fastmath=False, error_model="numpy", nogil=True, **UNCOUNTED)
 def _is_met_beside(outlines, v, gap, corner, other):
     """Whether ``v`` meets an edge with this ``gap`` at its ``corner``: neither that nor the ``other`` edge there."""
     vertices, next_vertex, previous_vertex = outlines.vertices, outlines.next_vertex, outlines.previous_vertex
@@ -530,7 +531,7 @@ def _geometry(table, met, outlines):
     return geometry, mate
 
 
-@part(fastmath=False, error_model="numpy", nogil=True)
+@part(fastmath=False, error_model="numpy", nogil=True, **UNCOUNTED)
 def _has_row(table, row, edge):
     """Whether the vertex of this ``row`` of the ``table`` also touches the line of another ``edge``; rows of one vertex
     follow one another."""
@@ -543,7 +544,7 @@ def _has_row(table, row, edge):
     return False
 
 
-@part(fastmath=False, error_model="numpy", nogil=True)
+@part(fastmath=False, error_model="numpy", nogil=True, **UNCOUNTED)
 def _tributary(outlines, vertex, edge, nx, ny, along, length, before, after):
     """Half the overlap of the faces that meet where ``vertex`` touches an ``edge`` of the outward normal (nx, ny) and this
     ``length`` so far ``along`` it, m; and the edge of the vertex's own block that faces it. ``before`` and ``after``:
@@ -610,7 +611,7 @@ def _parents(table, geometry, outlines, window, known):
     return parent
 
 
-@part(fastmath=False, error_model="numpy", nogil=True)
+@part(fastmath=False, error_model="numpy", nogil=True, **UNCOUNTED)
 def _renamed(keys, taken, known, previous_vertex, vertex, corner, nx, ny):
     """The contact that is ``known`` of ``vertex`` at a ``corner``, with the normal (nx, ny), under another name: the next
     edge round the corner, or the roles exchanged; −1 for none. It is ``taken`` then."""

@@ -20,7 +20,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...compiled import part
+from ...compiled import UNCOUNTED, part
 
 #: A normal within this angle (cosine; 0.2 rad) of that of one line is replaced by it: so shallow a ramp is lower than a
 #: fiftieth of the rounding length, and no step that was drawn.
@@ -32,14 +32,14 @@ EASED = 0.02
 _PRESSED = 4.0
 
 
-@part(fastmath=False, error_model="numpy", nogil=True)
+@part(fastmath=False, error_model="numpy", nogil=True, **UNCOUNTED)
 def rounding_length(rounding, longest, pressed):
     """Common rounding length of two corners, m: of their lengths ``rounding``, at most ``longest``, for blocks with the
     penetrations ``pressed``, all m."""
     return min(longest, max(rounding, _PRESSED * pressed))
 
 
-@part(fastmath=False, error_model="numpy", nogil=True)
+@part(fastmath=False, error_model="numpy", nogil=True, **UNCOUNTED)
 def _nearest(x, y, nx1, ny1, nx2, ny2, gap1, gap2, radius, cx, cy, way):
     """G and its gradient at (x, y), and the line it belongs to: 1, 2, or 0 for the arc."""
     zx, zy = x - cx, y - cy
@@ -53,12 +53,13 @@ def _nearest(x, y, nx1, ny1, nx2, ny2, gap1, gap2, radius, cx, cy, way):
     return nx2, ny2, gap2, 2
 
 
-@part(fastmath=False, error_model="numpy", nogil=True)
-def meeting(x, y, dx, dy, nx1, ny1, gap1, nx2, ny2, gap2, length):
+@part(fastmath=False, error_model="numpy", nogil=True, **UNCOUNTED)
+def meeting(x, y, dx, dy, nx1, ny1, gap1, nx2, ny2, gap2, length, places):
     """Contact normal and gap of two corners at x = (``x``, ``y``) m with the relative motion (``dx``, ``dy``) m in a
     step.
 
-    ``nx1`` … ``gap2``: unit normals of the two lines and x's distance from them; ``length``: the rounding length, m.
+    ``nx1`` … ``gap2``: unit normals of the two lines and x's distance from them; ``length``: the rounding length, m;
+    ``places`` (5,): working space.
     Returns the normal, the gap along it, m, and the line whose normal it is (1, 2, or 0 for neither).
     """
     cosine, sine = nx1 * nx2 + ny1 * ny2, nx1 * ny2 - ny1 * nx2
@@ -72,7 +73,6 @@ def meeting(x, y, dx, dy, nx1, ny1, gap1, nx2, ny2, gap2, length):
         # or where it crosses them, the arc also where the path passes its centre.
         rate1, rate2, travel = dx * nx1 + dy * ny1, dx * nx2 + dy * ny2, dx * dx + dy * dy
         along = zx * dx + zy * dy
-        places = np.empty(5)
         places[0], n = 1.0, 1
         if gap1 > 0.0 and -rate1 > gap1:
             places[n] = -gap1 / rate1

@@ -16,12 +16,14 @@ from dataclasses import replace
 import numpy as np
 
 from ...model import OPEN
+from ..equation_records import BlockEquations, ContactMotion
 from ..kinematics.midpoint_configuration import MidpointConfiguration
+from ..kinematics.newmark import BlockLoads
 from ..open_close.contact_set import ContactSet
 from ..open_close.equations import Unsettled
-from ..out_of_balance import imbalance
+from ..out_of_balance import ContactForces, imbalance
 from ..results import StepResult
-from ..time_step import Attempt
+from ..time_step import Attempt, StepStart
 from .deflected_blocks import DeflectedBlocks
 from .deflection_basis import n_deflections
 from .equations import HigherOrderEquations
@@ -33,16 +35,14 @@ from .six_row_system import fill_own, moved
 class BendingAttempt(Attempt):
     """As `Attempt`, of a system with ``deflected`` blocks; ``found`` are contacts at corners."""
 
-    def __init__(self, system, state, vertices, carried, moments, loads, dt, crack, found, cuts, load_time) -> None:
+    def __init__(self, system, start: StepStart, dt: float, found: ContactSet, cuts: int) -> None:
+        state = start.state
         self.blocks: DeflectedBlocks = system.deflected
         known = self.blocks.at_rest() if state.deflection is None else state.deflection
         self.deflection = np.ascontiguousarray(known[:, 0])
         #: (k,) m/s of deflection that the step begins with.
         self.rates = system.settings.dynamic_factor * known[:, 1]
-        super().__init__(
-            system, state, vertices, carried, moments, loads, dt, crack,
-            self._on_faces(system, state, vertices, found), cuts, load_time,
-        )  # fmt: skip
+        super().__init__(system, start, dt, self._on_faces(system, state, start.vertices, found), cuts)
 
     def _on_faces(self, system, state, vertices: np.ndarray, corners: ContactSet) -> FaceContacts:
         """The contacts found at ``corners``, with points along faces and what deflection adds to their gaps."""
@@ -248,9 +248,9 @@ class BendingAttempt(Attempt):
             forces = self.glue.forces(self.system.scheme.weight * self.glue_change, len(self.order))
             right[self.order[moving]] += forces[moving]
         return imbalance(
-            self.matrix, right, self.vectors, found.block, found.other, self.order, settled.unknowns[:n],
-            settled.normal_force, settled.shear_force, self.acceleration, self.density, self.moments, self.gravity,
-            load, largest,
+            BlockEquations(self.matrix, right), ContactMotion(found.block, found.other, self.order, self.vectors),
+            settled.unknowns[:n], ContactForces(settled.normal_force, settled.shear_force), self.acceleration,
+            self._mass, BlockLoads(self.gravity, load), largest,
         )  # fmt: skip
 
     def _energy(self, load: np.ndarray, end_shear: np.ndarray):

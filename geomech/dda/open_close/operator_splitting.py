@@ -24,6 +24,7 @@ import numpy as np
 
 from ...compiled import kept
 from ...model import OPEN, SLIP, STICK, ContactSolver
+from ..equation_records import ContactMotion, ContactStiffness
 from ..linear_solver import assembly
 from .equations import Equations, States
 from .interior_point.contact_terms import balance
@@ -106,8 +107,8 @@ def split(equations: Equations, bonded: np.ndarray, solver: ContactSolver) -> Pr
     rho, none = stiffness_between(equations), np.zeros(len(found))
     data = equations.room()
     assembly.assemble(
-        pattern, data, equations.matrix, pattern.upper, pattern.lower, found.block, found.other, order, vectors, rho,
-        rho, none, none, equations.sides,
+        pattern, data, equations.matrix, ContactMotion(found.block, found.other, order, vectors),
+        ContactStiffness(rho, rho, none, none), sides=equations.sides,
     )  # fmt: skip
     pattern.add_links(data)
     correction = pattern.solver.corrections(data)

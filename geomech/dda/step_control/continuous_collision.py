@@ -19,7 +19,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...compiled import kept, part
+from ...compiled import UNCOUNTED, kept, part
 
 #: Vertices may lie in a block by this part of the smaller block's size, √area, the radius of corners, …
 _DEPTH = 1e-5
@@ -37,7 +37,7 @@ _TIPS = 1.2
 INTO, THROUGH = 0, 1
 
 
-@part(fastmath=False, error_model="numpy", nogil=True)
+@part(fastmath=False, error_model="numpy", nogil=True, **UNCOUNTED)
 def depth_inside(x, y, vertices, next_vertex, first, last):
     """(how far (x, y) lies inside the polygon of the edges from ``first`` to ``last``, m, 0 outside; its nearest edge)."""
     winding, least, nearest = 0, np.inf, -1
@@ -59,7 +59,7 @@ def depth_inside(x, y, vertices, next_vertex, first, last):
     return (np.sqrt(least) if winding != 0 else 0.0), nearest
 
 
-@part(fastmath=False, error_model="numpy", nogil=True)
+@part(fastmath=False, error_model="numpy", nogil=True, **UNCOUNTED)
 def _seen(vertices, next_vertex, x, y, e):
     """(gap, place along, length) of (x, y) before edge ``e``."""
     f = next_vertex[e]
@@ -69,7 +69,7 @@ def _seen(vertices, next_vertex, x, y, e):
     return (px * dy - py * dx) / length, (px * dx + py * dy) / (length * length), length
 
 
-@part(fastmath=False, error_model="numpy", nogil=True)
+@part(fastmath=False, error_model="numpy", nogil=True, **UNCOUNTED)
 def _way(vertices, next_vertex, e, at, f, to):
     """Length of the outline between a place ``at`` (0 to 1) on edge ``e`` and one ``to`` on edge ``f``, the shorter way
     round; inf on different outlines of one block. m."""
@@ -95,7 +95,7 @@ def _way(vertices, next_vertex, e, at, f, to):
     return min(forth, whole - forth) if found else np.inf
 
 
-@part(fastmath=False, error_model="numpy", nogil=True)
+@part(fastmath=False, error_model="numpy", nogil=True, **UNCOUNTED)
 def _rounded_off(v, vertices, rounding, first, last):
     """The rounding length of corner ``v`` with the nearest of those from ``first`` to ``last``, m; 0 where none is near."""
     longest = 0.0
@@ -107,7 +107,7 @@ def _rounded_off(v, vertices, rounding, first, last):
     return longest
 
 
-@part(fastmath=False, error_model="numpy", nogil=True)
+@part(fastmath=False, error_model="numpy", nogil=True, **UNCOUNTED)
 def _crossed(vertices, next_vertex, start, a, b, pressed, least, length):
     """A vertex and an edge of two blocks of which edges cross, and by how much the nearest end of both is beyond the
     other's line, m; −1 where they cross by no more than contacts press there, ``least`` and the ``length`` of tips."""
@@ -159,7 +159,7 @@ class Allowed(NamedTuple):
     rounding: np.ndarray
 
 
-@part(fastmath=False, error_model="numpy", nogil=True)
+@part(fastmath=False, error_model="numpy", nogil=True, **UNCOUNTED)
 def _entered_by(paths, v, f, left, first, last):
     """The edge by which vertex ``v`` has last come in before it ``left`` by the edge ``f`` (the part of the step), and
     where along it; −1 for none."""
@@ -178,7 +178,7 @@ def _entered_by(paths, v, f, left, first, last):
     return entry, at
 
 
-@part(fastmath=False, error_model="numpy", nogil=True)
+@part(fastmath=False, error_model="numpy", nogil=True, **UNCOUNTED)
 def _gone_through(paths, v, first, last, allowed, longest):
     """The edge by which vertex ``v`` has come into the block with the vertices from ``first`` to ``last``, through which
     it has gone, and how deep, m; −1 for none. It is none of what is ``allowed`` m deep, or cuts a corner of the
@@ -211,7 +211,7 @@ def _gone_through(paths, v, first, last, allowed, longest):
     return -1, 0.0
 
 
-@part(fastmath=False, error_model="numpy", nogil=True)
+@part(fastmath=False, error_model="numpy", nogil=True, **UNCOUNTED)
 def _of_vertex(paths, box, allow, v, j, smaller):
     """How vertex ``v`` has crossed the outline of block ``j`` (−1: not at all), by which edge, and how deep, m; ``smaller``
     m is the size of the smaller block."""
@@ -233,7 +233,7 @@ def _of_vertex(paths, box, allow, v, j, smaller):
     return (THROUGH, edge, depth) if edge >= 0 else (-1, -1, 0.0)
 
 
-@part(fastmath=False, error_model="numpy", nogil=True)
+@part(fastmath=False, error_model="numpy", nogil=True, **UNCOUNTED)
 def _tell(found, count, pair, vertex, edge, kind, depth):
     """Write a crossing to the row ``count`` of ``found`` where it has room; how many there are then."""
     if count < found.shape[0]:
@@ -242,7 +242,7 @@ def _tell(found, count, pair, vertex, edge, kind, depth):
     return count + 1
 
 
-@kept(fastmath=False, error_model="numpy", nogil=True)
+@kept(fastmath=False, error_model="numpy", nogil=True, **UNCOUNTED)
 def _find(pairs, paths, box, allow, found):
     """Number of crossings of ``pairs``, the first of them in ``found`` (m, 6) as far as it has room."""
     count, start = 0, paths.vertex_start

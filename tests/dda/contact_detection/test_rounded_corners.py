@@ -22,11 +22,11 @@ G = 9.81
 @kept(fastmath=False, error_model="numpy")
 def _meetings(x, moved, n1, n2, length):
     """``meeting`` of every place (n, 2) with every motion (n, 2) of it: normals (n, 2), gaps (n,) and lines (n,)."""
-    normal, gap, line = np.empty(x.shape), np.empty(len(x)), np.empty(len(x), np.int64)
+    normal, gap, line, places = np.empty(x.shape), np.empty(len(x)), np.empty(len(x), np.int64), np.empty(5)
     for k in range(len(x)):
         gap1, gap2 = x[k, 0] * n1[0] + x[k, 1] * n1[1], x[k, 0] * n2[0] + x[k, 1] * n2[1]
         normal[k, 0], normal[k, 1], gap[k], line[k] = meeting(
-            x[k, 0], x[k, 1], moved[k, 0], moved[k, 1], n1[0], n1[1], gap1, n2[0], n2[1], gap2, length
+            x[k, 0], x[k, 1], moved[k, 0], moved[k, 1], n1[0], n1[1], gap1, n2[0], n2[1], gap2, length, places
         )
     return normal, gap, line
 
