@@ -37,7 +37,7 @@ def record(
     bent = bent_bodies(now.system.deflected, state, motion)
 
     def moved(block: int, point: tuple[float, float]) -> np.ndarray:
-        affine = motion.current(block, point) - np.asarray(point)
+        affine = motion.current(block, np.asarray(point)) - np.asarray(point)
         return affine + bent[block].deflection(np.array([point], float))[0] if block in bent else affine
 
     cycle = _LazyCycle(

@@ -362,7 +362,7 @@ class EnergyBudget:
         first = self.last is None
         totals = self.totals + step
         start = step.before if first else self.start
-        jump = 0.0 if first else step.before - self.last.stored
+        jump = 0.0 if self.last is None else step.before - self.last.stored
         split = self.split + (jump if self.is_cut else 0.0)
         residual = self.residual + (0.0 if self.is_cut else jump) + step.residual
         work = abs(float(totals[_SUMS["gravity_work"]])) + abs(float(totals[_SUMS["load_work"]]))

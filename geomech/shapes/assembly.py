@@ -73,7 +73,8 @@ def assemble(
 
 def block_names(zone_names: Sequence[str]) -> list[str]:
     """A name a block: the zone's own, or "zone 1", "zone 2" … where a zone has several."""
-    count, seen, names = Counter(zone_names), Counter(), []
+    count, names = Counter(zone_names), []
+    seen: Counter[str] = Counter()
     for name in zone_names:
         seen[name] += 1
         names.append(name if count[name] == 1 else f"{name} {seen[name]}")

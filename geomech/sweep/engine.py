@@ -131,7 +131,9 @@ class LocalEngine:
         self._stopping = True
 
     def results(self, jobs: Iterable[Job]) -> Iterator[dict[str, Any]]:
-        waiting, again, attempts = iter(jobs), deque(), {}
+        waiting = iter(jobs)
+        again: deque[Job] = deque()
+        attempts: dict[int, int] = {}
         exhausted = False
         while True:
             while not self._stopping and (worker := self._idle(bool(again) or not exhausted)) is not None:

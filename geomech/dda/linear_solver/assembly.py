@@ -370,8 +370,8 @@ def assemble_contacts(
     Normal force N = −kₙ(g + n·Δu − κ t·Δu), with dilation κ. Stick: S = S₀ − kₛ t·Δu. Slip: S = ± (μ N + c) with the
     unknown N, which makes the matrix unsymmetric but friction exact in one solution.
     """
-    *stiff, symmetric = _springs(right, own.right, contacts, springs)
-    stiffness = ContactStiffness(*stiff, springs.lift)
+    normal, shear, slope, symmetric = _springs(right, own.right, contacts, springs)
+    stiffness = ContactStiffness(normal, shear, slope, springs.lift)
     assemble(pattern, data, own.matrix, contacts, stiffness, sides=sides, filled=filled)
     return symmetric, stiffness
 

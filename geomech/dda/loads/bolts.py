@@ -125,14 +125,14 @@ class BoltSet:
         # A ground end has no unknowns: its half of the vectors is zero, and its block number may be the bolt's own
         # block.
         pairs = Pairs(block, other, vectors, ends, axes, -1.0, np.zeros((len(own), 2)))
-        k = column("stiffness")
-        trial = column("pretension") + k * (length - rows["length"] - rows["plastic"])
+        stiffness = column("stiffness")
+        trial = column("pretension") + stiffness * (length - rows["length"] - rows["plastic"])
         compression = np.array([bolt.compression for bolt in own])
         most = column("yield_force")
         bolt_set = cls(
             bolts=bolts, number=number, pairs=pairs, ends=ends, length=length, trial=trial,
             dowel=rows["shear_force"].copy(),
-            stiffness=k, shear_stiffness=column("shear_stiffness"), least=np.where(compression, -most, 0.0), most=most,
+            stiffness=stiffness, shear_stiffness=column("shear_stiffness"), least=np.where(compression, -most, 0.0), most=most,
             strength=column("shear_strength"), slack=~compression,
             geometric=np.clip(trial, 0.0, most) / length, axial=np.zeros(len(own), int), across=np.zeros(len(own), int),
         )  # fmt: skip

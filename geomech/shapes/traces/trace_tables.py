@@ -160,7 +160,7 @@ def _read_geojson(path: Path, set_property: str) -> FieldFile:
     except RecursionError:
         raise FieldFileError(f"{path.name}: its arrays are nested too deep", "export it again") from None
     kind = data.get("type") if isinstance(data, dict) else None
-    features = {"FeatureCollection": lambda: data.get("features"), "Feature": lambda: [data]}.get(kind)
+    features = {"FeatureCollection": lambda: data.get("features"), "Feature": lambda: [data]}.get(str(kind))
     if features is None:
         raise FieldFileError(f"{path.name} is no GeoJSON of features", 'its "type" must be "FeatureCollection"')
     about_crs = data["crs"].get("properties") if isinstance(data.get("crs"), dict) else None
