@@ -229,7 +229,7 @@ def _torn(points: np.ndarray, triangles: np.ndarray, crack_edges: np.ndarray) ->
 
     triangles, old = triangles.copy(), triangles
     new_points: list[np.ndarray] = []
-    new_sides: list[list[int]] = []
+    new_sides: list[np.ndarray] = []
     for node, corners in about.items():
         sectors = _sectors(node, corners, old, cut)
         if len(sectors) < 2:

@@ -145,7 +145,7 @@ class LocalEngine:
             busy = [each for each in self._all if each.jobs]
             if not busy:
                 return
-            by_pipe = {each.pipe: each for each in busy}
+            by_pipe: dict[Any, _Worker] = {each.pipe: each for each in busy}
             for pipe in wait(list(by_pipe), timeout=0.5):
                 yield from self._read(by_pipe[pipe], again, attempts)
 

@@ -324,6 +324,7 @@ def _plain(value: Any) -> Any:
 
 
 def _own_folder(job: Job) -> Path:
+    assert job.folder is not None
     place = Path(job.folder)
     place.mkdir(parents=True, exist_ok=True)
     return place

@@ -193,7 +193,7 @@ class BoltSet:
             arm = self.ends[:, side] - moments[owner, 1:3]
             row = np.where(owner >= 0, order[owner], -1)
             turning = np.maximum(np.sum(arm * pull, axis=1), 0.0) / moments[owner, 0]
-            np.add.at(matrix, (row[row >= 0], 2, 2), turning[row >= 0])
+            np.add.at(matrix[:, 2, 2], row[row >= 0], turning[row >= 0])
 
     def assemble(
         self, matrix: np.ndarray, right: np.ndarray, order: np.ndarray

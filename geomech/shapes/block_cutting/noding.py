@@ -333,7 +333,8 @@ def _met(graph: Graph, fresh: np.ndarray, n_outlines: int, tolerance: float, rou
         # The edge is led through the node; one that has been moved onto it lies on it but for round-off.
         through.setdefault(e, []).append(k)
         if away > _REPORTED * tolerance:
-            mends.append(Mend("near miss", *nodes[k].tolist(), away))
+            x, y = nodes[k].tolist()
+            mends.append(Mend("near miss", x, y, away))
     if not merged and not through:
         return None
     return _led_through(nodes, edges, source, settled, through)

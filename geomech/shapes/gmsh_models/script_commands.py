@@ -173,7 +173,7 @@ def _tokens(data: bytes) -> Iterator[_Token]:
     for found in _TOKEN.finditer(data):
         text, kind = found.group(), found.lastgroup
         if kind != "blank":
-            yield _Token(kind, text, line)
+            yield _Token(str(kind), text, line)
         line += text.count(b"\n")
 
 

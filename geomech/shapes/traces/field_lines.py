@@ -200,7 +200,7 @@ def drawing_of_lines(lines: Sequence[Named]) -> FieldDrawing:
         warnings.append(
             (f"{own[0].place}: {what} called {name!r}, left out", 'points are monitors: call them "monitor:NAME"')
         )
-    traces = []
+    traces: list[Trace] = []
     for name, own in cracks.items():
         for k, line in enumerate(own, 1):
             places["cracks", len(traces)] = line.place

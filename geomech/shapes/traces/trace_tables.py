@@ -73,7 +73,7 @@ def _read_csv(path: Path) -> FieldFile:
     names = [name.strip().strip('"').lower() for name in header.split(mark)]
     names = [_COLUMNS.get(name, name) for name in names]
     if set(_ENDS) <= set(names):
-        wanted = _ENDS
+        wanted: tuple[str, ...] = _ENDS
     elif set(_VERTICES) <= set(names) and "id" in names:
         wanted = _VERTICES
     else:
