@@ -23,6 +23,7 @@ import numpy as np
 
 from ..compiled import UNCOUNTED, kept, part
 from ..model import OPEN, SLIP
+from .kinematics.newmark import BlockMass, SchemeTerms
 
 log = logging.getLogger(__name__)
 
@@ -320,13 +321,14 @@ def _add_contacts(out, contacts, closure):
 def step_energies(motion, stress, mass, scheme, gravity, contacts, closure):
     """The terms of `StepEnergy` in its order but for impacts, (14,) J/m.
 
-    ``motion``, ``stress`` and ``mass`` of the blocks (`StepMotion`, `StepStress`, `BlockMass`), ``scheme``
+    Plain tuples: ``motion``, ``stress`` and ``mass`` of the blocks (`StepMotion`, `StepStress`, `BlockMass`), ``scheme``
     (`SchemeTerms`), ``gravity`` (2,) m/s², ``contacts`` (`ContactStep`), and ``closure`` (n_laws,) m, the largest of
     joints with Bandis' law, inf for the others.
     """
     out = np.zeros(14)
-    _add_blocks(out, motion, stress, mass, scheme, gravity, np.empty(3))
-    _add_contacts(out, contacts, closure)
+    blocks = StepMotion(*motion), StepStress(*stress), BlockMass(*mass), SchemeTerms(*scheme)
+    _add_blocks(out, *blocks, gravity, np.empty(3))
+    _add_contacts(out, ContactStep(*contacts), closure)
     work = out[_GRAVITY_WORK] + out[_LOAD_WORK] + out[_OVERLAP]
     losses = out[_FRICTION], out[_DAMPING], out[_BOND], out[_SCHEME], out[_CARRIED]
     out[_RESIDUAL] = out[_KINETIC] + out[_ELASTIC] + out[_CONTACT] - out[_BEFORE]

@@ -27,6 +27,7 @@ import numpy as np
 
 from ...compiled import UNCOUNTED, kept, part
 from ...model import OPEN, SLIP, STICK
+from .coulomb_return import ContactStates, Strengths
 
 #: Bonds of a CONTACT row: whole, and cracked from its edge, so that it holds only while it is pressed.
 WHOLE, CRACKED = 1, 3
@@ -260,9 +261,12 @@ def _stick_again(f, faces, forces, states, strengths, called, violation):
 
 
 @kept(fastmath=False, error_model="numpy", nogil=True, **UNCOUNTED)
-def check_faces(faces, forces, before, states, strengths, slack, called, violation):
-    """Correct, in place, the states ``called`` and the ``violation`` of `check_states` for contacts whose whole face is
-    bonded; ``faces`` (`FaceBonds`), ``before`` (`ForcesBefore`), other arguments as there."""
+def check_faces(face_bonds, forces, forces_before, tried, strength, slack, new, violation):
+    """Correct, in place, the states ``new`` and the ``violation`` of `check_states` for contacts whose whole face is
+    bonded. Plain tuples: ``face_bonds`` (`FaceBonds`), ``forces_before`` (`ForcesBefore`), the states that were ``tried``
+    (`ContactStates`) and their ``strength`` (`Strengths`); other arguments as there."""
+    faces, before, states = FaceBonds(*face_bonds), ForcesBefore(*forces_before), ContactStates(*tried)
+    strengths, called = Strengths(*strength), ContactStates(*new)
     for f in range(faces.length.shape[0]):
         intact, opened, loose = _bond_of_face(f, faces, states)
         if not intact:

@@ -272,7 +272,7 @@ def _rotated(c, s, xx, yy, xy):
 @kept(fastmath=False, error_model="numpy", nogil=True)
 def assemble_blocks(order, n, mass, start, cracks, loads, scheme):
     """The blocks' own equations: (matrix (n, 6, 6), right side (n, 6), tangent (n_blocks, 3, 3), stress0 (n_blocks, 3)).
-    ``order`` (n_blocks,) as in `assembly.Pattern`, ``mass`` (`BlockMass`), ``start`` (`BlockStart`), ``cracks``
+    ``order`` (n_blocks,) as in `assembly.Pattern`; plain tuples of ``mass`` (`BlockMass`), ``start`` (`BlockStart`), ``cracks``
     (`CrackTerms`), ``loads`` (`BlockLoads`), ``scheme`` (`SchemeTerms`).
 
     - inertia and elasticity as in this module's equation, with the velocity of the ``start``, the factor ``heavier`` 1/w
@@ -284,7 +284,7 @@ def assemble_blocks(order, n, mass, start, cracks, loads, scheme):
     - damping: a viscous stress ∝ C Δε/dt that gives a block's lowest vibration (taken as that of a square, ω² =
       12 C₁₁/(ρ h²)) the fraction ``block_damping`` of critical damping, and Rayleigh damping.
     """
-    density, moments = mass.density, mass.moments
+    density, moments, _ = mass
     carried, stress, stiffness, compliance = start
     weight, block_damping, mass_damping, stiffness_damping, dt, heavier = scheme
     crack_given, crack_strain, crack_compliance, crack_offset = cracks

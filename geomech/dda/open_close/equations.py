@@ -179,12 +179,11 @@ class Equations:
                 self.springs, self.gap, found, state, direction, bonded, forces[:, 0], slip
             )
             missed = self.curved.misfit(springs, gap, known, known_gap, state, forces)
-        tried, strengths = ContactStates(state, direction, bonded), Strengths.of(known)
-        *new, violation = check_states(forces, tuple(tried), tuple(strengths), found.shear, self.slack)
-        called = ContactStates(*new)
+        tried, strengths = (state, direction, bonded), tuple(Strengths.of(known))
+        *called, violation = check_states(forces, tried, strengths, found.shear, self.slack)
         if found.faces is not None:
-            begun = ForcesBefore(found.normal, found.shear)
-            check_faces(FaceBonds.of(found.faces), forces, begun, tried, strengths, self.slack, called, violation)
+            faces, before = tuple(FaceBonds.of(found.faces)), (found.normal, found.shear)
+            check_faces(faces, forces, before, tried, strengths, self.slack, tuple(called), violation)
         return Answer(unknowns, forces, States(*called), violation, missed, slip, springs, gap)
 
     def first_bonds(self, states: States, answer: Answer, which: np.ndarray) -> np.ndarray:
