@@ -15,6 +15,7 @@ from .contact_detection.initial_overlap import refuse_overlap
 from .counters import Work
 from .excavation import Excavations, until_next_event
 from .higher_order.deflected_blocks import DeflectedBlocks
+from .higher_order.glued_cells import GluedFaces, KeptCorners
 from .higher_order.order_choice import OrderChoice, relaid
 from .higher_order.six_row_system import six_row_pattern
 from .higher_order.unsupported import refuse_unsupported, refuse_unsupported_loads
@@ -99,7 +100,10 @@ class BlockSystem:
         #: What finds orders as the run goes; None where all are given.
         self.order_choice: OrderChoice | None = None
         self._take_out(None, None)
-        if blocks.order is not None and (np.asarray(blocks.order) != 1)[~self.fixed].any():
+        #: Faces of cells that are glued; None where no blocks are cells.
+        self.glued: GluedFaces | None = None
+        ordered = blocks.order is not None and (np.asarray(blocks.order) != 1)[~self.fixed].any()
+        if ordered or blocks.glued is not None:
             refuse_unsupported(blocks, self.materials, self.joints, self.settings)
             self._choose_orders()
         rigid = rigid & ~self.fixed
@@ -147,7 +151,7 @@ class BlockSystem:
             self.blocks, self.fixed, self.density, self.stiffness, self.compliance, self.settings.order_target
         )
         self.order_choice = choice if choice.found.any() else None
-        self.order = np.ones(self.blocks.n_blocks, np.int64)
+        self.order = np.zeros(self.blocks.n_blocks, np.int64)
         self._take_orders(choice, choice.first)
 
     def _take_orders(self, choice: OrderChoice, order: np.ndarray) -> None:
@@ -156,6 +160,9 @@ class BlockSystem:
             return
         self.order, self.deflected, self._sparse = order, choice.deflected(order), None
         self.finder.at_corners = self.deflected is not None
+        if self.blocks.glued is not None:
+            self.glued = GluedFaces.of(self.deflected)
+            self.finder.kept_corners = KeptCorners(self.deflected, self.finder.joined)
         self.finder.deflection, self.finder.sag = np.zeros((2, self.blocks.n_blocks))
 
     @property
@@ -303,6 +310,8 @@ class BlockSystem:
         and its solver: kept from step to step while the same blocks do."""
         if linked is not None:
             block, other = np.concatenate([block, linked[0]]), np.concatenate([other, linked[1]])
+        if self.glued is not None:
+            block, other = np.concatenate([block, self.glued.block]), np.concatenate([other, self.glued.other])
         if self.deflected is not None:
             known = None if self._sparse is None else self._sparse[1]
             pattern = six_row_pattern(self.free, self.deflected.rows, block, other, moments[:, 1:3], known)
