@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -22,10 +23,12 @@ def rock_of(name: str) -> str:
     return name.partition(CELL)[0]
 
 
-def divided(blocks: Blocks, size: np.ndarray, shape: np.ndarray) -> tuple[Blocks, np.ndarray]:
+def divided(
+    blocks: Blocks, size: np.ndarray, shape: np.ndarray, between: Sequence[str] | None = None
+) -> tuple[Blocks, np.ndarray]:
     """``blocks`` of which those with a ``size`` (n_blocks,), m, not nan, are divided into cells of about that size, ``shape``
     (n_blocks,) "triangles" or "quads"; and the block (n_cells,) that each is of. Sides of cells keep the names of the edges
-    that they lie on. Raises CannotMesh that names the block."""
+    that they lie on, those between cells have the name ``between`` (n_blocks,), if any. Raises CannotMesh that names the block."""
     polygons, names, edge_names, parent, glued, n = [], [], [], [], [], 0
     start, labels = blocks.vertex_start, blocks.edge_names
     for b in range(blocks.n_blocks):
@@ -46,7 +49,7 @@ def divided(blocks: Blocks, size: np.ndarray, shape: np.ndarray) -> tuple[Blocks
             raise CannotMesh(
                 f"{blocks.names[b]!r} cannot be divided into {shape[b]} of {size[b]:g} m: {error}"
             ) from error
-        edge_of = dict(lines)
+        edge_of, inner = dict(lines), "" if between is None else between[b]
         vertices = np.concatenate(loops)
         sides: dict[tuple[int, int], int] = {}
         for k, cell in enumerate(cells):
@@ -58,7 +61,7 @@ def divided(blocks: Blocks, size: np.ndarray, shape: np.ndarray) -> tuple[Blocks
                 else:
                     sides[one, two] = n + side
                 edge = edge_of.get((min(one, two), max(one, two)))
-                own.append("" if edge is None else labels[blocks.edge_name[vertices[edge]]])
+                own.append(inner if edge is None else labels[blocks.edge_name[vertices[edge]]])
             polygons.append([points[cell]])
             edge_names.append([own])
             names.append(f"{blocks.names[b]}{CELL}{k + 1}")

@@ -136,6 +136,8 @@ class ContactFinder:
         )
         #: Pairs of cells that meet, as numbers a · n_blocks + b.
         self.joined = _meeting_cells(blocks)
+        #: Those that have parted: they touch, and no bond holds them.
+        self.parted = np.zeros(0, np.int64)
         #: Which (k,) of the contacts at corners are kept, where not all are.
         self.kept_corners: Callable[[ContactSet], np.ndarray] | None = None
         self._always_fixed = np.ascontiguousarray(blocks.fixed, dtype=np.bool_)
@@ -180,6 +182,10 @@ class ContactFinder:
         block, other = self._owner[met.table[:, 0]], self._owner[met.table[:, 1]]
         springs = self._springs(block, other, law, geometry[:, 4], state.time >= self._eased_from)
         remembered = self._remembered(old, parent, state.time, geometry, springs, self._stiff[law])
+        if len(self.parted):
+            remembered["bonded"][
+                np.isin(np.minimum(block, other) * len(self._area) + np.maximum(block, other), self.parted)
+            ] = 0
         eased = 0.0
         if self._eases and len(old):
             eased = self._keep_forces(old, parent, geometry, springs, remembered, law)
@@ -513,6 +519,19 @@ class ContactFinder:
                 self._law_of[i, j] = _NEVER if index is None else index
             law = self._law_of[a, b]
         return law
+
+    def part(self, blocks: Blocks, parted: np.ndarray) -> None:
+        """Let the cells touch whose glued faces have ``parted`` (m,)."""
+        edges = np.asarray(blocks.glued)[parted]
+        pair = np.sort(blocks.vertex_block[edges], axis=1)
+        self.parted = np.unique(pair[:, 0] * blocks.n_blocks + pair[:, 1])
+        self.joined = np.setdiff1d(
+            _meeting_cells(replace(blocks, glued=np.asarray(blocks.glued)[~parted])), self.parted
+        )
+
+    def laws_of(self, edge: np.ndarray, mate: np.ndarray) -> np.ndarray:
+        """(n,) the joint laws between the edges ``edge`` and ``mate`` (n,); −1 where they do not touch."""
+        return self._laws(edge, mate)
 
     def _one_rock(self, vertex: np.ndarray, edge: np.ndarray) -> np.ndarray:
         """(n,) True where the blocks of ``vertex`` and ``edge`` (n,) are cells that meet, glued, in a face or a corner."""

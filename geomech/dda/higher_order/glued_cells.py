@@ -19,12 +19,12 @@ is an eigenvalue, computed for each cell whatever its shape; τ is twice the lar
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ...compiled import kept
-from ...model import State
+from ...model import JointLaw, State
 from ..kinematics.midpoint_configuration import MidpointConfiguration
 from ..open_close.contact_set import ContactSet
 from .deflected_blocks import DeflectedBlocks, rotation_of
@@ -38,6 +38,8 @@ from .six_row_system import SixRowPattern, add_force, add_pair, moved
 PENALTY = 2.0
 #: Corners of cells of one rock lie in one place if they are no farther apart than this part of the cells' size (√area).
 _SAME = 1e-3
+#: Faces part together that bear as much as the most stressed one, but for this part of it: those that symmetry makes equal.
+_TOGETHER = 0.01
 
 
 def traction_of(normal: np.ndarray) -> np.ndarray:
@@ -95,6 +97,14 @@ class GluedFaces:
         steepest = faces._steepest()
         faces.penalty[:] = PENALTY * np.maximum(steepest[block], steepest[other])[face]
         return faces
+
+    def kept(self, keep: np.ndarray) -> GluedFaces:
+        """The faces of which ``keep`` (m,) is True."""
+        number, some = np.cumsum(keep) - 1, keep[self.face]
+        return replace(
+            self, block=self.block[keep], other=self.other[keep], face=number[self.face[some]],
+            points=self.points[some], normal=self.normal[some], weight=self.weight[some], penalty=self.penalty[some],
+        )  # fmt: skip
 
     @property
     def owners(self) -> tuple[np.ndarray, np.ndarray]:
@@ -243,6 +253,54 @@ class Glue:
         """(n, 2) Pa, tension and shear that the points bear once the springs have changed by ``change`` (2 n, 2)."""
         n = len(self.faces.face)
         return -self.faces.penalty[:, None] * (self.before + change)[:n]
+
+    def mean_traction(self, change: np.ndarray) -> np.ndarray:
+        """(m, 2) Pa, the mean of `traction` on each face."""
+        faces, out = self.faces, np.zeros((len(self.faces.block), 2))
+        np.add.at(out, faces.face, faces.weight[:, None] * self.traction(change))
+        return out / np.bincount(faces.face, faces.weight, len(out))[:, None]
+
+
+@dataclass(frozen=True, eq=False)
+class GlueStrength:
+    """What the glued faces (m,) of cells bear: ``tension`` and ``cohesion``, Pa, and the ``friction`` (tangent) by which pressure
+    adds to it; infinite of faces that hold."""
+
+    tension: np.ndarray
+    cohesion: np.ndarray
+    friction: np.ndarray
+
+    @classmethod
+    def of(cls, laws: list[JointLaw | None]) -> GlueStrength:
+        """Of faces with these ``laws``, None of those that hold. Raises ValueError for a law without tensile strength."""
+        weak = next((law for law in laws if law is not None and not law.tensile_strength > 0), None)
+        if weak is not None:
+            raise ValueError(f"cells cannot part by the joint {weak.name!r}: it has no tensile strength")
+        given = [
+            (np.inf, np.inf, 0.0) if law is None else (law.tensile_strength, law.cohesion, law.friction) for law in laws
+        ]
+        tension, cohesion, friction = np.array(given).reshape(-1, 3).T
+        with np.errstate(divide="ignore", invalid="ignore"):
+            tip = np.where(friction > 0, cohesion / friction, np.inf)
+        return cls(np.minimum(tension, tip), cohesion, friction)
+
+    @property
+    def any(self) -> bool:
+        """Whether any face can part."""
+        return bool(np.isfinite(self.tension).any())
+
+    def parting(self, parted: np.ndarray, mean: np.ndarray) -> np.ndarray | None:
+        """(m,) the faces that have ``parted``, and those of the others, with this ``mean`` traction (n, 2), that bear more than
+        their strength and nearly as much as any; None where none does."""
+        left = np.flatnonzero(~parted)
+        pull, shear = mean[:, 0], np.abs(mean[:, 1])
+        shear_strength = self.cohesion[left] - np.minimum(pull, self.tension[left]) * self.friction[left]
+        share = np.maximum(pull / self.tension[left], shear / np.maximum(shear_strength, 1e-300))
+        if not len(share) or not share.max() > 1.0:
+            return None
+        out = parted.copy()
+        out[left[share > max(1.0, (1.0 - _TOGETHER) * share.max())]] = True
+        return out
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,6 +12,14 @@ from ..errors import Fault
 from ..locator import Path
 from ..tables import SceneTables
 
+#: What names of faces between cells begin with.
+CELLS = "cells:"
+
+
+def cells_of(zone: str) -> str:
+    """The name of the faces between the cells of a ``zone``."""
+    return CELLS + zone
+
 
 def with_cells(tables: SceneTables, drawing: Drawing, place: Callable[[Path], str], faults: list[Fault]) -> Drawing:
     """``drawing`` with the blocks of zones that have a mesh size divided into cells; what is wrong goes to ``faults``."""
@@ -24,8 +32,9 @@ def with_cells(tables: SceneTables, drawing: Drawing, place: Callable[[Path], st
 
     size = np.array([meshed[zone].mesh_size_m if zone in meshed else np.nan for zone in drawing.zones], float)
     shape = np.array([meshed[zone].cells if zone in meshed else "" for zone in drawing.zones])
+    between = [cells_of(zone) if zone in meshed and meshed[zone].cell_joint else "" for zone in drawing.zones]
     try:
-        blocks, of = divided(drawing.blocks, size, shape)
+        blocks, of = divided(drawing.blocks, size, shape, between)
     except (CannotMesh, GmshUnavailable) as error:
         name = next(iter(meshed))
         faults.append(Fault(place(("zones", name, "mesh_size_m")), str(error), "try another size"))

@@ -64,6 +64,11 @@ class ZoneTable(Table):
     cells: Literal["triangles", "quads"] = Field(
         "triangles", description='what blocks are divided into with `mesh_size_m`: "triangles" or "quads"'
     )
+    cell_joint: str | None = Field(
+        None,
+        description="a name of [joints]: faces between cells part where they bear its tensile or shear strength, and touch by its "
+        "friction from then on (unset: cells hold together)",
+    )
     body: Literal["block", "plane", "half-plane"] = Field(
         "block",
         description='"plane" or "half-plane": rock without an end, of which the zone is the piece that is seen; its holes are '
@@ -77,6 +82,8 @@ class ZoneTable(Table):
             raise ValueError('a "half-plane" needs `surface`, the name of the edges on its free surface')
         if self.mesh_size_m is not None and (self.fixed or self.guided is not None or self.body != "block"):
             raise ValueError("rock that is `fixed`, `guided` or without an end is not divided: leave `mesh_size_m` out")
+        if self.cell_joint is not None and self.mesh_size_m is None:
+            raise ValueError("`cell_joint` belongs to cells: say `mesh_size_m`, or leave it out")
         if self.mesh_size_m is not None and self.order in (1, "auto"):
             raise ValueError(
                 "cells take an order of 2 to 8, for uniformly strained ones bend as stiffly as one block: say order = 3"

@@ -28,18 +28,30 @@ def glued(blocks: Blocks) -> Blocks:
     return replace(blocks, glued=np.array(pairs))
 
 
-def cells_of(cells, order, *, below=(), joint=None, rock=None, loaded=None, angle=0.0, **settings) -> dda.BlockSystem:
-    """``cells`` above the fixed blocks ``below``; sides of which ``loaded`` (middle) → bool are called "loaded"."""
+def cells_of(cells, order, *, below=(), joint=None, rock=None, loaded=None, angle=0.0, between="", **settings):
+    """The system of ``cells`` above the fixed blocks ``below``; sides of which ``loaded`` (middle) → bool are called "loaded",
+    all other sides of cells ``between``."""
     polygons = [*below, *cells]
     sides = [0.5 * (polygon + np.roll(polygon, -1, axis=0)) for polygon in polygons]
-    names = [[["loaded" if loaded is not None and loaded(at) else "" for at in side]] for side in sides]
+    other = [""] * len(below) + [between] * len(cells)
+    names = [
+        [["loaded" if loaded is not None and loaded(at) else name for at in side]]
+        for side, name in zip(sides, other, strict=True)
+    ]
     fixed = [True] * len(below) + [False] * len(cells)
     order = [*[1] * len(below), *np.broadcast_to(order, len(cells)).tolist()]
     blocks = Blocks.from_polygons([turned(p, angle) for p in polygons], fixed=fixed, order=order, edge_names=names)
     return system(glued(blocks), joint, rock, **settings)
 
 
-def system(blocks: Blocks, joint: JointLaw | None = None, rock: Material | None = None, **settings) -> dda.BlockSystem:
+def system(blocks: Blocks, joint=None, rock: Material | None = None, **settings) -> dda.BlockSystem:
+    """Of these ``blocks``; ``joint`` is the law of all contacts, or a pair: that of unnamed edges, and that of named ones."""
+    if isinstance(joint, tuple):
+        given = {"dynamic_factor": 0.0, "time_step": 10.0, "max_displacement_ratio": 1.0} | settings
+        return dda.BlockSystem(
+            blocks, [rock or Material("rock", 2e10, 0.25, 2500.0)], joint,
+            lambda one, two: int(one == two != ""), settings=DdaSettings(**given),
+        )  # fmt: skip
     given = {"dynamic_factor": 0.0, "time_step": 10.0, "max_displacement_ratio": 1.0} | settings
     rock, joint = rock or Material("rock", 2e10, 0.25, 2500.0), joint or JointLaw("joint", 0.6)
     return dda.BlockSystem(blocks, [rock], [joint], settings=DdaSettings(**given))

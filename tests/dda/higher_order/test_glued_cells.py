@@ -174,3 +174,72 @@ def test_a_beam_of_cells_falls_on_the_floor_as_one():
     ]
     assert np.max(joined) < 1e-5
     assert 0.2499 < state.vertices[4:, 1].mean() < 0.27
+
+
+GRAIN = JointLaw("grain", 0.5, cohesion=4e6, tensile_strength=2e6)
+THIN = Material("rock", 2e10, 0.0, 2500.0, plane="stress")
+
+
+def strained_to(system, force: tuple[float, float], steps: int):
+    """The last of so many steps of 5 ms, in which inertia holds what comes loose."""
+    state = State.at_rest(system.blocks)
+    for _ in range(steps):
+        result = system.step(state, loaded(*force))
+        state = result.state
+    return result
+
+
+@pytest.mark.parametrize(("share", "parts"), [(0.98, False), (1.02, True)])
+def test_cells_part_at_the_tension_that_they_bear(share, parts):
+    """A bar of two columns of cells on a clamp that holds: its rows part, all at once, between 0.98 and 1.02 of their tensile
+    strength; the faces along the bar bear nothing."""
+    cells = columns_and_rows(np.linspace(0, 2, 3), np.linspace(0, 3, 4))
+    system = cells_of(
+        cells, 3, below=[rectangle(-1, -1, 3, 0)], joint=(CLAMP, GRAIN), between="cells", rock=THIN,
+        loaded=lambda at: abs(at[1] - 3) < 1e-9, time_step=5e-3,
+    )  # fmt: skip
+    state = strained_to(system, (0.0, share * 2e6), 3).state
+    one, two = system.blocks.vertices[system.blocks.glued[:, 0]], system.blocks.vertices[system.blocks.glued[:, 1]]
+    across = np.abs(one[:, 1] - two[:, 1]) < 1e-9
+    assert np.array_equal(state.parted, across & parts)
+
+
+@pytest.mark.parametrize(("share", "parts"), [(0.98, False), (1.02, True)])
+def test_cells_part_in_shear_and_slide_by_friction(share, parts):
+    """A bar that is pressed by P on a smooth floor, its cells divided at 45°: these bear P/2 across and along, and part at P/2 =
+    c + P/2 tan φ. What has parted slides, S = N tan φ; a bond does not come back."""
+    cells = [
+        np.array(p, float)
+        for p in ([[0, 0], [1, 0], [1, 2], [0, 1]], [[0, 1], [1, 2], [1, 3], [0, 2]], [[0, 2], [1, 3], [1, 4], [0, 4]])
+    ]
+    system = cells_of(
+        cells, 3, below=[rectangle(-1, -1, 3, 0)], joint=(SMOOTH, GRAIN), between="cells", rock=THIN,
+        loaded=lambda at: abs(at[1] - 4) < 1e-9, time_step=1e-2,
+    )  # fmt: skip
+    result = strained_to(system, (0.0, -share * 2 * 4e6 / (1 - np.tan(0.5))), 4)
+    assert (result.state.parted == parts).all()
+    between = result.contacts[(result.contacts["other"] > 0) & (result.contacts["normal_force"] > 0)]
+    assert (len(between) > 0) == parts
+    assert np.abs(between["shear_force"]) == pytest.approx(np.tan(0.5) * between["normal_force"], rel=1e-6)
+    assert not between["bonded"].any()
+
+
+def test_cells_that_have_parted_are_told_by_the_state():
+    """Another system goes on from a state in which faces have parted as the first does; a joint without tensile strength
+    cannot part cells."""
+    cells = columns_and_rows(np.linspace(0, 1, 2), np.linspace(0, 3, 4))
+
+    def built(law: JointLaw):
+        return cells_of(
+            cells, 2, below=[rectangle(-1, -1, 3, 0)], joint=(CLAMP, law), between="cells", rock=THIN,
+            loaded=lambda at: abs(at[1] - 3) < 1e-9, time_step=5e-3,
+        )  # fmt: skip
+
+    middle = strained_to(built(GRAIN), (0.0, 2.1e6), 3).state
+    assert middle.parted.any()
+    one, other = built(GRAIN), built(GRAIN)
+    first, second = one.step(middle, loaded(0.0, 2.1e6)).state, other.step(middle, loaded(0.0, 2.1e6)).state
+    assert (second.parted >= middle.parted).all()
+    assert np.array_equal(first.vertices, second.vertices) and np.array_equal(first.parted, second.parted)
+    with pytest.raises(ValueError, match="'grain': it has no tensile strength"):
+        built(replace(GRAIN, tensile_strength=0.0))

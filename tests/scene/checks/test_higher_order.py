@@ -43,6 +43,13 @@ def test_what_is_not_supported_is_refused_at_its_key(tmp_path, more, message):
         ("order = 4", "order = 9", "9"),
         ("order = 4", "order = 1\nmesh_size_m = 0.5", "cells take an order of 2 to 8"),
         ("order = 4", "order = 2\nmesh_size_m = 0.0", "mesh_size_m"),
+        ("order = 4", 'order = 2\ncell_joint = "grain"', "belongs to cells"),
+        ("order = 4", 'order = 2\nmesh_size_m = 0.4\ncell_joint = "grain"', r"no \[joints.grain\]"),
+        (
+            "order = 4",
+            'order = 2\nmesh_size_m = 0.4\ncell_joint = "grain"\n[joints.grain]\nfriction_angle_deg = 30',
+            "no tensile strength",
+        ),
         ("[zones.ground]\nfixed = true", "[zones.ground]\nfixed = true\nmesh_size_m = 0.5", "is not divided"),
         ("order = 4", 'order = "high"', "auto"),
         (
@@ -113,3 +120,13 @@ def test_a_zone_of_cells_runs_and_resumes(tmp_path, shape):
     run(load_scene(scene(tmp_path, more, text=text), ("run.end_time_s=0.05",)), whole)
     for name in ("history.csv", "contacts.pvd"):
         assert (folder / name).read_bytes() == (whole / name).read_bytes()
+
+
+def test_cells_have_the_joint_by_which_they_part(tmp_path):
+    text = BENDING.replace("order = 4", 'order = 2\nmesh_size_m = 0.6\ncell_joint = "grain"')
+    more = "[joints.grain]\nfriction_angle_deg = 30\ntensile_strength_pa = 1e6\ncohesion_pa = 2e6\n"
+    problem = load_scene(scene(tmp_path, more, text=text)).problem()
+    edge, mate = problem.blocks.glued[0]
+    names = [problem.blocks.edge_names[problem.blocks.edge_name[v]] for v in (edge, mate)]
+    assert names == ["cells:block", "cells:block"]
+    assert problem.joints[problem.joint_index(*names)].name == "grain"
