@@ -12,6 +12,7 @@ from typing import Any
 
 from ..model import Blocks, Cracks, Problem
 from ..shapes.mesh_exchange import SUFFIXES as OTHER_MESHES
+from .assembly.cells import with_cells
 from .assembly.drawn_marks import with_marks
 from .build import build_problem
 from .checks.action_checks import check_actions
@@ -213,6 +214,7 @@ def load_scene(
     place: Callable[[Path], str] = places
     if drawing is not None:
         tables, place = with_marks(moved(tables, drawing.origin), drawing, places, faults, warnings)
+        drawing = with_cells(tables, drawing, place, faults)
     sections = Check(tables, data, drawing, place, faults, warnings)
     check(sections)
     check_actions(sections)
