@@ -18,7 +18,6 @@ from docs.generate import gallery  # noqa: E402
 NOT_REMADE: set[str] = {
     "bench_dda.png",
     "bench_ddm.png",
-    "bench_geometry.png",
     "bench_solvers.png",
     "jointed_slope.png",
     "random_slope.png",
