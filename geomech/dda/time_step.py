@@ -23,7 +23,6 @@ from .energy_balance import (
     sliding,
     step_energies,
 )
-from .equation_records import BlockEquations, ContactMotion
 from .impacts.restitution import Rebound, RigidBlocks, Striking
 from .joint_laws.coulomb_return import reserves
 from .joint_laws.friction_arrest import Stopped, Unresolved, contact_speeds, dissipating, kinetic_energy, stop
@@ -53,7 +52,7 @@ from .open_close.contact_set import ContactSet
 from .open_close.equations import Equations, Unsettled
 from .open_close.iteration import is_large, settle
 from .open_close.settled_states import Settled
-from .out_of_balance import ContactForces, imbalance
+from .out_of_balance import imbalance
 from .results import CrackResponse, StepResult
 
 if TYPE_CHECKING:
@@ -226,8 +225,9 @@ class Attempt:
             # What is cut at the first sign needs no factors in double, of 100 000 blocks another 1.6 GB.
             self.pattern.solver.single_only = is_large(self.n_free, scheme.static, system.settings.contact_solver)
         self.matrix, self.right, self.tangent, self.stress0 = assemble_blocks(
-            self.order, self.n_free, self._mass, BlockStart(self.begun, self.stress, system.stiffness, system.compliance),
-            self.cracks, BlockLoads(self.gravity, self.load), scheme.terms(dt, self.heavier),
+            self.order, self.n_free, tuple(self._mass),
+            tuple(BlockStart(self.begun, self.stress, system.stiffness, system.compliance)), tuple(self.cracks),
+            tuple(BlockLoads(self.gravity, self.load)), tuple(scheme.terms(dt, self.heavier)),
         )  # fmt: skip
 
     @property
@@ -462,7 +462,7 @@ class Attempt:
         system = self.system
         outlines = Outlines(self.vertices, system.vertex_start, self.moments)
         return advance(
-            increment, self.carried, outlines, self.tangent, self.stress0, self.cracks, system.turns, self.dt,
+            increment, self.carried, tuple(outlines), self.tangent, self.stress0, tuple(self.cracks), system.turns, self.dt,
             system.scheme.static,
         )  # fmt: skip
 
@@ -720,9 +720,9 @@ class Attempt:
         """As `imbalance`."""
         found, settled = self.found, self.settled
         return imbalance(
-            BlockEquations(self.matrix, right), ContactMotion(found.block, found.other, self.order, self.vectors),
-            settled.unknowns, ContactForces(settled.normal_force, settled.shear_force), self.acceleration, self._mass,
-            BlockLoads(self.gravity, load), largest,
+            (self.matrix, right), (found.block, found.other, self.order, self.vectors), settled.unknowns,
+            (settled.normal_force, settled.shear_force), self.acceleration, tuple(self._mass), (self.gravity, load),
+            largest,
         )  # fmt: skip
 
     def _worst_overlap(self) -> tuple[float, int, int, float, float, float]:
@@ -740,17 +740,15 @@ class Attempt:
         weight = self.weight if isinstance(self.weight, np.ndarray) else np.full(len(found), self.weight)
         impact, velocity = self.impact, self.velocity if self.impact is None else self.impact.without
         normal, shear = self._real_springs()
+        motion = StepMotion(self.increment, self.state.velocity, self.carried, velocity, self.acceleration, load)
+        stress = StepStress(self.stress, self.tangent, self.stress0, system.compliance, system.stiffness)
+        contacts = ContactStep(
+            found.state, settled.state, found.bonded, settled.bonded, found.gap_before, settled.gap,
+            found.arc + np.zeros(len(found)), settled.lifted, settled.slip, self.slid, settled.normal_force,
+            found.shear, settled.shear_force, end_shear, normal, shear, weight, found.law,
+        )  # fmt: skip
         energies = step_energies(
-            StepMotion(self.increment, self.state.velocity, self.carried, velocity, self.acceleration, load),
-            StepStress(self.stress, self.tangent, self.stress0, system.compliance, system.stiffness),
-            self._mass,
-            scheme.terms(self.dt),
-            self.gravity,
-            ContactStep(
-                found.state, settled.state, found.bonded, settled.bonded, found.gap_before, settled.gap,
-                found.arc + np.zeros(len(found)), settled.lifted, settled.slip, self.slid, settled.normal_force,
-                found.shear, settled.shear_force, end_shear, normal, shear, weight, found.law,
-            ),
+            tuple(motion), tuple(stress), tuple(self._mass), tuple(scheme.terms(self.dt)), self.gravity, tuple(contacts),
             system.finder.closure,
         )  # fmt: skip
         energy = StepEnergy(*energies.tolist())

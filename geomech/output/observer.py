@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 from collections.abc import Iterable
 from pathlib import Path
-from typing import Any, Protocol, runtime_checkable
+from typing import Any, Protocol, cast, runtime_checkable
 
 from geomech.model import Cycle, Problem
 
@@ -31,6 +31,14 @@ class Observer(Protocol):
     def on_end(self, summary: dict[str, Any], error: BaseException | None = None) -> None: ...
 
 
+class Resumed(Observer, Protocol):
+    """An observer that goes on with what it wrote before."""
+
+    def memory(self) -> Any: ...
+
+    def on_resume(self, problem: Problem, folder: Path, memory: Any) -> None: ...
+
+
 class Group:
     """Several observers as one. Ends every one of them that was started, even when another fails in its `on_end`;
     the first such failure is raised after all have ended."""
@@ -53,12 +61,16 @@ class Group:
                 observer.on_start(problem, folder)
             else:
                 left.remove(mine)
-                observer.on_resume(problem, folder, mine[1])
+                cast(Resumed, observer).on_resume(problem, folder, mine[1])
             self._started.append(observer)
 
     def memories(self) -> list[tuple[str, Any]]:
         """(kind, memory) of every observer that can go on with one."""
-        return [(_kind(observer), observer.memory()) for observer in self.observers if hasattr(observer, "memory")]
+        return [
+            (_kind(observer), cast(Resumed, observer).memory())
+            for observer in self.observers
+            if hasattr(observer, "memory")
+        ]
 
     def on_cycle(self, cycle: Cycle) -> None:
         for observer in self.observers:

@@ -27,7 +27,9 @@ class RunLog:
         self.level = level
 
     def on_start(self, problem: Problem, folder: Path) -> None:
-        self._problem, self._last, self._happened = problem, None, set()
+        self._problem = problem
+        self._last: Cycle | None = None
+        self._happened: set[Any] = set()
         self._open(Path(folder), "w")
         _log.info("%s: %s, %s", problem.title, problem.inventory, counted(len(problem.materials), "material"))
 

@@ -150,7 +150,7 @@ def evenly(run: Run, cycles: Sequence[int], most: int) -> list[int]:
         if done[-1] > done[0]:
             way = way + (done - done[0]) / (done[-1] - done[0])
     numbers = np.asarray(cycles)
-    first = {}
+    first: dict[Any, Any] = {}
     for event in run.events if len(run.events) else ():
         first.setdefault(str(event["kind"]), int(event["cycle"]))
     fixed = {int(numbers[0]), int(numbers[-1])}

@@ -59,7 +59,7 @@ def _add_times(page: Page, runs: Sequence[Run]) -> None:
 def add_table(page: Page, runs: Sequence[Run]) -> None:
     """The table that the terminal shows, columns that no run fills left out."""
     headers, *rows = shown(table(runs))
-    page.table(headers, rows)
+    page.table([str(name) for name in headers], rows)
 
 
 def differences(runs: Sequence[Run]) -> dict[str, list[Any]]:

@@ -64,7 +64,7 @@ def _row(run: Run) -> dict[str, Any]:
     }
 
 
-def shown(rows: Sequence[dict[str, Any]]) -> list[list[str | None]]:
+def shown(rows: Sequence[dict[str, Any]]) -> list[Sequence[str | None]]:
     """Headers and cells of the rows as they are read: columns that no run fills left out, loads in the unit that the
     largest of them is told in."""
     headers = [name for name in COLUMNS if any(row[name] is not None for row in rows)]

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -72,7 +72,8 @@ def as_gmsh_mesh(path: Path, folder: Path) -> Path:
 def _with_groups(mesh, path: Path) -> PhysicalMesh:
     names_of = _sets(mesh)
     line_names, face_names = _Names(), _Names()
-    lines, faces, entities = [], [], {}
+    lines, faces = [], []
+    entities: dict[Any, Any] = {}
     for k, cells in enumerate(mesh.cells):
         if cells.type in _LINES:
             for i, nodes in enumerate(cells.data[:, :2].tolist()):

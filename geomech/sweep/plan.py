@@ -550,8 +550,9 @@ def _map_of(scene: Any) -> tuple[tuple[float, float, float, float], tuple[int, i
     low, high = blocks.vertices[free].min(axis=0), blocks.vertices[free].max(axis=0)
     size = high - low
     cell = float(max(size)) / _CELLS or 1.0
-    cells = tuple(int(max(1, math.ceil(length / cell - 1e-9))) for length in size)
-    return (*map(float, low), float(low[0] + cells[0] * cell), float(low[1] + cells[1] * cell)), cells
+    across, up = (int(max(1, math.ceil(length / cell - 1e-9))) for length in size)
+    x, y = map(float, low)
+    return (x, y, float(low[0] + across * cell), float(low[1] + up * cell)), (across, up)
 
 
 def _toml(value: Any) -> str:

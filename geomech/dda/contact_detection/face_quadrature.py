@@ -126,9 +126,9 @@ class FacePoints:
         if glued.any():
             shortest[glued] = 1.0
             apart[glued], share[glued] = softened(ends[glued], length[glued])
-            some = (apart < _AT_CORNERS) | (share < _AT_CORNERS)
+            inside = (apart < _AT_CORNERS) | (share < _AT_CORNERS)
             ends, length, held, shortest, apart, share, glued = (
-                each[some] for each in (ends, length, held, shortest, apart, share, glued)
+                each[inside] for each in (ends, length, held, shortest, apart, share, glued)
             )
         part = _left(borne.bare[ends], _pressed(borne.normal[ends], held, shortest), held, shortest)
         still, full = np.zeros_like(part), np.ones(len(part))

@@ -354,7 +354,7 @@ class BlockSolver:
         if number <= few:
             self.work.factorisations_kept += 1
             return False
-        self.factor(data, changed, not rough or changed is None or number < MOSTLY * self.n)
+        self.factor(data, changed, bool(not rough or changed is None or number < MOSTLY * self.n))
         return True
 
     def _count(self, share: float) -> None:

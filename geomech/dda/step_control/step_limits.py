@@ -219,6 +219,8 @@ class StepLimits:
         energy = result.energy
         if energy.overlap <= _GIVEN * max(energy.stored, energy.before) or not len(attempt.state.contacts):
             return None
+        if result.overlap is None:
+            return None
         _, a, b, deep, x, y = result.overlap
         reason = (
             f"{self._named(a)} and {self._named(b)} overlap by {deep:.3g} m near x = {x:.6g}, y = {y:.6g} m where they "
@@ -251,7 +253,8 @@ class StepLimits:
     def shortens(self, why: str, *blocks: int) -> None:
         """Count a step that one block has shortened, or two; the tenth, the hundredth … is logged."""
         names = tuple(self._finder.names[b] for b in blocks[:2])
-        key = (why, *names, "", "")[:3]
+        one, two = (*names, "", "")[:2]
+        key = why, one, two
         self._work.shortened[key] += 1
         count = self._work.shortened[key]
         if count > 1 and math.log10(count).is_integer():

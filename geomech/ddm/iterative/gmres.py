@@ -156,8 +156,8 @@ class Patches:
                 near = near[away <= lengths * elements.length[near]]
             whole = np.union1d(own, near)
             self._patches.append((whole, elements.unknowns(np.sort(own))))
-        self._factors: list[tuple[bytes, np.ndarray, np.ndarray, np.ndarray, Factor] | None]
-        self._factors = [None] * len(self._patches)
+        #: By patch, once `change` has said which equations are meant.
+        self._factors: dict[int, tuple[bytes, np.ndarray, np.ndarray, np.ndarray, Factor]] = {}
 
     def change(self, rows: Rows) -> None:
         """From now on the equations are those of ``rows``; only patches to which that is news are factored."""
@@ -165,7 +165,7 @@ class Patches:
             unknowns = self._elements.unknowns(elements)
             prescribed, mixed, spring = rows.prescribed[unknowns], rows.mixed[unknowns], rows.spring[unknowns]
             key = prescribed.tobytes() + mixed.tobytes() + spring.tobytes()
-            known = self._factors[k]
+            known = self._factors.get(k)
             if known is not None and known[0] == key:
                 continue
             matrix = self._between(elements)
@@ -185,19 +185,19 @@ class Patches:
     @property
     def rcond(self) -> float:
         """The worst patch's."""
-        return min(factor.rcond for *_, factor in self._factors)
+        return min(factor.rcond for *_, factor in self._factors.values())
 
     def solve(self, right: np.ndarray) -> np.ndarray:
         """Roughly S⁻¹ ``right`` (n,); zero where unknowns are held."""
         out = np.zeros_like(right)
-        for _, free, kept, to, factor in self._factors:
+        for _, free, kept, to, factor in self._factors.values():
             out[to] = factor.solve(right[free])[kept]
         return out
 
     def solve_transposed(self, right: np.ndarray) -> np.ndarray:
         """The transposed of `solve`."""
         out = np.zeros_like(right)
-        for _, free, kept, to, factor in self._factors:
+        for _, free, kept, to, factor in self._factors.values():
             own = np.zeros(len(free))
             own[kept] = right[to]
             out[free] += factor.solve(own, transposed=True)

@@ -157,8 +157,8 @@ class Holds:
             if support.hold in ("both", "normal", "tangent"):
                 self.supported[here] = (support.hold != "normal", support.hold != "tangent")
                 continue
-            way = np.array(axes.get(support.hold, support.hold))
-            along, across = self.sources.tangent[here] @ way, self.sources.normal[here] @ way
+            direction = np.array(axes[support.hold] if isinstance(support.hold, str) else support.hold)
+            along, across = self.sources.tangent[here] @ direction, self.sources.normal[here] @ direction
             self.directions[here] = np.stack(
                 [np.stack([along, across], axis=1), np.stack([-across, along], axis=1)], axis=1
             )

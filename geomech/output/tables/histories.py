@@ -90,7 +90,7 @@ class Table:
         if not path.is_file():
             raise FilesChanged(f"{path} is missing")
         with open(path, "r+b") as file:
-            header = next(csv.reader([file.readline().decode("utf-8")]), [])
+            header: list[str] | None = next(csv.reader([file.readline().decode("utf-8")]), [])
             if header == table.columns and os.fstat(file.fileno()).st_size >= end.size:
                 file.truncate(end.size)
                 header = None

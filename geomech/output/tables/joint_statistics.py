@@ -185,5 +185,6 @@ def _row(values: dict[str, Any], wanted: dict[str, Any] | None) -> str:
     for _, key, spread in _COLUMNS:
         value, off = values.get(key), values.get(spread) if spread else None
         text = "" if value is None else f"{value:.3g}"
-        cells.append(f"{text} ± {off:.2g}" if text and off and off > 1e-6 * abs(value) else text)
+        scattered = value is not None and off and off > 1e-6 * abs(value)
+        cells.append(f"{text} ± {off:.2g}" if scattered else text)
     return "".join(f" {cell:>14}" for cell in cells)

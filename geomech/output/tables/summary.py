@@ -124,7 +124,12 @@ class Summary:
         write_json(self._path, leading | summary)
 
     def _event_row(self, event: Event) -> dict[str, Any]:
-        row = {"load_pa": _finite(event.load), "time_s": event.time, "cycle": event.cycle, "point": list(event.point)}
+        row: dict[str, Any] = {
+            "load_pa": _finite(event.load),
+            "time_s": event.time,
+            "cycle": event.cycle,
+            "point": list(event.point),
+        }
         if self._scale is not None:
             half_length, toughness = self._scale
             row["load_normalised"] = _finite(abs(event.load) * math.sqrt(math.pi * half_length) / toughness)

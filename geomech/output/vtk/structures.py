@@ -144,6 +144,7 @@ class WaterLine:
 
     def grid(self, time: float) -> Grid:
         """The table at ``time`` s; it stands in space, so its displacement is zero."""
+        assert self._water is not None and self._ground is not None, "a scene without water has no table"
         line = self._water.line_at(time)
         found = ponds(line, self._ground)
         ends = [x for pond in found for x in (pond.start, pond.end)]

@@ -260,28 +260,29 @@ class Collection:
         else:
             self.path.unlink(missing_ok=True)
 
-    def _begin(self) -> None:
+    def _begin(self) -> int:
+        """Write the whole file and open it; its handle."""
         beside = self.path.with_name(self.path.name + ".part")
         content = "".join([_PVD_HEAD, *(_entry(*each) for each in self.entries), _PVD_END]).encode()
         _put(beside, content)
         os.replace(beside, self.path)
         self._end = len(content) - len(_PVD_END)
         self._handle = os.open(self.path, os.O_WRONLY)
+        return self._handle
 
     def add(self, at: float, file: str) -> None:
         """List ``file`` (relative to the PVD's folder) at time ``at``, which must be later than all before it."""
         last = self.entries[-1][0] if self.entries else -math.inf
         if not at > last:
             raise ValueError(f"{self.path.name}: time {at!r} does not follow {last!r}")
-        if self._handle is None:
-            self._begin()
+        handle = self._begin() if self._handle is None else self._handle
         entry = _entry(at, file).encode()
         content = entry + _PVD_END.encode()
-        written = os.pwrite(self._handle, content, self._end)
+        written = os.pwrite(handle, content, self._end)
         if written < len(content):
             # The disk is full. What stood here before is left room for.
-            os.pwrite(self._handle, _PVD_END.encode(), self._end)
-            os.ftruncate(self._handle, self._end + len(_PVD_END))
+            os.pwrite(handle, _PVD_END.encode(), self._end)
+            os.ftruncate(handle, self._end + len(_PVD_END))
             raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(self.path))
         self._end += len(entry)
         self.entries.append((float(at), file))

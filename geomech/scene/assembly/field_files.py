@@ -159,7 +159,7 @@ def _named_lines(
 
 def _read(path: FilePath, unit: str | None, chord_tolerance: float | None, set_property: str) -> FieldFile:
     """The file; one of a CAD program in a process of its own."""
-    arguments = {"unit": unit, "chord_tolerance": chord_tolerance, "set_property": set_property}
+    arguments: dict[str, Any] = {"unit": unit, "chord_tolerance": chord_tolerance, "set_property": set_property}
     if path.suffix.lower() == ".dxf" and path.is_file():
         from ...shapes.gmsh_models.isolated_reader import field_file_apart
 

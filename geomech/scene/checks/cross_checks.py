@@ -414,7 +414,9 @@ def _toughness(c: Check) -> None:
                     else ""
                 ),
             )
-    joints = set() if t.geometry is None else {joint.name for joint in (*t.geometry.joints, *t.geometry.joint_sets)}
+    geometry, joints = t.geometry, set[str]()
+    if geometry is not None:
+        joints = {joint.name for joint in geometry.joints} | {joint_set.name for joint_set in geometry.joint_sets}
     for name, crack in needy.items() if t.growth.enabled else ():
         dead_end = crack.rpartition(" ")[0] in joints
         c.refuse(

@@ -137,7 +137,7 @@ def _free_back(c: Check) -> None:
     side = 0 if rise > 0 else -1
     x = float(ground[side, 0])
     starts, ends = blocks.vertices, blocks.vertices[blocks.next_vertex]
-    loaded = {load.edge for load in (*t.loads.tractions, *t.loads.viscous_boundaries)}
+    loaded = {load.edge for load in t.loads.tractions} | {edge.edge for edge in t.loads.viscous_boundaries}
     constrained = constrained_unknowns(t, c.drawn)
     free = ~fixed if constrained is None else ~fixed & ~constrained.any(axis=1)
     near = 1e-6 * float(np.ptp(blocks.vertices, axis=0).max())

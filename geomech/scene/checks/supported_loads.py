@@ -73,7 +73,7 @@ def _loads_are_lost(c: Check, fixed: np.ndarray) -> bool:
     if any(traction.edge not in blocks.edge_names for traction in t.loads.tractions):
         return False
     on = [np.unique(blocks.vertex_block[blocks.edges_named(traction.edge)]) for traction in t.loads.tractions]
-    carried = [np.array(blocks_at(blocks, f.at), int) for f in t.loads.forces]
+    carried = [np.array(blocks_at(blocks, f.at), np.int64) for f in t.loads.forces if f.at is not None]
     loaded = [*on, *carried, *([np.arange(blocks.n_blocks)] if any(t.loads.gravity_m_s2) else [])]
     if loaded and all(len(at) and fixed[at].all() for at in loaded):
         zone = c.drawn.zones[int(loaded[0][0])]

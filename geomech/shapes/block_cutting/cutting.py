@@ -378,8 +378,8 @@ def _junctions(graph: Graph, drawn: Drawn) -> np.ndarray:
     node = np.concatenate([edges[:, 0], edges[:, 1]])
     away = graph.nodes[np.concatenate([edges[:, 1], edges[:, 0]])] - graph.nodes[node]
     away /= np.hypot(*away.T)[:, None]
-    three = np.flatnonzero(degree[node] == 3)
-    three = three[np.argsort(node[three], kind="stable")].reshape(-1, 3)
+    at = np.flatnonzero(degree[node] == 3)
+    three = at[np.argsort(node[at], kind="stable")].reshape(-1, 3)
     a, b, c = away[three[:, 0]], away[three[:, 1]], away[three[:, 2]]
     straight = np.min([np.einsum("ij,ij->i", *pair) for pair in ((a, b), (b, c), (c, a))], axis=0)
     kind[node[three[:, 0]][straight < -_STRAIGHT_ON]] = "T"

@@ -40,7 +40,7 @@ def partings(drawn: Drawn, names: Sequence[str], reach: np.ndarray, cutting: np.
     """Of the joints ``names``, of whose traces ``reach`` m lie in the rock and ``cutting`` m part blocks."""
     rank = drawn.rank
     return tuple(
-        Parting(name, *(int((own & (rank == place)).sum()) for own in (reach > 0, cutting > 0)),
+        Parting(name, int(((reach > 0) & (rank == place)).sum()), int(((cutting > 0) & (rank == place)).sum()),
                 float(cutting[rank == place].sum()))
         for place, name in enumerate(names)
     )  # fmt: skip

@@ -246,9 +246,10 @@ def chains(pairs: Iterable[tuple[int, int]]) -> list[list[int]]:
     for a, b in sorted(left):
         at.setdefault(a, []).append((a, b))
         at.setdefault(b, []).append((a, b))
-    runs = []
+    runs: list[list[int]] = []
     for first in sorted(at, key=lambda k: (len(at[k]) == 2, k)):
-        for edge in at[first]:
+        for start in at[first]:
+            edge: tuple[int, int] | None = start
             if edge not in left:
                 continue
             run = [first]

@@ -6,13 +6,14 @@ import difflib
 from collections.abc import Mapping
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import Any
 
 import numpy as np
 
 from ..curves import ended_on
 from ..mesh_exchange import SUFFIXES as OTHER_MESHES
 from ..mesh_exchange import as_gmsh_mesh
-from ..parts import JOINT, Joint, Mark, Trace, is_mark
+from ..parts import JOINT, Joint, Mark, Trace, Zone, is_mark
 from ..traces.field_lines import METRES
 from .mesh_files import drawing_of_mesh
 from .model_curves import Curves
@@ -64,7 +65,7 @@ def read_gmsh_model(
             f"there is no file {path}",
             f"did you mean {close[0]}?" if close else "paths are relative to the scene file",
         )
-    arguments = {"parameters": dict(parameters or {}), "chord_tolerance": chord_tolerance, "unit": unit}
+    arguments: dict[str, Any] = {"parameters": dict(parameters or {}), "chord_tolerance": chord_tolerance, "unit": unit}
     files = [path] if trusted() else refuse_commands(path, folder)
     if all(file.suffix in (*SCRIPTS, ".opt") for file in files) and (trusted() or all(map(is_light, files))):
         return read_here(path, **arguments)
@@ -126,7 +127,10 @@ def _drawing(gmsh, path: Path, parameters: dict[str, Parameter], chord: float | 
     used = {abs(t) for _, _, tags in groups[2] for tag in tags for t in _outline(gmsh, tag)}
     edge_name: dict[int, str] = {}
     traced: set[int] = set()
-    traces, joints, marks, places = [], [], [], {}
+    traces: list[Trace] = []
+    joints: list[Joint] = []
+    marks: list[Mark] = []
+    places = {}
     for name, _, tags in groups[0]:
         places["marks", len(marks)] = _entities("point", tags)
         marks.append(Mark(name, tuple(np.array([gmsh.model.getValue(0, tag, [])[:2]]) for tag in tags)))
@@ -149,7 +153,8 @@ def _drawing(gmsh, path: Path, parameters: dict[str, Parameter], chord: float | 
             tags = [tag for tag in tags if tag in used]
         _name_edges(path, name, tags, edge_name)
 
-    zones, named = [], set()
+    zones: list[Zone] = []
+    named = set()
     for name, _, tags in groups[2]:
         for tag in tags:
             places["zones", len(zones)] = _entities("surface", [tag])

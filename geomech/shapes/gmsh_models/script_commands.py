@@ -172,9 +172,9 @@ def _script(path: Path, data: bytes, homes: Sequence[Path]) -> list[Path]:
         if token.kind == "text" and len(token.text) > _LONGEST_STRING:
             raise GmshModelError(f"{path}:{token.line}: a text without an end", "close its quotes")
     if jumps:
-        for number, line in enumerate(re.split(rb"[\r\n]", data), 1):
-            if len(line) > _LONGEST_LINE:
-                raise GmshModelError(f"{path}:{number}: a line of {len(line)} characters", "break it into shorter ones")
+        for number, text in enumerate(re.split(rb"[\r\n]", data), 1):
+            if len(text) > _LONGEST_LINE:
+                raise GmshModelError(f"{path}:{number}: a line of {len(text)} characters", "break it into shorter ones")
     found = _judged(path, tokens, homes)
     if jumps:
         for token in tokens:
@@ -193,7 +193,7 @@ def _tokens(data: bytes) -> Iterator[_Token]:
     for found in _TOKEN.finditer(data):
         text, kind = found.group(), found.lastgroup
         if kind != "blank":
-            yield _Token(kind, text, line)
+            yield _Token(str(kind), text, line)
         line += text.count(b"\n")
 
 
