@@ -59,6 +59,8 @@ _FARTHEST = 64.0
 _BEYOND = 1e-2
 #: Factor from step to step in the search for a stable trial near a known factor; and of the first trial below a bound.
 _NEARBY, _BELOW = 0.85, 0.95
+#: The bound is sought from here: Newton's method comes from above, and most slopes fail below.
+_FIRST = 2.0
 #: Trials beside an expected factor are made so many tolerances from it; near a bound, a second one fails so much farther
 #: above the first that their drifts point at the factor.
 _BESIDE, _SECOND = 0.4, 0.01
@@ -199,7 +201,7 @@ class _Search:
             return 0.0
         system = self.system(1.0, counted)
         whole = without_failure(system, self.rest, self.under.loads, self.under.time)
-        return 0.0 if whole is None else self._bound(system, whole, 1.0, self.under.loads.bolts)
+        return 0.0 if whole is None else self._bound(system, whole, _FIRST, self.under.loads.bolts)
 
     def _bound(self, system: BlockSystem, state: State, first: float, bolts: Sequence[Bolt] = ()) -> float:
         forces = AdmissibleForces.of(system, state, self.rest, self.joints, self.chosen, bolts)
