@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from .loads.body_loads import BodyLoad
 
 
-#: A residual above this is told to the log.
+#: A residual above this is reported in the log.
 WORTH_A_WARNING = 1e-3
 _log = logging.getLogger(__name__)
 

@@ -144,7 +144,7 @@ def _rising(table: Rising, end: float) -> str:
 
 
 def _course(history: History, end: float, unit: str, sense: str) -> str:
-    """How large a load is and how it comes: magnitudes, and the direction where ``sense`` does not tell it."""
+    """How large a load is and how it comes: magnitudes, and the direction where ``sense`` does not say it."""
     value = history.at(end)
     size, direction = float(np.hypot(*value)), sense or f"along ({value[0]:.3g}, {value[1]:.3g})"
     if size == 0.0:

@@ -50,7 +50,7 @@ _HAIR = 1e-4
 #: weight of a slope of 1 000 blocks, put on suddenly, sinks into eased springs by 6 % of the work of its first 0.3 s, after
 #: so long by 0.1 %.)
 _TRANSITS, _STEPS = 4.0, 20
-#: Contacts are sought at this many times the depth to which the last step has let any penetrate, whatever the window.
+#: Contacts are searched for at this many times the depth to which the last step has let any penetrate, whatever the window.
 _DEEPER = 2.0
 
 

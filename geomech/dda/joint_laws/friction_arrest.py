@@ -28,7 +28,7 @@ from ..linear_solver import assembly
 from ..open_close.contact_set import ContactSet
 from ..open_close.settled_states import Settled
 
-#: Impulses found to be beyond what friction can have been are brought back to it so often.
+#: Impulses beyond what friction can exert are brought back to it this many times.
 _ROUNDS = 4
 #: A spring k turns the speed of a mass m about in every step of Shi's, instead of swinging, from k dt² = 16 m on: there
 #: its two roots are real, and one of them tends to −1.

@@ -24,7 +24,7 @@ from .influence_matrix import unknowns_of
 
 #: A new base is factored where the border would have more than this part of its unknowns, and more than so many.
 MOST_NEW, FEW = 0.2, 40
-#: Reciprocal condition of the border's own equations below which all is factored anew.
+#: Reciprocal condition of the border's own equations below which the whole matrix is factored again.
 TRUSTED = 1e-11
 
 

@@ -122,7 +122,7 @@ def read(path: Path) -> Any:
         try:
             return plain_data.read(file, _ALLOWED)
         except plain_data.Broken as error:
-            raise NotResumable(f"{path} does not hold what a checkpoint holds ({error}): run the scene anew") from error
+            raise NotResumable(f"{path} does not hold what a checkpoint holds ({error}): run the scene again") from error
 
 
 def whole(folder: Path) -> Iterator[tuple[dict[str, Any], Path]]:
@@ -191,7 +191,7 @@ def _sources() -> str:
 
 
 def _processor() -> str:
-    """The processor's own name, where the system tells."""
+    """The processor's own name, where the system gives it."""
     try:
         with open("/proc/cpuinfo", encoding="utf-8") as file:
             return next(line.partition(":")[2].strip() for line in file if line.startswith("model name"))

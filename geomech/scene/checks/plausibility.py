@@ -195,7 +195,7 @@ def _weightless(c: Check) -> None:
 
 
 def _sudden_weight(c: Check) -> None:
-    """Rock bridges that feel all their weight, and in dynamics up to twice of it, in the first steps."""
+    """Rock bridges that bear all the weight, and in dynamics up to twice that, in the first steps."""
     t = c.tables
     loads, bridges = t.loads, len(c.cracks.names) - len(t.geometry.cracks)
     tough = all(m.k_ic_pa_sqrt_m is None for m in t.materials.values()) or not t.growth.enabled
@@ -205,7 +205,7 @@ def _sudden_weight(c: Check) -> None:
     if any(loads.gravity_m_s2) and t.dda.dynamic_factor > 0:
         c.warn(
             ("geometry", "dead_ends") if "dead_ends" in c.data["geometry"] else ("loads", "gravity_m_s2"),
-            f"all weight comes on at once, and {bridges} cracks before rock bridges feel up to twice of it: blocks may "
+            f"all weight comes on at once, and {bridges} cracks before rock bridges bear up to twice of it: blocks may "
             "split in the first steps that would stand",
             'let it come by and by (loads.gravity_ramp_s), begin at rest (dda.equilibrium = "start"), or under the '
             "stress of the "

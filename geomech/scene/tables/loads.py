@@ -171,7 +171,7 @@ class BaseTable(Timed):
 
     frame: Literal["ground", "base"] = Field(
         "ground",
-        description='"ground": the fixed blocks move as the record says; "base": they stand, and blocks feel minus the '
+        description='"ground": the fixed blocks move as the record says; "base": they stay in place, and blocks are subject to minus the '
         "acceleration",
     )
     baseline: Literal["", "constant", "linear"] = Field(
