@@ -75,7 +75,7 @@ class Solution:
 
     @cached_property
     def _x(self) -> np.ndarray:
-        """(n_unknowns,) the boundary's unknowns: 2μ times its displacement, reactions where it is held."""
+        """(n_unknowns,) the boundary's unknowns: 2μ times its displacement, reactions where it is supported."""
         return -self._eliminated - self.body._w @ self.jumps
 
     @cached_property

@@ -164,7 +164,7 @@ class ContactFinder:
         margin: float = np.inf,
     ) -> ContactSet:
         """Every vertex within ``window`` (m, of all pairs of blocks or of each) of an edge it may touch, with what ``state.contacts`` remembers of it;
-        without corners that are held to each other by the glue around them, if that ``glue_holds``; the springs of
+        without corners that the bonds around them join, if ``glue_holds``; the springs of
         faces that have a stiffness of their own at their corners, if ``lumped``; those of the bonds ``broken``
         (vertex·n_vertices + edge), too. ``motion`` (n_vertices, 2) m is what vertices are expected to move by in the step:
         it says on which sides corners meet; corners that stay apart then, with ``margin`` m to spare, are left out."""

@@ -1,6 +1,6 @@
-"""Bonds of whole faces: what two corners of a face hold together, and when the bond between them fails.
+"""Bonds of whole faces: the strength of a bond between two faces, and when it fails.
 
-An edge on an edge is held by contacts at the ends of the overlap ℓ. Their pulls Tᵢ at the distances aᵢ from its middle
+Two bonded edges are joined by contacts at the ends of their overlap ℓ. Their pulls Tᵢ at the distances aᵢ from its middle
 are the resultants T = Σ Tᵢ and M = Σ Tᵢ aᵢ of the stress along the face, which between blocks that deform evenly is a
 straight line. Its extreme fibre is at
 

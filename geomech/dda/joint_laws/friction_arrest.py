@@ -7,7 +7,7 @@ the step, t* by the line from the sliding speed u₀ at the start to the one tha
 end, friction may have had any value |S| ≤ μN + c instead (Coulomb). Of these that is taken which leaves no sliding, or
 the one nearest to it (Moreau 1988: Coulomb's law between velocities and impulses).
 
-A contact that stays closed on a spring which is stiff beside m/dt² hardly moves, and v' = 2 d/dt − v only turns its speed
+A contact that stays closed on a spring that is stiff compared with m/dt² hardly moves, and v' = 2 d/dt − v only turns its speed
 about from step to step, undamped: forces then swing about those that hold the blocks, and contacts near their strength
 change their state in every step. Such a contact ends the step with the mean speed d/dt that it had in it.
 

@@ -266,14 +266,14 @@ class StepLimits:
 
 
 def _glued(pairs: np.ndarray, bonded: np.ndarray) -> np.ndarray:
-    """(k,) whether the blocks of each of ``pairs`` (k, 2) are held to each other, or both to a third, by the CONTACT rows
+    """(k,) whether the blocks of each of ``pairs`` (k, 2) are bonded to each other, or both to a third, by the CONTACT rows
     ``bonded``."""
-    held: dict[int, set[int]] = {}
+    joined: dict[int, set[int]] = {}
     for a, b in zip(bonded["block"].tolist(), bonded["other"].tolist(), strict=True):
-        held.setdefault(a, {a}).add(b)
-        held.setdefault(b, {b}).add(a)
+        joined.setdefault(a, {a}).add(b)
+        joined.setdefault(b, {b}).add(a)
     nothing: set[int] = set()
-    return np.array([bool(held.get(a, nothing) & held.get(b, nothing)) for a, b in pairs.tolist()], bool)
+    return np.array([bool(joined.get(a, nothing) & joined.get(b, nothing)) for a, b in pairs.tolist()], bool)
 
 
 def shortened(work: Work, most: int = 5) -> tuple[Shortened, ...]:

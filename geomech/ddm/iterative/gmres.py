@@ -188,7 +188,7 @@ class Patches:
         return min(factor.rcond for *_, factor in self._factors.values())
 
     def solve(self, right: np.ndarray) -> np.ndarray:
-        """Roughly S⁻¹ ``right`` (n,); zero where unknowns are held."""
+        """Roughly S⁻¹ ``right`` (n,); zero where unknowns are prescribed."""
         out = np.zeros_like(right)
         for _, free, kept, to, factor in self._factors.values():
             out[to] = factor.solve(right[free])[kept]

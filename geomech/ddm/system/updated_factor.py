@@ -69,7 +69,7 @@ class BaseOf:
         return out
 
     def border(self, rows: Rows) -> Border:
-        """What the equations that ``rows`` (without springs) leave have beside those of the base."""
+        """What the equations that ``rows`` (without springs) leave have in addition to those of the base."""
         return Border(self, rows)
 
     def changed(self, rows: Rows, border: Border, what: str) -> UpdatedFactor | None:

@@ -262,10 +262,10 @@ class Collection:
 
     def _begin(self) -> int:
         """Write the whole file and open it; its handle."""
-        beside = self.path.with_name(self.path.name + ".part")
+        unfinished = self.path.with_name(self.path.name + ".part")
         content = "".join([_PVD_HEAD, *(_entry(*each) for each in self.entries), _PVD_END]).encode()
-        _put(beside, content)
-        os.replace(beside, self.path)
+        _put(unfinished, content)
+        os.replace(unfinished, self.path)
         self._end = len(content) - len(_PVD_END)
         self._handle = os.open(self.path, os.O_WRONLY)
         return self._handle

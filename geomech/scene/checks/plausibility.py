@@ -30,7 +30,7 @@ LEAST_DENSITY = 100.0
 SHALLOW = 1.5
 #: What lies on one another: nearer than this part of the side, over no less than that part of it.
 LIES_ON, MOST_OF_IT = 1e-6, 0.5
-#: A block that moves is a sliver beside one so many times as large by area: in motion, pairs of such blocks shorten steps
+#: A block that moves is a sliver next to one this many times as large by area: in motion, pairs of such blocks shorten steps
 #: (`dda.step_control.relative_motion`) to less than a third of what those of the large one take.
 SLIVER = 1e-2
 #: A slope is where the ground at one end of the section stands above that at the other by this part of its height, and
@@ -81,7 +81,7 @@ def _materials(c: Check) -> None:
 
 
 def _slivers(c: Check) -> None:
-    """Small blocks beside large ones, which shorten the steps of a dynamic run."""
+    """Small blocks next to large ones, which shorten the steps of a dynamic run."""
     blocks = c.blocks
     if c.tables.dda.dynamic_factor == 0 or blocks.n_blocks < 3:
         return
@@ -105,7 +105,7 @@ def _slivers(c: Check) -> None:
 
 
 def _rounding(c: Check) -> None:
-    """A rounding length that was asked for and that the edges beside corners are too short for."""
+    """A rounding length that was asked for and that the edges at corners are too short for."""
     if "corner_rounding" not in c.tables.dda.model_fields_set:
         return
     blocks, share = c.blocks, c.tables.dda.corner_rounding
