@@ -19,7 +19,6 @@ NOT_REMADE: set[str] = {
     "bench_dda.png",
     "bench_ddm.png",
     "bench_solvers.png",
-    "jointed_slope.png",
     "random_slope.png",
     "stability.png",
     "stability_cracks.png",

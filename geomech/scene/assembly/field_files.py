@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
@@ -160,7 +161,7 @@ def _named_lines(
 def _read(path: FilePath, unit: str | None, chord_tolerance: float | None, set_property: str) -> FieldFile:
     """The file; one of a CAD program in a process of its own."""
     arguments: dict[str, Any] = {"unit": unit, "chord_tolerance": chord_tolerance, "set_property": set_property}
-    if path.suffix.lower() == ".dxf" and path.is_file():
+    if path.suffix.lower() == ".dxf" and os.path.isfile(path):
         from ...shapes.gmsh_models.isolated_reader import field_file_apart
 
         return field_file_apart(path, arguments)

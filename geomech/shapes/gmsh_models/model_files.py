@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import os
 from collections.abc import Mapping
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -58,7 +59,7 @@ def read_gmsh_model(
     named surfaces, and GmshUnavailable where Gmsh cannot be loaded.
     """
     path = Path(path)
-    if not path.is_file():
+    if not os.path.isfile(path):  # False, too, for a name that is too long to be one
         near = [p.name for p in path.parent.glob("*" + path.suffix)] if path.parent.is_dir() else []
         close = difflib.get_close_matches(path.name, near, 1)
         raise GmshModelError(
