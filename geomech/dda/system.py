@@ -15,6 +15,7 @@ from .contact_detection.initial_overlap import refuse_overlap
 from .counters import Work
 from .excavation import Excavations, until_next_event
 from .higher_order.deflected_blocks import DeflectedBlocks
+from .higher_order.glued_cells import GluedFaces, GlueStrength, KeptCorners
 from .higher_order.order_choice import OrderChoice, relaid
 from .higher_order.six_row_system import six_row_pattern
 from .higher_order.unsupported import refuse_unsupported, refuse_unsupported_loads
@@ -46,14 +47,14 @@ class BlockSystem:
     ``joint_index(edge_name, other_name)`` gives the index in ``joints`` of the law between two edges; None from it
     means that such edges do not touch; without it the first law holds everywhere. Contact springs are
     ``settings.normal_penalty`` and ``shear_penalty`` (Pa), by default both 40 times the E' of the two blocks
-    (`penalties`). ``work`` counts what is done, of systems that share it together.
+    (`penalties`). ``work`` counts operations, over all systems that share it.
 
-    What every `Attempt` at a step reads is made once: ``density`` (kg/m³), ``mass`` (kg/m), ``stiffness`` and
-    ``compliance`` (3, 3) of each block, ``constrained`` (what is held of its motion), ``rigid`` (indices), the ``finder`` of
-    contacts and the ``load_map``; and anew when blocks are ``taken_out``: which ones are ``fixed``, ``moving``
+    Arrays that every `Attempt` at a step reads are made once: ``density`` (kg/m³), ``mass`` (kg/m), ``stiffness`` and
+    ``compliance`` (3, 3) of each block, ``constrained`` (which of its unknowns), ``rigid`` (indices), the ``finder`` of
+    contacts and the ``load_map``; and again when blocks are ``taken_out``: which ones are ``fixed``, ``moving``
     (indices), which of them ``turns``, and ``free``, the number of a block among those that move, −1 for the others.
-    ``allowed_penetration`` (m) is zero where penalty springs hold alone; ``rounding`` (m) is that of coordinates:
-    less is no motion; what it makes of blocks' weights is told once.
+    ``allowed_penetration`` (m) is zero where only penalty springs act; ``rounding`` (m) is that of coordinates:
+    less is no motion; its effect relative to blocks' weights is reported once.
 
     Raises ValueError when there are no blocks, materials or joints are missing, a block has no area, or one that moves
     has no mass in a dynamic run.
@@ -99,9 +100,16 @@ class BlockSystem:
         #: What finds orders as the run goes; None where all are given.
         self.order_choice: OrderChoice | None = None
         self._take_out(None, None)
-        if blocks.order is not None and (np.asarray(blocks.order) != 1)[~self.fixed].any():
+        #: Faces of cells that are glued; None where no blocks are cells.
+        self.glued: GluedFaces | None = None
+        ordered = blocks.order is not None and (np.asarray(blocks.order) != 1)[~self.fixed].any()
+        if ordered or blocks.glued is not None:
             refuse_unsupported(blocks, self.materials, self.joints, self.settings)
             self._choose_orders()
+        #: What glue bears; None where none can part.
+        self.glue_strength: GlueStrength | None = None
+        if blocks.glued is not None and (strength := self._glue_strength()).any:
+            self.glue_strength = strength
         rigid = rigid & ~self.fixed
         self.rigid = np.flatnonzero(rigid)
         self.compliance[rigid] = 0.0
@@ -124,7 +132,7 @@ class BlockSystem:
         self.allowed_penetration = self._allowed_penetration(float(np.sqrt(areas.min())))
 
     def _allowed_penetration(self, size: float) -> float:
-        """m, of the multipliers' mode; 0 where penalty springs hold alone."""
+        """m, of the multipliers' mode; 0 where only penalty springs act."""
         share = self.settings.penetration_tolerance
         if self.settings.contact == "penalty":
             return 0.0
@@ -147,7 +155,7 @@ class BlockSystem:
             self.blocks, self.fixed, self.density, self.stiffness, self.compliance, self.settings.order_target
         )
         self.order_choice = choice if choice.found.any() else None
-        self.order = np.ones(self.blocks.n_blocks, np.int64)
+        self.order = np.zeros(self.blocks.n_blocks, np.int64)
         self._take_orders(choice, choice.first)
 
     def _take_orders(self, choice: OrderChoice, order: np.ndarray) -> None:
@@ -156,6 +164,28 @@ class BlockSystem:
             return
         self.order, self.deflected, self._sparse = order, choice.deflected(order), None
         self.finder.at_corners = self.deflected is not None
+        if self.blocks.glued is not None:
+            self._all_glued, self._parted = GluedFaces.of(self.deflected), None
+            self._part(np.zeros(len(self.blocks.glued), bool))
+
+    def _glue_strength(self) -> GlueStrength:
+        """What glued faces bear: those whose edges have names, as their joint law says."""
+        edge, mate = np.asarray(self.blocks.glued).T
+        law, named = (
+            self.finder.laws_of(edge, mate),
+            (self.blocks.edge_name[edge] > 0) & (self.blocks.edge_name[mate] > 0),
+        )
+        return GlueStrength.of(
+            [self.joints[k] if k >= 0 and has else None for k, has in zip(law.tolist(), named.tolist(), strict=True)]
+        )
+
+    def _part(self, parted: np.ndarray) -> None:
+        """Go on with cells whose glued faces have ``parted`` (n_faces,)."""
+        if self._parted is not None and np.array_equal(parted, self._parted):
+            return
+        self._parted, self._sparse, self.glued = parted, None, self._all_glued.kept(~parted)
+        self.finder.part(self.blocks, parted)
+        self.finder.kept_corners = KeptCorners(self.deflected, self.finder.joined)
         self.finder.deflection, self.finder.sag = np.zeros((2, self.blocks.n_blocks))
 
     @property
@@ -213,19 +243,32 @@ class BlockSystem:
         shorter one. Raises `NotConverged` after ``settings.max_step_cuts`` cuts, and ValueError when blocks overlap
         before they have moved, or when nothing holds them up in statics.
         """
-        choice = self.order_choice
-        if choice is None:
+        choice, strength = self.order_choice, self.glue_strength
+        if choice is None and strength is None:
             return self._step(state, loads, dt, crack, load_time, like)[1]
         refuse_unsupported_loads(loads)
-        self._take_orders(choice, choice.first if state.order is None else np.asarray(state.order))
+        if choice is not None:
+            self._take_orders(choice, choice.first if state.order is None else np.asarray(state.order))
+        if strength is not None:
+            self._part(np.zeros(len(strength.tension), bool) if state.parted is None else np.asarray(state.parted))
         while True:
             attempt, result = self._step(state, loads, dt, crack, load_time, like)
-            order = choice.raised(self.order, self.deflected, attempt)
-            if order is None:
-                return replace(result, state=replace(result.state, order=self.order))
-            if state.deflection is not None:
-                state = replace(state, deflection=relaid(state.deflection, self.order, order))
-            self._take_orders(choice, order)
+            order = None if choice is None else choice.raised(self.order, self.deflected, attempt)
+            if order is not None:
+                if state.deflection is not None:
+                    state = replace(state, deflection=relaid(state.deflection, self.order, order))
+                self._take_orders(choice, order)
+                continue
+            parted = None
+            if strength is not None and len(self.glued.block):
+                parted = strength.parting(self._parted, attempt.glue.mean_traction(attempt.glue_change))
+            if parted is None:
+                known = None if strength is None else self._parted
+                return replace(
+                    result, state=replace(result.state, order=None if choice is None else self.order, parted=known)
+                )
+            log.info("t = %g s: %d faces of cells part", attempt.time, int(parted.sum() - self._parted.sum()))
+            self._part(parted)
 
     def _step(
         self, state: State, loads: Loads, dt: float | None, crack: CrackResponse | None, load_time: float | None,
@@ -235,7 +278,7 @@ class BlockSystem:
         dt = self.settings.time_step if dt is None else float(dt)
         if not 0 < dt < np.inf:
             raise ValueError(f"a time step must be positive, got {dt!r} s")
-        # (Kernels are compiled for arrays that can be written to.)
+        # (Kernels are compiled for writable arrays.)
         state = state.writable()
         self._stray_loads.refuse(loads)
         if self.deflected is not None:
@@ -258,7 +301,7 @@ class BlockSystem:
         return StepCutting(self, start, dt, like).until_it_holds()
 
     def contacts_near(self, state: State) -> ContactSet:
-        """The contacts that a step from ``state`` would begin with, as CONTACT rows tell of them."""
+        """The contacts that a step from ``state`` would begin with, as CONTACT rows describe them."""
         state = state.writable()
         vertices = np.ascontiguousarray(state.vertices)
         return self.finder.find(state, vertices, self._standing(state, vertices), lumped=True)
@@ -270,7 +313,7 @@ class BlockSystem:
         return windows_of(self, start, 0.0)
 
     def inherited_contacts(self, state: State, found: ContactSet, forces: InheritedContacts) -> np.ndarray:
-        """CONTACT rows of ``found``, the contacts near ``state``, as ``forces`` say where they tell of one: for a
+        """CONTACT rows of ``found``, the contacts near ``state``, with the inherited ``forces`` where there are any: for a
         `State` whose next step begins so."""
 
         def on_multiplier(contacts: ContactSet) -> np.ndarray:
@@ -303,6 +346,8 @@ class BlockSystem:
         and its solver: kept from step to step while the same blocks do."""
         if linked is not None:
             block, other = np.concatenate([block, linked[0]]), np.concatenate([other, linked[1]])
+        if self.glued is not None:
+            block, other = np.concatenate([block, self.glued.block]), np.concatenate([other, self.glued.other])
         if self.deflected is not None:
             known = None if self._sparse is None else self._sparse[1]
             pattern = six_row_pattern(self.free, self.deflected.rows, block, other, moments[:, 1:3], known)

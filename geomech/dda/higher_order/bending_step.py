@@ -16,19 +16,18 @@ from dataclasses import replace
 import numpy as np
 
 from ...model import OPEN
-from ..equation_records import BlockEquations, ContactMotion
 from ..kinematics.midpoint_configuration import MidpointConfiguration
-from ..kinematics.newmark import BlockLoads
 from ..open_close.contact_set import ContactSet
 from ..open_close.equations import Unsettled
-from ..out_of_balance import ContactForces, imbalance
+from ..out_of_balance import imbalance
 from ..results import StepResult
 from ..time_step import Attempt, StepStart
 from .deflected_blocks import DeflectedBlocks
 from .deflection_basis import n_deflections
 from .equations import HigherOrderEquations
 from .face_points import FaceContacts
-from .six_row_system import moved
+from .glued_cells import Glue
+from .six_row_system import fill_own, moved
 
 
 class BendingAttempt(Attempt):
@@ -82,6 +81,12 @@ class BendingAttempt(Attempt):
         own += by_rate * np.einsum("bej,be->bj", self.shared, size[:, None] * self.carried[:, 3:])
         self.coupled_right = by_rate * np.einsum("bej,bj->be", self.shared, rates)
         self.own_right = own
+        faces = system.glued
+        self.glue = (
+            None
+            if faces is None
+            else Glue.of(faces, self.state, self.vertices, self.deflection, self.midpoint, self.turn)
+        )
         bending = (scheme.weight + drag / dt)[:, None, None] * blocks.stiffness
         self._own_matrices(bending, inertia * self.shared, inertia * self.density * blocks.basis.area)
 
@@ -130,9 +135,14 @@ class BendingAttempt(Attempt):
                 own[self.own_at[b] : self.own_at[b] + width * width].reshape(width, width)[:6, :6] = matrix[
                     self.order[b]
                 ]
+        base = np.empty(pattern.size)
+        fill_own(base, pattern.places, pattern.step, (own, self.own_at), pattern.order)
+        if self.glue is not None:
+            self.glue.push(full.ravel(), pattern)
+            self.glue.stiffen(base, pattern, len(contacts), self.system.scheme.weight)
         return HigherOrderEquations(
             pattern, matrix, full, contacts, vectors, springs, gap, slack, curved,
-            self.system.scheme.static, own=own, own_at=self.own_at, rows=self._rows(contacts, vectors),
+            self.system.scheme.static, base=base, rows=self._rows(contacts, vectors),
         )  # fmt: skip
 
     def _deflection_at(self, pattern) -> np.ndarray:
@@ -203,6 +213,8 @@ class BendingAttempt(Attempt):
         mean = blocks.padded(2.0 / self.dt**2 * (change - self.dt * self.rates))
         blocks.acceleration = np.sqrt((mean * mean).sum(axis=1))
         self.largest = max(self.largest, float(blocks.largest(change)[0].max()))
+        if self.glue is not None:
+            self.glue_change = self.glue.change(self.unknowns.ravel(), self.pattern)
         if self.n_free:
             found = self.found
             rows = self._rows(found, self.vectors)
@@ -230,10 +242,13 @@ class BendingAttempt(Attempt):
         bent = inertia * np.einsum("bej,bj->be", self.shared, self.blocks.padded(self.bent_by))
         moving = self.system.moving
         right[self.order[moving], 3:6] += (self.coupled_right - bent)[moving]
+        if self.glue is not None:
+            forces = self.glue.forces(self.system.scheme.weight * self.glue_change, len(self.order))
+            right[self.order[moving]] += forces[moving]
         return imbalance(
-            BlockEquations(self.matrix, right), ContactMotion(found.block, found.other, self.order, self.vectors),
-            settled.unknowns[:n], ContactForces(settled.normal_force, settled.shear_force), self.acceleration,
-            self._mass, BlockLoads(self.gravity, load), largest,
+            (self.matrix, right), (found.block, found.other, self.order, self.vectors), settled.unknowns[:n],
+            (settled.normal_force, settled.shear_force), self.acceleration, tuple(self._mass), (self.gravity, load),
+            largest,
         )  # fmt: skip
 
     def _energy(self, load: np.ndarray, end_shear: np.ndarray):
@@ -269,6 +284,10 @@ class BendingAttempt(Attempt):
         bent = blocks.stiffness_times(change)
         damped = float((drag / dt) @ (bent * padded).sum(axis=1))
         damped += scheme.mass_damping / dt * self._mass_of(change, padded, coupling, density)
+        if self.glue is not None:
+            u0 += self.glue.energy()
+            u1 += self.glue.energy(self.glue_change)
+            strained += self.glue.work(self.glue_change, scheme.weight)
         lost = inertia - (after - kept) + strained - (u1 - u0)
         stored = after + u1 - had - u0
         return energy._replace(

@@ -8,6 +8,7 @@ import fnmatch
 from ...model import WEIGHT
 from ...shapes.gmsh_models.model_drawing import CRACK
 from ...shapes.parts import JOINT
+from ..assembly.cells import CELLS
 from ..assembly.fixed_blocks import fixed_blocks, holds
 from ..drawing import Drawing
 from ..locator import Path
@@ -16,7 +17,7 @@ from .check import Check
 
 
 def check_edges(c: Check) -> None:
-    """Loads and joints must name edges that there are; names that neither says are told."""
+    """Loads and joints must name edges that there are; names in neither are reported."""
     _tractions(c)
     _joints(c)
     _unused(c)
@@ -100,12 +101,14 @@ def _unused(c: Check) -> None:
     from_files = c.drawn.model is not None or (t.geometry is not None and t.geometry.traces)
     if not from_files or t.loads is None or t.joints is None:
         return
-    used = {load.edge for load in (*t.loads.tractions, *t.loads.viscous_boundaries)}
+    used = {load.edge for load in t.loads.tractions} | {edge.edge for edge in t.loads.viscous_boundaries}
     used.update(() if t.loads.water is None else t.loads.water.dry_edges)
     for joint in t.joints.values():
         used.update(joint_names(joint.edges, _edge_names(c)), *joint.between)
     # Joints without a law of their own follow the default one, as is usual.
-    idle = [name for name in _edge_names(c) if name not in used and not name.startswith(JOINT) and not holds(name)]
+    idle = [
+        name for name in _edge_names(c) if name not in used and not name.startswith((JOINT, CELLS)) and not holds(name)
+    ]
     if idle:
         c.warn(
             ("geometry", "model" if c.drawn.model is not None else "traces"),
@@ -121,6 +124,7 @@ def joint_names(patterns: tuple[str, ...], known: list[str]) -> list[str]:
 
 def contact_names(drawing: Drawing) -> list[str]:
     """Names that faces in contact may have: edges as drawn, and the faces that a crack leaves when it cuts through."""
+    assert drawing.blocks is not None and drawing.cracks is not None
     names = [name for name in drawing.blocks.edge_names if name] + list(drawing.joints)
     faces = [f"crack:{name}" for name in (*drawing.cracks_drawn, *drawing.cracks.names)]
     return list(dict.fromkeys(names + faces))
@@ -148,7 +152,8 @@ def _joints(c: Check) -> None:
                 )
             continue
         of_a_crack = any(crack.joint == name for crack in (c.tables.cracks or {}).values())
-        if not (joint.edges or joint.between or of_a_crack):
+        of_cells = any(zone.cell_joint == name for zone in (c.tables.zones or {}).values())
+        if not (joint.edges or joint.between or of_a_crack or of_cells):
             c.refuse(("joints", name), f"joint {name!r} names no edges", 'add edges = ["…"], or call it `default`')
         for k, pattern in enumerate(joint.edges):
             names = joint_names((pattern,), known)
@@ -160,7 +165,7 @@ def _joints(c: Check) -> None:
             for n, edge in enumerate(pair):
                 if edge not in known:
                     c.refuse(("joints", name, "between", k, n), f"no edge is called {edge!r}", nearest(edge, known))
-            claim(tuple(sorted(pair)), name, ("joints", name, "between", k))
+            claim((min(pair), max(pair)), name, ("joints", name, "between", k))
     if c.blocks.n_blocks > 1 and "default" not in c.tables.joints:
         c.warn(
             ("joints",),
