@@ -80,7 +80,8 @@ class ContactSolver:
     patch_share: float = 0.4
     patch_blocks: int = 2000
     splitting: bool = True
-    splitting_iterations: int = 200
+    splitting_wrong: float = 0.02
+    splitting_iterations: int = 100
     splitting_settled: float = 0.001
     splitting_slow: float = 0.03
     central_path: bool = True

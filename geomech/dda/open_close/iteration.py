@@ -206,7 +206,7 @@ class _Search:
             or not self.equations.first_order
             or effort.within_patch
             or self.equations.pattern.solver is None
-            or self.may_split
+            or (self.may_split and self.fewest > solver.splitting_wrong * len(self.found))
             or self.patched >= solver.patch_tries
         ):
             return False
