@@ -235,7 +235,7 @@ class _Search:
         except np.linalg.LinAlgError as error:
             raise Unsettled(str(error)) from error
         self.spent += proposal.spent
-        if proposal.states is None or proposal.states.key in self.seen:
+        if proposal.states.key in self.seen:
             return False
         self.states, self.most = proposal.states, max(self.most, self.newton + self.solver.newton_to_finish)
         self._restart()

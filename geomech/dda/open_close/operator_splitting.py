@@ -11,11 +11,13 @@ of ρ on all contacts split the step into two problems that are easy alone (Doug
 
 Where z = G d, the forces F(z) balance the blocks. Unlike Newton's method on states it does not overshoot where hundreds of
 contacts change at once, and hard springs do not slow it down: how fast it converges depends on the blocks, whose answer
-lies between their inertia 2m/dt² and their stiffness E'. A motion that a contact prevents converges the faster the
-larger ρ is, one that it leaves free the faster the smaller: ρ is E' where a contact is closed, 2m/dt² where it is open, and
-the geometric mean of both along an edge where it slides, by the states that the turns have come to; it is the geometric
-mean everywhere at first (that takes three times the turns). What is left wrong in the end are contacts that bear next to
-nothing, and Newton's method finds all states from there. A turn takes a tenth of an iteration of it.
+lies between their inertia 2m/dt² and their stiffness E'. A motion that a contact prevents
+converges the faster the larger ρ is, one that it leaves free the faster the smaller. So ρ is the geometric mean of the two
+at first and where a contact slides along its edge; where the turns have closed a contact it comes to lie half way
+(in logarithms) between this mean and the stiffness, where they have opened it half way to the inertia. (With the mean
+alone twice the turns leave more states wrong; at the bounds themselves states go on changing.) What is left wrong in the end
+are contacts that bear next to nothing, and Newton's method finds all states from there. A turn takes a tenth of an
+iteration of it.
 """
 
 from __future__ import annotations
@@ -38,18 +40,14 @@ _RELAXATION = 1.7
 _LOOK = 10
 #: Turns after which ρ follows the states.
 _FOLLOWS = (20, 40, 80)
-_SHARE = 0.5
 #: What a turn and a factorisation take, in iterations of Newton's method.
 _TURN, _FACTORS = 0.1, 1.0
-#: … and after how many they tell whether it leads anywhere.
-_SLOW = 60
 
 
 class Proposal(NamedTuple):
-    """The ``states`` that contacts approach, None where they do not, and what it took, in iterations of Newton's
-    method."""
+    """The ``states`` that contacts approach, and what it took, in iterations of Newton's method."""
 
-    states: States | None
+    states: States
     spent: float
 
 
@@ -89,7 +87,8 @@ def _turn(unknowns, ends, vectors, law, rho, held, relaxation, at_hand, states):
 
 def can_split(equations: Equations) -> bool:
     """Not in statics, where no inertia holds blocks, nor for blocks of higher order or curved laws, nor where the system
-    is so small that its matrix is full."""
+    is so small that its matrix is full; nor where no contact bore anything before, as under sudden weight, so that there
+    is nothing to begin with."""
     if equations.statics or equations.expected is None or not equations.first_order:
         return False
     if not equations.found.normal.any():
@@ -104,14 +103,16 @@ class _Springs:
     def __init__(self, equations: Equations) -> None:
         self._equations = equations
         matrix, order, found = equations.matrix, equations.pattern.order, equations.found
-        inertia = np.append(np.minimum(matrix[:, 0, 0], matrix[:, 1, 1]), np.inf)
-        stiff = np.append(np.maximum(inertia[:-1], matrix[:, 3, 3]), np.inf)
-        self._loose, self._firm = (
-            np.minimum(value[order[found.block]], value[order[found.other]]) for value in (inertia, stiff)
-        )
-        for value in (self._loose, self._firm):
-            value[~np.isfinite(value)] = 1.0
-        self._mean = np.sqrt(self._loose * self._firm)
+
+        def of_softer(value: np.ndarray) -> np.ndarray:
+            value = np.append(value, np.inf)
+            softer = np.minimum(value[order[found.block]], value[order[found.other]])
+            return np.where(np.isfinite(softer), softer, 1.0)
+
+        inertia = np.minimum(matrix[:, 0, 0], matrix[:, 1, 1])
+        loose, firm = of_softer(inertia), of_softer(np.maximum(inertia, matrix[:, 3, 3]))
+        self._mean = np.sqrt(loose * firm)
+        self._if_open, self._if_closed = np.sqrt(self._mean * loose), np.sqrt(self._mean * firm)
         self._become(np.stack([self._mean, self._mean]))
 
     def _become(self, rho: np.ndarray) -> None:
@@ -129,15 +130,14 @@ class _Springs:
         """Take ρ by the ``state`` (n,) of the contacts; ζ of what is ``at_hand`` (n, 6) changes with it, the forces ρ (z − ζ)
         of the contacts do not."""
         forces = self.rho.T * (at_hand[:, 2:4] - at_hand[:, :2])
-        across = self._mean * (np.where(state == OPEN, self._loose, self._firm) / self._mean) ** _SHARE
+        across = np.where(state == OPEN, self._if_open, self._if_closed)
         self._become(np.stack([across, np.where(state == SLIP, self._mean, across)]))
         at_hand[:, :2] = at_hand[:, 2:4] - forces / self.rho.T
 
 
 def split(equations: Equations, bonded: np.ndarray, solver: ContactSolver) -> Proposal:
     """The states that the step's contacts come to, with the bonds ``bonded`` (n,) kept, from the motion of the
-    velocities and the forces carried over; None for states where it converges too slowly to lead there. Raises
-    numpy.linalg.LinAlgError."""
+    velocities and the forces carried over. Raises numpy.linalg.LinAlgError."""
     pattern, found, springs = equations.pattern, equations.found, equations.springs
     order, vectors = pattern.order, np.ascontiguousarray(equations.vectors)
     between = _Springs(equations)
@@ -163,8 +163,6 @@ def split(equations: Equations, bonded: np.ndarray, solver: ContactSolver) -> Pr
             changing = np.count_nonzero(states[0] != seen) / len(found)
             if taken > _FOLLOWS[0] and changing <= solver.splitting_settled:
                 break
-            if taken == _SLOW and changing > solver.splitting_slow:
-                return Proposal(None, spent)
             seen[:] = states[0]
         rest = (equations.right - pattern.without_contacts(equations.matrix, unknowns)).ravel()
         balance(0, pattern.n, *equations.sides, vectors, at_hand, 4, 5, rest, rest)

@@ -68,12 +68,12 @@ def test_it_leads_to_the_states_that_fit(struck, monkeypatch):
     found = searched(*struck, 5, monkeypatch)
     assert found
     for equations, bonded, settled in found:
-        proposal = split(equations, bonded, ContactSolver(splitting_settled=-1.0, splitting_slow=1.0))
+        proposal = split(equations, bonded, ContactSolver(splitting_settled=-1.0))
         changes = settled.state != equations.found.state
         wrong = settled.state != proposal.states.state
         assert wrong.sum() < 0.35 * changes.sum() and wrong.mean() < 0.15
-        # (A turn takes a twentieth of an iteration.)
-        assert proposal.spent == pytest.approx(11.0)
+        # (Four factorisations; a turn takes a tenth of an iteration.)
+        assert proposal.spent == pytest.approx(14.0)
 
 
 def test_the_motion_is_the_same_without_it(struck):
@@ -87,6 +87,6 @@ def test_it_is_for_steps_that_move(struck, monkeypatch):
     equations, bonded, _ = searched(*struck, 3, monkeypatch)[0]
     assert can_split(equations)
     assert not can_split(replace(equations, statics=True))
-    # Where it converges too slowly it gives up, after 60 turns.
-    slow = split(equations, bonded, ContactSolver(splitting_slow=-1.0, splitting_settled=-1.0))
-    assert slow.states is None and slow.spent == pytest.approx(4.0)
+    # Nor is there anything to begin with where no contact bore anything before.
+    found = equations.found
+    assert not can_split(replace(equations, found=replace(found, normal=np.zeros(len(found)))))
