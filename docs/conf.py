@@ -45,6 +45,8 @@ exclude_patterns = [
 ]
 # Topics beside the chapters may have been written or not: `howto/index` lists what there is.
 suppress_warnings = ["config.cache"]
+# Which kernels were compiled is of the machine that builds, not of the tutorials.
+logging.getLogger("geomech.compiled").addFilter(lambda record: record.levelno > logging.DEBUG)
 logging.getLogger("sphinx.sphinx.directives.other").addFilter(lambda record: "glob pattern" not in str(record.msg))
 
 autodoc_member_order = "bysource"

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import collections
 import importlib
+import io
 import json
 import math
 import types
@@ -249,9 +250,17 @@ class _Reader:
     def _bytes(self, file: BinaryIO) -> None:
         """The arrays that own their memory, in the order in which they were written."""
         own = sorted((node[1], k) for k, node in enumerate(self.nodes) if node[0] == "a")
+        start = file.tell()
+        left = file.seek(0, io.SEEK_END) - start
+        file.seek(start)
         for _, k in own:
             _, _, described, shape, order, writeable = self.nodes[k]
-            array = np.empty(tuple(shape), _dtype(described), order)
+            dtype = _dtype(described)
+            # Before memory is taken for an array that the file does not hold.
+            if min(shape, default=0) < 0 or math.prod(shape) * dtype.itemsize > left:
+                raise Broken("the file ends within an array")
+            array = np.empty(tuple(shape), dtype, order)
+            left -= array.nbytes
             memory = _memory(array)
             if file.readinto(memory) != memory.nbytes:
                 raise Broken("the file ends within an array")

@@ -10,8 +10,7 @@ yours: run at half the step, and look at what changes.
 # The time step of a slope that slides
 # ------------------------------------
 # The scene of the :doc:`first run </start/first_run>`, 0.4 s of it. The work of gravity is a good measure: it is one
-# number for how far all that moves has come down. Its
-# reference is the finest step.
+# number for how far all that moves has come down. The reference is the finest step.
 
 import time as clock
 from pathlib import Path
@@ -43,16 +42,16 @@ def fall(**dda) -> tuple[float, float]:
 
 fall(time_step_s=0.04)  # compiles what is to be compiled
 reference, _ = fall(time_step_s=0.002)
-figure, (left, right) = plt.subplots(1, 2, figsize=(10, 3.8), layout="constrained")
+figure, axes = plt.subplots(figsize=(5.5, 3.8), layout="constrained")
 for springs in ("stiff", "resolved"):
     found = []
     for dt in (0.02, 0.01, 0.005):
         work, spent = fall(time_step_s=dt, springs=springs)
         found.append((spent, abs(work / reference - 1)))
         print(f"{springs:9} dt = {1e3 * dt:4.0f} ms: {spent:5.2f} s, work of gravity off by {found[-1][1]:.2%}")
-    left.loglog(*np.array(found).T, "o-", label=f"{springs} springs, 20 / 10 / 5 ms")
-left.set(xlabel="processor time, s", ylabel="error of the work of gravity", title="a slope that slides")
-left.legend(frameon=False)
+    axes.loglog(*np.array(found).T, "o-", label=f"{springs} springs, 20 / 10 / 5 ms")
+axes.set(xlabel="processor time, s", ylabel="error of the work of gravity", title="a slope that slides")
+axes.legend(frameon=False)
 
 # %%
 # The order of crack elements
@@ -78,8 +77,9 @@ for order in (2, 3, 4, 5, 6, 8):
     k, spent = factors(order)
     found.append((1e3 * spent, np.abs(k - exact).max() / np.abs(exact).max()))
     print(f"order {order}: {found[-1][0]:5.1f} ms, K off by {found[-1][1]:.1e}")
-right.loglog(*np.array(found).T, "s-", color="C2")
-right.set(xlabel="processor time, ms", ylabel="error of K", title="order 2 … 8 of elements")
+figure, axes = plt.subplots(figsize=(5.5, 3.8), layout="constrained")
+axes.loglog(*np.array(found).T, "s-", color="C2")
+axes.set(xlabel="processor time, ms", ylabel="error of K", title="order 2 … 8 of elements")
 
 # %%
 # Or say which error you want: ``ddm.target_error`` in the scene, ``ddm.solve_to`` in Python.

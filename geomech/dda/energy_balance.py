@@ -77,8 +77,8 @@ class StepEnergy(NamedTuple):
 
 @part(fastmath=False, error_model="numpy", nogil=True)
 def _product(first, second, b, c, d, area, xx, yy, xy):
-    """∫ u·w of two first-order fields with unknowns ``first[b]`` and ``second[b]``, whose strains c and d stand apart,
-    over a block of these moments."""
+    """∫ u·w over a block with these moments, of two first-order fields with the rigid motions ``first[b]`` and
+    ``second[b]`` and the strains c and d."""
     p, q = 0.5 * c[2] - first[b, 2], 0.5 * c[2] + first[b, 2]
     r, s = 0.5 * d[2] - second[b, 2], 0.5 * d[2] + second[b, 2]
     # u = (u0 + εx x + p y, v0 + q x + εy y)
@@ -119,155 +119,212 @@ def sliding(vectors, unknowns, order, block, other, way=1):
     return out
 
 
-@kept(fastmath=False, error_model="numpy", nogil=True)
-def step_energies(
-    increment,
-    old_velocity,
-    carried,
-    velocity,
-    acceleration,
-    dt,
-    gravity,
-    load,
-    weight,
-    block_damping,
-    mass_damping,
-    stiffness_damping,
-    density,
-    moments,
-    fixed,
-    old_stress,
-    tangent,
-    stress0,
-    compliance,
-    stiffness,
-    was_state,
-    state,
-    was_bonded,
-    bonded,
-    gap0,
-    gap,
-    arc,
-    lifted,
-    slip,
-    sliding,
-    normal_force,
-    shear_force0,
-    shear_force,
-    end_shear,
-    normal,
-    shear,
-    theta,
-    law,
-    closure,
-):
-    """The terms of `StepEnergy` in its order but for impacts, (14,).
+class StepMotion(NamedTuple):
+    """Blocks in a step, (n_blocks, 6) each, in the unknowns u0, v0, r0, εx, εy, γxy.
 
-    Blocks: ``increment``, ``carried``, ``acceleration``, ``load`` (n_blocks, 6) as solved with, ``old_velocity`` and
-    ``velocity`` before and after the step, ``old_stress``, ``tangent``, ``stress0`` with σ′ = tangent Δε + stress0;
-    ``weight`` θ and dampings of the time scheme. Contacts (n,): states and bonds before and after, gaps from where the
-    faces meet, ``arc``, ``lifted``, ``slip`` and motion along the edge (``sliding``) in the step (m); forces that acted
-    over the step, and shear forces at its two ends (N); ``normal`` N/m, the spring without dashpot, and ``shear``, that
-    of the step (``theta`` times the spring), 0 where a multiplier holds and nothing is stored; ``closure`` (n_laws,) m.
+    increment        displacement over the step, m
+    old_velocity     as the last step ended
+    carried          with which the step begins (its dynamic factor times ``old_velocity``)
+    velocity         as it ends, on the rotated axes
+    acceleration     of the scheme's equation of motion
+    load             generalised forces of all loads but weight, N and N m
     """
-    kinetic = elastic = contact = before = fallen = loads = cracks = 0.0
-    friction = viscous = bond = scheme = lost = overlap = 0.0
+
+    increment: np.ndarray
+    old_velocity: np.ndarray
+    carried: np.ndarray
+    velocity: np.ndarray
+    acceleration: np.ndarray
+    load: np.ndarray
+
+
+class StepStress(NamedTuple):
+    """Stresses of blocks in a step: σ = ``old_stress`` (n_blocks, 3) Pa as it begins, σ′ = ``tangent`` Δε + ``stress0``
+    as it ends, and the blocks' own ``stiffness`` and ``compliance`` (n_blocks, 3, 3), Pa and 1/Pa."""
+
+    old_stress: np.ndarray
+    tangent: np.ndarray
+    stress0: np.ndarray
+    compliance: np.ndarray
+    stiffness: np.ndarray
+
+
+class ContactStep(NamedTuple):
+    """Contacts (n,) in a step.
+
+    was_state, state      as it begins and as it ends
+    was_bonded, bonded    their bonds
+    gap0, gap             from where the faces meet, m
+    arc, lifted           of the gap's change: by blocks that turn, by dilation, m
+    slip, sliding         plastic slip, and motion along the edge, m
+    normal_force          that acted over the step, N
+    shear_force0, shear_force, end_shear    as the step begins, over it, and as it ends, N
+    normal                stiffness without dashpot, N/m
+    shear                 that of the step (``theta`` times the spring), N/m. Both are 0 where a multiplier holds and
+                          nothing is stored
+    theta                 weight of the step's end
+    law                   joint law
+    """
+
+    was_state: np.ndarray
+    state: np.ndarray
+    was_bonded: np.ndarray
+    bonded: np.ndarray
+    gap0: np.ndarray
+    gap: np.ndarray
+    arc: np.ndarray
+    lifted: np.ndarray
+    slip: np.ndarray
+    sliding: np.ndarray
+    normal_force: np.ndarray
+    shear_force0: np.ndarray
+    shear_force: np.ndarray
+    end_shear: np.ndarray
+    normal: np.ndarray
+    shear: np.ndarray
+    theta: np.ndarray
+    law: np.ndarray
+
+
+#: Where the terms of `StepEnergy` stand in the sums of a step.
+_KINETIC, _ELASTIC, _CONTACT, _BEFORE, _GRAVITY_WORK, _LOAD_WORK, _CRACK_WORK = range(7)
+_FRICTION, _DAMPING, _BOND, _SCHEME, _CARRIED, _OVERLAP, _RESIDUAL = range(7, 14)
+
+
+@part(fastmath=False, error_model="numpy", nogil=True)
+def _strain_energies(b, strain, stress, weight):
+    """Of block ``b``, per area (J/m³): ½ σ·C⁻¹σ before and after the step, the work done on its cracks, σ̄·Δε, and
+    Δε·tangent Δε; ``strain`` (3,) is Δε."""
     now = np.empty(3)
+    u0 = u1 = cracked = mean = quadratic = 0.0
+    for k in range(3):
+        now[k] = stress.stress0[b, k]
+        for m in range(3):
+            now[k] += stress.tangent[b, k, m] * strain[m]
+            quadratic += strain[k] * stress.tangent[b, k, m] * strain[m]
+        mean += ((1.0 - weight) * stress.old_stress[b, k] + weight * stress.stress0[b, k]) * strain[k]
+    mean += weight * quadratic
+    for k in range(3):
+        opened = strain[k]
+        for m in range(3):
+            u0 += 0.5 * stress.old_stress[b, k] * stress.compliance[b, k, m] * stress.old_stress[b, m]
+            u1 += 0.5 * now[k] * stress.compliance[b, k, m] * now[m]
+            opened -= stress.compliance[b, k, m] * (now[m] - stress.old_stress[b, m])
+        cracked += 0.5 * (stress.old_stress[b, k] + now[k]) * opened
+    return u0, u1, cracked, mean, quadratic
+
+
+@part(fastmath=False, error_model="numpy", nogil=True)
+def _kinetic_energies(b, motion, mass):
+    """Of block ``b`` (J/m): kinetic energy as the last step ended, as this one begins and as it ends; the work of its
+    inertia on the step's displacement; and ∫ρ|d|², kg m."""
+    increment, velocity = motion.increment, motion.velocity
+    old, carried, acceleration = motion.old_velocity, motion.carried, motion.acceleration
+    area, xx, yy, xy = mass.moments[b, 0], mass.moments[b, 3], mass.moments[b, 4], mass.moments[b, 5]
+    rho = mass.density[b]
+    # The new velocity is on the rotated axes: rotated back, it is compared on the step's own.
+    c, s = np.cos(increment[b, 2]), np.sin(increment[b, 2])
+    ex, ey, g = velocity[b, 3], velocity[b, 4], 0.5 * velocity[b, 5]
     rate = np.empty(3)
+    rate[0] = c * c * ex + s * s * ey + 2 * s * c * g
+    rate[1] = s * s * ex + c * c * ey - 2 * s * c * g
+    rate[2] = 2.0 * ((c * c - s * s) * g - s * c * (ex - ey))
+    had = 0.5 * rho * _product(old, old, b, old[b, 3:], old[b, 3:], area, xx, yy, xy)
+    begun = 0.5 * rho * _product(carried, carried, b, carried[b, 3:], carried[b, 3:], area, xx, yy, xy)
+    work = rho * _product(increment, acceleration, b, increment[b, 3:], acceleration[b, 3:], area, xx, yy, xy)
+    moved = rho * _product(increment, increment, b, increment[b, 3:], increment[b, 3:], area, xx, yy, xy)
+    # The second moments of the mass as the step ends, (I + ε) S (I + ε): the rotation continues on the strained block.
+    fx, fy, h = 1.0 + increment[b, 3], 1.0 + increment[b, 4], 0.5 * increment[b, 5]
+    xx1 = fx * fx * xx + 2.0 * fx * h * xy + h * h * yy
+    yy1 = h * h * xx + 2.0 * h * fy * xy + fy * fy * yy
+    xy1 = fx * h * xx + (fx * fy + h * h) * xy + h * fy * yy
+    after = 0.5 * rho * _product(velocity, velocity, b, rate, rate, area, xx1, yy1, xy1)
+    return had, begun, after, work, moved
+
+
+@part(fastmath=False, error_model="numpy", nogil=True)
+def _add_blocks(out, motion, stress, mass, scheme, gravity):
+    """Add the terms of blocks to the sums ``out`` (14,)."""
+    increment = motion.increment
     for b in range(increment.shape[0]):
-        area = moments[b, 0]
-        u0 = u1 = cracked = mean = quadratic = 0.0
-        for k in range(3):
-            now[k] = stress0[b, k]
-            for m in range(3):
-                now[k] += tangent[b, k, m] * increment[b, 3 + m]
-                quadratic += increment[b, 3 + k] * tangent[b, k, m] * increment[b, 3 + m]
-            mean += ((1.0 - weight) * old_stress[b, k] + weight * stress0[b, k]) * increment[b, 3 + k]
-        mean += weight * quadratic
-        for k in range(3):
-            opened = increment[b, 3 + k]
-            for m in range(3):
-                u0 += 0.5 * old_stress[b, k] * compliance[b, k, m] * old_stress[b, m]
-                u1 += 0.5 * now[k] * compliance[b, k, m] * now[m]
-                opened -= compliance[b, k, m] * (now[m] - old_stress[b, m])
-            cracked += 0.5 * (old_stress[b, k] + now[k]) * opened
-        elastic += area * u1
-        before += area * u0
+        area, rho, strain = mass.moments[b, 0], mass.density[b], increment[b, 3:]
+        u0, u1, cracked, mean, quadratic = _strain_energies(b, strain, stress, scheme.weight)
+        out[_ELASTIC] += area * u1
+        out[_BEFORE] += area * u0
         # A fixed block may be made to move: what drives it works.
         for k in range(6):
-            loads += load[b, k] * increment[b, k]
-        if fixed[b]:
+            out[_LOAD_WORK] += motion.load[b, k] * increment[b, k]
+        if mass.fixed[b]:
             continue
-        scheme += area * (mean - (u1 - u0) - cracked)
-        cracks += area * cracked
-        # The new velocity is on turned axes: turned back, it is compared on the step's own.
-        c, s = np.cos(increment[b, 2]), np.sin(increment[b, 2])
-        ex, ey, g = velocity[b, 3], velocity[b, 4], 0.5 * velocity[b, 5]
-        rate[0] = c * c * ex + s * s * ey + 2 * s * c * g
-        rate[1] = s * s * ex + c * c * ey - 2 * s * c * g
-        rate[2] = 2.0 * ((c * c - s * s) * g - s * c * (ex - ey))
-        xx, yy, xy, rho = moments[b, 3], moments[b, 4], moments[b, 5], density[b]
-        had = (
-            0.5
-            * rho
-            * _product(old_velocity, old_velocity, b, old_velocity[b, 3:], old_velocity[b, 3:], area, xx, yy, xy)
-        )
-        kept = 0.5 * rho * _product(carried, carried, b, carried[b, 3:], carried[b, 3:], area, xx, yy, xy)
-        work = rho * _product(increment, acceleration, b, increment[b, 3:], acceleration[b, 3:], area, xx, yy, xy)
-        moved = rho * _product(increment, increment, b, increment[b, 3:], increment[b, 3:], area, xx, yy, xy)
-        # The second moments of the mass as the step ends, (I + ε) S (I + ε): rotation goes on on the strained block.
-        fx, fy, h = 1.0 + increment[b, 3], 1.0 + increment[b, 4], 0.5 * increment[b, 5]
-        xx1 = fx * fx * xx + 2.0 * fx * h * xy + h * h * yy
-        yy1 = h * h * xx + 2.0 * h * fy * xy + fy * fy * yy
-        xy1 = fx * h * xx + (fx * fy + h * h) * xy + h * fy * yy
-        after = 0.5 * rho * _product(velocity, velocity, b, rate, rate, area, xx1, yy1, xy1)
-        # What centrifugal force does on the strains it takes from the rotation.
-        spin = (
-            rho * carried[b, 2] * carried[b, 2] * (xx * increment[b, 3] + yy * increment[b, 4] + xy * increment[b, 5])
-        )
-        kinetic += after
-        before += had
-        lost += had - kept
-        scheme += work - spin - (after - kept)
-        fallen += density[b] * area * (gravity[0] * increment[b, 0] + gravity[1] * increment[b, 1])
-        viscous += mass_damping / dt * moved
-        drag = stiffness_damping + 2.0 * block_damping * np.sqrt(density[b] * area / (12.0 * stiffness[b, 0, 0]))
-        viscous += drag / dt * area * quadratic
-    for i in range(state.shape[0]):
-        kn, g0, g1, limit = normal[i], gap0[i], gap[i], closure[law[i]]
-        give = theta[i] / shear[i] if shear[i] > 0.0 else 0.0
+        out[_SCHEME] += area * (mean - (u1 - u0) - cracked)
+        out[_CRACK_WORK] += area * cracked
+        had, begun, after, work, moved = _kinetic_energies(b, motion, mass)
+        xx, yy, xy = mass.moments[b, 3], mass.moments[b, 4], mass.moments[b, 5]
+        # The work of the centrifugal force on the strains.
+        spin = rho * motion.carried[b, 2] * motion.carried[b, 2] * (xx * strain[0] + yy * strain[1] + xy * strain[2])
+        out[_KINETIC] += after
+        out[_BEFORE] += had
+        out[_CARRIED] += had - begun
+        out[_SCHEME] += work - spin - (after - begun)
+        out[_GRAVITY_WORK] += rho * area * (gravity[0] * increment[b, 0] + gravity[1] * increment[b, 1])
+        out[_DAMPING] += scheme.mass_damping / scheme.dt * moved
+        drag = scheme.stiffness_damping
+        drag += 2.0 * scheme.block_damping * np.sqrt(rho * area / (12.0 * stress.stiffness[b, 0, 0]))
+        out[_DAMPING] += drag / scheme.dt * area * quadratic
+
+
+@part(fastmath=False, error_model="numpy", nogil=True)
+def _add_contacts(out, contacts, closure):
+    """Add the terms of contacts to the sums ``out`` (14,); ``closure`` (n_laws,) m, the largest of a joint's faces."""
+    for i in range(contacts.state.shape[0]):
+        was, state, theta = contacts.was_state[i], contacts.state[i], contacts.theta[i]
+        kn, g0, g1, limit = contacts.normal[i], contacts.gap0[i], contacts.gap[i], closure[contacts.law[i]]
+        give = theta / contacts.shear[i] if contacts.shear[i] > 0.0 else 0.0
         phi0 = phi1 = given = rubbed = drag = done = 0.0
-        if was_state[i] != OPEN:
-            phi0 = _stored(kn, g0, limit, was_bonded[i]) + 0.5 * give * shear_force0[i] * shear_force0[i]
-        before += phi0
-        if state[i] != OPEN:
-            pushed, sheared = normal_force[i], shear_force[i]
-            if was_state[i] == OPEN and g0 < 0.0:
+        if was != OPEN:
+            shear0 = contacts.shear_force0[i]
+            phi0 = _stored(kn, g0, limit, contacts.was_bonded[i]) + 0.5 * give * shear0 * shear0
+        out[_BEFORE] += phi0
+        if state != OPEN:
+            pushed, sheared, end = contacts.normal_force[i], contacts.shear_force[i], contacts.end_shear[i]
+            if was == OPEN and g0 < 0.0:
                 given = _stored(kn, g0, limit, 0)
-            phi1 = _stored(kn, g1, limit, bonded[i]) + 0.5 * give * end_shear[i] * end_shear[i]
+            phi1 = _stored(kn, g1, limit, contacts.bonded[i]) + 0.5 * give * end * end
             # Forces act along the straight motion: what the arc takes from it or adds is the scheme's.
-            done = pushed * (g1 - g0 - arc[i] + lifted[i]) + sheared * sliding[i]
-            if state[i] == SLIP:
-                rubbed = -sheared * (slip[i] if give > 0.0 else sliding[i]) - pushed * lifted[i]
+            lifted, slid = contacts.lifted[i], contacts.sliding[i]
+            done = pushed * (g1 - g0 - contacts.arc[i] + lifted) + sheared * slid
+            if state == SLIP:
+                rubbed = -sheared * (contacts.slip[i] if give > 0.0 else slid) - pushed * lifted
             if kn > 0.0:
-                start = g0 if was_state[i] != OPEN and was_bonded[i] > 0 else min(g0, 0.0)
-                spring = -theta[i] * _push(kn, g1, limit) - (1.0 - theta[i]) * _push(kn, start, limit)
+                start = g0 if was != OPEN and contacts.was_bonded[i] > 0 else min(g0, 0.0)
+                spring = -theta * _push(kn, g1, limit) - (1.0 - theta) * _push(kn, start, limit)
                 drag = -(pushed + spring) * (g1 - g0)
         rest = given - done - (phi1 - phi0) - rubbed - drag
-        contact += phi1
-        overlap += given
-        friction += rubbed
-        viscous += drag
-        if was_bonded[i] and not bonded[i]:
-            bond += rest
+        out[_CONTACT] += phi1
+        out[_OVERLAP] += given
+        out[_FRICTION] += rubbed
+        out[_DAMPING] += drag
+        if contacts.was_bonded[i] and not contacts.bonded[i]:
+            out[_BOND] += rest
         else:
-            scheme += rest
-    out = np.empty(14)
-    out[0], out[1], out[2], out[3] = kinetic, elastic, contact, before
-    out[4], out[5], out[6] = fallen, loads, cracks
-    out[7], out[8], out[9], out[10], out[11], out[12] = friction, viscous, bond, scheme, lost, overlap
-    out[13] = kinetic + elastic + contact - before
-    out[13] -= fallen + loads + overlap - cracks - friction - viscous - bond - scheme - lost
+            out[_SCHEME] += rest
+
+
+@kept(fastmath=False, error_model="numpy", nogil=True)
+def step_energies(motion, stress, mass, scheme, gravity, contacts, closure):
+    """The terms of `StepEnergy` in its order but for impacts, (14,) J/m.
+
+    ``motion``, ``stress`` and ``mass`` of the blocks (`StepMotion`, `StepStress`, `BlockMass`), ``scheme``
+    (`SchemeTerms`), ``gravity`` (2,) m/s², ``contacts`` (`ContactStep`), and ``closure`` (n_laws,) m, the largest of
+    joints with Bandis' law, inf for the others.
+    """
+    out = np.zeros(14)
+    _add_blocks(out, motion, stress, mass, scheme, gravity)
+    _add_contacts(out, contacts, closure)
+    work = out[_GRAVITY_WORK] + out[_LOAD_WORK] + out[_OVERLAP]
+    losses = out[_FRICTION], out[_DAMPING], out[_BOND], out[_SCHEME], out[_CARRIED]
+    out[_RESIDUAL] = out[_KINETIC] + out[_ELASTIC] + out[_CONTACT] - out[_BEFORE]
+    out[_RESIDUAL] -= work - out[_CRACK_WORK] - losses[0] - losses[1] - losses[2] - losses[3] - losses[4]
     return out
 
 

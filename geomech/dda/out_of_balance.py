@@ -2,29 +2,22 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from ..compiled import kept
 
 
+class ContactForces(NamedTuple):
+    """Normal and shear forces of contacts (n,), N."""
+
+    normal: np.ndarray
+    shear: np.ndarray
+
+
 @kept(fastmath=False, error_model="numpy", nogil=True)
-def imbalance(
-    matrix,
-    right,
-    vectors,
-    block,
-    other,
-    order,
-    unknowns,
-    normal_force,
-    shear_force,
-    acceleration,
-    density,
-    moments,
-    gravity,
-    load,
-    largest,
-):
+def imbalance(own, contacts, unknowns, forces, acceleration, mass, loads, largest):
     """(residual, unbalanced force ratio).
 
     The residual is the largest of the equations of motion, contact forces as reported, over the largest force in them:
@@ -32,9 +25,15 @@ def imbalance(
     sum of the sizes of its weight, loads and contact forces (for its rotation moments over √area), at the block where
     it is largest: 0 at rest, 1 in free flight.
 
-    ``matrix`` (n, 6, 6), ``right`` (n, 6), ``unknowns`` (n, 6) as solved; ``vectors`` (n_contacts, 2, 12);
-    ``acceleration`` and ``load`` (n_blocks, 6); ``largest`` N of the forces in ``right`` that may cancel there.
+    ``own`` (`BlockEquations`), ``contacts`` (`ContactMotion`) and ``unknowns`` (n, 6) as solved; ``forces``
+    (`ContactForces`); ``acceleration`` (n_blocks, 6); ``mass`` (`BlockMass`); ``loads`` (`BlockLoads`); ``largest`` N of
+    the forces in the right side that may cancel there.
     """
+    matrix, right = own
+    block, other, order, vectors = contacts
+    density, moments, _ = mass
+    gravity, load = loads
+    normal_force, shear_force = forces
     n = right.shape[0]
     rest = np.empty((n, 6))
     size = np.zeros(n)
@@ -70,11 +69,11 @@ def imbalance(
         if i < 0:
             continue
         area = moments[b, 0]
-        mass = density[b] * area
+        own_mass = density[b] * area
         a, spin = acceleration[b], acceleration[b, 2]
         turning = density[b] * (moments[b, 3] + moments[b, 4]) * spin / np.sqrt(area)
-        moving = max(mass * np.sqrt(a[0] * a[0] + a[1] * a[1]), abs(turning))
-        pulled = size[i] + mass * np.sqrt(gravity[0] * gravity[0] + gravity[1] * gravity[1])
+        moving = max(own_mass * np.sqrt(a[0] * a[0] + a[1] * a[1]), abs(turning))
+        pulled = size[i] + own_mass * np.sqrt(gravity[0] * gravity[0] + gravity[1] * gravity[1])
         pulled += np.sqrt(load[b, 0] * load[b, 0] + load[b, 1] * load[b, 1])
         if pulled > 0.0 and moving > ratio * pulled:
             ratio = moving / pulled

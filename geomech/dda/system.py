@@ -4,22 +4,21 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 
 import numpy as np
 
-from ..model import OPEN, Blocks, DdaSettings, JointLaw, Loads, Material, State
+from ..model import Blocks, DdaSettings, JointLaw, Loads, Material, State
 from .contact_detection.contact_finder import ContactFinder
 from .contact_detection.inherited_contacts import InheritedContacts, at_their_springs, inherited_rows
 from .contact_detection.initial_overlap import refuse_overlap
 from .counters import Work
 from .excavation import Excavations, until_next_event
-from .higher_order.bending_step import BendingAttempt
 from .higher_order.deflected_blocks import DeflectedBlocks
+from .higher_order.glued_cells import GluedFaces, GlueStrength, KeptCorners
 from .higher_order.order_choice import OrderChoice, relaid
 from .higher_order.six_row_system import six_row_pattern
 from .higher_order.unsupported import refuse_unsupported, refuse_unsupported_loads
-from .kinematics.midpoint_configuration import MidpointConfiguration
 from .kinematics.newmark import TimeScheme
 from .kinematics.rigid_blocks import with_rigid
 from .kinematics.roundoff import rounding_of
@@ -28,44 +27,18 @@ from .linear_solver import assembly
 from .loads.load_checks import StrayLoads
 from .loads.load_vectors import LoadMap
 from .open_close.contact_set import ContactSet
-from .open_close.equations import Unsettled
-from .results import CrackResponse, NotConverged, StepResult
+from .results import CrackResponse, StepResult
 from .step_control.relative_motion import Windows
-from .step_control.step_limits import CROSSING, UNSETTLED, StepLimits
-from .time_step import Attempt
+from .step_control.step_limits import StepLimits
+from .step_cutting import StepCutting, windows_of
+from .time_step import Attempt, StepStart
 
 log = logging.getLogger(__name__)
 
-#: Contacts of one step are sought anew, farther, so often at most; then it is cut.
-_FARTHER = 6
-#: A step is begun again so often where corners meet in another direction than was expected, …
-_REDIRECTED = 3
-#: … by more than this angle (cosine).
-_OTHER_WAY = 0.95
 #: Half the diagonal of the domain: no limit for what blocks that hold together move.
 _ANYWHERE = 1.0
 #: Multipliers are not asked to close gaps below this many times that round-off.
 _FINEST = 10.0
-
-
-@dataclass(eq=False)
-class _Search:
-    """What the contacts of a step are sought by, see `ContactFinder.find`."""
-
-    finder: ContactFinder
-    state: State
-    vertices: np.ndarray
-    near: Windows
-    motion: np.ndarray | None
-    margin: float
-    glue_holds: bool = True
-    broken: np.ndarray = field(default_factory=lambda: np.zeros(0, np.int64))
-
-    def find(self) -> ContactSet:
-        return self.finder.find(
-            self.state, self.vertices, self.near, self.glue_holds, broken=self.broken, motion=self.motion,
-            margin=self.margin,
-        )  # fmt: skip
 
 
 class BlockSystem:
@@ -127,9 +100,16 @@ class BlockSystem:
         #: What finds orders as the run goes; None where all are given.
         self.order_choice: OrderChoice | None = None
         self._take_out(None, None)
-        if blocks.order is not None and (np.asarray(blocks.order) != 1)[~self.fixed].any():
+        #: Faces of cells that are glued; None where no blocks are cells.
+        self.glued: GluedFaces | None = None
+        ordered = blocks.order is not None and (np.asarray(blocks.order) != 1)[~self.fixed].any()
+        if ordered or blocks.glued is not None:
             refuse_unsupported(blocks, self.materials, self.joints, self.settings)
             self._choose_orders()
+        #: What glue bears; None where none can part.
+        self.glue_strength: GlueStrength | None = None
+        if blocks.glued is not None and (strength := self._glue_strength()).any:
+            self.glue_strength = strength
         rigid = rigid & ~self.fixed
         self.rigid = np.flatnonzero(rigid)
         self.compliance[rigid] = 0.0
@@ -175,7 +155,7 @@ class BlockSystem:
             self.blocks, self.fixed, self.density, self.stiffness, self.compliance, self.settings.order_target
         )
         self.order_choice = choice if choice.found.any() else None
-        self.order = np.ones(self.blocks.n_blocks, np.int64)
+        self.order = np.zeros(self.blocks.n_blocks, np.int64)
         self._take_orders(choice, choice.first)
 
     def _take_orders(self, choice: OrderChoice, order: np.ndarray) -> None:
@@ -184,6 +164,28 @@ class BlockSystem:
             return
         self.order, self.deflected, self._sparse = order, choice.deflected(order), None
         self.finder.at_corners = self.deflected is not None
+        if self.blocks.glued is not None:
+            self._all_glued, self._parted = GluedFaces.of(self.deflected), None
+            self._part(np.zeros(len(self.blocks.glued), bool))
+
+    def _glue_strength(self) -> GlueStrength:
+        """What glued faces bear: those whose edges have names, as their joint law says."""
+        edge, mate = np.asarray(self.blocks.glued).T
+        law, named = (
+            self.finder.laws_of(edge, mate),
+            (self.blocks.edge_name[edge] > 0) & (self.blocks.edge_name[mate] > 0),
+        )
+        return GlueStrength.of(
+            [self.joints[k] if k >= 0 and has else None for k, has in zip(law.tolist(), named.tolist(), strict=True)]
+        )
+
+    def _part(self, parted: np.ndarray) -> None:
+        """Go on with cells whose glued faces have ``parted`` (n_faces,)."""
+        if self._parted is not None and np.array_equal(parted, self._parted):
+            return
+        self._parted, self._sparse, self.glued = parted, None, self._all_glued.kept(~parted)
+        self.finder.part(self.blocks, parted)
+        self.finder.kept_corners = KeptCorners(self.deflected, self.finder.joined)
         self.finder.deflection, self.finder.sag = np.zeros((2, self.blocks.n_blocks))
 
     @property
@@ -241,19 +243,32 @@ class BlockSystem:
         shorter one. Raises `NotConverged` after ``settings.max_step_cuts`` cuts, and ValueError when blocks overlap
         before they have moved, or when nothing holds them up in statics.
         """
-        choice = self.order_choice
-        if choice is None:
+        choice, strength = self.order_choice, self.glue_strength
+        if choice is None and strength is None:
             return self._step(state, loads, dt, crack, load_time, like)[1]
         refuse_unsupported_loads(loads)
-        self._take_orders(choice, choice.first if state.order is None else np.asarray(state.order))
+        if choice is not None:
+            self._take_orders(choice, choice.first if state.order is None else np.asarray(state.order))
+        if strength is not None:
+            self._part(np.zeros(len(strength.tension), bool) if state.parted is None else np.asarray(state.parted))
         while True:
             attempt, result = self._step(state, loads, dt, crack, load_time, like)
-            order = choice.raised(self.order, self.deflected, attempt)
-            if order is None:
-                return replace(result, state=replace(result.state, order=self.order))
-            if state.deflection is not None:
-                state = replace(state, deflection=relaid(state.deflection, self.order, order))
-            self._take_orders(choice, order)
+            order = None if choice is None else choice.raised(self.order, self.deflected, attempt)
+            if order is not None:
+                if state.deflection is not None:
+                    state = replace(state, deflection=relaid(state.deflection, self.order, order))
+                self._take_orders(choice, order)
+                continue
+            parted = None
+            if strength is not None and len(self.glued.block):
+                parted = strength.parting(self._parted, attempt.glue.mean_traction(attempt.glue_change))
+            if parted is None:
+                known = None if strength is None else self._parted
+                return replace(
+                    result, state=replace(result.state, order=None if choice is None else self.order, parted=known)
+                )
+            log.info("t = %g s: %d faces of cells part", attempt.time, int(parted.sum() - self._parted.sum()))
+            self._part(parted)
 
     def _step(
         self, state: State, loads: Loads, dt: float | None, crack: CrackResponse | None, load_time: float | None,
@@ -282,151 +297,8 @@ class BlockSystem:
             refuse_overlap(self.blocks, vertices, moments)
             self._excavations.refuse(loads)
             self._refuse_unsupported(loads, state.time + dt if load_time is None else load_time)
-        gravity = loads.gravity.at(state.time + dt)
-        dt = self.limits.foreseen(vertices, carried, moments, dt, gravity)
-        search = self._search(state, vertices, carried, moments, dt, gravity)
-        found = search.find()
-        if like is not None:
-            found = found.like(like.state.contacts)
-            if self.scheme.static and found.tried is not None:
-                # (In motion the step's arcs are those that the velocity foresees.)
-                found = found.along(*like.arcs)
-        reason, before = "", np.inf
-        cuts, asked, failed, most, farther, redirected = 0, dt, "", 1.0, 0, 0
-        while True:
-            # What was tried before makes room first: its factors may be of other contacts than those of this attempt.
-            attempt = result = None
-            try:
-                attempt = (Attempt if self.deflected is None else BendingAttempt)(
-                    self, state, vertices, carried, moments, loads, dt, crack, found, cuts, load_time,
-                )  # fmt: skip
-                result = attempt.result()
-            except Unsettled as failure:
-                failed = reason = f"{failure}{self.finder.where(found, failure.contact)}"
-                shorter, guilty = 0.5 * dt, (UNSETTLED, *found.blocks_of(failure.contact))
-            else:
-                bonded = result.contacts["bonded"]
-                lost = (bonded != found.bonded) & found.inset
-                unheld = found.relies_on_glue and (bonded < found.bonded).any()
-                if unheld or lost.any():
-                    # Corners that were left out, and springs that were moved, for the sake of a bond are back before it
-                    # breaks.
-                    search.broken = np.append(search.broken, found.vertex[lost] * len(vertices) + found.edge[lost])
-                    search.glue_holds = found.relies_on_glue and not unheld
-                    found = search.find()
-                    continue
-                if redirected < _REDIRECTED:
-                    # Where corners meet is known once the step's motion is.
-                    again = self._with_corners_of(attempt, search, result.contacts["state"])
-                    if again is not None:
-                        redirected, found = redirected + 1, again
-                        continue
-                used = self.limits.used(attempt, result)
-                reason, guilty = used.reason, (used.why, *used.blocks)
-                if used.share <= 1.0001 * most:
-                    crossed = self.limits.crossed(attempt, result)
-                    if crossed is None and cuts < self.settings.max_step_cuts:
-                        crossed = self.limits.pressed_apart(attempt, result)
-                    if crossed is None:
-                        self._refuse_crushed(result.state)
-                        if self.deflected is not None:
-                            self.deflected.check_small(result.state)
-                        self.limits.warn_of_penetration(result)
-                        if failed:
-                            log.info("step at t = %g s cut from %.4g to %.4g s: %s", state.time, asked, dt, failed)
-                        result.statistics["limit_share"] = used.share
-                        return attempt, result
-                    wider = search.near.widened(crossed.pairs, crossed.motion, self.blocks.n_blocks)
-                    if farther < _FARTHER and wider.reaches_beyond(search.near):
-                        # What went in met no contact: with it the step may be as long.
-                        search.near, search.motion, farther = wider, attempt.new_vertices - vertices, farther + 1
-                        search.glue_holds = found.relies_on_glue
-                        found = search.find()
-                        continue
-                    if cuts >= self.settings.max_step_cuts and not crossed.through:
-                        log.warning("step at t = %g s: %s, and no shorter step avoids it", state.time, crossed.reason)
-                        result.statistics["limit_share"] = used.share
-                        return attempt, result
-                    failed = reason = crossed.reason
-                    guilty = CROSSING, *crossed.blocks
-                    shorter, farther = 0.5 * dt, 0
-                elif self.scheme.static and used.share > 0.9 * before:
-                    # Static equilibrium under a load that does not shrink with dt: let it move, search far enough.
-                    log.info("step at t = %g s: %s, and a shorter step does not help; accepted", state.time, reason)
-                    most = 1.1 * used.share
-                    search.near = search.near.widened(used.moved.pairs, 1.1 * used.moved.reach, self.blocks.n_blocks)
-                    search.glue_holds = found.relies_on_glue
-                    found = search.find()
-                    continue
-                else:
-                    before = used.share
-                    shorter = dt * min(0.8, max(0.05, 0.95 / used.share))
-            cuts += 1
-            if cuts > self.settings.max_step_cuts:
-                raise NotConverged(
-                    f"the block step at t = {state.time:g} s failed after {cuts - 1} cuts (dt = {dt:.3g} s): {reason}"
-                    f"{self._way_out}"
-                )
-            self.limits.shortens(*guilty)
-            log.debug("step at t = %g s cut from %.4g to %.4g s: %s", state.time, dt, shorter, reason)
-            dt = shorter
-            if not self.scheme.static:
-                shorter = self._search(state, vertices, carried, moments, dt, gravity)
-                search.near, search.motion, search.margin = shorter.near, shorter.motion, shorter.margin
-                search.glue_holds = found.relies_on_glue or not len(search.broken)
-                found = search.find()
-
-    def _search(self, state, vertices, carried, moments, dt, gravity) -> _Search:
-        """How a step of ``dt`` looks for contacts. Two corners may come nearer by their weight than their velocities say;
-        what comes nearer still is looked for once the step is known."""
-        return _Search(
-            self.finder, state, vertices, self._near(state, vertices, carried, moments, dt, gravity),
-            self._expected_motion(vertices, carried, moments, dt),
-            np.inf if self.scheme.static else dt * dt * float(np.hypot(*gravity)),
-        )  # fmt: skip
-
-    def _expected_motion(self, vertices, carried, moments, dt) -> np.ndarray | None:
-        """(n_vertices, 2) m: what the velocities ``carried`` make of a step of ``dt``; None where there are none."""
-        if not carried.any():
-            return None
-        return MidpointConfiguration.of(dt * carried, 1.0, vertices, self.owner, moments).vertices - vertices
-
-    def _with_corners_of(self, attempt: Attempt, search: _Search, state: np.ndarray) -> ContactSet | None:
-        """The contacts with which the step is to be begun again because corners have met on the way that the ``attempt``
-        went, with its contacts in ``state`` (n,), but not where they were expected to; None where all did."""
-        found, moved = attempt.found, attempt.new_vertices - attempt.vertices
-        if found.lumped is not None:
-            found = found.lumped
-        pressed = bool(((found.corner >= 0) & (state != OPEN)).any())
-        strayed = np.abs(moved if search.motion is None else moved - search.motion).max()
-        if not pressed and not strayed > 0.5 * search.margin:
-            return None
-        search.motion, search.glue_holds = moved, found.relies_on_glue
-        again = search.find()
-        if pressed and self._redirected(found, again, state):
-            return again
-        known = np.isin(again.vertex * len(moved) + again.edge, found.vertex * len(moved) + found.edge)
-        missed = ~known & (
-            self.finder.gaps(attempt.new_vertices, attempt.vertices, again) - again.lift < -again.precision
-        )
-        return again if missed.any() else None
-
-    def _redirected(self, found: ContactSet, again: ContactSet, state: np.ndarray) -> bool:
-        """Whether any pair of rounded corners that presses in ``state`` (n,) of ``found`` meets in another direction in
-        ``again``."""
-        known = {pair: c for c, pair in enumerate(zip(again.vertex.tolist(), again.edge.tolist(), strict=True))}
-        previous = self.blocks.previous_vertex
-        for c in np.flatnonzero((found.corner >= 0) & (state != OPEN)):
-            v, w = int(found.vertex[c]), int(found.corner[c])
-            names = ((v, w, 1), (v, int(previous[w]), 1), (w, v, -1), (w, int(previous[v]), -1))
-            ways = [
-                way * float(found.geometry[c, 1:3] @ again.geometry[known[v, e], 1:3])
-                for v, e, way in names
-                if (v, e) in known
-            ]
-            if max(ways, default=-1.0) < _OTHER_WAY:
-                return True
-        return False
+        start = StepStart(state, vertices, carried, moments, loads.gravity.at(state.time + dt), loads, crack, load_time)
+        return StepCutting(self, start, dt, like).until_it_holds()
 
     def contacts_near(self, state: State) -> ContactSet:
         """The contacts that a step from ``state`` would begin with, as CONTACT rows tell of them."""
@@ -434,19 +306,11 @@ class BlockSystem:
         vertices = np.ascontiguousarray(state.vertices)
         return self.finder.find(state, vertices, self._standing(state, vertices), lumped=True)
 
-    def _near(self, state, vertices, carried, moments, dt, gravity) -> Windows:
-        """Where a step of ``dt`` looks for contacts."""
-        rows = state.contacts
-        # What has yet to come nearer presses nowhere.
-        lift = float(np.abs(rows["lift"][(rows["state"] != OPEN) | (rows["lift"] > 0.0)]).max(initial=0.0))
-        if self.deflected is not None:
-            lift += 2.0 * float(self.finder.deflection.max())
-        return self.limits.windows(vertices, carried, moments, dt, gravity, lift)
-
     def _standing(self, state: State, vertices: np.ndarray) -> Windows:
-        """Where blocks that stand look for contacts."""
+        """Where blocks at rest look for contacts."""
         moments = block_moments(vertices, self.next, self.vertex_start)
-        return self._near(state, vertices, np.zeros_like(state.velocity), moments, 0.0, np.zeros(2))
+        start = StepStart(state, vertices, np.zeros_like(state.velocity), moments, np.zeros(2))
+        return windows_of(self, start, 0.0)
 
     def inherited_contacts(self, state: State, found: ContactSet, forces: InheritedContacts) -> np.ndarray:
         """CONTACT rows of ``found``, the contacts near ``state``, as ``forces`` say where they tell of one: for a
@@ -475,22 +339,6 @@ class BlockSystem:
                 "block, or let velocity be carried (dynamic_factor = 1)"
             )
 
-    @property
-    def _way_out(self) -> str:
-        """What may help a run in motion whose steps fail."""
-        if self.scheme.static or self.settings.springs == "resolved":
-            return ""
-        return '; dda.springs = "resolved" may go on, with contacts no stiffer than the time step resolves'
-
-    def _refuse_crushed(self, state: State) -> None:
-        area = block_moments(state.vertices, self.next, self.vertex_start)[:, 0]
-        if not (area > 0).all():
-            crushed = int(np.argmin(area > 0))
-            name = self.blocks.names[crushed] if self.blocks.names else f"block {crushed}"
-            raise NotConverged(
-                f"{name!r} is crushed to nothing at t = {state.time:g} s: its loads are beyond its stiffness"
-            )
-
     def pattern_of(
         self, block: np.ndarray, other: np.ndarray, moments: np.ndarray, linked: tuple[np.ndarray, np.ndarray] | None
     ) -> assembly.Pattern:
@@ -498,6 +346,8 @@ class BlockSystem:
         and its solver: kept from step to step while the same blocks do."""
         if linked is not None:
             block, other = np.concatenate([block, linked[0]]), np.concatenate([other, linked[1]])
+        if self.glued is not None:
+            block, other = np.concatenate([block, self.glued.block]), np.concatenate([other, self.glued.other])
         if self.deflected is not None:
             known = None if self._sparse is None else self._sparse[1]
             pattern = six_row_pattern(self.free, self.deflected.rows, block, other, moments[:, 1:3], known)

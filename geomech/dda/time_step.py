@@ -6,7 +6,7 @@ too far.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import TYPE_CHECKING
 
@@ -15,7 +15,15 @@ import numpy as np
 from ..conventions import rotate_stress
 from ..model import OPEN, SLIP, STICK, Loads, State
 from .contact_detection.contact_records import copied
-from .energy_balance import StepEnergy, sliding, step_energies
+from .energy_balance import (
+    ContactStep,
+    StepEnergy,
+    StepMotion,
+    StepStress,
+    sliding,
+    step_energies,
+)
+from .equation_records import BlockEquations, ContactMotion
 from .impacts.restitution import Rebound, RigidBlocks, Striking
 from .joint_laws.coulomb_return import reserves
 from .joint_laws.friction_arrest import Stopped, Unresolved, contact_speeds, dissipating, kinetic_energy, stop
@@ -23,7 +31,16 @@ from .joint_laws.penalty_springs import Springs, end_of_step, over_a_step
 from .joint_laws.sheared_stick import settle_sheared_sticks
 from .kinematics.constraints import balanced, hold, with_rigid_motion
 from .kinematics.midpoint_configuration import MidpointConfiguration
-from .kinematics.newmark import advance, assemble_blocks, turned
+from .kinematics.newmark import (
+    BlockLoads,
+    BlockMass,
+    BlockStart,
+    CrackTerms,
+    Outlines,
+    advance,
+    assemble_blocks,
+    turned,
+)
 from .kinematics.rigid_blocks import mean_stress
 from .kinematics.roundoff import undecided_gaps, warn_of_roundoff
 from .kinematics.simplex_integration import block_moments
@@ -36,7 +53,7 @@ from .open_close.contact_set import ContactSet
 from .open_close.equations import Equations, Unsettled
 from .open_close.iteration import is_large, settle
 from .open_close.settled_states import Settled
-from .out_of_balance import imbalance
+from .out_of_balance import ContactForces, imbalance
 from .results import CrackResponse, StepResult
 
 if TYPE_CHECKING:
@@ -83,39 +100,51 @@ class Impact:
         self.rubbed += rebound.rubbed
 
 
-class Attempt:
-    """A step of ``system`` by ``dt`` from ``state`` with the contacts ``found``; ``cuts`` steps were attempted in vain
-    before.
+@dataclass(frozen=True, eq=False)
+class StepStart:
+    """What all attempts at a step begin with.
 
-    ``carried`` (n_blocks, 6) is the velocity that the step begins with, ``moments`` those of the blocks of
-    ``vertices``. Raises `Unsettled` where contacts find no states.
+    state                      as the last step ended
+    vertices  (n_vertices, 2)  its vertices, m
+    carried   (n_blocks, 6)    velocity that the step begins with
+    moments   (n_blocks, 6)    of the blocks (`block_moments`)
+    gravity   (2,)             m/s² at the end of the step as it was asked for
+    loads, crack               that act, None for none
+    load_time                  at which loads are taken, s; None: as the time scheme weights them
     """
 
-    def __init__(
-        self,
-        system: SteppedSystem,
-        state: State,
-        vertices: np.ndarray,
-        carried: np.ndarray,
-        moments: np.ndarray,
-        loads: Loads,
-        dt: float,
-        crack: CrackResponse | None,
-        found: ContactSet,
-        cuts: int,
-        load_time: float | None,
-    ) -> None:
-        self.system, self.state, self.vertices, self.carried, self.moments = system, state, vertices, carried, moments
+    state: State
+    vertices: np.ndarray
+    carried: np.ndarray
+    moments: np.ndarray
+    gravity: np.ndarray
+    loads: Loads = field(default_factory=Loads)
+    crack: CrackResponse | None = None
+    load_time: float | None = None
+
+
+class Attempt:
+    """A step of ``system`` by ``dt`` from ``start`` with the contacts ``found``, after ``cuts`` attempts at longer ones.
+    Raises `Unsettled` where contacts find no states.
+    """
+
+    def __init__(self, system: SteppedSystem, start: StepStart, dt: float, found: ContactSet, cuts: int) -> None:
+        self.system, self.state, self.vertices = system, start.state, start.vertices
+        self.carried, self.moments = start.carried, start.moments
         self.dt, self.found, self.cuts, scheme = dt, found, cuts, system.scheme
+        state, moments, crack = start.state, start.moments, start.crack
         self.time = state.time + dt
         # Mass stays, whatever the strain does to the area.
         self.density = system.mass / moments[:, 0]
-        self.given, self.n_free = crack is not None, len(system.moving)
-        self.crack_compliance = (
-            np.ascontiguousarray(crack.compliance, dtype=float) if self.given else system.no_compliance
+        self.n_free = len(system.moving)
+        compliance, offset = (
+            (system.no_compliance, system.no_offset) if crack is None else (crack.compliance, crack.offset)
         )
-        self.crack_offset = np.ascontiguousarray(crack.offset, dtype=float) if self.given else system.no_offset
-        self.stress, self.crack_strain = np.array(state.stress), np.ascontiguousarray(state.crack_strain)
+        self.cracks = CrackTerms(
+            crack is not None, np.ascontiguousarray(state.crack_strain),
+            np.ascontiguousarray(compliance, dtype=float), np.ascontiguousarray(offset, dtype=float),
+        )  # fmt: skip
+        self.stress = np.array(state.stress)
         if system.taken_out is not None:
             # What blocks store goes with them, in the first step without them and not after it.
             self.stress[system.taken_out] = 0.0
@@ -129,9 +158,9 @@ class Attempt:
             # From the end's arms the arc is long, but known as well as these.
             self._follow(foreseen, self.midpoint.vertices)
         for bends in range(_BENDS, -1, -1):
-            self._act(loads, load_time)
+            self._act(start.loads, start.load_time)
             self._assemble()
-            self._absorb(loads, load_time)
+            self._absorb(start.loads, start.load_time)
             self._settle()
             if not bends or not self._bent():
                 break
@@ -197,11 +226,13 @@ class Attempt:
             # What is cut at the first sign needs no factors in double, of 100 000 blocks another 1.6 GB.
             self.pattern.solver.single_only = is_large(self.n_free, scheme.static, system.settings.contact_solver)
         self.matrix, self.right, self.tangent, self.stress0 = assemble_blocks(
-            self.order, self.moments, self.density, system.stiffness, system.compliance, self.begun, self.stress,
-            self.crack_strain, self.given, self.crack_compliance, self.crack_offset, self.gravity, self.load, dt,
-            self.heavier,
-            scheme.weight, scheme.block_damping, scheme.mass_damping, scheme.stiffness_damping, self.n_free,
+            self.order, self.n_free, self._mass, BlockStart(self.begun, self.stress, system.stiffness, system.compliance),
+            self.cracks, BlockLoads(self.gravity, self.load), scheme.terms(dt, self.heavier),
         )  # fmt: skip
+
+    @property
+    def _mass(self) -> BlockMass:
+        return BlockMass(self.density, self.moments, self.system.fixed)
 
     def _absorb(self, loads: Loads, load_time: float | None) -> None:
         """Add what viscous boundaries do."""
@@ -429,10 +460,10 @@ class Attempt:
     def _advanced(self, increment: np.ndarray):
         """As `advance` returns it."""
         system = self.system
+        outlines = Outlines(self.vertices, system.vertex_start, self.moments)
         return advance(
-            increment, self.carried, self.dt, system.scheme.static, self.vertices, system.vertex_start, self.moments,
-            self.tangent, self.stress0, self.crack_compliance, self.crack_offset, self.given, self.crack_strain,
-            system.turns,
+            increment, self.carried, outlines, self.tangent, self.stress0, self.cracks, system.turns, self.dt,
+            system.scheme.static,
         )  # fmt: skip
 
     def _move(self) -> None:
@@ -568,18 +599,16 @@ class Attempt:
         )  # fmt: skip
 
     def result(self) -> StepResult:
-        """The step as it is told of."""
+        """The result of the step."""
         system, scheme, found, settled = self.system, self.system.scheme, self.found, self.settled
-        state, actions, dt, gravity, midpoint = self.state, self.actions, self.dt, self.gravity, self.midpoint
+        actions, gravity, midpoint = self.actions, self.gravity, self.midpoint
         acting = self.acting
         if found.points is not None:
             corners = found.lumped
             acting = midpoint.contacts(found.points.corners, corners.block, corners.other, self.along_edges(corners))
         rows = found.rows(settled, acting)
         reaction, acting_right, largest_force, acted = None, self.right, 0.0, {}
-        points, load, turn = self.points, self.load, self.increment[:, 2]
-        if self.impact is not None:
-            turn = turn + self.impact.moved[:, 2]
+        points, load = self.points, self.load
         if actions is not None:
             points, reaction, acted = actions.acted(settled, self.unknowns, rows, points, self.new_vertices)
             acting_right, largest_force = actions.with_bolt_forces(self.right), actions.largest_bolt_force
@@ -588,26 +617,57 @@ class Attempt:
         end_shear = self._end_shear()
         energy = self._energy(load, end_shear)
         residual, ratio = self._imbalance(acting_right, load, largest_force)
-        new_stress, acceleration = self.new_stress, self.acceleration
+        acceleration, beyond = self._acceleration_and_overstress()
+        inertia = Inertia(self.density, gravity, acceleration, self.carried[:, 2], system.fixed)
+        forces = AppliedForces(
+            points, self.edges, midpoint.centroid, self.moments[:, 0].copy(), inertia, reaction, beyond
+        )  # fmt: skip
+        memory = rows
+        if scheme.weight != 1.0 or found.points is not None:
+            # Each of the springs inside a face continues with its own part of what they bear in shear.
+            memory = copied(rows)
+            memory["shear_force"] = found.shear_of_rows(end_shear)
+        new_state = self._new_state(memory, self._new_stresses(rows, load, reaction))
+        reserve = reserves(
+            settled.state, settled.bonded, settled.normal_force, settled.shear_force, settled.gap, settled.springs,
+            self.slack,
+        )  # fmt: skip
+        statistics = self._statistics(energy, residual, ratio) | acted
+        return StepResult(
+            new_state, self.dt, rows, forces, acceleration, energy, found.of_rows(reserve), midpoint.vertices, self.turn,
+            found.arcs, statistics, self._worst_overlap() if energy.overlap > 0.0 else None,
+        )  # fmt: skip
+
+    @property
+    def _rotation(self) -> np.ndarray:
+        """(n_blocks,) rad of the step, with that of its impacts."""
+        turn = self.increment[:, 2]
+        return turn if self.impact is None else turn + self.impact.moved[:, 2]
+
+    def _new_stresses(self, rows: np.ndarray, load: np.ndarray, reaction: np.ndarray | None) -> np.ndarray:
+        """(n_blocks, 3) Pa as the step ends; of rigid blocks the mean of what contacts ``rows``, ``load`` and ``reaction``
+        (n_blocks, 6) do."""
+        system, midpoint, stress = self.system, self.midpoint, self.new_stress
         if len(system.rigid):
             from_outside = load.copy()
             if reaction is not None:
-                # What holds the strains of a rigid block is its stress.
+                # The forces that constrain the strains of a rigid block are its stress.
                 from_outside[:, 3:] -= reaction[:, 3:]
-            new_stress[system.rigid] = mean_stress(
-                system.rigid, rows, from_outside, midpoint.moments, self.density, acceleration, self.carried[:, 2], self.turn,
-                turn,
+            stress[system.rigid] = mean_stress(
+                system.rigid, rows, from_outside, BlockMass(self.density, midpoint.moments, system.fixed),
+                self.acceleration, self.carried[:, 2], self.turn, self._rotation,
             )  # fmt: skip
+        if system.taken_out is not None:
+            stress[system.taken_out] = 0.0
+        return stress
+
+    def _acceleration_and_overstress(self) -> tuple[np.ndarray, np.ndarray | None]:
+        """(n_blocks, 6) acceleration with mass damping, and (n_blocks, 3) Pa of `TimeScheme.overstress`, None in statics;
+        both on the axes of the midpoint."""
+        system, scheme, dt, midpoint = self.system, self.system.scheme, self.dt, self.midpoint
+        acceleration, beyond = self.acceleration, None
         if scheme.mass_damping:
             acceleration = acceleration + scheme.mass_damping / dt * self.increment
-        memory = rows
-        if scheme.weight != 1.0 or found.points is not None:
-            # Of what springs inside faces bear in shear, each goes on with its own.
-            memory = copied(rows)
-            memory["shear_force"] = found.shear_of_rows(end_shear)
-        if system.taken_out is not None:
-            new_stress[system.taken_out] = 0.0
-        beyond = None
         if not scheme.static:
             beyond = scheme.overstress(
                 self.increment[:, 3:], self.tangent, self.stress0 - self.stress, system.stiffness, system.mass, dt
@@ -615,16 +675,18 @@ class Attempt:
         if midpoint.turn is not None:
             acceleration = turned(acceleration, midpoint.turn)
             beyond = None if beyond is None else rotate_stress(beyond, midpoint.turn)
-        inertia = Inertia(self.density, gravity, acceleration, self.carried[:, 2], system.fixed)
-        area = self.moments[:, 0].copy()
-        forces = AppliedForces(points, self.edges, midpoint.centroid, area, inertia, reaction, beyond)
+        return acceleration, beyond
+
+    def _new_state(self, memory: np.ndarray, stress: np.ndarray) -> State:
+        """The state as the step ends, with the CONTACT rows ``memory`` and ``stress`` (n_blocks, 3)."""
+        system, state, actions = self.system, self.state, self.actions
         imposed = None if actions is None else actions.imposed
-        new_state = State(
+        return State(
             time=self.time,
             vertices=self.new_vertices,
             velocity=self.velocity,
-            stress=new_stress,
-            rotation=state.rotation + turn,
+            stress=stress,
+            rotation=state.rotation + self._rotation,
             crack_strain=self.new_crack,
             contacts=system.finder.carried(self.new_vertices, memory),
             acceleration=self.kept,
@@ -632,27 +694,22 @@ class Attempt:
             imposed=state.imposed if imposed is None else imposed.totals,
             removed=system.taken_out,
         )
-        statistics = {
+
+    def _statistics(self, energy: StepEnergy, residual: float, ratio: float) -> dict[str, float]:
+        """What `StepResult.statistics` says of a step, but for bolts and reactions."""
+        settled = self.settled
+        return {
             "open_close_iterations": self.iterations,
-            "dt": dt,
+            "dt": self.dt,
             "step_cuts": self.cuts,
             "kinetic_energy": energy.kinetic,
             "elastic_energy": energy.elastic,
             "contact_energy": energy.contact,
-            "worst_penetration": _deepest(settled.state != OPEN, found.gap_before, settled.gap),
-            "max_displacement_ratio": self.largest / system.half_diagonal,
+            "worst_penetration": _deepest(settled.state != OPEN, self.found.gap_before, settled.gap),
+            "max_displacement_ratio": self.largest / self.system.half_diagonal,
             "unbalanced": residual,
             "unbalanced_ratio": ratio,
-            **acted,
         }
-        reserve = reserves(
-            settled.state, settled.bonded, settled.normal_force, settled.shear_force, settled.gap, settled.springs,
-            self.slack,
-        )  # fmt: skip
-        return StepResult(
-            new_state, dt, rows, forces, acceleration, energy, found.of_rows(reserve), midpoint.vertices, self.turn, found.arcs,
-            statistics, self._worst_overlap() if energy.overlap > 0.0 else None,
-        )  # fmt: skip
 
     def _end_shear(self) -> np.ndarray:
         """(n,) N shear forces of contacts at the end of the step."""
@@ -663,9 +720,9 @@ class Attempt:
         """As `imbalance`."""
         found, settled = self.found, self.settled
         return imbalance(
-            self.matrix, right, self.vectors, found.block, found.other, self.order, settled.unknowns,
-            settled.normal_force, settled.shear_force, self.acceleration, self.density, self.moments, self.gravity,
-            load, largest,
+            BlockEquations(self.matrix, right), ContactMotion(found.block, found.other, self.order, self.vectors),
+            settled.unknowns, ContactForces(settled.normal_force, settled.shear_force), self.acceleration, self._mass,
+            BlockLoads(self.gravity, load), largest,
         )  # fmt: skip
 
     def _worst_overlap(self) -> tuple[float, int, int, float, float, float]:
@@ -682,19 +739,21 @@ class Attempt:
         system, scheme, found, settled = self.system, self.system.scheme, self.found, self.settled
         weight = self.weight if isinstance(self.weight, np.ndarray) else np.full(len(found), self.weight)
         impact, velocity = self.impact, self.velocity if self.impact is None else self.impact.without
-        energy = StepEnergy(
-            *step_energies(
-                self.increment, self.state.velocity, self.carried, velocity, self.acceleration, self.dt,
-                self.gravity,
-                load, scheme.weight, scheme.block_damping, scheme.mass_damping, scheme.stiffness_damping, self.density,
-                self.moments, system.fixed, self.stress, self.tangent, self.stress0, system.compliance,
-                system.stiffness,
+        normal, shear = self._real_springs()
+        energies = step_energies(
+            StepMotion(self.increment, self.state.velocity, self.carried, velocity, self.acceleration, load),
+            StepStress(self.stress, self.tangent, self.stress0, system.compliance, system.stiffness),
+            self._mass,
+            scheme.terms(self.dt),
+            self.gravity,
+            ContactStep(
                 found.state, settled.state, found.bonded, settled.bonded, found.gap_before, settled.gap,
-                found.arc + np.zeros(len(found)), settled.lifted,
-                settled.slip, self.slid, settled.normal_force, found.shear, settled.shear_force, end_shear,
-                *self._real_springs(), weight, found.law, system.finder.closure,
-            ).tolist()
+                found.arc + np.zeros(len(found)), settled.lifted, settled.slip, self.slid, settled.normal_force,
+                found.shear, settled.shear_force, end_shear, normal, shear, weight, found.law,
+            ),
+            system.finder.closure,
         )  # fmt: skip
+        energy = StepEnergy(*energies.tolist())
         if impact is not None:
             end = block_moments(self.new_vertices, system.next, system.vertex_start)
             kinetic = kinetic_energy(self.velocity, end, system) - kinetic_energy(velocity, end, system)

@@ -24,8 +24,8 @@ from ..model.blocks.polygon import area_moments
 from .adaptivity import finer, for_target
 from .counters import Work
 from .crack_contact.face_contact import settle_faces
+from .crack_contact.face_equations import FaceEquations
 from .crack_contact.face_laws import SMOOTH, FaceLaws, FaceMemory, all_smooth, check_laws
-from .crack_contact.frictional_contact import FaceEquations
 from .fracture.chord_error import with_halved_chords
 from .fracture.target_error import met
 from .fracture.tip_elements import tip_elements

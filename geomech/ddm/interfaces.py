@@ -15,8 +15,8 @@ if TYPE_CHECKING:
 
     from ..model import Cracks, DdmSettings, JointLaw, Material
     from .counters import Work
+    from .crack_contact.face_equations import FaceEquations
     from .crack_contact.face_laws import FaceLaws, FaceMemory, FaceStates
-    from .crack_contact.frictional_contact import FaceEquations
     from .loads.body_loads import BodyLoad
     from .loads.supports import Support
     from .mesh.elements import Mesh

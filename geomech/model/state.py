@@ -109,6 +109,7 @@ class State:
     deflection    (k, 2)            m and m/s, of blocks of higher order (`Blocks.order`): the unknowns of deflection and
                                     their rates, block by block; None: no block has any. ``vertices`` are without it
     face_points   FACE_POINT rows   what points of the faces of such blocks remember
+    parted        (n_faces,)        True: the glue of that face of `Blocks.glued` has parted; None: all holds
     order         (n_blocks,)       order that each block has come to, where orders are found as the run goes; None: they
                                     are given, or the run begins
     """
@@ -127,6 +128,7 @@ class State:
     deflection: np.ndarray | None = None
     face_points: np.ndarray | None = None
     order: np.ndarray | None = None
+    parted: np.ndarray | None = None
 
     @classmethod
     def at_rest(cls, blocks: Blocks) -> State:

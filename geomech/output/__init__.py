@@ -51,18 +51,19 @@ def standard_observers(scene: Any = None, *, quiet: bool = False) -> list[Observ
         # Before the folder is cleared: what then breaks off can begin again.
         watchers.append(SceneCopy(resolved))
     watchers += [RunFolder(), RunLog(), Places()]
-    interior_every = getattr(output, "interior_every", 5) if getattr(output, "interior", True) else 0
+    configuration = getattr(output, "configuration", "reference")
+    series = Series(
+        every=getattr(output, "every", 1),
+        interior_every=getattr(output, "interior_every", 5) if getattr(output, "interior", True) else 0,
+        configuration=configuration,
+        format=getattr(output, "format", "vtu"),
+    )
     return [
         *watchers,
         Histories(),
         *([JointHistories()] if _joints_wanted(scene) else []),
-        Series(
-            every=getattr(output, "every", 1),
-            interior_every=interior_every,
-            configuration=getattr(output, "configuration", "reference"),
-            format=getattr(output, "format", "vtu"),
-        ),
-        ViewScript(getattr(output, "configuration", "reference")),
+        series,
+        ViewScript(configuration, series),
         Checkpoints(
             every=getattr(output, "checkpoint_every", None),
             scene=resolved,

@@ -12,7 +12,7 @@ from .checkpoints import checkpoint_file
 #: Files of a run, by the names that it gives them. Files of series are written over, and those left are deleted at the
 #: end.
 _OWN = (
-    "history.csv", "tips.csv", "events.csv", "joints.csv", "reactions.csv", "summary.json", "places.json", "*.csv.part", "*.pvd.part",
+    "history.csv", "tips.csv", "events.csv", "joints.csv", "reactions.csv", "summary.json", "places.json", "view.pvsm", "*.csv.part", "*.pvd.part",
     "*.json.part", "*.toml.part", f"{checkpoint_file.FOLDER}/cycle_[0-9]*.checkpoint", f"{checkpoint_file.FOLDER}/*.part",
 )  # fmt: skip
 

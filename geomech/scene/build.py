@@ -26,6 +26,7 @@ from ..model import (
     rayleigh_coefficients,
 )
 from ..shapes.parts import JOINT
+from .assembly.cells import cells_of
 from .assembly.fixed_blocks import block_orders, constrained_unknowns, first_velocities, fixed_blocks
 from .assembly.joint_laws import joint_law
 from .assembly.load_functions import actions_of, force_history, in_situ_of, profile_of, traction_history
@@ -174,6 +175,9 @@ def _joints(tables: SceneTables, drawing: Drawing) -> tuple[tuple[JointLaw, ...]
         ]:
             joint_of[pair] = len(laws)
         laws.append(joint_law(name, joint))
+    for zone, table in tables.zones.items():
+        if table.cell_joint is not None:
+            joint_of[cells_of(zone), cells_of(zone)] = [law.name for law in laws].index(table.cell_joint)
     return tuple(laws), joint_of
 
 

@@ -12,6 +12,7 @@ from typing import Any
 
 from ..model import Blocks, Cracks, Problem
 from ..shapes.mesh_exchange import SUFFIXES as OTHER_MESHES
+from .assembly.cells import with_cells
 from .assembly.drawn_marks import with_marks
 from .build import build_problem
 from .checks.action_checks import check_actions
@@ -213,6 +214,7 @@ def load_scene(
     place: Callable[[Path], str] = places
     if drawing is not None:
         tables, place = with_marks(moved(tables, drawing.origin), drawing, places, faults, warnings)
+        drawing = with_cells(tables, drawing, place, faults)
     sections = Check(tables, data, drawing, place, faults, warnings)
     check(sections)
     check_actions(sections)
@@ -285,6 +287,11 @@ def _parsed(path: FilePath) -> tuple[dict[str, Any], str]:
                 )
             ]
         ) from error
+    except ValueError as error:
+        # Python reads no integers of more digits than `sys.get_int_max_str_digits`.
+        line = max(enumerate(text.split("\n"), 1), key=lambda found: sum(map(str.isdigit, found[1])))[0]
+        fault = Fault(f"{path}:{line}", f"no number: {error}", "write large numbers as 1e9")
+        raise SceneError([fault]) from error
 
 
 def _is_deep(data: Any) -> bool:

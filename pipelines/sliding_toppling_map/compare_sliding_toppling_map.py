@@ -69,9 +69,9 @@ def draw(path: Path, incline: float, grid: list[tuple[float, float, str]], found
         fine, fine, expected_mode, cmap=ListedColormap([COLOURS[m] for m in MODES]), vmin=-0.5, vmax=3.5, alpha=0.28,
         linewidth=0, rasterized=True,
     )  # fmt: skip
-    for name in MODES:
+    for name, mark in zip(MODES, "os^P", strict=True):  # told apart in a grey print too
         own = np.array([(d, f) for d, f, what in grid if what == name])
-        axes.plot(*np.degrees(own).T, "o", ms=4, color=COLOURS[name], label=name)
+        axes.plot(*np.degrees(own).T, mark, ms=4.5, color=COLOURS[name], mec="#2f3136", mew=0.4, label=name)
     along = np.vstack([table[:, ::-1] if kind == "topples" else table for kind, table in found.items()])
     axes.plot(*np.degrees(along).T, "D", ms=6, mfc="white", mec="#2f3136", mew=1.4, label="boundary, by bisection")
     axes.set(xlim=(0, 60), ylim=(0, 60), aspect="equal")

@@ -11,7 +11,8 @@ import numpy as np
 
 from geomech.model import Cycle
 from geomech.reference.openings import roof_block as published
-from geomech.render.curves.plots import COLOURS, figure_of
+from geomech.render.curves.drive import line_of
+from geomech.render.curves.plots import figure_of
 
 #: The bridge is a fortieth of the parting, not of half-planes, and the roof above it bends a little: measured 0.1 to
 #: 0.4 %. In motion cracks answer to their block's mean stress, without the mean strain of what bends them open
@@ -160,7 +161,7 @@ def draw(runs: Mapping[str, Watch], file: Path) -> None:
     figure, save = figure_of((6.4, 4.4), file)
     axes = figure.subplots()
     for k, (name, run) in enumerate(fallen.items()):
-        axes.plot(run.time, -run.way, color=COLOURS[k], lw=2, label=name)
+        axes.plot(run.time, -run.way, **line_of(k), lw=2, label=name)
         # Place and speed at the end of the loading, from the run; the acceleration after it is Newton's.
         time = np.linspace(FULL_WEIGHT, run.time[-1], 6)
         place = np.interp(FULL_WEIGHT, run.time, run.way)

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from geomech.dda.equation_records import ContactMotion, ContactStiffness
 from geomech.dda.linear_solver import assembly
 
 N_BLOCKS, N_CONTACTS = 30, 150
@@ -27,7 +28,8 @@ def _system(sparse: bool):
 
 def _filled(pattern, matrix, block, other, vectors, laws) -> np.ndarray:
     data = np.full(pattern.size, np.nan)
-    assembly.assemble(pattern, data, matrix, pattern.upper, pattern.lower, block, other, pattern.order, vectors, *laws)
+    contacts = ContactMotion(block, other, pattern.order, vectors)
+    assembly.assemble(pattern, data, matrix, contacts, ContactStiffness(*laws))
     return data
 
 

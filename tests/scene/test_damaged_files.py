@@ -194,3 +194,10 @@ def test_a_plain_script_is_read_in_this_process(tmp_path, monkeypatch):
     monkeypatch.setattr(isolated_reader, "model_apart", None)
     assert len(read_gmsh_model(tmp_path / "model.geo").zones) == 2
     assert os.environ.get("GEOMECH_TRUST_MODELS", "") in ("", "0")
+
+
+def test_an_integer_that_python_does_not_read_is_refused_with_its_line(tmp_path):
+    path = tmp_path / "scene.toml"
+    path.write_text("[run]\nend_time_s = " + "9" * 5000 + "\n")
+    with pytest.raises(SceneError, match=r"scene\.toml:2\n    no number"):
+        load_scene(path)

@@ -134,6 +134,12 @@ class ContactFinder:
         self._corners = ToeCorners(
             self._next, self._previous, self._owner, self.rounding, np.sqrt(self._area)[self._owner], blocks.vertices
         )
+        #: Pairs of cells that meet, as numbers a · n_blocks + b.
+        self.joined = _meeting_cells(blocks)
+        #: Those that have parted: they touch, and no bond holds them.
+        self.parted = np.zeros(0, np.int64)
+        #: Which (k,) of the contacts at corners are kept, where not all are.
+        self.kept_corners: Callable[[ContactSet], np.ndarray] | None = None
         self._always_fixed = np.ascontiguousarray(blocks.fixed, dtype=np.bool_)
         self.widths = widths(blocks.vertices, self._next, self._start, self._area)
         self.take_out(None)
@@ -176,6 +182,10 @@ class ContactFinder:
         block, other = self._owner[met.table[:, 0]], self._owner[met.table[:, 1]]
         springs = self._springs(block, other, law, geometry[:, 4], state.time >= self._eased_from)
         remembered = self._remembered(old, parent, state.time, geometry, springs, self._stiff[law])
+        if len(self.parted):
+            remembered["bonded"][
+                np.isin(np.minimum(block, other) * len(self._area) + np.maximum(block, other), self.parted)
+            ] = 0
         eased = 0.0
         if self._eases and len(old):
             eased = self._keep_forces(old, parent, geometry, springs, remembered, law)
@@ -222,7 +232,9 @@ class ContactFinder:
             cohesion = np.where(found.bonded > 0, self._table.cohesion[found.law], 0.0)
             whole = WholeFaces.of(found.block, found.other, found.geometry, found.law, cohesion)
             found = replace(found, whole=whole).sharing_cohesion(found.state, found.bonded)
-        return found if lumped or self.at_corners else self._with_springs_in_faces(found, vertices, broken)
+        if self.at_corners:
+            return found if self.kept_corners is None else found.part(self.kept_corners(found))
+        return found if lumped else self._with_springs_in_faces(found, vertices, broken)
 
     def _meeting(
         self, old: np.ndarray, vertices: np.ndarray, window: float | Windows, motion: np.ndarray | None, margin: float
@@ -246,6 +258,7 @@ class ContactFinder:
         if not keep.all():
             table, geometry, mate, parent = table[keep], geometry[keep], mate[keep], parent[keep]
         law = self._laws(table[:, 1], mate)
+        law[self._one_rock(table[:, 0], table[:, 1])] = _NEVER
         if self._removed is not None:
             law[self._removed[self._owner[table[:, :2]]].any(axis=1)] = _NEVER
         if (law == _NEVER).any():
@@ -507,6 +520,26 @@ class ContactFinder:
             law = self._law_of[a, b]
         return law
 
+    def part(self, blocks: Blocks, parted: np.ndarray) -> None:
+        """Let the cells touch whose glued faces have ``parted`` (m,)."""
+        edges = np.asarray(blocks.glued)[parted]
+        pair = np.sort(blocks.vertex_block[edges], axis=1)
+        self.parted = np.unique(pair[:, 0] * blocks.n_blocks + pair[:, 1])
+        self.joined = np.setdiff1d(
+            _meeting_cells(replace(blocks, glued=np.asarray(blocks.glued)[~parted])), self.parted
+        )
+
+    def laws_of(self, edge: np.ndarray, mate: np.ndarray) -> np.ndarray:
+        """(n,) the joint laws between the edges ``edge`` and ``mate`` (n,); −1 where they do not touch."""
+        return self._laws(edge, mate)
+
+    def _one_rock(self, vertex: np.ndarray, edge: np.ndarray) -> np.ndarray:
+        """(n,) True where the blocks of ``vertex`` and ``edge`` (n,) are cells that meet, glued, in a face or a corner."""
+        one, two = self._owner[vertex], self._owner[edge]
+        if not len(self.joined):
+            return np.zeros(len(vertex), bool)
+        return np.isin(np.minimum(one, two) * len(self._area) + np.maximum(one, two), self.joined)
+
     def near_boxes(self, box: np.ndarray) -> np.ndarray:
         """(k, 2) all pairs of blocks whose boxes ``box`` (n_blocks, 4) meet, and some whose do not."""
         return self._near.of_boxes(box, 0.1 * self.widths)
@@ -514,7 +547,7 @@ class ContactFinder:
     def may_touch(self, vertex: np.ndarray, edge: np.ndarray) -> np.ndarray:
         """(n,) False for a ``vertex`` of which neither edge may touch the ``edge``, and for blocks that are taken out."""
         law = np.maximum(self._laws(edge, vertex), self._laws(edge, self._previous[vertex]))
-        out = law != _NEVER
+        out = (law != _NEVER) & ~self._one_rock(vertex, edge)
         if self._removed is not None:
             out &= ~(self._removed[self._owner[vertex]] | self._removed[self._owner[edge]])
         return out
@@ -560,6 +593,24 @@ class ContactFinder:
         x, y = found.geometry[contact, 5:7]
         a, b = self.names[found.block[contact]], self.names[found.other[contact]]
         return f" (a corner of {a!r} on {b!r} at x = {x:.6g}, y = {y:.6g} m)"
+
+
+def _meeting_cells(blocks: Blocks) -> np.ndarray:
+    """(k,) a · n_blocks + b, a < b, of all cells a and b that meet in a corner of glued faces."""
+    if blocks.glued is None:
+        return np.zeros(0, np.int64)
+    from scipy.sparse import csr_array
+    from scipy.sparse.csgraph import connected_components
+
+    n, (edge, mate) = len(blocks.vertices), np.asarray(blocks.glued, np.int64).T
+    one, two = np.concatenate([edge, blocks.next_vertex[edge]]), np.concatenate([blocks.next_vertex[mate], mate])
+    corner = connected_components(csr_array((np.ones(len(one)), (one, two)), (n, n)), directed=False)[1]
+    order = np.argsort(corner, kind="stable")
+    pairs = set()
+    for some in np.split(blocks.vertex_block[order], np.flatnonzero(np.diff(corner[order])) + 1):
+        cells = np.unique(some).tolist()
+        pairs |= {a * blocks.n_blocks + b for k, a in enumerate(cells) for b in cells[k + 1 :]}
+    return np.array(sorted(pairs), np.int64)
 
 
 def _transit(blocks: Blocks, stiffness: np.ndarray, mass: np.ndarray) -> float:

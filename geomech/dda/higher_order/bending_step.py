@@ -16,32 +16,33 @@ from dataclasses import replace
 import numpy as np
 
 from ...model import OPEN
+from ..equation_records import BlockEquations, ContactMotion
 from ..kinematics.midpoint_configuration import MidpointConfiguration
+from ..kinematics.newmark import BlockLoads
 from ..open_close.contact_set import ContactSet
 from ..open_close.equations import Unsettled
-from ..out_of_balance import imbalance
+from ..out_of_balance import ContactForces, imbalance
 from ..results import StepResult
-from ..time_step import Attempt
+from ..time_step import Attempt, StepStart
 from .deflected_blocks import DeflectedBlocks
 from .deflection_basis import n_deflections
 from .equations import HigherOrderEquations
 from .face_points import FaceContacts
-from .six_row_system import moved
+from .glued_cells import Glue
+from .six_row_system import fill_own, moved
 
 
 class BendingAttempt(Attempt):
     """As `Attempt`, of a system with ``deflected`` blocks; ``found`` are contacts at corners."""
 
-    def __init__(self, system, state, vertices, carried, moments, loads, dt, crack, found, cuts, load_time) -> None:
+    def __init__(self, system, start: StepStart, dt: float, found: ContactSet, cuts: int) -> None:
+        state = start.state
         self.blocks: DeflectedBlocks = system.deflected
         known = self.blocks.at_rest() if state.deflection is None else state.deflection
         self.deflection = np.ascontiguousarray(known[:, 0])
         #: (k,) m/s of deflection that the step begins with.
         self.rates = system.settings.dynamic_factor * known[:, 1]
-        super().__init__(
-            system, state, vertices, carried, moments, loads, dt, crack,
-            self._on_faces(system, state, vertices, found), cuts, load_time,
-        )  # fmt: skip
+        super().__init__(system, start, dt, self._on_faces(system, state, start.vertices, found), cuts)
 
     def _on_faces(self, system, state, vertices: np.ndarray, corners: ContactSet) -> FaceContacts:
         """The contacts found at ``corners``, with points along faces and what deflection adds to their gaps."""
@@ -82,6 +83,12 @@ class BendingAttempt(Attempt):
         own += by_rate * np.einsum("bej,be->bj", self.shared, size[:, None] * self.carried[:, 3:])
         self.coupled_right = by_rate * np.einsum("bej,bj->be", self.shared, rates)
         self.own_right = own
+        faces = system.glued
+        self.glue = (
+            None
+            if faces is None
+            else Glue.of(faces, self.state, self.vertices, self.deflection, self.midpoint, self.turn)
+        )
         bending = (scheme.weight + drag / dt)[:, None, None] * blocks.stiffness
         self._own_matrices(bending, inertia * self.shared, inertia * self.density * blocks.basis.area)
 
@@ -130,9 +137,14 @@ class BendingAttempt(Attempt):
                 own[self.own_at[b] : self.own_at[b] + width * width].reshape(width, width)[:6, :6] = matrix[
                     self.order[b]
                 ]
+        base = np.empty(pattern.size)
+        fill_own(base, pattern.places, pattern.step, (own, self.own_at), pattern.order)
+        if self.glue is not None:
+            self.glue.push(full.ravel(), pattern)
+            self.glue.stiffen(base, pattern, len(contacts), self.system.scheme.weight)
         return HigherOrderEquations(
             pattern, matrix, full, contacts, vectors, springs, gap, slack, curved,
-            self.system.scheme.static, own=own, own_at=self.own_at, rows=self._rows(contacts, vectors),
+            self.system.scheme.static, base=base, rows=self._rows(contacts, vectors),
         )  # fmt: skip
 
     def _deflection_at(self, pattern) -> np.ndarray:
@@ -203,6 +215,8 @@ class BendingAttempt(Attempt):
         mean = blocks.padded(2.0 / self.dt**2 * (change - self.dt * self.rates))
         blocks.acceleration = np.sqrt((mean * mean).sum(axis=1))
         self.largest = max(self.largest, float(blocks.largest(change)[0].max()))
+        if self.glue is not None:
+            self.glue_change = self.glue.change(self.unknowns.ravel(), self.pattern)
         if self.n_free:
             found = self.found
             rows = self._rows(found, self.vectors)
@@ -230,10 +244,13 @@ class BendingAttempt(Attempt):
         bent = inertia * np.einsum("bej,bj->be", self.shared, self.blocks.padded(self.bent_by))
         moving = self.system.moving
         right[self.order[moving], 3:6] += (self.coupled_right - bent)[moving]
+        if self.glue is not None:
+            forces = self.glue.forces(self.system.scheme.weight * self.glue_change, len(self.order))
+            right[self.order[moving]] += forces[moving]
         return imbalance(
-            self.matrix, right, self.vectors, found.block, found.other, self.order, settled.unknowns[:n],
-            settled.normal_force, settled.shear_force, self.acceleration, self.density, self.moments, self.gravity,
-            load, largest,
+            BlockEquations(self.matrix, right), ContactMotion(found.block, found.other, self.order, self.vectors),
+            settled.unknowns[:n], ContactForces(settled.normal_force, settled.shear_force), self.acceleration,
+            self._mass, BlockLoads(self.gravity, load), largest,
         )  # fmt: skip
 
     def _energy(self, load: np.ndarray, end_shear: np.ndarray):
@@ -269,6 +286,10 @@ class BendingAttempt(Attempt):
         bent = blocks.stiffness_times(change)
         damped = float((drag / dt) @ (bent * padded).sum(axis=1))
         damped += scheme.mass_damping / dt * self._mass_of(change, padded, coupling, density)
+        if self.glue is not None:
+            u0 += self.glue.energy()
+            u1 += self.glue.energy(self.glue_change)
+            strained += self.glue.work(self.glue_change, scheme.weight)
         lost = inertia - (after - kept) + strained - (u1 - u0)
         stored = after + u1 - had - u0
         return energy._replace(

@@ -14,11 +14,9 @@ from .six_row_system import SixRowPattern, fill, moved, springs_in_states
 
 @dataclass(eq=False)
 class HigherOrderEquations(Equations):
-    """As `Equations`, with ``own`` the blocks' own matrices, one after the other from ``own_at`` (n_blocks,) on, and
-    ``right`` (n, 6) and ``rows`` (n_contacts, 2, 2, w) of all unknowns (`six_row_system`)."""
+    """As `Equations`, with ``base`` the flat matrix without contacts, and ``right`` (n, 6) and ``rows`` (n_contacts, 2, 2, w) of all unknowns (`six_row_system`)."""
 
-    own: np.ndarray = None
-    own_at: np.ndarray = None
+    base: np.ndarray = None
     rows: np.ndarray = None
     first_order = False
 
@@ -38,7 +36,7 @@ class HigherOrderEquations(Equations):
             (springs.normal, springs.shear, springs.friction, springs.sliding, springs.lift),
         )  # fmt: skip
         fill(
-            self._data, pattern.places, pattern.step, (self.own, self.own_at), blocks, self.rows,
+            self._data, self.base, pattern.places, pattern.step, blocks, self.rows,
             (*laws, springs.lift),
         )  # fmt: skip
         return symmetric, None

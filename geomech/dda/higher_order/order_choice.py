@@ -79,8 +79,9 @@ class OrderChoice:
         target: float,
     ) -> None:  # fmt: skip
         self.blocks, self.target = blocks, target
-        self.found = (np.asarray(blocks.order) == AUTO_ORDER) & ~fixed
-        self.first = np.where(fixed | self.found, 1, blocks.order).astype(np.int64)
+        self.found = np.zeros(len(fixed), bool) if blocks.order is None else (blocks.order == AUTO_ORDER) & ~fixed
+        given = np.ones(len(fixed), int) if blocks.order is None else blocks.order
+        self.first = np.where(fixed | self.found, 1, given).astype(np.int64)
         self._fixed, self._density, self._elastic, self._compliance = fixed, density, elastic, compliance
         self._trial: DeflectedBlocks | None = None
         self._groups: list[_Group] = []
@@ -88,8 +89,8 @@ class OrderChoice:
         self.judged = 0
 
     def deflected(self, order: np.ndarray) -> DeflectedBlocks | None:
-        """The blocks with these orders (n_blocks,); None where all are of the first."""
-        if not (order > 1).any():
+        """The blocks with these orders (n_blocks,); None where all are of the first and none are cells."""
+        if not (order > 1).any() and self.blocks.glued is None:
             return None
         return DeflectedBlocks(self.blocks, self._fixed, self._density, self._elastic, order)
 

@@ -114,7 +114,7 @@ def _add_own(data, where, first, step, rows, matrix, begin):
 
 
 @part(fastmath={"contract"}, error_model="numpy", nogil=True)
-def _add_pair(data, where, first, step, rows, others, given, along):
+def add_pair(data, where, first, step, rows, others, given, along):
     """Add push ⊗ pull + drag ⊗ across of a contact: ``given`` (2, w) push and drag of the block with ``rows`` rows of six,
     ``along`` (2, w) pull and across of the one with ``others``."""
     push, drag, pull, across = given[0], given[1], along[0], along[1]
@@ -128,19 +128,27 @@ def _add_pair(data, where, first, step, rows, others, given, along):
 
 
 @_jit
-def fill(data, places, step, own, blocks, vectors, laws):
-    """Fill the flat matrix ``data`` with the blocks' own and with contacts, as `assembly.assemble`.
-
-    ``places``: ``where``, ``own``, ``upper``, ``lower`` and ``rows`` of the pattern; ``own``: the blocks' matrices, and where
-    each begins (n_blocks,); ``blocks``: block and other of contacts, and the pattern's order; ``vectors`` (n_contacts,
-    2, 2, w): way, side, unknowns of the side's block; ``laws``: kₙ, kₛ, μ and κ (n_contacts,)."""
-    where, own_at, upper, lower, rows = places
-    block, other, order = blocks
-    normal, shear, slope, lift = laws
+def fill_own(data, places, step, own, order):
+    """Fill the flat matrix ``data`` with the blocks' ``own`` matrices, and where each begins (n_blocks,); ``places`` as of
+    `fill`, ``order`` of the pattern."""
+    where, own_at, _, _, rows = places
     data[:] = 0.0
     for b in range(len(rows)):
         if order[b] >= 0:
             _add_own(data, where, own_at[b], step, rows[b], own[0], own[1][b])
+
+
+@_jit
+def fill(data, base, places, step, blocks, vectors, laws):
+    """Fill the flat matrix ``data`` with the ``base`` that is the same in all states, and with contacts, as
+    `assembly.assemble`.
+
+    ``places``: ``where``, ``own``, ``upper``, ``lower`` and ``rows`` of the pattern; ``blocks``: block and other of contacts, and the pattern's order; ``vectors`` (n_contacts,
+    2, 2, w): way, side, unknowns of the side's block; ``laws``: kₙ, kₛ, μ and κ (n_contacts,)."""
+    where, own_at, upper, lower, rows = places
+    block, other, order = blocks
+    normal, shear, slope, lift = laws
+    data[:] = base
     width = vectors.shape[3]
     given, along = np.empty((2, 2, width)), np.empty((2, 2, width))
     for c in range(len(block)):
@@ -155,16 +163,16 @@ def fill(data, places, step, own, blocks, vectors, laws):
                 along[side, 1, a] = t
         i, j = block[c], other[c]
         if order[i] >= 0:
-            _add_pair(data, where, own_at[i], step, rows[i], rows[i], given[0], along[0])
+            add_pair(data, where, own_at[i], step, rows[i], rows[i], given[0], along[0])
         if order[j] >= 0:
-            _add_pair(data, where, own_at[j], step, rows[j], rows[j], given[1], along[1])
+            add_pair(data, where, own_at[j], step, rows[j], rows[j], given[1], along[1])
         if order[i] >= 0 and order[j] >= 0:
-            _add_pair(data, where, upper[c], step, rows[i], rows[j], given[0], along[1])
-            _add_pair(data, where, lower[c], step, rows[j], rows[i], given[1], along[0])
+            add_pair(data, where, upper[c], step, rows[i], rows[j], given[0], along[1])
+            add_pair(data, where, lower[c], step, rows[j], rows[i], given[1], along[0])
 
 
 @part(fastmath={"contract"}, error_model="numpy", nogil=True)
-def _add_force(right, first, more, count, along, push, drag):
+def add_force(right, first, more, count, along, push, drag):
     """Add ``push`` across and ``drag`` along a face, ``along`` (2, w) of one block, to the right side."""
     for a in range(count):
         at = 6 * first + a if a < 6 else 6 * more + a - 6
@@ -195,7 +203,7 @@ def springs_in_states(right, blocks, rows, vectors, states, springs):
         for side in range(2):
             b = block[c] if side == 0 else other[c]
             if order[b] >= 0:
-                _add_force(
+                add_force(
                     right, order[b], more[b], 6 * count[b], vectors[c, :, side], -pressed, given - pressed * slope[c]
                 )
     return stiff, along, slope, symmetric

@@ -14,10 +14,13 @@ def refuse_unsupported(
     blocks: Blocks, materials: Sequence[Material], joints: Sequence[JointLaw], settings: DdaSettings
 ) -> None:
     """Raise ValueError where ``blocks``, of which some have an order above 1, ask for what these cannot do."""
-    order = np.asarray(blocks.order)
+    order = np.ones(blocks.n_blocks, int) if blocks.order is None else np.asarray(blocks.order)
     if not (((order >= 1) & (order <= HIGHEST)) | (order == AUTO_ORDER)).all():
         raise ValueError(f"the order of a block is 1 to {HIGHEST}, got {order.min()} to {order.max()}")
     bends = (order != 1) & ~blocks.fixed
+    if blocks.glued is not None:
+        bends[blocks.vertex_block[np.asarray(blocks.glued).ravel()]] = True
+        bends &= ~blocks.fixed
     names = blocks.names or tuple(f"block {b}" for b in range(blocks.n_blocks))
 
     def refuse(which: np.ndarray, why: str) -> None:

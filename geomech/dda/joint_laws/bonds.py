@@ -21,6 +21,7 @@ strength, the one that comes first to f = 0.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -128,54 +129,84 @@ def _when(before, after, strength):
     return -before / max(after - before, 1e-300)
 
 
+class FaceBonds(NamedTuple):
+    """`BondedFaces` as kernels take them."""
+
+    start: np.ndarray
+    rows: np.ndarray
+    arm: np.ndarray
+    length: np.ndarray
+
+    @classmethod
+    def of(cls, faces: BondedFaces) -> FaceBonds:
+        return cls(faces.start, faces.rows, faces.arm, faces.length)
+
+
+class ForcesBefore(NamedTuple):
+    """Normal and shear forces of contacts (n,) as the step begins, N."""
+
+    normal: np.ndarray
+    shear: np.ndarray
+
+
+class _FaceLoads(NamedTuple):
+    """A face's loads (N; ``fibre`` at its extreme fibre times its length) and strengths (N): tensile, ``capacity`` in
+    shear, of which ``firm`` does not depend on pressure."""
+
+    fibre: float
+    drawn: float
+    strength: float
+    capacity: float
+    firm: float
+
+
 @kept(fastmath=False, error_model="numpy", nogil=True)
-def first_to_break(
-    start, rows, arm, length, forces, normal0, shear0, state, bonded, new_bonded, peak, hold, cohesion, tension
-):  # fmt: skip
+def first_to_break(faces, forces, before, states, new_bonded, strengths):
     """(n,) at which part of the step each bond that ``new_bonded`` calls broken has come to its strength; inf for others.
-    Arguments as for `check_faces`; without faces ``length`` is empty."""
+    Arguments as for `check_faces`; there may be no faces."""
+    state, bonded = states.state, states.bonded
     n = state.shape[0]
     out, done = np.full(n, np.inf), np.zeros(n, np.bool_)
-    for f in range(length.shape[0]):
+    for f in range(faces.length.shape[0]):
         some, intact = False, True
-        for k in range(start[f], start[f + 1]):
-            intact &= (bonded[rows[k]] == WHOLE or bonded[rows[k]] == CRACKED) and state[rows[k]] == STICK
-            some |= new_bonded[rows[k]] != bonded[rows[k]]
+        for k in range(faces.start[f], faces.start[f + 1]):
+            c = faces.rows[k]
+            intact &= (bonded[c] == WHOLE or bonded[c] == CRACKED) and state[c] == STICK
+            some |= new_bonded[c] != bonded[c]
         if not (intact and some):
             continue
-        parts, slides = _times_of_face(
-            f, start, rows, arm, length, forces, normal0, shear0, bonded, peak, hold, cohesion, tension
-        )
-        for k in range(start[f], start[f + 1]):
-            out[rows[k]], done[rows[k]] = min(parts, slides), True
+        parts, slides = _times_of_face(f, faces, forces, before, bonded, strengths)
+        for k in range(faces.start[f], faces.start[f + 1]):
+            out[faces.rows[k]], done[faces.rows[k]] = min(parts, slides), True
     for c in range(n):
         if done[c] or new_bonded[c] == bonded[c]:
             continue
-        pull = tension[c] if bonded[c] == WHOLE else 0.0
+        pull = strengths.tension[c] if bonded[c] == WHOLE else 0.0
         if -forces[c, 0] > pull:
-            out[c] = _when(-normal0[c] - pull, -forces[c, 0] - pull, pull)
-        firm = hold[c] + cohesion[c]
-        was = abs(shear0[c]) - max(0.0, peak[c] * normal0[c] + firm)
-        now = abs(forces[c, 1]) - max(0.0, peak[c] * forces[c, 0] + firm)
+            out[c] = _when(-before.normal[c] - pull, -forces[c, 0] - pull, pull)
+        firm, peak = strengths.hold[c] + strengths.cohesion[c], strengths.peak[c]
+        was = abs(before.shear[c]) - max(0.0, peak * before.normal[c] + firm)
+        now = abs(forces[c, 1]) - max(0.0, peak * forces[c, 0] + firm)
         if now > 0.0:
-            out[c] = min(out[c], _when(was, now, max(0.0, peak[c] * normal0[c] + firm)))
+            out[c] = min(out[c], _when(was, now, max(0.0, peak * before.normal[c] + firm)))
     return out
 
 
 @part(fastmath=False, error_model="numpy", nogil=True)
-def _times_of_face(f, start, rows, arm, length, forces, normal0, shear0, bonded, peak, hold, cohesion, tension):
+def _times_of_face(f, faces, forces, before, bonded, strengths):
     """At which parts of the step the whole face ``f`` comes to its strength in tension and in shear; inf where it does
     not."""
     pull = moment = pull0 = moment0 = strength = drawn = drawn0 = capacity = capacity0 = 0.0
-    for k in range(start[f], start[f + 1]):
-        c = rows[k]
-        pull, pull0 = pull - forces[c, 0], pull0 - normal0[c]
-        moment, moment0 = moment - forces[c, 0] * arm[k], moment0 - normal0[c] * arm[k]
-        drawn, drawn0 = drawn + abs(forces[c, 1]), drawn0 + abs(shear0[c])
-        capacity += peak[c] * forces[c, 0] + hold[c] + cohesion[c]
-        capacity0 += peak[c] * normal0[c] + hold[c] + cohesion[c]
-        strength += tension[c] if bonded[c] == WHOLE else 0.0
-    fibre, fibre0 = pull + 6.0 * abs(moment) / length[f], pull0 + 6.0 * abs(moment0) / length[f]
+    for k in range(faces.start[f], faces.start[f + 1]):
+        c, arm = faces.rows[k], faces.arm[k]
+        pull, pull0 = pull - forces[c, 0], pull0 - before.normal[c]
+        moment, moment0 = moment - forces[c, 0] * arm, moment0 - before.normal[c] * arm
+        drawn, drawn0 = drawn + abs(forces[c, 1]), drawn0 + abs(before.shear[c])
+        capacity += strengths.peak[c] * forces[c, 0] + strengths.hold[c] + strengths.cohesion[c]
+        capacity0 += strengths.peak[c] * before.normal[c] + strengths.hold[c] + strengths.cohesion[c]
+        strength += strengths.tension[c] if bonded[c] == WHOLE else 0.0
+    length = faces.length[f]
+    fibre, fibre0 = pull + 6.0 * abs(moment) / length, pull0 + 6.0 * abs(moment0) / length
     capacity, capacity0 = max(0.0, capacity), max(0.0, capacity0)
     parts = slides = np.inf
     if strength > 0.0 and fibre > strength:
@@ -185,100 +216,109 @@ def _times_of_face(f, start, rows, arm, length, forces, normal0, shear0, bonded,
     return parts, slides
 
 
+@part(fastmath=False, error_model="numpy", nogil=True)
+def _loads_of_face(f, faces, forces, bonded, strengths):
+    """The `_FaceLoads` of the face ``f``."""
+    pull = moment = strength = drawn = capacity = firm = 0.0
+    for k in range(faces.start[f], faces.start[f + 1]):
+        c = faces.rows[k]
+        pull -= forces[c, 0]
+        moment -= forces[c, 0] * faces.arm[k]
+        drawn += abs(forces[c, 1])
+        capacity += strengths.peak[c] * forces[c, 0] + strengths.hold[c] + strengths.cohesion[c]
+        firm += strengths.cohesion[c] + strengths.hold[c]
+        strength += strengths.tension[c] if bonded[c] == WHOLE else 0.0
+    fibre = pull + 6.0 * abs(moment) / faces.length[f]
+    return _FaceLoads(fibre, drawn, strength, max(0.0, capacity), firm)
+
+
+@part(fastmath=False, error_model="numpy", nogil=True)
+def _bond_of_face(f, faces, states):
+    """Whether all contacts of the face ``f`` are bonded, whether any of them is open, and whether any does not stick."""
+    opened = loose = False
+    for k in range(faces.start[f], faces.start[f + 1]):
+        c = faces.rows[k]
+        if states.bonded[c] != WHOLE and states.bonded[c] != CRACKED:
+            return False, False, False
+        opened = opened or states.state[c] == OPEN
+        loose = loose or states.state[c] != STICK
+    return True, opened, loose
+
+
+@part(fastmath=False, error_model="numpy", nogil=True)
+def _stick_again(f, faces, forces, states, strengths, called, violation):
+    """Call for all contacts of the face ``f`` to stick: a fallback of the open–close iteration that does not know of
+    faces has released contacts that the face holds."""
+    for k in range(faces.start[f], faces.start[f + 1]):
+        c = faces.rows[k]
+        called.state[c], called.bonded[c] = STICK, states.bonded[c]
+        violation[c] = (
+            strengths.normal[c] * abs(forces[c, 2]) + strengths.shear[c] * abs(forces[c, 3])
+            if states.state[c] != STICK
+            else 0.0
+        )
+
+
 @kept(fastmath=False, error_model="numpy", nogil=True)
-def check_faces(
-    start,
-    rows,
-    arm,
-    length,
-    forces,
-    normal0,
-    shear0,
-    state,
-    bonded,
-    normal,
-    shear,
-    friction,
-    peak,
-    hold,
-    cohesion,
-    tension,
-    keeps,
-    slack,
-    new_state,
-    new_direction,
-    new_bonded,
-    violation,
-):
-    """Put right, in place, what `check_states` calls for contacts whose whole face is bonded; ``normal0`` and ``shear0``
-    (n,) N as the step begins, other arguments as there."""
-    for f in range(length.shape[0]):
-        intact, out, pulls, opened = True, False, False, False
-        pull = moment = strength = drawn = sheared = capacity = firm = least = 0.0
-        for k in range(start[f], start[f + 1]):
-            c = rows[k]
-            if bonded[c] != WHOLE and bonded[c] != CRACKED:
-                intact = False
-                break
-            force = forces[c, 0]
-            pull -= force
-            moment -= force * arm[k]
-            drawn += abs(forces[c, 1])
-            capacity += peak[c] * force + hold[c] + cohesion[c]
-            firm += cohesion[c] + hold[c]
-            strength += tension[c] if bonded[c] == WHOLE else 0.0
-            least = max(least, normal[c] * slack[c])
-            sheared = max(sheared, 1e-3 * shear[c] * slack[c])
-            pulls = pulls or -force > normal[c] * slack[c]
-            opened = opened or state[c] == OPEN
-            out = out or state[c] != STICK
-        if not intact or (opened and strength == 0.0):
+def check_faces(faces, forces, before, states, strengths, slack, called, violation):
+    """Correct, in place, the states ``called`` and the ``violation`` of `check_states` for contacts whose whole face is
+    bonded; ``faces`` (`FaceBonds`), ``before`` (`ForcesBefore`), other arguments as there."""
+    for f in range(faces.length.shape[0]):
+        intact, opened, loose = _bond_of_face(f, faces, states)
+        if not intact:
             continue
-        if out:
-            # A way of iterating that knows nothing of faces has let go of what they hold.
-            for k in range(start[f], start[f + 1]):
-                c = rows[k]
-                new_state[c], new_bonded[c] = STICK, bonded[c]
-                violation[c] = (
-                    normal[c] * abs(forces[c, 2]) + shear[c] * abs(forces[c, 3]) if state[c] != STICK else 0.0
-                )
+        loads = _loads_of_face(f, faces, forces, states.bonded, strengths)
+        if opened and loads.strength == 0.0:
             continue
-        fibre = pull + 6.0 * abs(moment) / length[f] - strength
-        parts = strength > 0.0 and fibre > 1e-9 * strength + 6.0 * least
-        capacity = max(0.0, capacity)
-        slides = drawn - capacity > 1e-9 * capacity + sheared
+        if loose:
+            _stick_again(f, faces, forces, states, strengths, called, violation)
+            continue
+        pulls, least, least_shear = False, 0.0, 0.0
+        for k in range(faces.start[f], faces.start[f + 1]):
+            c = faces.rows[k]
+            least = max(least, strengths.normal[c] * slack[c])
+            least_shear = max(least_shear, 1e-3 * strengths.shear[c] * slack[c])
+            pulls = pulls or -forces[c, 0] > strengths.normal[c] * slack[c]
+        parts = loads.strength > 0.0 and loads.fibre - loads.strength > 1e-9 * loads.strength + 6.0 * least
+        slides = loads.drawn - loads.capacity > 1e-9 * loads.capacity + least_shear
         when = 1.0
         if slides:
-            in_tension, in_shear = _times_of_face(
-                f, start, rows, arm, length, forces, normal0, shear0, bonded, peak, hold, cohesion, tension
-            )
+            in_tension, in_shear = _times_of_face(f, faces, forces, before, states.bonded, strengths)
             parts = parts and in_tension <= in_shear
             when = min(max(in_shear, 0.0), 1.0)
             opens = False
-            for k in range(start[f], start[f + 1]):
-                c = rows[k]
-                opens = opens or normal0[c] + when * (forces[c, 0] - normal0[c]) <= 0.0
+            for k in range(faces.start[f], faces.start[f + 1]):
+                c = faces.rows[k]
+                opens = opens or before.normal[c] + when * (forces[c, 0] - before.normal[c]) <= 0.0
             # Before its corners would open it may slide, and then they need not.
-            pulls = pulls and (strength > 0.0 or opens)
-        for k in range(start[f], start[f + 1]):
-            c = rows[k]
-            if strength == 0.0 and pulls:
+            pulls = pulls and (loads.strength > 0.0 or opens)
+        for k in range(faces.start[f], faces.start[f + 1]):
+            c = faces.rows[k]
+            if loads.strength == 0.0 and pulls:
                 # Corners that press wait for those that open.
-                if -forces[c, 0] <= normal[c] * slack[c]:
-                    new_state[c], new_bonded[c], violation[c] = STICK, bonded[c], 0.0
+                if -forces[c, 0] <= strengths.normal[c] * slack[c]:
+                    called.state[c], called.bonded[c], violation[c] = STICK, states.bonded[c], 0.0
                 continue
-            new_state[c], new_bonded[c], violation[c] = STICK, bonded[c], 0.0
-            if parts:
-                violation[c] = fibre
-                new_bonded[c] = 0 if pulls or firm == 0.0 else CRACKED
-            elif slides:
-                violation[c] = drawn - capacity
-                new_bonded[c] = 2 if keeps[c] else 0
-            if new_bonded[c] == 0 or new_bonded[c] == 2:
-                if parts:
-                    when = 1.0
-                pressed = normal0[c] + when * (forces[c, 0] - normal0[c])
-                if pressed < 0.0:
-                    new_state[c], new_bonded[c] = OPEN, (0 if parts else new_bonded[c])
-                elif slides and (keeps[c] or abs(forces[c, 1]) > friction[c] * pressed):
-                    new_state[c], new_direction[c] = SLIP, np.sign(forces[c, 1])
+            _break_bond(c, forces, before, states, strengths, called, violation, loads, (parts, slides, pulls, when))
+
+
+@part(fastmath=False, error_model="numpy", nogil=True)
+def _break_bond(c, forces, before, states, strengths, called, violation, loads, breaks):
+    """What contact ``c`` of a bonded face with these ``loads`` is called to be; ``breaks``: whether the face parts,
+    slides and pulls, and at which part of the step it slides."""
+    parts, slides, pulls, when = breaks
+    called.state[c], called.bonded[c], violation[c] = STICK, states.bonded[c], 0.0
+    if parts:
+        violation[c] = loads.fibre - loads.strength
+        called.bonded[c] = 0 if pulls or loads.firm == 0.0 else CRACKED
+    elif slides:
+        violation[c] = loads.drawn - loads.capacity
+        called.bonded[c] = 2 if strengths.keeps[c] else 0
+    if called.bonded[c] == 0 or called.bonded[c] == 2:
+        if parts:
+            when = 1.0
+        pressed = before.normal[c] + when * (forces[c, 0] - before.normal[c])
+        if pressed < 0.0:
+            called.state[c], called.bonded[c] = OPEN, (0 if parts else called.bonded[c])
+        elif slides and (strengths.keeps[c] or abs(forces[c, 1]) > strengths.friction[c] * pressed):
+            called.state[c], called.direction[c] = SLIP, np.sign(forces[c, 1])

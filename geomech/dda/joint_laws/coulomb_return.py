@@ -8,10 +8,13 @@ state fits a given motion. (The criterion of Shi 1988, the sign of the sliding, 
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from ...compiled import kept, part
 from ...model import OPEN, SLIP, STICK
+from .penalty_springs import Springs
 
 #: Relative tolerance of strengths; tolerance of slip, counted from the start of the step, relative to the round-off of
 #: coordinates.
@@ -50,11 +53,38 @@ def moved(unknowns, block, other, order, vectors, lift=None):
     return out
 
 
+class ContactStates(NamedTuple):
+    """State, sense of sliding and bond of each contact (n,)."""
+
+    state: np.ndarray
+    direction: np.ndarray
+    bonded: np.ndarray
+
+
+class Strengths(NamedTuple):
+    """What `check_states` reads of `penalty_springs.Springs`, (n,) each."""
+
+    normal: np.ndarray
+    shear: np.ndarray
+    friction: np.ndarray
+    sliding: np.ndarray
+    peak: np.ndarray
+    hold: np.ndarray
+    cohesion: np.ndarray
+    tension: np.ndarray
+    keeps: np.ndarray
+
+    @classmethod
+    def of(cls, springs: Springs) -> Strengths:
+        return cls(*(getattr(springs, name) for name in cls._fields))
+
+
 @_jit
-def contact_forces(
-    unknowns, block, other, order, vectors, state, direction, gap0, normal, shear, friction, sliding, lift, shear0
-):
-    """(n, 4): normal force, shear force, new gap and motion along the edge in the step, in the present states."""
+def contact_forces(unknowns, contacts, springs):
+    """(n, 4): normal force, shear force, new gap and motion along the edge in the step, of ``contacts`` (`ContactMotion`)
+    with ``springs`` in the present states (`SpringsInStates`)."""
+    block, other, order, vectors = contacts
+    state, direction, gap0, normal, shear, friction, sliding, lift, shear0 = springs
     n = block.shape[0]
     forces = np.zeros((n, 4))
     for c in range(n):
@@ -71,28 +101,15 @@ def contact_forces(
 
 
 @kept(fastmath=False, error_model="numpy", nogil=True)
-def check_states(
-    forces,
-    state,
-    direction,
-    bonded,
-    normal,
-    shear,
-    friction,
-    sliding,
-    peak,
-    hold,
-    cohesion,
-    tension,
-    keeps,
-    shear0,
-    slack,
-):
-    """The states that the ``forces`` (n, 4) of `contact_forces` require.
+def check_states(forces, states, strengths, shear0, slack):
+    """The states that the ``forces`` (n, 4) of `contact_forces` in the ``states`` (`ContactStates`) require.
 
-    Returns (new state; new direction; new bonded; violation (n,) N, 0 where the state is right). Gaps below ``slack``
-    (n,) m, the round-off of coordinates, and their effect on friction do not change a state.
+    Returns (new `ContactStates`; violation (n,) N, 0 where the state is right). ``strengths`` (`Strengths`), ``shear0``
+    (n,) N as the step begins. Gaps below ``slack`` (n,) m, the round-off of coordinates, and their effect on friction
+    do not change a state.
     """
+    state, direction, bonded = states
+    normal, shear, friction, sliding, peak, hold, cohesion, tension, keeps = strengths
     n = state.shape[0]
     new_state, new_direction, new_bonded = state.copy(), direction.copy(), bonded.copy()
     violation = np.zeros(n)
@@ -129,7 +146,7 @@ def check_states(
                 # Through sticking, even if it would slide back: two solutions of opposite direction may alternate.
                 new_state[c] = STICK
                 violation[c] = strength - trial
-    return new_state, new_direction, new_bonded, violation
+    return ContactStates(new_state, new_direction, new_bonded), violation
 
 
 def reserves(state, bonded, normal_force, shear_force, gap, springs, slack) -> np.ndarray:

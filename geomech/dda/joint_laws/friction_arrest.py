@@ -23,6 +23,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...model import OPEN, SLIP, STICK
+from ..equation_records import BlockEquations, ContactMotion, SpringsInStates
 from ..linear_solver import assembly
 from ..open_close.contact_set import ContactSet
 from ..open_close.settled_states import Settled
@@ -143,15 +144,16 @@ def stop(
     springs, nothing = settled.springs, np.zeros(len(found))
     apart, along = (nothing, nothing) if unresolved is None else (unresolved.apart, unresolved.along)
     data, side = np.empty(pattern.size), np.empty(6 * pattern.n)
+    own = BlockEquations(matrix, np.zeros((pattern.n, 6)))
+    contacts = ContactMotion(found.block, found.other, pattern.order, vectors)
 
     def answer(state, direction, friction, push, pull) -> np.ndarray:
         # Other contacts keep what they carry: closed ones their gap, sticking ones their place, sliding ones their
         # friction.
-        assembly.assemble_contacts(
-            pattern, data, side, matrix, np.zeros((pattern.n, 6)), pattern.upper, pattern.lower, found.block,
-            found.other, pattern.order, vectors, state, direction, 0.5 * dt * apart, springs.normal, springs.shear,
-            friction, push, springs.lift, pull,
-        )  # fmt: skip
+        in_states = SpringsInStates(
+            state, direction, 0.5 * dt * apart, springs.normal, springs.shear, friction, push, springs.lift, pull
+        )
+        assembly.assemble_contacts(pattern, own, contacts, in_states, data, side)
         return assembly.solve(pattern, data, side, False).reshape(-1, 6)
 
     shear = -springs.shear * 0.5 * dt * along

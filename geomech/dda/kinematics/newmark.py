@@ -32,6 +32,7 @@ step.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -41,6 +42,62 @@ from ...model import DdaSettings
 
 #: Stiffness over E' of the springs that restrain the rigid motion of a massless block; their force is as small.
 GROUND_RATIO = 1e-11
+
+
+class SchemeTerms(NamedTuple):
+    """What kernels take of a `TimeScheme`, for a step of ``dt`` s whose inertia is ``heavier`` (1/w) by the α-scheme."""
+
+    weight: float
+    block_damping: float
+    mass_damping: float
+    stiffness_damping: float
+    dt: float
+    heavier: float
+
+
+class BlockMass(NamedTuple):
+    """Mass of blocks as a step begins: ``density`` (n_blocks,) kg/m³, ``moments`` (n_blocks, 6) of the outline
+    (`block_moments`), and which blocks are ``fixed`` (n_blocks,)."""
+
+    density: np.ndarray
+    moments: np.ndarray
+    fixed: np.ndarray
+
+
+class BlockStart(NamedTuple):
+    """With what blocks begin a step: ``velocity`` (n_blocks, 6), m/s and 1/s, and ``stress`` (n_blocks, 3), Pa; and their
+    own ``stiffness`` and ``compliance`` (n_blocks, 3, 3), Pa and 1/Pa."""
+
+    velocity: np.ndarray
+    stress: np.ndarray
+    stiffness: np.ndarray
+    compliance: np.ndarray
+
+
+class CrackTerms(NamedTuple):
+    """Mean strain of blocks by their cracks: ``strain`` (n_blocks, 3) as a step begins, and at its end ``offset`` +
+    ``compliance`` σ, (n_blocks, 3) and (n_blocks, 3, 3) 1/Pa; these do not count unless ``given``."""
+
+    given: bool
+    strain: np.ndarray
+    compliance: np.ndarray
+    offset: np.ndarray
+
+
+class BlockLoads(NamedTuple):
+    """Effective ``gravity`` (2,) m/s², and generalised forces ``load`` (n_blocks, 6) of all other loads, N and N m."""
+
+    gravity: np.ndarray
+    load: np.ndarray
+
+
+class Outlines(NamedTuple):
+    """Blocks as polygons: ``vertices`` (n_vertices, 2) m, those of block b from ``start[b]`` to before ``start[b + 1]``,
+    and ``moments`` (n_blocks, 6)."""
+
+    vertices: np.ndarray
+    start: np.ndarray
+    moments: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -95,6 +152,12 @@ class TimeScheme:
             mass_damping=settings.rayleigh_mass,
             stiffness_damping=settings.rayleigh_stiffness,
         )
+
+    def terms(self, dt: float, heavier: float = 1.0) -> SchemeTerms:
+        """As kernels take it, for a step of ``dt`` s; ``heavier`` as from `begun`."""
+        return SchemeTerms(
+            self.weight, self.block_damping, self.mass_damping, self.stiffness_damping, dt, heavier
+        )  # fmt: skip
 
     def overstress(
         self,
@@ -166,15 +229,15 @@ def _invert(first, second, out):
 
 
 @part(fastmath=False, error_model="numpy", nogil=True)
-def _tangent(b, stiffness, compliance, crack_given, crack_compliance, out):
+def _tangent(b, stiffness, compliance, cracks, out):
     """(3, 3) (C⁻¹ + S)⁻¹ of block ``b``, into ``out[b]``."""
     soft = False
-    if crack_given:
+    if cracks.given:
         for k in range(3):
             for m in range(3):
-                soft = soft or crack_compliance[b, k, m] != 0.0
+                soft = soft or cracks.compliance[b, k, m] != 0.0
     if soft:
-        _invert(compliance[b], crack_compliance[b], out[b])
+        _invert(compliance[b], cracks.compliance[b], out[b])
     else:
         # By numbers: Numba takes seconds to compile the assignment of one array to another.
         for k in range(3):
@@ -207,34 +270,35 @@ def _rotated(c, s, xx, yy, xy):
 
 
 @kept(fastmath=False, error_model="numpy", nogil=True)
-def assemble_blocks(
-    order, moments, density, stiffness, compliance, carried, stress, crack_strain, crack_given, crack_compliance,
-    crack_offset, gravity, load, dt, heavier, weight, block_damping, mass_damping, stiffness_damping, n,
-):  # fmt: skip
-    """What blocks bring on their own: (matrix (n, 6, 6), right side (n, 6), tangent (n_blocks, 3, 3), stress0
-    (n_blocks, 3)).
+def assemble_blocks(order, n, mass, start, cracks, loads, scheme):
+    """The blocks' own equations: (matrix (n, 6, 6), right side (n, 6), tangent (n_blocks, 3, 3), stress0 (n_blocks, 3)).
+    ``order`` (n_blocks,) as in `assembly.Pattern`, ``mass`` (`BlockMass`), ``start`` (`BlockStart`), ``cracks``
+    (`CrackTerms`), ``loads`` (`BlockLoads`), ``scheme`` (`SchemeTerms`).
 
-    - inertia and elasticity as in this module's equation, with velocity ``carried``, factor ``heavier`` 1/w and
-      ``weight`` θ. The stress is σ₁ = (C⁻¹ + S)⁻¹ (Δε + C⁻¹σ − offset + crack strain), with the added compliance S of
+    - inertia and elasticity as in this module's equation, with the velocity of the ``start``, the factor ``heavier`` 1/w
+      and the ``weight`` θ. The stress is σ₁ = (C⁻¹ + S)⁻¹ (Δε + C⁻¹σ − offset + crack strain), with the added compliance S of
       cracks. For Δε = 0 it is σ, unless cracks have grown or their faces have opened or closed; that change acts over
       the step with weight θ;
     - body force ∫ Tᵀρg, and for the strain unknowns the centrifugal terms ρω²∫xx, ρω²∫yy, ρω²∫xy;
-    - generalised forces ``load`` (n_blocks, 6) of all other loads, N and N m;
+    - generalised forces of all other loads;
     - damping: a viscous stress ∝ C Δε/dt that gives a block's lowest vibration (taken as that of a square, ω² =
       12 C₁₁/(ρ h²)) the fraction ``block_damping`` of critical damping, and Rayleigh damping.
     """
-    inertia = 2.0 * heavier / (dt * dt) + mass_damping / dt
+    density, moments = mass.density, mass.moments
+    carried, stress, stiffness, compliance = start
+    weight, heavier, dt = scheme.weight, scheme.heavier, scheme.dt
+    inertia = 2.0 * heavier / (dt * dt) + scheme.mass_damping / dt
     n_blocks = order.shape[0]
     matrix = np.zeros((n, 6, 6))
     right = np.zeros((n, 6))
     tangent = np.empty((n_blocks, 3, 3))
     stress0 = np.empty((n_blocks, 3))
     strain = np.empty(3)
-    mass = np.empty((6, 6))
+    unit_mass = np.empty((6, 6))
     for b in range(n_blocks):
-        _tangent(b, stiffness, compliance, crack_given, crack_compliance, tangent)
+        _tangent(b, stiffness, compliance, cracks, tangent)
         for k in range(3):
-            strain[k] = crack_strain[b, k] - crack_offset[b, k] if crack_given else 0.0
+            strain[k] = cracks.strain[b, k] - cracks.offset[b, k] if cracks.given else 0.0
             for m in range(3):
                 strain[k] += compliance[b, k, m] * stress[b, m]
         for k in range(3):
@@ -247,22 +311,24 @@ def assemble_blocks(
         area, xx, yy, xy = moments[b, 0], moments[b, 3], moments[b, 4], moments[b, 5]
         h = np.sqrt(area)
         rho = density[b]
-        _unit_mass(moments[b], mass)
+        _unit_mass(moments[b], unit_mass)
         for k in range(6):
             for m in range(6):
-                matrix[row, k, m] = inertia * rho * mass[k, m]
-                right[row, k] += 2.0 * heavier * rho * mass[k, m] * (carried[b, m] * (1.0 if m < 2 else h)) / dt
+                matrix[row, k, m] = inertia * rho * unit_mass[k, m]
+                right[row, k] += 2.0 * heavier * rho * unit_mass[k, m] * (carried[b, m] * (1.0 if m < 2 else h)) / dt
         if rho == 0.0:
             for k in range(3):
                 matrix[row, k, k] += GROUND_RATIO * stiffness[b, 0, 0]
-        drag = stiffness_damping + 2.0 * block_damping * np.sqrt(rho * area / (12.0 * stiffness[b, 0, 0]))
+        drag = scheme.stiffness_damping
+        drag += 2.0 * scheme.block_damping * np.sqrt(rho * area / (12.0 * stiffness[b, 0, 0]))
         elastic = weight + drag / dt
         for k in range(3):
             for m in range(3):
                 matrix[row, 3 + k, 3 + m] += elastic * tangent[b, k, m]
             right[row, 3 + k] -= area * ((1.0 - weight) * stress[b, k] + weight * stress0[b, k]) / h
-        right[row, 0] += rho * area * gravity[0] + load[b, 0]
-        right[row, 1] += rho * area * gravity[1] + load[b, 1]
+        load = loads.load
+        right[row, 0] += rho * area * loads.gravity[0] + load[b, 0]
+        right[row, 1] += rho * area * loads.gravity[1] + load[b, 1]
         spin = rho * carried[b, 2] * carried[b, 2]
         right[row, 2] += load[b, 2] / h
         right[row, 3] += (load[b, 3] + spin * xx) / h
@@ -272,11 +338,9 @@ def assemble_blocks(
 
 
 @kept(fastmath=False, error_model="numpy", nogil=True)
-def advance(
-    increment, carried, dt, static, vertices, vertex_start, moments, tangent, stress0, compliance, offset, crack_given,
-    crack_strain, turns,
-):  # fmt: skip
-    """The state after a step from its displacement ``increment`` (n_blocks, 6) about the old centroids.
+def advance(increment, carried, outlines, tangent, stress0, cracks, turns, dt, static):
+    """The state after a step from its displacement ``increment`` (n_blocks, 6) about the old centroids and the velocity
+    ``carried`` (n_blocks, 6) with which it began; ``outlines`` (`Outlines`), ``cracks`` (`CrackTerms`).
 
     Vertices follow x' = c + d₀ + R(r)(I + ε)(x − c) with the exact rotation R, so that a spinning block does not swell.
     Stress, strain rates and crack strain are rotated by the same R; before, the stress is ``tangent`` Δε + ``stress0``.
@@ -287,6 +351,8 @@ def advance(
     largest vertex displacement m.
     """
     n_blocks = increment.shape[0]
+    vertices, vertex_start, moments = outlines
+    offset, compliance = cracks.offset, cracks.compliance
     new_vertices = np.empty_like(vertices)
     velocity = np.empty((n_blocks, 6))
     new_stress = np.empty((n_blocks, 3))
@@ -336,10 +402,10 @@ def advance(
         new_stress[b, 0], new_stress[b, 1], turned_shear = _rotated(c, s, a, d, e)
         new_stress[b, 2] = turned_shear
         for k in range(3):
-            if crack_given:
+            if cracks.given:
                 tensor[k] = offset[b, k] + compliance[b, k, 0] * a + compliance[b, k, 1] * d + compliance[b, k, 2] * e
             else:
-                tensor[k] = crack_strain[b, k]
+                tensor[k] = cracks.strain[b, k]
         a, d, e = tensor[0], tensor[1], 0.5 * tensor[2]
         new_crack[b, 0], new_crack[b, 1], turned_shear = _rotated(c, s, a, d, e)
         new_crack[b, 2] = 2.0 * turned_shear

@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from ...conventions import rotate_stress
+from .newmark import BlockMass
 
 
 def with_rigid(constrained: np.ndarray | None, rigid: np.ndarray) -> np.ndarray | None:
@@ -24,8 +25,7 @@ def mean_stress(
     blocks: np.ndarray,
     contacts: np.ndarray,
     load: np.ndarray,
-    moments: np.ndarray,
-    density: np.ndarray,
+    mass: BlockMass,
     acceleration: np.ndarray,
     spin: np.ndarray,
     contact_turn: np.ndarray,
@@ -33,9 +33,10 @@ def mean_stress(
 ) -> np.ndarray:
     """(n, 3) mean stress of ``blocks`` (n,), Pa, on axes rotated by ``turn`` (n_blocks,) rad.
 
-    ``contacts`` CONTACT rows on a configuration rotated by ``contact_turn`` (n_blocks,) rad; ``load`` (n_blocks, 6)
-    generalised forces, N and N m; ``moments`` (n_blocks, 6); ``density`` (n_blocks,) kg/m³; ``acceleration`` (n_blocks,
-    6); ``spin`` (n_blocks,) rad/s."""
+    ``contacts`` CONTACT rows on a configuration rotated by ``contact_turn`` (n_blocks,) rad, on which the moments of
+    ``mass`` are; ``load`` (n_blocks, 6) generalised forces, N and N m; ``acceleration`` (n_blocks, 6); ``spin``
+    (n_blocks,) rad/s."""
+    density, moments, _ = mass
     n = contacts["normal"]
     force = contacts["normal_force"][:, None] * n
     force += contacts["shear_force"][:, None] * np.stack([-n[:, 1], n[:, 0]], axis=1)

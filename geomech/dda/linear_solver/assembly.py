@@ -12,6 +12,14 @@ import numpy as np
 
 from ...compiled import kept, part
 from ...model import OPEN, SLIP, STICK
+from ..equation_records import (
+    BlockEquations,
+    ContactMotion,
+    ContactSides,
+    ContactStiffness,
+    MatrixPlaces,
+    SpringsInStates,
+)
 from .block_solver import RESIDUAL, BlockSolver
 from .simd import load_six, minus_product, numbers, plus_product, product, spread, store, store_six, zeros
 from .task_pool import add_at_once, await_value, crew
@@ -151,8 +159,7 @@ def contact_vectors(block, other, geometry, order, moments):
 
 @kept(fastmath=False, error_model="numpy", nogil=True)
 def sides_of(n, order, block, other):
-    """Contact sides of each of ``n`` free blocks: their begins (n + 1,) in (k,), where 2 c is the vertex of contact c
-    and 2 c + 1 its edge, ascending."""
+    """The `ContactSides` of ``n`` free blocks, ascending."""
     start = np.zeros(n + 2, np.int64)
     for c in range(len(block)):
         i, j = order[block[c]], order[other[c]]
@@ -171,7 +178,7 @@ def sides_of(n, order, block, other):
         if j >= 0:
             side[start[j + 1]] = 2 * c + 1
             start[j + 1] += 1
-    return start[: n + 1], side
+    return ContactSides(start[: n + 1], side)
 
 
 @part(error_model="numpy", nogil=True)
@@ -198,15 +205,16 @@ def _add_pair(room, pull, across, r0, r1, r2, r3, r4, r5):
 
 
 @kept(fastmath=False, error_model="numpy", nogil=True)
-def _fill_rows(
-    first, last, start, side, data, matrix, begins, stride, diagonal, upper, lower, block, other, order, vectors,
-    normal, shear, slope, lift,
-):  # fmt: skip
-    """Fill the rows of blocks from ``first`` to before ``last`` (see `assemble`); ``start`` and ``side`` from
-    `sides_of`. The rows of a block are the same to the last bit whichever thread fills them.
+def _fill_rows(first, last, sides, data, matrix, places, contacts, stiffness):
+    """Fill the rows of blocks from ``first`` to before ``last`` (see `assemble`); ``places`` (`MatrixPlaces`). The rows of
+    a block are the same to the last bit whichever thread fills them.
 
     The block's own 6 × 6, and that of the neighbour being processed, stay in registers."""
     buffer = np.empty(16)
+    start, side = sides
+    begins, stride, diagonal, upper, lower = places
+    block, other, order, vectors = contacts
+    normal, shear, slope, lift = stiffness
     room, into, given, along = numbers(buffer), numbers(data), numbers(matrix), numbers(vectors)
     kns, kss, frictions, rises = numbers(normal), numbers(shear), numbers(slope), numbers(lift)
     for b in range(first, last):
@@ -247,10 +255,7 @@ def _fill_rows(
 
 
 @kept(fastmath=False, error_model="numpy", nogil=True)
-def _fill_shared(
-    claimed, done, share, start, side, data, matrix, begins, stride, diagonal, upper, lower, block, other, order,
-    vectors, normal, shear, slope, lift,
-):  # fmt: skip
+def _fill_shared(claimed, done, share, sides, data, matrix, places, contacts, stiffness):
     """Fill the rows of ``share`` blocks at a time, shared with other threads; ``claimed`` and ``done`` (1,) as for the
     elimination of fronts."""
     n = len(matrix)
@@ -259,25 +264,21 @@ def _fill_shared(
         q = add_at_once(claimed, 0, 1)
         if q >= shares:
             break
-        _fill_rows(
-            q * share, min(n, (q + 1) * share), start, side, data, matrix, begins, stride, diagonal, upper, lower,
-            block, other, order, vectors, normal, shear, slope, lift,
-        )  # fmt: skip
+        _fill_rows(q * share, min(n, (q + 1) * share), sides, data, matrix, places, contacts, stiffness)
         add_at_once(done, 0, 1)
     await_value(done, 0, shares)
 
 
 @kept(fastmath=False, error_model="numpy", nogil=True)
-def _fill_again(
-    most, held, start, side, data, matrix, begins, stride, diagonal, upper, lower, block, other, order, vectors,
-    normal, shear, slope, lift,
-):  # fmt: skip
-    """Fill the rows of blocks whose contact springs differ from those ``held`` (4 of (n_contacts,)), unless these are
-    more than ``most`` blocks; returns whether they were filled."""
+def _fill_again(most, filled, sides, data, matrix, places, contacts, stiffness):
+    """Fill the rows of blocks whose contacts' ``stiffness`` differs from that ``filled``, unless these are more than
+    ``most`` blocks; returns whether they were filled."""
     n, rows = len(matrix), 0
+    block, other, order, _ = contacts
     differs = np.zeros(n, np.bool_)
     for c in range(len(block)):
-        if normal[c] != held[0][c] or shear[c] != held[1][c] or slope[c] != held[2][c] or lift[c] != held[3][c]:
+        same = stiffness.normal[c] == filled.normal[c] and stiffness.shear[c] == filled.shear[c]
+        if not (same and stiffness.slope[c] == filled.slope[c] and stiffness.lift[c] == filled.lift[c]):
             for i in (order[block[c]], order[other[c]]):
                 if i >= 0 and not differs[i]:
                     differs[i] = True
@@ -286,10 +287,7 @@ def _fill_again(
         return False
     for b in range(n):
         if differs[b]:
-            _fill_rows(
-                b, b + 1, start, side, data, matrix, begins, stride, diagonal, upper, lower, block, other, order,
-                vectors, normal, shear, slope, lift,
-            )  # fmt: skip
+            _fill_rows(b, b + 1, sides, data, matrix, places, contacts, stiffness)
     return True
 
 
@@ -297,33 +295,26 @@ def assemble(
     pattern: Pattern,
     data: np.ndarray,
     matrix: np.ndarray,
-    upper: np.ndarray,
-    lower: np.ndarray,
-    block: np.ndarray,
-    other: np.ndarray,
-    order: np.ndarray,
-    vectors: np.ndarray,
-    normal: np.ndarray,
-    shear: np.ndarray,
-    slope: np.ndarray,
-    lift: np.ndarray,
-    sides: tuple[np.ndarray, np.ndarray] | None = None,
-    held: tuple[np.ndarray, ...] | None = None,
+    contacts: ContactMotion,
+    stiffness: ContactStiffness,
+    couplings: tuple[np.ndarray, np.ndarray] | None = None,
+    sides: ContactSides | None = None,
+    filled: ContactStiffness | None = None,
 ) -> None:
-    """Fill ``data`` with the blocks' own ``matrix`` (n, 6, 6) and the contact springs dN = −``normal`` (n − κ t)·Δu,
-    with κ the ``lift``, and dS = −``shear`` t·Δu + ``slope`` dN. ``upper`` and ``lower`` as in the ``pattern``, for
-    these contacts; ``sides`` as from `sides_of`, if known. ``held``: the springs (``normal``, ``shear``, ``slope``,
-    ``lift``) with which ``data`` has been filled, everything else being equal."""
-    at = pattern.begins, pattern.stride, pattern.diagonal, upper, lower, block, other, order
-    laws = vectors, normal, shear, slope, lift
-    sides = sides_of(pattern.n, order, block, other) if sides is None else sides
-    if held is not None and _fill_again(int(FILLED_AGAIN * pattern.n), held, *sides, data, matrix, *at, *laws):
+    """Fill ``data`` with the blocks' own ``matrix`` (n, 6, 6) and the ``stiffness`` of ``contacts``. ``couplings``:
+    ``upper`` and ``lower`` of these contacts, where they are not those of the ``pattern``; ``sides`` as from
+    `sides_of`, if known. ``filled``: the stiffness with which ``data`` has been filled, everything else being equal."""
+    upper, lower = (pattern.upper, pattern.lower) if couplings is None else couplings
+    places = MatrixPlaces(pattern.begins, pattern.stride, pattern.diagonal, upper, lower)
+    sides = sides_of(pattern.n, contacts.order, contacts.block, contacts.other) if sides is None else sides
+    rest = sides, data, matrix, places, contacts, stiffness
+    if filled is not None and _fill_again(int(FILLED_AGAIN * pattern.n), filled, *rest):
         return
     if pattern.n < THREADED:
-        _fill_rows(0, pattern.n, *sides, data, matrix, *at, *laws)
+        _fill_rows(0, pattern.n, *rest)
         return
     claimed, done = np.zeros(1, np.int64), np.zeros(1, np.int64)
-    crew().share(_fill_shared, claimed, done, SHARE, *sides, data, matrix, *at, *laws)
+    crew().share(_fill_shared, claimed, done, SHARE, *rest)
 
 
 @part(fastmath=False, error_model="numpy", nogil=True)
@@ -336,15 +327,14 @@ def spring_in_state(state, direction, normal, shear, friction, sliding, shear0):
 
 
 @kept(fastmath=False, error_model="numpy", nogil=True)
-def _springs(
-    right, base_right, block, other, order, vectors, state, direction, gap, normal, shear, friction, sliding, lift,
-    shear0,
-):  # fmt: skip
+def _springs(right, own_right, contacts, springs):
     """Fill ``right`` (see `assemble_contacts`). Returns (n,) normal and shear stiffness of the contacts in their
     states, the ratio of shear to normal force of sliding ones, and whether the matrix is symmetric."""
-    for b in range(base_right.shape[0]):
+    block, other, order, vectors = contacts
+    state, direction, gap, normal, shear, friction, sliding, lift, shear0 = springs
+    for b in range(own_right.shape[0]):
         for a in range(6):
-            right[6 * b + a] = base_right[b, a]
+            right[6 * b + a] = own_right[b, a]
     stiff, along, slope, symmetric = np.zeros(len(block)), np.zeros(len(block)), np.zeros(len(block)), True
     for c in range(block.shape[0]):
         if state[c] == OPEN:
@@ -366,41 +356,24 @@ def _springs(
 
 def assemble_contacts(
     pattern: Pattern,
+    own: BlockEquations,
+    contacts: ContactMotion,
+    springs: SpringsInStates,
     data: np.ndarray,
     right: np.ndarray,
-    matrix: np.ndarray,
-    base_right: np.ndarray,
-    upper: np.ndarray,
-    lower: np.ndarray,
-    block: np.ndarray,
-    other: np.ndarray,
-    order: np.ndarray,
-    vectors: np.ndarray,
-    state: np.ndarray,
-    direction: np.ndarray,
-    gap: np.ndarray,
-    normal: np.ndarray,
-    shear: np.ndarray,
-    friction: np.ndarray,
-    sliding: np.ndarray,
-    lift: np.ndarray,
-    shear0: np.ndarray,
-    sides: tuple[np.ndarray, np.ndarray] | None = None,
-    held: tuple[np.ndarray, ...] | None = None,
-) -> tuple[bool, tuple[np.ndarray, ...]]:
-    """Fill ``data`` and ``right`` with the blocks' own equations and the springs of closed contacts. Returns whether
-    the matrix is symmetric, and the springs in ``data`` (see `assemble`).
+    sides: ContactSides | None = None,
+    filled: ContactStiffness | None = None,
+) -> tuple[bool, ContactStiffness]:
+    """Fill ``data`` and ``right`` with the blocks' ``own`` equations and the ``springs`` of closed ``contacts``. Returns
+    whether the matrix is symmetric, and the stiffness in ``data``; ``sides`` and ``filled`` as for `assemble`.
 
     Normal force N = −kₙ(g + n·Δu − κ t·Δu), with dilation κ. Stick: S = S₀ − kₛ t·Δu. Slip: S = ± (μ N + c) with the
     unknown N, which makes the matrix unsymmetric but friction exact in one solution.
     """
-    at = block, other, order, vectors
-    *laws, symmetric = _springs(
-        right, base_right, *at, state, direction, gap, normal, shear, friction, sliding, lift, shear0
-    )
-    laws = (*laws, lift)
-    assemble(pattern, data, matrix, upper, lower, *at, *laws, sides, held)
-    return symmetric, laws
+    *stiff, symmetric = _springs(right, own.right, contacts, springs)
+    stiffness = ContactStiffness(*stiff, springs.lift)
+    assemble(pattern, data, own.matrix, contacts, stiffness, sides=sides, filled=filled)
+    return symmetric, stiffness
 
 
 def solve(

@@ -7,8 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...model import OPEN, SLIP
-from ..joint_laws.bonds import BondedFaces, check_faces, first_to_break
-from ..joint_laws.coulomb_return import check_states, contact_forces
+from ..equation_records import BlockEquations, ContactMotion, ContactStiffness, SpringsInStates
+from ..joint_laws.bonds import BondedFaces, FaceBonds, ForcesBefore, check_faces, first_to_break
+from ..joint_laws.coulomb_return import ContactStates, Strengths, check_states, contact_forces
 from ..joint_laws.nonlinear_laws import CurvedJoints
 from ..joint_laws.penalty_springs import Springs
 from ..linear_solver import assembly
@@ -98,7 +99,7 @@ class Equations:
     def __post_init__(self) -> None:
         self._data = np.empty(self.pattern.size)
         self._side = np.empty(6 * self.pattern.n)
-        self._held: tuple[np.ndarray, ...] | None = None
+        self._held: ContactStiffness | None = None
         self._near: np.ndarray | None = None
         self._force = float(np.abs(self.right).max(initial=0.0))
         self.sides = assembly.sides_of(self.pattern.n, self.pattern.order, self.found.block, self.found.other)
@@ -130,22 +131,28 @@ class Equations:
 
     def _assembled(self, state: np.ndarray, direction: np.ndarray, springs: Springs, gap: np.ndarray):
         """Fill the matrix and the right side with contacts in this ``state``, as `assemble_contacts`."""
-        pattern, found = self.pattern, self.found
         return assembly.assemble_contacts(
-            pattern, self._data, self._side, self.matrix, self.right, pattern.upper, pattern.lower, found.block,
-            found.other, pattern.order, self.vectors, state, direction, gap, springs.normal, springs.shear,
-            springs.friction, springs.sliding, springs.lift, found.shear, self.sides, self._held,
+            self.pattern, BlockEquations(self.matrix, self.right), self._contacts,
+            self._in_states(state, direction, springs, gap), self._data, self._side, self.sides, self._held,
+        )  # fmt: skip
+
+    @property
+    def _contacts(self) -> ContactMotion:
+        return ContactMotion(self.found.block, self.found.other, self.pattern.order, self.vectors)
+
+    def _in_states(
+        self, state: np.ndarray, direction: np.ndarray, springs: Springs, gap: np.ndarray
+    ) -> SpringsInStates:
+        return SpringsInStates(
+            state, direction, gap, springs.normal, springs.shear, springs.friction, springs.sliding, springs.lift,
+            self.found.shear,
         )  # fmt: skip
 
     def _forces(
         self, unknowns: np.ndarray, state: np.ndarray, direction: np.ndarray, springs: Springs, gap: np.ndarray
     ) -> np.ndarray:
         """(n, 4) as `contact_forces`."""
-        found = self.found
-        return contact_forces(
-            unknowns, found.block, found.other, self.pattern.order, self.vectors, state, direction, gap, springs.normal,
-            springs.shear, springs.friction, springs.sliding, springs.lift, found.shear,
-        )  # fmt: skip
+        return contact_forces(unknowns, self._contacts, self._in_states(state, direction, springs, gap))
 
     def _answered(
         self, states: States, springs: Springs, gap: np.ndarray, slip: np.ndarray, symmetric: bool, within: float
@@ -171,16 +178,11 @@ class Equations:
                 self.springs, self.gap, found, state, direction, bonded, forces[:, 0], slip
             )
             missed = self.curved.misfit(springs, gap, known, known_gap, state, forces)
-        *called, violation = check_states(
-            forces, state, direction, bonded, known.normal, known.shear, known.friction, known.sliding,
-            known.peak, known.hold, known.cohesion, known.tension, known.keeps, found.shear, self.slack,
-        )  # fmt: skip
-        if (faces := found.faces) is not None:
-            check_faces(
-                faces.start, faces.rows, faces.arm, faces.length, forces, found.normal, found.shear, state, bonded,
-                known.normal, known.shear, known.friction,
-                known.peak, known.hold, known.cohesion, known.tension, known.keeps, self.slack, *called, violation,
-            )  # fmt: skip
+        tried, strengths = ContactStates(state, direction, bonded), Strengths.of(known)
+        called, violation = check_states(forces, tried, strengths, found.shear, self.slack)
+        if found.faces is not None:
+            begun = ForcesBefore(found.normal, found.shear)
+            check_faces(FaceBonds.of(found.faces), forces, begun, tried, strengths, self.slack, called, violation)
         return Answer(unknowns, forces, States(*called), violation, missed, slip, springs, gap)
 
     def first_bonds(self, states: States, answer: Answer, which: np.ndarray) -> np.ndarray:
@@ -189,8 +191,8 @@ class Equations:
         found, springs = self.found, answer.springs
         faces = BondedFaces.none() if found.faces is None else found.faces
         when = first_to_break(
-            faces.start, faces.rows, faces.arm, faces.length, answer.forces, found.normal, found.shear, states.state,
-            states.bonded, answer.called.bonded, springs.peak, springs.hold, springs.cohesion, springs.tension,
+            FaceBonds.of(faces), answer.forces, ForcesBefore(found.normal, found.shear),
+            ContactStates(states.state, states.direction, states.bonded), answer.called.bonded, Strengths.of(springs),
         )  # fmt: skip
         when[~which] = np.inf
         first = np.full(len(self.pattern.order), np.inf)

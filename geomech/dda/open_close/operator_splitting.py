@@ -28,6 +28,7 @@ import numpy as np
 
 from ...compiled import UNCOUNTED, kept
 from ...model import OPEN, SLIP, STICK, ContactSolver
+from ..equation_records import ContactMotion, ContactStiffness
 from ..linear_solver import assembly
 from .equations import Equations, States
 from .interior_point.contact_terms import balance
@@ -52,16 +53,16 @@ class Proposal(NamedTuple):
 
 
 @kept(fastmath={"contract"}, error_model="numpy", nogil=True, **UNCOUNTED)
-def _turn(unknowns, ends, vectors, law, rho, held, relaxation, at_hand, states):
-    """One turn of the contacts about the blocks' ``unknowns`` (6 n_free,). ``ends``: both blocks' numbers (n,) each;
-    ``law`` (n, 6): gap, kₙ, kₛ, S₀, μ, c; ``rho`` (2, n) across and along; ``held`` (n,) by bonds. ``at_hand`` (n, 6) has ζ,
-    z and the forces ρ (2z − ζ − q), each across and along; ``states``: state and direction (n,) of z."""
+def _turn(unknowns, contacts, law, rho, held, relaxation, at_hand, states):
+    """One turn of the ``contacts`` (`ContactMotion`) about the blocks' ``unknowns`` (6 n_free,). ``law`` (n, 6): gap, kₙ,
+    kₛ, S₀, μ, c; ``rho`` (2, n) across and along; ``held`` (n,) by bonds. ``at_hand`` (n, 6) has ζ, z and the forces
+    ρ (2z − ζ − q), each across and along; ``states``: state and direction (n,) of z."""
     state, direction = states
-    mine, theirs = ends
+    block, other, order, vectors = contacts
     for c in range(len(law)):
         apart = along = 0.0
         for side in range(2):
-            b, k = (mine[c] if side == 0 else theirs[c]), 6 * side
+            b, k = order[block[c] if side == 0 else other[c]], 6 * side
             if b < 0:
                 continue
             for a in range(6):
@@ -100,8 +101,8 @@ class _Springs:
     """The springs ρ of all contacts: ``rho`` (2, n) N/m, across the edge and along it, and ``correction``, by which the
     blocks answer what is out of balance between them."""
 
-    def __init__(self, equations: Equations) -> None:
-        self._equations = equations
+    def __init__(self, equations: Equations, contacts: ContactMotion) -> None:
+        self._equations, self._contacts = equations, contacts
         matrix, order, found = equations.matrix, equations.pattern.order, equations.found
 
         def of_softer(value: np.ndarray) -> np.ndarray:
@@ -116,13 +117,11 @@ class _Springs:
         self._become(np.stack([self._mean, self._mean]))
 
     def _become(self, rho: np.ndarray) -> None:
-        equations, found = self._equations, self._equations.found
-        pattern, none, data = equations.pattern, np.zeros(len(found)), equations.room()
+        equations, none = self._equations, np.zeros(rho.shape[1])
+        pattern, data = equations.pattern, equations.room()
         self.rho = rho
-        assembly.assemble(
-            pattern, data, equations.matrix, pattern.upper, pattern.lower, found.block, found.other, pattern.order,
-            equations.vectors, rho[0], rho[1], none, none, equations.sides,
-        )  # fmt: skip
+        stiffness = ContactStiffness(rho[0], rho[1], none, none)
+        assembly.assemble(pattern, data, equations.matrix, self._contacts, stiffness, sides=equations.sides)
         pattern.add_links(data)
         self.correction = pattern.solver.corrections(data)
 
@@ -140,14 +139,14 @@ def split(equations: Equations, bonded: np.ndarray, solver: ContactSolver) -> Pr
     velocities and the forces carried over. Raises numpy.linalg.LinAlgError."""
     pattern, found, springs = equations.pattern, equations.found, equations.springs
     order, vectors = pattern.order, np.ascontiguousarray(equations.vectors)
-    between = _Springs(equations)
+    contacts = ContactMotion(found.block, found.other, order, vectors)
+    between = _Springs(equations, contacts)
 
     slipped, slides = bonded == _SLIPPED, found.state == SLIP
     friction = np.where(slides, springs.friction, springs.peak)
     firm = np.where(slides, springs.sliding, springs.hold + np.where(slipped, springs.cohesion, 0.0))
     held = (bonded > 0) & ~slipped
     law = np.stack([equations.gap, springs.normal, springs.shear, found.shear, friction, firm], axis=1)
-    contacts = (order[found.block], order[found.other]), vectors, law
 
     # Before the first turn z is not known: ζ begins as q − F/ρ.
     unknowns, at_hand = equations.expected.copy(), np.zeros((len(found), 6))
@@ -157,7 +156,7 @@ def split(equations: Equations, bonded: np.ndarray, solver: ContactSolver) -> Pr
     states = found.state.copy(), np.zeros(len(found))
     seen, relaxation, spent = states[0].copy(), 1.0, _FACTORS
     for taken in range(1, solver.splitting_iterations + 1):
-        _turn(unknowns, *contacts, between.rho, held, relaxation, at_hand, states)
+        _turn(unknowns, contacts, law, between.rho, held, relaxation, at_hand, states)
         relaxation, spent = _RELAXATION, spent + _TURN
         if taken % _LOOK == 0:
             changing = np.count_nonzero(states[0] != seen) / len(found)

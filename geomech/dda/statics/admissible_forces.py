@@ -4,11 +4,13 @@ Forces N and S of the contacts are statically admissible at the factor F if ever
 
     N ≥ 0,    |S| ≤ (c ℓ + N tan φ)/F.
 
-Whether such forces exist is a linear programme (Livesley 1978, Int. J. Numer. Methods Eng. 12, 1853-1871). No
-equilibrium exists above the largest F with admissible forces (static theorem). Friction that dilates by less than its
-angle may fail below it (Drescher & Detournay 1993, Géotechnique 43, 443-456): blocks can be wedged against one another
-in many ways, and the deformation selects one. The search follows the deformation, so that its factor may lie below this
-bound; the difference shows how much depends on the way in which the blocks are wedged.
+The least sum of forces that such contact forces leave unbalanced, U(F), is a linear programme (Livesley 1978, Int. J.
+Numer. Methods Eng. 12, 1853-1871). U is zero up to the largest F with admissible forces; beyond, its dual solution gives
+dU/d(1/F), with which Newton's method finds that F from above in a few programmes. No equilibrium exists above it (static
+theorem). Friction that dilates by less than its angle may fail below it (Drescher & Detournay 1993, Géotechnique 43,
+443-456): blocks can be wedged against one another in many ways, and the deformation selects one. The search for a factor
+begins at this bound and follows the deformation, so that its answer may lie below; the difference shows how much depends
+on the way in which the blocks are wedged.
 
 The loads are those that the contact forces of an equilibrium balance, whatever they come from: weight, water, anchors.
 Joints with tensile strength are left out: a face that is bent holds less than the sum of what its ends would hold.
@@ -16,122 +18,198 @@ Joints with tensile strength are left out: a face that is bent holds less than t
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
-from ...model import JointLaw, State
+from ...model import GROUND, Bolt, JointLaw, State
 from ..kinematics.simplex_integration import block_moments
+from ..open_close.contact_set import ContactSet
 from ..results import contact_resultants
 from ..system import BlockSystem
 
-#: The bound is sought between the factor of an equilibrium and this many times that factor.
-_FARTHEST = 4.0
+#: The bound is sought up to this factor.
+_FARTHEST = 64.0
 #: Loads are balanced to this part of the largest load on a block.
 _BALANCED = 1e-6
+#: Newton's method ends when F changes by less than this part.
+_PRECISE = 1e-4
 
 
 @dataclass(frozen=True, eq=False)
 class AdmissibleForces:
     """The linear programme of the contacts (n,) of blocks at rest.
 
-    matrix    (3 m, 2 n)  sparse: forces x, y and moments on the m free blocks, by N and S of each contact
-    loads     (3 m,)      forces and moments that balance the loads, over the largest of them
+    matrix    (3 m, 2 n)  sparse: forces x, y and moments over √area on the m free blocks, by N and S of each contact
+    loads     (3 m,)      what balances the loads in the same rows, over the largest of them
     friction  (n,)        tan φ
     cohesion  (n,)        c ℓ of the contact's part of its face, in the unit of the loads; 0 once it is lost
     reduced   (n,) bool   whether the strength of the contact is divided by the factor
+    bolts     (3 m, k)    sparse: the same forces and moments by the pull of each bolt
+    pull      (k, 2)      least and largest pull of the bolts beside what is among the loads, in the unit of the loads
     """
 
-    matrix: object
+    matrix: Any
     loads: np.ndarray
     friction: np.ndarray
     cohesion: np.ndarray
     reduced: np.ndarray
+    bolts: Any
+    pull: np.ndarray
 
     @classmethod
     def of(
-        cls, system: BlockSystem, state: State, rest: State, joints: Sequence[JointLaw], chosen: Sequence[str]
-    ) -> AdmissibleForces | None:
-        """Of the blocks of ``system``, in equilibrium in ``state``, on all contacts that touch there or at ``rest``; ``joints`` with their whole strength, of which that of the laws ``chosen`` is divided. None where
-        the programme does not hold: rough joints, those that soften, and those with tensile strength."""
+        cls, system: BlockSystem, state: State, rest: State, joints: Sequence[JointLaw], chosen: Collection[str],
+        bolts: Sequence[Bolt] = (),
+    ) -> AdmissibleForces | None:  # fmt: skip
+        """Of the blocks of ``system``, in equilibrium in ``state``, on all contacts that touch there or at ``rest``;
+        ``joints`` with their whole strength, of which that of the laws ``chosen`` is divided. ``bolts`` (the loads')
+        may pull with anything up to their yield force; without, with what they do in ``state``. None where the
+        programme does not hold: rough joints, those that soften, and those with tensile strength."""
         if any(_varies(law) or law.tensile_strength > 0.0 for law in joints):
             return None
         from scipy import sparse
 
-        blocks = system.blocks
-        centre = block_moments(state.vertices, blocks.next_vertex, blocks.vertex_start)[:, 1:3]
-        near, drawn = system.contacts_near(state), system.contacts_near(rest)
-        n_vertices = len(blocks.vertices)
-        drawn_on = (drawn.vertex * n_vertices + drawn.edge)[drawn.gap_before <= drawn.precision]
-        touches = near.gap_before <= near.precision
-        rows = np.flatnonzero(touches | np.isin(near.vertex * n_vertices + near.edge, drawn_on))
-        free = ~system.fixed if blocks.constrained is None else ~(system.fixed | blocks.constrained.any(axis=1))
-        number = np.where(free, np.cumsum(free) - 1, -1)
-        loads = contact_resultants(state.contacts, blocks.n_blocks, centre)[free]
+        rows_of = _Rows.of(system, state)
+        loads = contact_resultants(state.contacts, system.blocks.n_blocks, rows_of.centre)
+        loads[:, 2] /= rows_of.size
+        loads = loads[rows_of.number >= 0].ravel()
         unit = float(np.abs(loads).max(initial=0.0))
+        near = system.contacts_near(state)
+        rows = _touching(near, system.contacts_near(rest), len(system.blocks.vertices))
         if not (len(rows) and unit > 0.0):
             return None
-        normal, at = near.geometry[rows, 1:3], near.geometry[rows, 5:7]
+        normal, at, law = near.geometry[rows, 1:3], near.geometry[rows, 5:7], near.law[rows]
+        pair, ends = np.stack([near.block[rows], near.other[rows]], axis=1), np.stack([at, at], axis=1)
         along = np.stack([-normal[:, 1], normal[:, 0]], axis=1)
-        entries = []
-        for of, sign in ((near.block[rows], 1.0), (near.other[rows], -1.0)):
-            own = np.flatnonzero(number[of] >= 0)
-            arm = (at - centre[of])[own]
-            for k, way in enumerate((normal[own], along[own])):
-                moment = arm[:, 0] * way[:, 1] - arm[:, 1] * way[:, 0]
-                for axis, part in enumerate((way[:, 0], way[:, 1], moment)):
-                    entries.append((3 * number[of[own]] + axis, own + k * len(rows), sign * part))
-        row, column, value = (np.concatenate(parts) for parts in zip(*entries, strict=True))
-        matrix = sparse.csc_matrix((value, (row, column)), (3 * int(free.sum()), 2 * len(rows)))
-        law = near.law[rows]
         # Faces that have parted by a hair could hold their cohesion as well.
-        length = near.geometry[rows, 4] * ((near.bonded > 0) | touches)[rows]
+        length = near.geometry[rows, 4] * ((near.bonded > 0) | (near.gap_before <= near.precision))[rows]
 
         def of_laws(name: str) -> np.ndarray:
             return np.array([getattr(each, name) for each in joints], float)[law]
 
+        pulls, least_and_most = _pulls(rows_of, bolts, state)
         return cls(
-            matrix, loads.ravel() / unit, of_laws("friction"), of_laws("cohesion") * length / unit,
-            np.array([each.name in chosen for each in joints])[law],
+            sparse.hstack([rows_of.by(normal, pair, ends), rows_of.by(along, pair, ends)], format="csc"),
+            loads / unit, of_laws("friction"), of_laws("cohesion") * length / unit,
+            np.array([each.name in chosen for each in joints])[law], pulls, least_and_most / unit,
         )  # fmt: skip
 
-    def balance(self, factor: float) -> bool:
-        """Whether admissible forces exist at the ``factor``: pushes along both edges of the friction cone of each
-        contact, and what cohesion holds of shear."""
+    def unbalanced(self, factor: float) -> tuple[float, float]:
+        """The least sum of forces and moments that admissible forces at the ``factor`` leave unbalanced, in the unit of
+        the loads, and its derivative by 1/``factor``. The unknowns are pushes along both edges of the friction cone of
+        each contact, what cohesion holds of shear, pulls of bolts, and what is left. Raises `Unsolved`."""
         from scipy import optimize, sparse
 
         share = np.where(self.reduced, 1.0 / factor, 1.0)
-        n = len(share)
+        n, m = len(share), len(self.loads)
         push, shear = self.matrix[:, :n], self.matrix[:, n:]
-        friction = sparse.diags(self.friction * share)
+        inclined = shear @ sparse.diags(self.friction * share)
         bonded = np.flatnonzero(self.cohesion > 0.0)
-        matrix = sparse.hstack([push + shear @ friction, push - shear @ friction, shear[:, bonded]], format="csc")
+        rest = sparse.identity(m)
+        matrix = sparse.hstack(
+            [push + inclined, push - inclined, shear[:, bonded], self.bolts, rest, -rest], format="csc"
+        )
         hold = (self.cohesion * share)[bonded]
-        low, high = np.append(np.zeros(2 * n), -hold), np.append(np.full(2 * n, np.inf), hold)
+        low = np.concatenate([np.zeros(2 * n), -hold, self.pull[:, 0], np.zeros(2 * m)])
+        high = np.concatenate([np.full(2 * n, np.inf), hold, self.pull[:, 1], np.full(2 * m, np.inf)])
+        cost = np.append(np.zeros(len(low) - 2 * m), np.ones(2 * m))
         found = optimize.linprog(
-            np.zeros(len(low)), A_eq=matrix, b_eq=self.loads, bounds=np.stack([low, high], axis=1), method="highs",
-            options={"primal_feasibility_tolerance": _BALANCED},
-        )  # fmt: skip
-        return found.status == 0
+            cost, A_eq=matrix, b_eq=self.loads, bounds=np.stack([low, high], axis=1), method="highs-ds"
+        )
+        if found.status != 0:
+            raise Unsolved(found.message)
+        friction = self.friction * self.reduced * (found.x[:n] - found.x[n : 2 * n])
+        slope = -float(found.eqlin.marginals @ (shear @ friction))
+        held, own = slice(2 * n, 2 * n + len(bonded)), (self.cohesion * self.reduced)[bonded]
+        slope += float(own @ (found.upper.marginals[held] - found.lower.marginals[held]))
+        return float(found.fun), slope
 
-    def largest_factor(self, lower: float, tolerance: float) -> float | None:
-        """The largest factor with admissible forces, to the relative ``tolerance``, where it is beyond the factor
-        ``lower`` of an equilibrium by more than that; inf where they exist at four times that factor. None if it is not
-        beyond."""
-        high = lower * (1.0 + tolerance)
-        if not self.balance(high):
-            return None
-        step = tolerance
-        while self.balance(high):
-            lower, step = high, 2.0 * step
-            high = lower * (1.0 + step)
-            if step > _FARTHEST:
-                return float("inf")
-        while high > lower * (1.0 + 0.1 * tolerance):
-            middle = 0.5 * (lower + high)
-            lower, high = (middle, high) if self.balance(middle) else (lower, middle)
-        return 0.5 * (lower + high)
+    def balance(self, factor: float) -> bool:
+        """Whether admissible forces exist at the ``factor``. Raises `Unsolved`."""
+        return self.unbalanced(factor)[0] <= _BALANCED
+
+    def largest_factor(self, first: float = 1.0) -> float:
+        """The largest factor with admissible forces, sought from ``first`` on; 0 without any down to 1/64, inf where
+        they exist at 64. Raises `Unsolved`."""
+        low, high, factor, step = 0.0, math.inf, first, _PRECISE
+        while True:
+            left, slope = self.unbalanced(factor)
+            if left <= _BALANCED:
+                low = factor
+                if low >= _FARTHEST:
+                    return math.inf
+                # Newton's method that ends on the admissible side is hardly below the bound.
+                factor = 2.0 * low if math.isinf(high) else min(low * (1.0 + step), 0.5 * (low + high))
+                step *= 4.0
+                continue
+            high = factor
+            if high <= 1.0 / _FARTHEST:
+                return 0.0
+            factor = max(1.0 / (1.0 / high - left / slope), low) if slope < 0.0 else 0.0
+            if high - factor <= _PRECISE * high or high - low <= 2.0 * _PRECISE * high:
+                return factor
+            factor = factor if factor > low else 0.5 * (low + high)
+
+
+class Unsolved(RuntimeError):
+    """The linear programme could not be solved."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Rows:
+    """Rows of the free blocks' equilibrium: ``number`` (n_blocks,) of each, −1 of others; ``centre`` (n_blocks, 2) m and
+    ``size`` √area (n_blocks,) m."""
+
+    number: np.ndarray
+    centre: np.ndarray
+    size: np.ndarray
+
+    @classmethod
+    def of(cls, system: BlockSystem, state: State) -> _Rows:
+        blocks = system.blocks
+        moments = block_moments(state.vertices, blocks.next_vertex, blocks.vertex_start)
+        free = ~system.fixed if blocks.constrained is None else ~(system.fixed | blocks.constrained.any(axis=1))
+        return cls(np.where(free, np.cumsum(free) - 1, -1), moments[:, 1:3], np.sqrt(moments[:, 0]))
+
+    def by(self, ways: np.ndarray, pair: np.ndarray, points: np.ndarray):
+        """Sparse (3 m, n): forces and moments over √area by forces along ``ways`` (n, 2) on the first block of each
+        ``pair`` (n, 2) and against them on the second (GROUND: none), at its own ``points`` (n, 2, 2) m."""
+        from scipy import sparse
+
+        entries = []
+        for side, sign in enumerate((1.0, -1.0)):
+            own = np.flatnonzero((pair[:, side] != GROUND) & (self.number[pair[:, side]] >= 0))
+            on, way = pair[own, side], ways[own]
+            arm = (points[own, side] - self.centre[on]) / self.size[on, None]
+            moment = arm[:, 0] * way[:, 1] - arm[:, 1] * way[:, 0]
+            for axis, part in enumerate((way[:, 0], way[:, 1], moment)):
+                entries.append((3 * self.number[on] + axis, own, sign * part))
+        row, column, value = (np.concatenate(parts) for parts in zip(*entries, strict=True))
+        return sparse.csc_matrix((value, (row, column)), (3 * (int(self.number.max()) + 1), len(ways)))
+
+
+def _pulls(rows_of: _Rows, bolts: Sequence[Bolt], state: State) -> tuple[Any, np.ndarray]:
+    """Sparse (3 m, k) of the ``bolts`` that act in ``state``, and the least and largest pull (k, 2) N/m of each beside
+    its force there."""
+    acting = [
+        (bolt, row) for bolt, row in zip(bolts, state.bolts, strict=False) if row["installed"] and not row["broken"]
+    ]
+    ends = np.array([[bolt.start, bolt.end] for bolt, _ in acting], float).reshape(-1, 2, 2)
+    axis = ends[:, 1] - ends[:, 0]
+    pair = np.array([(bolt.block, bolt.other) for bolt, _ in acting], int).reshape(-1, 2)
+    force = np.array([(row["force"], bolt.yield_force) for bolt, row in acting], float).reshape(-1, 2)
+    pulls = rows_of.by(axis / np.hypot(axis[:, 0], axis[:, 1])[:, None], pair, ends)
+    return pulls, np.stack([-force[:, 0], force[:, 1] - force[:, 0]], axis=1)
+
+
+def _touching(near: ContactSet, drawn: ContactSet, n_vertices: int) -> np.ndarray:
+    """Rows of the contacts ``near`` that touch, or that touch where they were ``drawn``."""
+    drawn_on = (drawn.vertex * n_vertices + drawn.edge)[drawn.gap_before <= drawn.precision]
+    return np.flatnonzero((near.gap_before <= near.precision) | np.isin(near.vertex * n_vertices + near.edge, drawn_on))
 
 
 def _varies(law: JointLaw) -> bool:

@@ -147,29 +147,29 @@ class DisplacementLimit:
         """m: what strains explain at most, from the largest displacement of a vertex were no joint to fail; 0 where
         joints alone do not hold the blocks."""
         if self._elastic is None:
-            self._elastic = _OPENING * self._without_failure()
+            end = without_failure(self._system, self._begin, self._loads, self._time)
+            way = 0.0 if end is None else float(np.hypot(*(end.vertices - self._begin.vertices).T).max())
+            self._elastic = _OPENING * way
         return self._elastic
 
-    def _without_failure(self) -> float:
-        system = self._system
-        laws = [
-            JointLaw(
-                law.name, law.friction_angle, _UNBREAKABLE, _UNBREAKABLE, normal_stiffness=law.normal_stiffness,
-                shear_stiffness=law.shear_stiffness,
-            )
-            for law in system.joints
-        ]  # fmt: skip
-        begin = replace(
-            self._begin, time=0.0, contacts=np.empty(0, CONTACT), velocity=np.zeros_like(self._begin.velocity)
+
+def without_failure(system: BlockSystem, begin: State, loads: Loads, load_time: float) -> State | None:
+    """The static equilibrium of the blocks of ``system`` from ``begin`` were no joint to fail, under ``loads`` of
+    ``load_time`` s; None where joints alone do not hold the blocks."""
+    laws = [
+        JointLaw(
+            law.name, law.friction_angle, _UNBREAKABLE, _UNBREAKABLE, normal_stiffness=law.normal_stiffness,
+            shear_stiffness=law.shear_stiffness,
         )
-        unbreakable = system.with_joints(laws)
-        # Bonds would draw together what stands off.
-        unbreakable.finder.toes = SHARP
-        try:
-            result = unbreakable.step(begin, self._loads, _LONG, load_time=self._time)
-        except (NotConverged, ValueError) as failure:
-            log.debug("what elasticity explains is not known: %s", failure)
-            return 0.0
-        if result.statistics["unbalanced_ratio"] > _BALANCED:
-            return 0.0
-        return float(np.hypot(*(result.state.vertices - begin.vertices).T).max())
+        for law in system.joints
+    ]  # fmt: skip
+    begin = replace(begin, time=0.0, contacts=np.empty(0, CONTACT), velocity=np.zeros_like(begin.velocity))
+    unbreakable = system.with_joints(laws)
+    # Bonds would draw together what stands off.
+    unbreakable.finder.toes = SHARP
+    try:
+        result = unbreakable.step(begin, loads, _LONG, load_time=load_time)
+    except (NotConverged, ValueError) as failure:
+        log.debug("what elasticity explains is not known: %s", failure)
+        return None
+    return None if result.statistics["unbalanced_ratio"] > _BALANCED else result.state

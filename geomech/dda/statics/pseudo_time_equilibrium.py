@@ -87,13 +87,14 @@ def equilibrium(
     crack: CrackResponse | None = None,
     watch: Callable[[StepResult, np.void], None] | None = None,
     limit: DisplacementLimit | None = None,
+    follow: bool = True,
 ) -> Equilibrium:
     """Find where the blocks of ``system`` come to rest from ``state`` under ``loads`` at ``load_time`` (default:
     state.time).
 
     ``tolerance`` bounds the unbalanced force on any block over the mean force on blocks. Blocks that move farther than
     ``limit`` allows (by default, one that begins here) have collapsed, and are followed to where they come to rest if
-    that is not far. A block that has gone ``reach`` m and is out of balance still is taken to have collapsed, too; by
+    that is not far, unless ``follow`` is False. A block that has gone ``reach`` m and is out of balance still is taken to have collapsed, too; by
     default that is a tenth of the blocks' extent, or a twentieth of the block's own size once the unbalanced force has
     stopped falling; with a ``reach`` of the caller's there is no other limit. ``watch`` sees every
     step and its RELAXATION_STEP. Raises ValueError for a tolerance that is not positive; what is not found is told in
@@ -166,6 +167,8 @@ def equilibrium(
             return answer(False, True, f"no equilibrium where the blocks are: they come to rest {far:.3g} m farther")
         if unbalanced <= tolerance:
             return answer(True, False, f"unbalanced force {unbalanced:.2g} of the mean force")
+        if gone and not follow:
+            break
         travelled += moved
         if travelled.max() > reach:
             return answer(False, True, f"no equilibrium: blocks have moved {travelled.max():.3g} m and go on")

@@ -7,9 +7,13 @@ a force, not a displacement: in a static step of length dt an unbalanced force m
 stable trial it falls to round-off within a few steps; in an unstable one it remains (`stability_trial`), and for
 sliding it grows as A − B/F. Two unstable trials thus predict F, and a few more enclose it.
 
+The search begins below the largest factor at which any contact forces at all could balance the loads
+(`admissible_forces`), and tries it from just below and from just above: most networks of rigid joints fail there. Where
+they fail earlier, or later (as contacts that were not there hold), trials go on.
+
 As in limit equilibrium, sharp toes in re-entrant corners are rounded (`sharp_toes`), and a face keeps its whole
 cohesion while any part of it is in contact (`whole_faces`). The factors without these assumptions are reported as well,
-and so is the largest factor with any admissible contact forces, where F is clearly below it (`admissible_forces`).
+and so is the largest factor with any admissible contact forces, where F is clearly below it.
 """
 
 from __future__ import annotations
@@ -19,12 +23,12 @@ import math
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, replace
 
-from ...model import Blocks, DdaSettings, JointLaw, Loads, Material, State
+from ...model import Blocks, Bolt, DdaSettings, JointLaw, Loads, Material, State
 from ...model.former_names import renamed_argument
 from ..joint_laws.reduced_strength import reduced
 from ..results import NotConverged
 from ..system import BlockSystem
-from .admissible_forces import AdmissibleForces
+from .admissible_forces import AdmissibleForces, Unsolved
 from .counted_resistance import (
     bearing_toes,
     hairline_faces,
@@ -37,7 +41,7 @@ from .counted_resistance import (
     with_parted_faces,
     with_toes,
 )
-from .displacement_limit import DisplacementLimit
+from .displacement_limit import DisplacementLimit, without_failure
 from .pseudo_time_equilibrium import equilibrium
 from .safety_answer import FactorOfSafety, mechanism_of, moving_in
 from .sharp_toes import FREE, ROUNDED, SHARP
@@ -53,8 +57,11 @@ _FROM_AFAR = 3.0
 _FARTHEST = 64.0
 #: Relative difference from the largest factor with admissible contact forces above which that is reported.
 _BEYOND = 1e-2
-#: Factor from step to step in the search for a stable trial near a known factor.
-_NEARBY = 0.85
+#: Factor from step to step in the search for a stable trial near a known factor; and of the first trial below a bound.
+_NEARBY, _BELOW = 0.85, 0.95
+#: Trials beside an expected factor are made so many tolerances from it; near a bound, a second one fails so much farther
+#: above the first that their drifts point at the factor.
+_BESIDE, _SECOND = 0.4, 0.01
 
 
 class NothingToReduce(ValueError):
@@ -186,12 +193,28 @@ class _Search:
             found = self._with_parted_faces(found, counted)
         return self._with_admissible_forces(found, counted)
 
+    def aim(self, counted: Counted) -> float:
+        """The largest factor with admissible contact forces as drawn, bolts at any force up to yield; 0 if unknown."""
+        if self.under.loads.excavations:
+            return 0.0
+        system = self.system(1.0, counted)
+        whole = without_failure(system, self.rest, self.under.loads, self.under.time)
+        return 0.0 if whole is None else self._bound(system, whole, 1.0, self.under.loads.bolts)
+
+    def _bound(self, system: BlockSystem, state: State, first: float, bolts: Sequence[Bolt] = ()) -> float:
+        forces = AdmissibleForces.of(system, state, self.rest, self.joints, self.chosen, bolts)
+        try:
+            return 0.0 if forces is None else forces.largest_factor(first)
+        except Unsolved as failure:
+            log.info("the largest factor with admissible contact forces is not known: %s", failure)
+            return 0.0
+
     def _with_admissible_forces(self, found: FactorOfSafety, counted: Counted) -> FactorOfSafety:
         if not math.isfinite(found.upper):
             return with_no_mechanism(found)
-        system = self.system(found.lower, counted)
-        forces = AdmissibleForces.of(system, found.state, self.rest, self.joints, self.chosen)
-        return found if forces is None else with_admissible_forces(found, forces.largest_factor(found.upper, _BEYOND))
+        first = found.upper * (1.0 + _BEYOND)
+        largest = self._bound(self.system(found.lower, counted), found.state, first)
+        return with_admissible_forces(found, largest) if largest > first else found
 
     def _with_toes(self, found: FactorOfSafety, counted: Counted) -> FactorOfSafety:
         bearing = self._bearing(found, counted)
@@ -241,9 +264,11 @@ class _Search:
         """Enclose the factor, starting with a trial at ``first``. Raises `_NoOther` if blocks are stable there and it
         was only asked whether any ``stands``, or if they are unstable at a factor ``above``; `NotConverged` if they are
         stable at none."""
-        bracket = _Bracket(self, counted, watch)
         near = stands or math.isfinite(above)
-        trial = bracket.begin(first)
+        aim = 0.0 if near else self.aim(counted)
+        bracket = _Bracket(self, counted, watch, aim)
+        known = near or 0.0 < aim < _FARTHEST
+        trial = bracket.begin(first if near or not known else _BELOW * aim)
         if trial.stable and stands:
             raise _NoOther
         while not trial.stable:
@@ -252,7 +277,7 @@ class _Search:
                     f"the blocks do not stand even with joints {_FARTHEST:g} times as strong: {trial.reason}; "
                     "what moves is not held by joint strength, or the contacts find no states"
                 )
-            trial = bracket.begin((_NEARBY if near else 0.5) * trial.factor)
+            trial = bracket.begin((_NEARBY if known else 0.5) * trial.factor)
         if math.isfinite(above) and not bracket.tried(above).stable:
             raise _NoOther
         return bracket.closed(self.tolerance)
@@ -263,10 +288,12 @@ class _NoOther(Exception):
 
 
 class _Bracket:
-    """Trials of a ``search`` that enclose the factor."""
+    """Trials of a ``search`` that enclose the factor, which is expected at the ``aim`` (0: anywhere)."""
 
-    def __init__(self, search: _Search, counted: Counted, watch: Callable[[Trial], None] | None) -> None:
-        self._search, self._counted, self._watch = search, counted, watch
+    def __init__(
+        self, search: _Search, counted: Counted, watch: Callable[[Trial], None] | None, aim: float = 0.0
+    ) -> None:
+        self._search, self._counted, self._watch, self._aim = search, counted, watch, aim
         self._limit: DisplacementLimit | None = None
         self._state = search.rest
         self.trials: list[Trial] = []
@@ -307,7 +334,10 @@ class _Bracket:
             if math.isinf(upper):
                 if self.lower >= _FARTHEST:
                     return self._answer(self.lower, None)
-                factor = 2.0 * self.lower
+                beside = _beside(self._aim, self.lower, tolerance) if math.isfinite(self._aim) else None
+                factor = 2.0 * self.lower if beside is None else beside
+            elif self._aim and sum(not t.stable for t in known) == 1:
+                factor = upper * (1.0 + _SECOND)
             elif upper > self.lower * (1.0 + tolerance):
                 factor = _next_factor(known, self.lower, upper, tolerance)
             elif self._from_afar(known, upper, tolerance):
@@ -337,7 +367,9 @@ def _relaxed(system: BlockSystem, under: TrialLoads, state: State) -> tuple[Stat
     """Equilibrium by relaxation from ``state``, after excavation and bolting up to the loads' time; ``state`` itself if
     none is found. And the displacement limit from there."""
     limit = DisplacementLimit(system, state, under.loads, under.time)
-    found = equilibrium(system, state, under.loads, load_time=under.time, max_steps=_RELAXING, limit=limit)
+    found = equilibrium(
+        system, state, under.loads, load_time=under.time, max_steps=_RELAXING, limit=limit, follow=False
+    )
     if found.converged:
         return replace(found.state, time=max(state.time, under.time)), limit
     return state, DisplacementLimit(system, state, under.loads, under.time)
@@ -371,9 +403,14 @@ def _next_factor(trials: Sequence[Trial], lower: float, upper: float, tolerance:
     failed = [t for t in trials if not t.stable and math.isfinite(t.drift)]
     if len(failed) < 2:
         return middle
-    aim = _pointed_at(trials, lower, upper)
-    margin = 0.4 * tolerance
-    below, above = aim * (1.0 - margin), aim * (1.0 + margin)
-    if lower < below and not lower > aim * (1.0 - 2.0 * margin):
-        return below
-    return above if above < upper else middle
+    beside = _beside(_pointed_at(trials, lower, upper), lower, tolerance)
+    return beside if beside is not None and beside < upper else middle
+
+
+def _beside(aim: float, lower: float, tolerance: float) -> float | None:
+    """The factor to try next to the expected one, ``aim``: just below or, where blocks are stable nearly up to that,
+    just above; None where they are stable beyond."""
+    margin = _BESIDE * tolerance
+    if lower < aim * (1.0 - 2.0 * margin):
+        return aim * (1.0 - margin)
+    return aim * (1.0 + margin) if lower < aim * (1.0 + margin) else None

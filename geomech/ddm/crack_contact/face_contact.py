@@ -10,6 +10,8 @@ import numpy as np
 
 from ..growth.crack_network import nearest_on
 from ..kernels import shape_functions
+from .confinement_path import confinement_path
+from .face_equations import FaceProblem
 from .face_laws import FaceMemory, FaceStates, carried_over
 from .frictional_contact import settle_rough
 from .frictionless_contact import NotConverged, Settled, settle
@@ -82,37 +84,40 @@ def settle_faces(
         rows = np.zeros((c.n, 2 * c.per), bool)
         rows[at >= 0] = warm.closed.reshape(-1, 2 * c.per)[at[at >= 0]]
         closed = rows.ravel()
-    try:
-        settled = settle(respond, can_close, closed)
-    except NotConverged as failure:
-        raise NotConverged(f"{failure}{_whereabouts(body, None)}") from None
+    settled = settle(respond, can_close, closed, lambda shut, disputed: _by_path(body, right, shut, disputed))
     if settled.undecided.any():
         _judge(body, settled)
     return FaceAnswer(state["w"], state["traction"], settled.closed, settled.solves)
 
 
-def _whereabouts(body: CrackedBody, node: int | None) -> str:
-    """Text for messages: the crack of ``node``, and the thickness of rock between its tips and the outline where that
-    is next to zero."""
-    c, cracks, edges = body.faces, body.cracks, body.mesh.edges
-    said = ""
-    if node is not None:
-        element = node // c.per
-        x, y = c.nodes[element, node % c.per]
-        said = f", one of {cracks.names[cracks.crack[c.source[element]]]!r} at ({x:.6g}, {y:.6g})"
-    if len(edges) and len(cracks.tips):
-        left = np.min(
-            [[nearest_on(tuple(cracks.nodes[tip]), tuple(a), tuple(b))[0] for a, b in edges] for tip in cracks.tips],
-            axis=1,
-        )
-        tip = int(np.argmin(left))
-        if left[tip] < BY_A_THREAD * body._extent:
-            (x, y), crack = cracks.nodes[cracks.tips[tip]], body.tip_elements[0]["crack"][tip]
-            said += (
-                f"; from the tip of {cracks.names[crack]!r} at ({x:.6g}, {y:.6g}) only {left[tip]:.2g} m of rock are "
-                "left to a side"
-            )
-    return said
+def _by_path(body: CrackedBody, right: np.ndarray, closed: np.ndarray, disputed: np.ndarray) -> np.ndarray:
+    """(n_unknowns,) bool: closed nodes of faces without friction, by `confinement_path` from ``closed``."""
+    problem = FaceProblem(body.face_equations, right, body.never_loaded)
+    at = problem.laws.across
+    n = len(at)
+    states = FaceStates(closed[at], np.zeros(n, np.int8), np.zeros(n, bool))
+    out = np.zeros(len(closed), bool)
+    out[at] = confinement_path(problem, states, disputed[at]).states.closed
+    return out
+
+
+def _thin_bridge(body: CrackedBody) -> str:
+    """Text for messages: the tip that has next to no rock between it and the outline."""
+    cracks, edges = body.cracks, body.mesh.edges
+    if not (len(edges) and len(cracks.tips)):
+        return ""
+    left = np.min(
+        [[nearest_on(tuple(cracks.nodes[tip]), tuple(a), tuple(b))[0] for a, b in edges] for tip in cracks.tips],
+        axis=1,
+    )
+    tip = int(np.argmin(left))
+    if left[tip] >= BY_A_THREAD * body._extent:
+        return ""
+    (x, y), crack = cracks.nodes[cracks.tips[tip]], body.tip_elements[0]["crack"][tip]
+    return (
+        f"; from the tip of {cracks.names[crack]!r} at ({x:.6g}, {y:.6g}) only {left[tip]:.2g} m of rock are left to a "
+        "side"
+    )
 
 
 def _judge(body: CrackedBody, settled: Settled) -> None:
@@ -130,7 +135,10 @@ def _judge(body: CrackedBody, settled: Settled) -> None:
             "their points"
         )
         if length > UNDECIDED * own or (c.kind[here] != shape_functions.ORDINARY).any():
-            raise NotConverged(f"{where}, over {length:.3g} m: give it an aperture, friction, or a finer mesh")
+            raise NotConverged(
+                f"{where}, over {length:.3g} m (violation {settled.violation:.1e} of the largest stress): give it an "
+                f"aperture, friction, or a finer mesh{_thin_bridge(body)}"
+            )
         _log.warning(
             "%s, over %.3g m; they are left with a violation of %.1e of the largest stress",
             where,
@@ -150,10 +158,7 @@ def _rough(
     began = body.never_loaded if history is None else _memory(history, body)
     first = history if warm is None else warm
     guess: FaceStates | None = None if first is None else _memory(first, body).states
-    try:
-        w, reaction, memory, solves, missed = settle_rough(body.face_equations, right, began, guess)
-    except NotConverged as failure:
-        raise NotConverged(f"{failure}{_whereabouts(body, failure.node)}", failure.node) from None
+    w, reaction, memory, solves, missed = settle_rough(body.face_equations, right, began, guess)
     if missed.undecided.any():
         _judge(body, Settled(memory.states.closed, solves, missed.undecided, missed.violation))
     closed = np.zeros(len(right), bool)

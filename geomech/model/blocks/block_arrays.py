@@ -46,6 +46,9 @@ class Blocks:
                                         zero, as for a guided platen; None: no moving block is constrained
         order         (n_blocks,)       p of the complete polynomial that is a block's displacement, 1 to 8, or `AUTO_ORDER`:
                                         found as the run goes; None: all are of first order
+        glued         (n_faces, 2)      edges of two blocks along each other, end to end, that are cells of one rock: displacement
+                                        and stress pass through them as if they were not there. Faces whose edges have names part at the
+                                        strength of their joint law, others hold. None: no blocks are cells
         edge_name     (n_vertices,)     index into ``edge_names`` (0: the empty name, unnamed)
         edge_names    tuple of str      e.g. ("", "load:top", "joint:set1")
         names         tuple of str      one name per block, for messages and files
@@ -61,6 +64,7 @@ class Blocks:
     names: tuple[str, ...] = ()
     constrained: np.ndarray | None = None
     order: np.ndarray | None = None
+    glued: np.ndarray | None = None
 
     @classmethod
     @renamed_argument("held", "constrained")

@@ -96,8 +96,8 @@ class Pace:
 
 class Progress:
     """Observer for people. On a terminal it draws a tqdm bar over the scene's time, elsewhere a line now and then. The
-    time left is that of the rest of the scene at the recent `Pace`, once there is a steady one; a scene that stops at
-    an event ends sooner. ``quiet`` leaves only where a failed run stopped.
+    time left is that of the rest of the scene at the recent `Pace`, once there is a steady one; where cracks are to end
+    the run by an event there is none to tell. ``quiet`` leaves only where a failed run stopped.
 
     ``stream`` defaults to stderr; ``interval`` s is the least time between two lines off a terminal, twice that
     between two with the same percentage.
@@ -110,6 +110,7 @@ class Progress:
         self._warnings = Warned()
         self._out = self.stream or sys.stderr
         self._folder, self._end = Path(folder), problem.run.end_time
+        self._stops = problem.run.stop_at
         self._said = time.perf_counter()
         self._percent, self._last = -1, None
         self._pace = Pace()
@@ -184,7 +185,10 @@ class Progress:
         return round(100 * min(cycle.state.time, self._end) / self._end)
 
     def _left(self, cycle: Cycle) -> str:
-        """Wall time that the rest of the scene takes; empty where there is no steady pace."""
+        """Wall time that the rest of the scene takes; empty where there is no steady pace. A run of cracks that an event
+        ends stops long before the end of the scene, nobody knows when: it says what it waits for."""
+        if self._stops and cycle.cracks.n_cracks:
+            return f", until {' or '.join(self._stops)}"
         seconds = self._pace.time_for(self._end - float(cycle.state.time))
         return f", about {_duration(seconds)} left" if 0.5 <= seconds < math.inf else ""
 

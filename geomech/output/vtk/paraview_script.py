@@ -7,6 +7,9 @@ from typing import Any
 
 from geomech.model import Cycle, Problem
 
+from .paraview_state import drawable, view_state
+from .series import Series
+
 _SCRIPT = '''"""Opens this run in ParaView: `paraview --script=view.py`, File > Load State, or without a screen
 `pvbatch view.py --picture view.png --state view.pvsm`.
 
@@ -124,7 +127,8 @@ def arrows(source, view, name, direction, size, rock):
     glyph.GlyphMode = "All Points"
     largest = span(source, "POINTS", size)[1]
     bounds = rock.GetDataInformation().GetBounds()
-    glyph.ScaleFactor = 0.1 * max(bounds[1] - bounds[0], bounds[3] - bounds[2]) / (abs(largest) or 1.0)
+    size = max(bounds[1] - bounds[0], bounds[3] - bounds[2])
+    glyph.ScaleFactor = 0.1 * size / largest if largest > 1e-20 else 1.0  # nothing acts
     return pv.Show(glyph, view)
 
 
@@ -222,12 +226,14 @@ main()
 
 
 class ViewScript:
-    """Observer that writes ``view.py``; ``configuration`` is that of the series."""
+    """Observer that writes ``view.py`` and at the end the state ``view.pvsm``, which opens what ``series`` has written;
+    ``configuration`` is that of the series."""
 
-    def __init__(self, configuration: str = "reference") -> None:
-        self.configuration = configuration
+    def __init__(self, configuration: str = "reference", series: Series | None = None) -> None:
+        self.configuration, self.series = configuration, series
 
     def on_start(self, problem: Problem, folder: Path) -> None:
+        self._folder = Path(folder)
         reference = self.configuration == "reference"
         warped = ", moved by their displacement" if reference else " already, which warping would move once more"
         text = _SCRIPT.format(
@@ -245,4 +251,8 @@ class ViewScript:
         pass
 
     def on_end(self, summary: dict[str, Any], error: BaseException | None = None) -> None:
-        pass
+        if self.series is None or not drawable(self.series.last):
+            return
+        suffix = ".pvd" if self.series.format == "vtu" else ".vtkhdf"
+        text = view_state(self._folder, self.series.last, self.configuration == "reference", suffix)
+        (self._folder / "view.pvsm").write_text(text, encoding="utf-8")

@@ -64,6 +64,8 @@ class Series:
             raise ValueError("every counts from 1, interior_every from 0")
         self.every, self.interior_every, self.configuration = every, interior_every, configuration
         self.format, self.seconds = format, 0.0
+        #: The last grid of each series, for whoever draws them at the end.
+        self.last: dict[str, Grid] = {}
 
     def on_start(self, problem: Problem, folder: Path) -> None:
         self._triangles, self._lines, self._meshes = Triangles(), grids.CrackLines(), InteriorMeshes()
@@ -221,6 +223,7 @@ class Series:
             vertices = cycle.blocks.vertices if self.configuration == "reference" else cycle.state.vertices
             grid = nothing(name, vertices[0])
         self._store.put(name, cycle.number, at, grid, numbers)
+        self.last[name] = grid
 
 
 def _names(names: Iterable[str]) -> bytes:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -16,8 +16,22 @@ if TYPE_CHECKING:
 
 #: One a curve.
 COLOURS = ("#1f6f8b", "#c8553d", "#588157", "#8d6a9f", "#b08900", "#3d405b")
+#: Full and broken lines, one for each colour: in a grey print colours look alike.
+DASHES = (
+    "-",
+    (0, (5, 1.8)),
+    (0, (1.2, 1.4)),
+    (0, (6, 1.6, 1.2, 1.6)),
+    (0, (9, 2.5)),
+    (0, (3, 1.2, 1.2, 1.2, 1.2, 1.2)),
+)
 #: Curves nearer than this part of the largest value are one on paper.
 SAME = 0.01
+
+
+def line_of(k: int) -> dict[str, Any]:
+    """Colour and dashes of the curve number ``k`` among several, for Matplotlib."""
+    return {"color": COLOURS[k % len(COLOURS)], "ls": DASHES[k % len(DASHES)]}
 
 
 def sense(run: Run) -> float:

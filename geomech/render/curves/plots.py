@@ -13,7 +13,7 @@ from geomech.output.reading import Run
 from geomech.output.units import largest_of, length_unit
 
 from .crack_curves import crack_length, stress_intensity
-from .drive import COLOURS, SAME, drive, first_events, load_label, load_unit, sense, to_the_end
+from .drive import COLOURS, SAME, drive, first_events, line_of, load_label, load_unit, sense, to_the_end
 from .structure_curves import bolt_curves, bolts, joint_curves, joints
 
 if TYPE_CHECKING:
@@ -65,7 +65,7 @@ def energies(axes: Axes, run: Run) -> None:
     out."""
     history = to_the_end(run)
     for k, (name, energy) in enumerate(_energy_curves(run).items()):
-        axes.plot(history["time"], energy, color=COLOURS[k % len(COLOURS)], lw=1.5, label=name)
+        axes.plot(history["time"], energy, **line_of(k), lw=1.5, label=name)
     # Beside the curves: there is no corner that one of them does not reach.
     axes.legend(frameon=False, fontsize=8, loc="upper left", bbox_to_anchor=(1.0, 1.0))
     axes.set(xlabel="time, s", ylabel="energy, J/m", title=run.title)
@@ -91,7 +91,7 @@ def monitors(axes: Axes, run: Run) -> None:
     history, ways = to_the_end(run), _monitor_curves(run)
     unit, size = length_unit(max(largest_of(way) for way in ways.values()))
     for k, (name, way) in enumerate(ways.items()):
-        axes.plot(history["time"], way / size, color=COLOURS[k % len(COLOURS)], lw=1.5, label=name)
+        axes.plot(history["time"], way / size, **line_of(k), lw=1.5, label=name)
     axes.legend(frameon=False, fontsize=8)
     axes.set(xlabel="time, s", ylabel=f"displacement, {unit}", title=run.title)
 
@@ -127,10 +127,7 @@ def compared(runs: Mapping[str, Run], path: Path) -> Path | None:
     def curves(axes: Axes, _: Run) -> None:
         for k, (name, run) in enumerate(known.items()):
             history, sign = to_the_end(run), sense(run)
-            colour, line = COLOURS[k % len(COLOURS)], ("-", "--", ":")[k // len(COLOURS) % 3]
-            axes.plot(
-                1e3 * sign * history["strain"], sign * history["load"] / size, color=colour, ls=line, lw=1.4, label=name
-            )
+            axes.plot(1e3 * sign * history["strain"], sign * history["load"] / size, **line_of(k), lw=1.4, label=name)
         axes.legend(frameon=False, fontsize=8)
         axes.set(xlabel="axial strain, 10⁻³", ylabel=f"load, {unit}")
 

@@ -10,7 +10,7 @@ from geomech.output.fields import JOINTS
 from geomech.output.reading import Run, read_grid, read_table
 from geomech.output.units import largest_of, length_unit
 
-from .drive import COLOURS
+from .drive import COLOURS, line_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -59,6 +59,6 @@ def bolts(axes: Axes, run: Run) -> None:
 
 def _draw(axes: Axes, run: Run, curves: dict[str, np.ndarray], label: str, size: float) -> None:
     for k, (name, curve) in enumerate(curves.items()):
-        axes.plot(curve[:, 0], curve[:, 1] / size, color=COLOURS[k % len(COLOURS)], lw=1.5, label=name)
+        axes.plot(curve[:, 0], curve[:, 1] / size, **line_of(k), lw=1.5, label=name)
     axes.legend(frameon=False, fontsize=8, loc="upper left", bbox_to_anchor=(1.0, 1.0))
     axes.set(xlabel="time, s", ylabel=label, title=run.title)

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from .plots import COLOURS, figure_of
+from .drive import COLOURS, line_of
+from .plots import figure_of
 
 #: A published range: its lower and upper end.
 Range = tuple[float, float]
@@ -27,8 +28,8 @@ def against(
     figure, save = figure_of((5.6, 3.6 + 0.2 * ((len(curves) + len(ranges or {})) // 2)), path)
     axes = figure.add_subplot()
     for k, (name, (xs, ys)) in enumerate(curves.items()):
-        marked = "o-" if len(xs) <= MARKED else "-"
-        axes.plot(xs, ys, marked, color=COLOURS[k % len(COLOURS)], lw=1.5, ms=4.5, label=name)
+        mark = "osD^v*"[k % 6] if len(xs) <= MARKED else None
+        axes.plot(xs, ys, marker=mark, **line_of(k), lw=1.5, ms=4.5, label=name)
     for k, (name, (low, high)) in enumerate((ranges or {}).items(), len(curves)):
         axes.axhspan(low, high, color=COLOURS[k % len(COLOURS)], alpha=0.22, lw=0, label=name)
     if log:

@@ -70,7 +70,8 @@ class CrackLines:
         axes.add_collection(halo)
         values, old = self._values(cracks)
         for part, width, ink in self._parts(values, old):
-            axes.add_collection(PolyCollection(gaps[part], linewidths=0, zorder=6.0, **ink))
+            fill = axes.add_collection(PolyCollection(gaps[part], linewidths=0.4, zorder=6.0, **ink))
+            fill.set_edgecolor("face")  # or seams would show
             axes.add_collection(LineCollection(lines[part], linewidths=width, capstyle="round", zorder=6.1, **ink))
 
     def _parts(self, values: np.ndarray, old: np.ndarray) -> list[tuple[np.ndarray, float, dict[str, Any]]]:

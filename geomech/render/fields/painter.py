@@ -11,7 +11,7 @@ import numpy as np
 from geomech.output.reading import Run
 from geomech.output.units import length_unit, stress_text
 
-from ..pictures.look import CRACK_COLOURS, final_cycle, magnification, rock_colours
+from ..pictures.look import CRACK_COLOURS, final_cycle, magnification, rock_colours, two_signed
 from .crack_lines import CrackLines
 from .frame import Frames, drawn
 from .marks import LABELLED, PAPER, Marks
@@ -239,10 +239,10 @@ class FieldPainter:
         here = _there(blocks, interior)
         corners = drawn(blocks, self.view.scale)[blocks.cells.reshape(-1, 4)[:, 1:]][here]
         colours = np.where(np.asarray(blocks["fixed"])[here] == 1, STANDS, ROCK)
-        axes.add_collection(PolyCollection(corners, facecolors=colours, edgecolors=colours, linewidths=0.3, zorder=1))
+        axes.add_collection(PolyCollection(corners, facecolors=colours, edgecolors=colours, linewidths=0.6, zorder=1))
         if interior is not None:
             corners = drawn(interior, self.view.scale)[interior.cells.reshape(-1, 4)[:, 1:]]
-            axes.add_collection(PolyCollection(corners, facecolors=ROCK, edgecolors=ROCK, linewidths=0.3, zorder=1))
+            axes.add_collection(PolyCollection(corners, facecolors=ROCK, edgecolors=ROCK, linewidths=0.6, zorder=1))
 
     def _field(self, axes: Axes, blocks: pv.UnstructuredGrid, interior: pv.UnstructuredGrid | None, time: float) -> Any:
         shown = None
@@ -277,6 +277,9 @@ class FieldPainter:
             return None
         points, triangles = drawn(grid, self.view.scale), grid.cells.reshape(-1, 4)[:, 1:][use]
         if at_points:
+            if two_signed(*self.view.limits) and values[triangles].min() < 0 < values[triangles].max():
+                # In a grey print red and blue look alike: the line between them tells.
+                axes.tricontour(*points.T, triangles, values, levels=[0.0], colors=SOFT, linewidths=0.5, zorder=2.5)
             return axes.tripcolor(*points.T, triangles, values, shading="gouraud", zorder=2, rasterized=True,
                                   **self._style())  # fmt: skip
         area = PolyCollection(points[triangles], array=values[use], edgecolors="face", linewidths=0.2, zorder=2,

@@ -8,6 +8,7 @@ import numpy as np
 
 from ...model import CHANGES, Blocks
 from ...shapes import cutting_cracks
+from ...shapes.cells import rock_of
 from ..assembly.fixed_blocks import check_borne, check_holding, fixed_blocks
 from ..assembly.joint_laws import check_joints
 from ..locator import Path
@@ -307,6 +308,9 @@ def carrier(c: Check, path: Path, what: str, point, zone: str | None, among: lis
             f"{high[1]:{digits}} m",
         )
         return -1
+    if len(at) > 1 and len({rock_of(c.blocks.names[b]) for b in at}) == 1:
+        # Cells of one rock: it moves there as either does.
+        at = at[:1]
     if len(at) > 1:
         names = [c.blocks.names[b] for b in at]
         way = 'add zone = "…"' if len({c.drawn.zones[b] for b in at}) > 1 else "move it into one of them"

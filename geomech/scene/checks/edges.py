@@ -8,6 +8,7 @@ import fnmatch
 from ...model import WEIGHT
 from ...shapes.gmsh_models.model_drawing import CRACK
 from ...shapes.parts import JOINT
+from ..assembly.cells import CELLS
 from ..assembly.fixed_blocks import fixed_blocks, holds
 from ..drawing import Drawing
 from ..locator import Path
@@ -105,7 +106,9 @@ def _unused(c: Check) -> None:
     for joint in t.joints.values():
         used.update(joint_names(joint.edges, _edge_names(c)), *joint.between)
     # Joints without a law of their own follow the default one, as is usual.
-    idle = [name for name in _edge_names(c) if name not in used and not name.startswith(JOINT) and not holds(name)]
+    idle = [
+        name for name in _edge_names(c) if name not in used and not name.startswith((JOINT, CELLS)) and not holds(name)
+    ]
     if idle:
         c.warn(
             ("geometry", "model" if c.drawn.model is not None else "traces"),
@@ -148,7 +151,8 @@ def _joints(c: Check) -> None:
                 )
             continue
         of_a_crack = any(crack.joint == name for crack in (c.tables.cracks or {}).values())
-        if not (joint.edges or joint.between or of_a_crack):
+        of_cells = any(zone.cell_joint == name for zone in (c.tables.zones or {}).values())
+        if not (joint.edges or joint.between or of_a_crack or of_cells):
             c.refuse(("joints", name), f"joint {name!r} names no edges", 'add edges = ["…"], or call it `default`')
         for k, pattern in enumerate(joint.edges):
             names = joint_names((pattern,), known)

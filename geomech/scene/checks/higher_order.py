@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from ..validation import nearest
 from .check import Check
 
 #: Of [loads]: what moves, holds or strains blocks in ways that deflection does not know.
@@ -32,6 +33,7 @@ def check_orders(c: Check) -> None:
         material = (t.materials or {}).get(zone.material or next(iter(t.materials or {}), ""))
         if material is not None and material.rigid:
             refuse("a rigid material does not bend", "leave `order` out, or `rigid`")
+        _check_cell_joint(c, name, zone.cell_joint)
         _check_cracks(c, refuse)
         _check_joints(c, refuse)
         _check_solver(c, refuse)
@@ -40,6 +42,19 @@ def check_orders(c: Check) -> None:
                 refuse(f"{what} ([loads] {key}) beside blocks of higher order are not supported yet", "leave out one")
         if t.loads is not None and t.loads.base is not None and t.loads.base.frame == "ground":
             refuse('a base that shakes in the frame "ground" is not supported yet', 'say frame = "base"')
+
+
+def _check_cell_joint(c: Check, zone: str, joint: str | None) -> None:
+    """The joint by which the cells of a ``zone`` part must exist and hold something."""
+    if joint is None:
+        return
+    path, joints = ("zones", zone, "cell_joint"), c.tables.joints or {}
+    if joint not in joints:
+        c.refuse(path, f"there is no [joints.{joint}]", nearest(joint, list(joints)))
+    elif not joints[joint].tensile_strength_pa > 0:
+        c.refuse(
+            path, f"[joints.{joint}] has no tensile strength", "say its tensile_strength_pa, or leave `cell_joint` out"
+        )
 
 
 def _check_cracks(c: Check, refuse) -> None:

@@ -55,6 +55,20 @@ class ZoneTable(Table):
         'from 2 on blocks bend, and their faces bear stress that varies along them; "auto": each block begins with 1 and is '
         "raised where that matters (`dda.order_target`)",
     )
+    mesh_size_m: Positive | None = Field(
+        None,
+        description="its blocks are divided by Gmsh into cells of about this size, m, smaller at short edges of their outline; "
+        "displacement and stress pass from cell to cell as in one rock. It takes an `order` of 2 or more (unset: a block is one "
+        "cell)",
+    )
+    cells: Literal["triangles", "quads"] = Field(
+        "triangles", description='what blocks are divided into with `mesh_size_m`: "triangles" or "quads"'
+    )
+    cell_joint: str | None = Field(
+        None,
+        description="a name of [joints]: faces between cells part where they bear its tensile or shear strength, and touch by its "
+        "friction from then on (unset: cells hold together)",
+    )
     body: Literal["block", "plane", "half-plane"] = Field(
         "block",
         description='"plane" or "half-plane": rock without an end, of which the zone is the piece that is seen; its holes are '
@@ -66,6 +80,14 @@ class ZoneTable(Table):
     def _one_surface(self):
         if self.body == "half-plane" and self.surface is None:
             raise ValueError('a "half-plane" needs `surface`, the name of the edges on its free surface')
+        if self.mesh_size_m is not None and (self.fixed or self.guided is not None or self.body != "block"):
+            raise ValueError("rock that is `fixed`, `guided` or without an end is not divided: leave `mesh_size_m` out")
+        if self.cell_joint is not None and self.mesh_size_m is None:
+            raise ValueError("`cell_joint` belongs to cells: say `mesh_size_m`, or leave it out")
+        if self.mesh_size_m is not None and self.order in (1, "auto"):
+            raise ValueError(
+                "cells take an order of 2 to 8, for uniformly strained ones bend as stiffly as one block: say order = 3"
+            )
         if self.body != "half-plane" and self.surface is not None:
             raise ValueError('`surface` belongs to body = "half-plane"')
         if self.velocity_m_s is not None and (self.fixed or self.body != "block"):

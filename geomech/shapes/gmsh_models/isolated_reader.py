@@ -1,8 +1,8 @@
 """Files of CAD programs read in a process of their own: what takes the reader down, or never ends, is a bad file.
 
 OpenCASCADE and mesh readers trust what they read: a line that is missing can end the process, a flipped byte keep it
-busy for ever. A child process reads the file within `SECONDS` of processor time and `BYTES` of memory, and hands back
-what it found as plain data.
+busy for ever; a script for Gmsh may loop without end. A child process reads the file within `SECONDS` of processor
+time and `BYTES` of memory, and hands back what it found as plain data.
 """
 
 from __future__ import annotations
@@ -21,6 +21,7 @@ from geomech import plain_data
 
 from ..traces.field_lines import FieldFile, FieldFileError
 from .model_drawing import GmshDrawing, GmshModelError
+from .script_commands import SCRIPTS
 from .session import GmshUnavailable
 
 #: Processor time that reading one file may take, s: a hundred times that of a section with thousands of curves.
@@ -80,11 +81,12 @@ def _read(kind: str, path: Path, arguments: Mapping[str, Any], error: type[Excep
         if said in ERRORS:
             raise ERRORS[said](*what)
         raise error(f"{path} cannot be read: {what}", "the file is damaged: export it again")
+    way_out = "the file is damaged: export it again"
+    if path.suffix in SCRIPTS:
+        way_out = "look for a loop or macro without an end, in Gmsh"
     if code in (-signal.SIGXCPU, -signal.SIGKILL):
-        raise error(
-            f"{path} cannot be read within {SECONDS} s of processor time", "the file is damaged: export it again"
-        )
+        raise error(f"{path} cannot be read within {SECONDS} s of processor time", way_out)
     if b"MemoryError" in done.stderr or b"bad_alloc" in done.stderr:
         raise error(f"{path} cannot be read within {BYTES >> 30} GiB of memory", "export it again, with less in it")
     name = signal.Signals(-code).name if code < 0 else f"exit code {code}"
-    raise error(f"{path} cannot be read: it ends its reader ({name})", "the file is damaged: export it again")
+    raise error(f"{path} cannot be read: it ends its reader ({name})", way_out)

@@ -18,7 +18,7 @@ from .mesh_files import drawing_of_mesh
 from .model_curves import Curves
 from .model_drawing import CRACK, GmshDrawing, GmshModelError, Parameter, scaled
 from .parameters import open_with_parameters
-from .script_commands import SCRIPTS, refuse_commands, trusted
+from .script_commands import SCRIPTS, is_light, refuse_commands, trusted
 from .session import gmsh_session
 from .step_units import STEP, metres_in_step
 from .unnamed_parts import lost_curves, out_of_plane
@@ -50,7 +50,8 @@ def read_gmsh_model(
     A model may draw; one that would run programs or write files is refused before Gmsh sees it, unless
     GEOMECH_TRUST_MODELS is set (`script_commands`). It may read files below ``folder`` (default: its own).
 
-    Meshes and shapes, and scripts that read such, are read in another process (`isolated_reader`): damaged ones can end it.
+    Meshes and shapes, and scripts that read files, loop or make a mesh, are read in another process
+    (`isolated_reader`): damaged ones can end it, and a loop need not end.
 
     Raises GmshModelError for a missing or faulty file, unknown parameters and values out of range, models without
     named surfaces, and GmshUnavailable where Gmsh cannot be loaded.
@@ -63,9 +64,9 @@ def read_gmsh_model(
             f"there is no file {path}",
             f"did you mean {close[0]}?" if close else "paths are relative to the scene file",
         )
-    files = [path] if trusted() else refuse_commands(path, folder)
     arguments = {"parameters": dict(parameters or {}), "chord_tolerance": chord_tolerance, "unit": unit}
-    if all(file.suffix in (*SCRIPTS, ".opt") for file in files):
+    files = [path] if trusted() else refuse_commands(path, folder)
+    if all(file.suffix in (*SCRIPTS, ".opt") for file in files) and (trusted() or all(map(is_light, files))):
         return read_here(path, **arguments)
     from .isolated_reader import model_apart
 
@@ -109,6 +110,10 @@ def _no_text(path: Path, error: UnicodeDecodeError) -> GmshModelError:
 
 def _drawing(gmsh, path: Path, parameters: dict[str, Parameter], chord: float | None) -> GmshDrawing:
     box = gmsh.model.getBoundingBox(-1, -1) if gmsh.model.getEntities(2) else (0.0,) * 6
+    if not np.isfinite(box).all():
+        raise GmshModelError(
+            f"{path.name}: its surfaces reach beyond all numbers", "draw it in metres, near the origin"
+        )
     chord = CHORD * max(box[3] - box[0], box[4] - box[1]) if chord is None else chord
     curves = Curves(gmsh, chord)
     warnings: list[tuple[str, str]] = []

@@ -1,8 +1,8 @@
 """What of a Gmsh model is looked at before Gmsh sees it: a script for Gmsh can run programs and write files.
 
 A .geo file is a program. Beside geometry it may run shell commands (SystemCall), write files (Save, Print, Printf > …),
-end the process (Exit) and read other files. Here these are found by name and line and refused, unless the models are
-the user's own (`TRUST`). Words are read as Gmsh's scanner reads them (`Gmsh.l`: comments, strings in either quotes).
+end the process (Exit), read and write memory (formats of Printf) and read other files. Here these are found by name
+and line and refused, unless the models are the user's own (`TRUST`). Words are read as Gmsh's scanner reads them (`Gmsh.l`: comments, strings in either quotes).
 Loops and macros make Gmsh jump back to the beginning of a line, where it knows nothing of a comment or string that
 began above: in files with loops or macros such lines are read as code as well.
 """
@@ -12,6 +12,7 @@ from __future__ import annotations
 import os
 import re
 from collections.abc import Iterator, Sequence
+from itertools import pairwise
 from pathlib import Path
 from typing import NamedTuple
 
@@ -40,6 +41,15 @@ _DOES = {
     **dict.fromkeys(("StringToName", "S2N"), "makes commands of text"),
     "Solver": "sets up a program to run",
 }
+#: Words whose first argument C's printf takes as it stands: "%s" there reads memory, "%n" writes to it.
+_FORMATS = ("Printf", "Sprintf", "Error", "Warning")
+#: What such a text may hold: "%%", and conversions of a number that take little room.
+_NUMBERS = re.compile(rb"(?:[^%]|%%|%[-+ #0]*[0-9]{0,2}(?:\.[0-9]{0,2})?l?[eEfFgG])*", re.DOTALL)
+#: Words by which a short script may take any time and memory.
+_HEAVY = frozenset(
+    b"For Macro Function Call Mesh RefineMesh RelocateMesh OptimizeMesh ClassifySurfaces CreateGeometry Homology "
+    b"Cohomology Field LinSpace LogSpace Include Merge MergeWithBoundingBox ShapeFromFile ListFromFile".split()
+)
 #: Words that read the file that is named behind them.
 _READS = ("Include", "Merge", "MergeWithBoundingBox", "ShapeFromFile", "ListFromFile")
 
@@ -83,6 +93,16 @@ def refuse_commands(path: Path, folder: Path | None = None) -> list[Path]:
             seen.append(found.resolve())
             waiting += _files_of(found, homes, is_script=found is not file)
     return seen
+
+
+def is_light(path: Path) -> bool:
+    """Whether the script ``path`` does no more than its length allows: it has no loop, macro or range, makes no mesh
+    and reads no other file, so that it cannot keep its reader busy or fill the memory."""
+    code = [token.text for token in _tokens(path.read_bytes()) if token.kind not in ("line", "block", "text")]
+    heavy = any(word in _HEAVY and (word, after) != (b"Mesh", b".") for word, after in pairwise([*code, b""]))
+    # A colon stands behind a question mark, or alone in braces ("all surfaces"), or in a range.
+    alone = sum(three == (b"{", b":", b"}") for three in zip(code, code[1:], code[2:], strict=False))
+    return not heavy and code.count(b":") - alone <= code.count(b"?")
 
 
 def files_read(path: Path) -> list[Path]:
@@ -192,9 +212,25 @@ def _judged(path: Path, tokens: Sequence[_Token], homes: Sequence[Path], comment
             _refuse(path, token.line, option, "names a file to write", comment)
         if word == "Printf" and _is_sent_to_a_file(code[k + 1 :]):
             _refuse(path, token.line, "Printf > …", "writes a file", comment)
+        if word in _FORMATS and following == [b"("]:
+            _look_at_format(path, token, code[k + 2 : k + 4], comment)
+        if word == "FileName" and code[k - 1].text == b"." and not comment:
+            _refuse(path, token.line, ".FileName", "reads a file", comment)
         if word in _READS:
             found += _read(path, token, code[k + 1 : k + 4], homes, comment)
     return found
+
+
+def _look_at_format(path: Path, token: _Token, rest: Sequence[_Token], comment: bool) -> None:
+    """The first argument of a word of `_FORMATS`: one text, written out, that formats nothing but numbers."""
+    word = token.text.decode()
+    if len(rest) < 2 or rest[0].kind != "text" or rest[1].text not in (b")", b","):
+        if not comment:
+            _refuse(path, token.line, word, "has a format that is not written out", comment)
+    elif not _NUMBERS.fullmatch(rest[0].text):
+        _refuse(
+            path, token.line, f"{word}({rest[0].text.decode('latin-1')[:40]}", "formats more than numbers (%g)", comment
+        )
 
 
 def _is_sent_to_a_file(rest: Sequence[_Token]) -> bool:

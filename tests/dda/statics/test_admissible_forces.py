@@ -11,7 +11,7 @@ from geomech import dda
 from geomech.bench.safety.factor_scenes import random_slope
 from geomech.bench.slopes.drawn_slopes import problem_of
 from geomech.dda.statics.admissible_forces import AdmissibleForces
-from geomech.model import Blocks, History, JointLaw, Loads, Material, State
+from geomech.model import GROUND, Blocks, Bolt, History, JointLaw, Loads, Material, State
 
 GRAVITY = 9.81
 WEIGHT = Loads(gravity=History.constant([0.0, -GRAVITY]))
@@ -40,11 +40,35 @@ def test_the_bound_of_a_block_on_a_plane_is_limit_equilibrium(cohesion):
     weight = 2600.0 * GRAVITY * 2.0
     expected = (cohesion * 2.0 + weight * math.cos(DIP) * math.tan(math.radians(40))) / (weight * math.sin(DIP))
     assert forces.balance(0.999 * expected) and not forces.balance(1.001 * expected)
-    assert forces.largest_factor(0.9 * expected, 1e-2) == pytest.approx(expected, rel=1e-3)
-    assert forces.largest_factor(expected, 1e-2) is None
+    # From either side, near and far.
+    for first in (0.01, 0.9, 1.0, 1.1, 20.0):
+        assert forces.largest_factor(first * expected) == pytest.approx(expected, rel=2e-4)
+    # The derivative of what is left out of balance.
+    (left, slope), (farther, _) = (forces.unbalanced(factor * expected) for factor in (1.05, 1.05001))
+    numerical = (farther - left) / (1.0 / 1.05001 - 1.0 / 1.05) * expected
+    assert left > 0.0 and slope == pytest.approx(numerical, rel=1e-3)
     # What is not reduced holds at any factor.
     kept = AdmissibleForces.of(system, state, rest, joints, [])
-    assert math.isinf(kept.largest_factor(1.0, 1e-2))
+    assert math.isinf(kept.largest_factor())
+
+
+def test_a_bolt_may_pull_with_what_it_yields_at_beside_what_it_does():
+    """Along the plane, the bolt adds its yield force to what holds: F = W cos β tan φ/(W sin β − T)."""
+    blocks = Blocks.from_polygons([rectangle(-6, -3, 8, 0, DIP), rectangle(0, 0, 2, 1, DIP)], fixed=[True, False])
+    joints = [JointLaw("plane", math.radians(40))]
+    system = dda.BlockSystem(blocks, [ROCK], joints)
+    (start, end), pull = rectangle(1, 0.0, 7, 0.0, DIP)[:2], 10e3
+    loads = Loads(
+        gravity=WEIGHT.gravity,
+        bolts=(Bolt(1, tuple(start), GROUND, tuple(end), 1e6, pretension=2e3, yield_force=pull),),
+    )
+    state = dda.equilibrium(system, State.at_rest(blocks), loads).state
+    assert state.bolts["force"][0] < 0.5 * pull
+    weight, rest = 2600.0 * GRAVITY * 2.0, State.at_rest(blocks)
+    for bolts, most in ((loads.bolts, pull), ((), float(state.bolts["force"][0]))):
+        forces = AdmissibleForces.of(system, state, rest, joints, ["plane"], bolts)
+        expected = weight * math.cos(DIP) * math.tan(math.radians(40)) / (weight * math.sin(DIP) - most)
+        assert forces.largest_factor() == pytest.approx(expected, rel=3e-4)
 
 
 def test_no_bound_is_given_where_strength_is_no_cone():

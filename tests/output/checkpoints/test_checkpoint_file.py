@@ -117,6 +117,7 @@ def _crafted(tmp_path, classes, nodes):
         (["geomech.model.problem:Problem"], [["s", 0, 1]]),
         (["geomech.model.state:Skip"], [["n", 0, 1]]),
         ([], [["a", 0, "|O", [2], "C", True]]),
+        ([], [["a", 0, "<f8", [10**14], "C", True]]),
         ([], [["v", 1, "<f8", [9], [8], 0, True], ["a", 0, "<f8", [0], "C", True]]),
         ([], [["v", 1, "|O", [1], [8], 0, True], ["a", 0, "<f8", [0], "C", True]]),
         ([], [["z", 1]]),

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import synthetic_run as made
 
+from geomech.model import RunSettings
 from geomech.output import Progress
 from geomech.output.console.at_work import AtWork, spoken
 
@@ -43,7 +44,12 @@ def test_the_time_left_is_in_sight_at_80_columns(tmp_path, monkeypatch):
     out = Terminal()
     watch = Progress(stream=out)
     watch.on_start(
-        replace(made.problem(), title="A title of more letters than a narrow terminal has room for"), tmp_path
+        replace(
+            made.problem(),
+            title="A title of more letters than a narrow terminal has room for",
+            run=RunSettings(end_time=100.0, stop_at=()),
+        ),
+        tmp_path,
     )
     watch._bar.dynamic_ncols, watch._bar.ncols, watch._bar.mininterval = None, 80, 0.0
     for step in range(30):

@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 import synthetic_run as made
 
+from geomech.model import RunSettings
 from geomech.output import (
     Group,
     Histories,
@@ -187,7 +188,7 @@ def test_progress_tells_the_time_left_at_a_steady_pace(tmp_path, monkeypatch):
     monkeypatch.setattr(module.time, "perf_counter", lambda: clock[0])
     out = io.StringIO()
     watch = Progress(stream=out, interval=0.5)
-    watch.on_start(made.problem(end_time=100.0), tmp_path)
+    watch.on_start(replace(made.problem(), run=RunSettings(end_time=100.0, stop_at=())), tmp_path)
     cycles = [(k, k, 0) for k in range(21)] + [(21 + k, 20, 1 + k) for k in range(20)]
     for k, step, growth_pass in cycles:
         clock[0] = 60.0 + k if k else 1.0
@@ -198,6 +199,22 @@ def test_progress_tells_the_time_left_at_a_steady_pace(tmp_path, monkeypatch):
     assert left[0] == "" and left[-1] == ""
     first = next(k for k, told in enumerate(left) if told)
     assert [told for told in left[first : first + 13]] == [f"{k} s left" for k in range(92, 79, -1)]
+
+
+def test_cracks_that_end_a_run_by_an_event_have_no_time_left(tmp_path, monkeypatch):
+    """The scene's end means nothing where coalescence comes at a sixth of it."""
+    from geomech.output.console import progress as module
+
+    clock = [0.0]
+    monkeypatch.setattr(module.time, "perf_counter", lambda: clock[0])
+    out = io.StringIO()
+    watch = Progress(stream=out, interval=0.5)
+    watch.on_start(made.problem(end_time=100.0), tmp_path)
+    for k in range(21):
+        clock[0] = float(k)
+        watch.on_cycle(made.cycle(k, k, 0, 0))
+    lines = [line for line in out.getvalue().splitlines() if "%" in line]
+    assert lines and all(line.endswith(", until coalescence or split") for line in lines)
 
 
 def test_the_pace_is_the_recent_one():

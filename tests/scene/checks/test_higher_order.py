@@ -41,6 +41,16 @@ def test_what_is_not_supported_is_refused_at_its_key(tmp_path, more, message):
     ("old", "new", "message"),
     [
         ("order = 4", "order = 9", "9"),
+        ("order = 4", "order = 1\nmesh_size_m = 0.5", "cells take an order of 2 to 8"),
+        ("order = 4", "order = 2\nmesh_size_m = 0.0", "mesh_size_m"),
+        ("order = 4", 'order = 2\ncell_joint = "grain"', "belongs to cells"),
+        ("order = 4", 'order = 2\nmesh_size_m = 0.4\ncell_joint = "grain"', r"no \[joints.grain\]"),
+        (
+            "order = 4",
+            'order = 2\nmesh_size_m = 0.4\ncell_joint = "grain"\n[joints.grain]\nfriction_angle_deg = 30',
+            "no tensile strength",
+        ),
+        ("[zones.ground]\nfixed = true", "[zones.ground]\nfixed = true\nmesh_size_m = 0.5", "is not divided"),
         ("order = 4", 'order = "high"', "auto"),
         (
             "order = 4",
@@ -90,3 +100,33 @@ def test_an_order_that_is_found_reaches_the_run(tmp_path):
     folder = tmp_path / "run"
     run(loaded, folder)
     assert np.ptp(np.asarray(Run(folder).grid("interior", 3)["stress"])[:, 1]) > 0
+
+
+@pytest.mark.parametrize("shape", ["triangles", "quads"])
+def test_a_zone_of_cells_runs_and_resumes(tmp_path, shape):
+    """Cells keep the names of the edges they lie on, and a monitor between two of them moves as either; the run goes on from
+    its checkpoint as if it had not been broken off."""
+    more = '[[monitors]]\nname = "top"\nat = [1.5, 0.5]\n[output]\ncheckpoint_every = 1\n'
+    text = BENDING.replace("order = 4", f'order = 2\nmesh_size_m = 0.4\ncells = "{shape}"')
+    loaded = load_scene(scene(tmp_path, more, text=text))
+    blocks, cells = loaded.blocks, np.arange(1, loaded.blocks.n_blocks)
+    assert len(cells) >= 4
+    assert blocks.areas()[cells].sum() == pytest.approx(1.0, rel=1e-12)
+    assert blocks.names[1] == "block#1" and set(loaded.drawing.zones[1:]) == {"block"}
+    folder, whole = tmp_path / "run", tmp_path / "whole"
+    run(loaded, folder)
+    assert Run(folder).history["top_uy"][-1] < 0
+    resume(folder, ("run.end_time_s=0.05",), quiet=True)
+    run(load_scene(scene(tmp_path, more, text=text), ("run.end_time_s=0.05",)), whole)
+    for name in ("history.csv", "contacts.pvd"):
+        assert (folder / name).read_bytes() == (whole / name).read_bytes()
+
+
+def test_cells_have_the_joint_by_which_they_part(tmp_path):
+    text = BENDING.replace("order = 4", 'order = 2\nmesh_size_m = 0.6\ncell_joint = "grain"')
+    more = "[joints.grain]\nfriction_angle_deg = 30\ntensile_strength_pa = 1e6\ncohesion_pa = 2e6\n"
+    problem = load_scene(scene(tmp_path, more, text=text)).problem()
+    edge, mate = problem.blocks.glued[0]
+    names = [problem.blocks.edge_names[problem.blocks.edge_name[v]] for v in (edge, mate)]
+    assert names == ["cells:block", "cells:block"]
+    assert problem.joints[problem.joint_index(*names)].name == "grain"

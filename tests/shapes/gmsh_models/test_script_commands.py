@@ -13,7 +13,8 @@ import pytest
 from geomech import cli
 from geomech.scene import SceneError, load_scene
 from geomech.shapes import GmshModelError, read_gmsh_model
-from geomech.shapes.gmsh_models.script_commands import TRUST, refuse_commands
+from geomech.shapes.gmsh_models import isolated_reader
+from geomech.shapes.gmsh_models.script_commands import TRUST, is_light, refuse_commands
 
 ROOT = Path(__file__).parents[3]
 #: A square of rock.
@@ -67,6 +68,15 @@ OTHERS = {
     'a() = ShapeFromFile("../../x.brep");': "ShapeFromFile",
     'a = "x.geo"; Include a;': "Include",
     "a = 1;\0SystemCall 'touch made';": "a zero byte",
+    # C's printf takes these texts: they read and write memory.
+    'Printf("%s%n%s%n");': 'Printf("%s%n%s%n"',
+    'a = Str(Sprintf("%n", 1));': 'Sprintf("%n"',
+    'a = Str(Sprintf("%1000000000g", 1));': 'Sprintf("%1000000000g"',
+    'Error("%s");': 'Error("%s"',
+    'Warning("%d");': 'Warning("%d"',
+    'b = "%n"; Printf(b);': "Printf",
+    'Printf(StrCat("%", "n"));': "Printf",
+    'Field[1] = Structured; Field[1].FileName = "/etc/passwd";': ".FileName",
 }
 
 
@@ -163,6 +173,37 @@ Print.Background = 0; Mesh.SaveAll = 1; General.Terminal = 0;
 SaveAll = 1; mySystemCall = 2; If (1 > 2) Printf("never"); EndIf
 """
     assert len(read_gmsh_model(written(tmp_path, harmless)).zones) == 1
+
+
+@pytest.mark.parametrize("text", ["For k In {1:2}\n x = k;\nEndFor", "x[] = {0:9};", "Mesh 2;", 'Include "x.geo";'])
+def test_what_may_take_any_time_is_read_in_another_process(tmp_path, text):
+    assert not is_light(written(tmp_path, text))
+    assert is_light(written(tmp_path, 'Mesh.Order = 1; x = (1 > 2) ? 1 : 2; // For\ny = "For {1:2}";'))
+
+
+@pytest.mark.parametrize(
+    ("text", "why"),
+    [
+        ("For k In {1:1e12}\n x = k;\nEndFor", "within 1 s of processor time"),
+        ("Macro A\n Call A;\nReturn\nCall A;", "within 1 s of processor time"),
+        ("x[] = {0:1e10};", r"within 1 s of processor time|GiB of memory|ends its reader"),
+    ],
+)
+def test_scripts_without_an_end_are_refused(tmp_path, text, why, monkeypatch):
+    monkeypatch.setattr(isolated_reader, "SECONDS", 1)
+    with pytest.raises(GmshModelError, match=why):
+        read_gmsh_model(written(tmp_path, text))
+
+
+def test_surfaces_beyond_all_numbers_are_refused(tmp_path):
+    path = tmp_path / "model.geo"
+    path.write_text(
+        "Point(1) = {0, 0, 0}; Point(2) = {1, 0, 0}; Point(3) = {0, 1, 0}; Point(9) = {1e308, 1e309, 0};\n"
+        "Line(1) = {1, 2}; Line(2) = {2, 3}; Line(3) = {3, 1}; Curve Loop(1) = {1, 2, 3}; Plane Surface(1) = {1};\n"
+        'Physical Surface("rock") = {1};\n'
+    )
+    with pytest.raises(GmshModelError, match="beyond all numbers"):
+        read_gmsh_model(path)
 
 
 def test_all_models_of_the_project_are_let_through():

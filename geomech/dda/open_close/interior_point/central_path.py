@@ -25,6 +25,7 @@ import numpy as np
 from ....compiled import kept
 from ....model import OPEN, SLIP, STICK, ContactSolver
 from ...contact_detection.contact_finder import ContactSet
+from ...equation_records import ContactMotion, ContactStiffness
 from ...joint_laws.coulomb_return import moved
 from ...joint_laws.penalty_springs import Springs
 from ...linear_solver import assembly
@@ -253,8 +254,8 @@ class CentralPath:
         stiff, stiff_along, slope = springs
         data = np.empty(pattern.size) if self._room is None else self._room()
         assembly.assemble(
-            pattern, data, self._matrix, self._upper, self._lower, *self._all_at, stiff, stiff_along, slope,
-            self._all_lift, self._sides,
+            pattern, data, self._matrix, ContactMotion(*self._all_at),
+            ContactStiffness(stiff, stiff_along, slope, self._all_lift), (self._upper, self._lower), self._sides,
         )  # fmt: skip
         solution = solution_of(pattern, data)
 

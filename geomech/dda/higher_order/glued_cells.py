@@ -1,0 +1,375 @@
+"""Cells of a continuous rock: blocks that are glued along their faces by symmetric interior penalty.
+
+With the jump [u] = u_a − u_b of the displacement on a face between cells a and b, the normal n out of a, and the mean
+{t} = ½ (σ_a + σ_b) n of their stresses there, a face has the energy
+
+    Π = ∫ (½ τ [u]·[u] − {t}·[u]) ds,
+
+and bears the traction {t} − τ [u]. The exact solution has no jump and the
+traction σ n, so that the glue is consistent: what converges with the size and the order of cells is the solution of the
+continuous rock, and no stiffness of glue has to be chosen. Π is half a sum of squares,
+
+    Π = ½ ∫ (τ [u − {t}/τ]² − {t}²/τ) ds,
+
+the form in which faces are added to the equations: springs of stiffness τ and of −1/τ, at the p + 1 Gauss points of a face.
+
+Energies stay positive if τ > λ/2, with λ the largest that ∫ |σ n|² ds on the glued faces of a cell can be over its ∫ σ:ε dA. It
+is an eigenvalue, computed for each cell whatever its shape; τ is twice the larger λ of both cells.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ...compiled import kept
+from ...model import JointLaw, State
+from ..kinematics.midpoint_configuration import MidpointConfiguration
+from ..open_close.contact_set import ContactSet
+from .deflected_blocks import DeflectedBlocks, rotation_of
+from .deflection_basis import n_deflections
+from .face_points import Faces
+from .polygon_quadrature import gauss_points
+from .six_row_system import SixRowPattern, add_force, add_pair, moved
+
+#: τ over the larger λ of the two cells; more than a half is stable. Displacements of a cantilever of cells hardly change from 1 to
+#: 10 (`tests/dda/higher_order/test_glued_cells.py`).
+PENALTY = 2.0
+#: Corners of cells of one rock lie in one place if they are no farther apart than this part of the cells' size (√area).
+_SAME = 1e-3
+#: Faces part together that bear as much as the most stressed one, but for this part of it: those that symmetry makes equal.
+_TOGETHER = 0.01
+
+
+def traction_of(normal: np.ndarray) -> np.ndarray:
+    """(n, 2, 3) M: stress (σxx, σyy, σxy) → its components across and along a face with this unit ``normal`` (n, 2)."""
+    x, y = normal[:, 0], normal[:, 1]
+    return np.stack(
+        [np.stack([x * x, y * y, 2 * x * y], axis=1), np.stack([-x * y, x * y, x * x - y * y], axis=1)], axis=1
+    )
+
+
+def _ways(normal: np.ndarray) -> np.ndarray:
+    """(n, 2, 2) the directions across and along faces."""
+    return np.stack([normal, np.stack([-normal[:, 1], normal[:, 0]], axis=1)], axis=1)
+
+
+@dataclass(frozen=True, eq=False)
+class GluedFaces:
+    """The glued faces (m,) of ``cells`` and their Gauss points (n,).
+
+    block, other  (m,)    the cells a and b
+    face          (n,)    of each point
+    points        (n, 2)  undeformed, m
+    normal        (n, 2)  undeformed, out of a
+    weight        (n,)    m
+    penalty       (n,)    τ, Pa/m
+    """
+
+    cells: DeflectedBlocks
+    block: np.ndarray
+    other: np.ndarray
+    face: np.ndarray
+    points: np.ndarray
+    normal: np.ndarray
+    weight: np.ndarray
+    penalty: np.ndarray
+
+    @classmethod
+    def of(cls, cells: DeflectedBlocks) -> GluedFaces:
+        """The faces that the blocks of ``cells`` say are glued."""
+        blocks = cells.blocks
+        edge, mate = np.asarray(blocks.glued, np.int64).reshape(-1, 2).T
+        block, other = blocks.vertex_block[edge], blocks.vertex_block[mate]
+        start = blocks.vertices[edge]
+        along = blocks.vertices[blocks.next_vertex[edge]] - start
+        count = np.maximum(cells.order[block], cells.order[other]) + 1
+        rules = {n: gauss_points(n) for n in np.unique(count).tolist()}
+        face = np.repeat(np.arange(len(edge)), count)
+        place = np.concatenate([rules[n][0] for n in count.tolist()])
+        length = np.hypot(*along.T)
+        normal = np.stack([along[:, 1], -along[:, 0]], axis=1) / length[:, None]
+        faces = cls(
+            cells, block, other, face, start[face] + place[:, None] * along[face], normal[face],
+            np.concatenate([rules[n][1] for n in count.tolist()]) * length[face], np.zeros(len(face)),
+        )  # fmt: skip
+        steepest = faces._steepest()
+        faces.penalty[:] = PENALTY * np.maximum(steepest[block], steepest[other])[face]
+        return faces
+
+    def kept(self, keep: np.ndarray) -> GluedFaces:
+        """The faces of which ``keep`` (m,) is True."""
+        number, some = np.cumsum(keep) - 1, keep[self.face]
+        return replace(
+            self, block=self.block[keep], other=self.other[keep], face=number[self.face[some]],
+            points=self.points[some], normal=self.normal[some], weight=self.weight[some], penalty=self.penalty[some],
+        )  # fmt: skip
+
+    @property
+    def owners(self) -> tuple[np.ndarray, np.ndarray]:
+        """(n,) twice: the cells a and b of each point."""
+        return self.block[self.face], self.other[self.face]
+
+    def _steepest(self) -> np.ndarray:
+        """(n_blocks,) λ, Pa/m; 0 of blocks without glued faces."""
+        from scipy.linalg import eigh
+
+        cells, out = self.cells, np.zeros(len(self.cells.order))
+        across = traction_of(self.normal)
+        both = np.concatenate(self.owners)
+        rows = np.argsort(both, kind="stable")
+        first = np.searchsorted(both[rows], np.arange(len(out) + 1))
+        for b in np.unique(both).tolist():
+            some = rows[first[b] : first[b + 1]] % len(self.face)
+            m = int(n_deflections(int(cells.order[b])))
+            strain = np.zeros((len(some), 3, 3 + m))
+            strain[:, :, :3] = np.eye(3)
+            strain[:, :, 3:] = cells.basis.strain(self.points[some], b)[..., :m]
+            traction = across[some] @ cells.elastic[b] @ strain
+            on_faces = np.einsum("n,nwi,nwj->ij", self.weight[some], traction, traction)
+            inside = np.zeros((3 + m, 3 + m))
+            inside[:3, :3] = cells.basis.area[b] * cells.elastic[b]
+            inside[3:, 3:] = cells.stiffness[b, :m, :m]
+            out[b] = eigh(on_faces, inside, eigvals_only=True, subset_by_index=[2 + m, 2 + m])[0]
+        return out
+
+    def places(self, vertices: np.ndarray, angle: np.ndarray, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """(n, 2) twice, m: where the points of a and of b are, with these strained ``vertices``, rotation ``angle``
+        (n_blocks,) and deflections ``q`` (k,)."""
+        blocks, padded = self.cells.blocks, self.cells.padded(q)
+        mean = blocks.mean_vertices(vertices)
+        reference, weights = blocks.affine_fit
+        arm = vertices - mean[blocks.vertex_block]
+        gradient = np.add.reduceat(arm[:, :, None] * weights[:, None, :], blocks.vertex_start[:-1], axis=0)
+        out = []
+        for owner in self.owners:
+            at = mean[owner] + np.einsum("nab,nb->na", gradient[owner], self.points - reference[owner])
+            bent = self.cells.directions(self.points, owner, angle)
+            out.append(at + np.einsum("naj,nj->na", bent, padded[owner]))
+        return out[0], out[1]
+
+
+@dataclass(frozen=True, eq=False)
+class Glue:
+    """The glue in one step: 2 n springs, those of τ and those of −1/τ, across and along.
+
+    faces    `GluedFaces`
+    vectors  (2 n, 2, 2, w)  way, side, per unit of all unknowns of the side's cell: of u − {t}/τ (m), and of {t} (Pa)
+    springs  (2 n,)          stiffness times length, and −1/τ times it
+    before   (2 n, 2)        what these stand at as the step begins
+    """
+
+    faces: GluedFaces
+    vectors: np.ndarray
+    springs: np.ndarray
+    before: np.ndarray
+
+    @classmethod
+    def of(
+        cls, faces: GluedFaces, state: State, vertices: np.ndarray, q: np.ndarray, midpoint: MidpointConfiguration,
+        turn: np.ndarray,
+    ) -> Glue:  # fmt: skip
+        """The glue of cells with deflections ``q`` (k,) in ``state``, whose forces act at the ``midpoint``, where cells have
+        turned by ``turn`` (n_blocks,) since."""
+        cells, owners, n = faces.cells, faces.owners, len(faces.face)
+        start, angle = state.rotation, state.rotation + turn
+        size, padded = np.sqrt(midpoint.moments[:, 0]), cells.padded(q)
+
+        def normal(at: np.ndarray) -> np.ndarray:
+            return np.einsum("nab,nb->na", rotation_of(0.5 * (at[owners[0]] + at[owners[1]])), faces.normal)
+
+        first, second = faces.places(vertices, start, q)
+        begun, acting = normal(start), _ways(normal(angle))
+        middle = 0.5 * (midpoint.points(first, owners[0]) + midpoint.points(second, owners[1]))
+        jump, mean = np.zeros((n, 2, 2, max(cells.width, 6))), np.zeros((n, 2, 2, max(cells.width, 6)))
+        bears = np.zeros((n, 2))
+        for side, (owner, sign) in enumerate(zip(owners, (1.0, -1.0), strict=True)):
+            matrix = midpoint.displacement(middle, owner)
+            matrix[..., 2:] /= size[owner, None, None]
+            bent = cells.directions(faces.points, owner, angle)
+            m = bent.shape[2]
+            jump[:, :, side, :6] = sign * acting @ matrix
+            jump[:, :, side, 6 : 6 + m] = sign * acting @ bent
+            elastic, across = cells.elastic[owner], traction_of(begun)
+            turned = np.einsum("nba,nb->na", rotation_of(start[owner]), begun)
+            own = traction_of(turned) @ elastic @ cells.basis.strain(faces.points, owner)
+            mean[:, :, side, 3:6] = 0.5 * across @ elastic / size[owner, None, None]
+            mean[:, :, side, 6 : 6 + m] = 0.5 * own
+            bears += 0.5 * (
+                np.einsum("nws,ns->nw", across, state.stress[owner]) + np.einsum("nwj,nj->nw", own, padded[owner])
+            )
+        apart = np.einsum("nwa,na->nw", _ways(begun), first - second)
+        give = 1.0 / faces.penalty
+        return cls(
+            faces, np.concatenate([jump - give[:, None, None, None] * mean, mean]),
+            np.concatenate([faces.penalty, -give]) * np.tile(faces.weight, 2),
+            np.concatenate([apart - give[:, None] * bears, bears]),
+        )  # fmt: skip
+
+    def blocks(self, order: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """As of `six_row_system.fill`."""
+        one, two = self.faces.owners
+        return np.tile(one, 2), np.tile(two, 2), order
+
+    def push(self, right: np.ndarray, pattern: SixRowPattern) -> None:
+        """Add the forces of the glue as the step begins to ``right`` (6 n,)."""
+        _push(
+            right,
+            self.blocks(pattern.order),
+            (pattern.more, pattern.rows),
+            self.vectors,
+            self.springs[:, None] * self.before,
+        )
+
+    def stiffen(self, data: np.ndarray, pattern: SixRowPattern, n_contacts: int, weight: float) -> None:
+        """Add the stiffness, times ``weight``, to the flat matrix ``data``; in the ``pattern`` faces come after ``n_contacts``."""
+        at = n_contacts + np.tile(self.faces.face, 2)
+        _stiffen(
+            data, pattern.places, pattern.step, at, self.blocks(pattern.order), self.vectors, weight * self.springs
+        )
+
+    def change(self, unknowns: np.ndarray, pattern: SixRowPattern) -> np.ndarray:
+        """(2 n, 2) by how much the springs change with all ``unknowns`` (6 n,) of the step."""
+        return moved(unknowns, self.blocks(pattern.order), (pattern.more, pattern.rows), self.vectors)
+
+    def forces(self, change: np.ndarray, n_blocks: int) -> np.ndarray:
+        """(n_blocks, 6) N on the six first unknowns of the solver, once the springs have changed by ``change`` (2 n, 2)."""
+        out, push = np.zeros((n_blocks, 6)), -self.springs[:, None] * (self.before + change)
+        for side, owner in enumerate(self.faces.owners):
+            np.add.at(out, np.tile(owner, 2), np.einsum("nw,nwj->nj", push, self.vectors[:, :, side, :6]))
+        return out
+
+    def energy(self, change: np.ndarray | float = 0.0) -> float:
+        """J/m once the springs have changed by ``change`` (2 n, 2)."""
+        return 0.5 * float((self.springs[:, None] * (self.before + change) ** 2).sum())
+
+    def work(self, change: np.ndarray, weight: float) -> float:
+        """J/m done against the glue in a step in which its springs change by ``change`` (2 n, 2), with the forces at this
+        ``weight`` of it."""
+        return float((self.springs[:, None] * (self.before + weight * change) * change).sum())
+
+    def traction(self, change: np.ndarray) -> np.ndarray:
+        """(n, 2) Pa, tension and shear that the points bear once the springs have changed by ``change`` (2 n, 2)."""
+        n = len(self.faces.face)
+        return -self.faces.penalty[:, None] * (self.before + change)[:n]
+
+    def mean_traction(self, change: np.ndarray) -> np.ndarray:
+        """(m, 2) Pa, the mean of `traction` on each face."""
+        faces, out = self.faces, np.zeros((len(self.faces.block), 2))
+        np.add.at(out, faces.face, faces.weight[:, None] * self.traction(change))
+        return out / np.bincount(faces.face, faces.weight, len(out))[:, None]
+
+
+@dataclass(frozen=True, eq=False)
+class GlueStrength:
+    """What the glued faces (m,) of cells bear: ``tension`` and ``cohesion``, Pa, and the ``friction`` (tangent) by which pressure
+    adds to it; infinite of faces that hold."""
+
+    tension: np.ndarray
+    cohesion: np.ndarray
+    friction: np.ndarray
+
+    @classmethod
+    def of(cls, laws: list[JointLaw | None]) -> GlueStrength:
+        """Of faces with these ``laws``, None of those that hold. Raises ValueError for a law without tensile strength."""
+        weak = next((law for law in laws if law is not None and not law.tensile_strength > 0), None)
+        if weak is not None:
+            raise ValueError(f"cells cannot part by the joint {weak.name!r}: it has no tensile strength")
+        given = [
+            (np.inf, np.inf, 0.0) if law is None else (law.tensile_strength, law.cohesion, law.friction) for law in laws
+        ]
+        tension, cohesion, friction = np.array(given).reshape(-1, 3).T
+        with np.errstate(divide="ignore", invalid="ignore"):
+            tip = np.where(friction > 0, cohesion / friction, np.inf)
+        return cls(np.minimum(tension, tip), cohesion, friction)
+
+    @property
+    def any(self) -> bool:
+        """Whether any face can part."""
+        return bool(np.isfinite(self.tension).any())
+
+    def parting(self, parted: np.ndarray, mean: np.ndarray) -> np.ndarray | None:
+        """(m,) the faces that have ``parted``, and those of the others, with this ``mean`` traction (n, 2), that bear more than
+        their strength and nearly as much as any; None where none does."""
+        left = np.flatnonzero(~parted)
+        pull, shear = mean[:, 0], np.abs(mean[:, 1])
+        shear_strength = self.cohesion[left] - np.minimum(pull, self.tension[left]) * self.friction[left]
+        share = np.maximum(pull / self.tension[left], shear / np.maximum(shear_strength, 1e-300))
+        if not len(share) or not share.max() > 1.0:
+            return None
+        out = parted.copy()
+        out[left[share > max(1.0, (1.0 - _TOGETHER) * share.max())]] = True
+        return out
+
+
+@dataclass(frozen=True, eq=False)
+class KeptCorners:
+    """Which contacts at corners are kept: not those of ``cells`` that meet another block in a corner alone, where a face of a
+    cell beside them ends. One rock bears by its faces, however it is divided. ``joined`` (k,): a · n_blocks + b of cells
+    a < b that meet."""
+
+    cells: DeflectedBlocks
+    joined: np.ndarray
+
+    def __call__(self, found: ContactSet) -> np.ndarray:
+        """(k,) of the contacts ``found`` at corners."""
+        from scipy.spatial import cKDTree
+
+        faces, n, area = Faces.of(found, self.cells.order), len(self.cells.order), self.cells.basis.area
+        ends, drop = faces.ends.ravel(), np.zeros(len(found), bool)
+        if not len(ends):
+            return np.arange(len(found))
+        size = np.sqrt(np.minimum(area[found.block], area[found.other]))
+        both, place = np.stack([found.block, found.other], axis=1), found.geometry[:, 5:7]
+        tree = cKDTree(place[ends])
+        for c in faces.lone.tolist():
+            for e in ends[tree.query_ball_point(place[c], _SAME * size[c])].tolist():
+                for mine, theirs in ((0, 0), (0, 1), (1, 0), (1, 1)):
+                    a, b = int(both[c, mine]), int(both[e, theirs])
+                    if both[c, 1 - mine] == both[e, 1 - theirs] and _is_in(min(a, b) * n + max(a, b), self.joined):
+                        drop[c] = True
+        return np.flatnonzero(~drop)
+
+
+def _is_in(value: int, ascending: np.ndarray) -> bool:
+    """Whether ``value`` is one of the ``ascending`` (n,)."""
+    at = int(np.searchsorted(ascending, value))
+    return at < len(ascending) and int(ascending[at]) == value
+
+
+_jit = kept(fastmath={"contract"}, error_model="numpy", nogil=True)
+
+
+@_jit
+def _push(right, blocks, rows, vectors, force):
+    """Subtract ``force`` (n, 2) across and along of each spring from ``right``."""
+    block, other, order = blocks
+    more, count = rows
+    for c in range(len(block)):
+        for side in range(2):
+            b = block[c] if side == 0 else other[c]
+            if order[b] >= 0:
+                add_force(right, order[b], more[b], 6 * count[b], vectors[c, :, side], -force[c, 0], -force[c, 1])
+
+
+@_jit
+def _stiffen(data, places, step, at, blocks, vectors, springs):
+    """Add ``springs`` (n,), as stiff across as along, to the flat matrix; ``at`` (n,) of the pattern's pairs."""
+    where, own_at, upper, lower, rows = places
+    block, other, order = blocks
+    given = np.empty((2, 2, vectors.shape[3]))
+    for c in range(len(block)):
+        for side in range(2):
+            for way in range(2):
+                for a in range(vectors.shape[3]):
+                    given[side, way, a] = springs[c] * vectors[c, way, side, a]
+        i, j, pair = block[c], other[c], at[c]
+        one, two = vectors[c, :, 0], vectors[c, :, 1]
+        if order[i] >= 0:
+            add_pair(data, where, own_at[i], step, rows[i], rows[i], given[0], one)
+        if order[j] >= 0:
+            add_pair(data, where, own_at[j], step, rows[j], rows[j], given[1], two)
+        if order[i] >= 0 and order[j] >= 0:
+            add_pair(data, where, upper[pair], step, rows[i], rows[j], given[0], two)
+            add_pair(data, where, lower[pair], step, rows[j], rows[i], given[1], one)

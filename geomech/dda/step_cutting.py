@@ -1,0 +1,299 @@
+"""Attempts at one step: with contacts found again, or shorter, until a step holds.
+
+A step whose contact states do not settle is halved; one in which blocks move beyond the limits (`step_limits`) is
+shortened in proportion; where a corner has gone into or through a block unseen, contacts are searched for farther away
+first. In statics, where a load does not shrink with the step, what a shorter step does not improve is accepted.
+"""
+
+from __future__ import annotations
+
+import logging
+from dataclasses import dataclass, field
+from typing import NoReturn, Protocol
+
+import numpy as np
+
+from ..model import OPEN, State
+from .contact_detection.contact_finder import ContactFinder
+from .higher_order.bending_step import BendingAttempt
+from .interfaces import SteppedSystem
+from .kinematics.midpoint_configuration import MidpointConfiguration
+from .kinematics.simplex_integration import block_moments
+from .open_close.contact_set import ContactSet
+from .open_close.equations import Unsettled
+from .results import NotConverged, StepResult
+from .step_control.relative_motion import Windows
+from .step_control.step_limits import CROSSING, UNSETTLED, Crossed, StepLimits, Used
+from .time_step import Attempt, StepStart
+
+log = logging.getLogger(__name__)
+
+#: Contacts of one step are searched for farther away this many times at most; then it is cut.
+_FARTHER = 6
+#: A step begins again this many times at most where corners meet in another direction than expected, …
+_REDIRECTED = 3
+#: … by more than this angle (cosine).
+_OTHER_DIRECTION = 0.95
+
+
+class Deflection(Protocol):
+    """Blocks of higher order: raises `NotConverged` for a ``state`` in which they bend too far."""
+
+    def check_small(self, state: State) -> None: ...
+
+
+class LimitedSystem(SteppedSystem, Protocol):
+    """A system whose steps have limits; ``deflected`` are its blocks of higher order, None without."""
+
+    limits: StepLimits
+
+    @property
+    def deflected(self) -> Deflection | None: ...
+
+
+@dataclass(eq=False)
+class _Search:
+    """The search for the contacts of a step, see `ContactFinder.find`."""
+
+    finder: ContactFinder
+    state: State
+    vertices: np.ndarray
+    near: Windows
+    motion: np.ndarray | None
+    margin: float
+    glue_holds: bool = True
+    broken: np.ndarray = field(default_factory=lambda: np.zeros(0, np.int64))
+
+    def find(self) -> ContactSet:
+        return self.finder.find(
+            self.state, self.vertices, self.near, self.glue_holds, broken=self.broken, motion=self.motion,
+            margin=self.margin,
+        )  # fmt: skip
+
+
+def windows_of(system: LimitedSystem, start: StepStart, dt: float) -> Windows:
+    """Where a step of ``dt`` from ``start`` looks for contacts."""
+    rows = start.state.contacts
+    # Pairs that have yet to come nearer press nowhere.
+    lift = float(np.abs(rows["lift"][(rows["state"] != OPEN) | (rows["lift"] > 0.0)]).max(initial=0.0))
+    if system.deflected is not None:
+        lift += 2.0 * float(system.finder.deflection.max())
+    return system.limits.windows(start.vertices, start.carried, start.moments, dt, start.gravity, lift)
+
+
+class StepCutting:
+    """Attempts at a step of ``system`` from ``start`` by ``dt`` at most; ``like``: the result of the same step with other
+    cracks, whose contact states are the first guess."""
+
+    def __init__(self, system: LimitedSystem, start: StepStart, dt: float, like: StepResult | None) -> None:
+        self.system, self.start = system, start
+        self.dt = self.asked = system.limits.foreseen(start.vertices, start.carried, start.moments, dt, start.gravity)
+        self.search = self._search()
+        self.found = self.search.find()
+        if like is not None:
+            self.found = self.found.like(like.state.contacts)
+            if system.scheme.static and self.found.tried is not None:
+                # (In motion the step's arcs are those that the velocity predicts.)
+                self.found = self.found.along(*like.arcs)
+        self.cuts, self.farther, self.redirected = 0, 0, 0
+        #: Why the last attempt failed, and the last of those that made the step shorter.
+        self.reason = self.failed = ""
+        #: Share of the limits that a step may use, and that the last attempt used.
+        self.allowed_share, self.last_share = 1.0, np.inf
+
+    def until_it_holds(self) -> tuple[Attempt, StepResult]:
+        """The first attempt that holds, and its result. Raises `NotConverged` after ``settings.max_step_cuts`` cuts."""
+        while True:
+            # One attempt is freed before the next is made: its factors may be of other contacts.
+            held = self._attempt()
+            if held is not None:
+                return held
+
+    def _attempt(self) -> tuple[Attempt, StepResult] | None:
+        """One attempt and its result; None where the step begins again."""
+        system, found = self.system, self.found
+        kind = Attempt if system.deflected is None else BendingAttempt
+        try:
+            attempt = kind(system, self.start, self.dt, found, self.cuts)
+            result = attempt.result()
+        except Unsettled as failure:
+            self.failed = self.reason = f"{failure}{system.finder.where(found, failure.contact)}"
+            self._cut(0.5 * self.dt, UNSETTLED, *found.blocks_of(failure.contact))
+            return None
+        if self._bonds_missed(result) or self._corners_missed(attempt, result):
+            return None
+        used = system.limits.used(attempt, result)
+        self.reason = used.reason
+        if used.share <= 1.0001 * self.allowed_share:
+            return (attempt, result) if self._holds(attempt, result, used) else None
+        if system.scheme.static and used.share > 0.9 * self.last_share:
+            self._allow(used)
+        else:
+            self.last_share = used.share
+            self._cut(self.dt * min(0.8, max(0.05, 0.95 / used.share)), used.why, *used.blocks)
+        return None
+
+    def _bonds_missed(self, result: StepResult) -> bool:
+        """Search again for corners that were left out, and springs that were moved, for the sake of a bond that has
+        broken: they must act before it breaks."""
+        found, search, bonded = self.found, self.search, result.contacts["bonded"]
+        lost = (bonded != found.bonded) & found.inset
+        unheld = found.relies_on_glue and (bonded < found.bonded).any()
+        if not (unheld or lost.any()):
+            return False
+        broken = found.vertex[lost] * len(self.start.vertices) + found.edge[lost]
+        search.broken = np.append(search.broken, broken)
+        search.glue_holds = bool(found.relies_on_glue and not unheld)
+        self.found = search.find()
+        return True
+
+    def _corners_missed(self, attempt: Attempt, result: StepResult) -> bool:
+        """Take the contacts of corners that have met elsewhere than expected; where they meet is known once the motion
+        of the step is."""
+        if self.redirected >= _REDIRECTED:
+            return False
+        again = self._with_corners_of(attempt, result.contacts["state"])
+        if again is None:
+            return False
+        self.redirected, self.found = self.redirected + 1, again
+        return True
+
+    def _holds(self, attempt: Attempt, result: StepResult, used: Used) -> bool:
+        """Whether an attempt within its limits holds: not if something went into or through a block in it."""
+        system, state = self.system, self.start.state
+        crossed = system.limits.crossed(attempt, result)
+        if crossed is None and self.cuts < system.settings.max_step_cuts:
+            crossed = system.limits.pressed_apart(attempt, result)
+        if crossed is None:
+            self._refuse_crushed(result.state)
+            if system.deflected is not None:
+                system.deflected.check_small(result.state)
+            system.limits.warn_of_penetration(result)
+            if self.failed:
+                log.info(
+                    "step at t = %g s cut from %.4g to %.4g s: %s", state.time, self.asked, self.dt, self.failed
+                )  # fmt: skip
+            result.statistics["limit_share"] = used.share
+            return True
+        if self._searched_farther(attempt, crossed):
+            return False
+        if self.cuts >= system.settings.max_step_cuts and not crossed.through:
+            log.warning("step at t = %g s: %s, and no shorter step avoids it", state.time, crossed.reason)
+            result.statistics["limit_share"] = used.share
+            return True
+        self.failed = self.reason = crossed.reason
+        self.farther = 0
+        self._cut(0.5 * self.dt, CROSSING, *crossed.blocks)
+        return False
+
+    def _searched_farther(self, attempt: Attempt, crossed: Crossed) -> bool:
+        """Search farther for contacts, where that finds more: what went in met no contact, and with it the step may be
+        as long."""
+        search = self.search
+        wider = search.near.widened(crossed.pairs, crossed.motion, self.system.blocks.n_blocks)
+        if self.farther >= _FARTHER or not wider.reaches_beyond(search.near):
+            return False
+        search.near, search.motion = wider, attempt.new_vertices - self.start.vertices
+        search.glue_holds = self.found.relies_on_glue
+        self.farther, self.found = self.farther + 1, search.find()
+        return True
+
+    def _allow(self, used: Used) -> None:
+        """Accept, in statics, the motion under a load that does not shrink with the step, and search far enough."""
+        search = self.search
+        log.info(
+            "step at t = %g s: %s, and a shorter step does not help; accepted", self.start.state.time, used.reason
+        )  # fmt: skip
+        self.allowed_share = 1.1 * used.share
+        search.near = search.near.widened(used.moved.pairs, 1.1 * used.moved.reach, self.system.blocks.n_blocks)
+        search.glue_holds = self.found.relies_on_glue
+        self.found = search.find()
+
+    def _cut(self, shorter: float, why: str, *blocks: int) -> None:
+        """Begin again with a step as long as ``shorter``, for the ``blocks`` that ask for it."""
+        system = self.system
+        self.cuts += 1
+        if self.cuts > system.settings.max_step_cuts:
+            self._refuse()
+        system.limits.shortens(why, *blocks)
+        log.debug("step at t = %g s cut from %.4g to %.4g s: %s", self.start.state.time, self.dt, shorter, self.reason)
+        self.dt = shorter
+        if not system.scheme.static:
+            search, again = self.search, self._search()
+            search.near, search.motion, search.margin = again.near, again.motion, again.margin
+            search.glue_holds = self.found.relies_on_glue or not len(search.broken)
+            self.found = search.find()
+
+    def _refuse(self) -> NoReturn:
+        static, way_out = self.system.scheme.static, ""
+        if not static and self.system.settings.springs != "resolved":
+            way_out = '; dda.springs = "resolved" may go on, with contacts no stiffer than the time step resolves'
+        raise NotConverged(
+            f"the block step at t = {self.start.state.time:g} s failed after {self.cuts - 1} cuts "
+            f"(dt = {self.dt:.3g} s): {self.reason}{way_out}"
+        )
+
+    def _refuse_crushed(self, state: State) -> None:
+        system = self.system
+        area = block_moments(state.vertices, system.next, system.vertex_start)[:, 0]
+        if not (area > 0).all():
+            crushed = int(np.argmin(area > 0))
+            names = system.blocks.names
+            name = names[crushed] if names else f"block {crushed}"
+            raise NotConverged(
+                f"{name!r} is crushed to nothing at t = {state.time:g} s: its loads are beyond its stiffness"
+            )
+
+    def _search(self) -> _Search:
+        """How a step of the present length looks for contacts. Two corners may come nearer by their weight than their
+        velocities say; what comes nearer still is searched for once the motion of the step is known."""
+        system, start, dt = self.system, self.start, self.dt
+        return _Search(
+            system.finder, start.state, start.vertices, windows_of(system, start, dt), self._expected_motion(),
+            np.inf if system.scheme.static else dt * dt * float(np.hypot(*start.gravity)),
+        )  # fmt: skip
+
+    def _expected_motion(self) -> np.ndarray | None:
+        """(n_vertices, 2) m: motion of the step by the velocities with which it begins; None where there are none."""
+        start = self.start
+        if not start.carried.any():
+            return None
+        increment = self.dt * start.carried
+        end = MidpointConfiguration.of(increment, 1.0, start.vertices, self.system.owner, start.moments)
+        return end.vertices - start.vertices
+
+    def _with_corners_of(self, attempt: Attempt, state: np.ndarray) -> ContactSet | None:
+        """The contacts with which the step begins again because corners have met elsewhere than expected in the
+        ``attempt``, which left its contacts in ``state`` (n,); None where all met as expected."""
+        finder, search = self.system.finder, self.search
+        found, moved = attempt.found, attempt.new_vertices - attempt.vertices
+        if found.lumped is not None:
+            found = found.lumped
+        pressed = bool(((found.corner >= 0) & (state != OPEN)).any())
+        strayed = np.abs(moved if search.motion is None else moved - search.motion).max()
+        if not pressed and not strayed > 0.5 * search.margin:
+            return None
+        search.motion, search.glue_holds = moved, found.relies_on_glue
+        again = search.find()
+        if pressed and self._redirected(found, again, state):
+            return again
+        known = np.isin(again.vertex * len(moved) + again.edge, found.vertex * len(moved) + found.edge)
+        missed = ~known & (finder.gaps(attempt.new_vertices, attempt.vertices, again) - again.lift < -again.precision)
+        return again if missed.any() else None
+
+    def _redirected(self, found: ContactSet, again: ContactSet, state: np.ndarray) -> bool:
+        """Whether any pair of rounded corners that presses in ``state`` (n,) of ``found`` meets in another direction in
+        ``again``."""
+        known = {pair: c for c, pair in enumerate(zip(again.vertex.tolist(), again.edge.tolist(), strict=True))}
+        previous = self.system.blocks.previous_vertex
+        for c in np.flatnonzero((found.corner >= 0) & (state != OPEN)):
+            v, w = int(found.vertex[c]), int(found.corner[c])
+            names = ((v, w, 1), (v, int(previous[w]), 1), (w, v, -1), (w, int(previous[v]), -1))
+            cosines = [
+                sense * float(found.geometry[c, 1:3] @ again.geometry[known[v, e], 1:3])
+                for v, e, sense in names
+                if (v, e) in known
+            ]
+            if max(cosines, default=-1.0) < _OTHER_DIRECTION:
+                return True
+        return False

@@ -1,0 +1,227 @@
+"""Linear equations of crack faces in given contact states.
+
+With λ = right − S w the pressure and shear between the faces (`schur_complement`; the traction on them is −λ), every
+node satisfies one linear equation in each direction, according to its state:
+
+    open         λ_n = 0,  λ_t = 0
+    closed       w_n = −a                     or, filled,  λ_n = −κ_n (w_n + a)
+    stick        w_t = rest                   or, filled,  λ_t = −κ_s (w_t − rest)
+    slip (±)     λ_t = ∓(c + λ_n tan φ)
+
+`rest` is the slip left by the last load: the result is one step, implicit in time, of a history-dependent process.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+
+from ..counters import Work
+from ..iterative.crack_gmres import Iterated, IterativeCrackSystem
+from ..system.bordered_factor import BorderedFactor
+from ..system.closed_face_factor import HeldFactor
+from ..system.contact_rows import Rows
+from ..system.dense_lu import Factor
+from ..system.schur_complement import CrackSystem
+from ..system.updated_factor import UpdatedFactor
+from .face_laws import FaceLaws, FaceMemory, FaceStates
+
+#: What solves the equations of given states.
+AnyFactor = Factor | BorderedFactor | HeldFactor | UpdatedFactor | Iterated
+#: Smallest load, Pa; strengths divided by it are still finite.
+NO_STRESS = 1e-100
+#: Number of states whose factors are kept.
+_KEPT = 8
+#: Fraction of changed prescribed jumps below which only the changes are multiplied.
+FEW_CHANGED = 0.1
+
+
+class FaceEquations:
+    """The linear equations of nodes in given states: ``system`` with rows and columns changed according to ``laws``."""
+
+    def __init__(self, system: CrackSystem | IterativeCrackSystem, laws: FaceLaws, work: Work):
+        self.system, self.laws, self._work = system, laws, work
+        #: Number of solutions since the beginning.
+        self.solved = 0
+        self._factors: dict[bytes, tuple[np.ndarray, AnyFactor]] = {}
+        self._last: list[tuple[np.ndarray, np.ndarray]] = []
+        self._pull: tuple[np.ndarray, np.ndarray] | None = None
+
+    def solve(
+        self, right: np.ndarray, states: FaceStates, memory: FaceMemory, cohesion: np.ndarray | float = 0.0
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Jumps and λ (n,) under ``right`` (n,), with more ``cohesion`` (n_nodes,) than the laws', Pa."""
+        laws, s = self.laws, self.system.matrix
+        self.solved += 1
+        prescribed, slides, spring = self._rows(states)
+        a, t = laws.across, laws.along
+        w, extra = np.zeros_like(right), np.zeros_like(right)
+        w[a[states.closed]] = -laws.aperture[states.closed]
+        w[t] = np.where(prescribed[t], memory.rest, 0.0)
+        w[~prescribed] = 0.0
+        bound = laws.cohesive_strength(memory.broken) + cohesion
+        bound = np.where(states.way != 0, bound, 0.0)  # it may be infinite where nothing slips
+        free, factor = self._factor(states)
+        if isinstance(factor, HeldFactor):
+            extra[t] = states.way * bound
+            w, reaction = factor.respond(self._opened(right, factor), extra, w)
+            reaction[t] = np.where(states.way != 0, -(extra[t] + slides * reaction[a]), reaction[t])
+            return w, reaction
+        extra[t] = states.way * bound + slides * right[a]
+        extra[a] += spring[a] * laws.aperture
+        extra[t] -= spring[t] * memory.rest
+        pull = self._pull_of(w)
+        known = right + extra - pull
+        known[t] -= slides * pull[a]
+        w[free] = factor.solve(known[free])
+        self._work.back_substitutions += 1
+        reaction = np.zeros_like(right)
+        missing = right - s @ w
+        closed = states.closed
+        reaction[a[closed]] = missing[a[closed]]
+        filled = spring[a] > 0
+        reaction[a[filled]] = -(spring[a] * (w[a] + laws.aperture))[filled]
+        stuck = prescribed[t]
+        reaction[t[stuck]] = missing[t[stuck]]
+        springy = spring[t] > 0
+        reaction[t[springy]] = -(spring[t] * (w[t] - memory.rest))[springy]
+        slipping = states.way != 0
+        reaction[t[slipping]] = -(states.way * bound + slides * reaction[a])[slipping]
+        return w, reaction
+
+    def _pull_of(self, w: np.ndarray) -> np.ndarray:
+        """S ``w`` of prescribed jumps; updated, since few of them change from state to state."""
+        if self._pull is not None and not isinstance(self.system, IterativeCrackSystem):
+            changed = np.flatnonzero(w != self._pull[0])
+            if len(changed) < FEW_CHANGED * len(w):
+                if len(changed):
+                    step = w[changed] - self._pull[0][changed]
+                    pull = self._pull[1] + self.system.matrix.entries(np.arange(len(w)), changed) @ step
+                    self._pull = w.copy(), pull
+                return self._pull[1]
+        pull = self.system.matrix @ w if w.any() else np.zeros_like(w)
+        if not isinstance(self.system, IterativeCrackSystem):
+            self._pull = w.copy(), pull
+        return pull
+
+    def _opened(self, right: np.ndarray, factor: HeldFactor) -> np.ndarray:
+        """S⁻¹ ``right``, computed once for each of the last two loads."""
+        for known, opened in self._last:
+            if known is right:
+                return opened
+        self._work.back_substitutions += 1
+        opened = factor.open.solve(right)
+        self._last = [*self._last[-1:], (right, opened)]
+        return opened
+
+    def tangent(self, right: np.ndarray, states: FaceStates) -> np.ndarray:
+        """(n, k) change of the jumps per change of ``right`` (n, k) at constant states."""
+        w = np.zeros_like(right)
+        free, factor = self._factor(states)
+        w[free] = factor.solve(np.asfortranarray(self._mixed(right, states)[free]))
+        self._work.back_substitutions += right.shape[1]
+        return w
+
+    def adjoint(self, weights: np.ndarray, states: FaceStates) -> np.ndarray:
+        """(n, k) y with ``weights``ᵀ w = yᵀ ``right`` at constant states (adjoint solution)."""
+        laws = self.laws
+        free, factor = self._factor(states)
+        out = np.zeros_like(weights)
+        out[free] = factor.solve(weights[free], transposed=True)
+        self._work.back_substitutions += weights.shape[1]
+        out[laws.across] += self._rows(states)[1][:, None] * out[laws.along]
+        return out
+
+    def rcond(self, states: FaceStates) -> float:
+        return self._factor(states)[1].rcond
+
+    def _mixed(self, right: np.ndarray, states: FaceStates) -> np.ndarray:
+        out = right.copy()
+        out[self.laws.along] += self._rows(states)[1][:, None] * right[self.laws.across]
+        return out
+
+    def _rows(self, states: FaceStates) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Prescribed unknowns (n,) bool, ± tan φ of sliding nodes (n_nodes,), stiffness of springs (n,)."""
+        laws = self.laws
+        prescribed, spring = np.zeros(self.system.n, bool), np.zeros(self.system.n)
+        filled = np.isfinite(laws.normal)
+        prescribed[laws.across] = states.closed & ~filled
+        spring[laws.across] = np.where(states.closed & filled, laws.normal, 0.0)
+        sticks, soft = states.closed & laws.rough & (states.way == 0), np.isfinite(laws.shear)
+        prescribed[laws.along] = sticks & ~soft
+        spring[laws.along] = np.where(sticks & soft, laws.shear, 0.0)
+        slides = states.way * np.where(states.pulled, 0.0, laws.friction)
+        return prescribed, slides, spring
+
+    def _factor(self, states: FaceStates) -> tuple[np.ndarray, AnyFactor]:
+        key = states.key
+        if key not in self._factors:
+            if len(self._factors) >= _KEPT:
+                self._factors.pop(next(iter(self._factors)))
+            prescribed, slides, spring = self._rows(states)
+            mixed = np.zeros(self.system.n)
+            mixed[self.laws.along] = slides
+            self._factors[key] = self.system.changed(Rows(prescribed, mixed, spring, self.laws.elements.per))
+        return self._factors[key]
+
+
+class FaceValues(NamedTuple):
+    """Solution in given states: ``jumps`` and ``reaction`` λ (n,), and at the nodes (n_nodes,), relative to the stress
+    and to the opening that goes with it: ``gap``, ``pressure``, ``shear`` and the ``slip`` since the last load."""
+
+    jumps: np.ndarray
+    reaction: np.ndarray
+    gap: np.ndarray
+    pressure: np.ndarray
+    shear: np.ndarray
+    slip: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class FaceProblem:
+    """Faces under one load: their ``equations``, ``right`` (n,), the traction of fluid in the cracks minus that of the
+    loads on closed faces, and the ``memory`` of the last load."""
+
+    equations: FaceEquations
+    right: np.ndarray
+    memory: FaceMemory
+
+    @property
+    def laws(self) -> FaceLaws:
+        return self.equations.laws
+
+    @cached_property
+    def length(self) -> float:
+        """Length of the longest element, m."""
+        return float(self.laws.elements.length.max())
+
+    @cached_property
+    def stress(self) -> float:
+        """Largest load, Pa. Without load the slip left behind is the only scale."""
+        left = 1e-8 * float(np.abs(self.memory.rest).max(initial=0.0)) / self.length
+        return max(float(np.abs(self.right).max()), left, NO_STRESS)
+
+    def solve(
+        self, states: FaceStates, right: np.ndarray | None = None, cohesion: np.ndarray | float = 0.0
+    ) -> FaceValues:
+        """Solution with the nodes in these ``states``; ``right`` and more ``cohesion`` than the laws' in place of the
+        problem's own."""
+        laws = self.laws
+        w, reaction = self.equations.solve(self.right if right is None else right, states, self.memory, cohesion)
+        opening = self.stress * self.length
+        return FaceValues(
+            w, reaction,
+            gap=(w[laws.across] + laws.aperture) / opening,
+            pressure=reaction[laws.across] / self.stress,
+            shear=-reaction[laws.along] / self.stress,
+            slip=(w[laws.along] - self.spring_slip(states, reaction) - self.memory.rest) / opening,
+        )  # fmt: skip
+
+    def spring_slip(self, states: FaceStates, reaction: np.ndarray) -> np.ndarray:
+        """(n_nodes,) slip carried by shear springs at slipping nodes (times 2μ)."""
+        soft = np.isfinite(self.laws.shear) & (states.way != 0)
+        stiffness = np.where(soft, self.laws.shear, 1.0)
+        return np.where(soft, -reaction[self.laws.along] / stiffness, 0.0)

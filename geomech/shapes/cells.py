@@ -1,0 +1,131 @@
+"""Blocks divided into triangles or quadrilaterals by Gmsh: cells of a rock that is continuous through their faces."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from ..model import Blocks
+from .gmsh_models.session import gmsh_session
+
+#: What stands between the name of a block and the number of its cell.
+CELL = "#"
+
+
+class CannotMesh(RuntimeError):
+    """Gmsh has not divided a block."""
+
+
+def rock_of(name: str) -> str:
+    """The name of the block that the cell of this ``name`` is of; a block that is no cell is its own."""
+    return name.partition(CELL)[0]
+
+
+def divided(
+    blocks: Blocks, size: np.ndarray, shape: np.ndarray, between: Sequence[str] | None = None
+) -> tuple[Blocks, np.ndarray]:
+    """``blocks`` of which those with a ``size`` (n_blocks,), m, not nan, are divided into cells of about that size, ``shape``
+    (n_blocks,) "triangles" or "quads"; and the block (n_cells,) that each is of. Sides of cells keep the names of the edges
+    that they lie on, those between cells have the name ``between`` (n_blocks,), if any. Raises CannotMesh that names the block."""
+    polygons, names, edge_names, parent, glued, n = [], [], [], [], [], 0
+    start, labels = blocks.vertex_start, blocks.edge_names
+    for b in range(blocks.n_blocks):
+        loops = [
+            np.arange(blocks.loop_start[k], blocks.loop_start[k + 1])
+            for k in range(blocks.block_loop[b], blocks.block_loop[b + 1])
+        ]
+        if not np.isfinite(size[b]):
+            polygons.append([blocks.vertices[loop] for loop in loops])
+            edge_names.append([[labels[blocks.edge_name[v]] for v in loop] for loop in loops])
+            names.append(blocks.names[b])
+            parent.append(b)
+            n += int(start[b + 1] - start[b])
+            continue
+        try:
+            points, cells, lines = _mesh([blocks.vertices[loop] for loop in loops], float(size[b]), str(shape[b]))
+        except Exception as error:
+            raise CannotMesh(
+                f"{blocks.names[b]!r} cannot be divided into {shape[b]} of {size[b]:g} m: {error}"
+            ) from error
+        edge_of, inner = dict(lines), "" if between is None else between[b]
+        vertices = np.concatenate(loops)
+        sides: dict[tuple[int, int], int] = {}
+        for k, cell in enumerate(cells):
+            ring = list(zip(cell, [*cell[1:], cell[0]], strict=True))
+            own = []
+            for side, (one, two) in enumerate(ring):
+                if (two, one) in sides:
+                    glued.append((sides.pop((two, one)), n + side))
+                else:
+                    sides[one, two] = n + side
+                edge = edge_of.get((min(one, two), max(one, two)))
+                own.append(inner if edge is None else labels[blocks.edge_name[vertices[edge]]])
+            polygons.append([points[cell]])
+            edge_names.append([own])
+            names.append(f"{blocks.names[b]}{CELL}{k + 1}")
+            n += len(cell)
+        parent += [b] * len(cells)
+    out = Blocks.from_polygons(polygons, edge_names=edge_names, names=names)
+    of = np.array(parent)
+    out = replace(
+        out, material=blocks.material[of], fixed=blocks.fixed[of],
+        constrained=None if blocks.constrained is None else blocks.constrained[of],
+        order=None if blocks.order is None else blocks.order[of],
+        glued=np.array(glued, np.int64).reshape(-1, 2) if glued else None,
+    )  # fmt: skip
+    return out, of
+
+
+def _mesh(loops: list[np.ndarray], size: float, shape: str):
+    """Points (n, 2), cells (lists of 3 or 4 of them, counter-clockwise) and ((a, b), edge), a < b, for all their sides on
+    the edges of ``loops``, counted one after the other."""
+    with gmsh_session("cells") as gmsh:
+        geo, mesh, option = gmsh.model.geo, gmsh.model.mesh, gmsh.option.setNumber
+        lines, rings, corners = [], [], []
+        for loop in loops:
+            tags = [geo.addPoint(x, y, 0.0) for x, y in loop.tolist()]
+            corners.append(tags)
+            own = [geo.addLine(a, b) for a, b in zip(tags, tags[1:] + tags[:1], strict=True)]
+            lines += own
+            rings.append(geo.addCurveLoop(own))
+        surface = geo.addPlaneSurface(rings)
+        geo.synchronize()
+        option("Mesh.MeshSizeExtendFromBoundary", 1)
+        option("Mesh.MeshSizeFromPoints", 0)
+        option("Mesh.MeshSizeMax", size)
+        option("Mesh.Algorithm", 6)
+        if shape == "quads":
+            option("Mesh.Algorithm", 8)
+            option("Mesh.RecombinationAlgorithm", 1)
+            mesh.setRecombine(2, surface)
+            if len(loops) == 1 and len(lines) == 4:
+                length = np.hypot(*(np.roll(loops[0], -1, axis=0) - loops[0]).T)
+                for k in range(4):
+                    count = max(1, round(max(length[k], length[(k + 2) % 4]) / size))
+                    mesh.setTransfiniteCurve(lines[k], count + 1)
+                mesh.setTransfiniteSurface(surface, "Left", corners[0])
+        mesh.generate(2)
+        nodes, coordinates, _ = mesh.getNodes()
+        number = np.full(int(nodes.max()) + 1, -1)
+        number[nodes] = np.arange(len(nodes))
+        points = np.ascontiguousarray(coordinates.reshape(-1, 3)[:, :2])
+        cells = [cell for kind, width in ((2, 3), (3, 4)) for cell in _of_kind(mesh, number, kind, width, surface)]
+        sides = [
+            ((min(a, b), max(a, b)), edge)
+            for edge, line in enumerate(lines)
+            for a, b in number[mesh.getElementsByType(1, line)[1]].reshape(-1, 2).tolist()
+        ]
+    if not cells:
+        raise CannotMesh("Gmsh has made no cells")
+    for cell in cells:
+        x, y = points[cell].T
+        if float(x @ np.roll(y, -1) - y @ np.roll(x, -1)) < 0:
+            cell.reverse()
+    return points, cells, sides
+
+
+def _of_kind(mesh, number: np.ndarray, kind: int, width: int, surface: int) -> list[list[int]]:
+    """The elements of Gmsh's ``kind`` with ``width`` nodes."""
+    return number[mesh.getElementsByType(kind, surface)[1]].reshape(-1, width).tolist()
