@@ -2,24 +2,23 @@
 Rock bridges that fail
 ======================
 
-A block lies on a plane that is a joint but for one bridge of whole rock. Its weight is raised, as in a centrifuge,
-until the
-bridge breaks. What is the load, and what does limit equilibrium say?
+A block rests on a plane that is a joint except for one bridge of intact rock. Its weight is raised, as in a
+centrifuge, until the bridge breaks. At what load does it break, and what does limit equilibrium say?
 """
 
 # %%
 # The scene
 # ---------
 # The plane is drawn as a *crack* with a joint's law on its faces, in two pieces: the gap between them is the bridge.
-# Before it breaks,
-# slope and ground are one cracked block; afterwards there are two, of which the upper one slides. The model is
-# ``geometry/bridged_slope.geo``: a slope of 30 m by Hoek & Bray (1981) with a tension crack behind the brink.
+# Before it breaks, slope and ground are one cracked block; afterwards there are two, of which the upper one slides.
+# The model is ``geometry/bridged_slope.geo``: a slope of 30 m by Hoek & Bray (1981) with a tension crack behind the
+# brink.
 #
 # Three choices matter:
 #
 # - ``criterion = "f"``: the bridge is sheared, so it may break in shear, against its own toughness
 #   ``k_iic_pa_sqrt_m``;
-# - ``stepping = "events"``: the run ends its steps at the very load at which a tip reaches its toughness;
+# - ``stepping = "events"``: a step ends at exactly the load at which a tip reaches its toughness;
 # - gravity grows by one g a second, so that time is the multiple of gravity.
 
 import tempfile
@@ -101,11 +100,10 @@ failure = cycle.state.time
 # %%
 # Limit equilibrium with a bridge
 # -------------------------------
-# A block of weight :math:`W` on a plane at angle :math:`d` slides when :math:`W\sin d` exceeds
-# :math:`W\cos d\tan\varphi + c\,\ell` and what the
-# bridge holds. Two deep cracks with a ligament of width :math:`2b` between them, sheared by a force :math:`Q`, have
-# :math:`K_{II} = Q/\sqrt{\pi b}` (Tada, Paris & Irwin). So the bridge holds :math:`K_{IIc}\sqrt{\pi b}`.
-# ``geomech/reference/slopes/rock_bridges.py`` has this formula with its sources.
+# A block of weight :math:`W` on a plane at angle :math:`d` slides when :math:`W\sin d` exceeds :math:`W\cos
+# d\tan\varphi + c\,\ell` plus what the bridge holds. Two deep cracks with a ligament of width :math:`2b` between them,
+# sheared by a force :math:`Q`, have :math:`K_{II} = Q/\sqrt{\pi b}` (Tada, Paris & Irwin). So the bridge holds
+# :math:`K_{IIc}\sqrt{\pi b}`. ``geomech/reference/slopes/rock_bridges.py`` has this formula with its sources.
 
 height, dip, crest = 30.0, np.radians(35), 6.0
 brink = height / np.tan(np.radians(60))
@@ -138,6 +136,5 @@ sketch(cycle, right)
 right.set(ylim=(-12, 33), title="two blocks now")
 
 # %%
-# ``pipelines/planar_slope`` does this for bridges of 0.15 to 1.2 m and one that may only tear.
-# ``pipelines/step_path_slope`` has ten
-# en-échelon joints, followed through the fall of the load with ``control = "toughness"``.
+# ``pipelines/planar_slope`` does this for bridges of 0.15 to 1.2 m, and for one that may only tear.
+# ``pipelines/step_path_slope`` follows ten en-échelon joints while the load drops, with ``control = "toughness"``.

@@ -2,18 +2,16 @@
 A rising water table
 ====================
 
-A block on a plane, a tension crack behind it, and water that rises in both. The factor of safety falls; at which
-level does
-it pass one? Then the water rises while the run goes on, and the block goes.
+A block on a plane, a tension crack behind it, and water that rises in both. The factor of safety falls: at which level
+does it reach 1? In a second run the water rises with time until the block slides.
 """
 
 # %%
 # The scene
 # ---------
-# Water presses in all joints below its table, ``[loads.water]``. Here the table is level in the crack; the plane
-# drains at the toe.
-# The plane goes on below the toe, so that nothing bars the way there. A table above the ground would be a lake;
-# ``follows_ground`` cuts it off there.
+# Water presses on the faces of all joints below the water table, ``[loads.water]``. Here the table is level in the
+# crack; the plane drains at the toe. The plane goes on below the toe, so that nothing blocks the slide there. A table
+# above the ground would be a lake; ``follows_ground`` cuts it off at the ground.
 
 import tempfile
 from pathlib import Path
@@ -91,9 +89,8 @@ found = [geomech.factor_of_safety(load_scene(work / "water.toml", table(level)))
 
 # %%
 # Against limit equilibrium (Hoek & Bray 1981, chapter 7): the water's thrust :math:`V = \tfrac12\gamma_w z^2` in the
-# crack and the uplift
-# :math:`U` on the plane. The table is a straight line here, so pressure along the plane is linear from the toe to
-# :math:`\gamma_w z`.
+# crack and the uplift :math:`U` on the plane. The table is a straight line here, so pressure along the plane is linear
+# from the toe to :math:`\gamma_w z`.
 
 dip, length = np.arctan2(10, 20), np.hypot(20, 10)
 weight = (
@@ -118,8 +115,8 @@ axes.legend(frameon=False)
 # %%
 # It rises while the run goes on
 # ------------------------------
-# ``levels_m`` raises the whole table in time. The block begins at rest (``equilibrium = "start"``), and goes when its
-# factor is one.
+# ``levels_m`` raises the whole table in time. The block begins at rest (``equilibrium = "start"``) and starts to slide
+# when its factor reaches 1.
 
 rising = load_scene(
     work / "water.toml",
@@ -142,6 +139,6 @@ sketch(cycle, right)
 right.set_title(f"t = {cycle.state.time:g} s")
 
 # %%
-# What to watch: pressure counts on every edge below the table, so a table drawn through the air in front of the face
-# is a lake that presses *on* the
-# slope and holds it. ``geomech check`` says so, and ``geomech build`` draws it.
+# One thing to watch: water presses on every edge below the table. A table drawn through the air in front of the face
+# is therefore a lake that presses *on* the slope and holds it. ``geomech check`` warns of it, and ``geomech build``
+# draws it.

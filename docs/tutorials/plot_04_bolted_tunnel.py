@@ -2,17 +2,16 @@
 Bolts and an excavated tunnel
 =============================
 
-Rock with three joint sets is at rest under its weight. A tunnel is dug into it while the run goes on. Without support
-a key block
-comes out of the roof; with bolts it stays.
+Rock with three joint sets is at rest under its weight. A tunnel is excavated during the run. Without support a key
+block falls from the roof; with bolts it stays.
 """
 
 # %%
 # The scene
 # ---------
-# The tunnel's inside is a zone of its own, ``core``, that is taken out at 0.02 s: ``[[loads.excavations]]``. Bolts
-# are lines; grouted ones work at every joint they
-# cross. Both have a time from which they act, ``time_s`` and ``start_s``.
+# The rock inside the tunnel is a zone of its own, ``core``, which is removed at 0.02 s: ``[[loads.excavations]]``.
+# Bolts are lines; grouted bolts work at every joint they cross. Excavations and bolts act from a given time on,
+# ``time_s`` and ``start_s``.
 
 import tempfile
 from pathlib import Path
@@ -123,19 +122,16 @@ for axes, name in zip(both, ("tunnel", "bolted")):
         axes.plot([x0, x1], [y0, y1], color="#0072b2", lw=2)
 
 # %%
-# Before the tunnel is dug nothing moves, and energies are next to nothing: a warning of the energy balance at 0.03 s,
-# as a part of what little has been turned over by then, need
-# not worry. ``budget_residual`` in ``history.csv`` says it in J/m.
+# Before the excavation nothing moves and almost no energy is turned over. The warning about the energy balance at 0.03
+# s is relative to that small amount and can be ignored; ``budget_residual`` in ``history.csv`` gives it in J/m.
 #
-# What the bolts carry
-# --------------------
-# A run folder has them in ``history.csv``, a column a bolt and joint. From Python they are rows of the state:
+# What the bolts carry -------------------- ``history.csv`` in the run folder has their forces, one column for each
+# bolt and joint. From Python they are rows of the state:
 
 carried = cycle.state.bolts["force"] / 1e3
 print(f"{len(carried)} pieces of bolts between joints carry up to {carried.max():.1f} kN/m; they yield at 160")
 
 # %%
 # ``geometry/tunnel.geo`` is a horseshoe tunnel with a fault, whose roof bolts are drawn in the model as lines called
-# ``bolt:roof``; the scene beside it
-# runs as it is. A liner is a zone of its own between rock and air. ``[loads.in_situ]`` begins with a stress and K0
-# instead of the weight alone.
+# ``bolt:roof``; the scene beside it runs as it is. A liner is a zone of its own between rock and air.
+# ``[loads.in_situ]`` starts from a given stress and K0 instead of the weight alone.

@@ -3,16 +3,15 @@ The two-crack specimen of the paper
 ===================================
 
 Khanizadeh Bahabadi et al. (2023) compute the specimens of Haeri et al. (2014): two slots of 10 mm in a plate of 60 ×
-120 mm between platens,
-crack 2 turned from crack 1 by φ. Here is φ = 0 and what it takes to say "the same" or "not the same" of a published
-figure.
+120 mm between platens, crack 2 turned from crack 1 by φ. This page runs φ = 0 and shows what it takes to say whether a
+result agrees with a published figure.
 """
 
 # %%
 # Run
 # ---
-# ``geomech run pipelines/two_cracks`` runs all four and writes the page that compares every table. From Python, one
-# of them, in about two seconds:
+# ``geomech run pipelines/two_cracks`` runs all four and writes a page that compares every table. From Python, one of
+# them, in about two seconds:
 
 from pathlib import Path
 
@@ -39,8 +38,8 @@ for event in events:
 # %%
 # The cracks, and the load they need
 # ----------------------------------
-# Steps end at the very load at which the next tip reaches its toughness (``run.stepping = "events"``), so K never
-# passes 2 MPa √m by more than what an increment brings.
+# Steps end at exactly the load at which the next tip reaches its toughness (``run.stepping = "events"``), so K exceeds
+# 2 MPa √m by no more than one increment of growth adds.
 
 figure, (left, right) = plt.subplots(1, 2, figsize=(10, 4.8), layout="constrained", width_ratios=(1.3, 1))
 left.plot(loads, factors, ".-")
@@ -53,10 +52,9 @@ right.set(title="after coalescence", xlim=(-0.03, 0.03), ylim=(-0.06, 0.06))
 # %%
 # Against the paper
 # -----------------
-# Loads scale with the toughness: :math:`\sigma\sqrt{\pi b}/K_{Ic}` is what can be compared. With the printed
-# toughness no such slot can grow below 44.6 MPa,
-# above the strength of the intact material (28 MPa), so the printed stresses (2 to 5 MPa) do not follow from it. What
-# can be compared is *where* cracks go:
+# Loads scale with the toughness, so :math:`\sigma\sqrt{\pi b}/K_{Ic}` is what can be compared. With the printed
+# toughness no such slot can grow below 44.6 MPa, above the strength of the intact material (28 MPa), so the printed
+# stresses (2 to 5 MPa) do not follow from it. What can be compared is *where* cracks go:
 
 first = next(event for event in events if event.kind == "initiation")
 last = next(event for event in events if event.kind == "coalescence")
@@ -83,7 +81,6 @@ for order in (2, 4, 6):
     print(f"order {order}: K_I, K_II at 1 MPa = {np.round(tips['k_i'] / 1e6, 6)}, {np.round(tips['k_ii'] / 1e6, 6)}")
 
 # %%
-# What else there is: ``--variant closed_0`` with closed faces, ``paper_0`` with the paper's elements and Kelvin's
-# solution, ``increment_…`` and ``order_…``; and
-# ``geomech report outputs/two_cracks`` for a page of all. What the paper's figures say and contradict:
-# :doc:`/verification/two_cracks`.
+# Other variants: ``--variant closed_0`` has closed faces, ``paper_0`` the paper's elements and Kelvin's solution,
+# ``increment_…`` and ``order_…`` other settings. ``geomech report outputs/two_cracks`` puts all of them on one page.
+# Where the paper's figures agree with each other, and where they do not: :doc:`/verification/two_cracks`.

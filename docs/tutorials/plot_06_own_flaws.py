@@ -7,8 +7,8 @@ cemented.
 """
 
 # %%
-# Each crack may have its own faces: ``[cracks.NAME]`` with an ``aperture`` and the law of a joint.
-# The specimen stands on one frictionless platen and is pressed by another, ``guided`` to run along y alone.
+# Each crack can have faces of its own: ``[cracks.NAME]`` with an ``aperture`` and a joint law. The specimen stands on
+# one frictionless platen and is pressed by another, ``guided`` to run along y alone.
 
 import tempfile
 from pathlib import Path
@@ -126,8 +126,8 @@ interior_every = 1000
 # %%
 # Run into a folder, as ``geomech run flaws.toml`` does, and read it back
 # ------------------------------------------------------------------------
-# Whoever watches a run is an observer. Those that write files come from ``standard_observers``; ours keeps the last
-# cycle, to draw it.
+# An observer watches a run, cycle by cycle. ``standard_observers`` returns those that write files; ours keeps the last
+# cycle so that we can draw it.
 
 
 class Last(Observer):
@@ -145,7 +145,7 @@ for _, event in run.events.head(6).iterrows():
     print(f"{event['load'] / 1e6:6.2f} MPa  {event['kind']}: {event['detail']}")
 
 # %%
-# ``tips.csv`` has a row a tip and cycle. The slot has a negative K_I, and grows wings all the same; the closed one
+# ``tips.csv`` has one row per tip and cycle. The slot has a negative K_I and grows wings all the same; the closed flaw
 # has K_I = 0 until its wings open.
 
 figure, (left, right) = plt.subplots(1, 2, figsize=(10, 4.8), layout="constrained", width_ratios=(1.3, 1))
@@ -178,5 +178,5 @@ strain = history["load"].iloc[-1] * (1 - 0.21**2) / 17e9
 print(f"strain at the end {history['strain'].iloc[-1]:.3e}; whole rock would have {strain:.3e}")
 
 # %%
-# To change it: ``--set geometry.cracks.1.angle_deg=60`` turns the second flaw (items count from 0);
-# ``aperture = 0.0002`` is a crack that closes when its faces have moved by 0.2 mm.
+# To change the scene: ``--set geometry.cracks.1.angle_deg=60`` turns the second flaw (items count from 0); a crack
+# with ``aperture = 0.0002`` closes once its faces have approached each other by 0.2 mm.

@@ -2,14 +2,13 @@
 A hydraulic fracture beside a fault
 ===================================
 
-A crack is pumped up in rock under in-situ stress. A fault, closed and rough, lies beside it. Does the fracture slip
-the fault,
-and does the fault turn the fracture?
+Fluid opens a crack in rock under in-situ stress. A closed, rough fault lies beside it. Does the fracture make the
+fault slip, and does the fault turn the fracture?
 """
 
 # %%
-# The crack solver alone: infinite plane, stress far away, fluid in one crack, friction on the other. No scene is
-# needed.
+# This uses the crack solver alone: an infinite plane, stress far away, fluid in one crack, friction on the other. No
+# scene is needed.
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -25,9 +24,9 @@ laws = [JointLaw("fracture", friction_angle=np.radians(30)), JointLaw("fault", f
 settings, growth = DdmSettings(order=4, elements_per_crack=8), GrowthSettings(increment=0.4)
 
 # %%
-# In-situ stress: 10 MPa from above, 22 MPa from the side (tension is positive). The fracture opens against the
-# smaller one once the fluid passes
-# 10 MPa. The fault at 45° bears nearly what its friction holds: it is at rest, but not by much.
+# In-situ stress: 10 MPa from above, 22 MPa from the side (tension is positive). The fracture opens against the smaller
+# one once the fluid passes 10 MPa. The fault at 45° carries nearly the shear that friction allows: it is at rest, but
+# only just.
 
 stress = np.array([-22e6, -10e6, 0.0])
 along = (fault[1] - fault[0]) / np.linalg.norm(fault[1] - fault[0])
@@ -40,7 +39,8 @@ print(f"on the fault, MPa: {normal / 1e6:.2f} across, {shear / 1e6:.2f} along; f
 # %%
 # Pumped, not grown
 # -----------------
-# A load is the stress far away, which stands, and the fluid's pressure in the segments of the first crack.
+# A load consists of the stress far away, which stays constant, and the fluid's pressure in the segments of the first
+# crack.
 
 
 def load(pressure: float, cracks: Cracks = cracks) -> ddm.BodyLoad:
@@ -67,8 +67,8 @@ print(
 print("estimated errors", np.round(solution.tip_errors[:2, 0] / alone, 9), "of it")
 
 # %%
-# The stress beside the fracture shows why: the fluid presses the rock above and below, and in front of the tip it
-# takes pressure off the fault.
+# The stress beside the fracture shows why: the fluid compresses the rock above and below; ahead of the tip it relieves
+# the fault.
 
 x, y = np.meshgrid(np.linspace(-4, 9, 130), np.linspace(-4, 5, 90))
 field = solution.stress(np.column_stack([x.ravel(), y.ravel()])).reshape(*x.shape, 3)
@@ -82,9 +82,8 @@ figure.colorbar(shades, ax=right, label="σyy, MPa")
 # %%
 # It grows
 # --------
-# ``control="toughness"`` finds, step by step, the pressure that just drives the fracture. A load that is a function
-# of the factor lets the stress of the
-# rock stand while the fluid's pressure changes.
+# ``control="toughness"`` finds, step by step, the pressure that just drives the fracture. When the load is a function
+# of the factor, the stress in the rock stays constant while the fluid's pressure changes.
 
 
 def grow(network: Cracks, **options) -> list:
@@ -114,5 +113,5 @@ for step in beside:
         print(event.kind, event.detail, np.round(event.point, 2))
 
 # %%
-# ``pipelines/pressurised_crack`` grows a fracture to a free surface; scenes take fluids too (``[[loads.fluids]]``),
-# pumped into cracks by name, standing in what they connect with.
+# ``pipelines/pressurised_crack`` grows a fracture to a free surface. Scenes take fluids too (``[[loads.fluids]]``), in
+# cracks that you name and in all that are connected with them.

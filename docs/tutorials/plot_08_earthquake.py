@@ -2,18 +2,16 @@
 An earthquake
 =============
 
-A block on a sliding plane is shaken by El Centro 1940. Newmark's sliding block is the answer to compare with; then
-the same plane carries a
-mass of blocks.
+A block on a sliding plane is shaken by El Centro 1940. We compare it with Newmark's sliding block, then put a jointed
+mass on the same plane.
 """
 
 # %%
 # The scene
 # ---------
 # ``[loads.base]`` shakes the fixed blocks with a record: time and acceleration in a text file. ``frame = "base"``
-# lets the base stand and blocks feel
-# minus its acceleration, which is the same and easier to look at. Joints with a stiffness settle more quickly than
-# penalty springs.
+# holds the base still and applies minus its acceleration to the blocks, which is equivalent and easier to look at.
+# Joints with a given stiffness settle more quickly than penalty springs.
 
 import tempfile
 from pathlib import Path
@@ -88,9 +86,9 @@ zone = "mass"
 # %%
 # Newmark's block
 # ---------------
-# It slides while the base's acceleration asks for more than friction holds, down the plane at 20° with 28° of
-# friction: the plain integration below has the
-# exact rule and no elasticity. The yield acceleration is :math:`g\tan(28° - 20°) = 0.14\,g`.
+# The block slides down the plane of 20° while the base's acceleration demands more than its friction of 28° provides.
+# The plain integration below follows that rule exactly, without elasticity. The yield acceleration is :math:`g\tan(28°
+# - 20°) = 0.14\,g`.
 
 shaking = History.from_file(record)
 times = np.arange(0, 6.0, 1e-4)
@@ -123,7 +121,7 @@ print(f"the block slides {1e3 * block[-1]:.1f} mm, Newmark's {1e3 * newmark[-1]:
 # %%
 # A mass of blocks
 # ----------------
-# Two joint sets in the mass. It slides as a whole, and opens besides.
+# The mass has two joint sets. It slides as a whole, and its joints open as well.
 
 JOINTS = """
 [[geometry.joint_sets]]
@@ -160,6 +158,6 @@ sketch(last, right, magnify=5)
 right.set_title("displacements five times")
 
 # %%
-# ``pipelines/jointed_slope`` has a thousand blocks with a hundred cracks on such a plane. Edges that should let waves
-# out take ``[[loads.viscous_boundaries]]``; records are
-# taken to rest by ``baseline = "linear"``.
+# ``pipelines/jointed_slope`` has a thousand blocks with a hundred cracks on such a plane.
+# ``[[loads.viscous_boundaries]]`` lets waves leave through edges; ``baseline = "linear"`` corrects a record so that it
+# ends at rest.

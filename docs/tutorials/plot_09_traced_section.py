@@ -2,17 +2,16 @@
 A section traced in DXF or GeoJSON
 ==================================
 
-A road cut was mapped: joints as lines on layers, in world coordinates, with ends that miss and overshoot. We read it,
-look at what was
-mended, run it, and write the blocks back for a GIS.
+A road cut was mapped: joints as lines on layers, in world coordinates, with ends that fall short or overshoot. We read
+it, look at what was mended, run it, and export the blocks to a GIS.
 """
 
 # %%
 # Layers say what lines are
 # -------------------------
 # ``geometry/traced_slope.toml`` names the layers of ``traced_slope.dxf``: zones, joints, bolts, the water table,
-# measuring points. Arcs, splines, blocks and units of the
-# drawing are read. Coordinates are easting and height; the run counts from an origin near the rock.
+# measuring points. Arcs, splines, blocks and the units of the drawing are understood. Coordinates are easting and
+# height; the run itself uses an origin near the rock.
 
 import json
 import tempfile
@@ -47,7 +46,7 @@ print(len(blocks["features"]), "features;", blocks["features"][0]["properties"])
 # %%
 # Run
 # ---
-# A second of motion under its weight, with water and anchors.
+# One second of motion under its own weight, with water and anchors.
 
 for cycle in geomech.cycles(load_scene(project / "geometry" / "traced_slope.toml", {"run.end_time_s": 0.3})):
     pass
@@ -58,7 +57,8 @@ axes.set_title(f"after {cycle.state.time:g} s")
 # %%
 # The same from GeoJSON or CSV
 # ----------------------------
-# Lines with a property that names their set; ``set_property`` says which. A polygon called ``zone:rock`` is the rock.
+# Each line has a property that names its set; ``set_property`` says which property that is. A polygon called
+# ``zone:rock`` is the rock.
 
 features = [
     ("zone:rock", "Polygon", [[[0, 0], [20, 0], [20, 12], [6, 12], [0, 0]]]),
@@ -103,6 +103,5 @@ for warning in cut.warnings:
 sketch(cut)
 
 # %%
-# Ends that miss by less than ``tolerance_m`` were meant to meet, and are reported with their place. Look at the list
-# before you trust the blocks: it is what
-# the person who digitised did not mean.
+# Ends that miss each other by less than ``tolerance_m`` are joined and reported with their place. Read that list
+# before you trust the blocks: it shows where the tracing was not what it was meant to be.

@@ -2,7 +2,7 @@
 Runs from Python, results in pandas
 ===================================
 
-A set of runs from one scene, driven from Python, and their tables in data frames.
+We drive a set of runs of one scene from Python and read their tables into data frames.
 """
 
 # %%
@@ -65,9 +65,8 @@ for friction in (0, 10, 20, 28, 32):
 # %%
 # Histories as data frames
 # ------------------------
-# ``geomech.open_run`` gives the tables of a run folder: ``history``, ``tips``, ``events``, ``joints``. (Every CSV has
-# one header line and SI units, so that ``pandas.read_csv`` and
-# any spreadsheet read it too.)
+# ``geomech.open_run`` gives the tables of a run folder: ``history``, ``tips``, ``events``, ``joints``. (Every CSV file
+# has one header line and SI units, so ``pandas.read_csv`` and any spreadsheet can read it too.)
 
 frames = {friction: geomech.open_run(work / f"friction_{friction}").history for friction in (0, 10, 20, 28, 32)}
 print(
@@ -93,8 +92,8 @@ axes.legend(frameon=False, title="friction")
 # %%
 # More than tables
 # ----------------
-# The same object has the summary, the scene as it was run, and the series as PyVista meshes at any cycle or time. In
-# a notebook it shows itself.
+# The same object has the summary, the scene as it was run, and the series as PyVista meshes at any cycle or time. In a
+# notebook it shows a summary, and ``run.view()`` plays the run.
 
 run = geomech.open_run(work / "friction_20")
 print(run, "·", run.summary["end"], "·", run.series)
@@ -108,8 +107,7 @@ print(run.joints.tail(1).T.to_string())
 # Without files
 # -------------
 # ``geomech.cycles(scene)`` yields each cycle as it comes: arrays of blocks, contacts, tips. An observer is any object
-# with ``on_cycle``; see
-# ``geomech.output.Observer``. Nothing is written that no observer writes.
+# with ``on_cycle``; see ``geomech.output.Observer``. Without an observer that writes files, nothing is written.
 
 for cycle in geomech.cycles(load_scene(work / "block.toml", {"dda.equilibrium": ""})):
     pass

@@ -2,8 +2,8 @@
 Choose the step, springs, increment and order
 =============================================
 
-Every setting buys accuracy with time. This page measures both on two small scenes, so that you can do the same on
-yours: run at half the step, and look at what changes.
+Every setting trades computing time for accuracy. This page measures both on two small scenes. You can do the same with
+yours: halve the step and look at what changes.
 """
 
 # %%
@@ -56,7 +56,7 @@ axes.legend(frameon=False)
 # %%
 # The order of crack elements
 # ---------------------------
-# A slanted crack in a plate; the reference is order 10. Each order costs little and brings most of a digit.
+# A slanted crack in a plate; the reference is order 10. Each order costs little and gains most of a digit.
 
 rock = Material("rock", 17e9, 0.21, k_ic=2e6)
 plate = np.array([[-0.03, -0.06], [0.03, -0.06], [0.03, 0.06], [-0.03, 0.06]])
@@ -82,7 +82,7 @@ axes.loglog(*np.array(found).T, "s-", color="C2")
 axes.set(xlabel="processor time, ms", ylabel="error of K", title="order 2 … 8 of elements")
 
 # %%
-# Or say which error you want: ``ddm.target_error`` in the scene, ``ddm.solve_to`` in Python.
+# Or state the error that you accept: ``ddm.target_error`` in the scene, ``ddm.solve_to`` in Python.
 
 solution = ddm.solve_to([plate], crack, rock, load, 1e-7)
 left_over = np.abs(solution.tip_errors).max() / np.abs(solution.tips["k_ii"]).max()
@@ -91,8 +91,7 @@ print(f"asked for 1e-7: order {solution.body.settings.order}, estimated error {l
 # %%
 # The increment of growth
 # -----------------------
-# Wing cracks of that crack, to a length of 12 mm, by increments of 4 to 1 mm. What is compared is where the tip comes
-# to.
+# The same crack grows wing cracks 12 mm long, by increments of 4 to 1 mm. We compare where the tip ends up.
 
 ends, figure = {}, plt.figure(figsize=(5, 3.6), layout="constrained")
 axes = figure.subplots()

@@ -22,6 +22,7 @@ TOPICS = {
     "kernels": "geomech.bench.cost.kernel_cost",
     "many": "geomech.bench.cost.many_cracks",
     "motion": "geomech.bench.cost.motion_cost",
+    "order": "geomech.bench.accuracy.bending_precision",
     "output": "geomech.bench.cost.output_cost",
     "safety": "geomech.bench.safety.slope_factors",
     "schemes": "geomech.bench.accuracy.block_schemes",

@@ -37,7 +37,7 @@ def record(
     bent = bent_bodies(now.system.deflected, state, motion)
 
     def moved(block: int, point: tuple[float, float]) -> np.ndarray:
-        affine = motion.current(block, point) - np.asarray(point)
+        affine = motion.current(block, np.asarray(point)) - np.asarray(point)
         return affine + bent[block].deflection(np.array([point], float))[0] if block in bent else affine
 
     cycle = _LazyCycle(
@@ -143,7 +143,7 @@ def leading_load(problem: Problem, blocks: Blocks, now: float, acted: Mapping[st
     if problem.endless is not None:
         return problem.endless.load_at(now)
     name = problem.load_edge
-    edges = blocks.edges_named(name) if name else []
+    edges = blocks.edges_named(name) if name else np.zeros(0, int)
     if not len(edges):
         return _weight_of_a_column(problem, now) if name == WEIGHT else 0.0
     outward = blocks.outward_normals[edges[0]]

@@ -21,8 +21,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..compiled import kept, part
+from ..compiled import UNCOUNTED, kept, part
 from ..model import OPEN, SLIP
+from .kinematics.newmark import BlockMass, SchemeTerms
 
 log = logging.getLogger(__name__)
 
@@ -75,7 +76,7 @@ class StepEnergy(NamedTuple):
         return self.kinetic + self.elastic + self.contact
 
 
-@part(fastmath=False, error_model="numpy", nogil=True)
+@part(fastmath=False, error_model="numpy", nogil=True, **UNCOUNTED)
 def _product(first, second, b, c, d, area, xx, yy, xy):
     """∫ u·w over a block with these moments, of two first-order fields with the rigid motions ``first[b]`` and
     ``second[b]`` and the strains c and d."""
@@ -88,13 +89,13 @@ def _product(first, second, b, c, d, area, xx, yy, xy):
     return total
 
 
-@part(fastmath=False, error_model="numpy", nogil=True)
+@part(fastmath=False, error_model="numpy", nogil=True, **UNCOUNTED)
 def _push(stiffness, gap, limit):
     """Normal force (N) of a contact's spring, straight or of Bandis' hyperbolic closure."""
     return -stiffness * gap / (1.0 + gap / limit)
 
 
-@part(fastmath=False, error_model="numpy", nogil=True)
+@part(fastmath=False, error_model="numpy", nogil=True, **UNCOUNTED)
 def _stored(stiffness, gap, limit, bonded):
     """Energy (J/m) of a contact's normal spring; apart, only a bonded one has any."""
     if gap > 0.0 and bonded == 0:
@@ -191,11 +192,10 @@ _KINETIC, _ELASTIC, _CONTACT, _BEFORE, _GRAVITY_WORK, _LOAD_WORK, _CRACK_WORK = 
 _FRICTION, _DAMPING, _BOND, _SCHEME, _CARRIED, _OVERLAP, _RESIDUAL = range(7, 14)
 
 
-@part(fastmath=False, error_model="numpy", nogil=True)
-def _strain_energies(b, strain, stress, weight):
+@part(fastmath=False, error_model="numpy", nogil=True, **UNCOUNTED)
+def _strain_energies(b, strain, stress, weight, now):
     """Of block ``b``, per area (J/m³): ½ σ·C⁻¹σ before and after the step, the work done on its cracks, σ̄·Δε, and
-    Δε·tangent Δε; ``strain`` (3,) is Δε."""
-    now = np.empty(3)
+    Δε·tangent Δε; ``strain`` (3,) is Δε, ``now`` (3,) room for σ′."""
     u0 = u1 = cracked = mean = quadratic = 0.0
     for k in range(3):
         now[k] = stress.stress0[b, k]
@@ -214,10 +214,10 @@ def _strain_energies(b, strain, stress, weight):
     return u0, u1, cracked, mean, quadratic
 
 
-@part(fastmath=False, error_model="numpy", nogil=True)
-def _kinetic_energies(b, motion, mass):
+@part(fastmath=False, error_model="numpy", nogil=True, **UNCOUNTED)
+def _kinetic_energies(b, motion, mass, rate):
     """Of block ``b`` (J/m): kinetic energy as the last step ended, as this one begins and as it ends; the work of its
-    inertia on the step's displacement; and ∫ρ|d|², kg m."""
+    inertia on the step's displacement; and ∫ρ|d|², kg m. ``rate`` (3,): room for strain rates."""
     increment, velocity = motion.increment, motion.velocity
     old, carried, acceleration = motion.old_velocity, motion.carried, motion.acceleration
     area, xx, yy, xy = mass.moments[b, 0], mass.moments[b, 3], mass.moments[b, 4], mass.moments[b, 5]
@@ -225,7 +225,6 @@ def _kinetic_energies(b, motion, mass):
     # The new velocity is on the rotated axes: rotated back, it is compared on the step's own.
     c, s = np.cos(increment[b, 2]), np.sin(increment[b, 2])
     ex, ey, g = velocity[b, 3], velocity[b, 4], 0.5 * velocity[b, 5]
-    rate = np.empty(3)
     rate[0] = c * c * ex + s * s * ey + 2 * s * c * g
     rate[1] = s * s * ex + c * c * ey - 2 * s * c * g
     rate[2] = 2.0 * ((c * c - s * s) * g - s * c * (ex - ey))
@@ -242,40 +241,46 @@ def _kinetic_energies(b, motion, mass):
     return had, begun, after, work, moved
 
 
-@part(fastmath=False, error_model="numpy", nogil=True)
-def _add_blocks(out, motion, stress, mass, scheme, gravity):
-    """Add the terms of blocks to the sums ``out`` (14,)."""
+@part(fastmath=False, error_model="numpy", nogil=True, **UNCOUNTED)
+def _add_blocks(out, motion, stress, mass, scheme, gravity, room):
+    """The terms of blocks, into ``out`` (14,); ``room`` (3,) is working space."""
     increment = motion.increment
+    kinetic = elastic = before = fallen = loads = cracks = viscous = scheme_loss = lost = 0.0
     for b in range(increment.shape[0]):
         area, rho, strain = mass.moments[b, 0], mass.density[b], increment[b, 3:]
-        u0, u1, cracked, mean, quadratic = _strain_energies(b, strain, stress, scheme.weight)
-        out[_ELASTIC] += area * u1
-        out[_BEFORE] += area * u0
+        u0, u1, cracked, mean, quadratic = _strain_energies(b, strain, stress, scheme.weight, room)
+        elastic += area * u1
+        before += area * u0
         # A fixed block may be made to move: what drives it works.
         for k in range(6):
-            out[_LOAD_WORK] += motion.load[b, k] * increment[b, k]
+            loads += motion.load[b, k] * increment[b, k]
         if mass.fixed[b]:
             continue
-        out[_SCHEME] += area * (mean - (u1 - u0) - cracked)
-        out[_CRACK_WORK] += area * cracked
-        had, begun, after, work, moved = _kinetic_energies(b, motion, mass)
+        scheme_loss += area * (mean - (u1 - u0) - cracked)
+        cracks += area * cracked
+        had, begun, after, work, moved = _kinetic_energies(b, motion, mass, room)
         xx, yy, xy = mass.moments[b, 3], mass.moments[b, 4], mass.moments[b, 5]
         # The work of the centrifugal force on the strains.
         spin = rho * motion.carried[b, 2] * motion.carried[b, 2] * (xx * strain[0] + yy * strain[1] + xy * strain[2])
-        out[_KINETIC] += after
-        out[_BEFORE] += had
-        out[_CARRIED] += had - begun
-        out[_SCHEME] += work - spin - (after - begun)
-        out[_GRAVITY_WORK] += rho * area * (gravity[0] * increment[b, 0] + gravity[1] * increment[b, 1])
-        out[_DAMPING] += scheme.mass_damping / scheme.dt * moved
+        kinetic += after
+        before += had
+        lost += had - begun
+        scheme_loss += work - spin - (after - begun)
+        fallen += rho * area * (gravity[0] * increment[b, 0] + gravity[1] * increment[b, 1])
+        viscous += scheme.mass_damping / scheme.dt * moved
         drag = scheme.stiffness_damping
         drag += 2.0 * scheme.block_damping * np.sqrt(rho * area / (12.0 * stress.stiffness[b, 0, 0]))
-        out[_DAMPING] += drag / scheme.dt * area * quadratic
+        viscous += drag / scheme.dt * area * quadratic
+    out[_KINETIC], out[_ELASTIC], out[_BEFORE] = kinetic, elastic, before
+    out[_GRAVITY_WORK], out[_LOAD_WORK], out[_CRACK_WORK] = fallen, loads, cracks
+    out[_DAMPING], out[_SCHEME], out[_CARRIED] = viscous, scheme_loss, lost
 
 
-@part(fastmath=False, error_model="numpy", nogil=True)
+@part(fastmath=False, error_model="numpy", nogil=True, **UNCOUNTED)
 def _add_contacts(out, contacts, closure):
     """Add the terms of contacts to the sums ``out`` (14,); ``closure`` (n_laws,) m, the largest of a joint's faces."""
+    contact = overlap = friction = bond = 0.0
+    before, viscous, scheme_loss = out[_BEFORE], out[_DAMPING], out[_SCHEME]
     for i in range(contacts.state.shape[0]):
         was, state, theta = contacts.was_state[i], contacts.state[i], contacts.theta[i]
         kn, g0, g1, limit = contacts.normal[i], contacts.gap0[i], contacts.gap[i], closure[contacts.law[i]]
@@ -284,7 +289,7 @@ def _add_contacts(out, contacts, closure):
         if was != OPEN:
             shear0 = contacts.shear_force0[i]
             phi0 = _stored(kn, g0, limit, contacts.was_bonded[i]) + 0.5 * give * shear0 * shear0
-        out[_BEFORE] += phi0
+        before += phi0
         if state != OPEN:
             pushed, sheared, end = contacts.normal_force[i], contacts.shear_force[i], contacts.end_shear[i]
             if was == OPEN and g0 < 0.0:
@@ -300,27 +305,30 @@ def _add_contacts(out, contacts, closure):
                 spring = -theta * _push(kn, g1, limit) - (1.0 - theta) * _push(kn, start, limit)
                 drag = -(pushed + spring) * (g1 - g0)
         rest = given - done - (phi1 - phi0) - rubbed - drag
-        out[_CONTACT] += phi1
-        out[_OVERLAP] += given
-        out[_FRICTION] += rubbed
-        out[_DAMPING] += drag
+        contact += phi1
+        overlap += given
+        friction += rubbed
+        viscous += drag
         if contacts.was_bonded[i] and not contacts.bonded[i]:
-            out[_BOND] += rest
+            bond += rest
         else:
-            out[_SCHEME] += rest
+            scheme_loss += rest
+    out[_BEFORE], out[_DAMPING], out[_SCHEME] = before, viscous, scheme_loss
+    out[_CONTACT], out[_OVERLAP], out[_FRICTION], out[_BOND] = contact, overlap, friction, bond
 
 
 @kept(fastmath=False, error_model="numpy", nogil=True)
 def step_energies(motion, stress, mass, scheme, gravity, contacts, closure):
     """The terms of `StepEnergy` in its order but for impacts, (14,) J/m.
 
-    ``motion``, ``stress`` and ``mass`` of the blocks (`StepMotion`, `StepStress`, `BlockMass`), ``scheme``
+    Plain tuples: ``motion``, ``stress`` and ``mass`` of the blocks (`StepMotion`, `StepStress`, `BlockMass`), ``scheme``
     (`SchemeTerms`), ``gravity`` (2,) m/s², ``contacts`` (`ContactStep`), and ``closure`` (n_laws,) m, the largest of
     joints with Bandis' law, inf for the others.
     """
     out = np.zeros(14)
-    _add_blocks(out, motion, stress, mass, scheme, gravity)
-    _add_contacts(out, contacts, closure)
+    blocks = StepMotion(*motion), StepStress(*stress), BlockMass(*mass), SchemeTerms(*scheme)
+    _add_blocks(out, *blocks, gravity, np.empty(3))
+    _add_contacts(out, ContactStep(*contacts), closure)
     work = out[_GRAVITY_WORK] + out[_LOAD_WORK] + out[_OVERLAP]
     losses = out[_FRICTION], out[_DAMPING], out[_BOND], out[_SCHEME], out[_CARRIED]
     out[_RESIDUAL] = out[_KINETIC] + out[_ELASTIC] + out[_CONTACT] - out[_BEFORE]
@@ -362,7 +370,7 @@ class EnergyBudget:
         first = self.last is None
         totals = self.totals + step
         start = step.before if first else self.start
-        jump = 0.0 if first else step.before - self.last.stored
+        jump = 0.0 if self.last is None else step.before - self.last.stored
         split = self.split + (jump if self.is_cut else 0.0)
         residual = self.residual + (0.0 if self.is_cut else jump) + step.residual
         work = abs(float(totals[_SUMS["gravity_work"]])) + abs(float(totals[_SUMS["load_work"]]))

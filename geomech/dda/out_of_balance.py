@@ -2,18 +2,9 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 
 from ..compiled import kept
-
-
-class ContactForces(NamedTuple):
-    """Normal and shear forces of contacts (n,), N."""
-
-    normal: np.ndarray
-    shear: np.ndarray
 
 
 @kept(fastmath=False, error_model="numpy", nogil=True)
@@ -25,9 +16,9 @@ def imbalance(own, contacts, unknowns, forces, acceleration, mass, loads, larges
     sum of the sizes of its weight, loads and contact forces (for its rotation moments over √area), at the block where
     it is largest: 0 at rest, 1 in free flight.
 
-    ``own`` (`BlockEquations`), ``contacts`` (`ContactMotion`) and ``unknowns`` (n, 6) as solved; ``forces``
-    (`ContactForces`); ``acceleration`` (n_blocks, 6); ``mass`` (`BlockMass`); ``loads`` (`BlockLoads`); ``largest`` N of
-    the forces in the right side that may cancel there.
+    ``own`` (`BlockEquations`), ``contacts`` (`ContactMotion`) and ``unknowns`` (n, 6) as solved; ``forces``, normal and
+    shear (n_contacts,); ``acceleration`` (n_blocks, 6); ``mass`` (`BlockMass`); ``loads`` (`BlockLoads`), all as plain
+    tuples; ``largest`` N of the forces in the right side that may cancel there.
     """
     matrix, right = own
     block, other, order, vectors = contacts

@@ -1,6 +1,6 @@
 """How the open–close iteration looks for contact states: the ways it goes, and the numbers that these are tuned by.
 
-``geomech bench contact-solver`` switches the ways off one by one and tells what each number is worth, over random
+``geomech bench contact-solver`` switches the methods off one by one and measures what each number is worth, over random
 slopes, slopes and walls under sudden weight, arches, debris and strength reduction: "measured" below means there.
 """
 
@@ -31,7 +31,7 @@ class ContactSolver:
 
     Patches of blocks about contacts that stay wrong (`dda.open_close.block_patches`)
     patches              whether they are settled by themselves
-    patch_tries          so often in a step
+    patch_tries          this many times in a step
     patch_wrong          where no more than this part of all contacts is wrong
     patch_rings          patches reach so many blocks beyond these contacts
     patch_share          and have at most this part of all blocks, …
@@ -53,7 +53,7 @@ class ContactSolver:
     path_start              ε begins at so many times the mean of N²/kₙ (1 takes a third more iterations) …
     path_least_start        … and not below this, in units of the squared load over the stiffness
     path_correctors         correctors of a step at most (Gondzio 1996; none: a quarter more iterations)
-    path_recentred          so often contacts are centred again where steps have become short, …
+    path_recentred          this many times contacts are centred again where steps have become short, …
     path_recentred_larger   … with so much larger an ε
     path_load_rings         a contact's load is the largest within so many blocks of it: a pebble below a large block
                             bears that one's

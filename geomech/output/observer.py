@@ -1,11 +1,11 @@
-"""What watches a run: objects that are told of its start, of every cycle and of its end."""
+"""Observers of a run: objects that are called at its start, after every cycle and at its end."""
 
 from __future__ import annotations
 
 import logging
 from collections.abc import Iterable
 from pathlib import Path
-from typing import Any, Protocol, runtime_checkable
+from typing import Any, Protocol, cast, runtime_checkable
 
 from geomech.model import Cycle, Problem
 
@@ -16,9 +16,8 @@ _log = logging.getLogger(__name__)
 class Observer(Protocol):
     """A run calls `on_start` once, `on_cycle` for every cycle in order, and `on_end` once, also after a failure.
 
-    An observer that writes what a resumed run is to go on with has two methods more: ``memory()``, what it needs for
-    that (plain data, see `geomech.plain_data`), and ``on_resume(problem, folder, memory)``, called in place of
-    `on_start`, which brings its files back to where they were then. Whoever has none of them is started anew.
+    An observer whose files a resumed run continues has two methods more: ``memory()``, what it needs for that (plain data, see `geomech.plain_data`), and ``on_resume(problem, folder, memory)``, called in place of
+    `on_start`, which brings its files back to their state at that time. Those without these methods are started as in a new run.
 
     ``summary`` is one mapping that all observers share: whoever runs the cycles puts in what it knows (``end``, the
     reason; ``wall_s``), and each observer may add to it. ``error`` is the exception that ended the run, if one did.
@@ -29,6 +28,14 @@ class Observer(Protocol):
     def on_cycle(self, cycle: Cycle) -> None: ...
 
     def on_end(self, summary: dict[str, Any], error: BaseException | None = None) -> None: ...
+
+
+class Resumed(Observer, Protocol):
+    """An observer that can be resumed."""
+
+    def memory(self) -> Any: ...
+
+    def on_resume(self, problem: Problem, folder: Path, memory: Any) -> None: ...
 
 
 class Group:
@@ -45,7 +52,7 @@ class Group:
             self._started.append(observer)
 
     def on_resume(self, problem: Problem, folder: Path, memories: list[tuple[str, Any]]) -> None:
-        """Go on with the ``memories`` of other such observers, each with the first of its own kind."""
+        """Continue with the ``memories`` of other such observers, each with the first of its own kind."""
         left = list(memories)
         for observer in self.observers:
             mine = next((each for each in left if each[0] == _kind(observer)), None)
@@ -53,12 +60,16 @@ class Group:
                 observer.on_start(problem, folder)
             else:
                 left.remove(mine)
-                observer.on_resume(problem, folder, mine[1])
+                cast(Resumed, observer).on_resume(problem, folder, mine[1])
             self._started.append(observer)
 
     def memories(self) -> list[tuple[str, Any]]:
-        """(kind, memory) of every observer that can go on with one."""
-        return [(_kind(observer), observer.memory()) for observer in self.observers if hasattr(observer, "memory")]
+        """(kind, memory) of every observer that can be resumed."""
+        return [
+            (_kind(observer), cast(Resumed, observer).memory())
+            for observer in self.observers
+            if hasattr(observer, "memory")
+        ]
 
     def on_cycle(self, cycle: Cycle) -> None:
         for observer in self.observers:

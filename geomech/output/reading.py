@@ -77,8 +77,8 @@ class Run:
             raise KeyError(f"no series {name!r}; there are {', '.join(SERIES)}")
         path, steps = self.folder / f"{name}.pvd", self.folder / (name + vtkhdf.SUFFIX)
         if path.is_file():
-            return read_collection(path)
-        return vtkhdf.read_steps(steps) if steps.is_file() else []
+            return list(read_collection(path))
+        return list(vtkhdf.read_steps(steps)) if steps.is_file() else []
 
     def grids(self, name: str) -> dict[int, Path | HdfStep]:
         """cycle number → file (or step) of the series ``name``, in order."""

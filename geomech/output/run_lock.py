@@ -66,7 +66,8 @@ class RunLock:
     who has left it without a word; None where nobody has. Raises FolderInUse."""
 
     def __init__(self, folder: Path) -> None:
-        self.folder, self.stale = Path(folder), None
+        self.folder = Path(folder)
+        self.stale: str | None = None
         self._file: int | None = None
 
     def __enter__(self) -> Self:

@@ -27,7 +27,9 @@ class RunLog:
         self.level = level
 
     def on_start(self, problem: Problem, folder: Path) -> None:
-        self._problem, self._last, self._happened = problem, None, set()
+        self._problem = problem
+        self._last: Cycle | None = None
+        self._happened: set[Any] = set()
         self._open(Path(folder), "w")
         _log.info("%s: %s, %s", problem.title, problem.inventory, counted(len(problem.materials), "material"))
 
@@ -90,9 +92,9 @@ class SceneCopy:
 
         folder = Path(folder)
         folder.mkdir(parents=True, exist_ok=True)
-        beside = folder / "scene.toml.part"
-        beside.write_text(tomli_w.dumps(_without_none(self.resolved)), encoding="utf-8")
-        os.replace(beside, folder / "scene.toml")
+        unfinished = folder / "scene.toml.part"
+        unfinished.write_text(tomli_w.dumps(_without_none(self.resolved)), encoding="utf-8")
+        os.replace(unfinished, folder / "scene.toml")
 
     def on_cycle(self, cycle: Cycle) -> None:
         pass

@@ -108,7 +108,8 @@ class Recording:
             # Every round leaves out one at least.
             chosen = evenly(self.run, chosen, max(2, min(len(chosen) - 1, int(len(chosen) * budget / size))))
         frames = [made[number] for number in chosen]
-        return self.opening() | self.state() | _with_own_meshes(frames, self.frames.meshes) | {"of": len(cycles)}
+        more = {"of": len(cycles), "ranges": picture_ranges(self.run)}
+        return self.opening() | self.state() | _with_own_meshes(frames, self.frames.meshes) | more
 
     def _size(self, made: dict[int, dict[str, Any]]) -> int:
         """Bytes of text that these frames take, with their meshes."""
@@ -149,7 +150,7 @@ def evenly(run: Run, cycles: Sequence[int], most: int) -> list[int]:
         if done[-1] > done[0]:
             way = way + (done - done[0]) / (done[-1] - done[0])
     numbers = np.asarray(cycles)
-    first = {}
+    first: dict[Any, Any] = {}
     for event in run.events if len(run.events) else ():
         first.setdefault(str(event["kind"]), int(event["cycle"]))
     fixed = {int(numbers[0]), int(numbers[-1])}
@@ -171,6 +172,17 @@ def magnification(run: Run) -> float:
     if asked is not None:
         return float(asked)
     return suitable_scale(run) if len(run.history) and run.series("blocks") else 1.0
+
+
+def picture_ranges(run: Run) -> dict[str, list[float]]:
+    """Lowest and highest value, SI units, of the fields that the run's pictures show: the page begins with the same
+    colours."""
+    from ..render.fields.quantity import limits, quantity
+
+    if not run.series("blocks"):
+        return {}
+    shown = ("displacement", run.scene.get("render", {}).get("component", "yy"))
+    return {name: list(limits([run], quantity(run, name))) for name in shown}
 
 
 def quick_magnification(run: Run, cycle: int) -> float:

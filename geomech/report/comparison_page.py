@@ -59,7 +59,7 @@ def _add_times(page: Page, runs: Sequence[Run]) -> None:
 def add_table(page: Page, runs: Sequence[Run]) -> None:
     """The table that the terminal shows, columns that no run fills left out."""
     headers, *rows = shown(table(runs))
-    page.table(headers, rows)
+    page.table([str(name) for name in headers], rows)
 
 
 def differences(runs: Sequence[Run]) -> dict[str, list[Any]]:
@@ -90,9 +90,16 @@ def add_ends(page: Page, runs: Sequence[Run], title: str = "Pictures") -> None:
         return
     page.section(title)
     with tempfile.TemporaryDirectory() as folder:
+        painters = [suited(run, width=560) for run in pictured]
+        # What is compared has one range of colours.
+        spans: dict[str, tuple[float, float]] = {}
+        for painter in painters:
+            low, high = spans.get(painter.what.name, painter.view.limits)
+            spans[painter.what.name] = min(low, painter.view.limits[0]), max(high, painter.view.limits[1])
         shown = []
         for k, run in enumerate(pictured):
-            path = draw_end(suited(run, width=560), Path(folder) / f"{k}.png")
+            painter = suited(run, width=560, span=spans.get(painters[k].what.name))
+            path = draw_end(painter, Path(folder) / f"{k}.png")
             shown.append((path, f"{run.folder.name}: {run.summary.get('end', 'not ended')}"))
         page.figures(shown, least_rem=13)
     if len(runs) > PICTURED:

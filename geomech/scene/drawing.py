@@ -189,8 +189,8 @@ def draw(
             if name not in known:
                 at = ("geometry", "traces", k, "zones", n)
                 faults.append(Fault(place(at), f"there is no zone {name!r}", nearest(name, known)))
-    for k, entry in enumerate(geometry.joints):
-        for n, name in enumerate(entry.zones):
+    for k, joint in enumerate(geometry.joints):
+        for n, name in enumerate(joint.zones):
             if name not in known:
                 at = ("geometry", "joints", k, "zones", n)
                 faults.append(Fault(place(at), f"there is no zone {name!r}", nearest(name, known)))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import difflib
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Annotated, Any
 
 from pydantic import ConfigDict, TypeAdapter, ValidationError
@@ -41,7 +41,7 @@ def validate(data: dict[str, Any], place: Callable[[Path], str]) -> tuple[SceneT
         if name not in data:
             sections[name] = None if field.is_required() else field.default
             continue
-        kind = Annotated[(field.annotation, *field.metadata)] if field.metadata else field.annotation
+        kind: Any = Annotated[(field.annotation, *field.metadata)] if field.metadata else field.annotation
         # A model brings its own configuration; only plain containers take it from here.
         config = None if table_at((name,)) else ConfigDict(strict=True)
         try:
@@ -83,7 +83,7 @@ def _meant(key: str, known: list[str]) -> str:
     return f"did you mean {' or '.join(map(repr, close))}? " if close else ""
 
 
-def _fault(item: dict[str, Any], place: Callable[[Path], str]) -> Fault:
+def _fault(item: Mapping[str, Any], place: Callable[[Path], str]) -> Fault:
     path: Path = tuple(item["loc"])
     kind, given, context = item["type"], item.get("input"), item.get("ctx", {})
     # Members of a union and keys of a map add parts that stand nowhere in the file.

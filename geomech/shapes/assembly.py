@@ -36,11 +36,12 @@ def assemble(
     of one another.
     """
     everything = [loop for zone in zones for loop in zone.loops] + [line for t in traces for line in t.lines]
+    drawn = [("zones", "zone", k, zone.name, zone.loops) for k, zone in enumerate(zones)]
+    drawn += [("cracks", "crack", k, trace.name, trace.lines) for k, trace in enumerate(traces)]
     flaws = [
-        Flaw(part, k, f"{what} {item.name!r} has a coordinate that is not a finite number", "give finite x and y in m")
-        for part, what, items in (("zones", "zone", zones), ("cracks", "crack", traces))
-        for k, item in enumerate(items)
-        if not all(np.isfinite(a).all() for a in (item.loops if part == "zones" else item.lines))
+        Flaw(part, k, f"{what} {name!r} has a coordinate that is not a finite number", "give finite x and y in m")
+        for part, what, k, name, lines in drawn
+        if not all(np.isfinite(line).all() for line in lines)
     ]
     if flaws:
         raise ShapeError(flaws)
@@ -73,7 +74,8 @@ def assemble(
 
 def block_names(zone_names: Sequence[str]) -> list[str]:
     """A name a block: the zone's own, or "zone 1", "zone 2" … where a zone has several."""
-    count, seen, names = Counter(zone_names), Counter(), []
+    count, names = Counter(zone_names), []
+    seen: Counter[str] = Counter()
     for name in zone_names:
         seen[name] += 1
         names.append(name if count[name] == 1 else f"{name} {seen[name]}")

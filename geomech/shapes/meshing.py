@@ -15,7 +15,7 @@ from .gmsh_models.session import gmsh_session
 
 log = logging.getLogger(__name__)
 
-#: Triangles with a smaller angle than this are told of, rad. Gmsh keeps 20° where nothing is narrow.
+#: Triangles with a smaller angle than this are reported, rad. Gmsh keeps 20° where nothing is narrow.
 SLIVER = math.radians(1.0)
 
 
@@ -61,7 +61,7 @@ def mesh_interior(
     grow back to it by ``slope`` times the distance (a half: over two of its lengths). Nodes on cracks are
     doubled, at junctions once a sector, at mouths too; tips stay single. Between cracks, or a crack and the outline,
     that come
-    nearer to each other than sides are long triangles are as flat as that; flatter ones than 1° are told to the log
+    nearer to each other than sides are long triangles are as flat as that; those below 1° are reported in the log
     with their
     place: fields are shown at nodes and lose nothing, but another program's finite elements would. Raises ValueError
     for sizes that are not
@@ -160,8 +160,8 @@ def _mesh(loops, cracks: Cracks, size: float, tip_size: float, reach: float):
             number = np.full(int(nodes.max()) + 1, -1)
             number[nodes] = np.arange(len(nodes))
             triangles = number[mesh.getElementsByType(2)[1]].reshape(-1, 3)
-            edges = [number[mesh.getElementsByType(1, line)[1]].reshape(-1, 2) for line in lines]
-            edges = np.concatenate(edges) if edges else np.empty((0, 2), int)
+            on_lines = [number[mesh.getElementsByType(1, line)[1]].reshape(-1, 2) for line in lines]
+            edges = np.concatenate(on_lines) if on_lines else np.empty((0, 2), int)
             if len(triangles) and _are_edges(edges, triangles, len(nodes)):
                 break
         else:
@@ -228,7 +228,8 @@ def _torn(points: np.ndarray, triangles: np.ndarray, crack_edges: np.ndarray) ->
         about.setdefault(int(triangles[t, k]), []).append((int(t), int(k)))
 
     triangles, old = triangles.copy(), triangles
-    new_points, new_sides = [], []
+    new_points: list[np.ndarray] = []
+    new_sides: list[np.ndarray] = []
     for node, corners in about.items():
         sectors = _sectors(node, corners, old, cut)
         if len(sectors) < 2:

@@ -18,5 +18,5 @@ def straight_crack(centre: Sequence[float], length: float, angle: float) -> np.n
     """(2, 2) ends of a crack of ``length`` m about ``centre``, at ``angle`` rad counter-clockwise from x; it runs
     from its far end to the end the angle points to."""
     half = 0.5 * length * np.array([math.cos(angle), math.sin(angle)])
-    centre = np.asarray(centre, dtype=float)
-    return np.array([centre - half, centre + half])
+    middle = np.asarray(centre, dtype=float)
+    return np.array([middle - half, middle + half])

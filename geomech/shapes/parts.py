@@ -70,7 +70,7 @@ class Flaw(NamedTuple):
     list."""
 
     part: str
-    index: int
+    index: int  # type: ignore[assignment]  # hides tuple.index
     message: str
     way_out: str
 

@@ -131,7 +131,9 @@ class LocalEngine:
         self._stopping = True
 
     def results(self, jobs: Iterable[Job]) -> Iterator[dict[str, Any]]:
-        waiting, again, attempts = iter(jobs), deque(), {}
+        waiting = iter(jobs)
+        again: deque[Job] = deque()
+        attempts: dict[int, int] = {}
         exhausted = False
         while True:
             while not self._stopping and (worker := self._idle(bool(again) or not exhausted)) is not None:
@@ -143,7 +145,7 @@ class LocalEngine:
             busy = [each for each in self._all if each.jobs]
             if not busy:
                 return
-            by_pipe = {each.pipe: each for each in busy}
+            by_pipe: dict[Any, _Worker] = {each.pipe: each for each in busy}
             for pipe in wait(list(by_pipe), timeout=0.5):
                 yield from self._read(by_pipe[pipe], again, attempts)
 
@@ -230,7 +232,7 @@ def work(handle: int) -> None:
 
 
 def prepare_worker() -> None:
-    """Ctrl-C in the terminal is for the sweep, which lets runs under way end; loops of references are seldom sought."""
+    """Ctrl-C in the terminal is for the sweep, which lets runs under way end; loops of references are seldom collected."""
     import gc
 
     with suppress(ValueError):  # another thread than the main one
@@ -296,7 +298,7 @@ def _locked(path: Path) -> Iterator[None]:
 
 
 def _memory(process: int) -> float:
-    """Bytes that a process holds; 0 where it cannot be told."""
+    """Bytes that a process holds; 0 where it is not known."""
     try:
         return int(Path(f"/proc/{process}/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE")
     except (OSError, ValueError, IndexError):

@@ -253,8 +253,8 @@ def _run(job: Job) -> dict[str, Any]:
         place = _own_folder(job)
         summary = run(scene, place, [*standard_observers(scene, quiet=True), watcher], overwrite=True)
     else:
-        with tempfile.TemporaryDirectory(prefix="geomech-run-") as place:
-            summary = run(scene, place, [Summary(), watcher], overwrite=True)
+        with tempfile.TemporaryDirectory(prefix="geomech-run-") as temporary:
+            summary = run(scene, Path(temporary), [Summary(), watcher], overwrite=True)
     summary = json.loads(json.dumps(summary, default=_plain))
     first, row = summary.get("first", {}), {}
     for kind in ("initiation", "coalescence"):
@@ -324,6 +324,7 @@ def _plain(value: Any) -> Any:
 
 
 def _own_folder(job: Job) -> Path:
+    assert job.folder is not None
     place = Path(job.folder)
     place.mkdir(parents=True, exist_ok=True)
     return place

@@ -68,7 +68,7 @@ class Plan:
 
     @property
     def result(self) -> str:
-        """The column that is told of first: what `fails` compares, else that of the measure."""
+        """The column that is reported first: what `fails` compares, else that of the measure."""
         first = next((name for name in sorted(names_in(self.fails)) if "." not in name), None)
         return (
             first
@@ -467,7 +467,9 @@ class _Checker:
         settings, seeds, random = self.settings, plan.seeds, plan.random
         if settings.rare and (seeds or not random or len(random) < len(plan.variables)):
             self.refuse(
-                ("rare",), "rare failures are sought among random variables alone", "leave seeds and listed values out"
+                ("rare",),
+                "rare failures are searched for among random variables alone",
+                "leave seeds and listed values out",
             )
         if settings.rare:
             try:
@@ -550,8 +552,9 @@ def _map_of(scene: Any) -> tuple[tuple[float, float, float, float], tuple[int, i
     low, high = blocks.vertices[free].min(axis=0), blocks.vertices[free].max(axis=0)
     size = high - low
     cell = float(max(size)) / _CELLS or 1.0
-    cells = tuple(int(max(1, math.ceil(length / cell - 1e-9))) for length in size)
-    return (*map(float, low), float(low[0] + cells[0] * cell), float(low[1] + cells[1] * cell)), cells
+    across, up = (int(max(1, math.ceil(length / cell - 1e-9))) for length in size)
+    x, y = map(float, low)
+    return (x, y, float(low[0] + across * cell), float(low[1] + up * cell)), (across, up)
 
 
 def _toml(value: Any) -> str:

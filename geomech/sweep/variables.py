@@ -187,7 +187,7 @@ def _of_table(name: str, table: dict[str, Any]) -> Random:
             f"its keys are {', '.join(names)}",
         )
     defaults = {"low": -math.inf, "high": math.inf}
-    numbers = [table.get(key, defaults.get(key)) for key in names]
+    numbers: list[Any] = [table.get(key, defaults.get(key)) for key in names]
     if not all(isinstance(number, (int, float)) and not isinstance(number, bool) for number in numbers):
         raise VariableError(f"the parameters of {law} are numbers", f"its keys are {', '.join(names)}")
     return _random(name, law, [float(number) for number in numbers])

@@ -15,7 +15,7 @@ from geomech.reference.specimens import single_flaw as published
 from geomech.render.curves.paths import crack_paths
 from geomech.render.curves.studies import against
 from geomech.report.page import Page
-from geomech.report.run_page import add_curves, add_pictures, add_time, key_results
+from geomech.report.run_page import add_curves, add_pictures, add_player, add_time, key_results
 
 #: What the sixth of a flaw's half-length is to a wing: shorter ones feel the corner they leave.
 SHORTEST = published.HALF_LENGTH / 6
@@ -33,6 +33,7 @@ def write_page(runs: Mapping[str, Wings], places: Mapping[str, Path], out: Path)
         "Figures 10 (the specimen), 11, 12 and 14 (its cracks, alone and beside other methods').",
     )
     page.facts(key_results(run))
+    add_player(page, [run])
     add_pictures(page, run)
     with tempfile.TemporaryDirectory() as folder:
         drawings = Path(folder)

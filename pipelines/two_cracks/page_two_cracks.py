@@ -17,6 +17,7 @@ from geomech.render.curves.paths import crack_paths
 from geomech.render.curves.studies import against
 from geomech.report.comparison_page import add_compared_curves, add_ends
 from geomech.report.page import Page
+from geomech.report.run_page import add_player
 
 #: Parts of the comparison that have a figure.
 LOADS = "Loads and strains"
@@ -53,6 +54,7 @@ def write_page(runs: Mapping[str, Watch], folder: Path, out: Path, overrides: Se
 def _fill(page: Page, runs, by_phi, folder: Path, out: Path, overrides, drawings: Path) -> None:
     folders = [Run(out / name) for name in own(runs) or runs if (out / name / "history.csv").is_file()]
     add_ends(page, folders, "Paths (Figures 8, 9 and 13)")
+    add_player(page, folders[:4])
     if by_phi:
         page.figures(
             [(_paths(own(runs) or runs, drawings / "paths.svg"), "Paths alone, mm: slots black, what grew in colour.")],

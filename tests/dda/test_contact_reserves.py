@@ -40,7 +40,7 @@ def test_contacts_leave_their_states_where_nothing_is_left_in_reserve(slack):
             np.zeros(n, bool),
         ),
         zero, np.full(n, slack),
-    )[0].state  # fmt: skip
+    )[0]  # fmt: skip
     reserve = reserves(state, bonded, normal, shear, gap, springs, slack)
     # Where forces are sums of larger numbers, these are known to their last digits.
     digits = 4e-16 * (np.abs(normal) + np.abs(shear) + strength)

@@ -18,9 +18,7 @@ from docs.generate import gallery  # noqa: E402
 NOT_REMADE: set[str] = {
     "bench_dda.png",
     "bench_ddm.png",
-    "bench_geometry.png",
     "bench_solvers.png",
-    "jointed_slope.png",
     "random_slope.png",
     "stability.png",
     "stability_cracks.png",

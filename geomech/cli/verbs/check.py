@@ -22,6 +22,7 @@ def declare(verbs: Verbs) -> None:
 def _check(options: argparse.Namespace) -> int:
     from ...coupling import crack_cost
     from ...model import counted
+    from ...model.loads.wave_limits import wave_lines
     from ...scene import load_scene
 
     first = load_scene(options.scene, options.overrides, None)
@@ -34,12 +35,9 @@ def _check(options: argparse.Namespace) -> int:
         problem = scene.problem()
         tips = f" with {counted(len(problem.cracks.tips), 'tip')}" if problem.cracks.n_cracks else ""
         print("\n".join([f"{problem.title}: {problem.inventory}{tips}: no errors", *scene.overview()]))
-        print(
-            "".join(
-                f"  {'elements' if k == 0 else '':<9} {line}\n" for k, line in enumerate(crack_cost.cost_lines(problem))
-            ),
-            end="",
-        )
+        for label, lines in (("elements", crack_cost.cost_lines(problem)), ("waves", wave_lines(problem))):
+            for k, line in enumerate(lines):
+                print(f"  {label if k == 0 else '':<9} {line}")
     if first.variants and not options.variants:
         print(f"variants: {', '.join(first.variants)}")
     return DONE

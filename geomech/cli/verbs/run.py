@@ -85,6 +85,8 @@ def _load_script(path: Path) -> Any:
     import importlib.util
 
     spec = importlib.util.spec_from_file_location(f"geomech_pipeline_{path.parent.name}", path)
+    if spec is None or spec.loader is None:
+        raise ImportError(f"{path} cannot be imported")
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     if not hasattr(module, "main"):

@@ -19,7 +19,7 @@ def declare(verbs: Verbs) -> None:
         "geomech safety slope.toml --along bedding fault --json safety.json --picture mechanism.png\n"
         "geomech safety slope.toml --divide cohesion=1.25 friction=1.25 tension=1.0",
     )  # fmt: skip
-    safety.description += (
+    safety.description = (safety.description or "") + (
         " tan φ, cohesion and tensile strength of the joints are divided by F until no static equilibrium is left. "
         "Blocks are whole: where cracks lead into blocks that can move, what rock bridges hold would count as if it "
         "could not break, and no factor is given unless it is asked for --without-cracks."

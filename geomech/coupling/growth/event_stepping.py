@@ -47,9 +47,10 @@ FURTHER_BACK = 0.75
 USE = 0.8
 #: Most solutions of one search, and most of them before the event is enclosed.
 MOST, OPEN = 40, 5
-#: Relative difference below which two times are the same. An event between two such times is a jump of K (faces that
-#: close or start to slip); tips grow at the later one.
-JUMP = 1e-6
+#: Relative difference below which two times are the same, of times beyond the fraction SOON of a time step. An event
+#: between two such times is a jump of K (faces that close or start to slip, or loads that act from the beginning); tips
+#: grow at the later one.
+JUMP, SOON = 1e-6, 1e-3
 
 
 class EventSteps:
@@ -128,7 +129,8 @@ class EventSteps:
             found, excess = self._at(now, aim, limit - start, free=k == 0)
             at = found.result.state.time
             search.add(at, excess)
-            self.reached = abs(excess) <= SETTLED or (excess > 0 and search.width <= JUMP * abs(at))
+            same = JUMP * max(abs(at), SOON * self.time_step)
+            self.reached = abs(excess) <= SETTLED or (excess > 0 and search.width <= same)
             goes_on = whole and (search.enclosed or (at < limit and k < OPEN)) and not self.changes.reached
             if self.reached or (excess < 0 and not goes_on):
                 break

@@ -33,7 +33,7 @@ class Crossing:
             self._low = at, value
         else:
             self._high = at, value
-        if side == self._side and self.enclosed:
+        if side == self._side and self._low is not None and self._high is not None:
             # The same end has stayed twice: half its value moves the next point across the root.
             if side < 0:
                 self._high = self._high[0], 0.5 * self._high[1]
@@ -52,17 +52,19 @@ class Crossing:
     @property
     def width(self) -> float:
         """Length of the interval that contains the root; infinite until there is one."""
-        return abs(self._high[0] - self._low[0]) if self.enclosed else math.inf
+        if self._low is None or self._high is None:
+            return math.inf
+        return abs(self._high[0] - self._low[0])
 
     @property
     def next(self) -> float:
         """The next trial point; infinite where the last points show no root ahead. Raises ValueError without points."""
-        if self.enclosed:
+        if self._low is not None and self._high is not None:
             (a, f), (b, g) = self._low, self._high
             if self._since >= _PATIENCE:
                 return 0.5 * (a + b)
             return a - f * (b - a) / (g - f)
         if self._last is None:
-            raise ValueError("a crossing is sought from at least one point")
+            raise ValueError("a crossing is searched for from at least one point")
         at, value = self._last
         return at - value / self.slope if self.slope > 0 else math.copysign(math.inf, -value)

@@ -64,7 +64,7 @@ class Found(NamedTuple):
     ``inside`` (k, 4): points and the forces there; ``bases`` (j, 4): first and last row of pieces on a rigid base,
     traction per unit pressure. Rows beyond the room of the arrays are only counted."""
 
-    count: np.ndarray
+    count: np.ndarray  # type: ignore[assignment]  # hides tuple.count
     pieces: np.ndarray
     inside: np.ndarray
     bases: np.ndarray

@@ -44,6 +44,7 @@ def _endless_pass(now: CrackedBlocks, dt: float, load_time: float | None) -> Bal
 def loads_of(now: CrackedBlocks, cracks: Cracks, bodies: dict) -> dict[int, BoundaryLoad]:
     """Loads (block →) at the time of the last pass, with these ``cracks``."""
     endless, time = now.problem.endless, now.load_time
+    assert endless is not None
     load = BoundaryLoad(
         np.empty((0, 2, 2)), np.empty((0, 2, 2)), np.zeros(2), np.zeros((2, 2)), np.zeros(2), 0.0,
         remote_stress=endless.stress_at(time),

@@ -178,8 +178,8 @@ def _divide(
                     spans.append([0.0, 1.0] if k < 0 else graph.span[k].tolist())
                 else:
                     spans[-1][1] = graph.span[k, 1]  # the edge continues beyond the mouth
-            corners = np.array(corners)
-            loops.append((graph.points[corners], current[corners], names))
+            at = np.array(corners)
+            loops.append((graph.points[at], current[at], names))
             origin.append(graph.vertex[corners])
             edge_origin.append(np.array(edges))
             edge_span.append(np.array(spans))

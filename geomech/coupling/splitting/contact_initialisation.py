@@ -222,7 +222,7 @@ def _inherit_along_walls(inherited: _Inherited, found, split: Split, parent: int
     points, following, owner = blocks.vertices, blocks.next_vertex, blocks.vertex_block
     own = np.flatnonzero((split.edge_origin < 0) & (split.parent[owner] == parent))
     edge_of = {(*points[e].tolist(), *points[following[e]].tolist()): int(e) for e in own}
-    between = {}
+    between: dict[tuple[frozenset[int], tuple[float, ...]], list[int]] = {}
     for row in np.flatnonzero((split.parent[found.block] == parent) & (split.parent[found.other] == parent)).tolist():
         at = tuple(points[found.vertex[row]].tolist())
         between.setdefault((frozenset((int(found.block[row]), int(found.other[row]))), at), []).append(row)

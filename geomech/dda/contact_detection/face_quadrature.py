@@ -126,9 +126,9 @@ class FacePoints:
         if glued.any():
             shortest[glued] = 1.0
             apart[glued], share[glued] = softened(ends[glued], length[glued])
-            some = (apart < _AT_CORNERS) | (share < _AT_CORNERS)
+            inside = (apart < _AT_CORNERS) | (share < _AT_CORNERS)
             ends, length, held, shortest, apart, share, glued = (
-                each[some] for each in (ends, length, held, shortest, apart, share, glued)
+                each[inside] for each in (ends, length, held, shortest, apart, share, glued)
             )
         part = _left(borne.bare[ends], _pressed(borne.normal[ends], held, shortest), held, shortest)
         still, full = np.zeros_like(part), np.ones(len(part))
@@ -295,7 +295,7 @@ class FacePoints:
         low, high = self.part.T
         length = high - low
         part = np.clip(part, (low - length)[:, None], (high + length)[:, None])
-        # A part that has moved to the other side is sought on both.
+        # A part that has moved to the other side is looked for on both.
         over = (part[:, 0] >= high) | (part[:, 1] <= low)
         part[over] = np.stack([np.minimum(part[:, 0], low), np.maximum(part[:, 1], high)], axis=1)[over]
         first, second = ((state[self.ends] != OPEN) | (gap[self.ends] <= 0)).T

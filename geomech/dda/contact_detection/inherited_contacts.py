@@ -84,6 +84,7 @@ def at_their_springs(
     order = np.argsort(keys)
     here = order[np.minimum(np.searchsorted(keys[order], theirs), len(keys) - 1)]
     points = placed.points
+    assert points is not None
     inherited = np.zeros(len(rows), bool)
     inherited[which] = True
     # Where only one end is prescribed, the other keeps its gap.

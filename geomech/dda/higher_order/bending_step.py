@@ -16,12 +16,10 @@ from dataclasses import replace
 import numpy as np
 
 from ...model import OPEN
-from ..equation_records import BlockEquations, ContactMotion
 from ..kinematics.midpoint_configuration import MidpointConfiguration
-from ..kinematics.newmark import BlockLoads
 from ..open_close.contact_set import ContactSet
 from ..open_close.equations import Unsettled
-from ..out_of_balance import ContactForces, imbalance
+from ..out_of_balance import imbalance
 from ..results import StepResult
 from ..time_step import Attempt, StepStart
 from .deflected_blocks import DeflectedBlocks
@@ -248,9 +246,9 @@ class BendingAttempt(Attempt):
             forces = self.glue.forces(self.system.scheme.weight * self.glue_change, len(self.order))
             right[self.order[moving]] += forces[moving]
         return imbalance(
-            BlockEquations(self.matrix, right), ContactMotion(found.block, found.other, self.order, self.vectors),
-            settled.unknowns[:n], ContactForces(settled.normal_force, settled.shear_force), self.acceleration,
-            self._mass, BlockLoads(self.gravity, load), largest,
+            (self.matrix, right), (found.block, found.other, self.order, self.vectors), settled.unknowns[:n],
+            (settled.normal_force, settled.shear_force), self.acceleration, tuple(self._mass), (self.gravity, load),
+            largest,
         )  # fmt: skip
 
     def _energy(self, load: np.ndarray, end_shear: np.ndarray):

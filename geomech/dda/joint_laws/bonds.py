@@ -1,6 +1,6 @@
-"""Bonds of whole faces: what two corners of a face hold together, and when the bond between them fails.
+"""Bonds of whole faces: the strength of a bond between two faces, and when it fails.
 
-An edge on an edge is held by contacts at the ends of the overlap ℓ. Their pulls Tᵢ at the distances aᵢ from its middle
+Two bonded edges are joined by contacts at the ends of their overlap ℓ. Their pulls Tᵢ at the distances aᵢ from its middle
 are the resultants T = Σ Tᵢ and M = Σ Tᵢ aᵢ of the stress along the face, which between blocks that deform evenly is a
 straight line. Its extreme fibre is at
 
@@ -8,8 +8,8 @@ straight line. Its extreme fibre is at
 
 and where that reaches the tensile strength a brittle bond fails from end to end, unless the resultant presses within
 the face: then the crack from its edge ends before the other, and what is left holds by friction and cohesion but no
-pull. Sheared, the face holds Σ |Sᵢ| ≤ c ℓ + tan φ Σ Nᵢ wherever along it Σ Nᵢ acts, for what one end does not hold the
-other does. The corners one by one would hold three times the moment, and half the cohesion where one end slips before
+pull. Sheared, the face bears Σ |Sᵢ| ≤ c ℓ + tan φ Σ Nᵢ wherever along it Σ Nᵢ acts: what one end does not bear the
+other does. The corners one by one would bear three times the moment, and half the cohesion where one end slips before
 the other.
 
 What has no tensile strength opens without breaking anything: it may close again, with its cohesion, while states are
@@ -25,8 +25,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...compiled import kept, part
+from ...compiled import UNCOUNTED, kept, part
 from ...model import OPEN, SLIP, STICK
+from .coulomb_return import ContactStates, Strengths
 
 #: Bonds of a CONTACT row: whole, and cracked from its edge, so that it holds only while it is pressed.
 WHOLE, CRACKED = 1, 3
@@ -120,7 +121,7 @@ def _on_one_line(first, last, swapped, geometry):
     return face, along
 
 
-@part(fastmath=False, error_model="numpy", nogil=True)
+@part(fastmath=False, error_model="numpy", nogil=True, **UNCOUNTED)
 def _when(before, after, strength):
     """At which part of the step something is loaded to its ``strength`` (N) that is beyond it by ``before`` as the step
     begins and ``after`` at its end; below zero where it is beyond it already."""
@@ -192,7 +193,7 @@ def first_to_break(faces, forces, before, states, new_bonded, strengths):
     return out
 
 
-@part(fastmath=False, error_model="numpy", nogil=True)
+@part(fastmath=False, error_model="numpy", nogil=True, **UNCOUNTED)
 def _times_of_face(f, faces, forces, before, bonded, strengths):
     """At which parts of the step the whole face ``f`` comes to its strength in tension and in shear; inf where it does
     not."""
@@ -216,7 +217,7 @@ def _times_of_face(f, faces, forces, before, bonded, strengths):
     return parts, slides
 
 
-@part(fastmath=False, error_model="numpy", nogil=True)
+@part(fastmath=False, error_model="numpy", nogil=True, **UNCOUNTED)
 def _loads_of_face(f, faces, forces, bonded, strengths):
     """The `_FaceLoads` of the face ``f``."""
     pull = moment = strength = drawn = capacity = firm = 0.0
@@ -232,7 +233,7 @@ def _loads_of_face(f, faces, forces, bonded, strengths):
     return _FaceLoads(fibre, drawn, strength, max(0.0, capacity), firm)
 
 
-@part(fastmath=False, error_model="numpy", nogil=True)
+@part(fastmath=False, error_model="numpy", nogil=True, **UNCOUNTED)
 def _bond_of_face(f, faces, states):
     """Whether all contacts of the face ``f`` are bonded, whether any of them is open, and whether any does not stick."""
     opened = loose = False
@@ -245,7 +246,7 @@ def _bond_of_face(f, faces, states):
     return True, opened, loose
 
 
-@part(fastmath=False, error_model="numpy", nogil=True)
+@part(fastmath=False, error_model="numpy", nogil=True, **UNCOUNTED)
 def _stick_again(f, faces, forces, states, strengths, called, violation):
     """Call for all contacts of the face ``f`` to stick: a fallback of the open–close iteration that does not know of
     faces has released contacts that the face holds."""
@@ -259,10 +260,13 @@ def _stick_again(f, faces, forces, states, strengths, called, violation):
         )
 
 
-@kept(fastmath=False, error_model="numpy", nogil=True)
-def check_faces(faces, forces, before, states, strengths, slack, called, violation):
-    """Correct, in place, the states ``called`` and the ``violation`` of `check_states` for contacts whose whole face is
-    bonded; ``faces`` (`FaceBonds`), ``before`` (`ForcesBefore`), other arguments as there."""
+@kept(fastmath=False, error_model="numpy", nogil=True, **UNCOUNTED)
+def check_faces(face_bonds, forces, forces_before, tried, strength, slack, new, violation):
+    """Correct, in place, the states ``new`` and the ``violation`` of `check_states` for contacts whose whole face is
+    bonded. Plain tuples: ``face_bonds`` (`FaceBonds`), ``forces_before`` (`ForcesBefore`), the states that were ``tried``
+    (`ContactStates`) and their ``strength`` (`Strengths`); other arguments as there."""
+    faces, before, states = FaceBonds(*face_bonds), ForcesBefore(*forces_before), ContactStates(*tried)
+    strengths, called = Strengths(*strength), ContactStates(*new)
     for f in range(faces.length.shape[0]):
         intact, opened, loose = _bond_of_face(f, faces, states)
         if not intact:
@@ -302,7 +306,7 @@ def check_faces(faces, forces, before, states, strengths, slack, called, violati
             _break_bond(c, forces, before, states, strengths, called, violation, loads, (parts, slides, pulls, when))
 
 
-@part(fastmath=False, error_model="numpy", nogil=True)
+@part(fastmath=False, error_model="numpy", nogil=True, **UNCOUNTED)
 def _break_bond(c, forces, before, states, strengths, called, violation, loads, breaks):
     """What contact ``c`` of a bonded face with these ``loads`` is called to be; ``breaks``: whether the face parts,
     slides and pulls, and at which part of the step it slides."""

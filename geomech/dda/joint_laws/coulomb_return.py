@@ -76,7 +76,10 @@ class Strengths(NamedTuple):
 
     @classmethod
     def of(cls, springs: Springs) -> Strengths:
-        return cls(*(getattr(springs, name) for name in cls._fields))
+        return cls(
+            springs.normal, springs.shear, springs.friction, springs.sliding, springs.peak, springs.hold,
+            springs.cohesion, springs.tension, springs.keeps,
+        )  # fmt: skip
 
 
 @_jit
@@ -104,7 +107,7 @@ def contact_forces(unknowns, contacts, springs):
 def check_states(forces, states, strengths, shear0, slack):
     """The states that the ``forces`` (n, 4) of `contact_forces` in the ``states`` (`ContactStates`) require.
 
-    Returns (new `ContactStates`; violation (n,) N, 0 where the state is right). ``strengths`` (`Strengths`), ``shear0``
+    Returns (new state; direction; bonded; violation (n,) N, 0 where the state is right). ``strengths`` (`Strengths`), ``shear0``
     (n,) N as the step begins. Gaps below ``slack`` (n,) m, the round-off of coordinates, and their effect on friction
     do not change a state.
     """
@@ -146,7 +149,7 @@ def check_states(forces, states, strengths, shear0, slack):
                 # Through sticking, even if it would slide back: two solutions of opposite direction may alternate.
                 new_state[c] = STICK
                 violation[c] = strength - trial
-    return ContactStates(new_state, new_direction, new_bonded), violation
+    return new_state, new_direction, new_bonded, violation
 
 
 def reserves(state, bonded, normal_force, shear_force, gap, springs, slack) -> np.ndarray:
@@ -158,8 +161,8 @@ def reserves(state, bonded, normal_force, shear_force, gap, springs, slack) -> n
     rounding = springs.normal * slack
     pull = np.where(bonded == 1, springs.tension, 0.0)
     lifts = normal_force + pull * (1.0 + _KNOWN) + rounding
-    held = springs.hold + np.where(bonded > 0, springs.cohesion, 0.0)
-    strength = np.maximum(0.0, springs.peak * normal_force + held)
+    firm = springs.hold + np.where(bonded > 0, springs.cohesion, 0.0)
+    strength = np.maximum(0.0, springs.peak * normal_force + firm)
     excess = _KNOWN * strength + (_OF_SLIP * springs.shear + springs.peak * springs.normal) * slack
     closed = np.where(state == STICK, np.minimum(lifts, strength + excess - np.abs(shear_force)), lifts)
     return np.where(state == OPEN, springs.normal * gap + rounding, closed)

@@ -19,10 +19,10 @@ def reduced(law: JointLaw, factor: float) -> JointLaw:
         rough = replace(law.roughness, reduction=law.roughness.reduction * factor)
         return replace(law, roughness=rough)
 
-    def angle(of: float | None) -> float | None:
-        return None if of is None else math.atan(math.tan(of) / factor)
+    def angle(of: float) -> float:
+        return math.atan(math.tan(of) / factor)
 
-    friction = angle(law.friction_angle)
+    friction, residual = angle(law.friction_angle), law.residual_friction_angle
     softens = law.residual_friction_angle is not None or law.residual_cohesion > 0 or law.softening_slip > 0
     kept = law.residual_cohesion if softens else law.cohesion
     return replace(
@@ -30,7 +30,7 @@ def reduced(law: JointLaw, factor: float) -> JointLaw:
         friction_angle=friction,
         cohesion=law.cohesion / factor,
         tensile_strength=law.tensile_strength / factor,
-        residual_friction_angle=angle(law.residual_friction_angle),
+        residual_friction_angle=None if residual is None else angle(residual),
         residual_cohesion=kept / factor,
         dilation_angle=min(law.dilation_angle, friction),
     )

@@ -36,7 +36,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...compiled import kept, part
+from ...compiled import UNCOUNTED, kept, part
 from ...conventions import rotate_stress
 from ...model import DdaSettings
 
@@ -214,7 +214,7 @@ def turned(rates: np.ndarray, angle: np.ndarray) -> np.ndarray:
     return out
 
 
-@part(fastmath=False, error_model="numpy", nogil=True)
+@part(fastmath=False, error_model="numpy", nogil=True, **UNCOUNTED)
 def _invert(first, second, out):
     """Write the inverse of the sum of two symmetric positive definite (3, 3) matrices to ``out``, by cofactors."""
     a, b, c = first[0, 0] + second[0, 0], first[0, 1] + second[0, 1], first[0, 2] + second[0, 2]
@@ -228,16 +228,16 @@ def _invert(first, second, out):
             out[k, m] /= determinant
 
 
-@part(fastmath=False, error_model="numpy", nogil=True)
-def _tangent(b, stiffness, compliance, cracks, out):
+@part(fastmath=False, error_model="numpy", nogil=True, **UNCOUNTED)
+def _tangent(b, stiffness, compliance, crack_given, crack_compliance, out):
     """(3, 3) (C⁻¹ + S)⁻¹ of block ``b``, into ``out[b]``."""
     soft = False
-    if cracks.given:
+    if crack_given:
         for k in range(3):
             for m in range(3):
-                soft = soft or cracks.compliance[b, k, m] != 0.0
+                soft = soft or crack_compliance[b, k, m] != 0.0
     if soft:
-        _invert(compliance[b], cracks.compliance[b], out[b])
+        _invert(compliance[b], crack_compliance[b], out[b])
     else:
         # By numbers: Numba takes seconds to compile the assignment of one array to another.
         for k in range(3):
@@ -245,7 +245,7 @@ def _tangent(b, stiffness, compliance, cracks, out):
                 out[b, k, m] = stiffness[b, k, m]
 
 
-@part(fastmath=False, error_model="numpy", nogil=True)
+@part(fastmath=False, error_model="numpy", nogil=True, **UNCOUNTED)
 def _unit_mass(moments, mass):
     """(6, 6) the mass matrix of a block of unit density with these ``moments`` (6,), in the unknowns of a step."""
     area, xx, yy, xy = moments[0], moments[3], moments[4], moments[5]
@@ -259,7 +259,7 @@ def _unit_mass(moments, mass):
     mass[3, 5] = mass[5, 3] = mass[4, 5] = mass[5, 4] = 0.5 * xy / area
 
 
-@part(fastmath=False, error_model="numpy", nogil=True)
+@part(fastmath=False, error_model="numpy", nogil=True, **UNCOUNTED)
 def _rotated(c, s, xx, yy, xy):
     """The components of a symmetric tensor turned by the angle of cosine ``c`` and sine ``s``."""
     return (
@@ -272,7 +272,7 @@ def _rotated(c, s, xx, yy, xy):
 @kept(fastmath=False, error_model="numpy", nogil=True)
 def assemble_blocks(order, n, mass, start, cracks, loads, scheme):
     """The blocks' own equations: (matrix (n, 6, 6), right side (n, 6), tangent (n_blocks, 3, 3), stress0 (n_blocks, 3)).
-    ``order`` (n_blocks,) as in `assembly.Pattern`, ``mass`` (`BlockMass`), ``start`` (`BlockStart`), ``cracks``
+    ``order`` (n_blocks,) as in `assembly.Pattern`; plain tuples of ``mass`` (`BlockMass`), ``start`` (`BlockStart`), ``cracks``
     (`CrackTerms`), ``loads`` (`BlockLoads`), ``scheme`` (`SchemeTerms`).
 
     - inertia and elasticity as in this module's equation, with the velocity of the ``start``, the factor ``heavier`` 1/w
@@ -284,10 +284,12 @@ def assemble_blocks(order, n, mass, start, cracks, loads, scheme):
     - damping: a viscous stress ∝ C Δε/dt that gives a block's lowest vibration (taken as that of a square, ω² =
       12 C₁₁/(ρ h²)) the fraction ``block_damping`` of critical damping, and Rayleigh damping.
     """
-    density, moments = mass.density, mass.moments
+    density, moments, _ = mass
     carried, stress, stiffness, compliance = start
-    weight, heavier, dt = scheme.weight, scheme.heavier, scheme.dt
-    inertia = 2.0 * heavier / (dt * dt) + scheme.mass_damping / dt
+    weight, block_damping, mass_damping, stiffness_damping, dt, heavier = scheme
+    crack_given, crack_strain, crack_compliance, crack_offset = cracks
+    gravity, load = loads
+    inertia = 2.0 * heavier / (dt * dt) + mass_damping / dt
     n_blocks = order.shape[0]
     matrix = np.zeros((n, 6, 6))
     right = np.zeros((n, 6))
@@ -296,9 +298,9 @@ def assemble_blocks(order, n, mass, start, cracks, loads, scheme):
     strain = np.empty(3)
     unit_mass = np.empty((6, 6))
     for b in range(n_blocks):
-        _tangent(b, stiffness, compliance, cracks, tangent)
+        _tangent(b, stiffness, compliance, crack_given, crack_compliance, tangent)
         for k in range(3):
-            strain[k] = cracks.strain[b, k] - cracks.offset[b, k] if cracks.given else 0.0
+            strain[k] = crack_strain[b, k] - crack_offset[b, k] if crack_given else 0.0
             for m in range(3):
                 strain[k] += compliance[b, k, m] * stress[b, m]
         for k in range(3):
@@ -319,16 +321,14 @@ def assemble_blocks(order, n, mass, start, cracks, loads, scheme):
         if rho == 0.0:
             for k in range(3):
                 matrix[row, k, k] += GROUND_RATIO * stiffness[b, 0, 0]
-        drag = scheme.stiffness_damping
-        drag += 2.0 * scheme.block_damping * np.sqrt(rho * area / (12.0 * stiffness[b, 0, 0]))
+        drag = stiffness_damping + 2.0 * block_damping * np.sqrt(rho * area / (12.0 * stiffness[b, 0, 0]))
         elastic = weight + drag / dt
         for k in range(3):
             for m in range(3):
                 matrix[row, 3 + k, 3 + m] += elastic * tangent[b, k, m]
             right[row, 3 + k] -= area * ((1.0 - weight) * stress[b, k] + weight * stress0[b, k]) / h
-        load = loads.load
-        right[row, 0] += rho * area * loads.gravity[0] + load[b, 0]
-        right[row, 1] += rho * area * loads.gravity[1] + load[b, 1]
+        right[row, 0] += rho * area * gravity[0] + load[b, 0]
+        right[row, 1] += rho * area * gravity[1] + load[b, 1]
         spin = rho * carried[b, 2] * carried[b, 2]
         right[row, 2] += load[b, 2] / h
         right[row, 3] += (load[b, 3] + spin * xx) / h
@@ -352,7 +352,7 @@ def advance(increment, carried, outlines, tangent, stress0, cracks, turns, dt, s
     """
     n_blocks = increment.shape[0]
     vertices, vertex_start, moments = outlines
-    offset, compliance = cracks.offset, cracks.compliance
+    crack_given, crack_strain, compliance, offset = cracks
     new_vertices = np.empty_like(vertices)
     velocity = np.empty((n_blocks, 6))
     new_stress = np.empty((n_blocks, 3))
@@ -402,10 +402,10 @@ def advance(increment, carried, outlines, tangent, stress0, cracks, turns, dt, s
         new_stress[b, 0], new_stress[b, 1], turned_shear = _rotated(c, s, a, d, e)
         new_stress[b, 2] = turned_shear
         for k in range(3):
-            if cracks.given:
+            if crack_given:
                 tensor[k] = offset[b, k] + compliance[b, k, 0] * a + compliance[b, k, 1] * d + compliance[b, k, 2] * e
             else:
-                tensor[k] = cracks.strain[b, k]
+                tensor[k] = crack_strain[b, k]
         a, d, e = tensor[0], tensor[1], 0.5 * tensor[2]
         new_crack[b, 0], new_crack[b, 1], turned_shear = _rotated(c, s, a, d, e)
         new_crack[b, 2] = 2.0 * turned_shear

@@ -21,7 +21,10 @@ def limits() -> tuple[Callable[[int], int], ...]:
     such."""
     found = []
     for package in ("numpy", "scipy"):
-        site = Path(importlib.util.find_spec(package).origin).resolve().parent.parent
+        found_at = importlib.util.find_spec(package)
+        if found_at is None or found_at.origin is None:
+            continue
+        site = Path(found_at.origin).resolve().parent.parent
         for library in sorted(site.glob(f"{package}.libs/*openblas*")):
             try:
                 found.append(ctypes.CDLL(str(library)).openblas_set_num_threads_local)

@@ -78,7 +78,9 @@ class Directions:
         if sharing is None:
             # Memory pages are allocated only as directions are added.
             room = np.empty(2 * most * size) if room is None else room
-            self._directions, self._products = room[: 2 * most * size].reshape(2, most, size)
+            pair = room[: 2 * most * size].reshape(2, most, size)
+            self._directions: np.ndarray = pair[0]
+            self._products: np.ndarray = pair[1]
         else:
             self._directions, self._products = sharing._directions[:most], sharing._products[:most]
             sharing._sharing = self

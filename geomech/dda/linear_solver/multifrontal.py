@@ -170,13 +170,13 @@ class Factors:
         above = self.tree.above
         self._awaited = np.bincount(above[above >= 0], minlength=len(above))
         self._at, self._back, size = places(np.diff(self.tree.pivots), np.diff(self.tree.reach))
-        self._factors = np.empty(size, dtype)
+        self._factors: np.ndarray = np.empty(size, dtype)
         # Whether partial refactorisation is possible, and now: every S is still in place.
         again = again and self.tree.kept
-        self._room = np.empty(self.tree.own_room_size if again else self.tree.stack_size, dtype)
+        self._room: np.ndarray = np.empty(self.tree.own_room_size if again else self.tree.stack_size, dtype)
         self._again, self._left = again, False
         self._passed = np.empty(6 * self.tree.reach[-1], dtype)
-        self._units = np.array([1.0, 0.0], dtype)
+        self._units: np.ndarray = np.array([1.0, 0.0], dtype)
 
     @property
     def single(self) -> bool:

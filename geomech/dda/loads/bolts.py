@@ -125,14 +125,14 @@ class BoltSet:
         # A ground end has no unknowns: its half of the vectors is zero, and its block number may be the bolt's own
         # block.
         pairs = Pairs(block, other, vectors, ends, axes, -1.0, np.zeros((len(own), 2)))
-        k = column("stiffness")
-        trial = column("pretension") + k * (length - rows["length"] - rows["plastic"])
+        stiffness = column("stiffness")
+        trial = column("pretension") + stiffness * (length - rows["length"] - rows["plastic"])
         compression = np.array([bolt.compression for bolt in own])
         most = column("yield_force")
         bolt_set = cls(
             bolts=bolts, number=number, pairs=pairs, ends=ends, length=length, trial=trial,
             dowel=rows["shear_force"].copy(),
-            stiffness=k, shear_stiffness=column("shear_stiffness"), least=np.where(compression, -most, 0.0), most=most,
+            stiffness=stiffness, shear_stiffness=column("shear_stiffness"), least=np.where(compression, -most, 0.0), most=most,
             strength=column("shear_strength"), slack=~compression,
             geometric=np.clip(trial, 0.0, most) / length, axial=np.zeros(len(own), int), across=np.zeros(len(own), int),
         )  # fmt: skip
@@ -162,9 +162,9 @@ class BoltSet:
         elastic = self.axial == _ELASTIC
         k = np.where(elastic, self.stiffness, 0.0)
         limit = np.select([self.axial == _YIELDS, self.axial == _CRUSHED], [self.most, self.least], 0.0)
-        held = self.across == 0
-        ks = np.where(held, self.shear_stiffness, 0.0) + self.geometric
-        dowel = np.where(held, self.dowel, self.across * np.where(held, 0.0, self.strength))
+        elastic = self.across == 0
+        ks = np.where(elastic, self.shear_stiffness, 0.0) + self.geometric
+        dowel = np.where(elastic, self.dowel, self.across * np.where(elastic, 0.0, self.strength))
         return np.stack([k, ks], axis=1), np.stack([-np.where(elastic, self.trial, limit), dowel], axis=1)
 
     def forces(self, motion: np.ndarray) -> np.ndarray:
@@ -193,7 +193,7 @@ class BoltSet:
             arm = self.ends[:, side] - moments[owner, 1:3]
             row = np.where(owner >= 0, order[owner], -1)
             turning = np.maximum(np.sum(arm * pull, axis=1), 0.0) / moments[owner, 0]
-            np.add.at(matrix, (row[row >= 0], 2, 2), turning[row >= 0])
+            np.add.at(matrix[:, 2, 2], row[row >= 0], turning[row >= 0])
 
     def assemble(
         self, matrix: np.ndarray, right: np.ndarray, order: np.ndarray

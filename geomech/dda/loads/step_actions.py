@@ -151,6 +151,7 @@ class StepActions:
     def _links(self, pattern: Pattern, across: np.ndarray) -> Links:
         """Off-diagonal blocks ``across`` (n, 6, 6) between the two ends of every bolt, and their transposes, as
         links."""
+        assert self.bolts is not None
         pairs, n = self.bolts.pairs, len(self.bolts.number)
         row, column = self.order[pairs.block], np.where(pairs.other == GROUND, -1, self.order[pairs.other])
         both = np.flatnonzero((row >= 0) & (column >= 0))
@@ -220,9 +221,9 @@ class StepActions:
             fx, fy = at_points[k]["force"]
             statistics[f"reaction_x:point {k + 1}"], statistics[f"reaction_y:point {k + 1}"] = float(fx), float(fy)
         driven = [motion.block for motion in self.loads.block_motions]
-        constrained = -contact_resultants(contacts, self.blocks.n_blocks, self.moments[:, 1:3]) if driven else None
+        on_fixed = -contact_resultants(contacts, self.blocks.n_blocks, self.moments[:, 1:3]) if driven else np.zeros(0)
         for b in driven:
-            force = reaction[b] if self.order[b] >= 0 else constrained[b]
+            force = reaction[b] if reaction is not None and self.order[b] >= 0 else on_fixed[b]
             for axis, value in zip("xy", force.tolist()):
                 statistics[f"reaction_{axis}:{self.blocks.names[b]}"] = value
         return all_points, reaction, statistics

@@ -46,14 +46,14 @@ class QuietEdges:
     ) -> QuietEdges:
         """Dashpots of ``boundaries`` at ``time`` s on the current ``vertices``, without edges of ``fixed`` (n_blocks,)
         blocks; ``density`` (n_blocks,) kg/m³, ``stiffness`` (n_blocks, 3, 3) Pa."""
-        edge, incoming = [], []
+        edges, waves = [], []
         for boundary in boundaries:
             named = blocks.edges_named(boundary.edge_name)
             named = named[~fixed[blocks.vertex_block[named]]]
             wave = np.zeros(2) if boundary.incoming is None else boundary.incoming.at(time)
-            edge.append(named)
-            incoming.append(np.tile(wave, (len(named), 1)))
-        edge, incoming = np.concatenate(edge), np.concatenate(incoming)
+            edges.append(named)
+            waves.append(np.tile(wave, (len(named), 1)))
+        edge, incoming = np.concatenate(edges), np.concatenate(waves)
         block = blocks.vertex_block[edge]
         ends = np.stack([vertices[edge], vertices[blocks.next_vertex[edge]]], axis=1)
         along = ends[:, 1] - ends[:, 0]

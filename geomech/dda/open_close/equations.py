@@ -152,7 +152,8 @@ class Equations:
         self, unknowns: np.ndarray, state: np.ndarray, direction: np.ndarray, springs: Springs, gap: np.ndarray
     ) -> np.ndarray:
         """(n, 4) as `contact_forces`."""
-        return contact_forces(unknowns, self._contacts, self._in_states(state, direction, springs, gap))
+        in_states = self._in_states(state, direction, springs, gap)
+        return contact_forces(unknowns, tuple(self._contacts), tuple(in_states))
 
     def _answered(
         self, states: States, springs: Springs, gap: np.ndarray, slip: np.ndarray, symmetric: bool, within: float
@@ -178,11 +179,11 @@ class Equations:
                 self.springs, self.gap, found, state, direction, bonded, forces[:, 0], slip
             )
             missed = self.curved.misfit(springs, gap, known, known_gap, state, forces)
-        tried, strengths = ContactStates(state, direction, bonded), Strengths.of(known)
-        called, violation = check_states(forces, tried, strengths, found.shear, self.slack)
+        tried, strengths = (state, direction, bonded), tuple(Strengths.of(known))
+        *called, violation = check_states(forces, tried, strengths, found.shear, self.slack)
         if found.faces is not None:
-            begun = ForcesBefore(found.normal, found.shear)
-            check_faces(FaceBonds.of(found.faces), forces, begun, tried, strengths, self.slack, called, violation)
+            faces, before = tuple(FaceBonds.of(found.faces)), (found.normal, found.shear)
+            check_faces(faces, forces, before, tried, strengths, self.slack, tuple(called), violation)
         return Answer(unknowns, forces, States(*called), violation, missed, slip, springs, gap)
 
     def first_bonds(self, states: States, answer: Answer, which: np.ndarray) -> np.ndarray:

@@ -57,9 +57,9 @@ def settle_faces(
     n = c.n_unknowns
     if n == 0:
         return FaceAnswer(np.zeros(0), np.zeros(0), np.zeros(0, bool), 0)
-    applied = np.zeros((c.n, 2, c.per))
-    applied[:, 1] = -pressure
-    applied = applied.ravel()
+    on_faces = np.zeros((c.n, 2, c.per))
+    on_faces[:, 1] = -pressure
+    applied = on_faces.ravel()
     right = applied - load_traction
     if body.rough:
         return _rough(body, right, applied, warm, history)

@@ -96,10 +96,10 @@ def check_laws(laws: Sequence[JointLaw], cracks: Cracks) -> None:
     law = cracks.law
     if not len(law) or (len(laws) == 1 and not law.any() and not laws[0].tensile_strength):
         return
-    for s in np.flatnonzero((law < 0) | (law >= len(laws))):
+    for s in np.flatnonzero((law < 0) | (law >= len(laws))).tolist():
         raise ValueError(f"{_called(cracks, s)}: its faces have law {int(law[s])}, but there are {len(laws)}")
     cemented = np.array([one.tensile_strength > 0 for one in laws])[law]
-    for s in np.flatnonzero(cemented & (cracks.aperture > 0)):
+    for s in np.flatnonzero(cemented & (cracks.aperture > 0)).tolist():
         raise ValueError(
             f"{_called(cracks, s)}: faces with an aperture cannot have the tensile strength of {laws[law[s]].name!r}"
         )

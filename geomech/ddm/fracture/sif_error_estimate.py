@@ -80,7 +80,7 @@ def _left_at(body: CrackedBody, point: np.ndarray, part: float) -> float:
     """Error of an element of the fraction ``part`` of its side or segment that ends at ``point``, if that is a node of
     the geometry."""
     network, left = body.cracks, 0.0
-    for node in np.flatnonzero((network.nodes == point).all(axis=1) & (network.valence > 0)):
+    for node in np.flatnonzero((network.nodes == point).all(axis=1) & (network.valence > 0)).tolist():
         where = "mouth" if network.surface[node] else "crack"
         for angle in wedges(network, node, body.sides):
             error, power = ungraded(float(angle), where)

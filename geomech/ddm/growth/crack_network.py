@@ -61,8 +61,8 @@ class Network:
         self.nodes: list[Point] = [tuple(p) for p in cracks.nodes.tolist()]
         self.surface: list[bool] = cracks.surface.tolist()
         self.rows = [
-            Row(*ends, crack, block, birth, aperture, law)
-            for ends, crack, block, birth, aperture, law in zip(
+            Row(start, end, crack, block, birth, aperture, law)
+            for (start, end), crack, block, birth, aperture, law in zip(
                 cracks.segments.tolist(),
                 cracks.crack.tolist(),
                 cracks.block.tolist(),

@@ -214,6 +214,7 @@ def _on_faces(solution: Solution):
 def _on_free_surface(solution: Solution, settings: GrowthSettings):
     """The surface of a half-plane, evenly spaced, to one extent beyond the structure below it."""
     body, rock = solution.body, solution.body.half_plane
+    assert rock is not None
     below = np.concatenate([*body.loops, body.cracks.nodes, np.empty((0, 2))])
     along = rock.frame(below)[:, 0] if len(below) else np.zeros(1)
     low, high = along.min() - body._extent, along.max() + body._extent
@@ -228,15 +229,15 @@ def _on_free_surface(solution: Solution, settings: GrowthSettings):
 def _at_corners(solution: Solution, distance: float):
     """Re-entrant corners of outline and holes. The stress is finite only away from them: halfway along the
     ``distance``."""
-    corners, inward = [np.empty((0, 2))], [np.empty((0, 2))]
+    sharp_corners, inward_at = [np.empty((0, 2))], [np.empty((0, 2))]
     for loop in solution.body.loops:
         heading, turn = _turns(loop)
         sharp = turn < -CURVE
         # The rock is on the left of both edges: direction of the mean of their normals.
         into = heading - 0.5 * turn + 0.5 * math.pi
-        corners.append(loop[sharp])
-        inward.append(np.column_stack([np.cos(into), np.sin(into)])[sharp])
-    corners, inward = np.concatenate(corners), np.concatenate(inward)
+        sharp_corners.append(loop[sharp])
+        inward_at.append(np.column_stack([np.cos(into), np.sin(into)])[sharp])
+    corners, inward = np.concatenate(sharp_corners), np.concatenate(inward_at)
     return (
         corners,
         inward,

@@ -20,7 +20,7 @@ TIED = 1e-9
 ONE_WAY = 1e-6
 
 
-def reached(value: np.ndarray, limit: np.ndarray | float) -> np.ndarray:
+def reached(value: np.ndarray | float, limit: np.ndarray | float) -> np.ndarray:
     """Whether ``value`` is at least ``limit``, both positive, or equal to it (`TIED`)."""
     return np.asarray(value) >= (1 - TIED) * np.asarray(limit)
 

@@ -22,7 +22,7 @@ from .fast_multipole import Tree
 PATCH = 60
 #: Of the cracks that a patch cuts, elements nearer to its middle than this many of its radii join it.
 REACH = 1.5
-#: Residual of a solution, relative to the right-hand side. Contact tells closed from open at 1e-10.
+#: Residual of a solution, relative to the right-hand side. Contact distinguishes closed from open at 1e-10.
 TOLERANCE = 1e-11
 #: What is good enough when round-off stops the residual.
 ENOUGH = 1e-9
@@ -129,7 +129,7 @@ class Patches:
     """An approximate inverse of the cracks' equations; ``crack`` (n,) is the crack of every element;
     ``between(elements)`` the matrix between some of them where it is not their influence alone. No element joins a
     patch that is farther from its own than ``lengths`` times its length: what is graded towards another corner is too
-    small to be felt here, and too much of it to be factored again."""
+    small to matter here, and too much of it to be factored again."""
 
     def __init__(
         self,
@@ -156,8 +156,8 @@ class Patches:
                 near = near[away <= lengths * elements.length[near]]
             whole = np.union1d(own, near)
             self._patches.append((whole, elements.unknowns(np.sort(own))))
-        self._factors: list[tuple[bytes, np.ndarray, np.ndarray, np.ndarray, Factor] | None]
-        self._factors = [None] * len(self._patches)
+        #: By patch, once `change` has said which equations are meant.
+        self._factors: dict[int, tuple[bytes, np.ndarray, np.ndarray, np.ndarray, Factor]] = {}
 
     def change(self, rows: Rows) -> None:
         """From now on the equations are those of ``rows``; only patches to which that is news are factored."""
@@ -165,7 +165,7 @@ class Patches:
             unknowns = self._elements.unknowns(elements)
             prescribed, mixed, spring = rows.prescribed[unknowns], rows.mixed[unknowns], rows.spring[unknowns]
             key = prescribed.tobytes() + mixed.tobytes() + spring.tobytes()
-            known = self._factors[k]
+            known = self._factors.get(k)
             if known is not None and known[0] == key:
                 continue
             matrix = self._between(elements)
@@ -185,19 +185,19 @@ class Patches:
     @property
     def rcond(self) -> float:
         """The worst patch's."""
-        return min(factor.rcond for *_, factor in self._factors)
+        return min(factor.rcond for *_, factor in self._factors.values())
 
     def solve(self, right: np.ndarray) -> np.ndarray:
-        """Roughly S⁻¹ ``right`` (n,); zero where unknowns are held."""
+        """Roughly S⁻¹ ``right`` (n,); zero where unknowns are prescribed."""
         out = np.zeros_like(right)
-        for _, free, kept, to, factor in self._factors:
+        for _, free, kept, to, factor in self._factors.values():
             out[to] = factor.solve(right[free])[kept]
         return out
 
     def solve_transposed(self, right: np.ndarray) -> np.ndarray:
         """The transposed of `solve`."""
         out = np.zeros_like(right)
-        for _, free, kept, to, factor in self._factors:
+        for _, free, kept, to, factor in self._factors.values():
             own = np.zeros(len(free))
             own[kept] = right[to]
             out[free] += factor.solve(own, transposed=True)

@@ -24,6 +24,7 @@ class Mirrored(Compressed):
     def __init__(self, targets: ElementSet, sources: ElementSet, nu: float, tol: float, error: float = 1e-10):
         self._whole_targets, self._whole_sources = targets, sources
         rock = targets.half_plane
+        assert rock is not None
         self._rock_targets, below = (
             replace(s, start=rock.frame(s.start), end=rock.frame(s.end), half_plane=None) for s in (targets, sources)
         )

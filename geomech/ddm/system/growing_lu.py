@@ -53,10 +53,12 @@ class GrowingFactor:
         self.n, self.names, self._factor = len(matrix), names, factor
         self._room(len(matrix))
         #: The first matrix, and the borders that came behind it.
-        self._first, self._borders = matrix, []
+        self._first = matrix
+        self._borders: list[Border] = []
         #: Ends of what came together, what was known of it, and of what is eliminated the worst reciprocal condition
         #: and loss of accuracy so far.
-        self._ends, self._known = [self.n], [None]
+        self._ends = [self.n]
+        self._known: list[Known | None] = [None]
         self._trust: list[tuple[float, float]] = []
         #: All of the matrix so far in one array, with room, and how many unknowns are in it; once asked for.
         self._whole, self._in_whole = np.empty((0, 0), order="F"), 0

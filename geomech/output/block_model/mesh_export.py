@@ -38,7 +38,7 @@ def export_blocks(problem: Problem, zones: list[str], path: Path, size: float | 
 
     check_format(path)
     blocks, cracks = problem.blocks, problem.cracks
-    points, triangles, owner = (_coarse if size is None else _fine)(problem, size)
+    points, triangles, owner = _coarse(problem) if size is None else _fine(problem, size)
     edges = np.stack([np.arange(blocks.n_vertices), blocks.next_vertex], axis=1)
     named = np.flatnonzero(np.array([bool(name) for name in blocks.edge_names])[blocks.edge_name])
     start = len(points)
@@ -82,7 +82,7 @@ def export_blocks(problem: Problem, zones: list[str], path: Path, size: float | 
     return f"{len(triangles)} triangles of {blocks.n_blocks} blocks, {len(lines)} edges and crack segments in {path}"
 
 
-def _coarse(problem: Problem, size: None) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _coarse(problem: Problem) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     cells, owner = Triangles().of(problem.blocks)
     return problem.blocks.vertices, cells, owner
 

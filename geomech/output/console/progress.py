@@ -82,7 +82,7 @@ class Pace:
 
     def time_for(self, rest: float) -> float:
         """Wall time, s, for ``rest`` s of the scene; inf where that is not known."""
-        if len(self._seen) < 5 or self._seen[-1][0] - self._began < self.LEAST:
+        if self._began is None or len(self._seen) < 5 or self._seen[-1][0] - self._began < self.LEAST:
             return math.inf
         first, last = self._seen[0], self._seen[-1]
         middle = min(self._seen, key=lambda seen: abs(seen[0] - 0.5 * (first[0] + last[0])))
@@ -97,7 +97,7 @@ class Pace:
 class Progress:
     """Observer for people. On a terminal it draws a tqdm bar over the scene's time, elsewhere a line now and then. The
     time left is that of the rest of the scene at the recent `Pace`, once there is a steady one; where cracks are to end
-    the run by an event there is none to tell. ``quiet`` leaves only where a failed run stopped.
+    the run by an event there is no estimate. ``quiet`` leaves only where a failed run stopped.
 
     ``stream`` defaults to stderr; ``interval`` s is the least time between two lines off a terminal, twice that
     between two with the same percentage.
@@ -112,7 +112,8 @@ class Progress:
         self._folder, self._end = Path(folder), problem.run.end_time
         self._stops = problem.run.stop_at
         self._said = time.perf_counter()
-        self._percent, self._last = -1, None
+        self._percent = -1
+        self._last: Cycle | None = None
         self._pace = Pace()
         self._bar = None
         if not self.quiet and self._out is not None and self._out.isatty():

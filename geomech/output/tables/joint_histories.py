@@ -37,7 +37,8 @@ class JointHistories:
         contacts, same = cycle.state.contacts, {"cycle": cycle.number, "time": cycle.state.time}
         sums = joint_sums(cycle.blocks, contacts, self._laws)
         self._joints.add(
-            same | {"joint": name} | dict(zip(JOINT_SUM.names, row.tolist(), strict=True)) for name, row in sums.items()
+            same | {"joint": name} | dict(zip(JOINT_SUM.names or (), row.tolist(), strict=True))
+            for name, row in sums.items()
         )
         self._reactions.add(
             same | {"block": cycle.blocks.names[block], "force_x": fx, "force_y": fy, "moment": moment}

@@ -122,7 +122,7 @@ def joint_statistics(scene: Any, problem: Any, free: np.ndarray) -> list[dict[st
         if shape is not None:
             entry["asked"] = asked(shape, geometry)
             if entry["mean_angle_deg"] is not None and "mean_angle_deg" in entry["asked"]:
-                # A trace has no sense: of its two angles, the one beside what was asked.
+                # A trace has no sense: of its two angles, the one nearer to what was asked.
                 off = entry["mean_angle_deg"] - entry["asked"]["mean_angle_deg"]
                 entry["mean_angle_deg"] -= 180 * round(off / 180)
             entry["ends_on"] = list(shape.ends_on)
@@ -185,5 +185,6 @@ def _row(values: dict[str, Any], wanted: dict[str, Any] | None) -> str:
     for _, key, spread in _COLUMNS:
         value, off = values.get(key), values.get(spread) if spread else None
         text = "" if value is None else f"{value:.3g}"
-        cells.append(f"{text} ± {off:.2g}" if text and off and off > 1e-6 * abs(value) else text)
+        scattered = value is not None and off and off > 1e-6 * abs(value)
+        cells.append(f"{text} ± {off:.2g}" if scattered else text)
     return "".join(f" {cell:>14}" for cell in cells)

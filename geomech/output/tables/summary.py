@@ -124,7 +124,12 @@ class Summary:
         write_json(self._path, leading | summary)
 
     def _event_row(self, event: Event) -> dict[str, Any]:
-        row = {"load_pa": _finite(event.load), "time_s": event.time, "cycle": event.cycle, "point": list(event.point)}
+        row: dict[str, Any] = {
+            "load_pa": _finite(event.load),
+            "time_s": event.time,
+            "cycle": event.cycle,
+            "point": list(event.point),
+        }
         if self._scale is not None:
             half_length, toughness = self._scale
             row["load_normalised"] = _finite(abs(event.load) * math.sqrt(math.pi * half_length) / toughness)
@@ -164,9 +169,9 @@ def installed(packages: Iterable[str]) -> dict[str, str]:
 
 def write_json(path: Path, value: Any) -> None:
     """Write ``value`` as JSON, whole or not at all; NumPy numbers become plain ones."""
-    beside = path.with_name(path.name + ".part")
-    beside.write_text(json.dumps(value, indent=2, default=_plain, ensure_ascii=False) + "\n", encoding="utf-8")
-    os.replace(beside, path)
+    unfinished = path.with_name(path.name + ".part")
+    unfinished.write_text(json.dumps(value, indent=2, default=_plain, ensure_ascii=False) + "\n", encoding="utf-8")
+    os.replace(unfinished, path)
 
 
 def _finite(value: float) -> float | None:

@@ -22,7 +22,7 @@ from .vtu import LINE, TRIANGLE, VERTEX, Grid
 
 CONFIGURATIONS = ("reference", "current")
 
-#: Key blocks are found anew when a block has turned by the inverse of this, rad.
+#: Key blocks are found again when a block has turned by the inverse of this, rad.
 _TURNS_SEEN = 50.0
 
 
@@ -142,11 +142,11 @@ def cracks_grid(cycle: Cycle, motion: Motion, configuration: str, lines: CrackLi
         types=lines.types,
         point_data={
             "displacement": moved,
-            "opening": along(faces and faces.opening),
-            "slip": along(faces and faces.slip),
-            "normal_traction": along(faces and faces.traction[..., 0]),
-            "shear_traction": along(faces and faces.traction[..., 1]),
-            "state": along(faces and faces.state, np.zeros(len(rest), int)),
+            "opening": along(None if faces is None else faces.opening),
+            "slip": along(None if faces is None else faces.slip),
+            "normal_traction": along(None if faces is None else faces.traction[..., 0]),
+            "shear_traction": along(None if faces is None else faces.traction[..., 1]),
+            "state": along(None if faces is None else faces.state, np.zeros(len(rest), int)),
         },
         cell_data=lines.cell_data,
     )

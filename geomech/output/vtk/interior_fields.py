@@ -79,8 +79,8 @@ class InteriorMeshes:
             return np.concatenate([p[name] for p in parts]) if parts else np.empty((0, *tail), kind)
 
         points, moved = joined("points", (2,)), joined("moved", (2,))
-        cells = [p["triangles"] + start for p, start in zip(parts, first)]
-        cells = np.concatenate(cells) if cells else np.empty((0, 3), int)
+        of_parts = [p["triangles"] + start for p, start in zip(parts, first)]
+        cells = np.concatenate(of_parts) if of_parts else np.empty((0, 3), int)
         owner_of_point = joined("owner", (), int)
         stress = six_components(joined("stress", (3,)), blocks.material[owner_of_point], materials)
         principal = principal_stresses(stress)

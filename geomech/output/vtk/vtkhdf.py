@@ -126,9 +126,9 @@ class HdfStore:
                         value = np.asarray(told[f.name])
                         array[(..., slice(value.shape[1])) if array.ndim == 2 else ...] = value
                         self._add(name, f"{place.capitalize()}Data/{f.name}", array)
-            for key, value in numbers.items():
-                self._add(name, f"FieldData/{key}", field_array(value))
-                steps.add(f"FieldSizes/{key}", len(field_array(value)))
+            for key, number in numbers.items():
+                self._add(name, f"FieldData/{key}", field_array(number))
+                steps.add(f"FieldSizes/{key}", len(field_array(number)))
             steps.times.append(float(at))
             steps.cycles.append(int(cycle))
         if self._bytes > _BATCH or time.monotonic() - self._flushed > _WAIT:
@@ -138,7 +138,7 @@ class HdfStore:
         """Points and cells, and the part that they make: again only where any of them has changed."""
         points = np.zeros((len(grid.points), 3))
         points[:, : grid.points.shape[1]] = grid.points
-        mesh = {
+        mesh: dict[str, np.ndarray] = {
             "Points": points,
             "Connectivity": np.asarray(grid.connectivity, np.int64),
             "Offsets": np.concatenate([[0], grid.offsets]).astype(np.int64),

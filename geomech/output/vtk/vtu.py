@@ -213,7 +213,7 @@ def _put(path: Path | str, content: bytes | bytearray) -> None:
     """A file of ``content``; a file that is there already is written over where it stands.
 
     Few system calls, a fraction of what a buffered file object takes. To empty a file first costs several times as much
-    as to write over it, and to delete and make thousands anew tens of times (ext4 will not take an inode again that was
+    as to write over it, and to delete and create thousands again tens of times (ext4 will not take an inode again that was
     freed minutes ago, and steps over all of these for every new one).
     """
     handle = os.open(path, os.O_WRONLY | os.O_CREAT, 0o666)
@@ -248,7 +248,7 @@ class Collection:
     written over the end that was there, at once: after every cycle, also the last before a crash, whoever reads the
     file finds a complete series. There is no file before there is an entry: ParaView opens no empty one.
 
-    ``entries`` (time, file) are listed already: the file is made anew with them, in place of what it was.
+    ``entries`` (time, file) are listed already: the file is written again with them, in place of what it was.
     """
 
     def __init__(self, path: Path, entries: Iterable[tuple[float, str]] = ()) -> None:
@@ -260,28 +260,29 @@ class Collection:
         else:
             self.path.unlink(missing_ok=True)
 
-    def _begin(self) -> None:
-        beside = self.path.with_name(self.path.name + ".part")
+    def _begin(self) -> int:
+        """Write the whole file and open it; its handle."""
+        unfinished = self.path.with_name(self.path.name + ".part")
         content = "".join([_PVD_HEAD, *(_entry(*each) for each in self.entries), _PVD_END]).encode()
-        _put(beside, content)
-        os.replace(beside, self.path)
+        _put(unfinished, content)
+        os.replace(unfinished, self.path)
         self._end = len(content) - len(_PVD_END)
         self._handle = os.open(self.path, os.O_WRONLY)
+        return self._handle
 
     def add(self, at: float, file: str) -> None:
         """List ``file`` (relative to the PVD's folder) at time ``at``, which must be later than all before it."""
         last = self.entries[-1][0] if self.entries else -math.inf
         if not at > last:
             raise ValueError(f"{self.path.name}: time {at!r} does not follow {last!r}")
-        if self._handle is None:
-            self._begin()
+        handle = self._begin() if self._handle is None else self._handle
         entry = _entry(at, file).encode()
         content = entry + _PVD_END.encode()
-        written = os.pwrite(self._handle, content, self._end)
+        written = os.pwrite(handle, content, self._end)
         if written < len(content):
             # The disk is full. What stood here before is left room for.
-            os.pwrite(self._handle, _PVD_END.encode(), self._end)
-            os.ftruncate(self._handle, self._end + len(_PVD_END))
+            os.pwrite(handle, _PVD_END.encode(), self._end)
+            os.ftruncate(handle, self._end + len(_PVD_END))
             raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(self.path))
         self._end += len(entry)
         self.entries.append((float(at), file))

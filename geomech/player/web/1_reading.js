@@ -118,7 +118,7 @@ class Run {
   }
   // What grows with a run: curves, tips, joints, events and how it ended.
   async update(record) {
-    Object.assign(this, { version: record.version, scale: record.scale, led: record.led, final: record.final, end: record.end, ended: record.ended, events: record.events, cracks: record.cracks });
+    Object.assign(this, { version: record.version, ranges: record.ranges || {}, scale: record.scale, led: record.led, final: record.final, end: record.end, ended: record.ended, events: record.events, cracks: record.cracks });
     const [curves, tips, joints] = await Promise.all([record.curves, record.tips, record.joints].map(
       (each) => each && Arrays.of(each)));
     this.curves = curves;

@@ -278,7 +278,11 @@ class Player {
   // -- what is shown -------------------------------------------------------------------------------------------
   setField(key) { this.field = FIELDS.find((f) => f.key === key); this.fieldInput.value = key; this.chosen(); }
   range() {
-    if (!this.ranges.has(this.field.key)) this.ranges.set(this.field.key, robustRange(this.runs, this.field));
+    const key = this.field.key, told = this.runs.map((run) => (run.ranges || {})[key]);  // as in the pictures, where they are known
+    if (!this.ranges.has(key)) {
+      const known = told.every(Boolean);
+      this.ranges.set(key, known ? [Math.min(...told.map((r) => r[0])), Math.max(...told.map((r) => r[1]))] : robustRange(this.runs, this.field));
+    }
     return this.ranges.get(this.field.key);
   }
   rangeOfThis() { this.own.add(this.field.key); this.ranges.set(this.field.key, robustRange(this.runs, this.field, (run) => this.frameOf(run))); this.writeRange(); this.redraw(); }

@@ -43,18 +43,19 @@ class Wish:
 
 
 def suited(
-    run: Run, component: str | None = None, *, width: int | None = None, scale: float | None = None
+    run: Run, component: str | None = None, *, width: int | None = None, span: tuple[float, float] | None = None
 ) -> FieldPainter:
     """A painter of what suits the run (`usual_field`) or of a stress ``component``; what is not given here, the scene's
-    ``[render]`` table says, and where that is silent too, vertical stress and 800 pixels. Raises KeyError for an unknown
+    ``[render]`` table says, and where that is silent too, vertical stress and 800 pixels; ``span`` of the colours in
+    the field's unit (None: of the run). Raises KeyError for an unknown
     stress component or crack colour."""
     asked = run.scene.get("render", {})
     field = component or usual_field(run) or asked.get("component", "yy")
     if component is not None and component not in COMPONENTS:
         raise KeyError(f"no stress component {component!r}; there are {', '.join(COMPONENTS)}")
     what = quantity(run, field)
-    scale = asked.get("deformation_scale") if scale is None else scale
-    fixed = view(run, what, scale=scale, size=(width or asked.get("width_px", 800), None))
+    size = (width or asked.get("width_px", 800), None)
+    fixed = view(run, what, scale=asked.get("deformation_scale"), span=span, size=size)
     return FieldPainter(run, what, fixed, asked.get("crack_colour", "birth"))
 
 

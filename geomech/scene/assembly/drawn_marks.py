@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import fnmatch
 from collections.abc import Callable, Sequence
+from typing import Any
 
 import numpy as np
 
@@ -17,7 +18,7 @@ from ..tables.loads import BoltTable, ForceTable
 from ..tables.output import MonitorTable
 from ..validation import nearest
 
-#: A bolt is straight to this part of its length; a drawn one that is less so is told.
+#: A bolt is straight to this part of its length; a drawn one that is less straight is reported.
 _STRAIGHT = 1e-3
 #: Pieces of one bolt, and of a water table, meet to this part of the drawing's largest side.
 _MEETING = 1e-6
@@ -33,7 +34,7 @@ def with_marks(
     marks = {mark.name: mark for mark in drawing.marks}
     work = _Matching(marks, drawing, place, faults, warnings)
     came_from: dict[Path, Path] = {}
-    changes = {}
+    changes: dict[str, Any] = {}
     if tables.loads is not None:
         bolts = work.bolts(tables.loads.bolts, came_from)
         water = work.water(tables.loads.water)
@@ -156,7 +157,7 @@ class _Matching:
         return table.model_copy(update={"points": tuple(map(tuple, points.tolist())), "line": None})
 
     def forces(self, tables: Sequence[ForceTable], came_from: dict[Path, Path]) -> tuple[ForceTable, ...]:
-        found = []
+        found: list[ForceTable] = []
         for k, table in enumerate(tables):
             known = table.point in self.marks and all(len(line) == 1 for line in self.marks[table.point].lines)
             if table.point is not None and not known:
@@ -181,7 +182,7 @@ class _Matching:
                 self.claimed[name] = 0
                 for k, point in enumerate(points, 1):
                     drawn[own if len(points) == 1 else f"{own} {k}"] = name, _pair(point[0])
-        found = []
+        found: list[MonitorTable] = []
         for k, table in enumerate(tables):
             name, at = drawn.pop(table.name, ("", None))
             if table.at is None and at is None:

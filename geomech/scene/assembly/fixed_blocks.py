@@ -30,9 +30,11 @@ def fixed_blocks(tables: SceneTables, drawing: Drawing) -> np.ndarray:
     fixed = np.array(
         [zone in zones and (zones[zone].fixed or zones[zone].body != "block") for zone in drawing.zones], dtype=bool
     )
-    for name in drawing.blocks.edge_names:
+    blocks = drawing.blocks
+    assert blocks is not None
+    for name in blocks.edge_names:
         if name.partition(":")[0] == FIXED:
-            fixed[drawing.blocks.vertex_block[drawing.blocks.edges_named(name)]] = True
+            fixed[blocks.vertex_block[blocks.edges_named(name)]] = True
     return fixed
 
 
@@ -50,12 +52,14 @@ def constrained_unknowns(tables: SceneTables, drawing: Drawing) -> np.ndarray | 
     constrained = np.zeros((len(drawing.zones), 6), bool)
     zones = tables.zones or {}
     for block, zone in enumerate(drawing.zones):
-        if zone in zones and zones[zone].guided is not None:
-            constrained[block, _CONSTRAINED[zones[zone].guided]] = True
+        axis = zones[zone].guided if zone in zones else None
+        if axis is not None:
+            constrained[block, _CONSTRAINED[axis]] = True
+    assert drawing.blocks is not None
     for name in drawing.blocks.edge_names:
         if holds(name) and name.split(":")[0] == GUIDED:
             blocks = np.unique(drawing.blocks.vertex_block[drawing.blocks.edges_named(name)])
-            constrained[np.ix_(blocks, _CONSTRAINED[name.split(":")[1]])] = True
+            constrained[np.ix_(blocks, np.array(_CONSTRAINED[name.split(":")[1]]))] = True
     return constrained if constrained.any() else None
 
 

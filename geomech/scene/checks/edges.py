@@ -17,7 +17,7 @@ from .check import Check
 
 
 def check_edges(c: Check) -> None:
-    """Loads and joints must name edges that there are; names that neither says are told."""
+    """Loads and joints must name edges that there are; names in neither are reported."""
     _tractions(c)
     _joints(c)
     _unused(c)
@@ -101,7 +101,7 @@ def _unused(c: Check) -> None:
     from_files = c.drawn.model is not None or (t.geometry is not None and t.geometry.traces)
     if not from_files or t.loads is None or t.joints is None:
         return
-    used = {load.edge for load in (*t.loads.tractions, *t.loads.viscous_boundaries)}
+    used = {load.edge for load in t.loads.tractions} | {edge.edge for edge in t.loads.viscous_boundaries}
     used.update(() if t.loads.water is None else t.loads.water.dry_edges)
     for joint in t.joints.values():
         used.update(joint_names(joint.edges, _edge_names(c)), *joint.between)
@@ -124,6 +124,7 @@ def joint_names(patterns: tuple[str, ...], known: list[str]) -> list[str]:
 
 def contact_names(drawing: Drawing) -> list[str]:
     """Names that faces in contact may have: edges as drawn, and the faces that a crack leaves when it cuts through."""
+    assert drawing.blocks is not None and drawing.cracks is not None
     names = [name for name in drawing.blocks.edge_names if name] + list(drawing.joints)
     faces = [f"crack:{name}" for name in (*drawing.cracks_drawn, *drawing.cracks.names)]
     return list(dict.fromkeys(names + faces))
@@ -164,7 +165,7 @@ def _joints(c: Check) -> None:
             for n, edge in enumerate(pair):
                 if edge not in known:
                     c.refuse(("joints", name, "between", k, n), f"no edge is called {edge!r}", nearest(edge, known))
-            claim(tuple(sorted(pair)), name, ("joints", name, "between", k))
+            claim((min(pair), max(pair)), name, ("joints", name, "between", k))
     if c.blocks.n_blocks > 1 and "default" not in c.tables.joints:
         c.warn(
             ("joints",),

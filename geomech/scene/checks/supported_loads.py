@@ -1,4 +1,4 @@
-"""Whether what the loads push is held: blocks that move have mass, and loads on blocks that nothing fixes balance."""
+"""Whether loaded blocks are supported: blocks that move have mass, and loads on blocks that nothing fixes balance."""
 
 from __future__ import annotations
 
@@ -73,7 +73,7 @@ def _loads_are_lost(c: Check, fixed: np.ndarray) -> bool:
     if any(traction.edge not in blocks.edge_names for traction in t.loads.tractions):
         return False
     on = [np.unique(blocks.vertex_block[blocks.edges_named(traction.edge)]) for traction in t.loads.tractions]
-    carried = [np.array(blocks_at(blocks, f.at), int) for f in t.loads.forces]
+    carried = [np.array(blocks_at(blocks, f.at), np.int64) for f in t.loads.forces if f.at is not None]
     loaded = [*on, *carried, *([np.arange(blocks.n_blocks)] if any(t.loads.gravity_m_s2) else [])]
     if loaded and all(len(at) and fixed[at].all() for at in loaded):
         zone = c.drawn.zones[int(loaded[0][0])]
@@ -81,7 +81,7 @@ def _loads_are_lost(c: Check, fixed: np.ndarray) -> bool:
             ("zones", zone, "fixed"),
             "every load acts on fixed blocks "
             f"({', '.join(sorted({c.drawn.zones[b] for at in loaded for b in at}))}): nothing would be strained",
-            "fix what the specimen stands on, never the specimen; a block alone is held by loads that balance",
+            "fix what the specimen stands on, never the specimen; a single block is kept in place by loads that balance",
         )
         return True
     totals: dict[str, list] = {}

@@ -16,7 +16,7 @@ _ROUNDS = 20
 #: What moves by less than this part of the tolerance moves by round-off, which is nobody's mistake.
 _REPORTED = 1e-4
 FREE, CORNER = -1, -2
-#: Cells along a side of the coarse grid that tells what is near to what has changed.
+#: Cells along a side of the coarse grid by which the surroundings of changes are found.
 _CELLS = 256
 
 
@@ -55,7 +55,8 @@ class Drawn:
 
     @classmethod
     def of(cls, zones: Sequence[Zone], joints: Sequence[Joint], origin: np.ndarray, decimals: int) -> Drawn:
-        starts, ends, source, names = [], [], [], []
+        starts, ends, sources = [], [], []
+        names: list[str] = []
         for zone in zones:
             for k, loop in enumerate(zone.loops):
                 loop = np.round(np.asarray(loop, dtype=float) - origin, decimals) + 0.0
@@ -65,7 +66,7 @@ class Drawn:
                 ends.append(np.roll(loop, -1, axis=0))
                 own = zone.edge_names[k][: len(loop)] if zone.edge_names is not None else [""] * len(loop)
                 # Every edge of an outline is a source of its own: its name differs.
-                source.append(len(names) + np.arange(len(loop)))
+                sources.append(len(names) + np.arange(len(loop)))
                 names += own
         n_outlines = len(names)
         rank = [-1] * n_outlines
@@ -78,12 +79,12 @@ class Drawn:
             inside = line[1:] == line[:-1]
             starts.append(points[:-1][inside])
             ends.append(points[1:][inside])
-            source.append(len(names) + line[:-1][inside])
+            sources.append(len(names) + line[:-1][inside])
             names += [joint.name] * len(count)
             rank += [place] * len(count)
-        start, end, source = np.concatenate(starts), np.concatenate(ends), np.concatenate(source)
-        joint = source >= n_outlines
-        start[joint], end[joint] = _clipped(start[joint], end[joint], start[~joint], decimals)
+        start, end, source = np.concatenate(starts), np.concatenate(ends), np.concatenate(sources)
+        of_joint = source >= n_outlines
+        start[of_joint], end[of_joint] = _clipped(start[of_joint], end[of_joint], start[~of_joint], decimals)
         long = (start != end).any(axis=1)
         return cls(
             start[long], end[long], source[long], np.array(names, dtype=object), np.array(rank, dtype=int), n_outlines
@@ -173,7 +174,8 @@ def _crossed(start, end, source, fresh, n_outlines, decimals, mends) -> tuple[Gr
     # Two joints on one another, or one on an outline; zones share outlines by right.
     again = np.unique(edges[~first & (of >= n_outlines)], axis=0)
     for p, q in nodes[again]:
-        mends.append(Mend("duplicate", *(0.5 * (p + q)).tolist(), float(np.hypot(*(q - p)))))
+        x, y = (0.5 * (p + q)).tolist()
+        mends.append(Mend("duplicate", x, y, float(np.hypot(*(q - p)))))
     new = np.logical_or.reduceat(new, np.flatnonzero(first))
     edges, of = edges[first], of[first]
     rim = np.flatnonzero(of < n_outlines)
@@ -298,7 +300,8 @@ def _met(graph: Graph, fresh: np.ndarray, n_outlines: int, tolerance: float, rou
         for k in np.flatnonzero((chief != np.arange(n)) & follows):
             away = float(np.hypot(*(nodes[k] - graph.nodes[chief[k]])))
             if away > _REPORTED * tolerance:
-                mends.append(Mend("near corners", *graph.nodes[chief[k]].tolist(), away))
+                x, y = graph.nodes[chief[k]].tolist()
+                mends.append(Mend("near corners", x, y, away))
             nodes[k] = graph.nodes[chief[k]]
             settled[k] = settled[chief[k]] = True
         alive = (nodes[edges[:, 0]] != nodes[edges[:, 1]]).any(axis=1)
@@ -330,7 +333,8 @@ def _met(graph: Graph, fresh: np.ndarray, n_outlines: int, tolerance: float, rou
         # The edge is led through the node; one that has been moved onto it lies on it but for round-off.
         through.setdefault(e, []).append(k)
         if away > _REPORTED * tolerance:
-            mends.append(Mend("near miss", *nodes[k].tolist(), away))
+            x, y = nodes[k].tolist()
+            mends.append(Mend("near miss", x, y, away))
     if not merged and not through:
         return None
     return _led_through(nodes, edges, source, settled, through)

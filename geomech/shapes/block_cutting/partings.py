@@ -30,7 +30,7 @@ def trimmed_away(drawn: Drawn, reach: np.ndarray, left: np.ndarray) -> list[Mend
     """The traces of which ``reach`` m lay in the rock and nothing is ``left``."""
     gone = np.flatnonzero((reach > 0) & (left == 0))
     gone = gone[gone >= drawn.n_outlines]
-    # Pieces stand in the order of their traces; a trace is told at its middle one.
+    # Pieces stand in the order of their traces; a trace is reported at its middle one.
     middle = (np.searchsorted(drawn.source, gone) + np.searchsorted(drawn.source, gone, "right")) // 2
     at = 0.5 * (drawn.start[middle] + drawn.end[middle])
     return [Mend("trimmed away", x, y, size) for (x, y), size in zip(at.tolist(), reach[gone].tolist(), strict=True)]
@@ -40,7 +40,7 @@ def partings(drawn: Drawn, names: Sequence[str], reach: np.ndarray, cutting: np.
     """Of the joints ``names``, of whose traces ``reach`` m lie in the rock and ``cutting`` m part blocks."""
     rank = drawn.rank
     return tuple(
-        Parting(name, *(int((own & (rank == place)).sum()) for own in (reach > 0, cutting > 0)),
+        Parting(name, int(((reach > 0) & (rank == place)).sum()), int(((cutting > 0) & (rank == place)).sum()),
                 float(cutting[rank == place].sum()))
         for place, name in enumerate(names)
     )  # fmt: skip

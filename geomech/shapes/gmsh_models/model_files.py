@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import difflib
+import os
 from collections.abc import Mapping
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import Any
 
 import numpy as np
 
 from ..curves import ended_on
 from ..mesh_exchange import SUFFIXES as OTHER_MESHES
 from ..mesh_exchange import as_gmsh_mesh
-from ..parts import JOINT, Joint, Mark, Trace, is_mark
+from ..parts import JOINT, Joint, Mark, Trace, Zone, is_mark
 from ..traces.field_lines import METRES
 from .mesh_files import drawing_of_mesh
 from .model_curves import Curves
@@ -57,14 +59,14 @@ def read_gmsh_model(
     named surfaces, and GmshUnavailable where Gmsh cannot be loaded.
     """
     path = Path(path)
-    if not path.is_file():
+    if not os.path.isfile(path):  # False, too, for a name that is too long to be one
         near = [p.name for p in path.parent.glob("*" + path.suffix)] if path.parent.is_dir() else []
         close = difflib.get_close_matches(path.name, near, 1)
         raise GmshModelError(
             f"there is no file {path}",
             f"did you mean {close[0]}?" if close else "paths are relative to the scene file",
         )
-    arguments = {"parameters": dict(parameters or {}), "chord_tolerance": chord_tolerance, "unit": unit}
+    arguments: dict[str, Any] = {"parameters": dict(parameters or {}), "chord_tolerance": chord_tolerance, "unit": unit}
     files = [path] if trusted() else refuse_commands(path, folder)
     if all(file.suffix in (*SCRIPTS, ".opt") for file in files) and (trusted() or all(map(is_light, files))):
         return read_here(path, **arguments)
@@ -95,7 +97,7 @@ def read_here(
 
 
 def _no_text(path: Path, error: UnicodeDecodeError) -> GmshModelError:
-    """A name in the file is no UTF-8: where, as far as the file's own lines tell."""
+    """A name in the file is no UTF-8: where, as far as the file's own lines show."""
     at = ""
     for number, line in enumerate(path.read_bytes().split(b"\n"), 1):
         try:
@@ -126,7 +128,10 @@ def _drawing(gmsh, path: Path, parameters: dict[str, Parameter], chord: float | 
     used = {abs(t) for _, _, tags in groups[2] for tag in tags for t in _outline(gmsh, tag)}
     edge_name: dict[int, str] = {}
     traced: set[int] = set()
-    traces, joints, marks, places = [], [], [], {}
+    traces: list[Trace] = []
+    joints: list[Joint] = []
+    marks: list[Mark] = []
+    places = {}
     for name, _, tags in groups[0]:
         places["marks", len(marks)] = _entities("point", tags)
         marks.append(Mark(name, tuple(np.array([gmsh.model.getValue(0, tag, [])[:2]]) for tag in tags)))
@@ -149,7 +154,8 @@ def _drawing(gmsh, path: Path, parameters: dict[str, Parameter], chord: float | 
             tags = [tag for tag in tags if tag in used]
         _name_edges(path, name, tags, edge_name)
 
-    zones, named = [], set()
+    zones: list[Zone] = []
+    named = set()
     for name, _, tags in groups[2]:
         for tag in tags:
             places["zones", len(zones)] = _entities("surface", [tag])
@@ -165,8 +171,8 @@ def _drawing(gmsh, path: Path, parameters: dict[str, Parameter], chord: float | 
             warnings.append(
                 (f"{path.name}: surface {tag} has no physical name and is left out", "name it, or remove it")
             )
-    told = _bound_nothing(path, edge_name, used, warnings)
-    warnings += lost_curves(gmsh, path, curves, zones, used | traced | told)
+    reported = _bound_nothing(path, edge_name, used, warnings)
+    warnings += lost_curves(gmsh, path, curves, zones, used | traced | reported)
     warnings += out_of_plane(gmsh, path, max(box[3] - box[0], box[4] - box[1]))
     chords = curves.chords()
     return GmshDrawing(
@@ -193,15 +199,15 @@ def _name_edges(path: Path, name: str, tags: list[int], edge_name: dict[int, str
 
 def _bound_nothing(path: Path, edge_name: dict[int, str], used: set[int], warnings: list[tuple[str, str]]) -> set[int]:
     """Named curves of which none is ``used`` by a surface, each name with a warning."""
-    told: set[int] = set()
+    reported: set[int] = set()
     for name in dict.fromkeys(edge_name.values()):
         tags = {tag for tag, its in edge_name.items() if its == name}
         if not used & tags:
-            told |= tags
+            reported |= tags
             warnings.append(
                 (f"{path.name}: physical curve {name!r} bounds no named surface", f'a crack is called "{CRACK}{name}"')
             )
-    return told
+    return reported
 
 
 def _named_groups(gmsh, path: Path, warnings: list[tuple[str, str]]) -> dict[int, list[tuple[str, int, list[int]]]]:

@@ -20,7 +20,8 @@ def open_with_parameters(gmsh, path: Path, wanted: Mapping[str, float | str]) ->
     known = _opened(gmsh, path)
     waiting = dict(wanted)
     while waiting:
-        ready = {name: _entry(name, known) for name in waiting if _entry(name, known) is not None}
+        found = {name: _entry(name, known) for name in waiting}
+        ready = {name: entry for name, entry in found.items() if entry is not None}
         if not ready:
             name = next(iter(waiting))
             close = difflib.get_close_matches(name, known, 1)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -37,7 +37,8 @@ def serve(job: Mapping[str, Any]) -> None:
 
 
 def _answer(job: Mapping[str, Any]) -> tuple[str, Any]:
-    read = {"model": read_here, "field": read_field_file}[job["kind"]]
+    readers: dict[str, Callable[..., Any]] = {"model": read_here, "field": read_field_file}
+    read = readers[job["kind"]]
     try:
         return "read", read(Path(job["file"]), **job["arguments"])
     except GmshModelError as error:

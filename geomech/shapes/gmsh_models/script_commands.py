@@ -22,7 +22,7 @@ from .model_drawing import GmshModelError
 #: Set to anything but "" or "0", this environment variable lets models do what Gmsh lets them do.
 TRUST = "GEOMECH_TRUST_MODELS"
 
-#: How files that Gmsh reads by their name's ending are told apart; all others it takes for scripts.
+#: How files that Gmsh reads by their name's ending are recognised; all others it takes for scripts.
 SCRIPTS, MESHES, SHAPES = (".geo", ".geo_unrolled"), (".msh",), (".brep", ".step", ".stp", ".STEP", ".STP")
 #: What a mesh begins with; Gmsh takes a .msh that begins otherwise for a script.
 _MESH_BEGINS = (b"$PTS", b"$NO", b"$PARA", b"$ELM", b"$MeshFormat", b"$Comments")
@@ -172,9 +172,9 @@ def _script(path: Path, data: bytes, homes: Sequence[Path]) -> list[Path]:
         if token.kind == "text" and len(token.text) > _LONGEST_STRING:
             raise GmshModelError(f"{path}:{token.line}: a text without an end", "close its quotes")
     if jumps:
-        for number, line in enumerate(re.split(rb"[\r\n]", data), 1):
-            if len(line) > _LONGEST_LINE:
-                raise GmshModelError(f"{path}:{number}: a line of {len(line)} characters", "break it into shorter ones")
+        for number, text in enumerate(re.split(rb"[\r\n]", data), 1):
+            if len(text) > _LONGEST_LINE:
+                raise GmshModelError(f"{path}:{number}: a line of {len(text)} characters", "break it into shorter ones")
     found = _judged(path, tokens, homes)
     if jumps:
         for token in tokens:
@@ -193,7 +193,7 @@ def _tokens(data: bytes) -> Iterator[_Token]:
     for found in _TOKEN.finditer(data):
         text, kind = found.group(), found.lastgroup
         if kind != "blank":
-            yield _Token(kind, text, line)
+            yield _Token(str(kind), text, line)
         line += text.count(b"\n")
 
 

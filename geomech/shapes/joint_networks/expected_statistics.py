@@ -27,7 +27,7 @@ def of_parallel(angle: Law | FisherAngle, spacing: Law, length: Law | None, gap:
         "persistence": share,
         **_angles(angle),
     }
-    if share < 1:
+    if share < 1 and spacing is not None and length is not None:
         out |= {
             "p20_per_m2": share / spacing.mean / length.mean,
             "mean_length_m": length.mean,

@@ -18,7 +18,7 @@ _LONG_ENOUGH = 0.5
 
 @dataclass(frozen=True)
 class SetStatistics:
-    """One joint set in a region; nan where there is nothing to tell.
+    """One joint set in a region; nan where there is nothing to measure.
 
     traces             how many reach into the region
     p10                1/m: traces met by scan-lines across the set
@@ -232,7 +232,7 @@ def block_sizes(areas: np.ndarray, passing: Sequence[float] = (0.1, 0.25, 0.5, 0
     size distribution (Hudson & Priest 1979)."""
     order = np.sort(np.asarray(areas, dtype=float))
     share = np.cumsum(order) / order.sum()
-    return {p: float(np.sqrt(order[min(np.searchsorted(share, p), len(order) - 1)])) for p in passing}
+    return {p: float(np.sqrt(order[min(int(np.searchsorted(share, p)), len(order) - 1)])) for p in passing}
 
 
 def passing_curve(areas: np.ndarray, most: int = 200) -> np.ndarray:

@@ -7,7 +7,7 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -130,13 +130,14 @@ def named_lines(
     that mean no layer, and the number of lines left out by layer.
     """
     found: list[Named] = []
-    idle, out = set(layers or ()), {}
+    idle = set(layers or ())
+    out: dict[str, Any] = {}
     meant: dict[str, str | None] = {}
     for line in file.lines:
         if line.layer not in meant:
             hits = [p for p in layers or () if fnmatch.fnmatch(line.layer.lower(), p.lower())]
             idle.difference_update(hits[:1])
-            meant[line.layer] = (layers[hits[0]] or line.layer) if hits else None if layers else line.layer
+            meant[line.layer] = (layers[hits[0]] or line.layer) if layers and hits else None if layers else line.layer
         said = meant[line.layer]
         if said is None:
             out[line.layer] = out.get(line.layer, 0) + 1
@@ -199,7 +200,7 @@ def drawing_of_lines(lines: Sequence[Named]) -> FieldDrawing:
         warnings.append(
             (f"{own[0].place}: {what} called {name!r}, left out", 'points are monitors: call them "monitor:NAME"')
         )
-    traces = []
+    traces: list[Trace] = []
     for name, own in cracks.items():
         for k, line in enumerate(own, 1):
             places["cracks", len(traces)] = line.place

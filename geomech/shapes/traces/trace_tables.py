@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import re
 from collections.abc import Sequence
 from pathlib import Path
@@ -31,7 +32,7 @@ def read_field_file(
     read.
     """
     path = Path(path)
-    if not path.is_file():
+    if not os.path.isfile(path):  # False, too, for a name that is too long to be one
         raise FieldFileError(f"there is no file {path}", "paths are relative to the scene file")
     kind = path.suffix.lower()
     if kind == ".dxf":
@@ -73,7 +74,7 @@ def _read_csv(path: Path) -> FieldFile:
     names = [name.strip().strip('"').lower() for name in header.split(mark)]
     names = [_COLUMNS.get(name, name) for name in names]
     if set(_ENDS) <= set(names):
-        wanted = _ENDS
+        wanted: tuple[str, ...] = _ENDS
     elif set(_VERTICES) <= set(names) and "id" in names:
         wanted = _VERTICES
     else:
@@ -160,7 +161,7 @@ def _read_geojson(path: Path, set_property: str) -> FieldFile:
     except RecursionError:
         raise FieldFileError(f"{path.name}: its arrays are nested too deep", "export it again") from None
     kind = data.get("type") if isinstance(data, dict) else None
-    features = {"FeatureCollection": lambda: data.get("features"), "Feature": lambda: [data]}.get(kind)
+    features = {"FeatureCollection": lambda: data.get("features"), "Feature": lambda: [data]}.get(str(kind))
     if features is None:
         raise FieldFileError(f"{path.name} is no GeoJSON of features", 'its "type" must be "FeatureCollection"')
     about_crs = data["crs"].get("properties") if isinstance(data.get("crs"), dict) else None

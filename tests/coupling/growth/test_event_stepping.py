@@ -74,6 +74,17 @@ def test_growth_starts_at_the_load_of_the_crack_solver_alone():
     assert -found.load == pytest.approx(toughness_factor(problem), rel=2e-6)
 
 
+def test_growth_under_a_load_that_acts_at_once_is_at_its_beginning():
+    """Within a millionth of a thousandth of a time step, and not at the smallest number after as many solutions as a
+    search may take."""
+    problem = plate()
+    critical = -first_growth(problem).load
+    ends = (("load:top", 1.5 * critical), ("load:bottom", -1.5 * critical))
+    loads = Loads(edge_tractions=tuple(EdgeTraction(name, History.constant([0.0, value])) for name, value in ends))
+    cycle = first_growth(replace(problem, loads=loads))
+    assert 1e-13 < cycle.state.time <= 1e-9 * problem.dda.time_step
+
+
 def test_weight_that_leads_is_that_of_a_column():
     """ρ g(t) h of what moves, in place of the traction on an edge."""
     problem = plate()

@@ -1,0 +1,159 @@
+"""Run time against error of blocks that bend: one block of order p, cells, uniformly strained sub-blocks, finite elements.
+
+A panel is clamped on its left side and loaded by a uniform shear traction on its right. The error is that of the energy it
+stores, which is half the work of the load: of a cantilever of slenderness 8 without Poisson's ratio, whose stress is smooth but at
+the ends, and of Cook's membrane, whose stress is singular at the upper corner of the clamp. Both are held against
+finite elements (`geomech.bench.peers.quadratic_quads`) of 66 690 unknowns, those of the membrane extrapolated to four digits.
+Everything is timed in one run of one process, from given blocks or a given grid to the energy.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ...model import Blocks, DdaSettings, EdgeTraction, History, JointLaw, Loads, Material, State
+from ..figures import Measured, Point, stopwatch
+from ..peers import finite_elements
+
+ONE, CELLS, STRAINED, FEM = "one block", "cells", "sub-blocks of first order, glued", "finite elements, Q2 (scikit-fem)"
+#: 1/m: a clamp with a stiffness of so many E gives by less than 1e-6 of what the panel does; round-off in coordinates of 50 m
+#: would be forces on stiffer ones.
+_CLAMP = 1e6
+#: Repetitions, of which the shortest counts.
+_TIMES = 3
+
+
+@dataclass(frozen=True)
+class Panel:
+    """``corners`` (4, 2) m counter-clockwise from the lower left, of ``rock``; ``columns`` to ``rows`` is as the coarsest grid,
+    ``traction`` Pa upwards on its right side, ``exact`` the energy that it stores, J/m."""
+
+    corners: np.ndarray
+    rock: Material
+    columns: int
+    rows: int
+    traction: float
+    exact: float
+
+    def grid(self, n: int) -> list[np.ndarray]:
+        """Quadrilaterals (4, 2), ``n`` times as many each way as in the coarsest grid."""
+        s, t = np.meshgrid(np.linspace(0, 1, n * self.columns + 1), np.linspace(0, 1, n * self.rows + 1), indexing="ij")
+        share = np.stack([(1 - s) * (1 - t), s * (1 - t), s * t, (1 - s) * t], axis=-1)
+        at = share @ self.corners
+        return [
+            np.array([at[i, j], at[i + 1, j], at[i + 1, j + 1], at[i, j + 1]])
+            for i in range(len(s) - 1)
+            for j in range(len(t[0]) - 1)
+        ]
+
+
+PANELS = {
+    "cantilever": Panel(
+        np.array([[0, 0], [8, 0], [8, 1], [0, 1.0]]), Material("rock", 2e10, 0.0, 2500.0, plane="stress"), 8, 1, -1e5,
+        516.8097,
+    ),
+    "Cook's membrane": Panel(
+        np.array([[0, 0], [48, 44], [48, 60], [0, 44.0]]), Material("rock", 1e9, 1 / 3, 2500.0, plane="stress"), 2, 2, 62.5,
+        0.0120206,
+    ),
+}  # fmt: skip
+
+
+def measure(quick: bool = False) -> Measured:
+    """The table; ``quick`` takes two sizes of each."""
+    points = list(_points(2 if quick else 4))
+    named = [(f"{p.problem}, {p.method}: {p.size:g}", p) for p in points]
+    return Measured.of(
+        table(points), errors={name: p.error for name, p in named}, times={name: p.seconds for name, p in named}
+    )
+
+
+def energy(panel: Panel, n: int, order: int, *, glued: bool = True) -> float:
+    """J/m that a ``panel`` of ``n`` times its coarsest grid stores (0: of one block), of cells of this ``order``, or of
+    sub-blocks of first order between which joints hold if not ``glued``."""
+    cells = [panel.corners] if n == 0 else panel.grid(n)
+    polygons = [panel.corners[[0, 3]][[0, 1, 1, 0]] - [[0, 0], [0, 0], [1, 0], [1, 0]], *cells]
+    right = panel.corners[1:3].mean(axis=0)[0]
+    names = [
+        [["loaded" if np.allclose(ends[:, 0], right) else "" for ends in np.stack([p, np.roll(p, -1, axis=0)], axis=1)]]
+        for p in polygons
+    ]
+    blocks = Blocks.from_polygons(
+        polygons, fixed=[True] + [False] * len(cells), order=[1] + [order] * len(cells), edge_names=names
+    )
+    stiff = _CLAMP * panel.rock.youngs_modulus
+    clamp = JointLaw("clamp", 0.5, cohesion=1e15, tensile_strength=1e15, normal_stiffness=stiff, shear_stiffness=stiff)
+    if glued and n:
+        blocks = replace(blocks, glued=_faces(blocks))
+    else:
+        clamp = clamp if not n else JointLaw("glue", 0.5, cohesion=1e15, tensile_strength=1e15)
+    from ...dda import BlockSystem
+
+    settings = DdaSettings(dynamic_factor=0.0, time_step=1e3, max_displacement_ratio=1.0)
+    system = BlockSystem(blocks, [panel.rock], [clamp], settings=settings)
+    loads = Loads(edge_tractions=(EdgeTraction("loaded", History.constant((0.0, panel.traction))),))
+    return system.step(State.at_rest(blocks), loads).energy.elastic
+
+
+def _faces(blocks: Blocks) -> np.ndarray:
+    """(m, 2) edges of blocks that move and coincide."""
+    seen: dict[tuple, int] = {}
+    pairs = []
+    for v in np.flatnonzero(~blocks.fixed[blocks.vertex_block]).tolist():
+        one, two = (tuple(np.round(blocks.vertices[k], 9).tolist()) for k in (v, blocks.next_vertex[v]))
+        if (two, one) in seen:
+            pairs.append((seen[two, one], v))
+        seen[one, two] = v
+    return np.array(pairs)
+
+
+def _points(sizes: int) -> Iterator[Point]:
+    """All methods for all panels; grids are refined twice from one to the next, and ``sizes`` of them are taken."""
+    refined = (1, 2, 4, 8)[:sizes]
+    for problem, panel in PANELS.items():
+        for order in (1, 2, 3, 5, 8)[: sizes + 1]:
+            yield _timed(problem, ONE, order, lambda panel=panel, order=order: energy(panel, 0, order))
+        for order in (2, 3, 4):
+            for n in refined[: max(1, sizes + 2 - order)]:
+                name = f"{CELLS} of order {order}"
+                yield _timed(problem, name, n, lambda panel=panel, n=n, order=order: energy(panel, n, order))
+        for n in refined:
+            yield _timed(problem, STRAINED, n, lambda panel=panel, n=n: energy(panel, n, 1, glued=False))
+        if finite_elements.available():
+            from ..peers.quadratic_quads import stored_energy
+
+            force = np.array([0.0, panel.traction])
+            for n in refined:
+                yield _timed(
+                    problem, FEM, n,
+                    lambda panel=panel, n=n, force=force: stored_energy(
+                        panel.corners, n * panel.columns, n * panel.rows, panel.rock, force
+                    )[0],
+                )  # fmt: skip
+
+
+def _timed(problem: str, method: str, size: int, run) -> Point:
+    """The error and the shortest time of ``run``; the first may compile."""
+    found, times = run(), []
+    for _ in range(_TIMES):
+        spent_on = stopwatch()
+        run()
+        times.append(spent_on())
+    return Point(problem, method, size, abs(found / PANELS[problem].exact - 1), min(times))
+
+
+def table(points: list[Point]) -> str:
+    """Errors and times, method by method."""
+    lines = ["energy of bent panels: order of one block, or how often the coarsest grid is refined; relative error, ms"]
+    for problem in dict.fromkeys(p.problem for p in points):
+        lines.append(problem)
+        for method in dict.fromkeys(p.method for p in points if p.problem == problem):
+            mine = [p for p in points if (p.problem, p.method) == (problem, method)]
+            row = "   ".join(f"{p.size:g}: {p.error:.1e} {1e3 * p.seconds:7.1f}" for p in mine)
+            lines.append(f"  {method:<34}{row}")
+    if not finite_elements.available():
+        lines.append("  (finite elements: pip install 'geomech[bench]')")
+    return "\n".join(lines)
