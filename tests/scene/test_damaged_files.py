@@ -201,3 +201,12 @@ def test_an_integer_that_python_does_not_read_is_refused_with_its_line(tmp_path)
     path.write_text("[run]\nend_time_s = " + "9" * 5000 + "\n")
     with pytest.raises(SceneError, match=r"scene\.toml:2\n    no number"):
         load_scene(path)
+
+
+@pytest.mark.parametrize(
+    "entry", ['model = "NAME.geo"', '[[geometry.traces]]\nfile = "NAME.csv"', '[[geometry.traces]]\nfile = "NAME.dxf"']
+)
+def test_a_file_name_that_is_too_long_is_no_file(tmp_path, entry):
+    (tmp_path / "scene.toml").write_text("[geometry]\n" + entry.replace("NAME", "a" * 300) + "\n")
+    with pytest.raises(SceneError, match=r"there is no file"):
+        load_scene(tmp_path / "scene.toml")

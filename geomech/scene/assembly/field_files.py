@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
@@ -67,8 +68,8 @@ def read_traces(
                 )
         named = _named_lines(file, k, entry, place, faults, warnings)
         if entry.simplify_m is not None:
-            named, told = _simplified(named, entry.simplify_m, geometry.tolerance_m)
-            warnings.append(Fault(place(source), f"{FilePath(entry.file).name}: {told}", ""))
+            named, removed = _simplified(named, entry.simplify_m, geometry.tolerance_m)
+            warnings.append(Fault(place(source), f"{FilePath(entry.file).name}: {removed}", ""))
         every += named
         by_file[k] = [item for item in named if item.role == "joint"]
         path_of.update((item.line.place, source) for item in named)
@@ -98,7 +99,7 @@ def read_traces(
 
 
 def _simplified(named: list[Named], tolerance: float, meets: float | None) -> tuple[list[Named], str]:
-    """``named`` with joints and cracks simplified, and what to tell of it."""
+    """``named`` with joints and cracks simplified, and what to report of it."""
     at = [
         k
         for k, item in enumerate(named)
@@ -110,10 +111,10 @@ def _simplified(named: list[Named], tolerance: float, meets: float | None) -> tu
     found, out = simplified(lines, tolerance, meets), list(named)
     for k, points in zip(at, found.lines):
         out[k] = named[k]._replace(line=replace(named[k].line, points=points, away=None))
-    told = (
+    report = (
         f"{found.before} sides of its joints and cracks are {found.after}, off by up to {found.off:.3g} m (simplify_m)"
     )
-    return out, told
+    return out, report
 
 
 def _named_lines(
@@ -160,7 +161,7 @@ def _named_lines(
 def _read(path: FilePath, unit: str | None, chord_tolerance: float | None, set_property: str) -> FieldFile:
     """The file; one of a CAD program in a process of its own."""
     arguments: dict[str, Any] = {"unit": unit, "chord_tolerance": chord_tolerance, "set_property": set_property}
-    if path.suffix.lower() == ".dxf" and path.is_file():
+    if path.suffix.lower() == ".dxf" and os.path.isfile(path):
         from ...shapes.gmsh_models.isolated_reader import field_file_apart
 
         return field_file_apart(path, arguments)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import re
 from collections.abc import Sequence
 from pathlib import Path
@@ -31,7 +32,7 @@ def read_field_file(
     read.
     """
     path = Path(path)
-    if not path.is_file():
+    if not os.path.isfile(path):  # False, too, for a name that is too long to be one
         raise FieldFileError(f"there is no file {path}", "paths are relative to the scene file")
     kind = path.suffix.lower()
     if kind == ".dxf":
