@@ -39,11 +39,10 @@ class ContactSolver:
 
     Operator splitting (`dda.open_close.operator_splitting`), of steps in motion
     splitting              whether it proposes states before the central path does
-    splitting_iterations   substitutions at most: from the states of 60 to 200 Newton's method ends in five iterations on
+    splitting_wrong        where fewer than this part of the contacts is wrong, patches are tried before
+    splitting_iterations   substitutions at most: from the states of 100 Newton's method mostly ends in five iterations on
                            a slope of 1 000 blocks that an impact shakes
     splitting_settled      … or until no more than this part of the states changes within ten of them
-    splitting_slow         given up where more than this part still changes within ten after 60 of them, as under sudden
-                           weight, which sets all blocks in motion at once
 
     Central path (`dda.open_close.interior_point`)
     central_path            whether it is followed
@@ -80,9 +79,9 @@ class ContactSolver:
     patch_share: float = 0.4
     patch_blocks: int = 2000
     splitting: bool = True
-    splitting_iterations: int = 200
+    splitting_wrong: float = 0.02
+    splitting_iterations: int = 100
     splitting_settled: float = 0.001
-    splitting_slow: float = 0.03
     central_path: bool = True
     path_iterations: int = 60
     path_undecided: int = 12
