@@ -43,7 +43,7 @@ try:
     from numba.core.options import DefaultOptions
     from numba.core.targetconfig import ConfigStack, TargetConfig
     from numba.core.types.functions import BaseFunction
-except ImportError:  # told below
+except ImportError:  # reported below
     IndexDataCacheFile = UserProvidedCacheLocator = JITCodeLibrary = Compiler = object
     ConfigStack = TargetConfig = BaseFunction = DefaultOptions = object
     Dispatcher = type(njit(lambda: None))
@@ -117,7 +117,7 @@ def part(**options) -> Callable:
         if not OWN_WAY:
             return njit(**options)(function)
         made = njit(no_cpython_wrapper=True, no_cfunc_wrapper=True, pipeline_class=_PartCompiler, **options)(function)
-        # There is nothing that Python could call: it is told so, and nothing is put where it would be found.
+        # Python cannot call it, and is refused with a message; nothing is stored where a call would look for it.
         made._insert = lambda *signature, **how: None
         made._compile_for_args = functools.partial(_refuse, function.__qualname__)
         made.get_call_template = functools.partial(_with_any_integer, made.get_call_template)
@@ -224,7 +224,7 @@ class _Part(JITCodeLibrary):
         return self
 
     def set_env(self, name: str, environment) -> None:
-        """What the code takes from Python; told to the kernel that is linked with it."""
+        """What the code takes from Python; passed on to the kernel that is linked with it."""
         self.environment = name, environment
 
     def finalize(self) -> None:
@@ -280,7 +280,7 @@ class _PartCompiler(_KernelCompiler):
 
 
 class _CacheFile(IndexDataCacheFile):
-    """Numba's own, with a sum of what is kept: what is damaged is compiled anew, and what cannot be kept is not."""
+    """Numba's own, with a sum of what is kept: what is damaged is compiled again, and what cannot be kept is not."""
 
     def _load_index(self) -> dict:
         try:
@@ -315,7 +315,7 @@ class _CacheFile(IndexDataCacheFile):
             file.write(stored + zlib.crc32(stored).to_bytes(4, "little"))
 
     def _drop(self, path: Path, error: Exception) -> None:
-        log.warning("%s is damaged (%s): compiled anew", path, error)
+        log.warning("%s is damaged (%s): compiled again", path, error)
         path.unlink(missing_ok=True)
 
 
@@ -336,7 +336,7 @@ class WithCalled(UserProvidedCacheLocator):
                 noted.write_text(str(Path(self._file).absolute()), encoding="utf-8")
             _prune_once(noted.parent.parent)
         except OSError as error:
-            log.debug("%s: %s", self.get_cache_path(), error)  # told when a kernel cannot be kept there
+            log.debug("%s: %s", self.get_cache_path(), error)  # reported when a kernel cannot be kept there
 
     def get_source_stamp(self) -> str:
         files, constants = compiled_in(self._function)

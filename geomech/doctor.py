@@ -84,7 +84,7 @@ def check_import(name: str, code: str, without: str) -> Check:
         return Check(name, True, done.stdout.strip())
     missing = missing_libraries(done.stderr)
     if missing:
-        # The loader stops at the first one; ldd tells the rest, so that one install is enough.
+        # The loader stops at the first one; ldd lists the rest, so that one install is enough.
         missing = list(dict.fromkeys(missing + _also_missing(name)))
         return Check(name, False, f"missing shared libraries: {', '.join(missing)}", apt_line(missing))
     last = (done.stderr.strip().splitlines() or [f"ended with code {done.returncode}"])[-1]
@@ -116,10 +116,10 @@ def _also_missing(package: str) -> list[str]:
     if not libraries:
         return []
     try:
-        told = subprocess.run(["ldd", *libraries], capture_output=True, text=True, timeout=30, check=False)
+        listed = subprocess.run(["ldd", *libraries], capture_output=True, text=True, timeout=30, check=False)
     except (OSError, subprocess.TimeoutExpired):
         return []
-    return missing_libraries(told.stdout)
+    return missing_libraries(listed.stdout)
 
 
 def _numba() -> Check:

@@ -68,7 +68,7 @@ def run(
 ) -> dict[str, Any]:
     """Run ``scene`` to its end and return the summary that ``summary.json`` holds.
 
-    ``out`` is the run folder (default ``outputs/<scene's name>``); ``observers`` are told of every cycle, by default
+    ``out`` is the run folder (default ``outputs/<scene's name>``); ``observers`` are called after every cycle, by default
     the writers that the scene's ``[output]`` table asks for. ``again``: the scene is the copy that an earlier run has
     left in ``out``. ``overwrite``: what an earlier run has left there may be replaced (None: as `overwriting` says).
     Whatever ends the run, what was written stays readable and every observer is ended; the exception is raised again.

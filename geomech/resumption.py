@@ -108,7 +108,7 @@ def _resumed(wish: _Wish) -> dict[str, Any]:
     try:
         return CoupledRun(problem, folder, wish.watching(scene), stored).go(warnings)
     except FilesChanged as error:
-        raise NotResumable(f"{error}: run it anew") from error
+        raise NotResumable(f"{error}: run it again") from error
 
 
 def _refuse_other_folders(folder: Path) -> None:
@@ -131,7 +131,7 @@ def _refuse_other_sources(header: Mapping[str, Any], path: Path) -> None:
             was = "" if name == "sources" else f" ({header.get(name)}, now {value})"
             raise NotResumable(
                 f"{path} was written with another {what}{was}: go on with what wrote it, geomech "
-                f"{header.get('geomech')}, or run the scene anew"
+                f"{header.get('geomech')}, or run the scene again"
             )
 
 
@@ -152,7 +152,7 @@ def _changes(header: Mapping[str, Any], resolved: Mapping[str, Any]) -> dict[str
     files = digests(resolved)
     for name, digest in header["files"].items():
         if files.get(name) != digest:
-            raise NotResumable(f"{name} is not what the run was begun with: bring it back, or run the scene anew")
+            raise NotResumable(f"{name} is not what the run was begun with: bring it back, or run the scene again")
     return changes
 
 
@@ -201,11 +201,11 @@ def _begin_again(wish: _Wish) -> dict[str, Any]:
     end = _end_reason(folder)
     if end is not None:
         raise Finished(
-            f"the run has ended ({end}), and it has no checkpoint: run the scene anew to let it go on, with a larger "
+            f"the run has ended ({end}), and it has no checkpoint: run the scene again to let it go on, with a larger "
             "output.checkpoint_kept_mb where it is its checkpoint's size that was too large"
         )
     if not (folder / "scene.toml").is_file():
-        raise NotResumable(f"{folder} holds neither a checkpoint nor a scene.toml: run the scene anew")
+        raise NotResumable(f"{folder} holds neither a checkpoint nor a scene.toml: run the scene again")
     wish.tell(f"{folder} holds no checkpoint yet: the run begins again")
     scene = wish.scene()
     return run(scene, folder, wish.watching(scene), again=True)

@@ -306,7 +306,7 @@ def test_a_checkpoint_changes_nothing_of_the_run_that_writes_it(write, tmp_path)
     assert differing(tmp_path / "often", tmp_path / "never") == ["scene.toml"]
     assert len(checkpoint_file.found(tmp_path / "often" / checkpoint_file.FOLDER)) == checkpoint_file.KEPT
     assert not (tmp_path / "never" / checkpoint_file.FOLDER).exists()
-    with pytest.raises(Finished, match="no checkpoint: run the scene anew"):
+    with pytest.raises(Finished, match="no checkpoint: run the scene again"):
         resume(tmp_path / "never", ["run.end_time_s=0.2"])
 
 

@@ -1,4 +1,4 @@
-"""What the command line says beside its results: warnings and errors, on the standard error stream."""
+"""What the command line prints in addition to its results: warnings and errors, on the standard error stream."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from typing import Any
 
 
 def say(text: str) -> None:
-    """A line beside the results, which alone go to the standard output. Where nobody can read it, it is left out."""
+    """A line that is no result; results alone go to the standard output. Where nobody can read it, it is left out."""
     if sys.stderr is None:
         return
     try:

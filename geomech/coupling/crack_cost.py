@@ -1,4 +1,4 @@
-"""What the cracked blocks of a problem ask of memory and time, told from their elements before any matrix is made.
+"""Memory and time that the cracked blocks of a problem need, estimated from their elements before any matrix is made.
 
 A block with m unknowns on its outline and n on its cracks keeps A_ΓΓ and its factors (2 m² numbers), A_CΓ and A_ΓΓ⁻¹ A_ΓC
 (2 m n), S and factors of its states (4 n²), and takes ⅔ m³ + 2 m² n + 2 m n² + ⅔ n³ multiplications to make. What is iterated
@@ -60,7 +60,7 @@ def crack_cost(problem: Problem) -> CrackCost:
 
 
 def cost_lines(problem: Problem) -> list[str]:
-    """Lines that tell the `crack_cost` of ``problem``; none without cracked blocks."""
+    """Lines that state the `crack_cost` of ``problem``; none without cracked blocks."""
     if not problem.cracks.n_cracks or problem.endless is not None:
         return []
     cost = crack_cost(problem)

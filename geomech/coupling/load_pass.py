@@ -285,16 +285,16 @@ def _answers_to_the_last_forces(now: CrackedBlocks, grown: list[int]) -> dict:
     from .. import ddm
 
     try:
-        told = now.solve(asked, now.loads, now.solutions)
+        solved = now.solve(asked, now.loads, now.solutions)
     except ddm.NotConverged:
         # Crack faces may still find consistent states under the forces of the next pass.
         return {}
         # (Observers keep their own reference to the solutions of the last pass.)
-    now.solutions = now.solutions | told
-    now.solved_from = now.solved_from | {b: now.history[b] for b in told if b in now.history}
+    now.solutions = now.solutions | solved
+    now.solved_from = now.solved_from | {b: now.history[b] for b in solved if b in now.history}
     with now.timed("compliance"):
-        now.compliances |= {b: _compliance(now, b, solution) for b, solution in told.items()}
-    return told
+        now.compliances |= {b: _compliance(now, b, solution) for b, solution in solved.items()}
+    return solved
 
 
 def _remember(now: CrackedBlocks, answer: Answer) -> None:

@@ -10,7 +10,7 @@ from typing import TypeVar
 _Item = TypeVar("_Item")
 _Result = TypeVar("_Result")
 
-#: The processors this process may use, where the system tells.
+#: The processors this process may use, where the system gives them.
 THREADS = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 _pools: dict[int, ThreadPoolExecutor] = {}
 

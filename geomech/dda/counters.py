@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 class Work:
     """Counts of work; systems that are given the same one add to it.
 
-    pair_searches, pair_searches_kept     lists of near blocks that were sought; that served again, since no vertex had
+    pair_searches, pair_searches_kept     lists of near blocks that were made; that served again, since no vertex had
                                           moved far enough for another pair to come near
     lone_searches                         contacts asked for of a block without another: nothing is looked for
     factorisations, factorisations_kept   of a sparse matrix, whole or in part; solutions with the factors of a matrix

@@ -87,7 +87,7 @@ class StepCutting:
 
     def __init__(self, system: LimitedSystem, start: StepStart, dt: float, like: StepResult | None) -> None:
         self.system, self.start = system, start
-        self.dt = self.asked = system.limits.foreseen(start.vertices, start.carried, start.moments, dt, start.gravity)
+        self.dt = self.asked = system.limits.predicted(start.vertices, start.carried, start.moments, dt, start.gravity)
         self.search = self._search()
         self.found = self.search.find()
         if like is not None:

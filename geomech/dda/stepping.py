@@ -1,4 +1,4 @@
-"""A run of blocks alone: steps until an end time, with what a run has to watch over."""
+"""A run of blocks alone: steps until an end time, with its energy balance and strains checked."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ log = logging.getLogger(__name__)
 
 @dataclass(eq=False)
 class _Watch:
-    """What is told of steps: energy that comes from nowhere or by overlaps, strains that are no longer elastic."""
+    """What is reported of steps: energy gained without work or by overlaps, strains beyond the elastic range."""
 
     blocks: Blocks
     budget: EnergyBudget = field(default_factory=EnergyBudget)
@@ -36,8 +36,8 @@ class _Watch:
         self.overlaps.check(self.budget, overlap, self.blocks.names, state.time)
         self.range.check(Motion.of(self.blocks, state.vertices), self.blocks, state.time)
 
-    def set_down(self) -> None:
-        """Blocks have come to rest without steps of the run: what that stores is none of its residual."""
+    def at_rest(self) -> None:
+        """Blocks have come to rest outside the steps of the run: the energy stored by that is not part of its residual."""
         self.budget = self.budget.cut()
 
 
@@ -54,14 +54,13 @@ def run(
     watch: Callable[[StepResult], None] | None = None,
 ) -> Iterator[State]:
     """States of a block system from rest (or from ``state``) until ``end_time``, one a step; `StepLength` says how
-    long. ``watch`` sees every `StepResult`. The arrays of states are those that the run goes on with: they can be read
-    and
-    kept, and not written to (`State.writable` has copies).
+    long. ``watch`` sees every `StepResult`. The arrays of states are those with which the run continues: they are
+    read-only (`State.writable` has copies).
 
     ``settings.equilibrium`` "start" brings the blocks to rest before the first state, "loads" in statics at every load
-    too. Logs a warning when energy comes from nowhere, a block is strained beyond the elastic range, or dashpots have
+    too. Logs a warning when energy is gained without work, a block is strained beyond the elastic range, or dashpots have
     nothing to brake in statics. Raises `NotConverged` where no step or equilibrium is found, or a block is strained by
-    more than a quarter, and ValueError for what makes no sense, before the first step as far as it can be told then.
+    more than a quarter, and ValueError for input that makes no sense, before the first step as far as possible.
 
     >>> ground, square = np.array([[-1, -1], [2, -1], [2, 0], [-1, 0]]), np.array([[0, 0], [1, 0], [1, 1], [0, 1]])
     >>> blocks = Blocks.from_polygons([ground, square], fixed=[True, False])
@@ -92,7 +91,7 @@ def run(
         if at_every_load:
             load_time = state.time + until_next_event(loads, state.time, dt)
             state = _at_rest(system, state, loads, load_time)
-            watched.set_down()
+            watched.at_rest()
         result = system.step(state, loads, dt, load_time=load_time)
         length.after(result, dt)
         watched.look(state, result)

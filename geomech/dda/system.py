@@ -47,14 +47,14 @@ class BlockSystem:
     ``joint_index(edge_name, other_name)`` gives the index in ``joints`` of the law between two edges; None from it
     means that such edges do not touch; without it the first law holds everywhere. Contact springs are
     ``settings.normal_penalty`` and ``shear_penalty`` (Pa), by default both 40 times the E' of the two blocks
-    (`penalties`). ``work`` counts what is done, of systems that share it together.
+    (`penalties`). ``work`` counts operations, over all systems that share it.
 
-    What every `Attempt` at a step reads is made once: ``density`` (kg/m³), ``mass`` (kg/m), ``stiffness`` and
-    ``compliance`` (3, 3) of each block, ``constrained`` (what is held of its motion), ``rigid`` (indices), the ``finder`` of
-    contacts and the ``load_map``; and anew when blocks are ``taken_out``: which ones are ``fixed``, ``moving``
+    Arrays that every `Attempt` at a step reads are made once: ``density`` (kg/m³), ``mass`` (kg/m), ``stiffness`` and
+    ``compliance`` (3, 3) of each block, ``constrained`` (which of its unknowns), ``rigid`` (indices), the ``finder`` of
+    contacts and the ``load_map``; and again when blocks are ``taken_out``: which ones are ``fixed``, ``moving``
     (indices), which of them ``turns``, and ``free``, the number of a block among those that move, −1 for the others.
-    ``allowed_penetration`` (m) is zero where penalty springs hold alone; ``rounding`` (m) is that of coordinates:
-    less is no motion; what it makes of blocks' weights is told once.
+    ``allowed_penetration`` (m) is zero where only penalty springs act; ``rounding`` (m) is that of coordinates:
+    less is no motion; its effect relative to blocks' weights is reported once.
 
     Raises ValueError when there are no blocks, materials or joints are missing, a block has no area, or one that moves
     has no mass in a dynamic run.
@@ -132,7 +132,7 @@ class BlockSystem:
         self.allowed_penetration = self._allowed_penetration(float(np.sqrt(areas.min())))
 
     def _allowed_penetration(self, size: float) -> float:
-        """m, of the multipliers' mode; 0 where penalty springs hold alone."""
+        """m, of the multipliers' mode; 0 where only penalty springs act."""
         share = self.settings.penetration_tolerance
         if self.settings.contact == "penalty":
             return 0.0
@@ -278,7 +278,7 @@ class BlockSystem:
         dt = self.settings.time_step if dt is None else float(dt)
         if not 0 < dt < np.inf:
             raise ValueError(f"a time step must be positive, got {dt!r} s")
-        # (Kernels are compiled for arrays that can be written to.)
+        # (Kernels are compiled for writable arrays.)
         state = state.writable()
         self._stray_loads.refuse(loads)
         if self.deflected is not None:
@@ -301,7 +301,7 @@ class BlockSystem:
         return StepCutting(self, start, dt, like).until_it_holds()
 
     def contacts_near(self, state: State) -> ContactSet:
-        """The contacts that a step from ``state`` would begin with, as CONTACT rows tell of them."""
+        """The contacts that a step from ``state`` would begin with, as CONTACT rows describe them."""
         state = state.writable()
         vertices = np.ascontiguousarray(state.vertices)
         return self.finder.find(state, vertices, self._standing(state, vertices), lumped=True)
@@ -313,7 +313,7 @@ class BlockSystem:
         return windows_of(self, start, 0.0)
 
     def inherited_contacts(self, state: State, found: ContactSet, forces: InheritedContacts) -> np.ndarray:
-        """CONTACT rows of ``found``, the contacts near ``state``, as ``forces`` say where they tell of one: for a
+        """CONTACT rows of ``found``, the contacts near ``state``, with the inherited ``forces`` where there are any: for a
         `State` whose next step begins so."""
 
         def on_multiplier(contacts: ContactSet) -> np.ndarray:

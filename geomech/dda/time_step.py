@@ -1,7 +1,6 @@
-"""One step of a given length: the equations of blocks, the states of contacts in them, the motion, and what it took.
+"""One step of a given length: the equations of blocks, the states of contacts in them, the motion, and its energy.
 
-`BlockSystem.step` attempts a step as long as it likes, and a shorter one where contacts do not settle or blocks move
-too far.
+`step_cutting` attempts a shorter step where contacts do not settle or blocks move too far.
 """
 
 from __future__ import annotations
@@ -58,29 +57,29 @@ from .results import CrackResponse, StepResult
 if TYPE_CHECKING:
     from .interfaces import SteppedSystem
 
-#: A moving step whose faces still seek their place after this many times the iterations that states may take is cut, so
-#: often at most: two half steps take a tenth of them (a thousand blocks that slide: 400 for 24 000).
+#: A step in motion whose faces have not found the part on which they touch after this many times the iterations that
+#: contact states may take is cut, this many times at most: two half steps take a tenth of them (a thousand blocks that slide: 400 for 24 000).
 _LABOUR, _EASED = 6, 3
-#: A step is begun again so many times at most for where faces with a stiffness touch. Few take more than four.
+#: A step begins again this many times at most to find the part of a joint face that touches. Few take more than four.
 _PLACED = 20
-#: … so often for which ends of faces hold the cohesion of all of them, …
+#: … this many times to find which ends of faces carry the cohesion of the whole face, …
 _SHARED = 8
-#: … and so often for the gaps that blocks which turn come to, until these are known to this part of the contacts'
-#: ``precision``; in statics to the second, where contacts store little, and springs of 40 E' make energy of what is not known
-#: (slabs that lean, of a tenth of that, as much in one step as all loads do).
+#: … and this many times for the gaps that rotating blocks reach, until these are known to this fraction of the contacts'
+#: ``precision``. The second is that of statics, where contacts store little and springs of 40 E' turn an error of the gap
+#: into energy (for leaning slabs, at a tenth of it, as much in one step as the work of all loads).
 _BENDS, _KNOWN, _KNOWN_IN_STATICS = 4, 0.1, 1e-3
 
 
-#: Blocks that have struck and are closer than they can be, by what others have made of it, are set apart so often.
+#: Blocks that have struck and overlap because of other impacts are set apart this many times.
 _LANDINGS = 4
 
 
 @dataclass(eq=False)
 class Impact:
-    """What the impacts of a step have done so far.
+    """Effect of the impacts of a step so far.
 
-    without  (n_blocks, 6)   velocities as they would be without
-    moved    (n_blocks, 6)   of blocks beside the step's displacement
+    without  (n_blocks, 6)   velocities without impacts
+    moved    (n_blocks, 6)   displacements in addition to that of the step
     lost, rubbed             J/m taken by restitution and friction
     """
 
@@ -151,11 +150,11 @@ class Attempt:
         if not scheme.static and found.tried is None and len(found):
             self.found = found.expecting(*self._expected_states())
         self._edges_along: tuple[np.ndarray | None, np.ndarray] = None, np.zeros((0, 2))
-        foreseen = self._foreseen()
-        self._place(foreseen)
-        if scheme.place == 1.0 and foreseen is not None:
-            # From the end's arms the arc is long, but known as well as these.
-            self._follow(foreseen, self.midpoint.vertices)
+        predicted = self._predicted()
+        self._place(predicted)
+        if scheme.place == 1.0 and predicted is not None:
+            # Measured from the end of the step the arc is long, but as well known as the arms.
+            self._follow(predicted, self.midpoint.vertices)
         for bends in range(_BENDS, -1, -1):
             self._act(start.loads, start.load_time)
             self._assemble()
@@ -167,7 +166,7 @@ class Attempt:
 
     def _expected_states(self) -> tuple[np.ndarray, np.ndarray]:
         """States and senses of sliding (n,) that open-close iterations begin with: those carried over, but of contacts
-        whose blocks part, meet or slide so fast that it would take more than all that they bear to keep them from it in
+        whose blocks part, meet or slide so fast that more than all the forces they bear would be needed to prevent it in
         a step."""
         found, system = self.found, self.system
         centroid = np.ascontiguousarray(self.moments[:, 1:3])
@@ -185,15 +184,15 @@ class Attempt:
         state = np.where(slides, SLIP, np.where(closed, np.where(found.state == OPEN, STICK, found.state), OPEN))
         return state, np.where(slides, -np.sign(along), np.where(parts, 0.0, found.direction))
 
-    def _foreseen(self) -> np.ndarray | None:
-        """(n_blocks, 6) what the velocity makes of this step; None in statics, which carry none."""
+    def _predicted(self) -> np.ndarray | None:
+        """(n_blocks, 6) displacement of this step at the velocity carried into it; None in statics."""
         system = self.system
         if system.scheme.static or not self.n_free:
             return None
         return self.dt * system.scheme.begun(self.carried, self.state.acceleration, self.dt)[0]
 
     def _place(self, increment: np.ndarray | None) -> None:
-        """Put the forces of the step where blocks are in the middle of ``increment`` (n_blocks, 6)."""
+        """Let the forces of the step act on the midpoint configuration of ``increment`` (n_blocks, 6)."""
         system = self.system
         self.midpoint = MidpointConfiguration.of(
             increment, system.scheme.place, self.vertices, system.owner, self.moments
@@ -222,7 +221,7 @@ class Attempt:
         self.pattern = system.pattern_of(found.block, found.other, self.moments, linked) if self.n_free else None
         self.order = system.free if self.pattern is None else self.pattern.order
         if self.pattern is not None and self.pattern.solver is not None:
-            # What is cut at the first sign needs no factors in double, of 100 000 blocks another 1.6 GB.
+            # Steps that are cut at the first difficulty need no double-precision factors, 1.6 GB more for 100 000 blocks.
             self.pattern.solver.single_only = is_large(self.n_free, scheme.static, system.settings.contact_solver)
         self.matrix, self.right, self.tangent, self.stress0 = assemble_blocks(
             self.order, self.n_free, tuple(self._mass),
@@ -235,7 +234,7 @@ class Attempt:
         return BlockMass(self.density, self.moments, self.system.fixed)
 
     def _absorb(self, loads: Loads, load_time: float | None) -> None:
-        """Add what viscous boundaries do."""
+        """Add the dashpots of viscous boundaries."""
         system, state = self.system, self.state
         self.quiet = None
         if loads.viscous_boundaries and not system.scheme.static and self.n_free:
@@ -247,7 +246,7 @@ class Attempt:
             self.quiet.assemble(self.matrix, self.right, self.order, self.midpoint, self.dt)
 
     def _constrained(self) -> np.ndarray | None:
-        """(n_blocks, 3) bool: what is held of the blocks' motion in this step; None where nothing is."""
+        """(n_blocks, 6) bool: which unknowns of blocks are constrained in this step; None without."""
         system, actions, constrained = self.system, self.actions, self.system.constrained
         alone = system.scheme.static and system.blocks.n_blocks == 1 and self.n_free and actions is None
         weight = system.mass[0] * self.gravity if alone else None
@@ -297,7 +296,7 @@ class Attempt:
                 better, shared = (None if sharing is found else sharing), shared + 1
             if better is None:
                 break
-            if self._laboured():
+            if self._labours():
                 raise Unsettled(f"contacts have not settled in {self.iterations} open-close iterations")
             if tries % _PLACED == 0:
                 # Which part touches may follow contacts that jump at any step: these faces stand on their corners in
@@ -320,8 +319,8 @@ class Attempt:
         speed = contact_speeds(found, found.geometry, rigid, centroid)
         return Striking.of(found, restitution, speed, float(np.hypot(*self.gravity)) * self.dt)
 
-    def _laboured(self) -> bool:
-        """Whether shorter steps are likely to come sooner to where this one goes."""
+    def _labours(self) -> bool:
+        """Whether shorter steps are likely to need fewer iterations in all."""
         if self.system.scheme.static or self.cuts >= _EASED:
             return False
         return self.iterations > _LABOUR * self.system.settings.max_open_close_iterations
@@ -350,8 +349,8 @@ class Attempt:
         if not system.scheme.static:
             self._place(increment)
         self._follow(increment, vertices)
-        # In statics bonds were first asked about blocks where they stand: on the arcs of one that has flown off, any
-        # would seem to hold.
+        # In statics bonds are judged with blocks where they stand: on the arcs of one that has flown off, any would seem
+        # intact.
         self.found = self.found.trying(tried, without_lost=system.scheme.static)
         return True
 
@@ -403,7 +402,7 @@ class Attempt:
 
     def _settled(self, pattern, matrix, right, found, gap, vectors, springs, curved) -> Settled:
         system = self.system
-        # Loads at which contacts change are sought in statics, and known to the rounding.
+        # In statics the loads at which contacts change are looked for, and known to round-off.
         slack = self.slack = (
             np.full(len(found), system.rounding)
             if system.scheme.static
@@ -438,7 +437,8 @@ class Attempt:
         )  # fmt: skip
 
     def _expected_unknowns(self) -> np.ndarray | None:
-        """(6 n_free,) what the velocity makes of this step, in the unknowns of `assembly`; None in statics."""
+        """(6 n_free,) displacement of this step at the velocity carried into it, in the unknowns of `assembly`; None in
+        statics."""
         if self.system.scheme.static:
             return None
         moving = self.system.moving
@@ -467,7 +467,7 @@ class Attempt:
         )  # fmt: skip
 
     def _move(self) -> None:
-        """Blocks are moved; their velocities, stresses and accelerations at the end."""
+        """Move the blocks; velocities, stresses and accelerations at the end of the step."""
         scheme, found, dt = self.system.scheme, self.found, self.dt
         carried, actions = self.carried, self.actions
         increment = self._increment(self.unknowns)
@@ -504,9 +504,9 @@ class Attempt:
     def _remembered(self, mean: np.ndarray) -> np.ndarray | None:
         """(n_blocks, 6) the acceleration that the step began with, as far as it still holds; None before there is any.
 
-        Where a contact has opened or closed it tells of forces that are gone, or not of those that have come, and what
-        a spring makes of it that the step does not resolve, k dt² > m, is noise that can grow from bounce to bounce:
-        there the ``mean`` of the step stands for it, with which no step gains energy."""
+        Where a contact has opened or closed it includes forces that no longer act, or lacks new ones; and the part of a
+        spring that the step does not resolve, k dt² > m, is noise that can grow from bounce to bounce. There it is
+        replaced by the ``mean`` of the step, with which no step gains energy."""
         before, system = self.state.acceleration, self.system
         if before is None or system.scheme.alpha or not system.scheme.memory:
             return before
@@ -520,7 +520,7 @@ class Attempt:
         return before
 
     def _stop(self, imposed) -> None:
-        """Take off the velocity what the step cannot bring about (`friction_arrest`); the energy (J/m) that this takes."""
+        """Remove from the velocity what the step cannot resolve (`friction_arrest`), and record the energy (J/m) of it."""
         system, found, velocity = self.system, self.found, self.velocity
         mass = np.where(system.fixed, np.inf, system.mass)
         if not len(found):
@@ -549,7 +549,7 @@ class Attempt:
         self.velocity, self.rubbed = velocity + rates, min(max(rubbed, 0.0), taken)
 
     def _rebound(self, imposed) -> None:
-        """Move blocks that strike each other in the step as their impacts do (`impacts`)."""
+        """Apply the impacts of blocks that strike each other in the step (`impacts`)."""
         found, striking = self.found, self.striking
         gap = self._gaps_now()
         struck = striking.closed(gap)
@@ -573,7 +573,7 @@ class Attempt:
         return self.system.finder.gaps(self.new_vertices, self.vertices, found) - found.lift
 
     def _strike(self, impact: Impact, rebound: Rebound) -> None:
-        """Add ``rebound`` to what impacts have done in the step."""
+        """Add ``rebound`` to the impacts of the step."""
         impact.add(rebound)
         self.velocity = self.velocity.copy()
         self.velocity[:, :3] = rebound.velocity
@@ -726,7 +726,7 @@ class Attempt:
         )  # fmt: skip
 
     def _worst_overlap(self) -> tuple[float, int, int, float, float, float]:
-        """As `overlap_energy.Overlap`: of the contact that closed where its vertex lay deepest in the springs' terms."""
+        """As `overlap_energy.Overlap`: of the contact that closed with the largest spring energy of its overlap."""
         found = self.found
         fresh = (found.state == OPEN) & (self.settled.state != OPEN)
         given = np.where(fresh, 0.5 * found.springs.normal * np.minimum(found.gap_before, 0.0) ** 2, 0.0)
@@ -771,12 +771,12 @@ class Attempt:
             before=energy.before + found.unbent + found.released,
             bond=energy.bond + found.unbent,
             friction=energy.friction + self.rubbed,
-            # What springs back where faces part is a vibration that no step resolves.
+            # Elastic energy released where faces part is a vibration that no step resolves.
             scheme=energy.scheme - self.rubbed + found.released,
         )
 
     def _real_springs(self) -> tuple[np.ndarray, np.ndarray]:
-        """Contact springs that store energy, normal and shear: what multipliers hold does not."""
+        """Contact springs that store energy, normal and shear; multipliers store none."""
         normal, shear = self.found.springs.normal, self.settled.springs.shear
         if not self.system.allowed_penetration:
             return normal, shear
@@ -785,5 +785,5 @@ class Attempt:
 
 
 def _deepest(closed: np.ndarray, before: np.ndarray, after: np.ndarray) -> float:
-    """The deepest that ``closed`` contacts penetrate, m: as the step found them and as it leaves them."""
+    """Largest penetration of ``closed`` contacts at either end of the step, m."""
     return float(max(0.0, -np.minimum(before, after)[closed].min())) if closed.any() else 0.0

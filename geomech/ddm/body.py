@@ -62,7 +62,7 @@ class Body:
     surface instead of all of the plane; cracks may end at it. ``cracks``: those of this body. ``previous``: an earlier
     body of which whatever is unchanged, element by element, is reused, factors included (`bordered_factor`): growth costs the
     rows and columns of the new elements. ``face_laws``: what crack faces do to each other (`face_laws`), the ``law`` of
-    a crack segment counts in them. ``counts`` tells what making it took, ``work`` what was done since by all bodies
+    a crack segment counts in them. ``counts``: operations that making it took; ``work``: those since then, by all bodies
     that share it. Raises ValueError naming the item on geometry that is no body, numpy.linalg.LinAlgError when cracks
     cut a part off.
 

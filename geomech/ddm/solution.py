@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from .loads.body_loads import BodyLoad
 
 
-#: A residual above this is told to the log.
+#: A residual above this is reported in the log.
 WORTH_A_WARNING = 1e-3
 _log = logging.getLogger(__name__)
 
@@ -75,7 +75,7 @@ class Solution:
 
     @cached_property
     def _x(self) -> np.ndarray:
-        """(n_unknowns,) the boundary's unknowns: 2μ times its displacement, reactions where it is held."""
+        """(n_unknowns,) the boundary's unknowns: 2μ times its displacement, reactions where it is supported."""
         return -self._eliminated - self.body._w @ self.jumps
 
     @cached_property

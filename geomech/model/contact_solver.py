@@ -1,6 +1,6 @@
 """How the open–close iteration looks for contact states: the ways it goes, and the numbers that these are tuned by.
 
-``geomech bench contact-solver`` switches the ways off one by one and tells what each number is worth, over random
+``geomech bench contact-solver`` switches the methods off one by one and measures what each number is worth, over random
 slopes, slopes and walls under sudden weight, arches, debris and strength reduction: "measured" below means there.
 """
 
@@ -31,7 +31,7 @@ class ContactSolver:
 
     Patches of blocks about contacts that stay wrong (`dda.open_close.block_patches`)
     patches              whether they are settled by themselves
-    patch_tries          so often in a step
+    patch_tries          this many times in a step
     patch_wrong          where no more than this part of all contacts is wrong
     patch_rings          patches reach so many blocks beyond these contacts
     patch_share          and have at most this part of all blocks, …
@@ -39,11 +39,10 @@ class ContactSolver:
 
     Operator splitting (`dda.open_close.operator_splitting`), of steps in motion
     splitting              whether it proposes states before the central path does
-    splitting_iterations   substitutions at most: from the states of 60 to 200 Newton's method ends in five iterations on
+    splitting_wrong        where fewer than this part of the contacts is wrong, patches are tried before
+    splitting_iterations   substitutions at most: from the states of 100 Newton's method mostly ends in five iterations on
                            a slope of 1 000 blocks that an impact shakes
     splitting_settled      … or until no more than this part of the states changes within ten of them
-    splitting_slow         given up where more than this part still changes within ten after 60 of them, as under sudden
-                           weight, which sets all blocks in motion at once
 
     Central path (`dda.open_close.interior_point`)
     central_path            whether it is followed
@@ -54,7 +53,7 @@ class ContactSolver:
     path_start              ε begins at so many times the mean of N²/kₙ (1 takes a third more iterations) …
     path_least_start        … and not below this, in units of the squared load over the stiffness
     path_correctors         correctors of a step at most (Gondzio 1996; none: a quarter more iterations)
-    path_recentred          so often contacts are centred again where steps have become short, …
+    path_recentred          this many times contacts are centred again where steps have become short, …
     path_recentred_larger   … with so much larger an ε
     path_load_rings         a contact's load is the largest within so many blocks of it: a pebble below a large block
                             bears that one's
@@ -80,9 +79,9 @@ class ContactSolver:
     patch_share: float = 0.4
     patch_blocks: int = 2000
     splitting: bool = True
-    splitting_iterations: int = 200
+    splitting_wrong: float = 0.02
+    splitting_iterations: int = 100
     splitting_settled: float = 0.001
-    splitting_slow: float = 0.03
     central_path: bool = True
     path_iterations: int = 60
     path_undecided: int = 12

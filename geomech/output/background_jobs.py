@@ -1,4 +1,4 @@
-"""Long jobs done beside the run: what waits in Gmsh, in compiled kernels and in compression leaves it the
+"""Long jobs done in the background of the run: what waits in Gmsh, in compiled kernels and in compression leaves it the
 interpreter."""
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ class BackgroundJobs:
 
     def __init__(self, most: int = 4) -> None:
         self.most = most
-        self._thread = ThreadPoolExecutor(1, thread_name_prefix="beside")
+        self._thread = ThreadPoolExecutor(1, thread_name_prefix="geomech-background")
         self._jobs: deque[Future] = deque()
 
     def do(self, job: Callable[..., Any], *arguments: Any) -> None:

@@ -54,8 +54,8 @@ SERIES: dict[str, tuple[Field, ...]] = {
             "key_block",
             "cell",
             "-",
-            "between neighbours that stand: -2 not known yet, -1 fixed or dug out, 0 held by them, 1 removable but "
-            "pushed in, 2 removable but held by strength, 3 slides, 4 falls",
+            "between neighbours that stand: -2 not known yet, -1 fixed or dug out, 0 locked by them, 1 removable but "
+            "pushed in, 2 removable but kept by strength, 3 slides, 4 falls",
             dtype="int32",
         ),
         Field("displacement_rank", "cell", "-", "0 the block that has moved farthest", dtype="int32"),

@@ -1,4 +1,4 @@
-"""What watches a run: objects that are told of its start, of every cycle and of its end."""
+"""Observers of a run: objects that are called at its start, after every cycle and at its end."""
 
 from __future__ import annotations
 
@@ -16,9 +16,8 @@ _log = logging.getLogger(__name__)
 class Observer(Protocol):
     """A run calls `on_start` once, `on_cycle` for every cycle in order, and `on_end` once, also after a failure.
 
-    An observer that writes what a resumed run is to go on with has two methods more: ``memory()``, what it needs for
-    that (plain data, see `geomech.plain_data`), and ``on_resume(problem, folder, memory)``, called in place of
-    `on_start`, which brings its files back to where they were then. Whoever has none of them is started anew.
+    An observer whose files a resumed run continues has two methods more: ``memory()``, what it needs for that (plain data, see `geomech.plain_data`), and ``on_resume(problem, folder, memory)``, called in place of
+    `on_start`, which brings its files back to their state at that time. Those without these methods are started as in a new run.
 
     ``summary`` is one mapping that all observers share: whoever runs the cycles puts in what it knows (``end``, the
     reason; ``wall_s``), and each observer may add to it. ``error`` is the exception that ended the run, if one did.
@@ -32,7 +31,7 @@ class Observer(Protocol):
 
 
 class Resumed(Observer, Protocol):
-    """An observer that goes on with what it wrote before."""
+    """An observer that can be resumed."""
 
     def memory(self) -> Any: ...
 
@@ -53,7 +52,7 @@ class Group:
             self._started.append(observer)
 
     def on_resume(self, problem: Problem, folder: Path, memories: list[tuple[str, Any]]) -> None:
-        """Go on with the ``memories`` of other such observers, each with the first of its own kind."""
+        """Continue with the ``memories`` of other such observers, each with the first of its own kind."""
         left = list(memories)
         for observer in self.observers:
             mine = next((each for each in left if each[0] == _kind(observer)), None)
@@ -65,7 +64,7 @@ class Group:
             self._started.append(observer)
 
     def memories(self) -> list[tuple[str, Any]]:
-        """(kind, memory) of every observer that can go on with one."""
+        """(kind, memory) of every observer that can be resumed."""
         return [
             (_kind(observer), cast(Resumed, observer).memory())
             for observer in self.observers

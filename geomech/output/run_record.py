@@ -92,9 +92,9 @@ class SceneCopy:
 
         folder = Path(folder)
         folder.mkdir(parents=True, exist_ok=True)
-        beside = folder / "scene.toml.part"
-        beside.write_text(tomli_w.dumps(_without_none(self.resolved)), encoding="utf-8")
-        os.replace(beside, folder / "scene.toml")
+        unfinished = folder / "scene.toml.part"
+        unfinished.write_text(tomli_w.dumps(_without_none(self.resolved)), encoding="utf-8")
+        os.replace(unfinished, folder / "scene.toml")
 
     def on_cycle(self, cycle: Cycle) -> None:
         pass

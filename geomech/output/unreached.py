@@ -9,12 +9,12 @@ from geomech.model import Cycle, Problem
 
 from .units import stress_text
 
-#: Rock under a press is linear elastic up to strains of some thousandths; loads that strain it by more are told of.
+#: Rock under a press is linear elastic up to strains of some thousandths; loads that strain it by more are reported.
 ELASTIC = 5e-3
 
 
 def unreached(problem: Problem, last: Cycle | None, happened: Container[str]) -> str:
-    """What to tell first of a run of cracked rock under a leading load that has ended with its time, with ``last`` its last
+    """What to say first of a run of cracked rock under a leading load that has ended with its time, with ``last`` its last
     cycle, while none of the events that were to stop it has ``happened``; "" of others."""
     stops = problem.run.stop_at
     if last is None or not problem.cracks.n_cracks or not stops or any(kind in happened for kind in stops):

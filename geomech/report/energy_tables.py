@@ -46,12 +46,12 @@ TAKEN = {
 def add_energy(page: Page, energy: Mapping[str, float]) -> None:
     """Tables of ``energy``, J/m, as in the run's summary; parts that are zero are left out."""
     done = abs(energy.get("load_work", 0.0) + energy.get("gravity_work", 0.0))
-    _add(page, "energy", "% of the work done", [(told, energy.get(name)) for name, told in BLOCKS.items()], done)
+    _add(page, "energy", "% of the work done", [(label, energy.get(name)) for name, label in BLOCKS.items()], done)
     given = sum(energy.get(name, 0.0) for name in GIVEN)
-    spent = [(told, energy.get(name)) for name, told in TAKEN.items()]
+    spent = [(label, energy.get(name)) for name, label in TAKEN.items()]
     if not any(value for _, value in spent):
         return
-    rows = [(told, energy.get(name)) for name, told in GIVEN.items()]
+    rows = [(label, energy.get(name)) for name, label in GIVEN.items()]
     _add(page, "energy at cracks", "% of what was given", rows + spent, abs(given))
     said = []
     if energy.get("toughness_energy"):
@@ -70,6 +70,6 @@ def add_energy(page: Page, energy: Mapping[str, float]) -> None:
 
 
 def _add(page: Page, what: str, share: str, parts: list[tuple[str, float | None]], whole: float) -> None:
-    rows = [[told, value, f"{100 * value / whole:.2f}" if whole else None] for told, value in parts if value]
+    rows = [[label, value, f"{100 * value / whole:.2f}" if whole else None] for label, value in parts if value]
     if rows:
         page.table([what, "J/m", share], rows)

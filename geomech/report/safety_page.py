@@ -20,7 +20,7 @@ from ..model import OPEN, SLIP, Problem, counted
 #: A block slides when it turns by less than the first of these (rad) as it goes its own size √area, topples when it
 #: turns by more than the second, about a point no farther off than two of its sizes; between, it does both.
 SLIDES, TOPPLES = 0.05, 0.5
-#: So many blocks and joints are told in words; files hold all of them.
+#: This many blocks and joints are named in the text; files list all of them.
 _LISTED = 8
 
 

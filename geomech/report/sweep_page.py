@@ -36,7 +36,7 @@ _RESULTS = (
     "moved_volume", "moved_mass", "moving_blocks", "run_out_m", "peak_load_pa", "initiation_load_pa",
     "coalescence_load_pa", "crack_growth_m", "key_blocks", "largest_displacement_m", "blocks",
 )  # fmt: skip
-#: So many reasons, mechanisms and columns are told.
+#: This many reasons, mechanisms and columns are shown.
 _LISTED = 20
 
 

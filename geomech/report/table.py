@@ -66,7 +66,7 @@ def _row(run: Run) -> dict[str, Any]:
 
 def shown(rows: Sequence[dict[str, Any]]) -> list[Sequence[str | None]]:
     """Headers and cells of the rows as they are read: columns that no run fills left out, loads in the unit that the
-    largest of them is told in."""
+    largest of them is shown in."""
     headers = [name for name in COLUMNS if any(row[name] is not None for row in rows)]
     loads = [name for name in headers if name.endswith(_MPA)]
     largest = max((abs(row[name]) for row in rows for name in loads if row[name] is not None), default=0.0)

@@ -108,7 +108,7 @@ def build_problem(tables: SceneTables, drawing: Drawing, check: Check) -> Proble
 
 
 def _events(tables: SceneTables, blocks: Blocks) -> tuple[str, ...] | None:
-    """What steps from event to event end at, and other steps tell of."""
+    """Events at which steps from event to event end, and which other steps report."""
     if tables.run.events is not None:
         return ("tips", *tables.run.events)
     if tables.run.stepping == "fixed":

@@ -330,7 +330,7 @@ def _syntax_hint(source: str) -> str:
 
 
 def _resolve_records(data: dict[str, Any], folder: FilePath) -> None:
-    """Make the files of loads absolute, in place: they stand beside the scene, and a resolved scene may stand
+    """Make the files of loads absolute, in place: they stand next to the scene, and a resolved scene may stand
     elsewhere."""
     loads = data.get("loads")
     for entry in loads.values() if isinstance(loads, dict) else ():

@@ -23,7 +23,7 @@ def locate(text: str) -> dict[Path, int]:
 
 def path_of(key: str) -> Path:
     """The path of a dotted key as TOML writes it ('joints."a.b".cohesion_pa', 'geometry.cracks.1.angle_deg'); parts
-    that are not bare keys may stand unquoted, and items of arrays as they are told, "geometry.cracks[1]". Whole numbers
+    that are not bare keys may stand unquoted, and items of arrays as messages name them, "geometry.cracks[1]". Whole numbers
     stay texts: what they index decides."""
     if '"' not in key and "'" not in key:
         key = _ITEM.sub(r".\1", key)

@@ -24,11 +24,11 @@ def overview(tables: SceneTables, drawing: Drawing) -> list[str]:
     """Size, zones, materials, cracks, loads and time of a scene, a line each."""
     rows = [("size", _box(drawing.blocks.vertices) + f", {counted(len(set(drawing.zones)), 'zone')}")]
     rows += _cut("zones", _zones(tables, drawing))
-    held = [name for name in drawing.blocks.edge_names if holds(name)]
-    if held:
-        edges = np.concatenate([drawing.blocks.edges_named(name) for name in held])
+    guided = [name for name in drawing.blocks.edge_names if holds(name)]
+    if guided:
+        edges = np.concatenate([drawing.blocks.edges_named(name) for name in guided])
         count = counted(len(np.unique(drawing.blocks.vertex_block[edges])), "block")
-        rows.append(("held", f"{count} by edges called {', '.join(map(repr, held))}"))
+        rows.append(("constrained", f"{count} by edges called {', '.join(map(repr, guided))}"))
     rows += _cut("materials", _materials(tables))
     rows += _cut("cracks", _cracks(drawing.cracks))
     rows += _cut("loads", _loads(tables, drawing))
@@ -144,7 +144,7 @@ def _rising(table: Rising, end: float) -> str:
 
 
 def _course(history: History, end: float, unit: str, sense: str) -> str:
-    """How large a load is and how it comes: magnitudes, and the direction where ``sense`` does not tell it."""
+    """How large a load is and how it comes: magnitudes, and the direction where ``sense`` does not say it."""
     value = history.at(end)
     size, direction = float(np.hypot(*value)), sense or f"along ({value[0]:.3g}, {value[1]:.3g})"
     if size == 0.0:

@@ -104,7 +104,7 @@ def check_endless(c: Check) -> None:
 
 
 def _fluids(c: Check) -> None:
-    """Cracks that a fluid is pumped into are there; one that stands in cracks which nothing connects is told."""
+    """Cracks that a fluid is pumped into are there; a fluid in cracks that nothing connects is reported."""
     cracks = c.cracks
     for k, table in enumerate(c.tables.loads.fluids):
         for n, pattern in enumerate(table.cracks):

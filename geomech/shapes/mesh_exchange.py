@@ -2,7 +2,7 @@
 
 A set of triangles or quadrilaterals is a zone, a set of line elements a joint, a crack or an edge, as physical groups of
 Gmsh are. A set called "block:…" parts blocks of one zone. Without sets, integers of cells ("zone", "material", a
-reference or a tag) tell zones apart.
+reference or a tag) distinguish zones.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from .gmsh_models.model_drawing import GmshModelError
 SUFFIXES = (".inp", ".bdf", ".nas", ".mesh", ".su2", ".vtk", ".vtu")
 #: A set of this name is one block of a zone.
 BLOCK = "block:"
-#: Cell data that tell zones apart where no set does, the best first.
+#: Cell data that distinguish zones where no set does, the best first.
 _ZONE_DATA = ("zone", "material", "gmsh:physical", "medit:ref", "su2:tag", "nastran:ref", "cell_tags", "block_id")
 _LINES = {"line": 2, "line3": 2}
 _FACES = {"triangle": 3, "triangle6": 3, "quad": 4, "quad8": 4, "quad9": 4}
@@ -85,7 +85,7 @@ def _with_groups(mesh, path: Path) -> PhysicalMesh:
                 if len(zones) > 1:
                     raise GmshModelError(
                         f"{path.name}: an element is in the sets {zones[0]!r} and {zones[1]!r}",
-                        f'leave each element in one set; blocks of one zone are told apart by sets "{BLOCK}NAME"',
+                        f'leave each element in one set; blocks of one zone are distinguished by sets "{BLOCK}NAME"',
                     )
                 zone = zones[0] if zones else "rock"
                 entity = entities.setdefault((zone, block), len(entities) + 1)
@@ -111,7 +111,7 @@ class _Names(dict):
 
 def _sets(mesh) -> list[list[list[str]]]:
     """Of every element of every block of cells, the names of the sets that it is in; where no face is in any, the
-    integers that tell zones apart."""
+    integers that distinguish zones."""
     found: list[list[list[str]]] = [[[] for _ in cells.data] for cells in mesh.cells]
     for name, by_block in mesh.cell_sets.items():
         if name.startswith("gmsh:"):

@@ -15,7 +15,7 @@ from .gmsh_models.session import gmsh_session
 
 log = logging.getLogger(__name__)
 
-#: Triangles with a smaller angle than this are told of, rad. Gmsh keeps 20° where nothing is narrow.
+#: Triangles with a smaller angle than this are reported, rad. Gmsh keeps 20° where nothing is narrow.
 SLIVER = math.radians(1.0)
 
 
@@ -61,7 +61,7 @@ def mesh_interior(
     grow back to it by ``slope`` times the distance (a half: over two of its lengths). Nodes on cracks are
     doubled, at junctions once a sector, at mouths too; tips stay single. Between cracks, or a crack and the outline,
     that come
-    nearer to each other than sides are long triangles are as flat as that; flatter ones than 1° are told to the log
+    nearer to each other than sides are long triangles are as flat as that; those below 1° are reported in the log
     with their
     place: fields are shown at nodes and lose nothing, but another program's finite elements would. Raises ValueError
     for sizes that are not

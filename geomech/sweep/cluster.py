@@ -34,7 +34,7 @@ from .measures import Job
 _AHEAD, _AHEAD_LONG, _LONG = 2, 1, 2.0
 #: Seconds of work in a batch, and the most jobs in one.
 _BATCH_SECONDS, _MOST = 0.5, 256
-#: A job that has come to nothing so often counts as failed.
+#: A job that has been lost this many times counts as failed.
 _ATTEMPTS = 3
 
 

@@ -232,7 +232,7 @@ def work(handle: int) -> None:
 
 
 def prepare_worker() -> None:
-    """Ctrl-C in the terminal is for the sweep, which lets runs under way end; loops of references are seldom sought."""
+    """Ctrl-C in the terminal is for the sweep, which lets runs under way end; loops of references are seldom collected."""
     import gc
 
     with suppress(ValueError):  # another thread than the main one
@@ -298,7 +298,7 @@ def _locked(path: Path) -> Iterator[None]:
 
 
 def _memory(process: int) -> float:
-    """Bytes that a process holds; 0 where it cannot be told."""
+    """Bytes that a process holds; 0 where it is not known."""
     try:
         return int(Path(f"/proc/{process}/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE")
     except (OSError, ValueError, IndexError):

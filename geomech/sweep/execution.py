@@ -1,4 +1,4 @@
-"""A sweep from its plan to its table: runs handed out, rows kept as they come, progress told, gone on with."""
+"""A sweep from its plan to its table: runs handed out, rows kept as they come, progress shown; and its resumption."""
 
 from __future__ import annotations
 
@@ -210,7 +210,7 @@ def _prepare(folder: Path, plan: Plan, resume: bool, overwrite: bool) -> None:
         ):
             if stored[name] != mine[name]:
                 raise CannotResume(
-                    f"{what} has changed since the sweep in {folder} began: begin anew in another folder "
+                    f"{what} has changed since the sweep in {folder} began: start again in another folder "
                     "(--out DIR), or over it (--overwrite)"
                 )
         return
@@ -384,7 +384,7 @@ class _Conduct:
                 known = self.journal.rows.get(number)
                 if known is not None and any(known[name] != value for name, value in row.items()):
                     raise CannotResume(
-                        f"run {number} in {self.folder} has other values than this sweep gives it: begin anew "
+                        f"run {number} in {self.folder} has other values than this sweep gives it: start again "
                         "(--overwrite)"
                     )
             self._make(own, table)

@@ -68,7 +68,7 @@ class Plan:
 
     @property
     def result(self) -> str:
-        """The column that is told of first: what `fails` compares, else that of the measure."""
+        """The column that is reported first: what `fails` compares, else that of the measure."""
         first = next((name for name in sorted(names_in(self.fails)) if "." not in name), None)
         return (
             first
@@ -467,7 +467,9 @@ class _Checker:
         settings, seeds, random = self.settings, plan.seeds, plan.random
         if settings.rare and (seeds or not random or len(random) < len(plan.variables)):
             self.refuse(
-                ("rare",), "rare failures are sought among random variables alone", "leave seeds and listed values out"
+                ("rare",),
+                "rare failures are searched for among random variables alone",
+                "leave seeds and listed values out",
             )
         if settings.rare:
             try:

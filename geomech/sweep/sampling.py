@@ -140,5 +140,5 @@ def run_table(variables: Sequence[Variable], design: Design, seeds: Sequence[int
 
 
 def digest_of(table: Sequence[Mapping[str, Any]]) -> str:
-    """What tells two tables apart."""
+    """A digest by which two tables differ."""
     return hashlib.sha256(json.dumps(list(table)).encode()).hexdigest()[:16]

@@ -147,7 +147,7 @@ def tornado(rows: Sequence[Mapping[str, Any]], names: Sequence[str], result: str
 
 class Sensitivity(NamedTuple):
     """Sobol' indices of the variable ``name``: the part of the variance of the result that it makes alone (``first``),
-    and with all others (``total``; nan where the samples do not tell); ``*_error``: half the 95 % interval."""
+    and with all others (``total``; nan where the samples do not determine it); ``*_error``: half the 95 % interval."""
 
     name: str
     first: float

@@ -189,7 +189,7 @@ def test_a_step_of_a_smooth_path_takes_little_more_than_one_body(monkeypatch):
 
 @pytest.mark.parametrize("law", [None, JointLaw("rough", friction_angle=0.4)])
 def test_every_step_meets_a_target_error(law):
-    """Open slots and a rough crack: meshes of other orders on the way, whose faces begin anew or with their memory."""
+    """Open slots and a rough crack: meshes of other orders on the way, whose faces begin without or with their memory."""
     square = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]], dtype=float)
     lines = [np.array([[-0.1, -0.1], [0.1, 0.1]]), np.array([[0.2, -0.05], [0.4, 0.1]])]
     cracks = Cracks.from_polylines(lines[:1] if law else lines)

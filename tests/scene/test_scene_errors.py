@@ -102,7 +102,7 @@ SPOILT = [
         "set dda.dynamic_factor = 0",
     ),
     ("[run]", '[run]\ncontrol = "toughness"', "run.control", 'belongs to stepping "events"', "run.stepping"),
-    ("[run]", '[run]\nstop_at = ["sliding"]', "run.stop_at", "fixed steps tell of these", "run.events = "),
+    ("[run]", '[run]\nstop_at = ["sliding"]', "run.stop_at", "fixed steps report these", "run.events = "),
     (
         "[run]",
         '[run]\nstepping = "events"\nevents = ["tips"]\nstop_at = ["parting"]',

@@ -87,5 +87,5 @@ def _schema(options: argparse.Namespace) -> int:
         print(text, end="")
     else:
         options.out.write_text(text, encoding="utf-8")
-        print(f"{options.out}: put `#:schema {options.out.name}` into the first line of a scene beside it")
+        print(f"{options.out}: put `#:schema {options.out.name}` into the first line of a scene next to it")
     return DONE

@@ -64,19 +64,19 @@ def unsupported(now: CrackedBlocks, result: dda.StepResult, mechanism: Mechanism
     if found is None:
         return ()
     block, detail = found
-    told = event(now, "mechanism", result.state, now.blocks.vertices[int(now.blocks.vertex_start[block])], detail)
+    reported = event(now, "mechanism", result.state, now.blocks.vertices[int(now.blocks.vertex_start[block])], detail)
     if now.problem.run.stepping == "events":
         log.warning(
             "cycle %d, t = %g s: %s; the run ends: no load has an equilibrium from here on. Follow it with "
             'dda.dynamic_factor = 1 and stepping "fixed"',
             now.number, result.state.time, detail,
         )  # fmt: skip
-        return (told,)
-    load = f" and a load of {told.load / 1e3:.4g} kPa" if told.load else ""
+        return (reported,)
+    load = f" and a load of {reported.load / 1e3:.4g} kPa" if reported.load else ""
     log.warning(
         "cycle %d, t = %g s%s: %s. What they move by from here on means nothing in a static run: follow it with "
         "dda.dynamic_factor = 1, find its limit with `geomech safety`, or end here: "
         'run.stop_at = ["mechanism"]',
         now.number, result.state.time, load, detail,
     )  # fmt: skip
-    return (told,)
+    return (reported,)

@@ -1,6 +1,6 @@
 """What parts begin with in motion: as much stress of their own as there is energy for, and their own cracks' strain.
 
-The last solution of the whole body tells the mean stress of every part, unlike the whole's where it was bent. A block
+The last solution of the whole body gives the mean stress of every part, unlike the whole's where it was bent. A block
 of one strain has stored nothing of that: its parts would begin with more energy than it had. What there is besides its
 own is what its cracks have stored, the part of it that the block has been spending, less what those keep that are still
 cracks, of a part. So parts begin with σ₀ + λ (σ − σ₀), σ₀ the stress of the whole, and the largest λ ≤ 1 with which

@@ -50,7 +50,7 @@ _HAIR = 1e-4
 #: weight of a slope of 1 000 blocks, put on suddenly, sinks into eased springs by 6 % of the work of its first 0.3 s, after
 #: so long by 0.1 %.)
 _TRANSITS, _STEPS = 4.0, 20
-#: Contacts are sought at this many times the depth to which the last step has let any penetrate, whatever the window.
+#: Contacts are searched for at this many times the depth to which the last step has let any penetrate, whatever the window.
 _DEEPER = 2.0
 
 
@@ -164,7 +164,7 @@ class ContactFinder:
         margin: float = np.inf,
     ) -> ContactSet:
         """Every vertex within ``window`` (m, of all pairs of blocks or of each) of an edge it may touch, with what ``state.contacts`` remembers of it;
-        without corners that are held to each other by the glue around them, if that ``glue_holds``; the springs of
+        without corners that the bonds around them join, if ``glue_holds``; the springs of
         faces that have a stiffness of their own at their corners, if ``lumped``; those of the bonds ``broken``
         (vertex·n_vertices + edge), too. ``motion`` (n_vertices, 2) m is what vertices are expected to move by in the step:
         it says on which sides corners meet; corners that stay apart then, with ``margin`` m to spare, are left out."""

@@ -57,14 +57,57 @@ def inherited(rows, parent):
     return kinds, sizes, inset
 
 
+class Pairing(NamedTuple):
+    """Of contacts (n,): vertex and edge, their blocks ``block`` and ``other``, the joint ``law``, and whether their spring
+    stands ``inset`` from the vertex."""
+
+    vertex: np.ndarray
+    edge: np.ndarray
+    block: np.ndarray
+    other: np.ndarray
+    law: np.ndarray
+    inset: np.ndarray
+
+
+class StepEnd(NamedTuple):
+    """Contacts (n,) as a step has left them: state and bond, gap m, forces N, ``slip`` in the step and what it
+    ``lifted``, m."""
+
+    state: np.ndarray
+    bonded: np.ndarray
+    gap: np.ndarray
+    normal_force: np.ndarray
+    shear_force: np.ndarray
+    slip: np.ndarray
+    lifted: np.ndarray
+
+
+class SlipBefore(NamedTuple):
+    """Slip, wear and lift of contacts (n,) as a step began, m."""
+
+    slip: np.ndarray
+    wear: np.ndarray
+    lift: np.ndarray
+
+
+class ContactShape(NamedTuple):
+    """Where contacts (n,) are: ``acting`` (n, 7) as in `ContactSet.geometry`, tributary ``length`` m, ``tilt`` of the
+    normal to the edge's, rad, and normal ``stiffness`` N/m."""
+
+    acting: np.ndarray
+    length: np.ndarray
+    tilt: np.ndarray
+    stiffness: np.ndarray
+
+
 @_jit
-def fill(
-    rows, vertex, edge, block, other, law, inset, state, bonded, gap, normal_force, shear_force, slipped, worn, slip,
-    lift, lifted, acting, length, tilt, stiffness,
-):  # fmt: skip
-    """Fill CONTACT ``rows`` (n,): ``slipped``, ``worn`` and ``lift`` (n,) m as the step began, ``slip`` and ``lifted``
-    in it; where contacts are by ``acting`` (n, 7), as in `ContactSet.geometry`, their ``length``,
-    ``tilt`` and ``stiffness`` (n,)."""
+def fill(rows, pairing, end, before, shape):
+    """Fill CONTACT ``rows`` (n,) from plain tuples: ``pairing`` (`Pairing`), ``end`` (`StepEnd`), ``before``
+    (`SlipBefore`) and ``shape`` (`ContactShape`)."""
+    vertex, edge, block, other, law, inset = pairing
+    state, bonded, gap, normal_force, shear_force, slip, lifted = end
+    slipped, worn, lift = before
+    acting, length, tilt, stiffness = shape
     for c in range(len(rows)):
         row = rows[c]
         row.vertex, row.edge, row.block, row.other, row.law = vertex[c], edge[c], block[c], other[c], law[c]

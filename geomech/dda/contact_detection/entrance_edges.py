@@ -227,7 +227,7 @@ class _Lines(NamedTuple):
 
 
 class _Near(NamedTuple):
-    """Two blocks ``a`` and ``b`` whose contacts are sought within a ``window`` m, and where: in the strip that both boxes
+    """Two blocks ``a`` and ``b`` whose contacts are searched for within a ``window`` m, and where: in the strip that both boxes
     share, widened by what can be in reach."""
 
     a: int

@@ -295,7 +295,7 @@ class FacePoints:
         low, high = self.part.T
         length = high - low
         part = np.clip(part, (low - length)[:, None], (high + length)[:, None])
-        # A part that has moved to the other side is sought on both.
+        # A part that has moved to the other side is looked for on both.
         over = (part[:, 0] >= high) | (part[:, 1] <= low)
         part[over] = np.stack([np.minimum(part[:, 0], low), np.maximum(part[:, 1], high)], axis=1)[over]
         first, second = ((state[self.ends] != OPEN) | (gap[self.ends] <= 0)).T

@@ -1,6 +1,6 @@
 """Neighbour search: pairs of blocks that may come into contact, from strips of bounding boxes, reused while valid.
 
-Pairs are sought within the contact window plus a margin, and remain valid until a vertex has moved by half the margin
+Pairs are searched for within the contact window plus a margin, and remain valid until a vertex has moved by half the margin
 (Verlet 1967). Which pairs are examined thus depends on the past; the contacts found do not.
 """
 
@@ -111,7 +111,7 @@ class NearPairs:
     def of_boxes(self, box: np.ndarray, more: np.ndarray) -> np.ndarray:
         """(k, 2) all pairs whose boxes ``box`` (n_blocks, 4) meet, and some others.
 
-        Boxes are widened by ``more`` (n_blocks,) m when pairs are sought, and the pairs remain valid while the widened
+        Boxes are widened by ``more`` (n_blocks,) m when pairs are searched for, and the pairs remain valid while the widened
         boxes contain the current ones."""
         if len(self._first) < 2:
             self.work.lone_searches += 1

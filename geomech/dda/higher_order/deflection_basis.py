@@ -103,6 +103,11 @@ def _principal_box(loop: np.ndarray, points: np.ndarray, weights: np.ndarray) ->
     return 0.5 * (low + high) @ axes, axes * (2.0 / (high - low))[:, None]
 
 
+def _integral(weights: np.ndarray, one: np.ndarray, two: np.ndarray) -> np.ndarray:
+    """(i, j) ∫ oneᵀ two dA of fields (k, a, i) and (k, a, j) at points with these ``weights`` (k,)."""
+    return (one * weights[:, None, None]).reshape(-1, one.shape[2]).T @ two.reshape(-1, two.shape[2])
+
+
 @dataclass(frozen=True, eq=False)
 class DeflectionBasis:
     """The basis of deflection of blocks, of each its own order.
@@ -187,7 +192,7 @@ class DeflectionBasis:
         (3, 3) Pa."""
         points, weights = polygon_points(start, end, self.centroid[block], 2 * int(self.order[block]) - 2)
         strain = self.strain(points, block)[..., : n_deflections(int(self.order[block]))]
-        out = np.einsum("k,kaj,ab,kbi->ji", weights, strain, elastic, strain, optimize=True)
+        out = _integral(weights, strain, elastic @ strain)
         return 0.5 * (out + out.T)
 
     def _evaluated(self, points: np.ndarray, owner: np.ndarray | int, gradients: bool) -> np.ndarray:
@@ -205,31 +210,34 @@ class DeflectionBasis:
         for _ in range(2):
             self._without_affine_part(block, points, weights)
             values = self.displacement(points, block)[..., :own]
-            gram = np.einsum("k,kai,kaj->ij", weights, values, values, optimize=True) / area
+            gram = _integral(weights, values, values) / area
             factor = np.linalg.cholesky(gram)
             coefficients[..., :own] = np.linalg.solve(factor, coefficients[..., :own].reshape(-1, own).T).T.reshape(
                 coefficients[..., :own].shape
             )
         values = self.displacement(points, block)
         by_strain = displacement_matrix(points, self.centroid[block])[..., 3:]
-        self.coupling[block] = np.einsum("k,kae,kaj->ej", weights, by_strain, values, optimize=True)
+        self.coupling[block] = _integral(weights, by_strain, values)
 
     def _without_affine_part(self, block: int, points: np.ndarray, weights: np.ndarray) -> None:
         """Take the rigid motion, by mass, and the mean strain off the columns of ``block``."""
         matrix = displacement_matrix(points, self.centroid[block])
         values, strain = self.displacement(points, block), self.strain(points, block)
-        mean = np.einsum("k,kej->ej", weights, strain) / self.area[block]
-        values = values - np.einsum("kae,ej->kaj", matrix[..., 3:], mean)
+        mean = np.tensordot(weights, strain, 1) / self.area[block]
+        values = values - matrix[..., 3:] @ mean
         rigid = matrix[..., :3]
-        mass = np.einsum("k,kai,kaj->ij", weights, rigid, rigid)
-        motion = np.linalg.solve(mass, np.einsum("k,kai,kaj->ij", weights, rigid, values))
+        mass = _integral(weights, rigid, rigid)
+        motion = np.linalg.solve(mass, _integral(weights, rigid, values))
         # The affine field T(X) (motion, mean) in terms of 1, ξ, η of the box, about its centre.
         gradient = np.array(
             [[mean[0], 0.5 * mean[2] - motion[2]], [0.5 * mean[2] + motion[2], mean[1]]]
         )  # (2, 2, m): ∂u_a/∂x_b
         shift = self.centre[block] - self.centroid[block]
-        constant = motion[:2] + np.einsum("abj,b->aj", gradient, shift)
-        slopes = np.einsum("abj,bc->acj", gradient, np.linalg.inv(self.to_box[block]))
+        constant = motion[:2] + shift[0] * gradient[:, 0] + shift[1] * gradient[:, 1]
+        (a, b), (c, d) = self.to_box[block]
+        # ∂u/∂ξ = ∂u/∂x · (inverse of the matrix to the box).
+        inverse = np.array([[d, -b], [-c, a]]) / (a * d - b * c)
+        slopes = np.swapaxes(np.swapaxes(gradient, 1, 2) @ inverse, 1, 2)
         coefficients = self.coefficients[block]
         coefficients[0] -= constant
         coefficients[1] -= slopes[:, 0]

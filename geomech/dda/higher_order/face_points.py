@@ -23,7 +23,7 @@ from functools import cached_property
 import numpy as np
 
 from ...model import CONTACT, FACE_POINT, OPEN, SLIP, STICK
-from ..contact_detection.contact_records import fill
+from ..contact_detection.contact_records import ContactShape, Pairing, SlipBefore, StepEnd, fill
 from ..joint_laws.bonds import WITHOUT_GAPS, on_lines
 from ..joint_laws.penalty_springs import Springs
 from ..open_close.contact_set import ContactSet
@@ -339,15 +339,18 @@ class FaceContacts(ContactSet):
         rows = np.empty(len(corners), CONTACT)
         bonded = np.where(settled.bonded > 0, settled.bonded, 9).astype(float)
         lowest = faces.least(bonded)
-        fill(
-            rows, corners.vertex, corners.edge, corners.block, corners.other, corners.law, corners.inset, kind,
-            np.where(lowest > 8, 0, lowest).astype(np.int64), faces.of_corners(settled.gap),
+        pairing = Pairing(corners.vertex, corners.edge, corners.block, corners.other, corners.law, corners.inset)
+        end = StepEnd(
+            kind, np.where(lowest > 8, 0, lowest).astype(np.int64), faces.of_corners(settled.gap),
             faces.at_corners(settled.normal_force), faces.at_corners(settled.shear_force),
-            faces.of_corners(self.slip), faces.of_corners(self.wear), faces.of_corners(settled.slip),
-            faces.of_corners(self.lift), faces.of_corners(settled.lifted),
-            corners.geometry if acting is None else acting, np.ascontiguousarray(corners.geometry[:, 4]),
-            corners.tilt, corners.springs.normal,
+            faces.of_corners(settled.slip), faces.of_corners(settled.lifted),
         )  # fmt: skip
+        before = SlipBefore(faces.of_corners(self.slip), faces.of_corners(self.wear), faces.of_corners(self.lift))
+        shape = ContactShape(
+            corners.geometry if acting is None else acting, np.ascontiguousarray(corners.geometry[:, 4]), corners.tilt,
+            corners.springs.normal,
+        )  # fmt: skip
+        fill(rows, tuple(pairing), tuple(end), tuple(before), tuple(shape))
         return rows
 
     def memory(self, settled: Settled, shear: np.ndarray, points: np.ndarray) -> np.ndarray:

@@ -8,15 +8,19 @@ r |(v₀ − c) × (v₁ − c)|, makes Gauss–Legendre points in r and s exact
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 
 
+@cache
 def gauss_points(n: int) -> tuple[np.ndarray, np.ndarray]:
     """The ``n`` Gauss–Legendre points and weights of [0, 1], exact for degree 2n − 1."""
     at, weight = np.polynomial.legendre.leggauss(n)
     return 0.5 * (at + 1.0), 0.5 * weight
 
 
+@cache
 def lobatto_points(n: int) -> tuple[np.ndarray, np.ndarray]:
     """The ``n`` ≥ 2 Gauss–Lobatto points and weights of [0, 1], both ends among them, exact for degree 2n − 3."""
     last = np.polynomial.legendre.Legendre.basis(n - 1)

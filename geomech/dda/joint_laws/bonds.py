@@ -1,6 +1,6 @@
-"""Bonds of whole faces: what two corners of a face hold together, and when the bond between them fails.
+"""Bonds of whole faces: the strength of a bond between two faces, and when it fails.
 
-An edge on an edge is held by contacts at the ends of the overlap ℓ. Their pulls Tᵢ at the distances aᵢ from its middle
+Two bonded edges are joined by contacts at the ends of their overlap ℓ. Their pulls Tᵢ at the distances aᵢ from its middle
 are the resultants T = Σ Tᵢ and M = Σ Tᵢ aᵢ of the stress along the face, which between blocks that deform evenly is a
 straight line. Its extreme fibre is at
 
@@ -8,8 +8,8 @@ straight line. Its extreme fibre is at
 
 and where that reaches the tensile strength a brittle bond fails from end to end, unless the resultant presses within
 the face: then the crack from its edge ends before the other, and what is left holds by friction and cohesion but no
-pull. Sheared, the face holds Σ |Sᵢ| ≤ c ℓ + tan φ Σ Nᵢ wherever along it Σ Nᵢ acts, for what one end does not hold the
-other does. The corners one by one would hold three times the moment, and half the cohesion where one end slips before
+pull. Sheared, the face bears Σ |Sᵢ| ≤ c ℓ + tan φ Σ Nᵢ wherever along it Σ Nᵢ acts: what one end does not bear the
+other does. The corners one by one would bear three times the moment, and half the cohesion where one end slips before
 the other.
 
 What has no tensile strength opens without breaking anything: it may close again, with its cohesion, while states are

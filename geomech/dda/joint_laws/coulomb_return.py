@@ -161,8 +161,8 @@ def reserves(state, bonded, normal_force, shear_force, gap, springs, slack) -> n
     rounding = springs.normal * slack
     pull = np.where(bonded == 1, springs.tension, 0.0)
     lifts = normal_force + pull * (1.0 + _KNOWN) + rounding
-    held = springs.hold + np.where(bonded > 0, springs.cohesion, 0.0)
-    strength = np.maximum(0.0, springs.peak * normal_force + held)
+    firm = springs.hold + np.where(bonded > 0, springs.cohesion, 0.0)
+    strength = np.maximum(0.0, springs.peak * normal_force + firm)
     excess = _KNOWN * strength + (_OF_SLIP * springs.shear + springs.peak * springs.normal) * slack
     closed = np.where(state == STICK, np.minimum(lifts, strength + excess - np.abs(shear_force)), lifts)
     return np.where(state == OPEN, springs.normal * gap + rounding, closed)

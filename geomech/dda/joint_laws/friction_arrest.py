@@ -7,7 +7,7 @@ the step, t* by the line from the sliding speed u₀ at the start to the one tha
 end, friction may have had any value |S| ≤ μN + c instead (Coulomb). Of these that is taken which leaves no sliding, or
 the one nearest to it (Moreau 1988: Coulomb's law between velocities and impulses).
 
-A contact that stays closed on a spring which is stiff beside m/dt² hardly moves, and v' = 2 d/dt − v only turns its speed
+A contact that stays closed on a spring that is stiff compared with m/dt² hardly moves, and v' = 2 d/dt − v only turns its speed
 about from step to step, undamped: forces then swing about those that hold the blocks, and contacts near their strength
 change their state in every step. Such a contact ends the step with the mean speed d/dt that it had in it.
 
@@ -28,7 +28,7 @@ from ..linear_solver import assembly
 from ..open_close.contact_set import ContactSet
 from ..open_close.settled_states import Settled
 
-#: Impulses found to be beyond what friction can have been are brought back to it so often.
+#: Impulses beyond what friction can exert are brought back to it this many times.
 _ROUNDS = 4
 #: A spring k turns the speed of a mass m about in every step of Shi's, instead of swinging, from k dt² = 16 m on: there
 #: its two roots are real, and one of them tends to −1.

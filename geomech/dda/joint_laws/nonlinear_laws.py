@@ -29,7 +29,7 @@ _ROUGHNESS_LEFT = np.array([1.0, 0.85, 0.70, 0.50, 0.40, 0.0])
 #: Where faces hardly press, the shear stiffness is that under this part of the wall's strength.
 _LEAST_PRESSURE = 1e-6
 #: Forces that differ from their laws by less than this part of the contact's own force agree with them. Slip wears the
-#: strength by successive substitution, so it is not as small as the round-off that the other states are held to.
+#: strength by successive substitution, so it is not as small as the round-off that the other states satisfy.
 _AGREED = 1e-8
 
 

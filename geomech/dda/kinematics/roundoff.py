@@ -30,7 +30,7 @@ def undecided_gaps(
 ) -> np.ndarray:
     """(n,) gaps that do not decide contact states in dynamic steps, m.
 
-    The ``rounding`` (m), or a multiple of it where its force is negligible beside the loads of the blocks. Contacts
+    The ``rounding`` (m), or a multiple of it where its force is negligible compared with the loads of the blocks. Contacts
     between ``block`` and ``other`` (n,) have springs ``normal`` (n,) N/m²; ``right`` (n_free, 6) are the blocks' loads,
     N/m, in their ``order`` (n_blocks,). A multiple everywhere would make a pebble far from the origin stick."""
     load = np.append(np.abs(right).max(axis=1, initial=0.0), np.inf)

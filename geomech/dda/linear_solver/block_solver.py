@@ -252,7 +252,7 @@ class BlockSolver:
         """A function ``solution(right, within)`` that returns x (6n,) with a residual of at most ``within`` times
         ``right``.
 
-        It uses factors in single precision (half the time of double ones, where their digits suffice) beside those of
+        It uses factors in single precision (half the time of double ones, where their digits suffice) in addition to those of
         `solve`, or in place of them for very many blocks. Search directions are kept for the next right-hand side.
         Raises numpy.linalg.LinAlgError."""
 
@@ -273,7 +273,7 @@ class BlockSolver:
             return exactly
 
         self._shown.forget()
-        # Those of `solve` are not referenced here, or they would be kept beside later double ones.
+        # Those of `solve` are not referenced here, or they would be kept in memory with later double ones.
         own = None if factors is self._factors else factors
 
         def solution(right: np.ndarray, within: float) -> np.ndarray:
@@ -414,7 +414,7 @@ class BlockSolver:
         known: Directions, tries: int,
     ) -> bool:  # fmt: skip
         """Reduce ``rest`` (6n,), the residual of ``x`` (6n,), until its ``largest`` entry is below ``target``, both in
-        place, by further directions beside the ``known`` ones; False if that takes more than ``tries``."""
+        place, by directions in addition to the ``known`` ones; False if that takes more than ``tries``."""
         for _ in range(tries):
             if largest <= target or not np.isfinite(largest):
                 break

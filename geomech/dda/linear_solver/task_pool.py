@@ -88,5 +88,5 @@ class Crew:
 
 @cache
 def crew() -> Crew:
-    """The crew of this process: one thread per core beside the caller's."""
+    """The crew of this process: one thread per core in addition to the caller's."""
     return Crew(len(os.sched_getaffinity(0)) - 1)

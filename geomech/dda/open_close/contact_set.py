@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from ...model import CONTACT, SLIP
-from ..contact_detection.contact_records import fill
+from ..contact_detection.contact_records import ContactShape, Pairing, SlipBefore, StepEnd, fill
 from ..contact_detection.face_quadrature import FacePoints
 from ..joint_laws.bonds import BondedFaces
 from ..joint_laws.penalty_springs import Springs
@@ -242,12 +242,13 @@ class ContactSet:
             normal, shear = points.at_corners(normal), points.at_corners(shear)
             gap = points.gap_at_corners(gap)
         rows = np.empty(len(self), CONTACT)
-        fill(
-            rows, self.vertex, self.edge, self.block, self.other, self.law, self.inset, settled.state, settled.bonded,
-            gap, normal, shear, self.slip, self.wear, settled.slip, lift, settled.lifted,
-            geometry if acting is None else acting, np.ascontiguousarray(geometry[:, 4]), self.tilt,
-            (self if self.lumped is None else self.lumped).springs.normal,
+        pairing = Pairing(self.vertex, self.edge, self.block, self.other, self.law, self.inset)
+        end = StepEnd(settled.state, settled.bonded, gap, normal, shear, settled.slip, settled.lifted)
+        stiffness = (self if self.lumped is None else self.lumped).springs.normal
+        shape = ContactShape(
+            geometry if acting is None else acting, np.ascontiguousarray(geometry[:, 4]), self.tilt, stiffness
         )  # fmt: skip
+        fill(rows, tuple(pairing), tuple(end), tuple(SlipBefore(self.slip, self.wear, lift)), tuple(shape))
         if points is not None:
             rows["bare"][points.ends] = np.abs(points.part - [0.0, 1.0])
         if np.any(settled.stretch):

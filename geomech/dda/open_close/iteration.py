@@ -4,9 +4,9 @@ Given contact states make the step linear. Its solution is checked against them 
 contact is switched, and the step is solved again: a semismooth Newton method, which converges in two or three
 iterations where few contacts change. Bonds, whose loss is final, break only when everything else is consistent.
 
-If the number of inconsistent contacts does not fall, operator splitting (`operator_splitting`) proposes states, once in
-a step in motion. Those that remain inconsistent are solved on the surrounding blocks alone (`block_patches`), if they
-are few; otherwise the interior-point method (`CentralPath`) proposes states from which Newton's method
+If the number of inconsistent contacts does not fall, few of them are solved on the surrounding blocks alone
+(`block_patches`); of many, in a step in motion, operator splitting (`operator_splitting`) proposes states once. If neither
+leads on, the interior-point method (`CentralPath`) proposes states from which Newton's method
 continues. If that fails, the step is cut. Nonlinear joint laws are linearised within an iteration, which continues
 until the laws agree with their linearisation. All parameters are in `ContactSolver`.
 """
@@ -206,7 +206,7 @@ class _Search:
             or not self.equations.first_order
             or effort.within_patch
             or self.equations.pattern.solver is None
-            or self.may_split
+            or (self.may_split and self.fewest > solver.splitting_wrong * len(self.found))
             or self.patched >= solver.patch_tries
         ):
             return False
@@ -235,7 +235,7 @@ class _Search:
         except np.linalg.LinAlgError as error:
             raise Unsettled(str(error)) from error
         self.spent += proposal.spent
-        if proposal.states is None or proposal.states.key in self.seen:
+        if proposal.states.key in self.seen:
             return False
         self.states, self.most = proposal.states, max(self.most, self.newton + self.solver.newton_to_finish)
         self._restart()

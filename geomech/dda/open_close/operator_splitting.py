@@ -1,5 +1,5 @@
 """Contact states of a step in motion by operator splitting: blocks and contacts are solved by turns, with one
-factorisation.
+factorisation for many turns.
 
 With the blocks' equations A d = f + Gᵀ F, the relative motions q = G d of contacts, and the contact law F(q), springs
 of ρ on all contacts split the step into two problems that are easy alone (Douglas & Rachford 1956; Lions & Mercier
@@ -11,9 +11,13 @@ of ρ on all contacts split the step into two problems that are easy alone (Doug
 
 Where z = G d, the forces F(z) balance the blocks. Unlike Newton's method on states it does not overshoot where hundreds of
 contacts change at once, and hard springs do not slow it down: how fast it converges depends on the blocks, whose answer
-lies between their inertia 2m/dt² and their stiffness E'. ρ is the geometric mean of these two. After some tens of
-substitutions what is left wrong are contacts that bear next to nothing, and Newton's method finds all states from there. A
-substitution takes a twentieth of an iteration of it.
+lies between their inertia 2m/dt² and their stiffness E'. A motion that a contact prevents
+converges the faster the larger ρ is, one that it leaves free the faster the smaller. So ρ is the geometric mean of the two
+at first and where a contact slides along its edge; where the turns have closed a contact it comes to lie half way
+(in logarithms) between this mean and the stiffness, where they have opened it half way to the inertia. (With the mean
+alone twice the turns leave more states wrong; at the bounds themselves states go on changing.) What is left wrong in the end
+are contacts that bear next to nothing, and Newton's method finds all states from there. A turn takes a tenth of an
+iteration of it.
 """
 
 from __future__ import annotations
@@ -22,7 +26,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...compiled import kept
+from ...compiled import UNCOUNTED, kept
 from ...model import OPEN, SLIP, STICK, ContactSolver
 from ..equation_records import ContactMotion, ContactStiffness
 from ..linear_solver import assembly
@@ -33,110 +37,136 @@ from .interior_point.contact_terms import balance
 _SLIPPED = 2
 #: α, the over-relaxation.
 _RELAXATION = 1.7
-#: Substitutions between two looks at how many states have changed.
+#: Turns between two looks at how many states have changed.
 _LOOK = 10
-#: … and after how many they tell whether it leads anywhere.
-_SLOW = 60
-#: What a substitution takes, in iterations of Newton's method.
-_SUBSTITUTION = 0.05
+#: Turns after which ρ follows the states.
+_FOLLOWS = (20, 40, 80)
+#: What a turn and a factorisation take, in iterations of Newton's method.
+_TURN, _FACTORS = 0.1, 1.0
 
 
 class Proposal(NamedTuple):
-    """The ``states`` that contacts approach, None where they do not, and what it took, in iterations of Newton's
-    method."""
+    """The ``states`` that contacts approach, and what it took, in iterations of Newton's method."""
 
-    states: States | None
+    states: States
     spent: float
 
 
-@kept(fastmath={"contract"}, error_model="numpy", nogil=True)
-def _turn(unknowns, ends, vectors, law, held, relaxation, at_hand, states):
-    """One turn of the contacts about the blocks' ``unknowns`` (6 n_free,). ``ends``: both blocks' numbers (n,) each;
-    ``law`` (n, 7): gap, kₙ, kₛ, S₀, μ, c, ρ; ``held`` (n,) by bonds. ``at_hand`` (n, 6) has ζ, z and the forces
+@kept(fastmath={"contract"}, error_model="numpy", nogil=True, **UNCOUNTED)
+def _turn(unknowns, contacts, law, rho, held, relaxation, at_hand, states):
+    """One turn of the ``contacts`` (`ContactMotion`) about the blocks' ``unknowns`` (6 n_free,). ``law`` (n, 6): gap, kₙ,
+    kₛ, S₀, μ, c; ``rho`` (2, n) across and along; ``held`` (n,) by bonds. ``at_hand`` (n, 6) has ζ, z and the forces
     ρ (2z − ζ − q), each across and along; ``states``: state and direction (n,) of z."""
     state, direction = states
+    block, other, order, vectors = contacts
     for c in range(len(law)):
         apart = along = 0.0
         for side in range(2):
-            b = ends[side][c]
+            b, k = order[block[c] if side == 0 else other[c]], 6 * side
             if b < 0:
                 continue
             for a in range(6):
-                apart += vectors[c, 0, 6 * side + a] * unknowns[6 * b + a]
-                along += vectors[c, 1, 6 * side + a] * unknowns[6 * b + a]
-        gap, normal, shear, before, friction, firm, rho = law[c]
-        now = at_hand[c]
-        across, slid = now[0] + relaxation * (apart - now[2]), now[1] + relaxation * (along - now[3])
+                apart += vectors[c, 0, k + a] * unknowns[6 * b + a]
+                along += vectors[c, 1, k + a] * unknowns[6 * b + a]
+        gap, normal, shear, before, friction, firm = law[c, 0], law[c, 1], law[c, 2], law[c, 3], law[c, 4], law[c, 5]
+        hard, rough = rho[0, c], rho[1, c]
+        across = at_hand[c, 0] + relaxation * (apart - at_hand[c, 2])
+        slid = at_hand[c, 1] + relaxation * (along - at_hand[c, 3])
         z, s = across, slid
         state[c], direction[c] = OPEN, 0.0
         if held[c] or gap + across < 0.0:
-            z = (rho * across - normal * gap) / (rho + normal)
-            s = (rho * slid + before) / (rho + shear)
+            z = (hard * across - normal * gap) / (hard + normal)
+            s = (rough * slid + before) / (rough + shear)
             strength, force = firm - friction * normal * (gap + z), before - shear * s
             state[c] = STICK
             if not held[c] and abs(force) > strength:
                 state[c], direction[c] = SLIP, (1.0 if force > 0.0 else -1.0)
-                s = slid + direction[c] * strength / rho
-        now[0], now[1], now[2], now[3] = across, slid, z, s
-        now[4], now[5] = rho * (2.0 * z - across - apart), rho * (2.0 * s - slid - along)
-
-
-def stiffness_between(equations: Equations) -> np.ndarray:
-    """(n,) N/m: ρ of each contact, the geometric mean of inertia and stiffness of the softer of its two blocks."""
-    matrix, order, found = equations.matrix, equations.pattern.order, equations.found
-    inertia = np.append(np.minimum(matrix[:, 0, 0], matrix[:, 1, 1]), np.inf)
-    both = np.append(np.sqrt(inertia[:-1] * np.maximum(inertia[:-1], matrix[:, 3, 3])), np.inf)
-    rho = np.minimum(both[order[found.block]], both[order[found.other]])
-    return np.where(np.isfinite(rho), rho, 1.0)
+                s = slid + direction[c] * strength / rough
+        at_hand[c, 0], at_hand[c, 1], at_hand[c, 2], at_hand[c, 3] = across, slid, z, s
+        at_hand[c, 4], at_hand[c, 5] = hard * (2.0 * z - across - apart), rough * (2.0 * s - slid - along)
 
 
 def can_split(equations: Equations) -> bool:
     """Not in statics, where no inertia holds blocks, nor for blocks of higher order or curved laws, nor where the system
-    is so small that its matrix is full."""
+    is so small that its matrix is full; nor where no contact bore anything before, as under sudden weight, so that there
+    is nothing to begin with."""
     if equations.statics or equations.expected is None or not equations.first_order:
+        return False
+    if not equations.found.normal.any():
         return False
     return equations.curved is None and equations.pattern.solver is not None
 
 
+class _Springs:
+    """The springs ρ of all contacts: ``rho`` (2, n) N/m, across the edge and along it, and ``correction``, by which the
+    blocks answer what is out of balance between them."""
+
+    def __init__(self, equations: Equations, contacts: ContactMotion) -> None:
+        self._equations, self._contacts = equations, contacts
+        matrix, order, found = equations.matrix, equations.pattern.order, equations.found
+
+        def of_softer(value: np.ndarray) -> np.ndarray:
+            value = np.append(value, np.inf)
+            softer = np.minimum(value[order[found.block]], value[order[found.other]])
+            return np.where(np.isfinite(softer), softer, 1.0)
+
+        inertia = np.minimum(matrix[:, 0, 0], matrix[:, 1, 1])
+        loose, firm = of_softer(inertia), of_softer(np.maximum(inertia, matrix[:, 3, 3]))
+        self._mean = np.sqrt(loose * firm)
+        self._if_open, self._if_closed = np.sqrt(self._mean * loose), np.sqrt(self._mean * firm)
+        self._become(np.stack([self._mean, self._mean]))
+
+    def _become(self, rho: np.ndarray) -> None:
+        equations, none = self._equations, np.zeros(rho.shape[1])
+        pattern, data = equations.pattern, equations.room()
+        self.rho = rho
+        stiffness = ContactStiffness(rho[0], rho[1], none, none)
+        assembly.assemble(pattern, data, equations.matrix, self._contacts, stiffness, sides=equations.sides)
+        pattern.add_links(data)
+        self.correction = pattern.solver.corrections(data)
+
+    def follow(self, state: np.ndarray, at_hand: np.ndarray) -> None:
+        """Take ρ by the ``state`` (n,) of the contacts; ζ of what is ``at_hand`` (n, 6) changes with it, the forces ρ (z − ζ)
+        of the contacts do not."""
+        forces = self.rho.T * (at_hand[:, 2:4] - at_hand[:, :2])
+        across = np.where(state == OPEN, self._if_open, self._if_closed)
+        self._become(np.stack([across, np.where(state == SLIP, self._mean, across)]))
+        at_hand[:, :2] = at_hand[:, 2:4] - forces / self.rho.T
+
+
 def split(equations: Equations, bonded: np.ndarray, solver: ContactSolver) -> Proposal:
     """The states that the step's contacts come to, with the bonds ``bonded`` (n,) kept, from the motion of the
-    velocities and the forces carried over; None for states where it converges too slowly to lead there. Raises
-    numpy.linalg.LinAlgError."""
+    velocities and the forces carried over. Raises numpy.linalg.LinAlgError."""
     pattern, found, springs = equations.pattern, equations.found, equations.springs
     order, vectors = pattern.order, np.ascontiguousarray(equations.vectors)
-    rho, none = stiffness_between(equations), np.zeros(len(found))
-    data = equations.room()
-    assembly.assemble(
-        pattern, data, equations.matrix, ContactMotion(found.block, found.other, order, vectors),
-        ContactStiffness(rho, rho, none, none), sides=equations.sides,
-    )  # fmt: skip
-    pattern.add_links(data)
-    correction = pattern.solver.corrections(data)
+    contacts = ContactMotion(found.block, found.other, order, vectors)
+    between = _Springs(equations, contacts)
 
     slipped, slides = bonded == _SLIPPED, found.state == SLIP
     friction = np.where(slides, springs.friction, springs.peak)
     firm = np.where(slides, springs.sliding, springs.hold + np.where(slipped, springs.cohesion, 0.0))
     held = (bonded > 0) & ~slipped
-    law = np.stack([equations.gap, springs.normal, springs.shear, found.shear, friction, firm, rho], axis=1)
-    contacts = (order[found.block], order[found.other]), vectors, law, held
+    law = np.stack([equations.gap, springs.normal, springs.shear, found.shear, friction, firm], axis=1)
 
     # Before the first turn z is not known: ζ begins as q − F/ρ.
     unknowns, at_hand = equations.expected.copy(), np.zeros((len(found), 6))
     strength = np.where(held, np.inf, friction * np.maximum(found.normal, 0.0) + firm)
-    at_hand[:, 0], at_hand[:, 1] = -found.normal / rho, -np.clip(found.shear, -strength, strength) / rho
+    forces = np.stack([found.normal, np.clip(found.shear, -strength, strength)], axis=1)
+    at_hand[:, :2] = -forces / between.rho.T
     states = found.state.copy(), np.zeros(len(found))
-    seen, relaxation = states[0].copy(), 1.0
+    seen, relaxation, spent = states[0].copy(), 1.0, _FACTORS
     for taken in range(1, solver.splitting_iterations + 1):
-        _turn(unknowns, *contacts, relaxation, at_hand, states)
-        relaxation = _RELAXATION
+        _turn(unknowns, contacts, law, between.rho, held, relaxation, at_hand, states)
+        relaxation, spent = _RELAXATION, spent + _TURN
         if taken % _LOOK == 0:
             changing = np.count_nonzero(states[0] != seen) / len(found)
-            if changing <= solver.splitting_settled:
+            if taken > _FOLLOWS[0] and changing <= solver.splitting_settled:
                 break
-            if taken == _SLOW and changing > solver.splitting_slow:
-                return Proposal(None, 1.0 + _SUBSTITUTION * taken)
             seen[:] = states[0]
         rest = (equations.right - pattern.without_contacts(equations.matrix, unknowns)).ravel()
         balance(0, pattern.n, *equations.sides, vectors, at_hand, 4, 5, rest, rest)
-        unknowns += correction(rest)
-    return Proposal(States(*states, bonded), 1.0 + _SUBSTITUTION * taken)
+        unknowns += between.correction(rest)
+        if taken in _FOLLOWS:
+            between.follow(states[0], at_hand)
+            spent += _FACTORS
+    return Proposal(States(*states, bonded), spent)

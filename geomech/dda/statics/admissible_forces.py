@@ -118,7 +118,7 @@ class AdmissibleForces:
         high = np.concatenate([np.full(2 * n, np.inf), hold, self.pull[:, 1], np.full(2 * m, np.inf)])
         cost = np.append(np.zeros(len(low) - 2 * m), np.ones(2 * m))
         found = optimize.linprog(
-            cost, A_eq=matrix, b_eq=self.loads, bounds=np.stack([low, high], axis=1), method="highs-ds"
+            cost, A_eq=matrix, b_eq=self.loads, bounds=np.stack([low, high], axis=1), method="highs-ipm"
         )
         if found.status != 0:
             raise Unsolved(found.message)

@@ -239,7 +239,8 @@ def with_admissible_forces(found: FactorOfSafety, largest: float | None) -> Fact
     line = (
         f"friction does not determine how the blocks are wedged against one another: contact forces that balance the "
         f"loads within the strength of all joints exist {bound}, which is an upper bound. The factor {found.factor:.4f} "
-        "is that of the contact forces which the deformation of the blocks brings about"
+        "is that of the contact forces which the deformation of the blocks brings about, and moves with the stiffness "
+        "of blocks and joints"
     )
     return replace(found, admissible=largest, warnings=(*found.warnings, line))
 

@@ -94,61 +94,90 @@ def equilibrium(
 
     ``tolerance`` bounds the unbalanced force on any block over the mean force on blocks. Blocks that move farther than
     ``limit`` allows (by default, one that begins here) have collapsed, and are followed to where they come to rest if
-    that is not far, unless ``follow`` is False. A block that has gone ``reach`` m and is out of balance still is taken to have collapsed, too; by
-    default that is a tenth of the blocks' extent, or a twentieth of the block's own size once the unbalanced force has
-    stopped falling; with a ``reach`` of the caller's there is no other limit. ``watch`` sees every
-    step and its RELAXATION_STEP. Raises ValueError for a tolerance that is not positive; what is not found is told in
-    the answer.
+    that is not far, unless ``follow`` is False. A block that has moved ``reach`` m and is still out of balance has also
+    collapsed; by default that is a tenth of the blocks' extent, or a twentieth of the block's own size once the
+    unbalanced force has stopped falling; with a ``reach`` of the caller's there is no other limit. ``watch`` sees every
+    step and its RELAXATION_STEP. Raises ValueError for a tolerance that is not positive; without an equilibrium the
+    result says so.
     """
     if not tolerance > 0:
         raise ValueError(f"the tolerance of the unbalanced force must be positive, got {tolerance!r}")
     blocks = system.blocks
     static = system if system.scheme.static else system.in_statics()
     time = state.time if load_time is None else load_time
-    begin = state = replace(state, velocity=np.zeros_like(state.velocity), acceleration=None)
+    state = replace(state, velocity=np.zeros_like(state.velocity), acceleration=None)
     free = np.flatnonzero(~blocks.fixed)
     if not len(free):
         nothing = np.zeros(blocks.n_blocks)
         return Equilibrium(state, True, False, (), "nothing moves", np.empty(0, RELAXATION_STEP), nothing, None)
-    judged = reach is None
-    size = np.sqrt(blocks.areas())
-    flights = 0
-    reach = 0.1 * float(np.hypot(*np.ptp(blocks.vertices, axis=0))) if reach is None else reach
-    dt, longest = _pseudo_times(static)
-    history: list[np.void] = []
-    result = None
-    travelled = np.zeros(blocks.n_blocks)
-    limit = limit or DisplacementLimit(static, begin, loads, time)
-    gone: tuple[int, ...] = ()
+    return _Relaxation(static, state, loads, time, reach, crack, limit).run(tolerance, max_steps, watch, follow)
 
-    def answer(converged: bool, collapsed: bool, reason: str) -> Equilibrium:
-        moving = gone
-        if not converged and not gone and result is not None:
-            speed = np.hypot(*result.state.velocity[:, :2].T)
-            order = np.argsort(-speed, kind="stable")
-            moving = tuple(order[speed[order] > 0.1 * speed.max()].tolist())
-        if not converged and moving:
-            named = ", ".join(repr(blocks.names[b] if blocks.names else f"block {b}") for b in moving[:5])
-            reason += f"; {named}{' and others' if len(moving) > 5 else ''} move{'s' if len(moving) == 1 else ''}"
-        rest = replace(state, time=begin.time, velocity=np.zeros_like(state.velocity))
-        rows = np.array(history, RELAXATION_STEP) if history else np.empty(0, RELAXATION_STEP)
-        log.info("static equilibrium: %s (%d steps)", reason, len(rows))
-        return Equilibrium(rest, converged, collapsed, moving, reason, rows, limit.moved(state.vertices), result)
 
-    for _ in range(max_steps):
-        try:
-            result = static.step(state, loads, dt, crack, time)
-        except NotConverged as failure:
-            return answer(False, bool(gone), str(failure))
+class _Relaxation:
+    """Static steps of ``system`` from ``state`` under the loads at ``time``; arguments as for `equilibrium`."""
+
+    def __init__(
+        self, system: BlockSystem, state: State, loads: Loads, time: float, reach: float | None,
+        crack: CrackResponse | None, limit: DisplacementLimit | None,
+    ) -> None:  # fmt: skip
+        blocks = system.blocks
+        self.system, self.loads, self.time, self.crack = system, loads, time, crack
+        self.state, self.start = state, state.time
+        self.limit = limit or DisplacementLimit(system, state, loads, time)
+        # With a reach of the caller's there is no other limit.
+        self.judged = reach is None
+        self.reach = 0.1 * float(np.hypot(*np.ptp(blocks.vertices, axis=0))) if reach is None else reach
+        self.size = np.sqrt(blocks.areas())
+        self.travelled = np.zeros(blocks.n_blocks)
+        self.history: list[np.void] = []
+        self.result: StepResult | None = None
+        #: Blocks that have moved beyond the limit, and the last step in which a block was in free flight.
+        self.gone: tuple[int, ...] = ()
+        self.last_flight = 0
+
+    def run(
+        self, tolerance: float, max_steps: int, watch: Callable[[StepResult, np.void], None] | None, follow: bool
+    ) -> Equilibrium:
+        """Step until the blocks are at rest, have collapsed, or ``max_steps`` are used up."""
+        dt, longest = _pseudo_times(self.system)
+        for _ in range(max_steps):
+            try:
+                self.result = result = self.system.step(self.state, self.loads, dt, self.crack, self.time)
+            except NotConverged as failure:
+                return self._ended(False, bool(self.gone), str(failure))
+            row, moved = self._take(result)
+            if watch is not None:
+                watch(result, row)
+            self.limit.follow(result)
+            if self.judged and not self.gone:
+                self.gone = tuple(self.limit.beyond(self.state).tolist())
+            if row["unbalanced"] <= tolerance:
+                return self._at_rest(float(row["unbalanced"]))
+            if self.gone and not follow:
+                break
+            self.travelled += moved
+            statistics = result.statistics
+            collapse = self._collapse(statistics["unbalanced_ratio"])
+            if collapse:
+                return self._ended(False, True, collapse)
+            moves_far = statistics["limit_share"] > _NEARLY
+            dt = min(result.dt if moves_far else _GROWTH * result.dt, longest)
+        if self.gone:
+            farthest = self.limit.moved(self.state.vertices).max()
+            return self._ended(False, True, f"no equilibrium: blocks have moved {farthest:.3g} m and go on")
+        unbalanced = self.history[-1]["unbalanced"]
+        return self._ended(False, False, f"unbalanced force {unbalanced:.2g} after {max_steps} steps")
+
+    def _take(self, result: StepResult) -> tuple[np.void, np.ndarray]:
+        """Go on from ``result``; its RELAXATION_STEP, and how far the centroids have moved (n_blocks,), m."""
         # Pseudo-time is not the time of the loads, which do not change here.
-        state = replace(result.state, time=begin.time)
+        self.state = replace(result.state, time=self.start)
+        moved = np.hypot(*(result.forces.centroid - _centroids(self.system, self.state)).T)
         statistics = result.statistics
-        unbalanced = unbalanced_force(static, result)
-        moved = np.hypot(*(result.forces.centroid - _centroids(static, state)).T)
         row = np.array(
             (
                 result.dt,
-                unbalanced,
+                unbalanced_force(self.system, result),
                 statistics["kinetic_energy"],
                 moved.max(),
                 statistics["open_close_iterations"],
@@ -156,43 +185,52 @@ def equilibrium(
             ),
             RELAXATION_STEP,
         )[()]
-        history.append(row)
-        if watch is not None:
-            watch(result, row)
-        limit.follow(result)
-        if judged and not gone:
-            gone = tuple(limit.beyond(state).tolist())
-        if unbalanced <= tolerance and gone:
-            far = limit.moved(state.vertices)[list(gone)].max()
-            return answer(False, True, f"no equilibrium where the blocks are: they come to rest {far:.3g} m farther")
-        if unbalanced <= tolerance:
-            return answer(True, False, f"unbalanced force {unbalanced:.2g} of the mean force")
-        if gone and not follow:
-            break
-        travelled += moved
-        if travelled.max() > reach:
-            return answer(False, True, f"no equilibrium: blocks have moved {travelled.max():.3g} m and go on")
-        flights = len(history) if statistics["unbalanced_ratio"] > _FLYING else flights
-        since = len(history) - _IN_VAIN
-        if judged and since > flights and (travelled > _GONE * size).any():
-            forces = [float(row["unbalanced"]) for row in history]
-            if min(forces[since:]) >= min(forces[:since]):
-                return answer(
-                    False, True,
-                    f"no equilibrium: blocks have moved {travelled.max():.3g} m, and {_IN_VAIN} steps brought no more "
-                    "balance",
-                )  # fmt: skip
-        moves_far = statistics["limit_share"] > _NEARLY
-        dt = min(result.dt if moves_far else _GROWTH * result.dt, longest)
-    if gone:
-        return answer(
-            False, True, f"no equilibrium: blocks have moved {limit.moved(state.vertices).max():.3g} m and go on"
-        )
-    return answer(False, False, f"unbalanced force {history[-1]['unbalanced']:.2g} after {max_steps} steps")
+        self.history.append(row)
+        return row, moved
+
+    def _at_rest(self, unbalanced: float) -> Equilibrium:
+        """The answer where the blocks are in balance: a collapse if they had to move too far for it."""
+        if self.gone:
+            far = self.limit.moved(self.state.vertices)[list(self.gone)].max()
+            return self._ended(
+                False, True, f"no equilibrium where the blocks are: they come to rest {far:.3g} m farther"
+            )
+        return self._ended(True, False, f"unbalanced force {unbalanced:.2g} of the mean force")
+
+    def _collapse(self, unbalanced_ratio: float) -> str:
+        """Why blocks that are out of balance have collapsed; empty where they may still come to rest."""
+        farthest, n = self.travelled.max(), len(self.history)
+        if farthest > self.reach:
+            return f"no equilibrium: blocks have moved {farthest:.3g} m and go on"
+        if unbalanced_ratio > _FLYING:
+            self.last_flight = n
+        since = n - _IN_VAIN
+        if not self.judged or since <= self.last_flight or not (self.travelled > _GONE * self.size).any():
+            return ""
+        forces = [float(row["unbalanced"]) for row in self.history]
+        if min(forces[since:]) < min(forces[:since]):
+            return ""
+        return f"no equilibrium: blocks have moved {farthest:.3g} m, and {_IN_VAIN} steps brought no more balance"
+
+    def _ended(self, converged: bool, collapsed: bool, reason: str) -> Equilibrium:
+        """The answer, with the blocks that move named in its ``reason``."""
+        blocks, state, moving = self.system.blocks, self.state, self.gone
+        if not converged and not moving and self.result is not None:
+            speed = np.hypot(*self.result.state.velocity[:, :2].T)
+            order = np.argsort(-speed, kind="stable")
+            moving = tuple(order[speed[order] > 0.1 * speed.max()].tolist())
+        if not converged and moving:
+            named = ", ".join(repr(blocks.names[b] if blocks.names else f"block {b}") for b in moving[:5])
+            reason += f"; {named}{' and others' if len(moving) > 5 else ''} move{'s' if len(moving) == 1 else ''}"
+        rest = replace(state, time=self.start, velocity=np.zeros_like(state.velocity))
+        rows = np.array(self.history, RELAXATION_STEP) if self.history else np.empty(0, RELAXATION_STEP)
+        log.info("static equilibrium: %s (%d steps)", reason, len(rows))
+        moved = self.limit.moved(state.vertices)
+        return Equilibrium(rest, converged, collapsed, moving, reason, rows, moved, self.result)
 
 
 def _pseudo_times(system: BlockSystem) -> tuple[float, float]:
-    """First and longest step, s; blocks without mass have no say."""
+    """First and longest step, s; blocks without mass do not count."""
     free = ~system.blocks.fixed & (system.density > 0)
     if not free.any():
         return 1.0, 1.0

@@ -23,7 +23,7 @@ import math
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, replace
 
-from ...model import Blocks, Bolt, DdaSettings, JointLaw, Loads, Material, State
+from ...model import Blocks, DdaSettings, JointLaw, Loads, Material, State
 from ...model.former_names import renamed_argument
 from ..joint_laws.reduced_strength import reduced
 from ..results import NotConverged
@@ -59,6 +59,8 @@ _FARTHEST = 64.0
 _BEYOND = 1e-2
 #: Factor from step to step in the search for a stable trial near a known factor; and of the first trial below a bound.
 _NEARBY, _BELOW = 0.85, 0.95
+#: The bound is sought from here: Newton's method comes from above, and most slopes fail below.
+_FIRST = 2.0
 #: Trials beside an expected factor are made so many tolerances from it; near a bound, a second one fails so much farther
 #: above the first that their drifts point at the factor.
 _BESIDE, _SECOND = 0.4, 0.01
@@ -125,10 +127,10 @@ def factor_of_safety(
         raise NothingToReduce("the joints have no friction, cohesion or tensile strength that could be reduced")
     if not 0 < tolerance < 1:
         raise NothingToReduce(f"the tolerance of the factor must lie between 0 and 1, got {tolerance!r}")
-    if blocks.order is not None and (blocks.order != 1).any():
+    if blocks.glued is not None or (blocks.order is not None and (blocks.order != 1).any()):
         raise NothingToReduce(
-            "blocks of higher order ([zones.NAME] order) are not supported in the search for a factor of safety yet: "
-            "leave `order` out"
+            "blocks of higher order ([zones.NAME] order) and cells are not supported in the search for a factor of safety yet: "
+            "leave `order` and `mesh_size_m` out"
         )
     if blocks.fixed.all():
         raise NothingToReduce("all blocks are fixed: none could fail")
@@ -199,12 +201,11 @@ class _Search:
             return 0.0
         system = self.system(1.0, counted)
         whole = without_failure(system, self.rest, self.under.loads, self.under.time)
-        return 0.0 if whole is None else self._bound(system, whole, 1.0, self.under.loads.bolts)
-
-    def _bound(self, system: BlockSystem, state: State, first: float, bolts: Sequence[Bolt] = ()) -> float:
-        forces = AdmissibleForces.of(system, state, self.rest, self.joints, self.chosen, bolts)
+        if whole is None:
+            return 0.0
+        forces = AdmissibleForces.of(system, whole, self.rest, self.joints, self.chosen, self.under.loads.bolts)
         try:
-            return 0.0 if forces is None else forces.largest_factor(first)
+            return 0.0 if forces is None else forces.largest_factor(_FIRST)
         except Unsolved as failure:
             log.info("the largest factor with admissible contact forces is not known: %s", failure)
             return 0.0
@@ -212,9 +213,17 @@ class _Search:
     def _with_admissible_forces(self, found: FactorOfSafety, counted: Counted) -> FactorOfSafety:
         if not math.isfinite(found.upper):
             return with_no_mechanism(found)
-        first = found.upper * (1.0 + _BEYOND)
-        largest = self._bound(self.system(found.lower, counted), found.state, first)
-        return with_admissible_forces(found, largest) if largest > first else found
+        forces = AdmissibleForces.of(
+            self.system(found.lower, counted), found.state, self.rest, self.joints, self.chosen
+        )
+        beyond = found.upper * (1.0 + _BEYOND)
+        try:
+            if forces is None or not forces.balance(beyond):
+                return found
+            return with_admissible_forces(found, forces.largest_factor(beyond / _NEARBY))
+        except Unsolved as failure:
+            log.info("whether contact forces are admissible beyond the factor is not known: %s", failure)
+            return found
 
     def _with_toes(self, found: FactorOfSafety, counted: Counted) -> FactorOfSafety:
         bearing = self._bearing(found, counted)

@@ -1,4 +1,4 @@
-"""Energy that comes in by overlaps: told of at one part of all energy turned over, and the end of a run at another.
+"""Energy that overlaps bring in: reported at one fraction of all energy turned over, the end of a run at another.
 
 Contacts that close with a vertex that lies in a block already push it out, with the work ½ k g² of springs that nothing
 has pressed. Blocks that do not go into each other bring none; what was drawn with an overlap brings its own in the first
@@ -16,7 +16,7 @@ from ..results import NotConverged
 
 log = logging.getLogger(__name__)
 
-#: Parts of all energy turned over: what is told of, and what makes the run meaningless.
+#: Fractions of all energy turned over: what is reported, and what makes the run meaningless.
 WARNED, ENDED = 0.01, 0.1
 
 

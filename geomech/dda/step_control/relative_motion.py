@@ -1,4 +1,4 @@
-"""How far two near blocks may move against each other in a step, and how far apart their contacts are sought.
+"""How far two near blocks may move against each other in a step, and how far apart their contacts are searched for.
 
 The relative displacement of blocks a and b is the affine field u_a(x) − u_b(x); where both may be in the step it is
 largest at a corner of the box that their boxes, widened by it, share. A pair's *motion* is that, so that neither what
@@ -6,10 +6,10 @@ moves along with both nor what lies elsewhere counts. From the velocity V with w
 
     motion ≤ V dt + g dt²,      window = 1.1 (V dt + g dt²) + margin,
 
-bounds what a contact may be sought for. Contacts keep the lines and the edges of the step's start. A pair may therefore
+bounds how far a contact is searched for. Contacts keep the lines and the edges of the step's start. A pair may therefore
 move by `SHARE` of the geometric mean of its blocks' sizes (`widths`), after it has gone the way that lies between the two, and
 turn by `TURN` against each other: what a third block is like does not matter, nor how the model lies. What is not
-foreseen (impacts, loads that set in) is checked after the step (`continuous_collision`).
+predicted (impacts, loads that set in) is checked after the step (`continuous_collision`).
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from ..contact_detection.neighbour_search import NearPairs, boxes
 SHARE = 0.1
 #: … and turn by this, rad: what lines of contacts that stay on the axes of the start are good for.
 TURN = 0.15
-#: Contacts are sought this part of the smaller block's size farther than the velocity leads, …
+#: Contacts are searched for this part of the smaller block's size farther than the velocity leads, …
 _MARGIN = 0.02
 #: … and this many times as far as it leads.
 _WIDER = 1.1
@@ -132,7 +132,7 @@ def _shares(pairs, affine, turn, centroid, box, vertices, next_vertex, start, si
 
 @dataclass(frozen=True, eq=False)
 class Windows:
-    """Contacts of the ``pairs`` (k, 2) of blocks, ascending, are sought within ``reach`` (k,) m of each."""
+    """Contacts of the ``pairs`` (k, 2) of blocks, ascending, are searched for within ``reach`` (k,) m of each."""
 
     pairs: np.ndarray
     reach: np.ndarray

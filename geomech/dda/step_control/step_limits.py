@@ -1,4 +1,4 @@
-"""What a step of blocks may do: how long it may be, where it looks for contacts, and whether something went through.
+"""Limits of a time step: how long it may be, where it looks for contacts, and whether a corner went through a block.
 
 Three limits shorten a step. No vertex moves by more than ``max_displacement_ratio`` of half the domain's diagonal, a
 bound on what the run is asked to resolve; no two blocks that touch, or may come to, move or turn against each other by
@@ -33,22 +33,22 @@ log = logging.getLogger(__name__)
 #: A step that speed limits uses this part of what it may move: round-off, arcs and what blocks hit take the rest, so
 #: that it need not be cut.
 _AIM = 0.99
-#: Where something went in, contacts are sought this many times as far as the blocks have moved.
+#: Where something went in, contacts are searched for this many times as far as the blocks have moved.
 _WIDER = 1.5
-#: Blocks that are glued to each other, or to a third, misfit where they meet by this part of the smaller one's size at
+#: Blocks that are bonded to each other, or to a third, misfit where they meet by this part of the smaller one's size at
 #: most, as their strains and rotations differ.
 _MISFIT = 1e-3
 
 
-#: Contacts pressed in by more than this part of the thinner block's size are asked whether that is through it.
+#: Contacts that penetrate by more than this fraction of the thinner block's size are checked for passing through it.
 _DEEP = 0.01
-#: Overlaps that bring more than this part of the energy of all blocks in a step are none that they had.
+#: Overlaps that bring more than this fraction of the energy of all blocks in a step are new ones.
 _GIVEN = 1e-3
 #: Why steps are shortened, and what to do about it.
 DISPLACEMENT, APPROACH, CROSSING, UNSETTLED = "displacement", "relative motion", "crossing", "contact states"
 WAY_OUT = {
     DISPLACEMENT: "raise dda.max_displacement_ratio if motion need not be followed so finely",
-    APPROACH: "small blocks that move fast beside others shorten steps: merge them (geometry.smallest_block_m2)",
+    APPROACH: "small blocks that move fast next to others shorten steps: merge them (geometry.smallest_block_m2)",
     CROSSING: "what is thinner than a step's motion takes shorter steps: merge slivers (geometry.smallest_block_m2), or "
     "shorten dda.time_step_s",
     UNSETTLED: "shorten dda.time_step_s, or merge small blocks (geometry.smallest_block_m2)",
@@ -90,9 +90,9 @@ class StepLimits:
         self._finder, self._size, self._start, self._next = finder, finder.widths, vertex_start, next_vertex
         self.displacement = settings.max_displacement_ratio * half_diagonal
         self._work = work
-        self._told: set[tuple[int, int]] = set()
+        self._warned_of: set[tuple[int, int]] = set()
 
-    def foreseen(
+    def predicted(
         self, vertices: np.ndarray, carried: np.ndarray, moments: np.ndarray, dt: float, gravity: np.ndarray
     ) -> float:
         """``dt`` shortened where the velocity ``carried`` (n_blocks, 6) alone would go beyond the limits."""
@@ -119,7 +119,7 @@ class StepLimits:
         lift: float = 0.0,
     ) -> Windows:  # fmt: skip
         """Where a step of ``dt`` looks for contacts; ``lift`` m is the most by which any presses at a distance. Without
-        velocity nothing is foreseen."""
+        velocity no motion is expected."""
         fall = float(np.hypot(*gravity)) * dt * dt if carried.any() else 0.0
         return self._finder.approach.windows(
             vertices, affine_motion(dt * carried), np.ascontiguousarray(moments[:, 1:3]), fall, lift
@@ -155,7 +155,7 @@ class StepLimits:
         return Used(float(of_all), reason, moved, DISPLACEMENT, (block,))
 
     def crossed(self, attempt: AttemptedStep, result: StepResult) -> Crossed | None:
-        """What has gone where contacts saw nothing come; None for nothing."""
+        """What has gone into or through a block without a contact; None for nothing."""
         if len(self._size) < 2:
             return None
         before, after = attempt.path(result.state.vertices)
@@ -240,9 +240,9 @@ class StepLimits:
         vertex, edge = (np.ascontiguousarray(rows[name]) for name in ("vertex", "edge"))
         for k in np.flatnonzero(self._finder.past_midpoint(vertices, vertex, edge)).tolist():
             pair = int(rows["block"][k]), int(rows["other"][k])
-            if pair in self._told:
+            if pair in self._warned_of:
                 continue
-            self._told.add(pair)
+            self._warned_of.add(pair)
             x, y = vertices[vertex[k]]
             log.warning(
                 "t = %g s: a corner of %s is pressed %.3g m into %s near x = %.6g, y = %.6g m, beyond the middle of what it "
@@ -258,22 +258,22 @@ class StepLimits:
         self._work.shortened[key] += 1
         count = self._work.shortened[key]
         if count > 1 and math.log10(count).is_integer():
-            told = " and ".join(map(repr, names)) or "no one block"
-            log.info("%s: %s shortened a step for the %s time; %s", why, told, _ordinal(count), WAY_OUT[why])
+            involved = " and ".join(map(repr, names)) or "no one block"
+            log.info("%s: %s shortened a step for the %s time; %s", why, involved, _ordinal(count), WAY_OUT[why])
 
     def _named(self, block: int) -> str:
         return repr(self._finder.names[block])
 
 
 def _glued(pairs: np.ndarray, bonded: np.ndarray) -> np.ndarray:
-    """(k,) whether the blocks of each of ``pairs`` (k, 2) are held to each other, or both to a third, by the CONTACT rows
+    """(k,) whether the blocks of each of ``pairs`` (k, 2) are bonded to each other, or both to a third, by the CONTACT rows
     ``bonded``."""
-    held: dict[int, set[int]] = {}
+    joined: dict[int, set[int]] = {}
     for a, b in zip(bonded["block"].tolist(), bonded["other"].tolist(), strict=True):
-        held.setdefault(a, {a}).add(b)
-        held.setdefault(b, {b}).add(a)
+        joined.setdefault(a, {a}).add(b)
+        joined.setdefault(b, {b}).add(a)
     nothing: set[int] = set()
-    return np.array([bool(held.get(a, nothing) & held.get(b, nothing)) for a, b in pairs.tolist()], bool)
+    return np.array([bool(joined.get(a, nothing) & joined.get(b, nothing)) for a, b in pairs.tolist()], bool)
 
 
 def shortened(work: Work, most: int = 5) -> tuple[Shortened, ...]:

@@ -67,7 +67,7 @@ class _Path:
         self.everywhere = False
 
     def begin(self, states: FaceStates, disputed: np.ndarray) -> FaceStates:
-        """Confine the ``disputed`` nodes, and all that do not obey their laws beside them."""
+        """Confine the ``disputed`` nodes, and neighbours that do not obey their laws."""
         problem, laws = self._problem, self._problem.laws
         # Faces with an aperture may close but begin open.
         can = (laws.closes & (laws.aperture == 0.0)) | self._cemented | (laws.closes & states.closed)

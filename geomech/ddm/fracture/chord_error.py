@@ -3,7 +3,7 @@
 A polygon is taken for a curve where two sides of about one length meet others at like bends of no more than 31°. Between
 such bends the arc lies off the chord of length L by its sagitta, ½ L tan (β/4), β the angle by which it turns. The body
 whose chords are halved, with their middles and the mouths of cracks on the arcs, has a quarter of that error, so that K
-on both differ by three quarters of it: a polygon that was meant is told an error that it does not have.
+on both differ by three quarters of it: a polygon that was meant as one is given an error that it does not have.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ NEAR_MIDDLE = 0.2
 
 def chord_errors(solution: SolvedBody) -> np.ndarray:
     """(n_tips, 2) Pa √m: by how much K_I and K_II change when curved walls are followed more closely; zeros where there
-    are none. Logs a warning where that cannot be told."""
+    are none. Logs a warning where that cannot be estimated."""
     k = factors(solution)
     try:
         body, load = solution.body.rounder, solution.load
@@ -125,7 +125,7 @@ def _end_on_arc(cracks: Cracks, node: int, a: np.ndarray, b: np.ndarray, sagitta
 
 
 def _halved_load(body: CrackedBody, where, value) -> list[tuple]:
-    """The traction ``value`` of the side ``where`` of ``body`` on its `Body.rounder`, which counts its sides anew."""
+    """The traction ``value`` of the side ``where`` of ``body`` on its `Body.rounder`, which numbers its sides differently."""
     if not isinstance(where, (int, np.integer)):
         return [(where, value)]
     parts = 1 + np.concatenate([sagittas(loop) != 0 for loop in body.loops])

@@ -3,7 +3,7 @@
 Unknown are displacements that enter as jumps, so A_ΓΓ is of the kind that cracks have and the same neighbourhoods
 (`iterative.Patches`) make GMRES converge: 38 products at 10 000 unknowns, 53 at 20 000, on a square as on a rough
 ellipse. The lifted rigid motions are in the neighbourhoods too; one that holds a whole small hole would be singular
-without them. Where supports hold the boundary the unknowns are reactions, line forces; these are few beside the
+without them. Where supports hold the boundary the unknowns are reactions, line forces; these are few compared with the
 boundary and stay dense.
 """
 
@@ -27,7 +27,7 @@ CROSSOVER = 6000
 #: Elements join a neighbourhood that are no farther from it than so many times their length: on even outlines as many
 #: products as with all that are near (24 at 4000 unknowns, with 4 it is 30).
 NEAR = 12.0
-#: Entries of the reactions' dense columns up to which a held boundary is iterated on (a gigabyte).
+#: Entries of the reactions' dense columns up to which a supported boundary is solved iteratively (a gigabyte).
 MOST_REACTIONS = 128_000_000
 
 
@@ -40,7 +40,7 @@ def is_iterated(solver: str, n_unknowns: int, holds: Holds | None = None, holes_
 
 
 class HeldMatrix:
-    """A_ΓΓ of a boundary that is held in part: ``jumps`` on all of it as an operator, and the columns of reactions."""
+    """A_ΓΓ of a boundary that is supported in part: ``jumps`` on all of it as an operator, and the columns of reactions."""
 
     def __init__(self, jumps: Compressed, holds: Holds, nu: float, tol: float):
         self._jumps, self._holds = jumps, holds

@@ -1,4 +1,4 @@
-"""A coarse level for long cracks: what the patches of one crack have to tell each other, in a few elements.
+"""A coarse level for long cracks: the interaction of the patches of one crack, in a few elements.
 
 Neighbourhoods solved by themselves (`iterative.Patches`) carry news along a crack by one patch an iteration. Here runs
 of a long crack's elements are replaced by one straight element each, of moderate order, and its equations are factored.

@@ -141,7 +141,7 @@ class IterativeCrackSystem:
         return w, reaction
 
     def solve(self, right: np.ndarray, rows: Rows) -> np.ndarray:
-        """(n,) jumps that are zero where held and obey the other ``rows``. Raises NotSolved."""
+        """(n,) jumps that are zero where prescribed and obey the other ``rows``. Raises NotSolved."""
         moving = np.flatnonzero(rows.mixed)
 
         def times(v: np.ndarray) -> np.ndarray:
@@ -168,7 +168,7 @@ class IterativeCrackSystem:
         return found[self._first :]
 
     def solve_transposed(self, right: np.ndarray, rows: Rows) -> np.ndarray:
-        """(n,) what multiplies right-hand sides of `solve` in ``right`` ᵀ w; zero where held. Raises NotSolved."""
+        """(n,) what multiplies right-hand sides of `solve` in ``right`` ᵀ w; zero where prescribed. Raises NotSolved."""
         moving = np.flatnonzero(rows.mixed)
 
         def times(v: np.ndarray) -> np.ndarray:

@@ -22,7 +22,7 @@ from .fast_multipole import Tree
 PATCH = 60
 #: Of the cracks that a patch cuts, elements nearer to its middle than this many of its radii join it.
 REACH = 1.5
-#: Residual of a solution, relative to the right-hand side. Contact tells closed from open at 1e-10.
+#: Residual of a solution, relative to the right-hand side. Contact distinguishes closed from open at 1e-10.
 TOLERANCE = 1e-11
 #: What is good enough when round-off stops the residual.
 ENOUGH = 1e-9
@@ -129,7 +129,7 @@ class Patches:
     """An approximate inverse of the cracks' equations; ``crack`` (n,) is the crack of every element;
     ``between(elements)`` the matrix between some of them where it is not their influence alone. No element joins a
     patch that is farther from its own than ``lengths`` times its length: what is graded towards another corner is too
-    small to be felt here, and too much of it to be factored again."""
+    small to matter here, and too much of it to be factored again."""
 
     def __init__(
         self,
@@ -188,7 +188,7 @@ class Patches:
         return min(factor.rcond for *_, factor in self._factors.values())
 
     def solve(self, right: np.ndarray) -> np.ndarray:
-        """Roughly S⁻¹ ``right`` (n,); zero where unknowns are held."""
+        """Roughly S⁻¹ ``right`` (n,); zero where unknowns are prescribed."""
         out = np.zeros_like(right)
         for _, free, kept, to, factor in self._factors.values():
             out[to] = factor.solve(right[free])[kept]

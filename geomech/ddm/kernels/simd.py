@@ -22,7 +22,7 @@ the processor can.
     angle(y, x)                 atan2 within 2 ulp, with signed zeros, not of two zeros
     term(b, u, v, c), value(b, q)           a polynomial with real coefficients c at a complex point q
 
-Kernels that use them are declared by `compiled.kept`, so that a change here compiles them anew.
+Kernels that use them are declared by `compiled.kept`, so that a change here compiles them again.
 """
 
 from __future__ import annotations

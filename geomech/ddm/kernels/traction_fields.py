@@ -15,7 +15,7 @@ DEGREE = 6
 TOLERANCE = 1e-9
 #: A jump of the function is left somewhere in a piece 2^−20 of an element long.
 _HALVINGS = 20
-#: Pieces whose influence is held in memory at a time.
+#: Pieces whose influence is kept in memory at a time.
 _AT_ONCE = 100
 
 

@@ -58,7 +58,7 @@ class Applied:
         self, targets: ElementSet, on_boundary: bool, nu: float, tol: float, anchors: Anchors | None = None
     ) -> np.ndarray:
         """(n_unknowns,) traction at the collocation nodes of ``targets`` from what is not `plain`; ``anchors`` of the
-        boundary's held holes."""
+        boundary's supported holes."""
         out = np.zeros(targets.n_unknowns)
         points = targets.nodes.reshape(-1, 2)
         # On the boundary, the wedges' own traction is what its line forces stand for.

@@ -15,11 +15,11 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class Reactions:
-    """Tractions that supports exert on a body, at the nodes of the held elements, and their resultants.
+    """Tractions that supports exert on a body, at the nodes of the supported elements, and their resultants.
 
     support   (n,)          which support holds each element
     points    (n, p+1, 2)   m
-    traction  (n, p+1, 2)   Pa, x and y, in the directions held (in others the load's own traction acts)
+    traction  (n, p+1, 2)   Pa, x and y, in the supported directions (in others the load's own traction acts)
     force     (n_supports, 2)  N/m
     moment    (n_supports,)    N, about the body's centroid
     """

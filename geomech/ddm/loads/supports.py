@@ -1,7 +1,7 @@
 """Supports: pieces of the boundary on which displacement is imposed instead of traction, in both directions or in one.
 
 On an element that a support holds, the known displacement goes to the right-hand side and the unknown is the reaction,
-a Kelvin line force with the shape functions that displacement has elsewhere. What is held is a pair of directions of
+a Kelvin line force with the shape functions that displacement has elsewhere. Each support fixes one or both of a pair of directions of
 every element, so that rollers may stand at any angle to the side they are on.
 """
 
@@ -15,7 +15,7 @@ import numpy as np
 from ..mesh.edge_location import onto_boundary
 from ..system.influence_matrix import ElementSet, influence, line_influence
 
-#: A rigid motion that supports let move by less than this part of its size is held.
+#: A rigid motion that supports let move by less than this fraction of its size is prevented.
 _HELD = 1e-9
 #: Graded layers at the end of a support beyond the settings': inside a side, where reactions grow like r^(−½), and at a
 #: corner. At order 4 these leave 1e-5 and 2e-6 in K_I of a crack in the block, without them 6e-4 and 2e-5.
@@ -25,7 +25,7 @@ _KINDS = ("both", "normal", "tangent", "x", "y")
 
 @dataclass(frozen=True)
 class Support:
-    """A piece of a body's boundary that is held.
+    """A piece of a body's boundary that is supported.
 
     on     the number of an edge (the outline's first, then the holes'), or a straight piece of the boundary ((x, y),
            (x, y)), m
@@ -90,7 +90,7 @@ def marks(
     ``loops``.
 
     Reactions are singular there like r^(−½) inside a side. At a corner they are so between a pinned and a free side,
-    but not at a right angle between a roller and a free side (mirrored there, the corner is none) or between two held
+    but not at a right angle between a roller and a free side (mirrored there, the corner is none) or between two supported
     sides.
     """
     tiny = 1e-9 * np.ptp(loops[0], axis=0).max()
@@ -121,13 +121,13 @@ def called(supports: Sequence[Support], k: int) -> str:
 
 
 class Holds:
-    """Which elements of a boundary are held, in which directions.
+    """Which elements of a boundary are supported, in which directions.
 
-    elements    (h,)      numbers of held elements
+    elements    (h,)      numbers of supported elements
     support     (h,)      the support that holds each
     directions  (h, 2, 2) two unit vectors, local (along, normal) components
-    held        (h, 2)    bool, in which of the two the element is held
-    sources     the held elements
+    held        (h, 2)    bool, in which of the two the element is supported
+    sources     the supported elements
 
     Unknown reactions are multiplied by their element's length, which makes their columns as large as those of
     displacements.
@@ -173,7 +173,7 @@ class Holds:
         return out.ravel()
 
     def turned(self, local: np.ndarray) -> np.ndarray:
-        """``local`` values (n_unknowns, …) of the boundary in the held elements' own directions."""
+        """``local`` values (n_unknowns, …) of the boundary in the supported elements' own directions."""
         return self._turn(local, self.directions)
 
     def local(self, turned: np.ndarray) -> np.ndarray:
@@ -189,7 +189,7 @@ class Holds:
     def swapped(
         self, targets: ElementSet, elements: np.ndarray, matrix: np.ndarray, nu: float, tol: float
     ) -> np.ndarray:
-        """The columns ``matrix`` of displacement jumps on boundary ``elements`` with those of reactions where held."""
+        """The columns ``matrix`` of displacement jumps on boundary ``elements`` with those of reactions where supported."""
         at = self.number[elements]
         which = np.flatnonzero(at >= 0)
         if not len(which) or not len(matrix):
@@ -214,11 +214,11 @@ class Holds:
         columns[which] = np.where(self.supported[at][:, :, None, None], pair[1], pair[0])
 
     def known(self, targets: ElementSet, nu: float, tol: float) -> np.ndarray:
-        """(targets.n_unknowns, h_unknowns) traction on ``targets`` from displacement of the held elements, local."""
+        """(targets.n_unknowns, h_unknowns) traction on ``targets`` from displacement of the supported elements, local."""
         return influence(targets, self.sources, nu, tol)
 
     def imposed(self, displacement: np.ndarray) -> np.ndarray:
-        """(h_unknowns,) the held part of ``displacement`` (h, p+1, 2) at the held elements' nodes, local components."""
+        """(h_unknowns,) the prescribed part of ``displacement`` (h, p+1, 2) at the supported elements' nodes, local components."""
         s = self.sources
         local = np.stack([np.einsum("hnc,hc->hn", displacement, axis) for axis in (s.tangent, s.normal)], axis=1)
         turned = np.einsum("hjc,hcn->hjn", self.directions, local) * self.supported[:, :, None]
@@ -237,7 +237,7 @@ class Holds:
         return free.ravel(), reaction.ravel()
 
     def joined(self, displacement: np.ndarray, reactions: np.ndarray) -> np.ndarray:
-        """(n_unknowns,) the transposed of `split`: where the boundary is held from ``reactions``, else from
+        """(n_unknowns,) the transposed of `split`: where the boundary is supported from ``reactions``, else from
         ``displacement``."""
         b = self.boundary
         out = self.turned(displacement).reshape(b.n, 2, b.per)

@@ -1,6 +1,6 @@
-"""A body under an even stress: while its crack faces keep their states, three solutions tell all others.
+"""A body under a uniform stress: while its crack faces keep their states, three solutions determine all others.
 
-With smooth faces of which some are held closed, jumps w and what presses on the faces are affine in the stress σ (xx, yy,
+With smooth faces of which some are closed, jumps w and face pressures are affine in the stress σ (xx, yy,
 xy): w = J σ + w₀, the same for the reaction, and so the strain of the cracks and K; the energy around them is quadratic.
 The answer is the solution as long as no closed face is pulled and none of the open ones overlap.
 """

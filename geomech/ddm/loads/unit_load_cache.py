@@ -76,7 +76,7 @@ class UnitLoads:
     """The unit loads of a body with elements ``mesh``; see `onto_boundary` for ``extent``, `full_plane` for ``tol``.
 
     ``outlined``: whether the first loop is an outline; if not, all are holes in the infinite plane. ``anchors``: of the
-    boundary's held holes.
+    boundary's supported holes.
     """
 
     def __init__(

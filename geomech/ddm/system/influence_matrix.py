@@ -18,7 +18,7 @@ from ..mesh.half_plane import HalfPlane
 
 #: Element–point pairs (some 30 ns each) below which another thread does not pay for itself.
 PAIRS_PER_THREAD = 8000
-#: The processors this process may use, where the system tells.
+#: The processors this process may use, where the system gives them.
 THREADS = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 _pool: ThreadPoolExecutor | None = None
 

@@ -140,7 +140,7 @@ class CrackSystem:
                     return factor
             except np.linalg.LinAlgError:
                 pass
-            # Only pivoting in the whole matrix can tell.
+            # Only pivoting in the whole matrix can decide.
             self.matrix = Bordered.whole(self.matrix.elements, self.matrix.dense)
         try:
             self._work.crack_factorisations += 1

@@ -24,7 +24,7 @@ from .influence_matrix import unknowns_of
 
 #: A new base is factored where the border would have more than this part of its unknowns, and more than so many.
 MOST_NEW, FEW = 0.2, 40
-#: Reciprocal condition of the border's own equations below which all is factored anew.
+#: Reciprocal condition of the border's own equations below which the whole matrix is factored again.
 TRUSTED = 1e-11
 
 
@@ -69,7 +69,7 @@ class BaseOf:
         return out
 
     def border(self, rows: Rows) -> Border:
-        """What the equations that ``rows`` (without springs) leave have beside those of the base."""
+        """What the equations that ``rows`` (without springs) leave have in addition to those of the base."""
         return Border(self, rows)
 
     def changed(self, rows: Rows, border: Border, what: str) -> UpdatedFactor | None:

@@ -83,9 +83,9 @@ def write(folder: Path, header: dict[str, Any], content: Any) -> Path:
     the one before are removed. Raises OSError."""
     folder.mkdir(parents=True, exist_ok=True)
     path = folder / f"cycle_{header['cycle']:07d}.checkpoint"
-    beside = path.with_name(path.name + ".part")
+    unfinished = path.with_name(path.name + ".part")
     try:
-        with open(beside, "wb") as file:
+        with open(unfinished, "wb") as file:
             head = json.dumps(header).encode()
             file.write(_FIRST.format(format=FORMAT, crc=zlib.crc32(head), length=len(head)).encode() + head + b"\n")
             summed = _Summed(file)
@@ -93,9 +93,9 @@ def write(folder: Path, header: dict[str, Any], content: Any) -> Path:
             file.write(_TRAILER.pack(summed.crc, summed.length))
             file.flush()
             os.fsync(file.fileno())
-        os.replace(beside, path)
+        os.replace(unfinished, path)
     except BaseException:
-        beside.unlink(missing_ok=True)
+        unfinished.unlink(missing_ok=True)
         raise
     for old in found(folder)[KEPT:]:
         old.unlink(missing_ok=True)
@@ -122,7 +122,9 @@ def read(path: Path) -> Any:
         try:
             return plain_data.read(file, _ALLOWED)
         except plain_data.Broken as error:
-            raise NotResumable(f"{path} does not hold what a checkpoint holds ({error}): run the scene anew") from error
+            raise NotResumable(
+                f"{path} does not hold what a checkpoint holds ({error}): run the scene again"
+            ) from error
 
 
 def whole(folder: Path) -> Iterator[tuple[dict[str, Any], Path]]:
@@ -191,7 +193,7 @@ def _sources() -> str:
 
 
 def _processor() -> str:
-    """The processor's own name, where the system tells."""
+    """The processor's own name, where the system gives it."""
     try:
         with open("/proc/cpuinfo", encoding="utf-8") as file:
             return next(line.partition(":")[2].strip() for line in file if line.startswith("model name"))

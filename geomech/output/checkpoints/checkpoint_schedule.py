@@ -34,7 +34,7 @@ class Checkpoints:
 
     ``every`` counts cycles between two, 0 for none at all; None leaves it to `INTERVAL` and `SHARE`. ``scene`` is the
     resolved scene, which a resumed run must still have. ``kept_mb``: of a run that has come to its end, checkpoints larger
-    than this are removed. That a checkpoint cannot be written is told to the log and ends
+    than this are removed. A checkpoint that cannot be written is reported in the log and ends
     nothing.
     """
 

@@ -97,7 +97,7 @@ class Pace:
 class Progress:
     """Observer for people. On a terminal it draws a tqdm bar over the scene's time, elsewhere a line now and then. The
     time left is that of the rest of the scene at the recent `Pace`, once there is a steady one; where cracks are to end
-    the run by an event there is none to tell. ``quiet`` leaves only where a failed run stopped.
+    the run by an event there is no estimate. ``quiet`` leaves only where a failed run stopped.
 
     ``stream`` defaults to stderr; ``interval`` s is the least time between two lines off a terminal, twice that
     between two with the same percentage.

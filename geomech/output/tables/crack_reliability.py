@@ -17,7 +17,7 @@ _log = logging.getLogger(__name__)
 
 
 def _three_digits(number: float) -> float:
-    """More of an estimate means nothing, and a run that is gone on with is to tell the same."""
+    """More of an estimate means nothing, and a resumed run is to report the same."""
     return float(f"{number:.2e}")
 
 

@@ -137,12 +137,12 @@ class Table:
         self._rewrite(row[: len(self.columns)] for row in rows[: self._rows])
 
     def _rewrite(self, rows: Iterable[list[str]]) -> None:
-        beside = self.path.with_name(self.path.name + ".part")
-        with open(beside, "w", newline="", encoding="utf-8") as file:
+        unfinished = self.path.with_name(self.path.name + ".part")
+        with open(unfinished, "w", newline="", encoding="utf-8") as file:
             writer = csv.writer(file)
             writer.writerow(self.columns)
             writer.writerows(rows)
-        os.replace(beside, self.path)
+        os.replace(unfinished, self.path)
 
 
 def history_row(cycle: Cycle) -> dict[str, Any]:

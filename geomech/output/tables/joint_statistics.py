@@ -122,7 +122,7 @@ def joint_statistics(scene: Any, problem: Any, free: np.ndarray) -> list[dict[st
         if shape is not None:
             entry["asked"] = asked(shape, geometry)
             if entry["mean_angle_deg"] is not None and "mean_angle_deg" in entry["asked"]:
-                # A trace has no sense: of its two angles, the one beside what was asked.
+                # A trace has no sense: of its two angles, the one nearer to what was asked.
                 off = entry["mean_angle_deg"] - entry["asked"]["mean_angle_deg"]
                 entry["mean_angle_deg"] -= 180 * round(off / 180)
             entry["ends_on"] = list(shape.ends_on)

@@ -22,7 +22,7 @@ from .vtu import LINE, TRIANGLE, VERTEX, Grid
 
 CONFIGURATIONS = ("reference", "current")
 
-#: Key blocks are found anew when a block has turned by the inverse of this, rad.
+#: Key blocks are found again when a block has turned by the inverse of this, rad.
 _TURNS_SEEN = 50.0
 
 

@@ -13,7 +13,7 @@ from .series import Series
 _SCRIPT = '''"""Opens this run in ParaView: `paraview --script=view.py`, File > Load State, or without a screen
 `pvbatch view.py --picture view.png --state view.pvsm`.
 
-Written by geomech beside the run's series; change it as you like. Where a point is now = points + REFERENCE x
+Written by geomech into the run folder; change it as you like. Where a point is now = points + REFERENCE x
 displacement: coordinates are the {configuration} ones{warped}.
 """
 

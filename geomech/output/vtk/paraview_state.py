@@ -109,7 +109,7 @@ def view_state(folder: Path, last: Mapping[str, Grid], reference: bool, suffix: 
 
 
 def _rock(state: State, shown: Mapping[str, int], last: Mapping[str, Grid]) -> list[int]:
-    """Blocks, in colours of displacement, or plain beside the stress inside cracked rock."""
+    """Blocks, in colours of displacement, or plain next to the stress inside cracked rock."""
     flat: dict[str, Any] = {"Visibility": 1, "Representation": "Surface", "Ambient": 1, "Diffuse": 0}
     inside = "interior" in shown and "principal_stress" in last["interior"].point_data
     if not inside:

@@ -197,8 +197,8 @@ class Series:
         self._interior_seconds += (time.perf_counter() - began) if timed else 0.0
 
     def _save(self, name: str, cycle: Cycle, at: float, grid: Grid) -> None:
-        """Small grids at once; large ones beside the run, which need not wait until they are packed. A series that has
-        been large stays beside, so that its files are listed in their order."""
+        """Small grids at once; large ones in the background, so that the run need not wait until they are packed. A series
+        that has been large stays in the background, so that its files are listed in their order."""
         if name in self._large or _size(grid) > LARGE:
             self._large.add(name)
             self._background.do(self._put, name, cycle, at, grid)

@@ -1,4 +1,4 @@
-"""Grids beside the rock itself: outlines of blocks, bolts with their forces, the water table.
+"""Grids other than the rock itself: outlines of blocks, bolts with their forces, the water table.
 
 Outlines are the edges of the polygons, so that no triangle's side is drawn; a bolt is one line between its two ends,
 which move with their blocks.
@@ -97,8 +97,8 @@ class BoltLines:
         ends = np.array([[bolt.start, bolt.end] for bolt in self._bolts], float).reshape(-1, 2)
         holder = self._holder.ravel()
         moved = np.zeros_like(ends)
-        held = holder != GROUND
-        moved[held] = displacement(motion, holder[held], ends[held])
+        moves = holder != GROUND
+        moved[moves] = displacement(motion, holder[moves], ends[moves])
         memory = cycle.state.bolts
         n = len(self._bolts)
         if len(memory) == n:

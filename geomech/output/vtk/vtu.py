@@ -213,7 +213,7 @@ def _put(path: Path | str, content: bytes | bytearray) -> None:
     """A file of ``content``; a file that is there already is written over where it stands.
 
     Few system calls, a fraction of what a buffered file object takes. To empty a file first costs several times as much
-    as to write over it, and to delete and make thousands anew tens of times (ext4 will not take an inode again that was
+    as to write over it, and to delete and create thousands again tens of times (ext4 will not take an inode again that was
     freed minutes ago, and steps over all of these for every new one).
     """
     handle = os.open(path, os.O_WRONLY | os.O_CREAT, 0o666)
@@ -248,7 +248,7 @@ class Collection:
     written over the end that was there, at once: after every cycle, also the last before a crash, whoever reads the
     file finds a complete series. There is no file before there is an entry: ParaView opens no empty one.
 
-    ``entries`` (time, file) are listed already: the file is made anew with them, in place of what it was.
+    ``entries`` (time, file) are listed already: the file is written again with them, in place of what it was.
     """
 
     def __init__(self, path: Path, entries: Iterable[tuple[float, str]] = ()) -> None:
@@ -262,10 +262,10 @@ class Collection:
 
     def _begin(self) -> int:
         """Write the whole file and open it; its handle."""
-        beside = self.path.with_name(self.path.name + ".part")
+        unfinished = self.path.with_name(self.path.name + ".part")
         content = "".join([_PVD_HEAD, *(_entry(*each) for each in self.entries), _PVD_END]).encode()
-        _put(beside, content)
-        os.replace(beside, self.path)
+        _put(unfinished, content)
+        os.replace(unfinished, self.path)
         self._end = len(content) - len(_PVD_END)
         self._handle = os.open(self.path, os.O_WRONLY)
         return self._handle

@@ -18,7 +18,7 @@ from ..tables.loads import BoltTable, ForceTable
 from ..tables.output import MonitorTable
 from ..validation import nearest
 
-#: A bolt is straight to this part of its length; a drawn one that is less so is told.
+#: A bolt is straight to this part of its length; a drawn one that is less straight is reported.
 _STRAIGHT = 1e-3
 #: Pieces of one bolt, and of a water table, meet to this part of the drawing's largest side.
 _MEETING = 1e-6

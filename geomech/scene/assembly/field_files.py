@@ -68,8 +68,8 @@ def read_traces(
                 )
         named = _named_lines(file, k, entry, place, faults, warnings)
         if entry.simplify_m is not None:
-            named, told = _simplified(named, entry.simplify_m, geometry.tolerance_m)
-            warnings.append(Fault(place(source), f"{FilePath(entry.file).name}: {told}", ""))
+            named, removed = _simplified(named, entry.simplify_m, geometry.tolerance_m)
+            warnings.append(Fault(place(source), f"{FilePath(entry.file).name}: {removed}", ""))
         every += named
         by_file[k] = [item for item in named if item.role == "joint"]
         path_of.update((item.line.place, source) for item in named)
@@ -99,7 +99,7 @@ def read_traces(
 
 
 def _simplified(named: list[Named], tolerance: float, meets: float | None) -> tuple[list[Named], str]:
-    """``named`` with joints and cracks simplified, and what to tell of it."""
+    """``named`` with joints and cracks simplified, and what to report of it."""
     at = [
         k
         for k, item in enumerate(named)
@@ -111,10 +111,10 @@ def _simplified(named: list[Named], tolerance: float, meets: float | None) -> tu
     found, out = simplified(lines, tolerance, meets), list(named)
     for k, points in zip(at, found.lines):
         out[k] = named[k]._replace(line=replace(named[k].line, points=points, away=None))
-    told = (
+    report = (
         f"{found.before} sides of its joints and cracks are {found.after}, off by up to {found.off:.3g} m (simplify_m)"
     )
-    return out, told
+    return out, report
 
 
 def _named_lines(

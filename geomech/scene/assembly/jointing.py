@@ -28,7 +28,7 @@ from ...shapes.joint_networks.joint_sets import (
 from ...shapes.parts import JOINT, Flaw, ShapeError, extent_of, grid_decimals
 from ..tables.geometry import Geometry, JointSetShape
 
-#: So many places of each kind of defect are told in full.
+#: This many places of each kind of defect are listed.
 _LISTED = 4
 #: More pieces of joints between one crossing and the next are not cut: 100 000 blocks have 250 000, and take seconds;
 #: ten times as many take a minute and 10 GB, and no solver here moves them. Nor are joints of which so many pairs lie
@@ -157,7 +157,7 @@ def _too_fine(geometry: Geometry, box: np.ndarray) -> list[Flaw]:
         try:
             wanted = asked(shape, geometry)
         except ValueError:
-            continue  # told of when it is drawn
+            continue  # reported when it is drawn
         region = box if shape.region is None else np.array(shape.region, dtype=float).reshape(-1, 2)
         x, y = (region - region[0]).T
         area = 0.5 * abs(float(x @ np.roll(y, -1) - y @ np.roll(x, -1)))

@@ -94,7 +94,7 @@ def _stepping(c: Check) -> None:
     if "mechanism" in run.stop_at and dda.dynamic_factor > 0:
         c.refuse(
             ("run", "stop_at"),
-            '"mechanism" is told of in static runs only, and dda.dynamic_factor is not 0: in dynamics blocks just move',
+            '"mechanism" is reported in static runs only, and dda.dynamic_factor is not 0: in dynamics blocks just move',
             "leave it out, or set dda.dynamic_factor = 0",
         )
     if run.stepping == "events":
@@ -124,14 +124,14 @@ def _stepping(c: Check) -> None:
 
 
 def _warned(c: Check) -> None:
-    """What ends a run has to be told of."""
+    """Events that end a run must be reported."""
     run = c.tables.run
     if run is None or (run.events is None and run.stepping == "events") or set(run.events or ()) - {"tips"}:
         return
     for kind in sorted(set(run.stop_at) & set(CHANGES)):
         if run.events is None:
             what, way_out = (
-                "fixed steps tell of these where run.events names them",
+                "fixed steps report these where run.events names them",
                 'say run.events = ["contacts", "faces"]',
             )
         else:

@@ -17,7 +17,7 @@ from .check import Check
 
 
 def check_edges(c: Check) -> None:
-    """Loads and joints must name edges that there are; names that neither says are told."""
+    """Loads and joints must name edges that there are; names in neither are reported."""
     _tractions(c)
     _joints(c)
     _unused(c)

@@ -39,7 +39,10 @@ def check_orders(c: Check) -> None:
         _check_solver(c, refuse)
         for key, what in _LOADS.items():
             if t.loads is not None and getattr(t.loads, key):
-                refuse(f"{what} ([loads] {key}) beside blocks of higher order are not supported yet", "leave out one")
+                refuse(
+                    f"{what} ([loads] {key}) together with blocks of higher order are not supported yet",
+                    "leave out one",
+                )
         if t.loads is not None and t.loads.base is not None and t.loads.base.frame == "ground":
             refuse('a base that shakes in the frame "ground" is not supported yet', 'say frame = "base"')
 

@@ -30,7 +30,7 @@ LEAST_DENSITY = 100.0
 SHALLOW = 1.5
 #: What lies on one another: nearer than this part of the side, over no less than that part of it.
 LIES_ON, MOST_OF_IT = 1e-6, 0.5
-#: A block that moves is a sliver beside one so many times as large by area: in motion, pairs of such blocks shorten steps
+#: A block that moves is a sliver next to one this many times as large by area: in motion, pairs of such blocks shorten steps
 #: (`dda.step_control.relative_motion`) to less than a third of what those of the large one take.
 SLIVER = 1e-2
 #: A slope is where the ground at one end of the section stands above that at the other by this part of its height, and
@@ -81,7 +81,7 @@ def _materials(c: Check) -> None:
 
 
 def _slivers(c: Check) -> None:
-    """Small blocks beside large ones, which shorten the steps of a dynamic run."""
+    """Small blocks next to large ones, which shorten the steps of a dynamic run."""
     blocks = c.blocks
     if c.tables.dda.dynamic_factor == 0 or blocks.n_blocks < 3:
         return
@@ -105,7 +105,7 @@ def _slivers(c: Check) -> None:
 
 
 def _rounding(c: Check) -> None:
-    """A rounding length that was asked for and that the edges beside corners are too short for."""
+    """A rounding length that was asked for and that the edges at corners are too short for."""
     if "corner_rounding" not in c.tables.dda.model_fields_set:
         return
     blocks, share = c.blocks, c.tables.dda.corner_rounding
@@ -195,7 +195,7 @@ def _weightless(c: Check) -> None:
 
 
 def _sudden_weight(c: Check) -> None:
-    """Rock bridges that feel all their weight, and in dynamics up to twice of it, in the first steps."""
+    """Rock bridges that bear all the weight, and in dynamics up to twice that, in the first steps."""
     t = c.tables
     loads, bridges = t.loads, len(c.cracks.names) - len(t.geometry.cracks)
     tough = all(m.k_ic_pa_sqrt_m is None for m in t.materials.values()) or not t.growth.enabled
@@ -205,7 +205,7 @@ def _sudden_weight(c: Check) -> None:
     if any(loads.gravity_m_s2) and t.dda.dynamic_factor > 0:
         c.warn(
             ("geometry", "dead_ends") if "dead_ends" in c.data["geometry"] else ("loads", "gravity_m_s2"),
-            f"all weight comes on at once, and {bridges} cracks before rock bridges feel up to twice of it: blocks may "
+            f"all weight comes on at once, and {bridges} cracks before rock bridges bear up to twice of it: blocks may "
             "split in the first steps that would stand",
             'let it come by and by (loads.gravity_ramp_s), begin at rest (dda.equilibrium = "start"), or under the '
             "stress of the "

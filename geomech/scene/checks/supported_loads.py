@@ -1,4 +1,4 @@
-"""Whether what the loads push is held: blocks that move have mass, and loads on blocks that nothing fixes balance."""
+"""Whether loaded blocks are supported: blocks that move have mass, and loads on blocks that nothing fixes balance."""
 
 from __future__ import annotations
 
@@ -81,7 +81,7 @@ def _loads_are_lost(c: Check, fixed: np.ndarray) -> bool:
             ("zones", zone, "fixed"),
             "every load acts on fixed blocks "
             f"({', '.join(sorted({c.drawn.zones[b] for at in loaded for b in at}))}): nothing would be strained",
-            "fix what the specimen stands on, never the specimen; a block alone is held by loads that balance",
+            "fix what the specimen stands on, never the specimen; a single block is kept in place by loads that balance",
         )
         return True
     totals: dict[str, list] = {}

@@ -171,7 +171,7 @@ class BaseTable(Timed):
 
     frame: Literal["ground", "base"] = Field(
         "ground",
-        description='"ground": the fixed blocks move as the record says; "base": they stand, and blocks feel minus the '
+        description='"ground": the fixed blocks move as the record says; "base": they stay in place, and blocks are subject to minus the '
         "acceleration",
     )
     baseline: Literal["", "constant", "linear"] = Field(
@@ -246,7 +246,7 @@ class BoltTable(Table):
     zone: str | None = Field(None, description="zone of its one end, where two zones touch")
     end_zone: str | None = Field(None, description="zone of its other end, where two zones touch")
     end_in_ground: bool = Field(
-        False, description="true: its other end is held by the ground at rest, whatever is there"
+        False, description="true: its other end is fixed to the ground at rest, whatever is there"
     )
     stiffness_n_per_m: Positive | None = Field(None, description="EA/L, N/m per metre of thickness")
     axial_stiffness_n: Positive | None = Field(

@@ -38,7 +38,7 @@ class MaterialTable(Table):
 
 
 class ZoneTable(Table):
-    """[zones.NAME]: what a zone is made of, and how it is held."""
+    """[zones.NAME]: what a zone is made of, and how it is constrained."""
 
     material: str | None = Field(None, description="a name of [materials] (unset: the only one there is)")
     fixed: bool = Field(False, description="true: its blocks do not move")

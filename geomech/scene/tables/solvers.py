@@ -39,7 +39,7 @@ class DdaTable(Table):
     )
     equilibrium: Literal["", "start", "loads"] = Field(
         "",
-        description='when static equilibrium is sought, whatever the time step: "" never, "start" before the run begins, '
+        description='when static equilibrium is searched for, whatever the time step: "" never, "start" before the run begins, '
         '"loads" at every load of a static run too; a run ends if there is none, or only one after blocks have moved by '
         "more than a two-thousandth of their size in addition to elastic displacements",
     )

@@ -1,4 +1,4 @@
-"""Many runs of a scene: [sweep], or a sweep.toml beside the scene."""
+"""Many runs of a scene: [sweep], or a sweep.toml next to the scene."""
 
 from __future__ import annotations
 

@@ -107,11 +107,11 @@ def _block_of(k, name, line, zone_names, tree, tolerance, flaws) -> int:
     polygons = tree.geometries[near]
     inside = shapely.length(shapely.intersection(pieces[:, None], polygons[None])).sum(axis=0)
     slack = 2.5 * tolerance  # an overshoot of one tolerance at each end
-    # A crack on a common outline is held by two blocks and is wrong in both.
+    # A crack on a common outline lies in two blocks and is wrong in both.
     holds = np.flatnonzero(inside >= length - slack)
-    for held in holds:
-        block = near[held]
-        along = shapely.length(shapely.intersection(pieces, shapely.boundary(polygons[held]))).sum()
+    for nearby in holds:
+        block = near[nearby]
+        along = shapely.length(shapely.intersection(pieces, shapely.boundary(polygons[nearby]))).sum()
         if along > slack:
             flaws.append(
                 Flaw(

@@ -1,7 +1,7 @@
 """Rock cut into blocks by joint traces: cleaned, noded, faces taken, dead ends kept as cracks.
 
 Everything nearer than the tolerance meets: ends stop on what they nearly reach, near corners become one, a trace that
-nearly passes through a corner passes through it. Outlines stand still; joints give way. What was mended is told with
+nearly passes through a corner passes through it. Outlines stand still; joints give way. What was mended is reported with
 its place. Cuts are exact otherwise: the blocks tile their zones.
 """
 
@@ -189,8 +189,8 @@ def _kept(
     keep = ~(joint & _outside(arrangement, zone))
     dead = arrangement.dead & keep & joint
     if dead.any():
-        shortest, told = (np.inf, []) if dead_ends == "trim" else (max(shortest, tolerance), mends)
-        keep[_short_dead_ends(arrangement, dead, shortest, told)] = False
+        shortest, reported = (np.inf, []) if dead_ends == "trim" else (max(shortest, tolerance), mends)
+        keep[_short_dead_ends(arrangement, dead, shortest, reported)] = False
     area, rim = arrangement.areas_and_rims()
     thin = 2 * area < tolerance * rim
     small = np.flatnonzero((zone >= 0) & ((area < smallest) | thin))

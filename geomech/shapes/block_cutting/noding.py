@@ -16,7 +16,7 @@ _ROUNDS = 20
 #: What moves by less than this part of the tolerance moves by round-off, which is nobody's mistake.
 _REPORTED = 1e-4
 FREE, CORNER = -1, -2
-#: Cells along a side of the coarse grid that tells what is near to what has changed.
+#: Cells along a side of the coarse grid by which the surroundings of changes are found.
 _CELLS = 256
 
 

@@ -30,7 +30,7 @@ def trimmed_away(drawn: Drawn, reach: np.ndarray, left: np.ndarray) -> list[Mend
     """The traces of which ``reach`` m lay in the rock and nothing is ``left``."""
     gone = np.flatnonzero((reach > 0) & (left == 0))
     gone = gone[gone >= drawn.n_outlines]
-    # Pieces stand in the order of their traces; a trace is told at its middle one.
+    # Pieces stand in the order of their traces; a trace is reported at its middle one.
     middle = (np.searchsorted(drawn.source, gone) + np.searchsorted(drawn.source, gone, "right")) // 2
     at = 0.5 * (drawn.start[middle] + drawn.end[middle])
     return [Mend("trimmed away", x, y, size) for (x, y), size in zip(at.tolist(), reach[gone].tolist(), strict=True)]

@@ -39,15 +39,15 @@ def drawing_of_mesh(gmsh, path: Path) -> GmshDrawing:
         if not inner:
             continue
         runs = tuple(mesh.nodes[_corners_of(run, mesh.nodes, {}, closed=False), :2] for run in chains(inner))
-        told = f"curves {', '.join(map(str, where[name]))}"
+        source = f"curves {', '.join(map(str, where[name]))}"
         if is_mark(name):
-            places["marks", len(marks)] = told
+            places["marks", len(marks)] = source
             marks.append(Mark(name, runs))
         elif name.startswith(CRACK):
-            places["cracks", len(traces)] = told
+            places["cracks", len(traces)] = source
             traces.append(Trace(name[len(CRACK) :], runs))
         elif name.startswith(JOINT):
-            places["joints", len(joints)] = told
+            places["joints", len(joints)] = source
             joints.append(Joint(name, runs))
         else:
             warnings.append(

@@ -54,7 +54,7 @@ class Curves:
         return points
 
     def chained(self, tags: list[int]) -> list[np.ndarray]:
-        """Curves that follow one another joined into polylines; one starts anew where they branch."""
+        """Curves that follow one another joined into polylines; a new one starts where they branch."""
         pieces = [self.polyline(tag) for tag in tags]
         lines = []
         while pieces:

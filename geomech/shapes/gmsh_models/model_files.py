@@ -97,7 +97,7 @@ def read_here(
 
 
 def _no_text(path: Path, error: UnicodeDecodeError) -> GmshModelError:
-    """A name in the file is no UTF-8: where, as far as the file's own lines tell."""
+    """A name in the file is no UTF-8: where, as far as the file's own lines show."""
     at = ""
     for number, line in enumerate(path.read_bytes().split(b"\n"), 1):
         try:
@@ -171,8 +171,8 @@ def _drawing(gmsh, path: Path, parameters: dict[str, Parameter], chord: float | 
             warnings.append(
                 (f"{path.name}: surface {tag} has no physical name and is left out", "name it, or remove it")
             )
-    told = _bound_nothing(path, edge_name, used, warnings)
-    warnings += lost_curves(gmsh, path, curves, zones, used | traced | told)
+    reported = _bound_nothing(path, edge_name, used, warnings)
+    warnings += lost_curves(gmsh, path, curves, zones, used | traced | reported)
     warnings += out_of_plane(gmsh, path, max(box[3] - box[0], box[4] - box[1]))
     chords = curves.chords()
     return GmshDrawing(
@@ -199,15 +199,15 @@ def _name_edges(path: Path, name: str, tags: list[int], edge_name: dict[int, str
 
 def _bound_nothing(path: Path, edge_name: dict[int, str], used: set[int], warnings: list[tuple[str, str]]) -> set[int]:
     """Named curves of which none is ``used`` by a surface, each name with a warning."""
-    told: set[int] = set()
+    reported: set[int] = set()
     for name in dict.fromkeys(edge_name.values()):
         tags = {tag for tag, its in edge_name.items() if its == name}
         if not used & tags:
-            told |= tags
+            reported |= tags
             warnings.append(
                 (f"{path.name}: physical curve {name!r} bounds no named surface", f'a crack is called "{CRACK}{name}"')
             )
-    return told
+    return reported
 
 
 def _named_groups(gmsh, path: Path, warnings: list[tuple[str, str]]) -> dict[int, list[tuple[str, int, list[int]]]]:

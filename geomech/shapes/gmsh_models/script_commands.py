@@ -22,7 +22,7 @@ from .model_drawing import GmshModelError
 #: Set to anything but "" or "0", this environment variable lets models do what Gmsh lets them do.
 TRUST = "GEOMECH_TRUST_MODELS"
 
-#: How files that Gmsh reads by their name's ending are told apart; all others it takes for scripts.
+#: How files that Gmsh reads by their name's ending are recognised; all others it takes for scripts.
 SCRIPTS, MESHES, SHAPES = (".geo", ".geo_unrolled"), (".msh",), (".brep", ".step", ".stp", ".STEP", ".STP")
 #: What a mesh begins with; Gmsh takes a .msh that begins otherwise for a script.
 _MESH_BEGINS = (b"$PTS", b"$NO", b"$PARA", b"$ELM", b"$MeshFormat", b"$Comments")

@@ -18,7 +18,7 @@ _LONG_ENOUGH = 0.5
 
 @dataclass(frozen=True)
 class SetStatistics:
-    """One joint set in a region; nan where there is nothing to tell.
+    """One joint set in a region; nan where there is nothing to measure.
 
     traces             how many reach into the region
     p10                1/m: traces met by scan-lines across the set

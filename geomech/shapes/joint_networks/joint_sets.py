@@ -121,7 +121,7 @@ class FisherAngle:
     stands in place of a `Law` of the angle.
 
     The section cuts a plane as often as the sine of the angle between its pole and the section's normal (Terzaghi
-    1965): planes beside the section are seldom seen in it."""
+    1965): planes off the section are seldom seen in it."""
 
     dip: float
     dip_direction: float

@@ -36,7 +36,7 @@ def read_dxf(path: Path, unit: str | None = None, chord_tolerance: float | None 
     ELLIPSE, SPLINE, POINT and what INSERT puts there of them.
 
     ``unit`` (a key of `METRES`) overrides the file's $INSUNITS; ``chord_tolerance`` m, default `CHORD` of the largest
-    side. Layers that are off or frozen and other kinds of entities are left out and told. What a block draws on layer 0
+    side. Layers that are off or frozen and other kinds of entities are left out and reported. What a block draws on layer 0
     is on the layer of its INSERT. Raises FieldFileError for a file that cannot be read, or where ezdxf is not
     installed.
     """

@@ -63,17 +63,17 @@ def searched(blocks: Blocks, state: State, steps: int, monkeypatch) -> list[tupl
 
 
 def test_it_leads_to_the_states_that_fit(struck, monkeypatch):
-    # Up to half of all contacts change in a step. Two hundred turns find all but a third of these changes (measured: all
-    # but 12 to 28 in a hundred), and all but a tenth of all states.
+    # Up to two thirds of all contacts change in a step. Two hundred turns find all but a quarter of these changes
+    # (measured: all but 5 to 21 in a hundred), and all but an eighth of all states.
     found = searched(*struck, 5, monkeypatch)
     assert found
     for equations, bonded, settled in found:
-        proposal = split(equations, bonded, ContactSolver(splitting_settled=-1.0, splitting_slow=1.0))
+        proposal = split(equations, bonded, ContactSolver(splitting_settled=-1.0, splitting_iterations=200))
         changes = settled.state != equations.found.state
         wrong = settled.state != proposal.states.state
-        assert wrong.sum() < 0.35 * changes.sum() and wrong.mean() < 0.15
-        # (A turn takes a twentieth of an iteration.)
-        assert proposal.spent == pytest.approx(11.0)
+        assert wrong.sum() < 0.25 * changes.sum() and wrong.mean() < 0.125
+        # (Four factorisations; a turn takes a tenth of an iteration.)
+        assert proposal.spent == pytest.approx(24.0)
 
 
 def test_the_motion_is_the_same_without_it(struck):
@@ -84,9 +84,9 @@ def test_the_motion_is_the_same_without_it(struck):
 
 
 def test_it_is_for_steps_that_move(struck, monkeypatch):
-    equations, bonded, _ = searched(*struck, 3, monkeypatch)[0]
+    equations, *_ = searched(*struck, 3, monkeypatch)[0]
     assert can_split(equations)
     assert not can_split(replace(equations, statics=True))
-    # Where it converges too slowly it gives up, after 60 turns.
-    slow = split(equations, bonded, ContactSolver(splitting_slow=-1.0, splitting_settled=-1.0))
-    assert slow.states is None and slow.spent == pytest.approx(4.0)
+    # Nor is there anything to begin with where no contact bore anything before.
+    found = equations.found
+    assert not can_split(replace(equations, found=replace(found, normal=np.zeros(len(found)))))

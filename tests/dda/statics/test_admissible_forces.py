@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -95,6 +96,21 @@ def test_a_toppling_row_whose_factor_depends_on_how_it_is_wedged_is_reported():
     assert found.as_dict(problem.blocks)["largest_factor_with_admissible_forces"] == found.admissible
 
 
+@pytest.mark.parametrize(
+    "seed", [69, pytest.param(104, marks=pytest.mark.slow), pytest.param(114, marks=pytest.mark.slow)]
+)
+def test_rows_of_joints_that_dilate_by_their_friction_reach_the_bound(seed):
+    """What forces exist and what fails agree where slip follows the normal to the strength (Drescher & Detournay 1993):
+    the static theorem is exact then, whatever way the columns are wedged in."""
+    slope = random_slope(seed)
+    problem = problem_of(slope.scene)
+    joints = [replace(law, dilation_angle=law.friction_angle) for law in problem.joints]
+    found = dda.factor_of_safety(
+        problem.blocks, problem.materials, joints, problem.loads, problem.dda, joint_index=problem.joint_index
+    )
+    assert found.factor == pytest.approx(slope.bound, rel=1e-3) and found.admissible is None
+
+
 def test_a_row_that_reaches_its_bound_needs_no_warning():
     slope = random_slope(19)
     problem = problem_of(slope.scene)
@@ -102,6 +118,8 @@ def test_a_row_that_reaches_its_bound_needs_no_warning():
         problem.blocks, problem.materials, problem.joints, problem.loads, problem.dda, joint_index=problem.joint_index
     )
     assert found.factor == pytest.approx(slope.bound, rel=1e-3) and found.admissible is None and not found.warnings
+    # One trial below the bound, one on either side of it, and one that shows where the motion ends.
+    assert len(found.trials) == 4
 
 
 @pytest.mark.parametrize("bend_deg", [0.0, 0.5, 1.25, 2.5, 6.0])
