@@ -8,6 +8,7 @@
         ...
 """
 
+from ..model.former_names import renamed_exports
 from .contact_detection.inherited_contacts import InheritedContacts
 from .counters import Work
 from .energy_balance import EnergyBudget, StepEnergy
@@ -62,3 +63,5 @@ __all__ = [
     "mobilised_joints",
     "run",
 ]
+
+__getattr__ = renamed_exports(__name__, {"ToldContacts": "InheritedContacts"}, globals())

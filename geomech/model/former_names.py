@@ -1,10 +1,10 @@
-"""Former names of arguments, accepted for one version with a DeprecationWarning."""
+"""Former names of arguments and of what packages export, accepted for one version with a DeprecationWarning."""
 
 from __future__ import annotations
 
 import functools
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any, TypeVar, cast
 
 _Function = TypeVar("_Function", bound=Callable[..., Any])
@@ -30,3 +30,16 @@ def renamed_argument(old: str, new: str) -> Callable[[_Function], _Function]:
         return cast(_Function, called)
 
     return decorate
+
+
+def renamed_exports(module: str, renamed: Mapping[str, str], names: Mapping[str, Any]) -> Callable[[str], Any]:
+    """The ``__getattr__`` of ``module``, whose globals are ``names``: former names (the keys of ``renamed``) give what is
+    called otherwise now, with a DeprecationWarning. Other names raise AttributeError."""
+
+    def find(name: str) -> Any:
+        if name not in renamed:
+            raise AttributeError(f"module {module!r} has no attribute {name!r}")
+        warnings.warn(f"{module}.{name} is now {module}.{renamed[name]}", DeprecationWarning, stacklevel=2)
+        return names[renamed[name]]
+
+    return find

@@ -41,3 +41,10 @@ def test_the_comparison_of_toes_is_asked_for_by_its_former_name():
     loads = Loads()
     with pytest.warns(DeprecationWarning, match="compare="), pytest.raises(dda.NothingToReduce):
         dda.factor_of_safety(blocks, [rock], [joint], loads, reduce=["none"], compare_toes=False)
+
+
+def test_a_former_name_of_a_package_gives_the_present_one():
+    with pytest.warns(DeprecationWarning, match=r"geomech\.dda\.ToldContacts is now geomech\.dda\.InheritedContacts"):
+        assert dda.ToldContacts is dda.InheritedContacts
+    with pytest.raises(AttributeError, match="no attribute 'no_such_name'"):
+        dda.no_such_name  # noqa: B018

@@ -84,13 +84,15 @@ def sliding_case(name: str) -> tuple[float, float, np.ndarray, np.ndarray]:
 )
 def test_block_slides_on_a_shaken_base_as_newmark_says(verified, case, frame, contact):
     incline, friction, times, base = sliding_case(case)
-    expected = exact.sliding_block(times, base, np.radians(incline), np.radians(friction))
+    # Exact at every quarter of a millisecond: straight lines between the record's own times, 20 ms apart, are off by 0.2 %.
+    fine = np.linspace(0.0, times[-1], round(times[-1] / 0.25e-3) + 1)
+    expected = exact.sliding_block(fine, np.interp(fine, times, base), np.radians(incline), np.radians(friction))
     most = np.abs(expected).max()
     errors = []
     steps = (0.01, 0.0025) if "Centro" in case else (0.008, 0.002)
     for dt in steps:
         rows = slid(incline, friction, times, base, dt, frame, contact=contact)
-        errors.append(np.abs(rows[:, 1] - np.interp(rows[:, 0], times, expected)).max() / most)
+        errors.append(np.abs(rows[:, 1] - np.interp(rows[:, 0], fine, expected)).max() / most)
     order = np.log(errors[0] / errors[1]) / np.log(steps[0] / steps[1])
     print(
         f"{case}, {frame} frame, {contact}: slips {1e3 * most:.2f} mm at most, error at dt = "
@@ -106,9 +108,9 @@ def test_block_slides_on_a_shaken_base_as_newmark_says(verified, case, frame, co
     )
     # Within a step in which it stops or turns about, the block's way is off by a dt² / 8 (1e-3 at dt = 2 ms where it
     # turns about six times). On the level the record does that again and again after a few millimetres.
-    assert errors[1] < {"El Centro on the level": 0.04, "El Centro on an incline": 0.02}.get(case, 1e-3)
-    # There what is left at 10 ms is no more than at 2.5 ms, of turns within one step of the record: 2 % at both.
-    assert order > 0.5 or (case == "El Centro on the level" and errors[0] < 0.03)
+    assert errors[1] < {"El Centro on the level": 0.02, "El Centro on an incline": 0.002}.get(case, 1e-3)
+    # There what is left at 10 ms is no more than at 2.5 ms, of turns within one step of the record: 1 % at both.
+    assert order > 0.5 or (case == "El Centro on the level" and errors[0] < 0.015)
 
 
 def test_the_alpha_scheme_follows_a_base_that_shakes(verified):

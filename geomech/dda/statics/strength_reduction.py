@@ -127,10 +127,10 @@ def factor_of_safety(
         raise NothingToReduce("the joints have no friction, cohesion or tensile strength that could be reduced")
     if not 0 < tolerance < 1:
         raise NothingToReduce(f"the tolerance of the factor must lie between 0 and 1, got {tolerance!r}")
-    if blocks.order is not None and (blocks.order != 1).any():
+    if blocks.glued is not None or (blocks.order is not None and (blocks.order != 1).any()):
         raise NothingToReduce(
-            "blocks of higher order ([zones.NAME] order) are not supported in the search for a factor of safety yet: "
-            "leave `order` out"
+            "blocks of higher order ([zones.NAME] order) and cells are not supported in the search for a factor of safety yet: "
+            "leave `order` and `mesh_size_m` out"
         )
     if blocks.fixed.all():
         raise NothingToReduce("all blocks are fixed: none could fail")

@@ -94,11 +94,15 @@ def test_stress_inside_and_bent_outlines_are_written_and_a_run_resumes(tmp_path)
 def test_an_order_that_is_found_reaches_the_run(tmp_path):
     """The only block of a scene stores all there is: it is raised, and what is inside it is written."""
     text = BENDING.replace("order = 4", 'order = "auto"').replace("[dda]", "[dda]\norder_target = 0.02", 1)
-    loaded = load_scene(scene(tmp_path, text=text))
+    more = "[output]\ncheckpoint_every = 1\n"
+    loaded = load_scene(scene(tmp_path, more, text=text))
     problem = loaded.problem()
     assert problem.blocks.order.tolist() == [1, AUTO_ORDER] and problem.dda.order_target == 0.02
-    folder = tmp_path / "run"
+    folder, whole = tmp_path / "run", tmp_path / "whole"
     run(loaded, folder)
+    resume(folder, ("run.end_time_s=0.05",), quiet=True)
+    run(load_scene(scene(tmp_path, more, text=text), ("run.end_time_s=0.05",)), whole)
+    assert (folder / "history.csv").read_bytes() == (whole / "history.csv").read_bytes()
     assert np.ptp(np.asarray(Run(folder).grid("interior", 3)["stress"])[:, 1]) > 0
 
 
