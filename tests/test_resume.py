@@ -242,6 +242,9 @@ def files(folder: Path) -> dict[str, bytes]:
         name = str(path.relative_to(folder))
         if path.is_file() and name != "run.log" and path.parent.name != checkpoint_file.FOLDER:
             found[name] = path.read_bytes()
+    # ParaView's state names the run folder.
+    if "view.pvsm" in found:
+        found["view.pvsm"] = found["view.pvsm"].replace(str(folder.resolve()).encode(), b"RUN")
     summary = json.loads(found["summary.json"])
     for told in summary.get("skipped", {}).values():
         told.pop("saved_s", None)

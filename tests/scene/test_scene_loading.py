@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 import tomli_w
 from scene_texts import GOOD
+from small_scenes import block
 
 from geomech.model import rayleigh_coefficients
 from geomech.scene import SceneError, describe_keys, load_scene
@@ -364,3 +365,23 @@ def test_missing_files(tmp_path, scene_file):
     assert "plate.toml" in caught.value.errors[0].way_out
     with pytest.raises(SceneError, match=r"holds no scene.toml"):
         load_scene(tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("shaken", "asked", "scheme", "radius"),
+    [
+        (True, "", (0.25, 0.5), None),
+        (False, "", (0.5, 1.0), None),
+        (True, "newmark = [0.5, 1.0]\n", (0.5, 1.0), None),
+        (True, "spectral_radius = 0.8\n", (0.25, 0.5), 0.8),
+    ],
+)
+def test_where_the_ground_moves_waves_are_kept(scene_file, tmp_path, shaken, asked, scheme, radius):
+    (tmp_path / "quake.csv").write_text("0, 0\n1, 1\n2, 0\n")
+    base = '[loads.base]\nfile = "quake.csv"\ndirection = [1.0, 0.0]\n' if shaken else ""
+    text = block(moving=True).replace("dynamic_factor", asked + "dynamic_factor").replace("[dda]", base + "[dda]")
+    scene = load_scene(scene_file(text))
+    assert (scene.problem().dda.newmark, scene.problem().dda.spectral_radius) == (scheme, radius)
+    # As it is written out in a run folder, it is the same run.
+    (tmp_path / "again.toml").write_text(tomli_w.dumps(scene.resolved()))
+    assert load_scene(tmp_path / "again.toml").problem().dda == scene.problem().dda

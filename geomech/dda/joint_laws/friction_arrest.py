@@ -23,7 +23,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...model import OPEN, SLIP, STICK
-from ..equation_records import BlockEquations, ContactMotion, SpringsInStates
+from ..equation_records import BlockEquations, ContactMotion, ContactStiffness, SpringsInStates
 from ..linear_solver import assembly
 from ..open_close.contact_set import ContactSet
 from ..open_close.settled_states import Settled
@@ -146,6 +146,8 @@ def stop(
     data, side = np.empty(pattern.size), np.empty(6 * pattern.n)
     own = BlockEquations(matrix, np.zeros((pattern.n, 6)))
     contacts = ContactMotion(found.block, found.other, pattern.order, vectors)
+    sides = assembly.sides_of(pattern.n, pattern.order, found.block, found.other)
+    filled: ContactStiffness | None = None
 
     def answer(state, direction, friction, push, pull) -> np.ndarray:
         # Other contacts keep what they carry: closed ones their gap, sticking ones their place, sliding ones their
@@ -153,7 +155,10 @@ def stop(
         in_states = SpringsInStates(
             state, direction, 0.5 * dt * apart, springs.normal, springs.shear, friction, push, springs.lift, pull
         )
-        assembly.assemble_contacts(pattern, own, contacts, in_states, data, side)
+        nonlocal filled
+        _, stiffness = assembly.assemble_contacts(pattern, own, contacts, in_states, data, side, sides, filled)
+        # Dense matrices are overwritten by their factors, links added to all.
+        filled = stiffness if pattern.solver is not None and pattern.links is None else None
         return assembly.solve(pattern, data, side, False).reshape(-1, 6)
 
     shear = -springs.shear * 0.5 * dt * along

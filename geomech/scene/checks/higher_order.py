@@ -88,7 +88,7 @@ def _check_solver(c: Check, refuse) -> None:
     dda = c.tables.dda
     if dda is None:
         return
-    beta, gamma = dda.newmark
+    beta, gamma = dda.newmark or (0.5, 1.0)  # unset: one of the two that are allowed
     if dda.dynamic_factor > 0 and (dda.spectral_radius is not None or abs(gamma - 2 * beta) > 1e-12):
         refuse("it moves by Newmark's scheme with gamma = 2 beta only", "say newmark = [0.5, 1.0] or [0.25, 0.5]")
     if dda.contact != "penalty" or dda.springs != "stiff":

@@ -26,9 +26,10 @@ class DdaTable(Table):
         description="damping of dynamic steps, as a fraction of the critical one of a block's lowest vibration (below 0.3 a "
         "block that should stick may creep; waves that cross many blocks want less)",
     )
-    newmark: Pair = Field(
-        (0.5, 1.0),
-        description="β and γ of the time scheme: [0.5, 1] is Shi's, [0.25, 0.5] the trapezoidal rule without dissipation; "
+    newmark: Pair | None = Field(
+        None,
+        description="β and γ of the time scheme: [0.5, 1] is Shi's, [0.25, 0.5] the trapezoidal rule without dissipation "
+        "(unset: that where the ground moves or edges absorb waves, which Shi's eats, and Shi's elsewhere); "
         "2β ≥ γ ≥ 0.5 and β ≤ γ − 0.25; γ > 0.5 damps and is of first order, `spectral_radius` damps and is of second",
     )
     spectral_radius: Annotated[float, Field(ge=0, le=1)] | None = Field(
