@@ -118,7 +118,7 @@ def test_the_slider_the_keys_and_play(opened, address):
     page.keyboard.press(" ")
     until(page, "geomechPlayer.root.dataset.cycle !== '6'")
     until(page, "!geomechPlayer.playing")
-    assert page.evaluate("geomechPlayer.root.dataset.cycle") == "6"
+    until(page, "geomechPlayer.root.dataset.cycle === '6'")  # drawn in the browser's next frame
     page.keyboard.press("f")
     assert page.locator("[data-role=field]").input_value() != "yy"
     page.keyboard.press("?")
