@@ -162,9 +162,9 @@ class BoltSet:
         elastic = self.axial == _ELASTIC
         k = np.where(elastic, self.stiffness, 0.0)
         limit = np.select([self.axial == _YIELDS, self.axial == _CRUSHED], [self.most, self.least], 0.0)
-        elastic = self.across == 0
-        ks = np.where(elastic, self.shear_stiffness, 0.0) + self.geometric
-        dowel = np.where(elastic, self.dowel, self.across * np.where(elastic, 0.0, self.strength))
+        sticks = self.across == 0
+        ks = np.where(sticks, self.shear_stiffness, 0.0) + self.geometric
+        dowel = np.where(sticks, self.dowel, self.across * np.where(sticks, 0.0, self.strength))
         return np.stack([k, ks], axis=1), np.stack([-np.where(elastic, self.trial, limit), dowel], axis=1)
 
     def forces(self, motion: np.ndarray) -> np.ndarray:

@@ -47,10 +47,11 @@ class TipFunctionals:
         _, element, last, lead, touching = body.tip_elements
         n = len(element)
         factor = np.sqrt(2 * np.pi) / (8 * (1 - body.nu))
-        weights = np.zeros((c.n, 2, c.per, 2, n))
+        by_node = np.zeros((c.n, 2, c.per, 2, n))
         for k in range(n):
-            weights[element[k], 1, :, 0, k] = weights[element[k], 0, :, 1, k] = factor * lead[k]
-        self.on_faces = equations.adjoint(weights.reshape(c.n_unknowns, 2 * n), states)
+            by_node[element[k], 1, :, 0, k] = by_node[element[k], 0, :, 1, k] = factor * lead[k]
+        weights = by_node.reshape(c.n_unknowns, 2 * n)
+        self.on_faces = equations.adjoint(weights, states)
         self.on_boundary = body._outside.solve(body._cg.T @ self.on_faces, transposed=True)
         at_rest, _ = equations.solve(np.zeros(c.n_unknowns), states, memory)
         self.constant = weights.T @ at_rest
