@@ -619,6 +619,7 @@ def _readable(out: Path) -> int:
     return len(numbers)
 
 
+@pytest.mark.slow
 def test_kills_lose_nothing(write, tmp_path):
     text = SLIDING.replace("end_time_s = 0.12", "end_time_s = 0.3") + "[output]\ncheckpoint_every = 3\n"
     _killed_and_resumed(write(text), tmp_path, 5, 1)
