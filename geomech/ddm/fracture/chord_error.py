@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ...model import Cracks
+from ..mesh.grading import CURVED
 from .tip_factors import factors
 
 if TYPE_CHECKING:
@@ -23,8 +24,8 @@ if TYPE_CHECKING:
 
 _log = logging.getLogger(__name__)
 
-#: Bends between these (rad) may be a curve's: a circle of twelve sides turns by 30° at each.
-LEAST_BEND, MOST_BEND = np.radians(0.1), np.radians(31.0)
+#: Bends between these (rad) may be a curve's.
+LEAST_BEND, MOST_BEND = np.radians(0.1), CURVED
 #: Neighbouring chords of a curve, and its neighbouring bends, differ by less than this factor.
 LIKE = 2.0
 #: A mouth this near to a chord's middle (as part of the chord) is where the arc is halved.

@@ -31,6 +31,14 @@ FOLD, FOLD_SHRINKS = math.radians(120), math.radians(20 / 3)
 #: to 45°, 1 to 0.01 of their crack), and ungraded ones leave this error of K, in proportion to the turn up to that
 #: beside it.
 CLOSED_KINK, CLOSED_EXPONENT, CLOSED_ERROR, CLOSED_TURN = math.radians(5) - 1e-9, 0.41, 1.1e-2, math.radians(25)
+#: Bends by less than this (rad) may be those of a curve that is given by points of it: a circle of twelve sides turns by
+#: 30° at each. Between sides shorter than elements are they are taken for that, and of cracks they are not graded: what is
+#: left of K then, 1e-4 (open) to 1e-2 (closed, by 20°), is a tenth to a half of what the chords themselves cost
+#: (`tests/ddm/mesh/test_digitised_lines.py`).
+CURVED = math.radians(31)
+#: What a corner between short sides costs falls like (side / distance to the nearest crack)^FAR: measured 1 with the side,
+#: 2 to 2.6 with the distance, of bends by 30° to 90° (the same tests).
+FAR = 1.5
 #: Re-entrant corners of the outline that a crack comes nearer to than so many of the outline's elements get as many
 #: layers as leave this error of K there, unless none are wanted: three, which serve elsewhere, left 1.5e-2 beside a
 #: right-angled one (`tests/ddm/mesh/test_corner_beside_crack.py`).
@@ -130,6 +138,19 @@ class Grading:
         error, power = ungraded(angle, "outline")
         wanted = self._layers_for(math.log(max(error / CORNER_ERROR, 1.0)) / power)
         return max(self.at_corner(angle), wanted + self.layers - KINK_LAYERS)
+
+    def away_from_cracks(self, angle: float, side: float, distance: float) -> int:
+        """At a corner of the outline (``angle`` of rock, rad) between sides of no more than ``side`` m, ``distance`` m from
+        the nearest crack: those that leave K the error of a kink."""
+        error, power = ungraded(angle, "outline")
+        error *= min(1.0, side / distance) ** FAR if distance > 0 else 1.0
+        wanted = self._layers_for(math.log(max(error / KINK_ERROR, 1.0)) / power)
+        return max(0, wanted + self.layers - KINK_LAYERS)
+
+    @property
+    def at_bend_of_curve(self) -> int:
+        """At a slight bend of a crack that was digitised."""
+        return max(0, self.layers - KINK_LAYERS)
 
     def at_closed_kink(self, turn: float) -> int:
         """At a kink by ``turn`` of a crack that was drawn closed; no fewer than at an open one."""

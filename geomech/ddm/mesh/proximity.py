@@ -31,6 +31,8 @@ AT_NODE = 0.01
 #: be as good as loose, and what its end lacks of equilibrium bends it. (By dislocations, short cracks at 3.5° to a
 #: side: K 1 % off; 64 % where only a ten-thousandth of the longer face was.)
 AT_BOUNDARY = 0.0001
+#: What `Sources.meeting` says of two pieces of one digitised line: they are not compared.
+IN_LINE = 2.0
 #: Elements are not halved below this part of the largest extent of the geometry.
 FLOOR = 1e-10
 #: What is longer than so many times its distance to another element, at the floor, is refused.
@@ -64,7 +66,7 @@ class Candidates(NamedTuple):
 
 class Sources(NamedTuple):
     """Edges, ``n_edges`` of them, and crack segments: their ``span`` (n_sources,) m; what ``meeting`` (n_sources, n_sources)
-    says, 0 for two that do not meet, 1 for those that do, −sin of the angle between cracks where that is acute; those from
+    says, 0 for two that do not meet, 1 for those that do, `IN_LINE` for those that go on nearly straight, −sin of the angle between cracks where that is acute; those from
     ``images`` on are behind a free surface. Where they meet, ``chained`` times the distance is allowed, at an acute angle
     `BESIDE` times it, and ``beside`` times `GRADED`."""
 
@@ -141,6 +143,8 @@ def _compare(elements, length, sources, i, j, out):
     start, end, n_edges = elements.start, elements.end, sources.n_edges
     one, other = elements.source[i], elements.source[j]
     meet = sources.meeting[one, other]
+    if meet == IN_LINE:
+        return
     allowed = APART
     if meet != 0:
         allowed = sources.chained if meet > 0 else min(sources.chained, BESIDE)
@@ -161,12 +165,12 @@ def _compare(elements, length, sources, i, j, out):
         out[k] = max(out[k], length[k] / (d * (allowed if length[k] > least else graded)))
 
 
-def keep_apart(start, end, kind, source, pieces, touching, n_edges, ratio, extent, unknowns, images=None):
+def keep_apart(start, end, kind, source, pieces, touching, n_edges, ratio, extent, unknowns, images=None, line=None):
     """Elements (``start``, ``end`` (n, 2), ``kind``, ``source`` (n,)) with those halved that stand too close to
     another.
 
     ``pieces`` (n_sources, 2, 2) are the edges, then the crack segments, ``touching`` (n_sources, n_sources) which of
-    them meet; ``ratio`` that of graded elements, ``unknowns`` those of an element; sources from ``images`` on are
+    them meet, ``line`` the same of those that go on nearly straight (None: none do); ``ratio`` that of graded elements, ``unknowns`` those of an element; sources from ``images`` on are
     behind a free surface. Raises ValueError, saying where, when rock is too thin for that: it would take too many
     elements, or shorter ones than coordinates can tell apart.
     """
@@ -176,6 +180,8 @@ def keep_apart(start, end, kind, source, pieces, touching, n_edges, ratio, exten
         beside, meeting = np.inf, touching.astype(float)
     else:
         beside, meeting = LOW if unknowns <= 6 else 1.0, _meeting(pieces, touching, n_edges, np.cos(ACUTE))
+    if line is not None:
+        meeting[line & ~np.eye(len(pieces), dtype=bool)] = IN_LINE
     span = np.hypot(*(pieces[:, 1] - pieces[:, 0]).T)
     images = len(pieces) if images is None else images
     sources = Sources(n_edges, images, span, meeting, chained, float(beside))
