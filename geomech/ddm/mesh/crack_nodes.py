@@ -108,11 +108,10 @@ def _share_ends(points, order):
 def in_line(touching: np.ndarray, pieces: np.ndarray, wanted: np.ndarray, line: np.ndarray) -> np.ndarray | None:
     """(m, m) bool: which of ``pieces`` (m, 2, 2) that follow each other on one ``line`` (m,), a loop or a crack, go on so
     nearly straight that what is between them is no rock; None where elements, ``wanted`` (m,) m long, are shorter than
-    all of it. 0 is wanted of increments of growth, which were not digitised.
+    all of it. 0 is wanted of increments of growth, and of curved walls, which are compared as before.
 
     Adds to ``touching`` (m, m) those that are one behind the other, and what meets a piece that another is in line with.
     """
-    # A chain of pieces, the one that begins where the last ended; -1 where it is another line's.
     short = np.hypot(*(pieces[:, 1] - pieces[:, 0]).T) < REACH * wanted
     if not short.any():
         return None
@@ -130,10 +129,10 @@ def _next(pieces, line):
     for i in range(len(pieces)):
         # The next in the list; of a loop the last's is the first.
         for j in (i + 1, np.searchsorted(line[: i + 1], line[i])):
-            if 0 <= j < len(pieces) and j != i and line[j] == line[i]:
-                if pieces[j, 0, 0] == pieces[i, 1, 0] and pieces[j, 0, 1] == pieces[i, 1, 1]:
-                    out[i] = j
-                    break
+            here = 0 <= j < len(pieces) and j != i and line[j] == line[i]
+            if here and pieces[j, 0, 0] == pieces[i, 1, 0] and pieces[j, 0, 1] == pieces[i, 1, 1]:
+                out[i] = j
+                break
     return out
 
 

@@ -36,6 +36,10 @@ CLOSED_KINK, CLOSED_EXPONENT, CLOSED_ERROR, CLOSED_TURN = math.radians(5) - 1e-9
 #: left of K then, 1e-4 (open) to 1e-2 (closed, by 20°), is a tenth to a half of what the chords themselves cost
 #: (`tests/ddm/mesh/test_digitised_lines.py`).
 CURVED = math.radians(31)
+#: A wall is a curve (`sagittas`) where it bends by no less than this, rad, at each end of a side, …
+LEAST_BEND = math.radians(0.1)
+#: … and its neighbouring sides, and neighbouring bends, differ by less than this factor.
+LIKE = 2.0
 #: What a corner between short sides costs falls like (side / distance to the nearest crack)^FAR: measured 1 with the side,
 #: 2 to 2.6 with the distance, of bends by 30° to 90° (the same tests).
 FAR = 1.5
@@ -90,6 +94,21 @@ def at_graded_kink(turn: float) -> float:
     its crack, the worst of those measured (20° to 120°: within 30 %). Layers begin to tell from the second: `ungraded`
     is less."""
     return 2.4e-2 * (turn / (math.pi / 2)) ** 1.6
+
+
+def sagittas(loop: np.ndarray) -> np.ndarray:
+    """(n,) m, how far the curve that ``loop`` (n, 2) may stand for lies off each of its edges, positive to the right;
+    0 of straight ones."""
+    along = np.roll(loop, -1, axis=0) - loop
+    before = np.roll(along, 1, axis=0)
+    length = np.hypot(*along.T)
+    bend = np.arctan2(before[:, 0] * along[:, 1] - before[:, 1] * along[:, 0], np.sum(before * along, axis=1))
+    ahead = np.roll(bend, -1)
+    small, large = np.minimum(abs(bend), abs(ahead)), np.maximum(abs(bend), abs(ahead))
+    curved = (bend * ahead > 0) & (small > LEAST_BEND) & (large < CURVED) & (large < LIKE * small)
+    for other in (np.roll(length, 1), np.roll(length, -1)):
+        curved &= (length < LIKE * other) & (other < LIKE * length)
+    return np.where(curved, np.sign(bend) * 0.5 * length * np.tan((abs(bend) + abs(ahead)) / 8), 0.0)
 
 
 @dataclass(frozen=True)

@@ -31,15 +31,15 @@ def digitised(sides: int, wave: float) -> np.ndarray:
 
 
 def test_elements_follow_the_line():
-    """Four times as many vertices on one wavy square: one element a side where sides are shorter than elements are (a sixth
-    of the edge), and a few at the corners; 2.2 times as many before, in proportion to the vertices."""
+    """Four times as many vertices on one wavy square: one element a side where sides are shorter than elements are, and a few
+    at the corners (two a side, 328, where each is taken for beside the next but one)."""
     settings = DdmSettings()
     numbers = [mesh([digitised(sides, 0.02)], CRACK, settings).boundary.n for sides in (10, 40)]
     assert numbers[0] < 80 and numbers[1] < 4 * 40 + 30
 
 
 def test_a_crack_does_not_take_elements_by_its_vertices():
-    """A closed arc of 60° in so many sides: 90 elements for 10 sides before, each bend graded."""
+    """A closed arc of 60° in so many sides (90 elements for 10 sides where each bend is graded)."""
     for sides in (10, 15):
         c = arc(sides)
         assert mesh([], c, DdmSettings()).cracks.n == sides
@@ -65,7 +65,9 @@ def test_what_bends_leave_is_less_than_what_chords_cost():
     assert by_chords > 0.02 * largest(k)
 
 
-@pytest.mark.parametrize(("bend", "side", "distance"), [(30, 0.1, 0.2), (60, 0.02, 0.1), (60, 0.1, 0.8), (90, 0.02, 0.2)])
+@pytest.mark.parametrize(
+    ("bend", "side", "distance"), [(30, 0.1, 0.2), (60, 0.02, 0.1), (60, 0.1, 0.8), (90, 0.02, 0.2)]
+)
 def test_corners_of_short_sides(bend, side, distance):
     """A notch of two sides in the wall of a plate, ``distance`` from a crack, as graded as `Grading.away_from_cracks`
     wants, beside one with twelve layers: K to 1.5e-3 (of three corners, each to 5e-4)."""
