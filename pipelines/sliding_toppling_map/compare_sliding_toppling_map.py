@@ -8,7 +8,7 @@ import numpy as np
 
 from geomech.reference.blocks.block_on_incline import MODES, failure_mode, toe_holds_above
 
-COLOURS = dict(zip(MODES, ("#8aa4a0", "#f2d16b", "#a63c28", "#8d6a9f")))
+COLOURS = dict(zip(MODES, ("#8aa4a0", "#d9a441", "#c8553d", "#8d6a9f")))
 
 #: The threshold of motion, 2e-4 g, and elastic give: 0.01° each.
 BOUNDARY_TOLERANCE_DEG = 0.02
