@@ -40,13 +40,15 @@ _PRINCIPAL = ("principal_stress", "Pa", "principal stresses of the full tensor, 
 _PRINCIPAL_NAMES = ("S1", "S2", "S3")
 _STATE = "0 open, 1 stick, 2 slip"
 
-#: Series name → its fields. The series is written as ``<name>.pvd`` with its files under ``vtk/``.
+#: Series name → its fields. The series is written as ``<name>.pvd`` with its files under ``vtk/``. What there is much of,
+#: at every corner, contact and node, is in single precision: seven digits, half the bytes. Places and displacements
+#: are in double precision, since gaps and openings are small differences of theirs.
 SERIES: dict[str, tuple[Field, ...]] = {
     "blocks": (
         _DISPLACEMENT,
-        Field("velocity", "point", "m/s", "velocity of the material point", _XYZ),
-        Field(_STRESS[0], "cell", *_STRESS[1:], VTK_STRESS),
-        Field(_PRINCIPAL[0], "cell", *_PRINCIPAL[1:], _PRINCIPAL_NAMES),
+        Field("velocity", "point", "m/s", "velocity of the material point", _XYZ, "float32"),
+        Field(_STRESS[0], "cell", *_STRESS[1:], VTK_STRESS, "float32"),
+        Field(_PRINCIPAL[0], "cell", *_PRINCIPAL[1:], _PRINCIPAL_NAMES, "float32"),
         Field("block_id", "cell", "-", "index of the block", dtype="int32"),
         Field("material", "cell", "-", "index of the block's material", dtype="int32"),
         Field("fixed", "cell", "-", "1 where the block does not move", dtype="int32"),
@@ -87,15 +89,15 @@ SERIES: dict[str, tuple[Field, ...]] = {
     ),
     "contacts": (
         _DISPLACEMENT,
-        Field("force", "point", "N/m", "on the block that owns the vertex", _XYZ),
-        Field("normal_force", "point", "N/m", "positive in compression"),
-        Field("shear_force", "point", "N/m", "along the touched edge"),
-        Field("gap", "point", "m", "distance of the faces, negative in penetration"),
-        Field("slip", "point", "m", "accumulated sliding"),
-        Field("wear", "point", "m", "accumulated sliding distance, both directions"),
-        Field("lift", "point", "m", "normal displacement due to dilation"),
+        Field("force", "point", "N/m", "on the block that owns the vertex", _XYZ, "float32"),
+        Field("normal_force", "point", "N/m", "positive in compression", dtype="float32"),
+        Field("shear_force", "point", "N/m", "along the touched edge", dtype="float32"),
+        Field("gap", "point", "m", "distance of the faces, negative in penetration", dtype="float32"),
+        Field("slip", "point", "m", "accumulated sliding", dtype="float32"),
+        Field("wear", "point", "m", "accumulated sliding distance, both directions", dtype="float32"),
+        Field("lift", "point", "m", "normal displacement due to dilation", dtype="float32"),
         Field("state", "point", "-", _STATE, dtype="int32"),
-        Field("length", "point", "m", "tributary length; 0 at lone corners"),
+        Field("length", "point", "m", "tributary length; 0 at lone corners", dtype="float32"),
         Field("joint", "point", "-", "index of the joint law", dtype="int32"),
         Field(
             "bonded",
@@ -108,7 +110,6 @@ SERIES: dict[str, tuple[Field, ...]] = {
         Field("block_id", "point", "-", "owner of the vertex", dtype="int32"),
         Field("other_block_id", "point", "-", "owner of the edge", dtype="int32"),
     ),
-    # Interior fields are large and smooth: single precision, seven digits, is more than the mesh resolves.
     "interior": (
         Field(
             "displacement",

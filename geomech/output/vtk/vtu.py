@@ -143,6 +143,7 @@ class _Layout:
         # and would take one of those for the offset of a later array if it did not meet that one first.
         self._columns = columns[::-1]
         self._compress = sum(c.nbytes for c in columns) > SMALL
+        self._kept: dict[str, tuple[bytes, bytes]] = {}
         if not self._compress:
             self._lay_out()
 
@@ -165,11 +166,21 @@ class _Layout:
             arrays = [np.zeros(c.shape, c.dtype) for c in self._columns]
             for column, array in zip(self._columns, arrays, strict=True):
                 _fill(array, data[column.name])
-            packed = [_compressed(array) for array in arrays]
+            packed = [
+                self._packed(column.name, array.tobytes()) for column, array in zip(self._columns, arrays, strict=True)
+            ]
             return b"".join([self._head([len(p) for p in packed]), *packed, _TAIL])
         for name, place in self._places:
             _fill(place, data[name])
         return self._file
+
+    def _packed(self, name: str, raw: bytes) -> bytes:
+        """The array ``name`` compressed. Much of a grid stays from cycle to cycle (points, cells, numbers of blocks): to
+        compare takes a hundredth of the time of compressing again."""
+        kept = self._kept.get(name)
+        if kept is None or kept[0] != raw:
+            kept = self._kept[name] = (raw, _compressed(raw))
+        return kept[1]
 
     def _head(self, sizes: list[int]) -> bytes:
         """The file up to its data; ``sizes``: bytes of each array in the file, in the order of the data, which is the
@@ -234,9 +245,8 @@ def _put(path: Path | str, content: bytes | bytearray) -> None:
         os.close(handle)
 
 
-def _compressed(data: np.ndarray) -> bytes:
+def _compressed(raw: bytes) -> bytes:
     """One compressed array: (number of blocks, block size, size of a partial last block, compressed sizes), data."""
-    raw = data.tobytes()
     pieces = [zlib.compress(raw[k : k + _BLOCK], 1) for k in range(0, len(raw), _BLOCK)]
     size = min(len(raw), _BLOCK)
     # "Partial" is zero when the last block is full; a single block is always full.
