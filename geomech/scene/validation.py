@@ -118,7 +118,7 @@ def _fault(item: Mapping[str, Any], place: Callable[[Path], str]) -> Fault:
         if isinstance(path[-1], int) or table_at(path) or not what:
             what = {"float": "number", "string": "text", **wanted}.get(kind.split("_")[0], what)
         hint = _hint(given, what) if isinstance(given, str) else ""
-        return Fault(place(path), f"{written(given)} is not {what or 'the expected type'}", hint + meaning)
+        return Fault(place(path), f"{written(given)} given, expected {what or 'another type'}", hint + meaning)
     return Fault(place(path), item["msg"], meaning)
 
 

@@ -200,7 +200,7 @@ def test_checkpoints_come_every_so_many_cycles_or_by_the_clock(tmp_path):
     assert not never.wanted and not never.due and clock.wanted and not clock.due
     clock._last -= 31.0
     assert clock.due
-    with pytest.raises(ValueError, match="never with 0"):
+    with pytest.raises(ValueError, match="or 0 for no checkpoints"):
         Checkpoints(every=-1)
 
 
