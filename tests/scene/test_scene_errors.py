@@ -158,7 +158,7 @@ SPOILT = [
         "rate_pa_per_s = [0.0, -1e5]",
         "rate_pa_per_s = -1e5",
         "loads.tractions[0].rate_pa_per_s",
-        "where [x, y] belongs",
+        "expected [x, y]",
         "Pa/s",
     ),
     ("rate_pa_per_s = [0.0, -1e5]", "rate_pa_per_s = [0.0, -2e5]", "loads", "do not balance", "balance the tractions"),
