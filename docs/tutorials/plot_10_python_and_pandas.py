@@ -1,6 +1,6 @@
 """
 Runs from Python, results in pandas and xarray
-=============================================
+===============================================
 
 We drive a set of runs of one scene from Python and read their tables into data frames.
 """
