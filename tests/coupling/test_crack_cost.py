@@ -1,0 +1,39 @@
+"""What `check` says cracked blocks ask for: their unknowns as the solver has them, memory and time by these."""
+
+from __future__ import annotations
+
+import pytest
+from small_scenes import PLATE
+
+from geomech import ddm
+from geomech.coupling import crack_cost
+from geomech.scene import load_scene
+
+
+@pytest.fixture
+def problem(tmp_path):
+    path = tmp_path / "plate.toml"
+    path.write_text(PLATE, encoding="utf-8")
+    return load_scene(path).problem()
+
+
+def test_unknowns_are_those_of_the_solver(problem):
+    cost = crack_cost.crack_cost(problem)
+    assert len(cost.blocks) == 1
+    block = int(cost.blocks[0])
+    body = ddm.Body(
+        problem.blocks.loops(block), problem.cracks, problem.materials[problem.blocks.material[block]], problem.ddm
+    )
+    m, n = body.boundary.n_unknowns, body.faces.n_unknowns
+    assert (cost.on_sides[0], cost.on_cracks[0]) == (m, n)
+    # A_ΓΓ and its factors, A_CΓ and A_ΓΓ⁻¹ A_ΓC, S and its factors with those of other states.
+    assert cost.memory == pytest.approx(8 * (2 * m * m + 2 * m * n + 4 * n * n))
+    assert cost.seconds > 0
+
+
+def test_lines_name_the_largest_block_and_what_makes_it_large(problem, monkeypatch):
+    (line,) = crack_cost.cost_lines(problem)
+    assert "1 cracked block" in line and "unknowns on sides" in line and "GB" in line and "processor time" in line
+    monkeypatch.setattr(crack_cost, "LARGE", 10)
+    monkeypatch.setattr(crack_cost, "FINE", 0.01)
+    assert "simplify_m" in crack_cost.cost_lines(problem)[1]
