@@ -172,8 +172,6 @@ def hairline_faces(system: BlockSystem, state: State) -> tuple[PartedFace, ...]:
     """Faces of joints with cohesion that in ``state`` are open at all of their ends, by less than what blocks are known
     to, and so hold nothing, bonded still or not; the one that is open farthest first."""
     near = system.contacts_near(state)
-    if not system.finder.whole_faces:
-        return ()
     cohesion = np.array([joint.cohesion for joint in system.joints])[near.law]
     whole = WholeFaces.of(near.block, near.other, near.geometry, near.law, cohesion)
     if whole is None:
@@ -196,18 +194,21 @@ def _faces(near: ContactSet, whole: WholeFaces, contacts: list[np.ndarray]) -> t
     return tuple(sorted(out, key=lambda each: -each.gap))
 
 
-def with_hairlines(
+def with_rigid_blocks(
     blocks: Blocks, found: FactorOfSafety, loose: tuple[PartedFace, ...], rigid: FactorOfSafety
 ) -> FactorOfSafety:
-    """The answer ``found`` with the faces that are ``loose`` in it by a hair, and the answer of ``rigid`` blocks."""
-    worst = loose[0]
-    a, b = (blocks.names[k] if blocks.names else f"block {k}" for k in (worst.block, worst.other))
-    one = len(loose) == 1
-    line = (
-        f"{'a face' if one else f'{len(loose)} faces'} with cohesion between {a!r} and {b!r}"
-        f"{'' if one else ' and others'} hold{'s' if one else ''} nothing, open by {1e3 * worst.gap:.2g} mm because "
-        f"blocks strain evenly; rigid blocks have the factor {rigid.factor:.4f}"
-    )
+    """The answer ``found`` with the answer of ``rigid`` blocks, and the faces that are ``loose`` in it by a hair."""
+    if loose:
+        worst, one = loose[0], len(loose) == 1
+        a, b = (blocks.names[k] if blocks.names else f"block {k}" for k in (worst.block, worst.other))
+        what = (
+            f"{'a face' if one else f'{len(loose)} faces'} with cohesion between {a!r} and {b!r}"
+            f"{'' if one else ' and others'} hold{'s' if one else ''} nothing, open by {1e3 * worst.gap:.2g} mm because "
+            "blocks strain evenly"
+        )
+    else:
+        what = "blocks strain evenly and so bear on few points of faces with cohesion, which others would hold too"
+    line = f"{what}; rigid blocks have the factor {rigid.factor:.4f}"
     return replace(found, factor_if_rigid=rigid.factor, warnings=(*found.warnings, line))
 
 
