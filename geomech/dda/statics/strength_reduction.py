@@ -198,9 +198,7 @@ class _Search:
             found = self._with_parted_faces(found, counted, largest is not None)
         return with_admissible_forces(found, largest)
 
-    def _found(
-        self, counted: Counted, watch: Callable[[Trial], None] | None
-    ) -> tuple[FactorOfSafety, Counted]:
+    def _found(self, counted: Counted, watch: Callable[[Trial], None] | None) -> tuple[FactorOfSafety, Counted]:
         """The factor, and what has been ``counted`` in it: of the cohesion of whole faces, or of what touches of them,
         the larger. What balances without the cohesion of open ends balances with it, but a face that bears shear by
         cohesion alone, pressed by nothing, may have no consistent states: open it holds nothing, and closed it opens."""
