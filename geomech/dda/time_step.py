@@ -37,12 +37,11 @@ from .kinematics.newmark import (
     Outlines,
     advance,
     assemble_blocks,
-    mass_matrices,
     turned,
 )
 from .kinematics.rigid_blocks import mean_stress
 from .kinematics.roundoff import undecided_gaps, warn_of_roundoff
-from .kinematics.simplex_integration import block_moments
+from .kinematics.simplex_integration import block_moments, mass_matrix
 from .linear_solver import assembly
 from .loads.load_vectors import AppliedForces, Inertia, generalised
 from .loads.step_actions import StepActions, effective_gravity
@@ -240,11 +239,11 @@ class Attempt:
         """(n_free, 6) forces of inertia 2M d/dt² against the ``increment`` (n_blocks, 6) of a static step, in the rows of
         its equations."""
         moving = self.system.moving
-        scaled = increment[moving]
-        scaled[:, 2:] *= np.sqrt(self.moments[moving, :1])
-        mass = mass_matrices(self.density[moving], self.moments[moving])
-        out = np.empty_like(scaled)
-        out[self.order[moving]] = 2.0 / self.dt**2 * np.einsum("nab,nb->na", mass, scaled)
+        mass = mass_matrix(self.moments[moving], self.density[moving])
+        force = 2.0 / self.dt**2 * np.einsum("nab,nb->na", mass, increment[moving])
+        force[:, 2:] /= np.sqrt(self.moments[moving, :1])
+        out = np.empty_like(force)
+        out[self.order[moving]] = force
         return out
 
     def inertia_and_size(self) -> tuple[np.ndarray, np.ndarray]:

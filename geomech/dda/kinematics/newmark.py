@@ -259,19 +259,6 @@ def _unit_mass(moments, mass):
     mass[3, 5] = mass[5, 3] = mass[4, 5] = mass[5, 4] = 0.5 * xy / area
 
 
-def mass_matrices(density: np.ndarray, moments: np.ndarray) -> np.ndarray:
-    """(n, 6, 6) kg/m: mass matrices of blocks of ``density`` (n,) kg/m³ with ``moments`` (n, 6), in the unknowns of a
-    step."""
-    area, _, _, xx, yy, xy = moments.T
-    out = np.zeros((len(moments), 6, 6))
-    out[:, 0, 0] = out[:, 1, 1] = area
-    out[:, 2, 2] = (xx + yy) / area
-    out[:, 3, 3], out[:, 4, 4], out[:, 5, 5] = xx / area, yy / area, 0.25 * (xx + yy) / area
-    for row, column, value in ((2, 3, -xy), (2, 4, xy), (2, 5, 0.5 * (xx - yy)), (3, 5, 0.5 * xy), (4, 5, 0.5 * xy)):
-        out[:, row, column] = out[:, column, row] = value / area
-    return density[:, None, None] * out
-
-
 @part(fastmath=False, error_model="numpy", nogil=True, **UNCOUNTED)
 def _rotated(c, s, xx, yy, xy):
     """The components of a symmetric tensor turned by the angle of cosine ``c`` and sine ``s``."""

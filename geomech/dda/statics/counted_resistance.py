@@ -3,6 +3,7 @@ at one end, the way in which blocks are wedged; and the warnings that name it.""
 
 from __future__ import annotations
 
+import logging
 import math
 from dataclasses import dataclass, replace
 
@@ -13,11 +14,15 @@ from ..joint_laws.whole_faces import WholeFaces
 from ..kinematics.simplex_integration import block_moments
 from ..loads.bolts import labels
 from ..open_close.contact_set import ContactSet
+from ..results import CrackResponse
 from ..system import BlockSystem
 from .displacement_limit import MOVED
+from .pseudo_time_equilibrium import equilibrium
 from .safety_answer import Anchor, FactorOfSafety
-from .sharp_toes import FREE, Toe
+from .sharp_toes import FREE, ROUNDED, Toe
 from .stability_trial import Trial
+
+log = logging.getLogger(__name__)
 
 #: So many blocks with toes are named.
 _LISTED = 8
@@ -65,6 +70,31 @@ def bearing_toes(system: BlockSystem, state: State, loads: Loads, load_time: flo
     return tuple(toe for toe in toes_in_the_way(system, state) if toe.force > _BEARS * weight[toe.block])
 
 
+def warn_of_toes(
+    system: BlockSystem, begun: State, found: State, loads: Loads, load_time: float, crack: CrackResponse | None = None
+) -> None:
+    """Log which toes hold blocks that have come to rest in ``found`` from ``begun`` and would not with rounded ones: a
+    search for equilibrium outside `factor_of_safety` takes corners as sharp as they are drawn."""
+    finder = system.finder
+    before = finder.toes
+    try:
+        toes = bearing_toes(system, found, loads, load_time)
+        if not toes:
+            return
+        finder.toes = ROUNDED
+        other = equilibrium(system, begun, loads, load_time=load_time, crack=crack, follow=False)
+    finally:
+        finder.toes = before
+    if other.collapsed:
+        one = len({toe.block for toe in toes}) == 1
+        log.warning(
+            "t = %g s: %s and hold%s %.4g kN/m with %s sharp tip%s; rounded, blocks do not stand: `geomech safety` tells "
+            "the factor",
+            load_time, _where(system.blocks, toes), "s" if one else "", sum(toe.force for toe in toes) / 1e3,
+            "its" if one else "their", "" if one else "s",
+        )  # fmt: skip
+
+
 def with_toes(
     blocks: Blocks, found: FactorOfSafety, toes: tuple[Toe, ...], other: FactorOfSafety | None, hold: bool
 ) -> FactorOfSafety:
@@ -81,18 +111,7 @@ def _of_toes(blocks: Blocks, toes: tuple[Toe, ...], other: FactorOfSafety | None
     def factor(of: FactorOfSafety) -> str:
         return f"{of.factor:.4f}" if math.isfinite(of.upper) else f"above {of.lower:g}"
 
-    def name(block: int) -> str:
-        return repr(blocks.names[block] if blocks.names else f"block {block}")
-
-    first, one = toes[0], len({toe.block for toe in toes}) == 1
-    where = (
-        f"the toe of {name(first.block)} touches {name(first.other)} at x = {_metres(first.at[0])}, "
-        f"y = {_metres(first.at[1])} m"
-    )
-    if not one:
-        rest = list(dict.fromkeys(name(toe.block) for toe in toes if toe.block != first.block))
-        more = f" and {len(rest) - _LISTED} others" if len(rest) > _LISTED else ""
-        where += f" (so do those of {', '.join(rest[:_LISTED])}{more})"
+    where, one = _where(blocks, toes), len({toe.block for toe in toes}) == 1
     if hold:
         without = "the blocks do not stand" if other is None else f"the factor is {factor(other)}"
         force = sum(toe.force for toe in toes) / 1e3
@@ -106,6 +125,24 @@ def _of_toes(blocks: Blocks, toes: tuple[Toe, ...], other: FactorOfSafety | None
         "would hold"
     )
     return (f"{where}; {rounded}: factor {factor(other)}, which is not to be relied on",)
+
+
+def _where(blocks: Blocks, toes: tuple[Toe, ...]) -> str:
+    """Which toes touch what, and where."""
+
+    def name(block: int) -> str:
+        return repr(blocks.names[block] if blocks.names else f"block {block}")
+
+    first = toes[0]
+    where = (
+        f"the toe of {name(first.block)} touches {name(first.other)} at x = {_metres(first.at[0])}, "
+        f"y = {_metres(first.at[1])} m"
+    )
+    rest = list(dict.fromkeys(name(toe.block) for toe in toes if toe.block != first.block))
+    if not rest:
+        return where
+    more = f" and {len(rest) - _LISTED} others" if len(rest) > _LISTED else ""
+    return f"{where} (so do those of {', '.join(rest[:_LISTED])}{more})"
 
 
 def _metres(value: float) -> str:
