@@ -22,7 +22,7 @@ from .kinematics.simplex_integration import block_moments
 from .open_close.contact_set import ContactSet
 from .open_close.equations import Unsettled
 from .results import NotConverged, StepResult
-from .statics.pseudo_inertia import balanced_attempt
+from .step_control.pseudo_inertia import balanced_attempt
 from .step_control.relative_motion import Windows
 from .step_control.step_limits import CROSSING, UNSETTLED, Crossed, StepLimits, Used
 from .time_step import Attempt, StepStart

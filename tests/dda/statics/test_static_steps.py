@@ -47,8 +47,8 @@ def sheared(motion: History, dt: float, end: float, density: float = 2600.0, equ
 def test_what_dilation_lifts_is_not_pressed_by_inertia(dt):
     """2M d/dt² for the lift d = v dt tan ψ of a step would press by 9e2 to 1.5e5 N/m; what is left is round-off."""
     _, results = sheared(History.ramp([0.1, 0.0]), dt, 8 * dt)
-    assert results[-1].contacts["normal_force"].sum() == pytest.approx(1e6, rel=1e-6)
-    assert results[-1].statistics["unbalanced_ratio"] < 1e-6
+    assert results[-1].contacts["normal_force"].sum() == pytest.approx(1e6, rel=3e-6)
+    assert results[-1].statistics["unbalanced_ratio"] < 2e-6
 
 
 def test_pseudo_inertia_stays_where_it_is_asked_for():
@@ -63,7 +63,7 @@ def test_pseudo_inertia_stays_where_it_is_asked_for():
     for keep in (True, False):
         result = system.step(state, loads, 1e-3, pseudo_inertia=keep)
         ratios.append(result.statistics["unbalanced_ratio"])
-    assert ratios[0] > 1e-4 and ratios[1] < 1e-7
+    assert ratios[0] > 1e-4 and ratios[1] < 1e-6
 
 
 def test_a_block_that_slides_keeps_its_step_beside_one_that_is_held():
