@@ -2,8 +2,7 @@
 
 A static step solves (2M/dt² + K) d = F: the inertia 2M d/dt² decides how far a block goes that nothing holds, and of one
 that is held it takes a part of the force, the larger the shorter the step (a joint that dilates by d = v dt tan ψ would be
-pressed by 2 M v tan ψ/dt). Solved again about the displacement d_k found before, a proximal point iteration (Rockafellar
-1976, SIAM J. Control Optim. 14, 877-898),
+pressed by 2 M v tan ψ/dt). Solved again about the displacement d_k found before, a proximal point iteration,
 
     2M/dt² (d_{k+1} − d_k) + K d_{k+1} = F,
 
