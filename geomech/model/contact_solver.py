@@ -79,8 +79,9 @@ class ContactSolver:
     patch_share: float = 0.4
     patch_blocks: int = 2000
     splitting: bool = True
+    splitting_violation: float = 0.03
     splitting_wrong: float = 0.02
-    splitting_iterations: int = 100
+    splitting_iterations: int = 60
     splitting_settled: float = 0.001
     central_path: bool = True
     path_iterations: int = 60

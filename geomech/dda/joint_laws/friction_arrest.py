@@ -28,8 +28,9 @@ from ..linear_solver import assembly
 from ..open_close.contact_set import ContactSet
 from ..open_close.settled_states import Settled
 
-#: Impulses beyond what friction can exert are brought back to it this many times.
-_ROUNDS = 4
+#: Impulses beyond what friction can exert are brought back to it this many times, or until no more than this part of the
+#: contacts that stop have such.
+_ROUNDS, _LEFT = 4, 0.1
 #: A spring k turns the speed of a mass m about in every step of Shi's, instead of swinging, from k dt² = 16 m on: there
 #: its two roots are real, and one of them tends to −1.
 _TURNS_ABOUT = 16.0
@@ -40,10 +41,10 @@ _PASSED_ON = 20.0
 #: it in so long a time; with it all that is slower, else nothing. (One brick that slides on a wall of 10 000 shakes
 #: hundreds of contacts at their strength, by 1e-11 m each, of 1e-12 J in all, in every step, which all blocks' equations
 #: were solved for three times more.)
-_WORTH = 3e-5
+_WORTH = 1e-3
 #: … and takes vibrations out that swing the forces of contacts by more than this part of the largest: less hardly brings
 #: one to its strength.
-_SWING = 1e-3
+_SWING = 1e-2
 
 
 @dataclass(frozen=True, eq=False)
@@ -194,7 +195,7 @@ def stop(
         # What friction at its bound has stopped and more, sticks.
         speed = u1 + sense * moved * 2.0 / dt
         within = given & (np.where(bound < strength, speed, -speed) > 0.0)
-        if not (beyond.any() or within.any()):
+        if np.count_nonzero(beyond | within) <= _LEFT * len(rows):
             break
         bound[beyond] = np.clip(total, least, strength)[beyond]
         bound[within] = np.nan

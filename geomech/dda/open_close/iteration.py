@@ -145,7 +145,7 @@ class _Search:
                 continue
             if not self.equations.first_order:
                 self._pivot(answer, wrong, called, returned)
-            elif returned or self.tries > self._most_tries(number):
+            elif returned or self._overshoots(answer) or self.tries > self._most_tries(number):
                 if not self._by_splitting():
                     self._by_path(answer)
             else:
@@ -188,6 +188,12 @@ class _Search:
         self.falls = number < self.fewest
         if self.falls:
             self.fewest, self.best = number, (self.states, answer, wrong)
+
+    def _overshoots(self, answer: Answer) -> bool:
+        """Whether the forces of wrong contacts are so large that operator splitting, while it is still to be tried, leads on
+        sooner than Newton's method."""
+        forces = float(np.abs(answer.forces[:, 0]).sum())
+        return self.may_split and float(answer.violation.sum()) > self.solver.splitting_violation * forces
 
     def _most_tries(self, number: int) -> int:
         """How many iterations may go by without a reduction: none of a large system, whose factors are dear, nor where
