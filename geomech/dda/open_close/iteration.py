@@ -20,6 +20,7 @@ import numpy as np
 
 from ...model import OPEN, STICK, ContactSolver
 from ..contact_detection.contact_finder import ContactSet
+from ..contact_detection.contact_records import largest_of_blocks
 from .block_patches import settled_in_patch
 from .equations import Answer, Equations, States, Unsettled
 from .interior_point.central_path import CentralPath
@@ -331,8 +332,7 @@ def _negligible(answer: Answer, found: ContactSet, number: int, solver: ContactS
     if number > solver.sliver_contacts:
         return False
     largest = np.zeros(int(max(found.block.max(), found.other.max())) + 1)
-    for blocks in (found.block, found.other):
-        np.maximum.at(largest, blocks, np.abs(answer.forces[:, 0]))
+    largest_of_blocks(np.abs(answer.forces[:, 0]), found.block, found.other, largest)
     wrong = np.flatnonzero(answer.violation > 0)
     bears = np.maximum(largest[found.block[wrong]], largest[found.other[wrong]])
     return bool((answer.violation[wrong] <= solver.sliver_force * bears).all())
@@ -343,7 +343,6 @@ def _half_as_wrong_as_the_worst(
 ) -> np.ndarray:
     """(n,) True for contacts at least half as violated as any other contact of either of their free blocks."""
     worst = np.zeros(len(order))
-    np.maximum.at(worst, block, violation)
-    np.maximum.at(worst, other, violation)
+    largest_of_blocks(violation, block, other, worst)
     worst[order < 0] = 0.0
     return violation >= 0.5 * np.maximum(worst[block], worst[other])
