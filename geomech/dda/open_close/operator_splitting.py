@@ -13,11 +13,11 @@ Where z = G d, the forces F(z) balance the blocks. Unlike Newton's method on sta
 contacts change at once, and hard springs do not slow it down: how fast it converges depends on the blocks, whose answer
 lies between their inertia 2m/dt² and their stiffness E'. A motion that a contact prevents
 converges the faster the larger ρ is, one that it leaves free the faster the smaller. So ρ is the geometric mean of the two
-at first and where a contact slides along its edge; where the turns have closed a contact it comes to lie half way
-(in logarithms) between this mean and the stiffness, where they have opened it half way to the inertia. (With the mean
-alone twice the turns leave more states wrong; at the bounds themselves states go on changing.) What is left wrong in the end
-are contacts that bear next to nothing, and Newton's method finds all states from there. A turn takes a tenth of an
-iteration of it.
+where a contact slides along its edge; where a contact is closed it lies half way (in logarithms) between this mean and
+the stiffness, where it is open half way to the inertia: at first by the states that the step begins with, then by those that
+the turns have found, if many have changed. (With the mean alone twice the turns leave more states wrong; at the bounds
+themselves states go on changing.) What is left wrong in the end are contacts that bear next to nothing, and Newton's
+method finds all states from there. A turn takes a tenth of an iteration of it.
 """
 
 from __future__ import annotations
