@@ -8,7 +8,7 @@ first. In statics, where a load does not shrink with the step, what a shorter st
 from __future__ import annotations
 
 import logging
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import NoReturn, Protocol
 
 import numpy as np
@@ -22,6 +22,7 @@ from .kinematics.simplex_integration import block_moments
 from .open_close.contact_set import ContactSet
 from .open_close.equations import Unsettled
 from .results import NotConverged, StepResult
+from .step_control.pseudo_inertia import balanced_attempt
 from .step_control.relative_motion import Windows
 from .step_control.step_limits import CROSSING, UNSETTLED, Crossed, StepLimits, Used
 from .time_step import Attempt, StepStart
@@ -83,9 +84,12 @@ def windows_of(system: LimitedSystem, start: StepStart, dt: float) -> Windows:
 
 class StepCutting:
     """Attempts at a step of ``system`` from ``start`` by ``dt`` at most; ``like``: the result of the same step with other
-    cracks, whose contact states are the first guess."""
+    cracks, whose contact states are the first guess; ``pseudo_inertia`` as in `BlockSystem.step`."""
 
-    def __init__(self, system: LimitedSystem, start: StepStart, dt: float, like: StepResult | None) -> None:
+    def __init__(
+        self, system: LimitedSystem, start: StepStart, dt: float, like: StepResult | None, pseudo_inertia: bool = True
+    ) -> None:
+        self.balances = system.scheme.static and system.deflected is None and not pseudo_inertia
         self.system, self.start = system, start
         self.dt = self.asked = system.limits.predicted(start.vertices, start.carried, start.moments, dt, start.gravity)
         self.search = self._search()
@@ -112,9 +116,9 @@ class StepCutting:
     def _attempt(self) -> tuple[Attempt, StepResult] | None:
         """One attempt and its result; None where the step begins again."""
         system, found = self.system, self.found
-        kind = Attempt if system.deflected is None else BendingAttempt
+        begun = balanced_attempt if self.balances else Attempt if system.deflected is None else BendingAttempt
         try:
-            attempt = kind(system, self.start, self.dt, found, self.cuts)
+            attempt = begun(system, self.start, self.dt, found, self.cuts)
             result = attempt.result()
         except Unsettled as failure:
             self.failed = self.reason = f"{failure}{system.finder.where(found, failure.contact)}"
@@ -265,21 +269,39 @@ class StepCutting:
     def _with_corners_of(self, attempt: Attempt, state: np.ndarray) -> ContactSet | None:
         """The contacts with which the step begins again because corners have met elsewhere than expected in the
         ``attempt``, which left its contacts in ``state`` (n,); None where all met as expected."""
-        finder, search = self.system.finder, self.search
+        system, search = self.system, self.search
         found, moved = attempt.found, attempt.new_vertices - attempt.vertices
         if found.lumped is not None:
             found = found.lumped
-        pressed = bool(((found.corner >= 0) & (state != OPEN)).any())
-        strayed = np.abs(moved if search.motion is None else moved - search.motion).max()
-        if not pressed and not strayed > 0.5 * search.margin:
+        pressed = (found.corner >= 0) & (state != OPEN)
+        off = np.abs(moved if search.motion is None else moved - search.motion).max(axis=1)
+        strayed = np.zeros(system.blocks.n_blocks, bool)
+        strayed[system.owner[off > 0.5 * search.margin]] = True
+        if not pressed.any() and not strayed.any():
             return None
         search.motion, search.glue_holds = moved, found.relies_on_glue
+        # Only these pairs may meet in another way; all pairs are searched again if any of them does.
+        near = search.near
+        some = strayed[near.pairs].any(axis=1)
+        at = near.of_contacts(found.block[pressed], found.other[pressed], len(strayed))
+        some[at[at >= 0]] = True
+        doubtful = replace(search, near=Windows(near.pairs[some], near.reach[some])).find()
+        if not self._meets_otherwise(attempt, found, doubtful, state):
+            return None
         again = search.find()
-        if pressed and self._redirected(found, again, state):
-            return again
-        known = np.isin(again.vertex * len(moved) + again.edge, found.vertex * len(moved) + found.edge)
-        missed = ~known & (finder.gaps(attempt.new_vertices, attempt.vertices, again) - again.lift < -again.precision)
-        return again if missed.any() else None
+        return again if self._meets_otherwise(attempt, found, again, state) else None
+
+    def _meets_otherwise(self, attempt: Attempt, found: ContactSet, again: ContactSet, state: np.ndarray) -> bool:
+        """Whether corners that ``found`` has pressing in ``state`` (n,), or does not have, meet otherwise in ``again``, the
+        contacts of all pairs of blocks or of some, which the motion of the ``attempt`` has told."""
+        if again.lumped is not None:
+            again = again.lumped
+        if self._redirected(found, again, state):
+            return True
+        finder, n = self.system.finder, len(attempt.vertices)
+        known = np.isin(again.vertex * n + again.edge, found.vertex * n + found.edge)
+        gap = finder.gaps(attempt.new_vertices, attempt.vertices, again) - again.lift
+        return bool((~known & (gap < -again.precision)).any())
 
     def _redirected(self, found: ContactSet, again: ContactSet, state: np.ndarray) -> bool:
         """Whether any pair of rounded corners that presses in ``state`` (n,) of ``found`` meets in another direction in

@@ -18,11 +18,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ...model import OPEN, STICK, ContactSolver
+from ...model import OPEN, SLIP, STICK, ContactSolver
 from ..contact_detection.contact_finder import ContactSet
+from ..contact_detection.contact_records import largest_of_blocks
 from .block_patches import settled_in_patch
 from .equations import Answer, Equations, States, Unsettled
-from .interior_point.central_path import CentralPath
+from .interior_point.central_path import SLIPPED, CentralPath
 from .operator_splitting import can_split, split
 from .settled_states import Settled
 
@@ -145,7 +146,7 @@ class _Search:
                 continue
             if not self.equations.first_order:
                 self._pivot(answer, wrong, called, returned)
-            elif returned or self.tries > self._most_tries(number):
+            elif returned or self._overshoots(answer) or self.tries > self._most_tries(number):
                 if not self._by_splitting():
                     self._by_path(answer)
             else:
@@ -188,6 +189,12 @@ class _Search:
         self.falls = number < self.fewest
         if self.falls:
             self.fewest, self.best = number, (self.states, answer, wrong)
+
+    def _overshoots(self, answer: Answer) -> bool:
+        """Whether the forces of wrong contacts are so large that operator splitting, while it is still to be tried, leads on
+        sooner than Newton's method."""
+        forces = float(np.abs(answer.forces[:, 0]).sum())
+        return self.may_split and float(answer.violation.sum()) > self.solver.splitting_violation * forces
 
     def _most_tries(self, number: int) -> int:
         """How many iterations may go by without a reduction: none of a large system, whose factors are dear, nor where
@@ -279,10 +286,30 @@ class _Search:
 
     def _bonds_on_path(self) -> np.ndarray:
         """(n,) the bonds that the central path counts with: those of open contacts are gone, but not where cohesion belongs
-        to the whole face (`whole_faces`): it stays with a face of which one end is open."""
-        states, whole = self.states, self.found.whole
+        to the whole face (`whole_faces`): it stays with a face of which one end is open. Such a face that holds no pull
+        is free to open and to slide under its cohesion."""
+        states, found = self.states, self.found
         bonded = states.without_open_bonds().bonded
-        return bonded if whole is None else np.where(whole.face >= 0, states.bonded, bonded)
+        if found.whole is None:
+            return bonded
+        bonded = np.where(found.whole.face >= 0, states.bonded, bonded)
+        return np.where(self._without_pull(bonded), SLIPPED, bonded)
+
+    def _without_pull(self, bonded: np.ndarray) -> np.ndarray:
+        """(n,) which of the ``bonded`` contacts (n,) of whole faces hold no pull and keep their cohesion when they slide."""
+        springs = self.equations.springs
+        return (self.found.whole.face >= 0) & (bonded > 0) & (springs.tension <= 0.0) & (springs.keeps > 0)
+
+    def _bonds_after_path(self, state: np.ndarray, bonded: np.ndarray) -> np.ndarray:
+        """(n,) the bonds with which iterations go on from the ``state`` (n,) that the path proposes with ``bonded`` (n,):
+        faces that stick all along have not slipped."""
+        whole = self.found.whole
+        if whole is None:
+            return bonded
+        known = whole.face >= 0
+        slides = np.zeros(int(whole.face.max()) + 1, bool)
+        slides[whole.face[known & (state == SLIP)]] = True
+        return np.where(known & ~slides[whole.face] & (bonded == SLIPPED), self.states.bonded, bonded)
 
     def _proposed(self, path: CentralPath) -> States | None:
         """States that the ``path`` proposes once nearly all contacts are decided, none of those offered already; None
@@ -301,7 +328,8 @@ class _Search:
             few = max(2, min(solver.path_undecided, solver.path_undecided_share * n))
             decided = path.arrived or undecided <= few
             if decided and path.missed < solver.path_balance and path.epsilon < 1.0:
-                states = States(*path.states(), path.bonded)
+                state, direction = path.states()
+                states = States(state, direction, self._bonds_after_path(state, path.bonded))
                 if states.key not in self.offered:
                     self.offered.add(states.key)
                     return states
@@ -325,8 +353,7 @@ def _negligible(answer: Answer, found: ContactSet, number: int, solver: ContactS
     if number > solver.sliver_contacts:
         return False
     largest = np.zeros(int(max(found.block.max(), found.other.max())) + 1)
-    for blocks in (found.block, found.other):
-        np.maximum.at(largest, blocks, np.abs(answer.forces[:, 0]))
+    largest_of_blocks(np.abs(answer.forces[:, 0]), found.block, found.other, largest)
     wrong = np.flatnonzero(answer.violation > 0)
     bears = np.maximum(largest[found.block[wrong]], largest[found.other[wrong]])
     return bool((answer.violation[wrong] <= solver.sliver_force * bears).all())
@@ -337,7 +364,6 @@ def _half_as_wrong_as_the_worst(
 ) -> np.ndarray:
     """(n,) True for contacts at least half as violated as any other contact of either of their free blocks."""
     worst = np.zeros(len(order))
-    np.maximum.at(worst, block, violation)
-    np.maximum.at(worst, other, violation)
+    largest_of_blocks(violation, block, other, worst)
     worst[order < 0] = 0.0
     return violation >= 0.5 * np.maximum(worst[block], worst[other])
