@@ -7,6 +7,7 @@ slow as a row of thirty by itself, are formed together.
 from __future__ import annotations
 
 import numpy as np
+
 from ...compiled import UNCOUNTED, part
 from .front_elimination import PANEL
 from .simd import (

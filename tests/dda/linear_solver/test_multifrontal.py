@@ -185,7 +185,7 @@ def test_products_of_parts_of_fronts_are_those_of_numpy(dtype):
     front = rng.normal(size=(720, 700)).astype(dtype)
 
     @kept(error_model="numpy", nogil=True)
-    def add_product(a, at_a, row_a, b, at_b, row_b, c, at_c, row_c, rows, k, n, keep, width, units):
+    def add_product(a, at_a, row_a, b, at_b, row_b, c, at_c, row_c, rows, k, n, keep, width, units):  # noqa: PLR0913
         front_elimination._add_product(a, at_a, row_a, b, at_b, row_b, c, at_c, row_c, rows, k, n, keep, width, units)
 
     units, width = np.array([1, 0], dtype), simd.BYTES // front.itemsize
