@@ -22,7 +22,7 @@ from ..system.influence_matrix import ElementSet
 from .crack_nodes import cut, ends_at, share_ends, straight_on
 from .grading import KINK, NEAR_CORNER, Grading
 from .half_plane import ON_SURFACE, HalfPlane
-from .proximity import keep_apart
+from .proximity import Pieces, keep_apart
 
 #: Neighbouring segments are graded where the ratio of their element lengths exceeds this.
 JUMP = 10.0 * (1 + 1e-9)
@@ -101,9 +101,9 @@ def mesh(
             half_plane, (start, end, pieces), kind, source, touching, ON_SURFACE * extent
         )
     start, end, kind, source = keep_apart(
-        start, end, kind, source, pieces, touching, len(edges), settings.grading_ratio, extent,
+        start, end, kind, source, Pieces(pieces, touching, len(edges), n_pieces), settings.grading_ratio, extent,
         # Images have no unknowns.
-        (2 if half_plane is None else 1) * (settings.order + 1), n_pieces,
+        (2 if half_plane is None else 1) * (settings.order + 1),
     )  # fmt: skip
     if half_plane is not None:
         own = source < n_pieces
