@@ -82,7 +82,7 @@ def mesh(
     sides_of_rock = edges if half_plane is None else np.concatenate([edges, half_plane.edge(points)])
     mouths = [
         (cracks.nodes[k], _layers_at(cracks, k, sides_of_rock, grading))
-        for k in (np.flatnonzero(cracks.surface & (cracks.valence > 0)) if len(edges) else ())
+        for k in (np.flatnonzero(cracks.surface & (cracks.valence > 0)).tolist() if len(edges) else ())
     ]
     corners = _corners_near_cracks(cracks, loops, settings, grading)
     key: tuple = float(extent), tuple((*point, deep) for point, deep in [*mouths, *corners])
@@ -320,7 +320,7 @@ def _cracks(cracks: Cracks, settings: DdmSettings, grading: Grading, extent: flo
         a, b = cracks.nodes[cracks.segments[s]].tolist()
         long = float(length[s])
         part = m / long
-        fine = list(range(1, m))
+        fine: list[float] = list(range(1, m))
         if at_start:
             fine = grading.fractions(at_start, grading.finest(a, long, extent) * part) + fine
         if at_end:
