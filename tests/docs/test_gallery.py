@@ -21,7 +21,6 @@ NOT_REMADE: set[str] = {
     "bench_ddm.png",
     "bench_geometry.png",
     "bench_solvers.png",
-    "random_slope.png",
     "stability.png",
     "stability_cracks.png",
 }
