@@ -16,36 +16,11 @@ Begin in an empty folder, with the environment active in which geomech is instal
 # %%
 # 1. Draw the slope
 # -----------------
-# A Gmsh model is a text file. Save these lines as ``my_slope.geo`` in your folder:
-
-MODEL = """
-DefineConstant[
-  height_m = {20, Name "Parameters/height_m"},
-  face_angle_deg = {63, Name "Parameters/face_angle_deg"}
-];
-crest = height_m / Tan(face_angle_deg * Pi / 180);
-back = crest + 18;
-size = height_m / 8;
-
-// The rock: toe, foot of the back, top of the back, crest
-Point(1) = {0, 0, 0, size};            Point(2) = {back, 0, 0, size};
-Point(3) = {back, height_m, 0, size};  Point(4) = {crest, height_m, 0, size};
-Line(1) = {1, 2};  Line(2) = {2, 3};  Line(3) = {3, 4};  Line(4) = {4, 1};
-Curve Loop(1) = {1, 2, 3, 4};
-Plane Surface(1) = {1};
-
-// The base: a floor in front of the toe, below the rock and behind it
-Point(5) = {-12, 0, 0, size};          Point(6) = {-12, -3, 0, size};
-Point(7) = {back + 3, -3, 0, size};    Point(8) = {back + 3, height_m, 0, size};
-Line(5) = {1, 5};  Line(6) = {5, 6};  Line(7) = {6, 7};  Line(8) = {7, 8};  Line(9) = {8, 3};
-Curve Loop(2) = {5, 6, 7, 8, 9, -2, -1};
-Plane Surface(2) = {2};
-
-Physical Surface("rock") = {1};
-Physical Surface("base") = {2};
-"""
-
-# %%
+# A Gmsh model is a text file. Save these lines as ``my_slope.geo`` in your folder (a button in the corner of the box copies them):
+#
+# .. literalinclude:: /tutorials/my_slope.geo
+#    :language: c
+#
 # To see it, open it in Gmsh, which came with geomech: ``gmsh my_slope.geo``. The drawing follows every change of the
 # file (press ``0`` in Gmsh to reload it). Values in ``DefineConstant`` stand in the panel on the left. You can also draw
 # by mouse there (*Geometry → Elementary entities → Add*): Gmsh appends what you draw to the file.
@@ -66,59 +41,12 @@ Physical Surface("base") = {2};
 # ------------------
 # The scene says what the drawing does not: joints, materials, loads, time. Save it as ``my_slope.toml`` beside the
 # model. All values are in SI units and the unit stands in the name of the key.
-
-SCENE = """
-title = "My slope"
-
-[geometry]
-model = "my_slope.geo"
-parameters = { height_m = 20 }
-seed = 3                       # other seeds draw other joints by the same statistics
-dead_ends = "trim"             # cut off the ends of joints that stop inside the rock
-smallest_block_m2 = 0.3        # merge smaller blocks with a neighbour
-
-[[geometry.joint_sets]]        # beds that dip out of the slope: angles count counter-clockwise from x
-name = "beds"
-angle_deg = 30
-spacing_m = 2.5
-zones = ["rock"]
-
-[[geometry.joint_sets]]        # cross joints, nearly perpendicular to the beds
-name = "cross"
-angle_deg = 112
-angle_deviation_deg = 4
-spacing_m = 3.2
-zones = ["rock"]
-
-[materials.rock]
-youngs_modulus_pa = 20e9
-poissons_ratio = 0.25
-density_kg_m3 = 2600
-
-[zones.base]
-fixed = true
-
-[joints.default]               # all joints that no other law names
-friction_angle_deg = 35
-
-[joints.beds]
-edges = ["joint:beds"]         # the edges that a joint set makes are called joint:NAME
-friction_angle_deg = 24
-
-[loads]
-gravity_m_s2 = [0, -9.81]
-
-[dda]
-dynamic_factor = 1.0           # 1: motion in real time; 0: statics
-time_step_s = 0.01
-
-[run]
-end_time_s = 1.5
-"""
-
-# %%
-# The code below is only there to make this page: it saves both files in a temporary folder and types the commands for
-# you.
+#
+# .. literalinclude:: /tutorials/my_slope.toml
+#    :language: toml
+#
+# The code below is only there to make this page: it copies both files into a temporary folder and types the commands
+# for you. In your terminal, type what stands in ``terminal("…")``.
 
 import contextlib
 import shlex
@@ -133,6 +61,9 @@ from geomech.cli import main
 from geomech.render import sketch
 from geomech.scene import SceneError, load_scene
 
+here = Path.cwd()  # the project's folder, or one below it
+project = next(folder for folder in (here, *here.parents) if (folder / "docs").is_dir())
+MODEL, SCENE = ((project / "docs" / "tutorials" / f"my_slope.{kind}").read_text() for kind in ("geo", "toml"))
 work = Path(tempfile.mkdtemp(prefix="geomech-tutorial-"))
 (work / "my_slope.geo").write_text(MODEL)
 (work / "my_slope.toml").write_text(SCENE)

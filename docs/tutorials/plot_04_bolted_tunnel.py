@@ -81,7 +81,6 @@ zones = ["core"]
 [dda]
 dynamic_factor = 1.0
 time_step_s = 0.005
-springs = "resolved"
 equilibrium = "start"
 
 [run]
@@ -122,11 +121,10 @@ for axes, name in zip(both, ("tunnel", "bolted")):
         axes.plot([x0, x1], [y0, y1], color="#0072b2", lw=2)
 
 # %%
-# Before the excavation nothing moves and almost no energy is turned over. The warning about the energy balance at 0.03
-# s is relative to that small amount and can be ignored; ``budget_residual`` in ``history.csv`` gives it in J/m.
-#
-# What the bolts carry -------------------- ``history.csv`` in the run folder has their forces, one column for each
-# bolt and joint. From Python they are rows of the state:
+# What the bolts carry
+# --------------------
+# ``history.csv`` in the run folder has their forces, one column for each bolt and joint. From Python they are rows of
+# the state:
 
 carried = cycle.state.bolts["force"] / 1e3
 print(f"{len(carried)} pieces of bolts between joints carry up to {carried.max():.1f} kN/m; they yield at 160")

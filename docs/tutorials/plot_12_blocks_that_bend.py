@@ -92,18 +92,18 @@ def last(overrides: dict):
 
 
 heights = np.linspace(0.0, depth, 41)
-figure, (left, right) = plt.subplots(1, 2, figsize=(9, 3.4), layout="constrained")
+figure, axes = plt.subplots(figsize=(5.5, 3.4), layout="constrained")
 for order in (2, 3, 4, 6, "auto"):
     cycle = last({"zones.lintel.order": order})
     (body,) = cycle.bent.values()
     stress = body.fields(np.column_stack([np.full(41, 2.0), heights]))[0][:, 0]
     found = order if order != "auto" else int(cycle.state.order.max())
     print(f"order {order}: of order {found}, sags by {-1e3 * cycle.monitors['mid-span'][1]:.3f} mm")
-    left.plot(stress / 1e6, heights, label=f"order {order}")
+    axes.plot(stress / 1e6, heights, label=f"order {order}")
 moment = load * (span**2 / 8 - over**2 / 2)
-left.plot(moment * (0.5 * depth - heights) / inertia / 1e6, heights, "k:", label="beam theory")
-left.set(xlabel="horizontal stress at mid-span, MPa", ylabel="m above the piers")
-left.legend(frameon=False, fontsize=8)
+axes.plot(moment * (0.5 * depth - heights) / inertia / 1e6, heights, "k:", label="beam theory")
+axes.set(xlabel="horizontal stress at mid-span, MPa", ylabel="m above the piers")
+axes.legend(frameon=False, fontsize=8)
 print(f"beam theory: {1e3 * beam:.3f} mm")
 
 # %%
@@ -149,10 +149,11 @@ start, vertices = whole.blocks.vertex_start, whole.state.vertices
 polygons = [vertices[a:b] for a, b in pairwise(start)]
 drawn = PolyCollection(polygons, array=whole.state.stress[:, 0] / 1e6, cmap="RdBu_r", edgecolor="0.6", linewidth=0.3)
 drawn.set_clim(-4, 4)
-right.add_collection(drawn)
-right.plot(*at.T, "k.", ms=4)
-right.set(
+figure, axes = plt.subplots(figsize=(9, 3), layout="constrained")
+axes.add_collection(drawn)
+axes.plot(*at.T, "k.", ms=4)
+axes.set(
     xlim=(0.9, 3.1), ylim=(-0.05, 0.55), aspect="equal", xlabel="m", title="horizontal stress, MPa; faces that part"
 )
-figure.colorbar(drawn, ax=right, shrink=0.6)
+figure.colorbar(drawn, ax=axes, shrink=0.8)
 plt.show()

@@ -1,4 +1,4 @@
-"""Benchmarks: what a run costs and how right it is, in one table a topic."""
+"""Benchmarks of cost and accuracy, one table per topic."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from .figures import Measured
 
-#: Topic → module with ``measure(quick: bool) -> Measured``: the table that is printed, and its figures.
+#: Topic → module with ``measure(quick: bool) -> Measured``: the printed table and its figures.
 TOPICS = {
     "accuracy": "geomech.bench.accuracy.published_values",
     "boundary": "geomech.bench.accuracy.boundary_stress",
@@ -37,5 +37,5 @@ TOPICS = {
 
 
 def topic(name: str) -> Callable[[bool], Measured]:
-    """The measuring function of a topic, imported only now."""
+    """The measuring function of a topic, imported on demand."""
     return import_module(TOPICS[name]).measure

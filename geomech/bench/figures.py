@@ -1,8 +1,7 @@
-"""What a benchmark measured, as named numbers: kept in a file, and held against an earlier one.
+"""Figures of benchmarks: named numbers, stored in a file and compared with earlier ones.
 
-Errors are compared as they are. Times are compared after division by the time of a yardstick, a fixed piece of work of
-every kind that counts here (Python, products of matrices, memory), measured in the same run: a slower machine, or a
-busier one, is not a slower solver.
+Errors are compared directly. Times are divided by the time of a yardstick, a fixed piece of work of every relevant kind
+(Python, products of matrices, memory), measured in the same run: a slower or busier machine is not a slower solver.
 """
 
 from __future__ import annotations
@@ -21,25 +20,24 @@ import numpy as np
 
 from ..output.tables.summary import installed, write_json
 
-#: Kinds of figures. Less is better of both; `TIME` in seconds, `ERROR` relative.
+#: Kinds of figures, less being better: `TIME` in seconds, `ERROR` relative.
 ERROR, TIME = "error", "time"
 
-#: An error is worse when it is more than so many times what it was …
+#: An error is worse if it exceeds the earlier one by this factor …
 WORSE = 1.1
-#: … and above round-off, which differs among machines and libraries. Errors below `EXACT` may be as large as that.
+#: … and round-off, which differs between machines and libraries. Errors below `EXACT` may rise to that.
 EXACT = 1e-9
-#: A time is longer when it is more than so many times what it was: medians on a machine with other users vary by a
-#: third.
+#: A time is longer if it exceeds the earlier one by this factor: medians on a shared machine vary by a third.
 LONGER = 1.5
 
-#: Distributions whose versions are told.
+#: Distributions whose versions are recorded.
 PACKAGES = ("geomech", "numpy", "scipy", "numba", "shapely", "gmsh", "vtk", "pyvista", "meshio", "scikit-fem")
 
 
 @dataclass(frozen=True)
 class Point:
     """A point of a work–precision curve: the ``error`` (relative) and ``seconds`` of a ``method`` for a ``problem``, at
-    that ``size`` of what is varied."""
+    this ``size`` of the varied parameter."""
 
     problem: str
     method: str
@@ -50,7 +48,7 @@ class Point:
 
 @dataclass(frozen=True)
 class Figure:
-    """``name`` is one of a kind within its topic; ``value`` is finite and ≥ 0."""
+    """``name`` is unique within its topic; ``value`` is finite and ≥ 0."""
 
     name: str
     value: float
@@ -59,7 +57,7 @@ class Figure:
 
 @dataclass(frozen=True)
 class Measured:
-    """What a topic says (``text``, the table that is printed) and its ``figures``."""
+    """Result of a topic: ``text``, the printed table, and its ``figures``."""
 
     text: str
     figures: tuple[Figure, ...] = ()
@@ -68,7 +66,7 @@ class Measured:
     def of(
         cls, text: str, *, errors: dict[str, float] | None = None, times: dict[str, float] | None = None
     ) -> Measured:
-        """From tables name → relative error and name → seconds; what is not finite is left out."""
+        """From tables name → relative error and name → seconds; non-finite values are left out."""
         named = [(ERROR, errors or {}), (TIME, times or {})]
         return cls(
             text,
@@ -82,7 +80,7 @@ class Measured:
 
 
 def machine() -> dict:
-    """Processor, cores, system, versions, load: what a time means."""
+    """Processor, cores, system, versions, load: the context of a time."""
     processor = platform.processor() or platform.machine()
     information = Path("/proc/cpuinfo")
     if information.is_file():
@@ -100,7 +98,7 @@ def machine() -> dict:
 
 
 def said(about: dict) -> str:
-    """A line or two on the `machine`."""
+    """One or two lines about the `machine`."""
     versions = ", ".join(f"{name} {version}" for name, version in about["versions"].items())
     return (
         f"{about['processor']}, {about['cores']} cores (BLAS: {about['threads of BLAS']} threads), "
@@ -109,25 +107,25 @@ def said(about: dict) -> str:
 
 
 def stopwatch() -> Callable[[], float]:
-    """Starts; what it returns tells the seconds since then, by the clock or of this process's processors, whichever are
-    fewer.
+    """Start a stopwatch; the returned function gives the seconds since then, by the clock or of this process's
+    processors, whichever is less.
 
-    Waiting while other programs have the processor is left out so; work on several threads is still told by the clock.
-    Not for what waits for a disk or for a child process.
+    This excludes waiting for the processor; work on several threads is still measured by the clock. Not for operations
+    that wait for a disk or a child process.
     """
     clock, processor = time.perf_counter(), time.process_time()
     return lambda: min(time.perf_counter() - clock, time.process_time() - processor)
 
 
 def processor_seconds() -> float:
-    """Of this process and of its children that have ended, user and system; of this process alone where the system
-    tells no more."""
+    """Processor time of this process and its finished children, user and system; of this process only if the system
+    does not report more."""
     spent = os.times()
     return spent.user + spent.system + spent.children_user + spent.children_system
 
 
 def times_text(spent: Mapping[str, Mapping[str, float]]) -> str:
-    """The table of what every topic took, and all of them."""
+    """Table of the time of every topic, and the total."""
     rows = [(name, took["seconds"], took["of processor"]) for name, took in spent.items()]
     rows.append(("all", sum(row[1] for row in rows), sum(row[2] for row in rows)))
     lines = ["what the benchmarks themselves took        s   of processor"]
@@ -156,7 +154,7 @@ def write(
     unit: float,
     spent: Mapping[str, Mapping[str, float]] | None = None,
 ) -> Path:
-    """``topics`` as JSON; ``unit`` is the yardstick's time, ``spent`` what the topics took."""
+    """Write ``topics`` as JSON; ``unit`` is the yardstick's time, ``spent`` the time of the topics."""
     path.parent.mkdir(parents=True, exist_ok=True)
     record = {
         "machine": machine(),
@@ -173,14 +171,17 @@ def write(
 
 
 def read(path: Path, *, quick: bool | None = None) -> dict:
-    """What `write` wrote. Raises FileNotFoundError, and ValueError for a file of something else, or of a run that was
-    ``quick`` where this one is not (or the other way round): figures of the same name are then of other sizes."""
+    """Read a file of `write`.
+
+    Raises FileNotFoundError, and ValueError for another file, or for a run that was ``quick`` if this one is not (or
+    vice versa): figures with the same name then have different sizes.
+    """
     try:
         record = json.loads(Path(path).read_text(encoding="utf-8"))
     except json.JSONDecodeError as error:
-        raise ValueError(f"{path} is no JSON ({error}); give a file that `geomech bench` wrote") from error
+        raise ValueError(f"{path} is not valid JSON ({error}); give a file written by `geomech bench`") from error
     if not isinstance(record, dict) or not {"topics", "yardstick_s"} <= set(record):
-        raise ValueError(f"{path} holds no figures of a benchmark; give a file that `geomech bench` wrote")
+        raise ValueError(f"{path} has no benchmark figures; give a file written by `geomech bench`")
     if quick is not None and bool(record.get("quick")) != quick:
         this, other = ("this run is quick", "was not") if quick else ("this run is not quick", "was")
         raise ValueError(f"{this}, that of {path} {other}: compare quick with quick, and full with full")
@@ -212,7 +213,7 @@ class Change:
 
 
 def changes(before: dict, topics: dict[str, Measured], unit: float) -> list[Change]:
-    """Every figure that is in both, those that got worse most first."""
+    """Every figure in both runs, the worst ratios first."""
     out = []
     for topic, found in topics.items():
         known = before["topics"].get(topic, {})
@@ -227,8 +228,8 @@ def changes(before: dict, topics: dict[str, Measured], unit: float) -> list[Chan
 
 
 def compared(found: Sequence[Change], before: dict, path: Path) -> str:
-    """The table of what got worse or better."""
-    lines = [f"held against {path}: {len(found)} figures"]
+    """The table of figures that became worse or better."""
+    lines = [f"compared with {path}:  {len(found)} figures"]
     for title, rows in (
         ("less accurate", [c for c in found if c.worse and c.kind == ERROR]),
         (
@@ -246,5 +247,5 @@ def compared(found: Sequence[Change], before: dict, path: Path) -> str:
 
 
 def less_accurate(found: Iterable[Change]) -> list[Change]:
-    """The errors that got worse."""
+    """The errors that became worse."""
     return [c for c in found if c.kind == ERROR and c.worse]

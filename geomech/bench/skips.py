@@ -1,8 +1,8 @@
-"""What a scene does not need is not done: what each of these skips saves, and that its results are the same.
+"""Skipped work: the time that each skip saves, and a check that results are the same.
 
-Every row is the same work twice in one process, without the skip and with it, the shorter of two times each (once in a
-quick run); the difference is the largest of the states' coordinates and stress intensity factors, relative. Modules are
-counted in processes of their own.
+Every row is the same work twice in one process, without and with the skip, the shorter of two times each (one in a
+quick run); the difference is the largest relative one of the states' coordinates and stress intensity factors. Modules
+are counted in separate processes.
 """
 
 from __future__ import annotations
@@ -20,19 +20,18 @@ from ..model import Blocks, Cracks, Problem, State
 from .cost import block_scenes
 from .figures import Measured, stopwatch
 
-#: Where the picture goes, below the working folder.
+#: Folder of the picture, in the working folder.
 FOLDER = Path("outputs/bench_skips")
 SPECIMEN = Path("pipelines/two_cracks/toml.toml")
-#: What a scene of blocks alone must not load, nor one of cracks that writes no interior fields.
+#: Modules that a scene of blocks must not import, nor one of cracks without interior fields.
 CRACK_SOLVER, MESHER, PICTURES = "geomech.ddm.body", "gmsh", "vtkmodules"
 
-#: A run's results: coordinates and stress intensity factors.
+#: Results of a run: coordinates and stress intensity factors.
 Results = list[np.ndarray]
 
 
 def measure(quick: bool = False) -> Measured:
-    """The table; leaves ``skips.png`` in `FOLDER`. Raises AssertionError when results with a skip are not those without
-    it."""
+    """The table; writes ``skips.png`` to `FOLDER`. Raises AssertionError if results with a skip differ."""
     from ..render.benchmarks.bars import draw_bars
 
     rows = [*_rows(quick)]
@@ -46,7 +45,7 @@ def measure(quick: bool = False) -> Measured:
         )
         differences[label], times[label] = difference, with_it
     worst = max(differences.values())
-    # Kept factors are renewed by rows and columns, which is round-off; all else is the same to the bit.
+    # Kept factors are updated by rows and columns, which causes round-off; everything else is equal bit for bit.
     if worst > 1e-9:
         raise AssertionError(f"results with and without a skip differ by {worst:.1e}")
     ways = {"with the skip": [row[2] for row in rows], "without": [row[1] for row in rows]}
@@ -121,7 +120,7 @@ def _blocks(problem: Problem) -> Results:
 
 
 def _specimen(part: float) -> Problem:
-    """The two-crack specimen, φ = 0, to that ``part`` of the load at which its cracks join."""
+    """The two-crack specimen, φ = 0, up to this ``part`` of the load at which its cracks coalesce."""
     from ..scene import load_scene
 
     return load_scene(SPECIMEN, [f"run.end_time_s={1050 * part:g}"], "phi_0").problem()
@@ -141,7 +140,7 @@ def _written(problem: Problem, interior: bool) -> Results:
 
 
 def _searches(skip: bool) -> Results:
-    """Pairs of blocks at rest but for a thousandth of the window a time, sought anew or kept; each list as a set of
+    """Pairs of blocks that move by a thousandth of the window each time, searched again or kept; each list as a set of
     results."""
     from ..dda.contact_detection import neighbour_search
 
@@ -157,7 +156,7 @@ def _searches(skip: bool) -> Results:
 
 
 def _lone_searches(skip: bool) -> Results:
-    """The pairs of a single block: none, whether they are looked for or not."""
+    """Pairs of a single block: none, whether they are searched for or not."""
     from ..dda.contact_detection import neighbour_search
 
     blocks = Blocks.from_polygons([np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])])
@@ -172,7 +171,7 @@ def _lone_searches(skip: bool) -> Results:
 
 
 def _modules() -> list[str]:
-    """What runs load, each in a process of its own; AssertionError where one loads what it does not need."""
+    """Imported modules of runs, each in a separate process; AssertionError if one imports what it does not need."""
     from .cost.startup import COMMANDS
 
     lines = ["modules that a run does not load"]

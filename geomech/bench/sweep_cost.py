@@ -1,7 +1,7 @@
-"""What a sweep itself costs: runs that only wait, on processes of this machine and on simulated clusters.
+"""Overhead of a sweep: runs that only wait, on processes of this machine and on simulated clusters.
 
-Workers of a simulated cluster are real ones (`dask worker`, a process each) on this machine; their runs sleep in place
-of solving, so that many more of them than cores show how fast jobs are handed out and rows taken back.
+Workers of a simulated cluster are real ones (`dask worker`, one process each) on this machine; their runs sleep instead
+of solving, so that many more of them than cores show how fast jobs are distributed and rows returned.
 """
 
 from __future__ import annotations
@@ -22,12 +22,12 @@ from ..sweep.measures import Job
 from ..sweep.results import Journal, write_tables
 from .figures import Measured
 
-#: Waits of a run, s, and how many waits' worth of time each worker is given.
+#: Waiting times of a run, s, and the number of runs per worker.
 _WAITS, _EACH = (0.05, 0.5), 6.0
 CLUSTERS, QUICK_CLUSTERS = (4, 16, 64), ()
 _TINY, _QUICK_TINY = 5000, 1000
-#: Dask's workers watch themselves: a stack sample every 10 ms, and what the machine does every 0.5 s, take 3 % of a core
-#: each, also when idle. 64 of them on two cores would do nothing else; machines of their own do not feel it.
+#: Dask's workers monitor themselves: a stack sample every 10 ms, and the machine's load every 0.5 s, take 3 % of a core
+#: each, also when idle. 64 of them would fill two cores; on machines of their own this is negligible.
 _UNWATCHED = {
     "DASK_DISTRIBUTED__WORKER__PROFILE__ENABLED": "False",
     "DASK_DISTRIBUTED__ADMIN__SYSTEM_MONITOR__INTERVAL": "60s",
@@ -75,7 +75,7 @@ def _cluster_lines(workers: int) -> Iterator[str]:
     from ..sweep.cluster import DaskEngine
 
     with _cluster(workers) as address:
-        # What starts in each worker at its first run.
+        # Start-up in each worker at its first run.
         _made(DaskEngine(address), 4 * workers, 0.01)
         for wait in _WAITS:
             runs = int(workers * _EACH / wait)
@@ -89,8 +89,8 @@ def _cluster_lines(workers: int) -> Iterator[str]:
 
 
 def _made(engine: Engine, runs: int, wait: float) -> tuple[float, float]:
-    """Seconds by the clock from the first row to the last (scaled to all ``runs``), and of this processor, that
-    ``runs`` waits take with journal and tables."""
+    """Wall-clock seconds from the first row to the last (scaled to all ``runs``), and processor seconds of this
+    process, for ``runs`` waits with journal and tables."""
     settings = {"measure": "pause", "pause_s": wait, "columns": {}, "fails": None}
     from ..sweep.engine import program
 
@@ -112,7 +112,7 @@ def _made(engine: Engine, runs: int, wait: float) -> tuple[float, float]:
 
 @contextmanager
 def _cluster(workers: int) -> Iterator[str]:
-    """A scheduler and so many workers, each a process, until the context ends; the scheduler's address."""
+    """A scheduler and ``workers`` workers, one process each, until the context ends; gives the scheduler's address."""
     from distributed import Client
 
     with socket.socket() as free:

@@ -1,7 +1,8 @@
-"""The command line: ``geomech examples | new | check | build | run | resume | safety | sweep | render | view | report | bench | doctor``.
+"""The command line: ``geomech examples | new | check | build | run | resume | safety | sweep | render | view | report |
+bench | doctor``.
 
-Exit codes: 0 done, 1 the run failed (what was written stays readable), 2 bad input, 3 interrupted (Ctrl-C or SIGTERM).
-Each verb is a module: ``declare`` says its arguments, and nothing heavy is imported before the verb is asked for.
+Exit codes: 0 done, 1 the run failed (its output stays readable), 2 bad input, 3 interrupted (Ctrl-C or SIGTERM). Each
+verb is a module: ``declare`` defines its arguments, and heavy imports happen only when the verb is used.
 """
 
 from __future__ import annotations
@@ -19,8 +20,8 @@ from .verbs import bench, build, check, doctor, render, report, resume, run, saf
 
 __all__ = ["BAD_INPUT", "DONE", "FAILED", "INTERRUPTED", "default_folder", "main"]
 
-# The matrices of a specimen are small: a second BLAS thread gains them nothing, and costs tens of times their own time
-# when the machine is busy. Set before numpy is loaded; whoever wants more says so in the environment.
+# The matrices of a specimen are small: a second BLAS thread gains nothing and costs tens of times their own time when
+# the machine is busy. Set before numpy is loaded; the environment may ask for more.
 for _library in ("OPENBLAS", "MKL"):
     os.environ.setdefault(f"{_library}_NUM_THREADS", "1")
 
@@ -29,12 +30,12 @@ VERBS = (starting, check, build, run, resume, safety, sweep, render, report, ben
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the command line; the exit code. ``arguments`` defaults to the process's own."""
+    """Run the command line; returns the exit code. ``arguments`` defaults to those of the process."""
     spell_out()
     options = _parser().parse_args(arguments)
     verb: Callable[[argparse.Namespace], int] = options.verb
     if getattr(options, "trust_models", False):
-        # Wherever models are read in this process, and in those that it starts.
+        # For models read in this process and in its children.
         os.environ["GEOMECH_TRUST_MODELS"] = "1"
     try:
         code = verb(options)
@@ -42,7 +43,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             sys.stdout.flush()
         return code
     except BrokenPipeError:
-        # Whoever reads has seen enough, as `head` has.
+        # The reader has stopped reading, as `head` does.
         silence("stdout")
         return DONE
     except KeyboardInterrupt:
@@ -78,7 +79,7 @@ def _parser() -> argparse.ArgumentParser:
 def _is_bad_input(error: Exception) -> bool:
     if isinstance(error, BadInput):
         return True
-    # Packages are only asked when they have been imported: no other part raises their errors.
+    # Only packages that have been imported are checked: no other can raise its errors.
     for module, name in (("geomech.scene", "SceneError"), ("geomech.output.run_lock", "FolderRefused")):
         if isinstance(error, getattr(sys.modules.get(module), name, ())):
             return True

@@ -1,4 +1,4 @@
-"""What the command line prints in addition to its results: warnings and errors, on the standard error stream."""
+"""Messages of the command line other than results: warnings and errors, on the standard error stream."""
 
 from __future__ import annotations
 
@@ -11,7 +11,8 @@ from typing import Any
 
 
 def say(text: str) -> None:
-    """A line that is no result; results alone go to the standard output. Where nobody can read it, it is left out."""
+    """Print a line that is not a result (results alone go to the standard output). It is dropped if it cannot be
+    written."""
     if sys.stderr is None:
         return
     try:
@@ -21,19 +22,19 @@ def say(text: str) -> None:
 
 
 def silence(name: str) -> None:
-    """From now on the standard stream ``name`` takes what is written and keeps nothing: nobody can read it."""
+    """From now on discard what is written to the standard stream ``name``, which nobody can read."""
     setattr(sys, name, open(os.devnull, "w", encoding="utf-8"))  # noqa: SIM115 (as long as the process)
 
 
 def spell_out() -> None:
-    """Let streams that know ASCII alone write something for what they cannot, instead of failing."""
+    """Let streams with ASCII only write replacements for other characters instead of failing."""
     for stream in (sys.stdout, sys.stderr):
         if hasattr(stream, "reconfigure") and "utf" not in (stream.encoding or "").lower():
             stream.reconfigure(errors="replace")
 
 
 class Compiling(logging.Handler):
-    """Says that kernels are compiled, once at first and then every `EVERY` s, as long as it goes on."""
+    """Reports that kernels are compiled: once at first, and then every `EVERY` s while it goes on."""
 
     EVERY = 5.0
 
@@ -49,17 +50,14 @@ class Compiling(logging.Handler):
         self.count += 1
         if self.count == 1:
             self.began = self.said = now
-            say(
-                "compiling kernels, which this version does once on a machine (kept in "
-                f"{os.environ.get('NUMBA_CACHE_DIR', '')}) …"
-            )
+            say(f"compiling kernels, once per version and machine (kept in {os.environ.get('NUMBA_CACHE_DIR', '')}) …")
         elif now - self.said >= self.EVERY:
             self.said = now
             say(f"  {self.count} compiled, {now - self.began:.0f} s so far")
 
 
 def report_compiling() -> None:
-    """From now on, say when kernels are compiled."""
+    """From now on report when kernels are compiled."""
     logger = logging.getLogger("geomech.compiled")
     if not any(isinstance(handler, Compiling) for handler in logger.handlers):
         logger.addHandler(Compiling())
@@ -67,7 +65,8 @@ def report_compiling() -> None:
 
 
 def say_warnings(scenes: Iterable[Any], but: str | None = None) -> None:
-    """A line each, ``but`` for those that begin so; what several variants share is said once."""
+    """One line per warning, except those that begin with ``but``; warnings common to several variants are printed
+    once."""
     for place, message, way_out in dict.fromkeys(warning for scene in scenes for warning in scene.warnings):
         if but is not None and message.startswith(but):
             continue
@@ -75,7 +74,7 @@ def say_warnings(scenes: Iterable[Any], but: str | None = None) -> None:
 
 
 def say_errors(error: Exception) -> None:
-    """Every error that a scene was refused for, a place, a reason and a way out each; of another error its words."""
+    """Every error for which a scene was refused, with place, reason and way out; other errors by their text."""
     errors = getattr(error, "errors", None)
     if not errors:
         say(f"geomech: {error}")

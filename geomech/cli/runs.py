@@ -1,4 +1,4 @@
-"""Run folders that a command line names, or that lie below what it names."""
+"""Run folders named on a command line, or below a named folder."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ if TYPE_CHECKING:
 
 
 def run_folders(place: Path) -> list[Path]:
-    """``place`` itself where it is a run folder (or nothing that could hold one), else all below it."""
+    """``place`` itself if it is a run folder (or cannot contain one), else all run folders below it."""
     if (place / "history.csv").is_file() or not place.is_dir():
         return [place]
     return sorted(found.parent for found in place.rglob("history.csv")) or [place]
 
 
 def open_run(folder: Path) -> Run:
-    """The run in ``folder``; where there is none, BadInput that names those below it."""
+    """The run in ``folder``; if there is none, raises BadInput with those below it."""
     from ..output import Run
 
     try:

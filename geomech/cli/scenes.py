@@ -1,4 +1,4 @@
-"""The scenes that a command line asks for: a file or folder, keys overridden, variants by name."""
+"""Scenes named on a command line: a file or folder, overridden keys, variants by name."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from .verb import BadInput
 
 
 def scene_arguments(parser: argparse.ArgumentParser) -> None:
-    """The arguments of every verb that takes a scene: where it is, keys to override, variants."""
+    """Arguments of every verb that takes a scene: its location, keys to override, variants."""
     parser.add_argument(
         "scene", type=scene_place, metavar="SCENE",
         help="a scene.toml, a folder that holds one, or the name of an example",
@@ -22,13 +22,13 @@ def scene_arguments(parser: argparse.ArgumentParser) -> None:
     )  # fmt: skip
     parser.add_argument(
         "--variant", action="append", default=[], metavar="NAME", dest="variants",
-        help="a variant that the scene names, or 'all' (may be repeated)",
+        help="a variant of the scene, or 'all' (may be repeated)",
     )  # fmt: skip
     trust_argument(parser)
 
 
 def scene_place(text: str) -> Path:
-    """Where the scene ``text`` is: that path, or where there is none the example of this name."""
+    """Location of the scene ``text``: that path, or else the example of this name."""
     place = Path(text)
     if place.exists() or place.name != text:
         return place
@@ -42,13 +42,15 @@ def trust_argument(parser: argparse.ArgumentParser) -> None:
     """The argument of every verb that reads models."""
     parser.add_argument(
         "--trust-models", action="store_true",
-        help="let Gmsh models run commands, write files and read any: of your own alone (else they are refused)",
+        help="let Gmsh models run commands and read or write any file: only for your own models (otherwise refused)",
     )  # fmt: skip
 
 
 def scenes_asked(first: Any, options: argparse.Namespace, *, to_run: bool = True) -> dict[str | None, Any]:
-    """The scenes that are asked for, by variant, [run] only where they are ``to_run``; ``first``, which has none, where
-    none is asked for."""
+    """The requested scenes, by variant; ``first``, which has no variant, if none is requested.
+
+    [run] is required only if they are ``to_run``.
+    """
     from ..scene import load_scene
 
     names = variants_asked(first, options.variants)
@@ -56,7 +58,7 @@ def scenes_asked(first: Any, options: argparse.Namespace, *, to_run: bool = True
 
 
 def variants_asked(scene: Any, asked: Sequence[str]) -> list[str]:
-    """The names ``asked`` for, once each, ``all`` of them spelled out; BadInput where the scene has no such variant."""
+    """The names ``asked`` for, once each, with ``all`` expanded; BadInput if the scene has no such variant."""
     known = list(scene.variants)
     names = known if "all" in asked else list(dict.fromkeys(asked))
     unknown = [name for name in names if name not in known]
@@ -66,6 +68,6 @@ def variants_asked(scene: Any, asked: Sequence[str]) -> list[str]:
 
 
 def default_folder(scene: Path) -> Path:
-    """``outputs/NAME`` below the working folder: NAME is the pipeline's folder, or the file's name without suffix."""
+    """``outputs/NAME`` in the working folder; NAME is the pipeline's folder, or the file's name without suffix."""
     scene = scene.resolve()
     return Path("outputs") / (scene.parent.name if scene.name == "scene.toml" else scene.stem)

@@ -1,4 +1,4 @@
-"""What every verb has: a place in the help, an example, and an exit code at its end."""
+"""Common parts of all verbs: entry in the help, example, exit code."""
 
 from __future__ import annotations
 
@@ -7,19 +7,21 @@ import os
 from collections.abc import Callable
 from pathlib import Path
 
-#: What the verbs of a command line are added to.
+#: The object to which the verbs of a command line are added.
 Verbs = argparse._SubParsersAction
 
 DONE, FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 3
 
 
 class BadInput(ValueError):
-    """Something on the command line that cannot be: exit code 2."""
+    """An error in the command line: exit code 2."""
 
 
 def check_writable(option: str, path: Path | None) -> None:
-    """Refuse a file that what follows could not write, before it has cost anything: raise BadInput where ``path`` is a
-    folder or may not be written, or where what is to be its folder is a file."""
+    """Check before any work that the file ``path`` can be written.
+
+    Raises BadInput if it is a folder or may not be written, or if its parent is a file.
+    """
     if path is None:
         return
     if path.is_dir():
@@ -28,7 +30,7 @@ def check_writable(option: str, path: Path | None) -> None:
 
 
 def check_folder(option: str, path: Path | None) -> None:
-    """The same of a folder that is to be written into."""
+    """The same for a folder."""
     if path is not None:
         if path.exists() and not path.is_dir():
             raise BadInput(f"{option}: {path} is a file, not a folder")
@@ -40,13 +42,14 @@ def _check_place(option: str, path: Path) -> None:
     if there != path.absolute() and not there.is_dir():
         raise BadInput(f"{option}: {there} is a file and not a directory that {path} could be in")
     if not os.access(there, os.W_OK):
-        raise BadInput(f"{option}: {path} may not be written")
+        raise BadInput(f"{option}: {path} cannot be written")
 
 
 def add_verb(
     verbs: Verbs, name: str, does: Callable[[argparse.Namespace], int], what: str, example: str
 ) -> argparse.ArgumentParser:
-    """The parser of the verb ``name``, in the help as ``what``; ``does`` takes its options and gives an exit code."""
+    """Parser of the verb ``name``, listed in the help as ``what``; ``does`` takes its options and returns an exit
+    code."""
     made = verbs.add_parser(
         name,
         help=what,

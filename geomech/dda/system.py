@@ -16,7 +16,7 @@ from .counters import Work
 from .excavation import Excavations, until_next_event
 from .higher_order.deflected_blocks import DeflectedBlocks
 from .higher_order.glued_cells import GluedFaces, GlueStrength, KeptCorners
-from .higher_order.order_choice import OrderChoice, relaid
+from .higher_order.order_choice import OrderChoice, extended_deflection
 from .higher_order.six_row_system import six_row_pattern
 from .higher_order.unsupported import refuse_unsupported, refuse_unsupported_loads
 from .kinematics.newmark import TimeScheme
@@ -24,7 +24,7 @@ from .kinematics.rigid_blocks import with_rigid
 from .kinematics.roundoff import rounding_of
 from .kinematics.simplex_integration import block_moments
 from .linear_solver import assembly
-from .loads.load_checks import StrayLoads
+from .loads.load_checks import LoadChecks
 from .loads.load_vectors import LoadMap
 from .open_close.contact_set import ContactSet
 from .results import CrackResponse, StepResult
@@ -80,7 +80,7 @@ class BlockSystem:
         self.settings = settings or DdaSettings()
         self.scheme = TimeScheme.of(self.settings)
         self.load_map = LoadMap(blocks)
-        self._stray_loads = StrayLoads(blocks)
+        self._stray_loads = LoadChecks(blocks)
         self._excavations = Excavations(blocks)
 
         of = np.asarray(blocks.material, dtype=int)
@@ -256,7 +256,7 @@ class BlockSystem:
             order = None if choice is None else choice.raised(self.order, self.deflected, attempt)
             if order is not None:
                 if state.deflection is not None:
-                    state = replace(state, deflection=relaid(state.deflection, self.order, order))
+                    state = replace(state, deflection=extended_deflection(state.deflection, self.order, order))
                 self._take_orders(choice, order)
                 continue
             parted = None

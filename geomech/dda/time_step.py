@@ -45,7 +45,7 @@ from .kinematics.simplex_integration import block_moments
 from .linear_solver import assembly
 from .loads.load_vectors import AppliedForces, Inertia, generalised
 from .loads.step_actions import StepActions, effective_gravity
-from .loads.viscous_boundary import QuietEdges
+from .loads.viscous_boundary import ViscousEdges
 from .open_close.augmented_lagrangian import settle_augmented
 from .open_close.contact_set import ContactSet
 from .open_close.equations import Equations, Unsettled
@@ -239,7 +239,7 @@ class Attempt:
         self.quiet = None
         if loads.viscous_boundaries and not system.scheme.static and self.n_free:
             time = state.time + 0.5 * self.dt if load_time is None else load_time
-            self.quiet = QuietEdges.of(
+            self.quiet = ViscousEdges.of(
                 loads.viscous_boundaries, system.blocks, self.midpoint.vertices, time, system.density, system.stiffness,
                 system.fixed,
             )  # fmt: skip

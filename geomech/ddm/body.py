@@ -36,7 +36,7 @@ from .iterative.gmres import NotSolved
 from .loads.body_loads import BodyLoad
 from .loads.load_vectors import Applied, apply, check_equilibrium
 from .loads.supports import Holds, Support, called, marks, place, values_at
-from .loads.uniform_stress_response import EvenResponse, even_response, scales
+from .loads.uniform_stress_response import UniformStressResponse, scales, uniform_stress_response_of
 from .loads.unit_load_cache import UnitLoad, UnitLoads, on_elements
 from .mesh.edge_location import OFF
 from .mesh.elements import Mesh, mesh, outline_edges
@@ -148,7 +148,7 @@ class Body:
         #: Bodies with trial kinks (`f_criterion`): length → number of the direction → body.
         self.trials: dict[float, dict[int, Body]] = {}
         #: How cracks answer to an even stress, by the states of their faces (`uniform_stress_response`).
-        self.even: dict[bytes, EvenResponse] = {}
+        self.uniform_responses: dict[bytes, UniformStressResponse] = {}
         #: Where faces stand on bases, and how unit tractions move them by the states of the cracks (`rigid_bases`).
         self.on_bases: dict[bytes, object] = {}
         self._assemble(previous, holds, many)
@@ -232,7 +232,7 @@ class Body:
         """Loops about what is not rock, that above a free surface included, and the outline."""
         if self.half_plane is None:
             return self.loops
-        return [*self.loops, self.half_plane.sky(self._vertices)]
+        return [*self.loops, self.half_plane.region_above_surface(self._vertices)]
 
     @property
     def sides(self) -> np.ndarray:
@@ -506,7 +506,7 @@ class Body:
             return np.zeros((3, 3))
         if scales(self):
             closed = np.zeros(self.faces.n_unknowns, bool) if sol is None else sol.closed
-            response = self.strain_weights @ even_response(self, closed).jumps[:, :3]
+            response = self.strain_weights @ uniform_stress_response_of(self, closed).jumps[:, :3]
             return 0.5 * (response + response.T)
         right = np.column_stack([-on_elements(self.faces, unit) for unit in np.eye(3)])
         try:

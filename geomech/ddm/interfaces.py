@@ -55,7 +55,7 @@ class CrackedBody(Protocol):
     boundary: ElementSet
     faces: ElementSet
     crack_system: Any
-    even: dict[bytes, Any]
+    uniform_responses: dict[bytes, Any]
     work: Work
     never_loaded: FaceMemory
     laws: FaceLaws

@@ -306,7 +306,7 @@ class Solution:
         points = np.ascontiguousarray(points, dtype=float).reshape(-1, 2)
         n = len(points)
         points, out = onto_rock(body.loops, points, OFF * body._extent, body._tol)
-        where, double = self._ends.aside(points, side)
+        where, double = self._ends.moved_off(points, side)
         stress, shift = np.zeros((len(where), 3)), np.zeros((len(where), 2))
         nu, net = body.nu, sum((p.force for p in self._applied.kelvin), np.zeros(2))
 

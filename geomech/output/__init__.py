@@ -1,7 +1,6 @@
-"""What a run leaves behind: ParaView series, histories, a summary, a log; and how to read it back.
+"""Results of a run: ParaView series, histories, a summary, a log; and how to read them back.
 
-Everything here watches the cycles of a run from outside (`Observer`) and knows the solvers only by
-`geomech.model.Cycle`.
+Everything here observes the cycles of a run (`Observer`) and knows the solvers only through `geomech.model.Cycle`.
 """
 
 from __future__ import annotations
@@ -40,15 +39,17 @@ __all__ = [
 
 
 def standard_observers(scene: Any = None, *, quiet: bool = False) -> list[Observer]:
-    """The observers of an ordinary run. ``scene`` (a loaded scene, or None for the defaults) gives its ``output`` table
-    (``every``, ``joints``, ``interior_fields``, ``interior_every``, ``configuration``, ``checkpoint_every``,
-    ``checkpoint_kept_mb``, ``format``) and its
-    ``resolved()`` form."""
+    """The observers of an ordinary run.
+
+    ``scene`` (a loaded scene, or None for the defaults) gives its ``output`` table (``every``, ``joints``,
+    ``interior_fields``, ``interior_every``, ``configuration``, ``checkpoint_every``, ``checkpoint_kept_mb``,
+    ``format``) and its ``resolved()`` form.
+    """
     output = getattr(scene, "output", None)
     resolved = None if scene is None else scene.resolved()
     watchers: list[Observer] = []
     if resolved is not None:
-        # Before the folder is cleared: what then breaks off can begin again.
+        # Before the folder is cleared: a run that fails here can be started again.
         watchers.append(SceneCopy(resolved))
     watchers += [RunFolder(), RunLog(), Places()]
     configuration = getattr(output, "configuration", "reference")
@@ -69,13 +70,13 @@ def standard_observers(scene: Any = None, *, quiet: bool = False) -> list[Observ
             scene=resolved,
             kept_mb=getattr(output, "checkpoint_kept_mb", KEPT_MB),
         ),
-        Summary(),  # after the writers, whose times it takes in
+        Summary(),  # after the writers, whose times it includes
         Progress(quiet=quiet),
     ]
 
 
 def _joints_wanted(scene: Any) -> bool:
-    """Whether sums by joint are written: as the scene says, else where no crack makes the blocks a specimen in a
+    """Whether sums by joint are written: as the scene says; otherwise unless cracks make the blocks a specimen in a
     press."""
     wanted = getattr(getattr(scene, "output", None), "joints", None)
     return wanted if wanted is not None else scene is not None and not scene.cracks.n_cracks

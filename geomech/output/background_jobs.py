@@ -1,5 +1,4 @@
-"""Long jobs done in the background of the run: what waits in Gmsh, in compiled kernels and in compression leaves it the
-interpreter."""
+"""Long jobs done in a background thread: Gmsh, compiled kernels and compression leave the interpreter to the run."""
 
 from __future__ import annotations
 
@@ -12,8 +11,8 @@ from typing import Any
 class BackgroundJobs:
     """Jobs done one after another in a thread, in the order given; at most ``most`` wait.
 
-    It pays for jobs of many milliseconds outside the interpreter; for short ones the two threads only take turns. A job
-    that failed raises its exception in a later `do`, or in `close`, which waits for all.
+    Useful for jobs of many milliseconds outside the interpreter; for short ones the two threads only take turns. A job
+    that fails raises its exception in a later `do`, or in `close`, which waits for all jobs.
     """
 
     def __init__(self, most: int = 4) -> None:
@@ -27,7 +26,7 @@ class BackgroundJobs:
         self._jobs.append(self._thread.submit(job, *arguments))
 
     def wait(self) -> None:
-        """Until all jobs are done."""
+        """Wait until all jobs are done."""
         while self._jobs:
             self._jobs.popleft().result()
 

@@ -1,7 +1,7 @@
-"""Every field that lands in a file: its name, components, unit, place and meaning, declared once.
+"""Declaration of every field in output files: name, components, unit, location and meaning.
 
-Writers refuse an array that is not declared here, and a declared one that is missing, so this table *is* the format.
-All stresses are tension positive; see `geomech.conventions` for the signs of contacts and cracks.
+Writers refuse an array that is not declared here, and a declared one that is missing, so that this table *is* the
+format. Stresses are positive in tension; see `geomech.conventions` for the signs of contacts and cracks.
 """
 
 from __future__ import annotations
@@ -17,7 +17,8 @@ from geomech.model import CHANGES
 
 @dataclass(frozen=True)
 class Field:
-    """One array of a file. ``place`` is "point" or "cell"; ``components`` are the names VTK shows, () for a scalar."""
+    """One array of a file. ``place`` is "point" or "cell"; ``components`` are the names that VTK shows, () for a
+    scalar."""
 
     name: str
     place: str
@@ -28,7 +29,7 @@ class Field:
 
     @property
     def shape(self) -> tuple[int, ...]:
-        """The trailing shape of the array."""
+        """Trailing shape of the array."""
         return (len(self.components),) if self.components else ()
 
 
@@ -39,22 +40,24 @@ _PRINCIPAL = ("principal_stress", "Pa", "principal stresses of the full tensor, 
 _PRINCIPAL_NAMES = ("S1", "S2", "S3")
 _STATE = "0 open, 1 stick, 2 slip"
 
-#: Series name → its fields. The series is written as ``<name>.pvd`` with its files under ``vtk/``.
+#: Series name → its fields. The series is written as ``<name>.pvd`` with its files under ``vtk/``. What there is much of,
+#: at every corner, contact and node, is in single precision: seven digits, half the bytes. Places and displacements
+#: are in double precision, since gaps and openings are small differences of theirs.
 SERIES: dict[str, tuple[Field, ...]] = {
     "blocks": (
         _DISPLACEMENT,
-        Field("velocity", "point", "m/s", "velocity of the material point", _XYZ),
-        Field(_STRESS[0], "cell", *_STRESS[1:], VTK_STRESS),
-        Field(_PRINCIPAL[0], "cell", *_PRINCIPAL[1:], _PRINCIPAL_NAMES),
+        Field("velocity", "point", "m/s", "velocity of the material point", _XYZ, "float32"),
+        Field(_STRESS[0], "cell", *_STRESS[1:], VTK_STRESS, "float32"),
+        Field(_PRINCIPAL[0], "cell", *_PRINCIPAL[1:], _PRINCIPAL_NAMES, "float32"),
         Field("block_id", "cell", "-", "index of the block", dtype="int32"),
         Field("material", "cell", "-", "index of the block's material", dtype="int32"),
         Field("fixed", "cell", "-", "1 where the block does not move", dtype="int32"),
-        Field("removed", "cell", "-", "1 where the block has been taken out", dtype="int32"),
+        Field("removed", "cell", "-", "1 where the block has been excavated", dtype="int32"),
         Field(
             "key_block",
             "cell",
             "-",
-            "between neighbours that stand: -2 not known yet, -1 fixed or dug out, 0 locked by them, 1 removable but "
+            "with fixed neighbours: -2 not known yet, -1 fixed or excavated, 0 locked by them, 1 removable but "
             "pushed in, 2 removable but kept by strength, 3 slides, 4 falls",
             dtype="int32",
         ),
@@ -62,22 +65,22 @@ SERIES: dict[str, tuple[Field, ...]] = {
     ),
     "cracks": (
         _DISPLACEMENT,
-        Field("opening", "point", "m", "normal jump between the faces, positive when they part; nan: not solved for"),
+        Field("opening", "point", "m", "normal displacement jump, positive in opening; nan: not solved for"),
         Field("slip", "point", "m", "tangential jump, positive when the upper face moves along the tangent"),
-        Field("normal_traction", "point", "Pa", "on the faces, negative when they press"),
+        Field("normal_traction", "point", "Pa", "on the faces, negative in compression"),
         Field("shear_traction", "point", "Pa", "on the faces, along the crack"),
         Field("state", "point", "-", _STATE, dtype="int32"),
         Field("crack_id", "cell", "-", "index of the crack", dtype="int32"),
         Field("block_id", "cell", "-", "index of the block it lies in", dtype="int32"),
-        Field("birth_cycle", "cell", "-", "0 for what the scene drew, else the cycle in which it grew", dtype="int32"),
+        Field("birth_cycle", "cell", "-", "0 for cracks of the scene, else the cycle in which it grew", dtype="int32"),
     ),
     "tips": (
         _DISPLACEMENT,
-        Field("K_I", "point", "Pa √m", "mode I stress intensity factor; negative at an open slot that is pressed"),
+        Field("K_I", "point", "Pa √m", "mode I stress intensity factor; negative at an open slot that closes"),
         Field("K_II", "point", "Pa √m", "mode II stress intensity factor; positive turns the crack clockwise"),
         Field("K_eq", "point", "Pa √m", "equivalent factor of the growth criterion, grows at K_Ic"),
         Field("growth_angle", "point", "deg", "from the crack's direction to the growth direction, counter-clockwise"),
-        Field("growth_direction", "point", "-", "unit vector the criterion points to", _XYZ),
+        Field("growth_direction", "point", "-", "unit vector in the growth direction of the criterion", _XYZ),
         Field("grown", "point", "m", "advance in this cycle"),
         Field("crack_id", "point", "-", "index of the crack; the names stand in CRACK_NAMES", dtype="int32"),
         Field("end", "point", "-", "0 the tip at the start of its crack, 1 at its end", dtype="int32"),
@@ -86,15 +89,15 @@ SERIES: dict[str, tuple[Field, ...]] = {
     ),
     "contacts": (
         _DISPLACEMENT,
-        Field("force", "point", "N/m", "on the block that owns the vertex", _XYZ),
-        Field("normal_force", "point", "N/m", "positive in compression"),
-        Field("shear_force", "point", "N/m", "along the edge that is touched"),
-        Field("gap", "point", "m", "from where the faces meet, negative when penetrating"),
-        Field("slip", "point", "m", "accumulated sliding"),
-        Field("wear", "point", "m", "way slid to and fro"),
-        Field("lift", "point", "m", "by which sliding has forced the faces apart"),
+        Field("force", "point", "N/m", "on the block that owns the vertex", _XYZ, "float32"),
+        Field("normal_force", "point", "N/m", "positive in compression", dtype="float32"),
+        Field("shear_force", "point", "N/m", "along the touched edge", dtype="float32"),
+        Field("gap", "point", "m", "distance of the faces, negative in penetration", dtype="float32"),
+        Field("slip", "point", "m", "accumulated sliding", dtype="float32"),
+        Field("wear", "point", "m", "accumulated sliding distance, both directions", dtype="float32"),
+        Field("lift", "point", "m", "normal displacement due to dilation", dtype="float32"),
         Field("state", "point", "-", _STATE, dtype="int32"),
-        Field("length", "point", "m", "tributary length; 0 at lone corners"),
+        Field("length", "point", "m", "tributary length; 0 at lone corners", dtype="float32"),
         Field("joint", "point", "-", "index of the joint law", dtype="int32"),
         Field(
             "bonded",
@@ -107,7 +110,6 @@ SERIES: dict[str, tuple[Field, ...]] = {
         Field("block_id", "point", "-", "owner of the vertex", dtype="int32"),
         Field("other_block_id", "point", "-", "owner of the edge", dtype="int32"),
     ),
-    # Interior fields are large and smooth, so single precision: seven digits are more than the mesh resolves.
     "interior": (
         Field(
             "displacement",
@@ -125,7 +127,7 @@ SERIES: dict[str, tuple[Field, ...]] = {
         _DISPLACEMENT,
         Field("block_id", "cell", "-", "index of the block whose edge it is", dtype="int32"),
         Field("fixed", "cell", "-", "1 where the block does not move", dtype="int32"),
-        Field("removed", "cell", "-", "1 where the block has been taken out", dtype="int32"),
+        Field("removed", "cell", "-", "1 where the block has been excavated", dtype="int32"),
         Field("edge_name", "cell", "-", "index of the edge's name; the names stand in EDGE_NAMES", dtype="int32"),
     ),
     "bolts": (
@@ -142,7 +144,7 @@ SERIES: dict[str, tuple[Field, ...]] = {
     ),
 }
 
-#: What readers show first: series → (section, attributes of its tag).
+#: Attributes that readers show first: series → (section, attributes of its tag).
 ACTIVE: dict[str, dict[str, str]] = {
     "blocks": {"PointData": 'Vectors="displacement"', "CellData": 'Scalars="displacement_rank"'},
     "cracks": {"PointData": 'Scalars="opening" Vectors="displacement"', "CellData": 'Scalars="birth_cycle"'},
@@ -154,7 +156,7 @@ ACTIVE: dict[str, dict[str, str]] = {
     "water": {"PointData": 'Vectors="displacement"', "CellData": 'Scalars="ponded"'},
 }
 
-#: Columns every ``history.csv`` begins with, and their units; the step's statistics and the monitors follow.
+#: Columns with which every ``history.csv`` begins, and their units; the step's statistics and the monitors follow.
 HISTORY: dict[str, str] = {
     "cycle": "-",
     "time": "s",
@@ -169,7 +171,7 @@ HISTORY: dict[str, str] = {
     "closed_contacts": "number of contacts that carry force",
 }
 
-#: Columns of ``tips.csv``: a row a tip and cycle.
+#: Columns of ``tips.csv``: one row per tip and cycle.
 TIPS: dict[str, str] = {
     "cycle": "-",
     "time": "s",
@@ -187,13 +189,13 @@ TIPS: dict[str, str] = {
     "crack_name": "as in the scene",
 }
 
-#: Columns of ``joints.csv``: a row a joint and cycle. A joint goes by the name of its edges, else by that of its law.
+#: Columns of ``joints.csv``: one row per joint and cycle. A joint has the name of its edges, or else that of its law.
 JOINTS: dict[str, str] = {
     "cycle": "-",
     "time": "s",
     "joint": "-",
     "contacts": "number",
-    "length": "m, of faces that touch or are near",
+    "length": "m, of faces in or near contact",
     "open_length": "m",
     "sliding_length": "m",
     "mean_opening": "m, over the length",
@@ -202,12 +204,12 @@ JOINTS: dict[str, str] = {
     "mean_slip": "m, over the length",
     "max_slip": "m",
     "normal_force": "N/m, sum, positive in compression",
-    "shear_force": "N/m, sum of sizes",
-    "mobilised": "shear force over what friction and cohesion hold",
+    "shear_force": "N/m, sum of magnitudes",
+    "mobilised": "shear force over shear strength (friction and cohesion)",
     "bonded_length": "m",
 }
 
-#: Columns of ``reactions.csv``: a row a fixed or guided block and cycle; what contacts put on it.
+#: Columns of ``reactions.csv``: one row per fixed or guided block and cycle: the forces of contacts on it.
 REACTIONS: dict[str, str] = {
     "cycle": "-",
     "time": "s",
@@ -228,7 +230,7 @@ EVENTS: dict[str, str] = {
     "detail": "-",
 }
 
-#: What `geomech build` leaves of a scene before anything has run: file name → its fields.
+#: Files that `geomech build` writes before a run: file name → its fields.
 PREPARED: dict[str, tuple[Field, ...]] = {
     "block_system": (
         Field("block_id", "cell", "-", "index of the block", dtype="int32"),
@@ -254,10 +256,11 @@ _DECLARED = {
 
 
 def declared(series: str, place: str, count: int, arrays: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
-    """A dictionary of ``arrays``, which must be those that ``series`` has at ``place``, with ``count`` rows each;
-    vectors in the plane may leave out their third component.
+    """Dictionary of ``arrays``, which must be those of ``series`` at ``place``, with ``count`` rows each.
 
-    Raises ValueError naming a missing, an undeclared or a wrongly shaped array."""
+    Vectors in the plane may leave out their third component. Raises ValueError naming a missing, undeclared or wrongly
+    shaped array.
+    """
     fields = _DECLARED[series, place]
     if arrays.keys() != fields.keys():
         missing, extra = sorted(fields.keys() - arrays.keys()), sorted(arrays.keys() - fields.keys())

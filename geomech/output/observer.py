@@ -16,11 +16,12 @@ _log = logging.getLogger(__name__)
 class Observer(Protocol):
     """A run calls `on_start` once, `on_cycle` for every cycle in order, and `on_end` once, also after a failure.
 
-    An observer whose files a resumed run continues has two methods more: ``memory()``, what it needs for that (plain data, see `geomech.plain_data`), and ``on_resume(problem, folder, memory)``, called in place of
-    `on_start`, which brings its files back to their state at that time. Those without these methods are started as in a new run.
+    An observer whose files a resumed run continues has two further methods: ``memory()`` returns what it needs for that
+    (plain data, see `geomech.plain_data`), and ``on_resume(problem, folder, memory)``, called instead of `on_start`,
+    restores its files to their state at that time. Observers without these methods are started as in a new run.
 
-    ``summary`` is one mapping that all observers share: whoever runs the cycles puts in what it knows (``end``, the
-    reason; ``wall_s``), and each observer may add to it. ``error`` is the exception that ended the run, if one did.
+    ``summary`` is one mapping that all observers share: the driver of the cycles enters what it knows (``end``, the
+    reason; ``wall_s``), and each observer may add to it. ``error`` is the exception that ended the run, if any.
     """
 
     def on_start(self, problem: Problem, folder: Path) -> None: ...
@@ -39,8 +40,8 @@ class Resumed(Observer, Protocol):
 
 
 class Group:
-    """Several observers as one. Ends every one of them that was started, even when another fails in its `on_end`;
-    the first such failure is raised after all have ended."""
+    """Several observers as one. Ends every one that was started, even if another fails in its `on_end`; the first such
+    failure is raised after all have ended."""
 
     def __init__(self, observers: Iterable[Observer]) -> None:
         self.observers = list(observers)
@@ -52,7 +53,7 @@ class Group:
             self._started.append(observer)
 
     def on_resume(self, problem: Problem, folder: Path, memories: list[tuple[str, Any]]) -> None:
-        """Continue with the ``memories`` of other such observers, each with the first of its own kind."""
+        """Continue with the ``memories`` of another such group, each given to the first observer of its own kind."""
         left = list(memories)
         for observer in self.observers:
             mine = next((each for each in left if each[0] == _kind(observer)), None)

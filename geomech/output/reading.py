@@ -1,4 +1,4 @@
-"""A run folder read back: summary, histories, events and the grids of any cycle."""
+"""Reading of a run folder: summary, histories, events and the grids of any cycle."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ from .vtk.vtu import EMPTY, read_collection
 if TYPE_CHECKING:
     import pyvista
 
-#: Columns that hold text; every other one holds numbers, nan where a cell is empty.
+#: Columns that hold text; all others hold numbers, nan where a cell is empty.
 _TEXT = ("kind", "detail", "crack_name", "joint", "support")
 
 
 class Run:
-    """A run in ``folder``; nothing is read before it is asked for. A run that is still going, or that failed, reads as
-    far as it has come. Raises FileNotFoundError when there is no run in ``folder``."""
+    """A run in ``folder``, read lazily. A run that is still going, or that failed, is read as far as it has come.
+    Raises FileNotFoundError if there is no run in ``folder``."""
 
     def __init__(self, folder: Path | str) -> None:
         self.folder = Path(folder)
@@ -35,34 +35,34 @@ class Run:
 
     @cached_property
     def summary(self) -> dict[str, Any]:
-        """``summary.json``; empty while the run lasts."""
+        """``summary.json``; empty during the run."""
         path = self.folder / "summary.json"
         return json.loads(path.read_text(encoding="utf-8")) if path.is_file() else {}
 
     @cached_property
     def scene(self) -> dict[str, Any]:
-        """``scene.toml``, the resolved scene; empty where it was not written."""
+        """``scene.toml``, the resolved scene; empty if it was not written."""
         path = self.folder / "scene.toml"
         return tomllib.loads(path.read_text(encoding="utf-8")) if path.is_file() else {}
 
     @cached_property
     def history(self) -> np.ndarray:
-        """Structured array, a row a cycle; columns of `fields.HISTORY`, statistics and monitors."""
+        """Structured array, one row per cycle; columns of `fields.HISTORY`, statistics and monitors."""
         return read_table(self.folder / "history.csv", HISTORY)
 
     @cached_property
     def tips(self) -> np.ndarray:
-        """Structured array, a row a tip and cycle; columns of `fields.TIPS`."""
+        """Structured array, one row per tip and cycle; columns of `fields.TIPS`."""
         return read_table(self.folder / "tips.csv", TIPS)
 
     @cached_property
     def events(self) -> np.ndarray:
-        """Structured array, a row an event; columns of `fields.EVENTS`."""
+        """Structured array, one row per event; columns of `fields.EVENTS`."""
         return read_table(self.folder / "events.csv", ())
 
     @cached_property
     def led(self) -> bool:
-        """Whether a leading edge is loaded at some time: a scene without one has a load of 0 throughout."""
+        """Whether a leading edge is loaded at some time: without one the load is 0 throughout."""
         load = self.history["load"]
         return bool(np.any(np.isfinite(load) & (load != 0)))
 
@@ -71,8 +71,8 @@ class Run:
         return self.summary.get("title") or self.scene.get("title") or self.folder.name
 
     def series(self, name: str) -> list[tuple[float, Path | HdfStep]]:
-        """(time, file) of every written cycle of the series ``name``, or (time, step in its VTKHDF file); empty
-        where it was not written. `read_grid` reads either."""
+        """(time, file) of every written cycle of the series ``name``, or (time, step in its VTKHDF file); empty if it
+        was not written. `read_grid` reads either."""
         if name not in SERIES:
             raise KeyError(f"no series {name!r}; there are {', '.join(SERIES)}")
         path, steps = self.folder / f"{name}.pvd", self.folder / (name + vtkhdf.SUFFIX)
@@ -81,7 +81,7 @@ class Run:
         return list(vtkhdf.read_steps(steps)) if steps.is_file() else []
 
     def grids(self, name: str) -> dict[int, Path | HdfStep]:
-        """cycle number → file (or step) of the series ``name``, in order."""
+        """{cycle number: file (or step)} of the series ``name``, in order."""
         if name not in self._files:
             self._files[name] = {
                 file.cycle if isinstance(file, HdfStep) else int(file.stem.rpartition("_")[2]): file
@@ -90,7 +90,8 @@ class Run:
         return self._files[name]
 
     def grid(self, name: str, cycle: int) -> pyvista.UnstructuredGrid:
-        """The series ``name`` at ``cycle``, or at the last cycle written before it. Raises KeyError without one."""
+        """The series ``name`` at ``cycle``, or at the last cycle written before it. Raises KeyError if there is
+        none."""
         files = self.grids(name)
         before = [number for number in files if number <= cycle]
         if not before:
@@ -103,8 +104,8 @@ class Run:
 
 
 def read_grid(where: Path | HdfStep) -> pyvista.UnstructuredGrid:
-    """A grid of a series as PyVista has it; one that was written to draw nothing (`geomech.output.vtk.vtu.nothing`) has
-    no points and no cells."""
+    """A grid of a series as PyVista object; one that was written as empty (`geomech.output.vtk.vtu.nothing`) has no
+    points and no cells."""
     import pyvista
 
     grid = vtkhdf.read_step(where) if isinstance(where, HdfStep) else pyvista.read(where)
@@ -114,8 +115,10 @@ def read_grid(where: Path | HdfStep) -> pyvista.UnstructuredGrid:
 
 
 def read_table(path: Path, numeric: Any) -> np.ndarray:
-    """A CSV file with a header as a structured array: float columns (nan for empty cells), text for those of
-    names. A last line that a crash cut short is left out. Missing files read as no rows of ``numeric`` columns."""
+    """A CSV file with a header as a structured array: float columns (nan for empty cells), text for those of names.
+
+    A last line that was cut off by a crash is left out. Missing files have no rows of ``numeric`` columns.
+    """
     if not path.is_file():
         return np.empty(0, [(name, float) for name in numeric])
     with open(path, newline="", encoding="utf-8") as file:

@@ -1,4 +1,4 @@
-"""A run folder at the start of a run: without what an earlier run in it has left and this one may not write over."""
+"""Clears a run folder at the start of a run of those files of an earlier run that are not overwritten."""
 
 from __future__ import annotations
 
@@ -9,8 +9,7 @@ from geomech.model import Cycle, Problem
 
 from .checkpoints import checkpoint_file
 
-#: Files of a run, by the names that it gives them. Files of series are written over, and those left are deleted at the
-#: end.
+#: Names of a run's files. Files of series are overwritten, and the remaining ones are deleted at the end.
 _OWN = (
     "history.csv", "tips.csv", "events.csv", "joints.csv", "reactions.csv", "summary.json", "places.json", "view.pvsm", "*.csv.part", "*.pvd.part",
     "*.json.part", "*.toml.part", f"{checkpoint_file.FOLDER}/cycle_[0-9]*.checkpoint", f"{checkpoint_file.FOLDER}/*.part",
@@ -18,14 +17,13 @@ _OWN = (
 
 
 class RunFolder:
-    """Observer that clears the folder of an earlier run's histories, summary and checkpoints before the others
-    begin."""
+    """Observer that removes the histories, summary and checkpoints of an earlier run before the others begin."""
 
     def on_start(self, problem: Problem, folder: Path) -> None:
         _clear(Path(folder), _OWN)
 
     def memory(self) -> None:
-        """Nothing: a resumed run goes on with the files that are there."""
+        """Nothing: a resumed run continues with the existing files."""
 
     def on_resume(self, problem: Problem, folder: Path, memory: None) -> None:
         _clear(Path(folder), tuple(name for name in _OWN if name.endswith(".part")))

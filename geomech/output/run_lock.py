@@ -1,8 +1,8 @@
-"""One run at a time in a folder, and none over the results of another unless that is asked for.
+"""Run lock: one run at a time in a folder, and none over the results of another unless asked for.
 
-The lock is the system's (flock) on ``run.lock``, so that it goes with its process however that ends; what stands in the
-file is for people. File systems without locks are gone by what stands there: a process of this machine that is alive
-has the folder, and so has any of another machine.
+The lock is the system's (flock) on ``run.lock``, so that it ends with its process in any case; the content of the file
+is for people. On file systems without locks the content decides: a live process of this machine, or any process of
+another machine, has the folder.
 """
 
 from __future__ import annotations
@@ -23,31 +23,31 @@ from .checkpoints import checkpoint_file
 
 #: In the run folder.
 FILE = "run.lock"
-#: What a file system says that knows no locks.
+#: Errors of file systems that do not support locks.
 _NO_LOCKS = (errno.ENOLCK, errno.EOPNOTSUPP, errno.ENOSYS, errno.EINVAL)
 
 
 class FolderRefused(RuntimeError):
-    """No run may begin in the folder: the message says why, and what to do instead."""
+    """No run may begin in the folder: the message gives the reason and a way out."""
 
 
 class FolderInUse(FolderRefused):
-    """Another run is at work in it."""
+    """Another run uses the folder."""
 
 
 class FolderTaken(FolderRefused):
-    """It holds the results of a run."""
+    """The folder holds the results of a run."""
 
 
 def refuse_results(folders: Iterable[Path]) -> None:
-    """Refuse folders that hold what a run has come to: raises FolderTaken. A run that failed or was killed before its
-    first cycle, and left no checkpoint, has come to nothing."""
+    """Refuse folders that hold results: raises FolderTaken. A run that failed or was killed before its first cycle, and
+    left no checkpoint, has none."""
     for folder in folders:
         found = _results(Path(folder))
         if found is not None:
             raise FolderTaken(
-                f"{folder} holds {found}: to run over it say --overwrite, to keep it name another folder (--out DIR), "
-                f"to go on with it `geomech resume {folder}`"
+                f"{folder} holds {found}: to replace it use --overwrite, to keep it name another folder (--out DIR), "
+                f"to continue it `geomech resume {folder}`"
             )
 
 
@@ -57,13 +57,16 @@ def _results(folder: Path) -> str | None:
         if isinstance(summary, dict) and summary.get("cycles"):
             return f"a run of {counted(int(summary['cycles']), 'cycle')} ({str(summary.get('end', 'ended'))[:60]})"
     if checkpoint_file.found(folder / checkpoint_file.FOLDER):
-        return "a run that was broken off, with a checkpoint"
+        return "an interrupted run with a checkpoint"
     return None
 
 
 class RunLock:
-    """While this context lasts no other run begins in ``folder``, which is made. ``stale`` says, once it is entered,
-    who has left it without a word; None where nobody has. Raises FolderInUse."""
+    """Context in which no other run begins in ``folder``, which is created.
+
+    After entering, ``stale`` is a message about a run that left the folder without ending properly, or None. Raises
+    FolderInUse.
+    """
 
     def __init__(self, folder: Path) -> None:
         self.folder = Path(folder)
@@ -80,7 +83,7 @@ class RunLock:
                 found = _read(handle)
                 if locked is False or (locked is None and found and _alive(found)):
                     raise FolderInUse(f"{self.folder} is in use by {_holder_text(found)}{self._way_out(locked)}")
-                # Whoever had it may have removed the file between opening and locking: then it locks nobody out.
+                # The previous owner may have removed the file between opening and locking: then it locks nobody out.
                 if locked and not _is_still(handle, path):
                     os.close(handle)
                     continue
@@ -90,11 +93,11 @@ class RunLock:
             break
         self._file = handle
         if found:
-            self.stale = f"{self.folder} was left without a word by {_holder_text(found)}, which is gone: taken over"
+            self.stale = f"{self.folder} was left without being closed by {_holder_text(found)}, which no longer runs: taken over"
         text = json.dumps(
             {"process": os.getpid(), "host": platform.node(), "since": f"{datetime.now():%Y-%m-%d %H:%M:%S}"}
         ).encode()
-        with suppress(OSError):  # a full disk: the lock holds without it
+        with suppress(OSError):  # a full disk: the lock works without content
             os.ftruncate(handle, 0)
             os.pwrite(handle, text, 0)
         return self
@@ -113,7 +116,7 @@ class RunLock:
 
 
 def _locked(handle: int) -> bool | None:
-    """Whether the lock is ours now; None where the file system has none."""
+    """Whether we now hold the lock; None if the file system has no locks."""
     try:
         import fcntl
     except ImportError:
@@ -137,7 +140,7 @@ def _is_still(handle: int, path: Path) -> bool:
 
 
 def _read(handle: int) -> dict[str, Any]:
-    """What stands in the file; {} where nothing that makes sense does."""
+    """Content of the file; {} if it cannot be read."""
     try:
         found = json.loads(os.pread(handle, 4096, 0) or b"{}")
     except ValueError:
@@ -153,7 +156,7 @@ def _holder_text(found: dict[str, Any]) -> str:
 
 
 def _alive(found: dict[str, Any]) -> bool:
-    """Whether the process may be at work; one of another machine may."""
+    """Whether the process may be running; one of another machine may."""
     if found.get("host") != platform.node() or not isinstance(found.get("process"), int):
         return True
     try:

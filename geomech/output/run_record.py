@@ -1,4 +1,4 @@
-"""What a run folder says about its origin: the log, the scene as it was understood, the places of monitors and bolts."""
+"""Records of a run's origin in its folder: the log, the resolved scene, the locations of monitors and bolts."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ from geomech.model import GROUND, Cycle, Problem, counted
 from .units import stress_text
 from .unreached import unreached
 
-#: The file with the places of monitors and bolts.
+#: The file with the locations of monitors and bolts.
 PLACES = "places.json"
 
 _log = logging.getLogger("geomech.run")
 
 
 class RunLog:
-    """Observer that keeps ``run.log``: everything geomech logs while the run lasts, its events and its end."""
+    """Observer that keeps ``run.log``: everything geomech logs during the run, its events and its end."""
 
     def __init__(self, level: int = logging.INFO) -> None:
         self.level = level
@@ -34,7 +34,7 @@ class RunLog:
         _log.info("%s: %s, %s", problem.title, problem.inventory, counted(len(problem.materials), "material"))
 
     def memory(self) -> list[str]:
-        """The kinds of events so far; the log goes on where it ends."""
+        """Kinds of events so far; the log continues at its end."""
         return sorted(self._happened)
 
     def on_resume(self, problem: Problem, folder: Path, memory: list[str]) -> None:
@@ -57,7 +57,7 @@ class RunLog:
         self._last = cycle
         for event in cycle.events:
             self._happened.add(event.kind)
-            # A load of 0 is that of a scene which has no leading one.
+            # Without a leading load, the load is 0.
             load = f", load {stress_text(event.load)}" if event.load else ""
             _log.info(
                 "cycle %d, t = %g s%s: %s at (%.6g, %.6g) %s",
@@ -82,7 +82,9 @@ class RunLog:
 
 class SceneCopy:
     """Observer that writes ``scene.toml``, the scene with its variant and overrides applied, before the first cycle.
-    ``resolved`` is a mapping as a TOML file holds it; absent values (None) are left out, since TOML has no null."""
+
+    ``resolved`` is a mapping like that of a TOML file; absent values (None) are left out, since TOML has no null.
+    """
 
     def __init__(self, resolved: Mapping[str, Any]) -> None:
         self.resolved = resolved
@@ -104,7 +106,7 @@ class SceneCopy:
 
 
 class Places:
-    """Observer that writes `PLACES`: where monitors and bolts are in the reference, m, which the scene may leave to its
+    """Observer that writes `PLACES`: reference locations (m) of monitors and bolts, which the scene may take from its
     drawing."""
 
     def on_start(self, problem: Problem, folder: Path) -> None:
@@ -125,7 +127,7 @@ class Places:
         (folder / PLACES).write_text(json.dumps(places, indent=1), encoding="utf-8")
 
     def memory(self) -> None:
-        """Nothing: the places are those of the reference."""
+        """Nothing: the locations are those of the reference configuration."""
 
     def on_resume(self, problem: Problem, folder: Path, memory: None) -> None:
         """The file stays; the model may have lost bolts meanwhile."""

@@ -1,5 +1,4 @@
-"""Units in which a number is easily read: kPa for a slope's loads, MPa for a specimen's; metres, millimetres or
-microns."""
+"""Readable units: kPa for the loads of a slope, MPa for those of a specimen; metres, millimetres or microns."""
 
 from __future__ import annotations
 
@@ -7,41 +6,41 @@ import math
 
 import numpy as np
 
-#: (smallest value that it is for, unit, size of the unit)
+#: (smallest value for which it is used, unit, size of the unit)
 STRESSES = ((1e5, "MPa", 1e6), (1e2, "kPa", 1e3), (0.0, "Pa", 1.0))
 LENGTHS = ((1.0, "m", 1.0), (1e-4, "mm", 1e-3), (0.0, "µm", 1e-6))
 
 
 def stress_unit(largest: float) -> tuple[str, float]:
-    """(name, Pa) of the unit for stresses of which the ``largest``, Pa, is of this size; MPa where there is none."""
+    """(name, Pa) of the unit for stresses up to ``largest`` (Pa); MPa if it is 0."""
     return _unit(STRESSES, largest)
 
 
 def length_unit(largest: float) -> tuple[str, float]:
-    """(name, m) of the unit for lengths of which the ``largest``, m, is of this size; m where there is none."""
+    """(name, m) of the unit for lengths up to ``largest`` (m); m if it is 0."""
     return _unit(LENGTHS, largest)
 
 
 def largest_of(values: np.ndarray) -> float:
-    """The largest magnitude among ``values``, nan left out; 0 of none."""
+    """The largest magnitude among ``values``, without nan; 0 for none."""
     finite = np.abs(values[np.isfinite(values)])
     return float(finite.max()) if len(finite) else 0.0
 
 
 def stress_text(value: float, digits: int = 4) -> str:
-    """The magnitude of a stress in Pa, in so many digits, with its unit."""
+    """Magnitude of a stress in Pa with ``digits`` digits and its unit."""
     name, size = stress_unit(value)
     return f"{_digits(abs(value) / size, digits)} {name}"
 
 
 def length_text(value: float, digits: int = 3) -> str:
-    """A length in m, in so many digits, with its unit."""
+    """Length in m with ``digits`` digits and its unit."""
     name, size = length_unit(value)
     return f"{_digits(value / size, digits)} {name}"
 
 
 def _digits(value: float, digits: int) -> str:
-    """``value`` with so many digits, those before the point all of them, without an exponent."""
+    """``value`` with ``digits`` digits, without an exponent; all digits before the point are kept."""
     before = 1 + math.floor(math.log10(abs(value))) if value else 1
     return f"{value:.{max(0, digits - max(before, 1))}f}"
 

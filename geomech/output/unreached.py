@@ -1,4 +1,4 @@
-"""A specimen's run that came to the end of its loads before anything that it was to stop at: what it says first."""
+"""First line of a specimen's run that reached the end of its loads before any of its stop events."""
 
 from __future__ import annotations
 
@@ -9,13 +9,15 @@ from geomech.model import Cycle, Problem
 
 from .units import stress_text
 
-#: Rock under a press is linear elastic up to strains of some thousandths; loads that strain it by more are reported.
+#: Rock in a press is linear elastic up to strains of some thousandths; loads with larger strains are reported.
 ELASTIC = 5e-3
 
 
 def unreached(problem: Problem, last: Cycle | None, happened: Container[str]) -> str:
-    """What to say first of a run of cracked rock under a leading load that has ended with its time, with ``last`` its last
-    cycle, while none of the events that were to stop it has ``happened``; "" of others."""
+    """First line for a run of cracked rock under a leading load that ended with its time; "" for other runs.
+
+    ``last`` is the last cycle; none of the events that were to stop the run has ``happened``.
+    """
     stops = problem.run.stop_at
     if last is None or not problem.cracks.n_cracks or not stops or any(kind in happened for kind in stops):
         return ""

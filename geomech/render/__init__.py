@@ -1,4 +1,4 @@
-"""Pictures, movies and curves of a finished run, made from its folder alone."""
+"""Pictures, movies and curves of a run, from its folder alone."""
 
 from __future__ import annotations
 
@@ -22,21 +22,22 @@ def draw(
     width: int | None = None,
     movie: bool | None = None,
 ) -> list[Path]:
-    """Everything there is to see of ``run``, in the folder ``out`` (default: ``pictures`` in the run folder), and the
-    curves; the paths of what was drawn. Of cracked rock that is the stress at the end and the growth of the cracks,
-    ``specimen.png`` and ``growth.gif``, and where cracks have tips their stress intensity, ``K.png``; where blocks move,
-    or nothing is cracked, ``displacement.png`` and ``displacement.gif``, and after an earthquake ``slip.png``.
+    """Draw the pictures and curves of ``run`` into ``out`` (default: ``pictures`` in the run folder); returns their
+    paths.
 
-    What is not said here the scene's ``[render]`` table says, and where that is silent too, 800 pixels and a movie; a
-    ``component`` asks for stress whatever the run. `draw_field` draws any other field. Raises ValueError for a run
-    without a cycle, KeyError for an unknown stress component."""
+    Cracked rock: stress at the end and growth of the cracks, ``specimen.png`` and ``growth.gif``, and stress intensity
+    at the tips, ``K.png``. Moving blocks, or no cracks: ``displacement.png`` and ``displacement.gif``, and after an
+    earthquake ``slip.png``. Settings that are not given come from the scene's ``[render]`` table, and else are 800
+    pixels and a movie; a ``component`` draws stress for any run. `draw_field` draws any other field. Raises ValueError
+    for a run without a cycle, KeyError for an unknown stress component.
+    """
     from .curves.plots import plots
     from .fields.draw import Wish, draw_end, draw_field, suited, usual_field
     from .movie import movie as draw_movie
 
     if not len(run.history):
         raise ValueError(
-            f"{run.folder}: the run has no cycle yet: let it go on (`geomech resume {run.folder}`), then draw it"
+            f"{run.folder}: the run has no cycle yet: continue it (`geomech resume {run.folder}`), then draw it"
         )
     asked = run.scene.get("render", {})
     folder = run.folder / "pictures" if out is None else Path(out)
@@ -55,7 +56,7 @@ def draw(
 
 
 def _motion(run: Run, folder: Path, asked: dict[str, Any], width: int | None, movie: bool | None) -> list[Path]:
-    """Pictures of a run whose blocks move: how far, and after an earthquake how far joints have slipped."""
+    """Pictures of a run whose blocks move: displacement and, after an earthquake, slip of the joints."""
     from .fields.draw import Wish, draw_field
 
     wish = Wish(

@@ -1,4 +1,4 @@
-"""The growth of a run as a movie."""
+"""Movie of crack growth."""
 
 from __future__ import annotations
 
@@ -13,16 +13,17 @@ from .fields.painter import FieldPainter
 from .pictures.field import agreeing
 from .pictures.look import final_cycle
 
-#: A frame in which cracks grew stays so much longer than one of loading.
+#: A frame with crack growth stays this much longer than one of loading.
 LINGER = 2.0
-#: The shortest and the longest time of a frame, over the mean, where the run's time goes on between frames.
+#: Shortest and longest duration of a frame, relative to the mean, if the run's time advances between frames.
 PACES = 0.5, 4.0
 
 
 def movie(painter: FieldPainter, path: Path, *, frames: int = 48, frames_per_second: float = 10.0) -> Path | None:
-    """Draw the growth of the run of ``painter`` as the GIF ``path``: at most about ``frames`` cycles, those whose stress
-    field is known for their own cracks, up to the one that shows what the run came to. None where there are not two
-    cycles to show."""
+    """Draw the growth in the run of ``painter`` as the GIF ``path``; None if there are not two cycles to show.
+
+    It has at most about ``frames`` cycles, those whose stress field belongs to their own cracks, up to the final state.
+    """
     shown = moments(painter.run, frames)
     if len(shown) < 2:
         return None
@@ -35,8 +36,11 @@ def movie(painter: FieldPainter, path: Path, *, frames: int = 48, frames_per_sec
 
 
 def durations(run: Run, shown: list[int], frames_per_second: float) -> list[int]:
-    """ms for which each of the cycles ``shown`` stands: as the run's time goes by until the next one, between a half
-    and four times the mean; cycles in which cracks have grown, at one load perhaps, no less than `LINGER` of it."""
+    """Duration, ms, of each of the cycles ``shown``.
+
+    It is proportional to the run's time until the next one, between a half and four times the mean; cycles with crack
+    growth, perhaps at constant load, get at least `LINGER` times the mean.
+    """
     rows = [run.at(cycle) for cycle in shown]
     gone_by = np.abs(np.diff([float(row["time"]) for row in rows]))
     pace = np.ones(len(rows))
@@ -51,8 +55,8 @@ def durations(run: Run, shown: list[int], frames_per_second: float) -> list[int]
 
 
 def moments(run: Run, frames: int) -> list[int]:
-    """The cycles a movie shows, first and last always: a third of ``frames`` spread over the loading, the rest over the
-    growth."""
+    """Cycles of a movie, with the first and the last: a third of ``frames`` distributed over the loading, the rest over
+    the growth."""
     last = final_cycle(run)
     written = [c for c in run.grids("blocks") if c <= last]
     told = agreeing(run, written)
@@ -65,7 +69,7 @@ def moments(run: Run, frames: int) -> list[int]:
     def spread(cycles: np.ndarray, count: int) -> np.ndarray:
         return cycles[np.unique(np.linspace(0, len(cycles) - 1, min(count, len(cycles))).round().astype(int))]
 
-    # Loading is the same picture in ever deeper colours: where there is growth to see, a few frames of it do.
+    # Loading is the same picture in stronger colours: if there is growth to see, a few frames suffice.
     few = frames if not len(growth) else min(frames // 3, max(6, len(growth) // 2))
     chosen = [*spread(loading, few), *spread(growth, frames - min(few, len(loading))), written[0], written[-1]]
     return sorted({int(c) for c in chosen})

@@ -1,4 +1,4 @@
-"""A quick drawing with Matplotlib: blocks where they are, cracks where they have grown, in axes of one's own."""
+"""Quick drawing with Matplotlib: blocks in their current position and cracks, in given axes."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 
 from geomech.model import Blocks, Cracks
 
-#: Rock that moves, rock that is fixed, outlines, cracks.
+#: Colours of moving rock, fixed rock, outlines, cracks.
 ROCK, FIXED, INK, CRACK = "#eadfca", "#b9bcc2", "#33363b", "#d7263d"
 
 
@@ -22,12 +22,11 @@ def sketch(
     magnify: float = 1.0,
     cmap: str = "viridis",
 ) -> Any:
-    """Draw the blocks and cracks of ``what`` and return the axes: a coupling `Cycle` (blocks where they are), a
-    `Problem`, or a scene that was loaded (as drawn).
+    """Draw the blocks and cracks of ``what`` and return the axes.
 
-    ``axes`` are those of Matplotlib (None: of a new figure); ``values`` (n_blocks,) colour the blocks, with a colour bar
-    that says ``label``; displacements are drawn ``magnify`` times. Raises ValueError where there are not as many values
-    as blocks.
+    ``what`` is a coupling `Cycle` (current position), a `Problem`, or a loaded scene (as drawn). ``axes`` are those of
+    Matplotlib (None: of a new figure); ``values`` (n_blocks,) colour the blocks, with a colour bar labelled ``label``;
+    displacements are multiplied by ``magnify``. Raises ValueError if the number of values is not that of blocks.
     """
     from matplotlib.collections import LineCollection, PathCollection
     from matplotlib.path import Path
@@ -64,7 +63,7 @@ def sketch(
 
 
 def _new_axes(points: np.ndarray) -> Any:
-    """Axes of a new figure of the shape of the ``points``."""
+    """Axes of a new figure with the proportions of the ``points``."""
     import matplotlib.pyplot as plt
 
     wide, tall = np.ptp(points, axis=0)
@@ -75,7 +74,7 @@ def _new_axes(points: np.ndarray) -> Any:
 
 
 def _loops(blocks: Blocks, block: int) -> list[np.ndarray]:
-    """The vertices of each loop of a block, closed, as numbers."""
+    """Vertex numbers of each loop of a block, closed."""
     left = set(range(blocks.vertex_start[block], blocks.vertex_start[block + 1]))
     loops = []
     while left:
@@ -88,7 +87,7 @@ def _loops(blocks: Blocks, block: int) -> list[np.ndarray]:
 
 
 def _carried(cracks: Cracks, cycle: Any, magnify: float) -> np.ndarray:
-    """(n_nodes, 2) nodes of the cracks, moved with the blocks that hold them."""
+    """(n_nodes, 2) nodes of the cracks, moved with their blocks."""
     nodes = cracks.nodes.copy()
     for block in np.unique(cracks.block):
         own = np.unique(cracks.segments[cracks.block == block])

@@ -1,4 +1,4 @@
-"""What runs and benchmarks came to: a table for the terminal, a page for the reader."""
+"""Reports of runs and benchmarks: a table for the terminal, and a page."""
 
 from __future__ import annotations
 
@@ -12,9 +12,12 @@ __all__ = ["COLUMNS", "as_csv", "as_text", "is_benchmark", "table", "write_page"
 
 
 def write_page(folder: Path, runs: Sequence[Run], path: Path | None = None, *, play: bool = True) -> Path:
-    """Write the page of ``runs``, which lie in ``folder`` (one: in it), or with none of the benchmark there; the file,
-    by default ``report.html`` in ``folder``, or ``runs.html`` where runs are below it: there a study leaves its own
-    ``report.html``. With ``play`` the cycles of runs can be played in the page."""
+    """Write the page of ``runs``, or, with none, of the benchmark in ``folder``; returns the file.
+
+    ``folder`` is the run's own folder, or the one with the ``runs``. By default the file is ``report.html`` in
+    ``folder``, or ``runs.html`` for several runs: a study leaves its own ``report.html`` there. With ``play`` the page
+    includes a player.
+    """
     if not runs:
         from .benchmark_page import page_of_benchmark
 
@@ -32,12 +35,12 @@ def write_page(folder: Path, runs: Sequence[Run], path: Path | None = None, *, p
 
 
 def write_sweep_page(folder: Path, path: Path | None = None) -> Path:
-    """Write the page of the sweep in ``folder``; the file, by default ``report.html`` in it."""
+    """Write the page of the sweep in ``folder``; returns the file, by default ``report.html`` in it."""
     from .sweep_page import page_of_sweep
 
     return page_of_sweep(folder).write(folder / "report.html" if path is None else path)
 
 
 def is_benchmark(folder: Path) -> bool:
-    """Whether ``folder`` holds what `geomech bench` leaves, and no runs."""
+    """Whether ``folder`` holds the output of `geomech bench`, and no runs."""
     return any(folder.glob("*.json")) and not any(folder.rglob("history.csv"))

@@ -1,4 +1,4 @@
-"""The page of a benchmark: its pictures, and the tables in the JSON that it left."""
+"""Page of a benchmark: its pictures, and the tables in its JSON files."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ from typing import Any
 
 from .page import Page
 
-#: So many rows of a table are shown, the rest is in the file.
+#: Number of rows shown of a table; the rest is in the file.
 LISTED = 200
 
 
 def page_of_benchmark(folder: Path) -> Page:
-    """The page of the JSON files and pictures in ``folder``. Raises ValueError naming a file that is no JSON."""
+    """Page of the JSON files and pictures in ``folder``. Raises ValueError naming a file that is not JSON."""
     page = Page("Benchmark " + folder.name.removeprefix("bench").lstrip("_"), f"from {folder}")
     if _pictures(folder):
         page.section("Plots")
@@ -23,7 +23,7 @@ def page_of_benchmark(folder: Path) -> Page:
         try:
             found = json.loads(path.read_text(encoding="utf-8"))
         except ValueError as error:
-            raise ValueError(f"{path} is no JSON: {error}") from None
+            raise ValueError(f"{path} is not valid JSON: {error}") from None
         if isinstance(found, Mapping) and isinstance(found.get("topics"), Mapping):
             _add_topics(page, found, folder)
         else:
@@ -38,10 +38,10 @@ def _pictures(folder: Path) -> list[tuple[Path, str]]:
 
 
 def _add_topics(page: Page, found: Mapping[str, Any], folder: Path) -> None:
-    """The figures of `geomech bench`, topic by topic with the pictures that each has left beside, then the machine."""
+    """Figures of `geomech bench`, topic by topic with the pictures of each, then the machine."""
     for topic, figures in found["topics"].items():
         page.section(topic)
-        # The maps of stability have a folder of their own name.
+        # The stability maps have a folder of their own.
         for beside in (f"bench_{topic}", topic):
             page.figures(_pictures(folder.parent / beside), whole=True)
         for kind, values in figures.items():
@@ -54,7 +54,7 @@ def _add_topics(page: Page, found: Mapping[str, Any], folder: Path) -> None:
 
 
 def _add(page: Page, value: Any, name: str) -> None:
-    """``value`` as a table, as tiles, or, where it holds more of them, one after the other."""
+    """``value`` as a table, as tiles, or, if it holds several, one after the other."""
     if isinstance(value, list) and value and all(isinstance(row, Mapping) for row in value):
         headers = list(dict.fromkeys(key for row in value for key in row if _plain(row[key])))
         page.table(

@@ -1,5 +1,4 @@
-"""The page of several runs side by side: one table, what differs between their scenes, a picture and the curves of
-each."""
+"""Page of several runs side by side: a table, the differences between their scenes, a picture and curves of each."""
 
 from __future__ import annotations
 
@@ -13,14 +12,14 @@ from .page import Page
 from .run_page import LISTED, add_player
 from .table import shown, table
 
-#: Keys of a scene that say where it lies, not what it is.
+#: Keys of a scene that give its location, not its content.
 _NOT_COMPARED = ("title", "geometry.model")
-#: So many runs are shown in pictures.
+#: Number of runs shown in pictures.
 PICTURED = 12
 
 
 def page_of_runs(runs: Sequence[Run], folder: Path, play: bool = True) -> Page:
-    """The page of ``runs``, which lie in ``folder``; with ``play`` their cycles can be played."""
+    """Page of ``runs`` in ``folder``; with ``play`` with a player."""
     page = Page(_title(runs), f"{len(runs)} runs in {folder}")
     page.section("Side by side")
     add_table(page, runs)
@@ -28,7 +27,7 @@ def page_of_runs(runs: Sequence[Run], folder: Path, play: bool = True) -> Page:
         add_player(page, runs)
     different = differences(runs)
     if different:
-        page.section("What differs between their scenes")
+        page.section("Differences between their scenes")
         page.table(
             ["key", *(run.folder.name for run in runs)],
             [[key, *values] for key, values in list(different.items())[:LISTED]],
@@ -38,7 +37,7 @@ def page_of_runs(runs: Sequence[Run], folder: Path, play: bool = True) -> Page:
     add_ends(page, runs)
     add_compared_curves(page, runs)
     _add_times(page, runs)
-    page.section("How to make this page again")
+    page.section("How to reproduce this page")
     page.code(f"geomech report {folder}\n" + "\n".join(f"geomech report {run.folder}" for run in runs))
     return page
 
@@ -49,7 +48,7 @@ def _add_times(page: Page, runs: Sequence[Run]) -> None:
         {phase for one in spent for phase in one}, key=lambda name: -max(one.get(name, 0.0) for one in spent)
     )
     if phases:
-        page.section("Where the time went")
+        page.section("Computing time")
         page.table(
             ["phase, s", *(run.folder.name for run in runs)],
             [[phase, *(one.get(phase) for one in spent)] for phase in phases],
@@ -57,13 +56,13 @@ def _add_times(page: Page, runs: Sequence[Run]) -> None:
 
 
 def add_table(page: Page, runs: Sequence[Run]) -> None:
-    """The table that the terminal shows, columns that no run fills left out."""
+    """The table that the terminal shows, without columns that are empty for all runs."""
     headers, *rows = shown(table(runs))
     page.table([str(name) for name in headers], rows)
 
 
 def differences(runs: Sequence[Run]) -> dict[str, list[Any]]:
-    """Key of the scene → its value in every run (None: not there), for keys whose values are not all the same."""
+    """Key of the scene → its value in every run (None: missing), for keys whose values differ."""
     flat = [dict(_leaves(run.scene)) for run in runs]
     keys = dict.fromkeys(key for leaves in flat for key in leaves if not key.startswith(_NOT_COMPARED))
     found = {key: [leaves.get(key) for leaves in flat] for key in keys}
@@ -82,7 +81,7 @@ def _leaves(value: Any, place: str = "") -> Iterator[tuple[str, Any]]:
 
 
 def add_ends(page: Page, runs: Sequence[Run], title: str = "Pictures") -> None:
-    """How every run ended, in pictures."""
+    """Pictures of the end of every run."""
     from ..render.fields.draw import draw_end, suited
 
     pictured = [run for run in runs if len(run.history) and run.grids("blocks")][:PICTURED]
@@ -91,7 +90,7 @@ def add_ends(page: Page, runs: Sequence[Run], title: str = "Pictures") -> None:
     page.section(title)
     with tempfile.TemporaryDirectory() as folder:
         painters = [suited(run, width=560) for run in pictured]
-        # What is compared has one range of colours.
+        # Compared pictures have one range of colours.
         spans: dict[str, tuple[float, float]] = {}
         for painter in painters:
             low, high = spans.get(painter.what.name, painter.view.limits)
@@ -107,7 +106,7 @@ def add_ends(page: Page, runs: Sequence[Run], title: str = "Pictures") -> None:
 
 
 def add_compared_curves(page: Page, runs: Sequence[Run]) -> None:
-    """Load against strain of all runs in one drawing, where they have them."""
+    """Load against strain of all runs in one figure, if they have both."""
     from ..render.curves.plots import compared
 
     with tempfile.TemporaryDirectory() as folder:
@@ -118,6 +117,6 @@ def add_compared_curves(page: Page, runs: Sequence[Run]) -> None:
 
 
 def _title(runs: Sequence[Run]) -> str:
-    """What the runs' titles have in common, up to a comma."""
+    """Common beginning of the runs' titles, up to a comma."""
     titles = {run.title.rsplit(",", 1)[0] for run in runs}
     return titles.pop() if len(titles) == 1 else "Runs side by side"

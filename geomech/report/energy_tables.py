@@ -1,4 +1,4 @@
-"""The energy budget of a run as tables of its page: of blocks and contacts, and of cracks."""
+"""Energy budget of a run as tables for its page: of blocks and contacts, and of cracks."""
 
 from __future__ import annotations
 
@@ -6,45 +6,45 @@ from collections.abc import Mapping
 
 from .page import Page
 
-#: Parts of the blocks' budget → what they are called.
+#: Parts of the blocks' budget → their names.
 BLOCKS = {
     "load_work": "work of loads",
     "gravity_work": "work of gravity",
     "elastic_energy": "elastic, in blocks",
     "contact_energy": "elastic, in contacts",
     "kinetic_energy": "kinetic",
-    "crack_work": "spent on cracks by the mean stress",
+    "crack_work": "given to cracks by the mean stress",
     "friction_loss": "friction",
     "damping_loss": "damping",
     "bond_loss": "broken bonds",
     "impact_loss": "impacts",
     "scheme_loss": "time scheme",
     "carried_loss": "velocity carried over",
-    "growth_release": "of the time scheme: set free by growth at one load",
+    "growth_release": "of the time scheme: released by growth at constant load",
     "overlap_energy": "overlaps",
-    "split_energy": "of blocks dug out (they take it along) or cut",
+    "split_energy": "of excavated blocks (which take it along) or cut ones",
     "energy_residual": "unexplained",
 }
-#: Where what is spent on cracks comes from …
+#: Source of the energy given to cracks …
 GIVEN = {
     "crack_work": "from blocks, by their mean stress",
-    "uneven_work": "from forces that bend them open, press unevenly or wait for faces to give way",
-    "set_free_energy": "set free by blocks that parted",
+    "uneven_work": "from forces that open them by bending, act non-uniformly or are delayed",
+    "set_free_energy": "released by blocks that split",
 }
-#: … and where it goes.
+#: … and its use.
 TAKEN = {
     "crack_elastic": "stored around cracks",
     "crack_friction": "friction of crack faces",
-    "crack_bond_loss": "cement of crack faces that broke",
+    "crack_bond_loss": "broken cement of crack faces",
     "fracture_energy": "new crack",
-    "runaway_loss": "released by unstable growth beyond what rock takes",
-    "parting_energy": "last ligaments, and walls that were cracks",
+    "runaway_loss": "released by unstable growth in excess of the fracture energy",
+    "parting_energy": "last ligaments, and block faces that were cracks",
     "crack_residual": "unexplained",
 }
 
 
 def add_energy(page: Page, energy: Mapping[str, float]) -> None:
-    """Tables of ``energy``, J/m, as in the run's summary; parts that are zero are left out."""
+    """Tables of ``energy``, J/m, as in the run's summary; zero parts are left out."""
     done = abs(energy.get("load_work", 0.0) + energy.get("gravity_work", 0.0))
     _add(page, "energy", "% of the work done", [(label, energy.get(name)) for name, label in BLOCKS.items()], done)
     given = sum(energy.get(name, 0.0) for name in GIVEN)
@@ -55,15 +55,15 @@ def add_energy(page: Page, energy: Mapping[str, float]) -> None:
     _add(page, "energy at cracks", "% of what was given", rows + spent, abs(given))
     said = []
     if energy.get("toughness_energy"):
-        said.append(f"Rock takes {energy['toughness_energy']:.4g} J/m, K_Ic²/E' of all new crack, as it breaks.")
+        said.append(f"Fracture energy of all new cracks, K_Ic²/E' times length: {energy['toughness_energy']:.4g} J/m.")
     if energy.get("unpaid_toughness"):
         said.append(
-            f"Of that blocks did not give {energy['unpaid_toughness']:.4g} J/m: they store no bending, and cracks that "
+            f"Of this, blocks did not supply {energy['unpaid_toughness']:.4g} J/m: they store no bending, and cracks that "
             "it opens take no energy from the motion."
         )
     if energy.get("budget_residual") is not None:
         said.append(
-            f"Of all energy turned over, of blocks and cracks together, {abs(energy['budget_residual']):.1e} is not "
+            f"Of all energy turned over by blocks and cracks, {abs(energy['budget_residual']):.1e} is not "
             "accounted for."
         )
     page.text(*said)

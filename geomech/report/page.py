@@ -1,7 +1,7 @@
-"""A self-contained HTML page: text, tables and pictures in one file, to be read on a phone, at a desk or on paper.
+"""A self-contained HTML page of text, tables and pictures, for a phone, a desktop or paper.
 
-Nothing is fetched: pictures are data in the page, and letters are the reader's own. The one script is the player of
-`geomech.player`; a content security policy lets no other run and asks for nothing from elsewhere.
+Nothing is fetched: pictures are data in the page, and fonts are the reader's own. The only script is the player of
+`geomech.player`; a content security policy blocks all others and all requests.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from typing import Any
 from ..player.page import player, policy
 from .table import is_number
 
-#: What a page without a player may do: show its own pictures.
+#: Permissions of a page without a player: its own pictures.
 _PLAIN = "default-src 'none'; style-src 'unsafe-inline'; img-src data:; base-uri 'none'; form-action 'none'"
 _KINDS = {".png": "image/png", ".svg": "image/svg+xml", ".gif": "image/gif", ".jpg": "image/jpeg"}
 _RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
@@ -111,7 +111,7 @@ td.bar span { display: block; height: .7rem; border-radius: .15rem; background: 
 
 
 class Page:
-    """A page in the making: every method adds below what is there."""
+    """A page under construction: every method appends to it."""
 
     def __init__(self, title: str, lead: str = "") -> None:
         self.title = title
@@ -141,7 +141,7 @@ class Page:
             self._body.append(f'<dl class="facts">{"".join(tiles)}</dl>')
 
     def table(self, headers: Sequence[str], rows: Iterable[Sequence[Any]], caption: str = "") -> None:
-        """A row a sequence of cells: words, numbers, None. Columns of numbers are set to the right."""
+        """Each row is a sequence of cells: text, numbers, None. Columns of numbers are right-aligned."""
         rows = [list(row) for row in rows]
         words = [any(isinstance(row[k], str) and not is_number(row[k]) for row in rows) for k in range(len(headers))]
         long = [any(isinstance(row[k], str) and len(row[k]) > 40 for row in rows) for k in range(len(headers))]
@@ -177,7 +177,8 @@ class Page:
         )
 
     def figures(self, pictures: Iterable[tuple[Path, str]], least_rem: float = 17.0, whole: bool = False) -> None:
-        """(file, caption) side by side as far as each keeps ``least_rem`` of width; ``whole``: one below the other."""
+        """(file, caption) side by side as far as each keeps a width of ``least_rem``; ``whole``: one below the
+        other."""
         size = "--least:100%" if whole else f"--least:{least_rem:g}rem"
         shown = [
             f'<figure><img alt="{html.escape(caption, quote=True)}" src="{_data(path)}">'
@@ -188,7 +189,7 @@ class Page:
             self._body.append(f'<div class="figures" style="{size}">{"".join(shown)}</div>')
 
     def play(self, records: Sequence[Mapping[str, Any]]) -> None:
-        """The player of runs (`geomech.player.page.records_of`), wider than the text; a page has one."""
+        """The player of runs (`geomech.player.page.records_of`), wider than the text; at most one per page."""
         if self._plays:
             raise ValueError(f"{self.title}: a page plays its runs in one place")
         self._plays = True
@@ -198,7 +199,7 @@ class Page:
         self._body.append(f"<pre>{html.escape(text)}</pre>")
 
     def folded(self, summary: str, text: str) -> None:
-        """``text`` as it stands, shown when ``summary`` is touched."""
+        """``text`` verbatim, shown when ``summary`` is opened."""
         self._body.append(f"<details><summary>{html.escape(summary)}</summary><pre>{html.escape(text)}</pre></details>")
 
     def __str__(self) -> str:
@@ -213,7 +214,7 @@ class Page:
         )
 
     def write(self, path: Path) -> Path:
-        """The page as the file ``path``, whole or not at all."""
+        """Write the page to ``path``, atomically."""
         path.parent.mkdir(parents=True, exist_ok=True)
         beside = path.with_name(path.name + ".part")
         beside.write_text(str(self), encoding="utf-8")
@@ -222,7 +223,7 @@ class Page:
 
 
 def written(value: Any) -> str:
-    """A cell: words as they are, numbers to four digits, what is not there as a dash."""
+    """A cell: text unchanged, numbers with four digits, missing values as a dash."""
     if value is None or (isinstance(value, float) and math.isnan(value)):
         return "–"
     if isinstance(value, bool):

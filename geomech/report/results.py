@@ -20,13 +20,14 @@ if TYPE_CHECKING:
 
     from ..player.widget import RunPlayer
 
-#: Entries of the summary that a notebook shows, where the run has them.
+#: Entries of the summary shown in a notebook, if the run has them.
 _SHOWN = ("end", "time_s", "peak_load_pa", "wall_s")
 
 
 def open_run(folder: str | Path) -> RunResults:
-    """The run in ``folder``, one that lasts or failed included, as far as it has come. Raises FileNotFoundError where
-    there is none, with the runs below the folder, if any.
+    """The run in ``folder``, as far as it has come; it may still be running or have failed.
+
+    Raises FileNotFoundError if there is none, naming the runs below the folder, if any.
 
     >>> results = geomech.open_run("outputs/slope")
     >>> results.history[["time", "open_close_iterations"]].shape
@@ -47,7 +48,7 @@ def open_run(folder: str | Path) -> RunResults:
 
 
 class RunResults:
-    """What a run has left in its folder. Nothing is read before it is asked for; units as in the files (SI)."""
+    """Results of a run in its folder, read lazily; units as in the files (SI)."""
 
     def __init__(self, run: Run) -> None:
         self._run = run
@@ -57,7 +58,7 @@ class RunResults:
 
     @property
     def folder(self) -> Path:
-        """Where the run is."""
+        """The run's folder."""
         return self._run.folder
 
     @property
@@ -67,46 +68,48 @@ class RunResults:
 
     @property
     def summary(self) -> dict[str, Any]:
-        """``summary.json``; empty while the run lasts."""
+        """``summary.json``; empty during the run."""
         return self._run.summary
 
     @property
     def scene(self) -> dict[str, Any]:
-        """The scene as it was understood, every default filled in."""
+        """The resolved scene, with all defaults filled in."""
         return self._run.scene
 
     @cached_property
     def history(self) -> pandas.DataFrame:
-        """A row a cycle: time (s), load (Pa), energies (J/m), displacements of monitors (m), …"""
+        """One row per cycle: time (s), load (Pa), energies (J/m), displacements of monitors (m), …"""
         return _frame(self._run.history)
 
     @cached_property
     def tips(self) -> pandas.DataFrame:
-        """A row a crack tip and cycle: K_I, K_II, K_eq (Pa √m), place (m), growth (m)."""
+        """One row per crack tip and cycle: K_I, K_II, K_eq (Pa √m), location (m), growth (m)."""
         return _frame(self._run.tips)
 
     @cached_property
     def events(self) -> pandas.DataFrame:
-        """A row an event: kind, cycle, time (s), load (Pa), place (m), detail."""
+        """One row per event: kind, cycle, time (s), load (Pa), location (m), detail."""
         return _frame(self._run.events)
 
     @cached_property
     def joints(self) -> pandas.DataFrame:
-        """A row a joint and cycle, where the run has written ``joints.csv``: lengths, openings and slips (m), forces
+        """One row per joint and cycle, if the run has written ``joints.csv``: lengths, openings and slips (m), forces
         (N/m)."""
         return _frame(read_table(self.folder / "joints.csv", ("cycle", "time")))
 
     @property
     def series(self) -> list[str]:
-        """The series that the run has written for ParaView, by name."""
+        """The written ParaView series, by name."""
         from ..output.fields import SERIES
 
         return [name for name in SERIES if self._run.series(name)]
 
     def mesh(self, series: str = "blocks", cycle: int | None = None, time: float | None = None) -> pyvista.DataSet:
-        """A ``series`` as a PyVista mesh at a ``cycle`` or ``time`` (s), or the last one written before it; at the end of
-        the run where neither is given. Raises KeyError for a series that was not written and a time before its first
-        cycle."""
+        """A ``series`` as a PyVista mesh at a ``cycle`` or ``time`` (s), or at the last one written before it.
+
+        Without either, the end of the run. Raises KeyError for a series that was not written and a time before its
+        first cycle.
+        """
         if series not in self.series:
             raise KeyError(f"{self.folder} has no series {series!r}; it has {', '.join(self.series) or 'none'}")
         if cycle is not None and time is not None:
@@ -121,8 +124,11 @@ class RunResults:
         return self._run.grid(series, cycle)
 
     def plot(self, out: str | Path | None = None, **options: Any) -> list[Path]:
-        """The usual pictures, movie and curves, into ``out`` (default: ``pictures`` in the run folder); their paths.
-        ``options`` as of `geomech.render.draw`: component, width, movie."""
+        """Draw the usual pictures, movie and curves into ``out`` (default: ``pictures`` in the run folder); returns
+        their paths.
+
+        ``options`` as of `geomech.render.draw`: component, width, movie.
+        """
         from ..render import draw
 
         return draw(self._run, out, **options)
@@ -162,8 +168,8 @@ def _frame(table: np.ndarray) -> pandas.DataFrame:
         import pandas
     except ImportError as error:
         raise ImportError(
-            "tables come as pandas DataFrames: `pip install pandas`; without it `geomech.output.Run(folder)` has them "
-            "as NumPy arrays"
+            "tables are pandas DataFrames: `pip install pandas`; without it use `geomech.output.Run(folder)`, which "
+            "has NumPy arrays"
         ) from error
     frame = pandas.DataFrame(table)
     for name in ("cycle", "crack", "end", "tip", "load_step", "growth_pass"):

@@ -1,5 +1,4 @@
-"""The page of one run: what it is, what it came to, pictures, curves, events, where its time went, how to make it
-again."""
+"""Page of one run: input, results, pictures, curves, events, computing time, and how to reproduce it."""
 
 from __future__ import annotations
 
@@ -18,12 +17,12 @@ from ..player.page import records_of
 from .energy_tables import add_energy
 from .page import Page, written
 
-#: A record of the log, which may run over several lines, up to the next.
+#: A record of the log, which may extend over several lines, up to the next.
 _RECORD = re.compile(r"^\d{4}-\d\d-\d\d \S+ (\w+) +[\w.]+: (.*?)(?=^\d{4}-\d\d-\d\d |\Z)", re.MULTILINE | re.DOTALL)
 
-#: So many events or tips are listed; the CSV files have them all.
+#: Number of listed events or tips; the CSV files hold all.
 LISTED = 40
-#: Material keys that are shown → header, factor.
+#: Displayed material keys → header, factor.
 _MATERIAL = {
     "youngs_modulus_pa": ("E, GPa", 1e-9),
     "poissons_ratio": ("ν", 1.0),
@@ -40,14 +39,14 @@ _JOINT = {
 
 
 def page_of_run(run: Run, play: bool = True) -> Page:
-    """The page of ``run``, pictures and curves drawn on the way; with ``play`` its cycles can be played."""
+    """Page of ``run``, whose pictures and curves are drawn for it; with ``play`` it includes a player."""
     summary = run.summary
     page = Page(run.title, f"{_ended(summary)} · run folder {run.folder}")
     page.facts(key_results(run))
     add_warnings(page, run)
     if play:
         add_player(page, [run])
-    page.section("What was run")
+    page.section("Input")
     add_scene(page, run)
     add_pictures(page, run)
     add_curves(page, run)
@@ -55,13 +54,13 @@ def page_of_run(run: Run, play: bool = True) -> Page:
     _add_tips(page, run)
     _add_blocks(page, summary)
     add_time(page, summary)
-    page.section("How to make it again")
+    page.section("How to reproduce it")
     add_remaking(page, run)
     return page
 
 
 def add_player(page: Page, runs: Sequence[Run]) -> None:
-    """The cycles of ``runs`` with a slider over them, where they have been drawn."""
+    """Player of the cycles of ``runs`` that have been drawn."""
     records = records_of(runs)
     if not records:
         return
@@ -70,12 +69,14 @@ def add_player(page: Page, runs: Sequence[Run]) -> None:
     thinned = [f"{r['name']} {len(r['frames'])} of {r['of']}" for r in records if len(r["frames"]) < r["of"]]
     notes = [f"Cycles that the page holds: {', '.join(thinned)}."] if thinned else []
     if len(runs) > len(records):
-        notes.append(f"{len(records)} of {len(runs)} runs play here; `geomech report RUN RUN` takes those you name.")
+        notes.append(
+            f"{len(records)} of {len(runs)} runs are shown here; `geomech report RUN RUN` shows the named ones."
+        )
     page.text(*notes)
 
 
 def key_results(run: Run) -> dict[str, Any]:
-    """What a run came to, a few numbers; what it has not is left out."""
+    """Results of a run in a few numbers; missing ones are left out."""
     summary = run.summary
     first = summary.get("first", {})
 
@@ -105,18 +106,18 @@ def key_results(run: Run) -> dict[str, Any]:
     facts["blocks"] = summary.get("blocks")
     facts["cycles"] = summary.get("cycles")
     facts["time simulated, s"] = summary.get("time_s")
-    facts["at the end blocks are"] = summary.get("motion", {}).get("condition") or None
+    facts["blocks at the end"] = summary.get("motion", {}).get("condition") or None
     facts["mind"] = NO_ANSWER if "mechanism" in first else None
     facts["computed in, s"] = scaled("wall_s", 1.0, ".1f")
     return facts
 
 
 def _ended(summary: Mapping[str, Any]) -> str:
-    return f"Ended: {summary['end']}" if "end" in summary else "Still going, or stopped without a summary"
+    return f"Ended: {summary['end']}" if "end" in summary else "Still running, or stopped without a summary"
 
 
 def add_warnings(page: Page, run: Run) -> None:
-    """Warnings and errors of the run's log."""
+    """Warnings and errors in the run's log."""
     path = run.folder / "run.log"
     text = path.read_text(encoding="utf-8", errors="replace") if path.is_file() else ""
     lines = [" ".join(words.split()) for level, words in _RECORD.findall(text) if level in ("WARNING", "ERROR")]
@@ -130,7 +131,7 @@ def add_warnings(page: Page, run: Run) -> None:
 
 
 def add_scene(page: Page, run: Run) -> None:
-    """The scene in a few tables, and the whole of it folded."""
+    """The scene in a few tables, and in full in a folded section."""
     scene = run.scene
     if not scene:
         page.text("The run was not made from a scene file.")
@@ -156,7 +157,7 @@ def add_scene(page: Page, run: Run) -> None:
                 ],
                 caption,
             )  # fmt: skip
-    page.folded("The whole scene, as it was run", (run.folder / "scene.toml").read_text(encoding="utf-8"))
+    page.folded("The complete scene", (run.folder / "scene.toml").read_text(encoding="utf-8"))
 
 
 def _times(value: Any, factor: float) -> float | None:
@@ -181,20 +182,20 @@ def _moment(run: Run, cycle: int) -> str:
     return f"{load}t = {written(float(row['time']))} s, cycle {written(cycle)}"
 
 
-#: Curve's file → caption.
+#: File of a curve → caption.
 _CURVES = {
     "stress_strain": "Load and axial strain.",
     "stress_intensity": "K_I (full) and K_II (dashed) of the tips.",
     "crack_length": "Length of all cracks.",
-    "energy": "What the work done went into.",
-    "monitors": "Ways of the monitored points.",
-    "joints": "Mean slip of the joints that slipped farthest.",
-    "bolts": "Forces of the bolts that carry most.",
+    "energy": "Use of the work done.",
+    "monitors": "Displacements of the monitored points.",
+    "joints": "Mean slip of the joints with the largest slip.",
+    "bolts": "Largest bolt forces.",
 }
 
 
 def add_curves(page: Page, run: Run) -> None:
-    """The run's curves, as drawings that stay sharp."""
+    """The run's curves, as vector graphics."""
     from ..render.curves.plots import plots
 
     if not len(run.history):
@@ -282,25 +283,27 @@ def _add_blocks(page: Page, summary: Mapping[str, Any]) -> None:
 
 
 def add_time(page: Page, summary: Mapping[str, Any]) -> None:
-    """Where the seconds went, by phase."""
+    """Computing time by phase."""
     seconds = summary.get("seconds")
     if not seconds:
         return
-    page.section("Where the time went")
+    page.section("Computing time")
     spent = dict(sorted(seconds.items(), key=lambda pair: -pair[1]))
     rest = summary.get("wall_s", 0.0) - sum(spent.values())
     page.bars(["phase", "s"], spent | ({"the rest": rest} if rest > 0 else {}))
     work = summary.get("crack_solver")
     if work:
-        page.table(["what the crack solver did", "times"], [[name.replace("_", " "), n] for name, n in work.items()])
+        page.table(
+            ["operations of the crack solver", "times"], [[name.replace("_", " "), n] for name, n in work.items()]
+        )
     skipped = summary.get("skipped")
     if skipped:
         rows = [[entry.get("what", name), entry["count"], entry.get("saved_s")] for name, entry in skipped.items()]
-        page.table(["what had not to be done", "times", "saved, s"], rows)
+        page.table(["skipped work", "times", "saved, s"], rows)
 
 
 def add_remaking(page: Page, run: Run) -> None:
-    """The commands that make the run and this page again, and the versions that made them."""
+    """Commands that reproduce the run and this page, and the versions used."""
     kept = run.folder / "scene.toml"
     again = f"geomech run {kept} --out {run.folder}_again\n" if kept.is_file() else ""
     page.code(f"{again}geomech report {run.folder}")

@@ -1,5 +1,5 @@
-"""What an engineer reports of a factor of safety: the factor and its bracket, the mechanism, how far joints are
-mobilised, what anchors carry and toes hold, and what the search itself left out."""
+"""Report of a factor of safety: factor and bracket, mechanism, mobilised strength of joints, forces of anchors and
+toes, and the limits of the search."""
 
 from __future__ import annotations
 
@@ -17,18 +17,23 @@ from ..dda.statics.partial_factors import PartialFactors
 from ..dda.statics.safety_answer import FactorOfSafety
 from ..model import OPEN, SLIP, Problem, counted
 
-#: A block slides when it turns by less than the first of these (rad) as it goes its own size √area, topples when it
-#: turns by more than the second, about a point no farther off than two of its sizes; between, it does both.
+#: A block slides if it rotates by less than the first value (rad) while it moves by its own size √area; it topples if
+#: it rotates by more than the second about a point within two of its sizes; in between it does both.
 SLIDES, TOPPLES = 0.05, 0.5
-#: This many blocks and joints are named in the text; files list all of them.
+#: Number of blocks and joints in the text; files list all of them.
 _LISTED = 8
 
 
 @dataclass(frozen=True)
 class MovingBlock:
-    """How a block moves at failure: ``part`` of the farthest one's way, ``towards`` degrees from +x counter-clockwise,
-    turning by ``turn`` rad (left positive) while it goes its own size, and so by ``kind``: "slides", "topples" or
-    "slides and topples"; ``displacement`` (x, y) with the farthest one's as 1."""
+    """Motion of a block at failure.
+
+    part           displacement relative to the farthest block's
+    towards        direction, degrees from +x counter-clockwise
+    turn           rotation, rad (positive counter-clockwise), while it moves by its own size
+    kind           "slides", "topples" or "slides and topples"
+    displacement   (x, y), relative to the farthest block's
+    """
 
     name: str
     part: float
@@ -47,13 +52,13 @@ class MovingBlock:
 
 @dataclass(frozen=True, eq=False)
 class SafetyReport:
-    """A ``found`` factor of ``problem`` (with design strengths, see `design_problem`) as it is reported.
+    """Report of a factor ``found`` for ``problem`` (with design strengths, see `design_problem`).
 
-    reduced      names of the laws whose strength was reduced; None: of all
-    divide       partial factors on strengths before
-    along        the joints as they were asked for; None: all
+    reduced      names of the laws whose strength was reduced; None: all
+    divide       partial factors applied to strengths first
+    along        the joints as requested; None: all
     cracks       names of cracks that were left out
-    tolerance    relative width of the bracket that was asked for
+    tolerance    requested relative width of the bracket
     """
 
     problem: Problem
@@ -65,7 +70,7 @@ class SafetyReport:
     tolerance: float = 2e-3
 
     def moving(self) -> list[MovingBlock]:
-        """Those that move at failure, the fastest first."""
+        """Blocks that move at failure, the fastest first."""
         failed = min((t for t in self.found.trials if not t.stable), key=lambda t: t.factor, default=None)
         if failed is None or not self.found.moving:
             return []
@@ -82,19 +87,19 @@ class SafetyReport:
 
     @property
     def mechanism(self) -> str:
-        """In a word: "sliding", "toppling", "sliding and toppling"; empty where nothing fails."""
+        """One of "sliding", "toppling", "sliding and toppling"; empty if nothing fails."""
         kinds = Counter(each.kind for each in self.moving())
         words = {"sliding": "slides", "toppling": "topples"}
         return " and ".join(word for word, kind in words.items() if any(kind in each for each in kinds))
 
     def joints(self) -> list[MobilisedJoint]:
-        """In the equilibrium at ``found.lower``."""
+        """Joints in the equilibrium at ``found.lower``."""
         return mobilised_joints(
             self.problem.blocks, self.problem.joints, self.found.state, self.found.lower, self.reduced
         )
 
     def sliding_faces(self) -> np.ndarray:
-        """(n, 2, 2) m: the faces of two blocks that have mobilised all their strength, from end to end."""
+        """(n, 2, 2) m: faces between two blocks that have mobilised all their strength."""
         rows = self.found.state.contacts
         rows = rows[rows["length"] > 0]
         pairs = np.sort(np.stack([rows["block"], rows["other"]], axis=1), axis=1)
@@ -108,7 +113,7 @@ class SafetyReport:
         return np.array(out).reshape(-1, 2, 2)
 
     def strain(self) -> tuple[float, str]:
-        """The largest elastic strain of a block at ``found.lower``, and which block's."""
+        """Largest elastic strain of a block at ``found.lower``, and the block."""
         problem, state = self.problem, self.found.state
         free = np.flatnonzero(~problem.blocks.fixed)
         modulus = np.array([m.plane_modulus for m in problem.materials])[problem.blocks.material[free]]
@@ -118,7 +123,7 @@ class SafetyReport:
         return float(share[worst]), problem.blocks.names[free[worst]]
 
     def text(self, title: str = "factor of safety") -> str:
-        """For the terminal."""
+        """Report for the terminal."""
         found, names = self.found, self.problem.blocks.names
         if math.isfinite(found.upper):
             lines = [f"{title} {found.factor:.4f} (equilibrium at {found.lower:.4f}, none at {found.upper:.4f})"]
@@ -126,9 +131,9 @@ class SafetyReport:
             lines = [f"{title} above {found.lower:g}: the search ends there"]
         if not self.divide.plain:
             enough = "suffices" if found.lower >= 1 or found.factor >= 1 else "does not suffice"
-            lines.append(f"  on top of partial factors: {self.divide}; the design strength {enough}")
+            lines.append(f"  in addition to partial factors: {self.divide}; the design strength {enough}")
         if self.along is not None:
-            lines.append(f"  reduced along {', '.join(self.along)} alone")
+            lines.append(f"  reduced along {', '.join(self.along)} only")
         moving = self.moving()
         if moving:
             lines.append(f"mechanism: {self.mechanism}, moving at failure:")
@@ -149,7 +154,7 @@ class SafetyReport:
                     f"; {'without them' if found.toes_hold else 'with sharp tips'} the factor is {found.other_factor:.4f}"
                 )
             )
-            lines.append(f"toes that {'hold' if found.toes_hold else 'touch, rounded, and hold nothing'}{other}:")
+            lines.append(f"toes that {'hold' if found.toes_hold else 'touch when rounded, and do not hold'}{other}:")
             lines += [
                 f"  of {names[t.block]} on {names[t.other]} at x = {t.at[0]:.4g}, y = {t.at[1]:.4g} m"
                 + (f": {t.force / 1e3:.4g} kN/m" if found.toes_hold else "")
@@ -185,7 +190,7 @@ class SafetyReport:
         cracks = f"{counted(len(self.cracks), 'crack')} left out, " if self.cracks else ""
         return (
             f"search: {cracks}{len(found.trials)} trials; at the factor blocks have moved by "
-            f"{1e3 * found.moved[far]:.3g} mm at most ({blocks.names[far]}) and are strained by {strain:.2g} ({strained}); what moves beyond "
+            f"{1e3 * found.moved[far]:.3g} mm at most ({blocks.names[far]}) and are strained by {strain:.2g} ({strained}); blocks that move by more than "
             f"{MOVED:g} of its size √area and what elasticity explains has failed"
         )
 

@@ -1,5 +1,4 @@
-"""A part of a study's comparison: a title, a table, what there is to say about it; for the terminal and for the page
-alike."""
+"""Part of a study's comparison: title, table and text, for the terminal and the page."""
 
 from __future__ import annotations
 
@@ -14,7 +13,7 @@ from .table import aligned
 
 @dataclass(frozen=True)
 class Part:
-    """``rows`` are cells under ``headers``: words, numbers, None; ``before`` and ``after`` sentences around the
+    """``rows`` are cells under ``headers``: text, numbers, None; ``before`` and ``after`` are sentences around the
     table."""
 
     title: str

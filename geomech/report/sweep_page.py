@@ -1,5 +1,4 @@
-"""The page of a sweep: how often it fails and how sure that is, what that depends on, what moves and how, what it
-took."""
+"""Page of a sweep: probability of failure with its confidence interval, sensitivities, mechanisms, computing time."""
 
 from __future__ import annotations
 
@@ -29,19 +28,19 @@ from ..sweep.statistics import (
 )  # fmt: skip
 from .page import Page
 
-#: So many variables are drawn, those with the largest swing.
+#: Number of variables shown, those with the largest effect.
 _DRAWN = 9
-#: Columns that are summed up, where runs have them.
+#: Columns with statistics, if runs have them.
 _RESULTS = (
     "moved_volume", "moved_mass", "moving_blocks", "run_out_m", "peak_load_pa", "initiation_load_pa",
     "coalescence_load_pa", "crack_growth_m", "key_blocks", "largest_displacement_m", "blocks",
 )  # fmt: skip
-#: This many reasons, mechanisms and columns are shown.
+#: Number of reasons, mechanisms and columns shown.
 _LISTED = 20
 
 
 def page_of_sweep(folder: Path | str) -> Page:
-    """The page of the sweep in ``folder``, as far as it has come. Raises FileNotFoundError, SceneError."""
+    """Page of the sweep in ``folder``, as far as it has come. Raises FileNotFoundError, SceneError."""
     found = read_sweep(folder)
     page = Page(f"Sweep: {found.plan.title}", f"{len(found.rows)} runs · {found.folder}")
     with tempfile.TemporaryDirectory() as place:
@@ -50,7 +49,7 @@ def page_of_sweep(folder: Path | str) -> Page:
 
 
 class _Writer:
-    """Adds section after section; ``place`` takes pictures until the page is written."""
+    """Adds section after section; ``place`` holds pictures until the page is written."""
 
     def __init__(self, page: Page, found: Sweep, place: Path) -> None:
         self.page, self.found, self.place = page, found, place
@@ -100,24 +99,24 @@ class _Writer:
         self.page.facts(facts)
         if not self.found.complete:
             self.page.warning(
-                f"The sweep is not complete: {len(self.rows)} of {len(self.found.plan.table)} runs. To go on: "
+                f"The sweep is not complete: {len(self.rows)} of {len(self.found.plan.table)} runs. To continue: "
                 "geomech sweep … --resume"
             )
         if self.found.rare is None and sure.few and sure.failures < sure.answered:
             self.page.warning(
                 f"Only {sure.failures} runs failed: the probability of failure is known to its order of "
-                "magnitude. More runs, or --rare subset, would be surer."
+                "magnitude. More runs, or --rare subset, would reduce the uncertainty."
             )
         if sure.answered < sure.runs and self.found.rare is None:
             self.page.warning(
                 f"{sure.runs - sure.answered} runs have no answer and are left out of the probability of "
                 "failure; it would be "
-                f"{share_text(sure.least)} if all of them stood, {share_text(sure.most)} if all failed."
+                f"{share_text(sure.least)} if all of them were stable, {share_text(sure.most)} if all failed."
             )
 
     def _asked(self) -> None:
         plan, settings = self.found.plan, self.found.plan.settings
-        self.page.section("What was run")
+        self.page.section("Input")
         rows = [[each.name, str(each)] for each in plan.variables]
         rows += [[key, f"= {text}"] for key, text in plan.derived.items()]
         rows += [["joint seeds", f"{plan.seeds[0]} to {plan.seeds[-1]} ({len(plan.seeds)})"]] if plan.seeds else []
@@ -147,7 +146,7 @@ class _Writer:
             [
                 (
                     drawn,
-                    f"Left: runs by {self.label}, those that fail in red. Right: the share below, with the 95 "
+                    f"Left: runs by {self.label}, failed ones in red. Right: the cumulative distribution, with the 95 "
                     "% band of Dvoretzky, Kiefer and Wolfowitz.",
                 )
             ],
@@ -156,8 +155,7 @@ class _Writer:
         bounds = sum(bool(row.get("is_bound")) for row in self.done)
         if bounds:
             self.page.text(
-                f"Of {bounds} runs the factor is a bound: nothing failed up to the end of the search, or "
-                "cracks were left out."
+                f"Of {bounds} runs the factor is a bound: no failure up to the end of the search, or cracks left out."
             )
         quantiles = (0.01, 0.05, 0.25, 0.5, 0.75, 0.95, 0.99)
         self.page.table(
@@ -184,7 +182,7 @@ class _Writer:
                 f"Reliability index β = {rare.beta:.3f}",
             )
         self.page.text(
-            "Its runs are no plain samples: counts, maps and shares below are of those that the method has made."
+            "Its runs are not plain samples: counts, maps and shares below refer to the runs that the method has made."
         )
 
     def _convergence(self) -> None:
@@ -193,22 +191,22 @@ class _Writer:
             self.page.section("Convergence")
             drawn = sweep_figures.draw_convergence(table, self.place / "convergence.svg")
             self.page.figures(
-                [(drawn, "Probability of failure as runs are added, in the order of the table.")], whole=True
+                [(drawn, "Probability of failure against the number of runs, in the order of the table.")], whole=True
             )
 
     def _sensitivities(self) -> None:
         swings = tornado(self.done, self.names, self.result)
         if not swings or len(self._values()) < 3:
             return
-        self.page.section("What it depends on")
+        self.page.section("Sensitivities")
         middle = float(self._values().mean())
         drawn = sweep_figures.draw_tornado(swings[:_DRAWN], middle, self.label, self.place / "tornado.svg")
         self.page.figures(
             [
                 (
                     drawn,
-                    f"Mean {self.label} at both ends of each variable, all others as they come; lines: 95 % of "
-                    "the mean.",
+                    f"Mean {self.label} at both ends of each variable, with the others random; lines: 95 % "
+                    "interval of the mean.",
                 )
             ],
             whole=True,
@@ -222,12 +220,10 @@ class _Writer:
             self.page.text(f"No Sobol' indices: {missing}.")
             return
         drawn = sweep_figures.draw_sensitivities(found, self.place / "sensitivities.svg")
-        way = (
-            "Saltelli's design" if plan.settings["sampling"] == "saltelli" else "RBD-FAST from the samples as they are"
-        )
+        way = "Saltelli's design" if plan.settings["sampling"] == "saltelli" else "RBD-FAST from the given samples"
         self.page.figures([(drawn, f"Sobol' indices ({way}; SALib), with 95 % intervals.")], whole=True)
         if plan.settings["correlated"]:
-            self.page.text("Variables go together here: an index counts what comes with the variable, too.")
+            self.page.text("Variables are correlated: an index includes the effect of correlated ones.")
 
     def _responses(self) -> None:
         rows = [row for row in self.done if isinstance(row.get(self.result), (int, float))]
@@ -243,7 +239,7 @@ class _Writer:
             columns, numbers(rows, self.result), fails, self.label, self.place / "responses.png", self.limit
         )
         self.page.figures(
-            [(drawn, "Every run; red ones fail. Lines: means of tenths of the runs, or at each value.")], whole=True
+            [(drawn, "All runs, failed ones in red. Lines: means of tenths of the runs, or at each value.")], whole=True
         )
 
     def _map(self) -> None:
@@ -261,14 +257,14 @@ class _Writer:
         problem = load_scene(plan.scene, plan.changes(first), plan.variant, to_run=False).problem()
         blocks = problem.blocks
         outlines = [blocks.loops(b)[0] for b in range(blocks.n_blocks)]
-        self.page.section("Where it moves")
+        self.page.section("Moving region")
         drawn = sweep_figures.draw_map(shares, plan.box, outlines, blocks.fixed.tolist(), self.place / "map.png")
         what = "at failure, whatever the factor," if plan.settings["measure"] == "safety" else "in the run"
         self.page.figures(
             [
                 (
                     drawn,
-                    f"In how many of {len(rows)} runs each place moves {what} with the blocks of run {rows[0]['run']}.",
+                    f"Number of {len(rows)} runs in which each place moves {what}, with the blocks of run {rows[0]['run']}.",
                 )
             ],
             whole=True,
@@ -279,7 +275,7 @@ class _Writer:
         counts = Counter(str(row[kind]) for row in self.done if row.get(kind))
         if not counts:
             return
-        self.page.section("Mechanisms" if kind == "mechanism" else "How runs end")
+        self.page.section("Mechanisms" if kind == "mechanism" else "Ends of runs")
         total, table = sum(counts.values()), []
         for name, number in counts.most_common(_LISTED):
             own = [row for row in self.done if row.get(kind) == name]
@@ -340,23 +336,23 @@ class _Writer:
         seconds, processor = numbers(self.rows, "seconds"), numbers(self.rows, "processor_seconds")
         if not len(seconds):
             return
-        self.page.section("What it took")
+        self.page.section("Computing time")
         hosts = Counter(row.get("host") for row in self.rows)
         self.page.facts({
-            "a run, mean, s": float(seconds.mean()), "the longest, s": float(seconds.max()),
+            "per run, mean, s": float(seconds.mean()), "the longest, s": float(seconds.max()),
             "processor, h": float(processor.sum()) / 3600, "the sweep, s": self.found.seconds or None,
             "at a time": self.found.workers, "machines": len(hosts),
-            "handed out again": sum(int(row.get("attempts") or 1) > 1 for row in self.rows),
+            "repeated": sum(int(row.get("attempts") or 1) > 1 for row in self.rows),
         })  # fmt: skip
 
     def _again(self) -> None:
-        self.page.section("How to make it again")
+        self.page.section("How to reproduce it")
         plan = self.found.plan
-        lines = [f"geomech sweep {plan.scene} --out {self.found.folder} --resume        # what is missing",
+        lines = [f"geomech sweep {plan.scene} --out {self.found.folder} --resume        # missing runs",
                  f"geomech report {self.found.folder}"]  # fmt: skip
         if self.rows:
             values = {name: self.rows[0][name] for name in (*self.names, "seed") if name in self.rows[0]}
-            lines.append(plan.how_to_repeat(values) + f"        # run {self.rows[0]['run']} alone")
+            lines.append(plan.how_to_repeat(values) + f"        # run {self.rows[0]['run']} only")
         self.page.code("\n".join(lines))
 
 
@@ -366,7 +362,7 @@ def _mean(rows: Sequence[dict[str, Any]], name: str) -> float | None:
 
 
 def _limit(fails: str, result: str) -> float | None:
-    """The number that the ``result`` is compared with in the expression ``fails``."""
+    """The number with which the expression ``fails`` compares the ``result``."""
     head, sign, tail = fails.partition("<")
     try:
         return float(tail) if sign and head.strip() == result else None

@@ -1,4 +1,4 @@
-"""Several runs side by side: a row a run."""
+"""Table of several runs, one row each."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ _LOWERED = str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "-0123456789")
 
 _MPA = " MPa"
 
-#: Header → how a number is written.
+#: Header → format of its numbers.
 COLUMNS = {
     "run": "{}",
     "end": "{}",
@@ -30,7 +30,7 @@ COLUMNS = {
 
 
 def table(runs: Sequence[Run]) -> list[dict[str, Any]]:
-    """A row (header → value, None where a run has none) for each of ``runs``, from their summaries."""
+    """One row (header → value, None if missing) for each of ``runs``, from their summaries."""
     return [_row(run) for run in runs]
 
 
@@ -43,7 +43,7 @@ def _row(run: Run) -> dict[str, Any]:
         return None if value is None else value / scale
 
     def load(kind: str, what: str, scale: float = 1.0) -> float | None:
-        # Where no edge leads, a load of 0 says nothing.
+        # Without a leading edge the load is 0.
         return of(kind, what, scale) if run.led else None
 
     def plain(what: str, scale: float = 1.0) -> float | None:
@@ -65,8 +65,7 @@ def _row(run: Run) -> dict[str, Any]:
 
 
 def shown(rows: Sequence[dict[str, Any]]) -> list[Sequence[str | None]]:
-    """Headers and cells of the rows as they are read: columns that no run fills left out, loads in the unit that the
-    largest of them is shown in."""
+    """Headers and formatted cells of the rows, without empty columns, with loads in the unit of the largest."""
     headers = [name for name in COLUMNS if any(row[name] is not None for row in rows)]
     loads = [name for name in headers if name.endswith(_MPA)]
     largest = max((abs(row[name]) for row in rows for name in loads if row[name] is not None), default=0.0)
@@ -81,13 +80,12 @@ def shown(rows: Sequence[dict[str, Any]]) -> list[Sequence[str | None]]:
 
 
 def as_text(rows: Sequence[dict[str, Any]]) -> str:
-    """The rows as an aligned table, as they are `shown`."""
+    """The rows as an aligned table, formatted by `shown`."""
     return aligned([["-" if cell is None else cell for cell in line] for line in shown(rows)])
 
 
 def aligned(lines: Sequence[Sequence[str]]) -> str:
-    """The cells of ``lines``, the first of which are headers, in columns: those with words to the left, numbers to the
-    right."""
+    """Cells of ``lines`` (the first are headers) in columns: text left-aligned, numbers right-aligned."""
     widths = [max(map(len, column)) for column in zip(*lines)]
     words = [any(not is_number(cell) for cell in column[1:]) for column in zip(*lines)]
 
@@ -99,7 +97,7 @@ def aligned(lines: Sequence[Sequence[str]]) -> str:
 
 
 def is_number(text: str) -> bool:
-    """Whether a cell is a number, or the dash of one that is not there."""
+    """Whether a cell is a number, or the dash of a missing one."""
     try:
         float(text.replace("−", "-").replace("\u202f", "").replace("·10", "e").translate(_LOWERED))
     except ValueError:
@@ -108,7 +106,7 @@ def is_number(text: str) -> bool:
 
 
 def as_csv(rows: Sequence[dict[str, Any]]) -> str:
-    """The rows as CSV with every column, numbers in full."""
+    """The rows as CSV with every column, numbers in full precision."""
     text = io.StringIO()
     writer = csv.DictWriter(text, list(COLUMNS), lineterminator="\n")
     writer.writeheader()

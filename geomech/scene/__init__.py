@@ -1,4 +1,4 @@
-"""The scene file: typed tables, loading, checks that report every error at once, and the problem it describes."""
+"""The scene file: typed tables, loading, checks that report all errors at once, and the problem that it describes."""
 
 from .errors import Fault, SceneError
 from .keys import describe_keys

@@ -1,4 +1,4 @@
-"""The geometry of a scene as blocks and cracks, from a Gmsh model, from files of traces, or from the scene itself."""
+"""Geometry of a scene as blocks and cracks: from a Gmsh model, from files of traces, or from the scene itself."""
 
 from __future__ import annotations
 
@@ -24,20 +24,24 @@ from .world import local_origin, moved_section
 if TYPE_CHECKING:
     from .assembly.jointing import Jointed
 
-#: What warnings of mended joints begin with.
-MENDED = "mended while cutting"
+#: Prefix of warnings about repaired joints.
+MENDED = "repaired while cutting"
 
 
 @dataclass(frozen=True, eq=False)
 class Drawing:
-    """Blocks and cracks before materials and apertures are given. ``zones`` (n_blocks,) is the
-    name of the zone each block belongs to, ``cracks_drawn`` the names of the cracks, ``parameters`` those of a Gmsh
-    model, as used, ``choices`` the names of their values where they have such, ``model`` its file, ``joints`` what
-    edges along joints are called, whether or not a block has such an edge, ``jointed`` how they cut the rock.
-    ``blocks`` is None where the drawing cannot be assembled. ``marks`` are lines and points that cut nothing,
-    ``mark_places`` (path in the scene, where in the file) of each by name, ``crack_paths`` the paths of the drawn
-    cracks; ``origin`` m, world coordinates of what is (0, 0) in all these, ``crs`` their reference
-    system as a GeoJSON file says it; ``folder`` that of the scene."""
+    """Blocks and cracks before materials and apertures are assigned.
+
+    zones           (n_blocks,) zone of each block
+    cracks_drawn    names of the cracks
+    parameters      of a Gmsh model, as used; ``choices``: names of their values, if any; ``model``: its file
+    joints          names of edges along joints, with or without block edges; ``jointed``: how they cut the rock
+    blocks          None if the drawing cannot be assembled
+    marks           lines and points that cut nothing; ``mark_places``: (path in the scene, place in the file) by name
+    crack_paths     paths of the drawn cracks
+    origin          m, world coordinates of the origin of all these; ``crs``: their reference system as in GeoJSON
+    folder          of the scene
+    """
 
     zones: tuple[str, ...]
     cracks_drawn: tuple[str, ...]
@@ -56,19 +60,19 @@ class Drawing:
     folder: FilePath | None = None
 
     def assembled(self) -> tuple[Blocks, Cracks]:
-        """Blocks and cracks. Raises ValueError where the drawing cannot be assembled."""
+        """Blocks and cracks. Raises ValueError if the drawing cannot be assembled."""
         if self.blocks is None or self.cracks is None:
             raise ValueError("the drawing could not be assembled")
         return self.blocks, self.cracks
 
     def path_of_crack(self, name: str) -> Path:
-        """Where in the scene the crack ``name`` is drawn, or what made it."""
+        """Where in the scene the crack ``name`` is drawn, or what created it."""
         whole = ("geometry",) if self.model is None else ("geometry", "model")
         return self.crack_paths.get(name) or self.crack_paths.get(name.rpartition(" ")[0], whole)
 
     def choices_with_edge(self, name: str) -> str:
-        """The choices of one parameter with which the model has edges called ``name``, as a scene says them; empty
-        where there are none. The model is read again for each choice: this is for messages."""
+        """Choices of one parameter with which the model has edges called ``name``, as written in a scene; empty if
+        there are none. The model is read again for each choice: for messages only."""
         if self.model is None:
             return ""
         from ..shapes import GmshModelError, read_gmsh_model
@@ -90,8 +94,11 @@ class Drawing:
 
 @dataclass(eq=False)
 class _Parts:
-    """What is drawn so far, in world coordinates. ``sources`` says, for (part, index) or (part, name) of joints and
-    marks, where each stands: its path in the scene and, for other files, where there."""
+    """Parts drawn so far, in world coordinates.
+
+    ``sources`` gives for (part, index), or (part, name) of joints and marks, its path in the scene and, for other
+    files, its place there.
+    """
 
     zones: list[Zone] = field(default_factory=list)
     traces: list[Trace] = field(default_factory=list)
@@ -100,11 +107,11 @@ class _Parts:
     marks: list[Mark] = field(default_factory=list)
     sources: dict[tuple[str, int | str], tuple[Path, str]] = field(default_factory=dict)
     only_in: dict[int, Sequence[str]] = field(default_factory=dict)  # names of zones that a joint cuts
-    chords: Chords = field(default_factory=Chords.none)  # that stand for curves of models and files
+    chords: Chords = field(default_factory=Chords.none)  # of curves of models and files
 
     def add(self, read, source: Callable[[str, int], tuple[Path, str]], zones: Sequence[str] = ()) -> None:
-        """What a file holds: zones, traces, joints (that cut the named ``zones`` alone), marks, and edges where it has
-        such."""
+        """Add the content of a file: zones, traces, joints (which cut only the named ``zones``), marks, and edges if
+        any."""
         if zones:
             self.only_in.update((len(self.joints) + k, zones) for k in range(len(read.joints)))
         for part, mine, own in (
@@ -122,13 +129,13 @@ class _Parts:
                 mine.append(item)
 
     def arrays(self) -> list[np.ndarray]:
-        """All points of the rock and what cuts it."""
+        """All points of the rock and of the lines that cut it."""
         return [loop for zone in self.zones for loop in zone.loops] + [
             line for item in (*self.traces, *self.joints) for line in item.lines
         ]
 
     def move(self, origin: np.ndarray) -> None:
-        """Count from ``origin`` (2,), m."""
+        """Make coordinates relative to ``origin`` (2,), m."""
 
         def lines(items):
             return [replace(item, lines=tuple(line - origin for line in item.lines)) for item in items]
@@ -149,7 +156,7 @@ def draw(
     faults: list[Fault],
     warnings: list[Fault],
 ) -> Drawing | None:
-    """Read or make the drawing; what is wrong goes to ``faults``. None where not even its names are known."""
+    """Read or make the drawing; errors are added to ``faults``. None if not even its names are known."""
     parts, parameters, choices = _Parts(), {}, {}
     model = None if geometry.model is None else folder / geometry.model
     if model is not None:
@@ -175,8 +182,8 @@ def draw(
         faults.append(
             Fault(
                 place(("geometry", "traces")),
-                f"no rock: none of the layers is a zone, they are sets of joints ({layers})",
-                'say which layer holds the outline: layers = { "NAME" = "zone:rock", "*" = "" }, or add '
+                f"no rock: none of the layers is a zone; they are sets of joints ({layers})",
+                'state which layer holds the outline:  layers = { "NAME" = "zone:rock", "*" = "" }, or add '
                 "[[geometry.zones]]",
             )
         )
@@ -205,7 +212,7 @@ def draw(
 
 
 def _draw_here(geometry: Geometry, parts: _Parts) -> None:
-    """What the scene draws itself."""
+    """The parts drawn in the scene itself."""
     parts.zones += [Zone(z.name, _loops(z)) for z in geometry.zones]
     parts.traces += [Trace(c.name, (_line(c),)) for c in geometry.cracks]
     parts.edges += [EdgeLine(e.name, *e.line, e.zone) for e in geometry.edges]
@@ -229,7 +236,7 @@ def _refuse_two_of_a_name(parts: _Parts, place: Callable[[Path], str], faults: l
 def _read_model(
     geometry: Geometry, model: FilePath, folder: FilePath, place: Callable[[Path], str], faults: list[Fault]
 ):
-    """The `GmshDrawing` of the model, without parameters that are faulty; None where it cannot be read."""
+    """The `GmshDrawing` of the model, without faulty parameters; None if it cannot be read."""
     # Imported here: a scene drawn in TOML needs no Gmsh.
     from ..shapes import GmshModelError, GmshUnavailable, read_gmsh_model
 
@@ -259,7 +266,7 @@ def _assembled(
     faults: list[Fault],
     warnings: list[Fault],
 ) -> Drawing:
-    """``drawing`` with the blocks and cracks that ``parts`` make, or without them where they make none."""
+    """``drawing`` with the blocks and cracks of ``parts``, or without them if they cannot be assembled."""
     names = tuple(zone.name for zone in parts.zones)
     drawing = replace(
         drawing,
@@ -286,7 +293,7 @@ def _assembled(
         _warn_outside(geometry, parts, place, warnings)
         cut = jointed(geometry, parts.zones, blocks, parts.traces, parts.joints, parts.chords)
     except ShapeError as error:
-        counted_from = f"; coordinates count from ({origin[0]:.10g}, {origin[1]:.10g})" if origin.any() else ""
+        counted_from = f"; coordinates are relative to ({origin[0]:.10g}, {origin[1]:.10g})" if origin.any() else ""
         # Joints are counted by name: the scene's own, then those of files.
         own = [JOINT + joint.name for joint in geometry.joints]
         ordered = list(dict.fromkeys([*own, *(joint.name for joint in parts.joints)]))
@@ -310,7 +317,7 @@ def _assembled(
 
 
 def _source(flaw: Flaw, parts: _Parts, joints: Sequence[str], own: Sequence[str]) -> tuple[Path, str]:
-    """Path in the scene, and place in another file, of what a flaw is about."""
+    """Path in the scene, and place in another file, of the part with a flaw."""
     key: int | str = flaw.index
     index = flaw.index
     if flaw.part == "joints" and flaw.index < len(joints):
@@ -320,8 +327,7 @@ def _source(flaw: Flaw, parts: _Parts, joints: Sequence[str], own: Sequence[str]
 
 
 def _warn_outside(geometry: Geometry, parts: _Parts, place: Callable[[Path], str], warnings: list[Fault]) -> None:
-    """Warn of joints, drawn in the scene or from files, of which nothing lies in the rock: units or origins that
-    differ."""
+    """Warn of joints, drawn in the scene or from files, that lie outside the rock: wrong units or origin."""
     import shapely
 
     found = [

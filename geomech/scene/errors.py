@@ -1,4 +1,4 @@
-"""What is wrong with a scene, all of it at once."""
+"""Errors of a scene, reported all at once."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 
 class Fault(NamedTuple):
-    """``place``: file, line and dotted key; ``message``: what is wrong; ``way_out``: what to write instead."""
+    """``place``: file, line and dotted key; ``message``: the error; ``way_out``: the remedy."""
 
     place: str
     message: str
@@ -18,15 +18,15 @@ class Fault(NamedTuple):
         return f"{self.place}\n    {self.message}" + (f"\n    → {self.way_out}" if self.way_out else "")
 
 
-#: Names in quotes and numbers: what two warnings of one cause differ by.
+#: Names in quotes and numbers, in which two warnings of one cause differ.
 _OWN = re.compile(r"'[^']*'|[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?")
-#: So many of the others are named.
+#: Number of other names given.
 _NAMED = 3
 
 
 def one_a_cause(warnings: Sequence[Fault]) -> list[Fault]:
-    """``warnings`` of one place and way out that differ in names and numbers alone made one, the first, with the count
-    of the others and some of their names."""
+    """``warnings`` with one place and way out that differ in names and numbers only, merged into the first, with the
+    number of the others and some of their names."""
     kinds: dict[tuple[str, str, str], list[Fault]] = {}
     for warning in dict.fromkeys(warnings):
         kinds.setdefault((warning.place, _OWN.sub("#", warning.message), warning.way_out), []).append(warning)

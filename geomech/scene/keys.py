@@ -1,4 +1,4 @@
-"""The keys of a scene: what each is, listed for people and looked up for error messages."""
+"""Keys of a scene: their types and descriptions, for listings and error messages."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def bare(annotation: Any) -> Any:
 
 
 def kind_of(annotation: Any) -> tuple[str, Any]:
-    """("table", its class), ("map", what its values are), ("list", what its items are) or ("value", the type)."""
+    """("table", its class), ("map", type of its values), ("list", type of its items) or ("value", the type)."""
     inner = bare(annotation)
     if isinstance(inner, type) and issubclass(inner, BaseModel):
         return "table", inner
@@ -47,7 +47,7 @@ def kind_of(annotation: Any) -> tuple[str, Any]:
 
 
 def table_at(path: tuple[str | int, ...]) -> type[BaseModel] | None:
-    """The table class at ``path`` of a scene; None where there is a value or nothing."""
+    """The table class at ``path`` of a scene; None if there is a value or nothing."""
     kind, what = "table", SceneTables
     for part in path:
         if kind == "table":
@@ -63,18 +63,18 @@ def table_at(path: tuple[str | int, ...]) -> type[BaseModel] | None:
 
 
 def keys_of(table: type[BaseModel]) -> list[str]:
-    """The keys of ``table`` as they are written."""
+    """The keys of ``table`` as written in a scene."""
     return [field.alias or name for name, field in table.model_fields.items()]
 
 
 def field_of(table: type[BaseModel], key: str | int) -> FieldInfo | None:
-    """The field of a ``table`` with this key; None where it has none."""
+    """The field of ``table`` with this key; None if it has none."""
     return next((f for name, f in table.model_fields.items() if key in (name, f.alias)), None)
 
 
 def places_of_keys() -> dict[str, list[str]]:
-    """Key → where it may stand, dotted, as "run.end_time_s", "materials.NAME.density_kg_m3" or
-    "loads.tractions[].edge"; variants, which hold any of them, left out."""
+    """Key → its dotted places, such as "run.end_time_s", "materials.NAME.density_kg_m3" or "loads.tractions[].edge";
+    without variants, which may hold any of them."""
     found: dict[str, list[str]] = {}
 
     def walk(table: type[BaseModel], prefix: str) -> None:
@@ -91,7 +91,7 @@ def places_of_keys() -> dict[str, list[str]]:
 
 
 def description_at(path: tuple[str | int, ...]) -> str:
-    """What the key at ``path`` (or the nearest one above it that has a description) means."""
+    """Description of the key at ``path``, or of the nearest one above it that has one."""
     for n in range(len(path), 0, -1):
         table = table_at(path[: n - 1])
         field = field_of(table, path[n - 1]) if table else None
@@ -101,7 +101,7 @@ def description_at(path: tuple[str | int, ...]) -> str:
 
 
 def expected(annotation: Any) -> str:
-    """What may be written for a key of this type."""
+    """Admissible values of a key of this type."""
     if get_origin(annotation) in (Union, types.UnionType):
         left = [a for a in get_args(annotation) if a is not type(None)]
         return " or ".join(expected(a) for a in left)
@@ -113,7 +113,7 @@ def expected(annotation: Any) -> str:
         needed = [field.alias or name for name, field in inner.model_fields.items() if field.is_required()]
         return f"{{ {', '.join([*(f'{key} = …' for key in needed), '…'])} }}"
     for known, text in _SHAPES.items():
-        # Field keeps the metadata of an Annotated type apart, so compare what is left as well.
+        # Field keeps the metadata of an Annotated type apart, so that the rest is compared as well.
         if inner == bare(known) and inner not in _SIMPLE:
             return text
     if get_origin(inner) is Literal:
@@ -127,7 +127,7 @@ def expected(annotation: Any) -> str:
 
 
 def expected_of(field: FieldInfo) -> str:
-    """What may be written for ``field``, its bounds included."""
+    """Admissible values of ``field``, including its bounds."""
     text = expected(field.annotation)
     if text in ("number", "whole number"):
         bounds = [
@@ -141,14 +141,14 @@ def expected_of(field: FieldInfo) -> str:
 
 
 def describe_keys() -> str:
-    """Every key of a scene, one a line: its name, what may be written, its default, what it means."""
+    """Every key of a scene, one per line: name, admissible values, default, description."""
     lines: list[str] = []
     _describe(SceneTables, "", "", lines)
     return "\n".join(lines).strip() + "\n"
 
 
 def schema() -> dict[str, Any]:
-    """The JSON schema (2020-12) of a scene: keys, types, bounds, defaults and what they mean. TOML knows no null."""
+    """JSON schema (2020-12) of a scene: keys, types, bounds, defaults and descriptions. TOML has no null."""
     whole = _without_null(SceneTables.model_json_schema(by_alias=True))
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
@@ -158,8 +158,8 @@ def schema() -> dict[str, Any]:
 
 
 def _without_null(node: Any, names: bool = False) -> Any:
-    """``node`` of a schema without its nulls and without the titles that pydantic makes of names; ``names``: its keys are
-    names that the scene gives."""
+    """``node`` of a schema without nulls and without pydantic's titles; ``names``: its keys are names from the
+    scene."""
     if isinstance(node, list):
         return [_without_null(entry) for entry in node if entry != {"type": "null"}]
     if not isinstance(node, dict):
@@ -200,7 +200,7 @@ def _describe(table: type[BaseModel], prefix: str, header: str, lines: list[str]
 
 
 def written(value: Any) -> str:
-    """``value`` as TOML writes it."""
+    """``value`` in TOML syntax."""
     if isinstance(value, bool):
         return "true" if value else "false"
     if isinstance(value, str):

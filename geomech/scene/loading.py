@@ -1,4 +1,4 @@
-"""Reading a scene: file, variant, changes, checks; everything that is wrong is said at once."""
+"""Loading of a scene: file, variant, overrides, checks; all errors are reported at once."""
 
 from __future__ import annotations
 
@@ -32,21 +32,23 @@ from .unbounded_rock import check_endless
 from .validation import DECIMAL_COMMA, nearest, validate
 from .world import moved
 
-#: The file that a pipeline folder holds.
+#: The scene file of a pipeline folder.
 SCENE_FILE = "scene.toml"
 
-#: What a scene's geometry.model may be, and is taken for a scene at times.
+#: Files for geometry.model, which users sometimes give as the scene.
 MODELS = (".geo", ".geo_unrolled", ".msh", ".step", ".stp", ".brep", ".dxf", *OTHER_MESHES)
 
-#: A scene nests tables and arrays some six deep; what is nested deeper than this is a mistake, or meant to exhaust.
+#: Tables and arrays of a scene are nested some six deep; deeper nesting is a mistake or an attack.
 DEEPEST = 40
 
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """A scene that has passed every check. ``warnings`` are faults that do not keep it from running. ``tables`` count
-    from ``origin`` and hold what the drawing says of bolts, water and monitors; the file's own are in world
-    coordinates."""
+    """A scene that has passed every check.
+
+    ``warnings`` are faults that do not prevent a run. ``tables`` are relative to ``origin`` and include the drawing's
+    bolts, water and monitors; the file's own are in world coordinates.
+    """
 
     path: FilePath
     variant: str | None
@@ -63,7 +65,7 @@ class Scene:
 
     @property
     def name(self) -> str:
-        """What run folders are called: the pipeline folder's name, or the file's."""
+        """Name for run folders: the pipeline folder's name, or the file's."""
         return self.path.absolute().parent.name if self.path.name == SCENE_FILE else self.path.stem
 
     @property
@@ -76,27 +78,27 @@ class Scene:
 
     @property
     def blocks(self) -> Blocks:
-        """The blocks as drawn, without materials."""
+        """The drawn blocks, without materials."""
         return self.drawing.assembled()[0]
 
     @property
     def cracks(self) -> Cracks:
-        """The cracks as drawn, without apertures."""
+        """The drawn cracks, without apertures."""
         return self.drawing.assembled()[1]
 
     @property
     def origin(self) -> tuple[float, float]:
-        """World coordinates of the origin that blocks, cracks and results count from, m."""
+        """World coordinates, m, of the origin to which blocks, cracks and results refer."""
         return self.drawing.origin
 
     def problem(self) -> Problem:
-        """The scene as the solvers take it; its title names the variant."""
+        """The problem for the solvers; its title names the variant."""
         try:
             return replace(build_problem(self.tables, self.drawing, self._check), title=self._full_title)
         except SceneError:
             raise
         except ValueError as error:
-            # What the checks have let through and the model does not take.
+            # Values that passed the checks but are refused by the model.
             raise SceneError([Fault(str(self.path), str(error), "")]) from error
 
     @property
@@ -104,8 +106,11 @@ class Scene:
         return self.title if self.variant is None else f"{self.title}, {self.variant}"
 
     def resolved(self) -> dict[str, Any]:
-        """The scene with its variant and changes applied and all defaults written out, ready for ``tomli_w``: paths are
-        absolute, all parameters of a Gmsh model are given, variants are gone. Loading it gives the same problem."""
+        """The scene with its variant and overrides applied and all defaults written out, ready for ``tomli_w``.
+
+        Paths are absolute, all parameters of a Gmsh model are given, variants are removed. Loading it gives the same
+        problem.
+        """
         data = self._written.model_dump(by_alias=True, exclude_none=True, exclude={"variants", "sweep"})
         data["title"] = self._full_title
         if any(self.origin):
@@ -118,17 +123,17 @@ class Scene:
         return data
 
     def overview(self) -> list[str]:
-        """The scene in a few lines: size, zones, materials, cracks, loads and time."""
+        """Summary of the scene: size, zones, materials, cracks, loads and time."""
         return overview(self.tables, self.drawing)
 
     @staticmethod
     def describe_keys() -> str:
-        """Every key a scene may have, with its default and meaning."""
+        """All keys of a scene, with default and description."""
         return describe_keys()
 
 
 class _Places:
-    """Says where a key stands: the file and line, or the change that set it."""
+    """Gives the place of a key: file and line, or the override that set it."""
 
     def __init__(self, shown: str, lines: dict[Path, int]) -> None:
         self.shown, self.lines = shown, lines
@@ -163,11 +168,12 @@ def load_scene(
     *,
     to_run: bool = True,
 ) -> Scene:
-    """Load, change and check a scene.
+    """Load, override and check a scene.
 
     ``path`` is a .toml file or a pipeline folder (then its scene.toml); ``variant`` one of the scene's [variants];
-    ``overrides`` are changes on top, {"section.key": value} with Python values, or a list of "section.key=value" with
-    values in TOML's way or bare words. Raises SceneError with every fault: place (file, line, key), message and way out. A scene that is not ``to_run`` may leave [run] out.
+    ``overrides`` are further changes, {"section.key": value} with Python values, or a list of "section.key=value" with
+    values in TOML syntax or bare words. Raises SceneError with all faults: place (file, line, key), message and way
+    out. A scene that is not ``to_run`` may lack [run].
 
     >>> scene = geomech.load_scene("slope.toml", {"joints.default.friction_angle_deg": 40})
     >>> scene.problem().blocks.n_blocks
@@ -194,7 +200,7 @@ def load_scene(
         called = f"--set {one}" if isinstance(one, str) else f"{one[0]} = {one[1]!r}"
         try:
             key, value = change_of(one)
-            # Changes from outside are listed after the file's own faults.
+            # Overrides are listed after the file's own faults.
             places.changed_by(assign(data, key, value), called, 1e9 + number)
         except OverrideError as error:
             faults.append(Fault(called, error.message, error.way_out))
@@ -223,7 +229,7 @@ def load_scene(
     if faults:
         raise SceneError(places.sorted(faults))
     check_plausible(sections)
-    # Building asks the same questions as the checks did; whatever it would find has been found.
+    # Building repeats the checks; their faults are known already.
     quiet = Check(tables, data, drawing, place, [], [])
     return Scene(
         path,
@@ -259,7 +265,7 @@ def _file(path: FilePath) -> FilePath:
 
 def _parsed(path: FilePath) -> tuple[dict[str, Any], str]:
     try:
-        # Line ends as tomllib sees them, so that lines count alike; editors on Windows put a mark at the beginning.
+        # Line ends as tomllib sees them, so that line numbers agree; editors on Windows put a mark at the beginning.
         text = path.read_bytes().decode("utf-8-sig").replace("\r\n", "\n")
         data = tomllib.loads(text)
         if _is_deep(data):
@@ -267,8 +273,8 @@ def _parsed(path: FilePath) -> tuple[dict[str, Any], str]:
         return data, text
     except RecursionError:
         line = _deepest_line(text)
-        message = f"tables and arrays stand in one another, deeper than {DEEPEST}"
-        fault = Fault(f"{path}:{line}", message, "no key of a scene needs that: is a bracket open?")
+        message = f"tables and arrays are nested deeper than {DEEPEST}"
+        fault = Fault(f"{path}:{line}", message, "no key of a scene needs that: is a bracket not closed?")
         raise SceneError([fault]) from None
     except UnicodeDecodeError as error:
         raise SceneError([Fault(str(path), f"the file is not UTF-8 text ({error})", "save it as UTF-8")]) from error
@@ -288,14 +294,14 @@ def _parsed(path: FilePath) -> tuple[dict[str, Any], str]:
             ]
         ) from error
     except ValueError as error:
-        # Python reads no integers of more digits than `sys.get_int_max_str_digits`.
+        # Python reads no integers with more digits than `sys.get_int_max_str_digits`.
         line = max(enumerate(text.split("\n"), 1), key=lambda found: sum(map(str.isdigit, found[1])))[0]
-        fault = Fault(f"{path}:{line}", f"no number: {error}", "write large numbers as 1e9")
+        fault = Fault(f"{path}:{line}", f"not a number: {error}", "write large numbers as 1e9")
         raise SceneError([fault]) from error
 
 
 def _is_deep(data: Any) -> bool:
-    """Whether a parsed document is nested deeper than `DEEPEST`; found without recursion."""
+    """Whether a parsed document is nested deeper than `DEEPEST`; without recursion."""
     level = [data]
     for _ in range(DEEPEST):
         level = [item for node in level if isinstance(node, (dict, list))
@@ -306,7 +312,7 @@ def _is_deep(data: Any) -> bool:
 
 
 def _deepest_line(text: str) -> int:
-    """The first line where more than `DEEPEST` brackets are open, or dots stand in a key; brackets in texts count as
+    """First line at which more than `DEEPEST` brackets are open, or a key has as many dots; brackets in texts count as
     well."""
     open_ones = 0
     for number, line in enumerate(text.split("\n"), 1):
@@ -320,17 +326,17 @@ def _deepest_line(text: str) -> int:
 
 
 def _syntax_hint(source: str) -> str:
-    """What to write instead of the line ``source``, which is no TOML."""
+    """Suggestion for the invalid line ``source``."""
     value = source.partition("=")[2].partition("#")[0].strip()
     if re.fullmatch(DECIMAL_COMMA, value):
         return f"numbers have a decimal point: {value.replace(',', '.')}"
     if value.lower() in ("true", "false"):
         return f"write {value.lower()} in lower case"
-    return "texts stand in double quotes, arrays in square brackets, each key once"
+    return "put texts in double quotes and arrays in square brackets, and give each key once"
 
 
 def _resolve_records(data: dict[str, Any], folder: FilePath) -> None:
-    """Make the files of loads absolute, in place: they stand next to the scene, and a resolved scene may stand
+    """Make paths of load files absolute, in place: they are relative to the scene, and a resolved scene may be
     elsewhere."""
     loads = data.get("loads")
     for entry in loads.values() if isinstance(loads, dict) else ():
@@ -342,7 +348,7 @@ def _resolve_records(data: dict[str, Any], folder: FilePath) -> None:
 def _apply_variant(data: dict[str, Any], name: str, places: _Places, faults: list[Fault]) -> None:
     changes = data["variants"][name]
     if not isinstance(changes, dict):
-        return  # the tables say so
+        return  # reported by the checks of the tables
     for own, target, value in flattened(changes):
         here = ("variants", name, *own)
         line = places.lines.get(here, 0)
@@ -357,7 +363,7 @@ def _check_variants(
     data: dict[str, Any], names: Sequence[str], chosen: str | None, path: FilePath, lines: dict[Path, int],
     faults: list[Fault],
 ) -> None:  # fmt: skip
-    """The tables of every variant that was not chosen: a typing error should not wait until its turn."""
+    """Check the tables of all other variants too: a typing error should be found before its variant is run."""
     for name in names:
         if name == chosen:
             continue

@@ -1,4 +1,4 @@
-"""Where each key of a TOML file stands: `tomllib` keeps values, not lines."""
+"""Line numbers of the keys of a TOML file: `tomllib` keeps values, not lines."""
 
 from __future__ import annotations
 
@@ -15,16 +15,18 @@ _SCALAR = re.compile(r"[^,\]}#\r\n]*")
 def locate(text: str) -> dict[Path, int]:
     """Line (from 1) of every table, key and array item of the valid TOML document ``text``, by its path.
 
-    Paths are those of the parsed document: ("loads", "tractions", 0, "edge"). A table that headers and dotted keys
-    only imply has the line of the first key in it.
+    Paths are those of the parsed document: ("loads", "tractions", 0, "edge"). A table that is only implied by headers
+    and dotted keys has the line of its first key.
     """
     return _Scanner(text).lines
 
 
 def path_of(key: str) -> Path:
-    """The path of a dotted key as TOML writes it ('joints."a.b".cohesion_pa', 'geometry.cracks.1.angle_deg'); parts
-    that are not bare keys may stand unquoted, and items of arrays as messages name them, "geometry.cracks[1]". Whole numbers
-    stay texts: what they index decides."""
+    """The path of a dotted key in TOML syntax ('joints."a.b".cohesion_pa', 'geometry.cracks.1.angle_deg').
+
+    Parts that are not bare keys may be unquoted, and items of arrays may be written as in messages,
+    "geometry.cracks[1]". Numbers stay texts: their meaning depends on what they index.
+    """
     if '"' not in key and "'" not in key:
         key = _ITEM.sub(r".\1", key)
     try:
@@ -39,7 +41,7 @@ def path_of(key: str) -> Path:
 
 
 def dotted(path: Path) -> str:
-    """``path`` as people write it: loads.tractions[0].edge."""
+    """``path`` as written in messages: loads.tractions[0].edge."""
     text = ""
     for part in path:
         if isinstance(part, int):
@@ -51,7 +53,7 @@ def dotted(path: Path) -> str:
 
 
 class _Scanner:
-    """One pass over a valid document. It follows structure only; values were read and checked by tomllib."""
+    """One pass over a valid document, following its structure only; values are read and checked by tomllib."""
 
     def __init__(self, text: str) -> None:
         self.text, self.at = text, 0
@@ -88,7 +90,7 @@ class _Scanner:
         return False
 
     def _resolved(self, keys: list[str]) -> Path:
-        """Header keys as a path: through an array of tables they mean its last table."""
+        """Header keys as a path: through an array of tables they refer to its last table."""
         path: Path = ()
         for key in keys:
             path += (key,)
@@ -172,7 +174,7 @@ class _Scanner:
             while not self.text.startswith(quote * 3, self.at):
                 self.at += 2 if quote == '"' and self.text[self.at] == "\\" else 1
             self.at += 3
-            # Up to two quotes may stand just before the closing three.
+            # Up to two quotes may precede the closing three.
             while self.at < len(self.text) and self.text[self.at] == quote:
                 self.at += 1
             return

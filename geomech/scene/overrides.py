@@ -1,4 +1,4 @@
-"""Changes to a scene from outside its file: the command line's ``section.key=value`` and the scene's own variants."""
+"""Overrides of a scene: ``section.key=value`` on the command line, and the scene's own variants."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from .locator import Path, dotted, path_of
 
 
 class OverrideError(ValueError):
-    """A change that cannot be applied: message and way out."""
+    """An override that cannot be applied: message and way out."""
 
     def __init__(self, message: str, way_out: str) -> None:
         super().__init__(f"{message}: {way_out}")
@@ -19,8 +19,10 @@ class OverrideError(ValueError):
 
 
 def parse_override(text: str) -> tuple[Path, Any]:
-    """("section.key=value") as path and value; what is no TOML value is a text, but for True and False, which are
-    taken as they are meant. Raises OverrideError without "="."""
+    """Path and value of "section.key=value".
+
+    A value that is not valid TOML is a text, except True and False. Raises OverrideError without "=".
+    """
     key, equals, value = text.partition("=")
     if not equals or not key.strip():
         raise OverrideError(
@@ -34,8 +36,10 @@ def parse_override(text: str) -> tuple[Path, Any]:
 
 
 def change_of(one: str | tuple[str, Any]) -> tuple[Path, Any]:
-    """A change to a scene as path and value: of "section.key=value" (`parse_override`), or of a "section.key" and a Python
-    value (numbers of NumPy, paths and tuples as TOML has them). Raises OverrideError for what is neither."""
+    """Path and value of an override: "section.key=value" (`parse_override`), or a "section.key" and a Python value.
+
+    NumPy numbers, paths and tuples are converted to TOML types. Raises OverrideError for anything else.
+    """
     if isinstance(one, str):
         return parse_override(one)
     key, value = one
@@ -43,7 +47,7 @@ def change_of(one: str | tuple[str, Any]) -> tuple[Path, Any]:
 
 
 def _as_toml(value: Any, key: str) -> Any:
-    """``value`` in the types that TOML is read as."""
+    """``value`` in the types of parsed TOML."""
     if hasattr(value, "tolist") and not isinstance(value, (list, tuple)):
         value = value.tolist()
     if isinstance(value, (bool, int, float, str)):
@@ -54,12 +58,14 @@ def _as_toml(value: Any, key: str) -> Any:
         return {str(name): _as_toml(inner, key) for name, inner in value.items()}
     if isinstance(value, (list, tuple)):
         return [_as_toml(inner, key) for inner in value]
-    raise OverrideError(f"{key}: {value!r} cannot stand in a scene", "give a number, a text, a list or a table")
+    raise OverrideError(f"{key}: {value!r} is not possible in a scene", "give a number, a text, a list or a table")
 
 
 def flattened(changes: dict[str, Any]) -> list[tuple[Path, Path, Any]]:
-    """The changes of a variant: (path in the variant's table, path in the scene, value). A key may be a quoted dotted
-    path or an unquoted one; whole tables are changed key by key."""
+    """The overrides of a variant: (path in the variant's table, path in the scene, value).
+
+    A key may be a quoted dotted path or an unquoted one; whole tables are overridden key by key.
+    """
     found: list[tuple[Path, Path, Any]] = []
 
     def walk(node: dict[str, Any], own: Path, target: Path) -> None:
@@ -75,8 +81,10 @@ def flattened(changes: dict[str, Any]) -> list[tuple[Path, Path, Any]]:
 
 
 def assign(data: dict[str, Any], path: Path, value: Any) -> Path:
-    """Set ``path`` of the parsed scene ``data`` to ``value``, in place; tables on the way are made. Numbers index
-    arrays. Returns the path with those numbers as int. Raises OverrideError where there is no way."""
+    """Set ``path`` of the parsed scene ``data`` to ``value``, in place, creating tables as needed.
+
+    Numbers index arrays. Returns the path with those numbers as int. Raises OverrideError if there is no such path.
+    """
     node: Any = data
     taken: Path = ()
     for n, part in enumerate(path):

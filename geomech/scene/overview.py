@@ -1,4 +1,4 @@
-"""A scene in a few lines, for people to see whether it is the one they meant."""
+"""Summary of a scene in a few lines, so that users can check that it is the intended one."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ from .tables import SceneTables
 from .tables.loads import Rising
 from .unbounded_rock import rising_history
 
-#: Longer lists are cut after so many lines.
+#: Longer lists are cut after this many lines.
 SHOWN = 8
 
 
 def overview(tables: SceneTables, drawing: Drawing) -> list[str]:
-    """Size, zones, materials, cracks, loads and time of a scene, a line each."""
+    """Size, zones, materials, cracks, loads and time of a scene, one line each."""
     rows = [("size", _box(drawing.blocks.vertices) + f", {counted(len(set(drawing.zones)), 'zone')}")]
     rows += _cut("zones", _zones(tables, drawing))
     guided = [name for name in drawing.blocks.edge_names if holds(name)]
@@ -34,7 +34,7 @@ def overview(tables: SceneTables, drawing: Drawing) -> list[str]:
     rows += _cut("loads", _loads(tables, drawing))
     stops = f" or the first of {', '.join(tables.run.stop_at)}" if tables.run.stop_at else ""
     rows.append(("run", f"to {tables.run.end_time_s:g} s{stops}, {_steps(tables)}"))
-    # A label stands before the first of its lines.
+    # A label precedes the first of its lines.
     labels = [label if k == 0 or rows[k - 1][0] != label else "" for k, (label, _) in enumerate(rows)]
     return [f"  {label:<9} {text}" for label, (_, text) in zip(labels, rows)]
 
@@ -72,7 +72,7 @@ def _zones(tables: SceneTables, drawing: Drawing) -> list[str]:
         if entry is not None and entry.order != 1:
             text += f", order {entry.order}"
         if entry is not None and entry.velocity_m_s is not None:
-            text += f", at ({entry.velocity_m_s[0]:g}, {entry.velocity_m_s[1]:g}) m/s to begin with"
+            text += f", at ({entry.velocity_m_s[0]:g}, {entry.velocity_m_s[1]:g}) m/s initially"
         if entry is not None and entry.body != "block":
             text += f", a piece of the {'infinite ' if entry.body == 'plane' else ''}{entry.body}"
         lines.append(text)
@@ -144,7 +144,7 @@ def _rising(table: Rising, end: float) -> str:
 
 
 def _course(history: History, end: float, unit: str, sense: str) -> str:
-    """How large a load is and how it comes: magnitudes, and the direction where ``sense`` does not say it."""
+    """Magnitude and history of a load, and its direction unless given by ``sense``."""
     value = history.at(end)
     size, direction = float(np.hypot(*value)), sense or f"along ({value[0]:.3g}, {value[1]:.3g})"
     if size == 0.0:
@@ -156,13 +156,13 @@ def _course(history: History, end: float, unit: str, sense: str) -> str:
 
 
 def _sense(blocks: Blocks, edge_name: str, traction: np.ndarray) -> str:
-    """Whether a traction presses, pulls or shears; empty where it does one here and another there."""
+    """Whether a traction is compressive, tensile or shear; empty if it varies."""
     edges = blocks.edges_named(edge_name)
     along = blocks.vertices[blocks.next_vertex[edges]] - blocks.vertices[edges]
     size = np.hypot(*traction)
     if not len(edges) or size == 0.0:
         return ""
-    # Outlines run counter-clockwise, so the outward normal is to the right.
+    # Outlines run counter-clockwise, so that the outward normal is to the right.
     normal = (along[:, 1] * traction[0] - along[:, 0] * traction[1]) / (np.hypot(*along.T) * size)
     for sense, fits in (
         ("compression", normal < -0.999), ("tension", normal > 0.999), ("shear", np.abs(normal) < 1e-3)
@@ -177,7 +177,7 @@ def _length(length: float) -> str:
 
 
 def _scaled(value: float, unit: str) -> str:
-    """``value`` with the unit's prefix that leaves one to three digits before the point."""
+    """``value`` with the prefix of ``unit`` that leaves one to three digits before the point."""
     for factor, prefix in ((1e9, "G"), (1e6, "M"), (1e3, "k")):
         if abs(value) >= factor:
             return f"{value / factor:.4g} {prefix}{unit}"

@@ -1,4 +1,4 @@
-"""Scenes of rock without an end: the infinite plane or a half-plane, of which one zone is the piece that is seen."""
+"""Scenes of unbounded rock: the infinite plane or a half-plane, of which one zone is the displayed part."""
 
 from __future__ import annotations
 
@@ -16,19 +16,20 @@ from .tables import SceneTables
 from .tables.loads import FluidTable, Rising
 from .validation import nearest
 
-#: Edges lie on the free surface to this part of the drawing's size; a stress loads it not by this part of its own.
+#: Edges lie on the free surface to within this part of the drawing's size; a stress counts as parallel to it to within
+#: this part of its magnitude.
 _STRAIGHT, _FREE = 1e-9, 1e-9
-#: What acts on rock without an end; all other loads act on blocks.
+#: Loads on unbounded rock; all other loads act on blocks.
 _ACTS = ("remote", "fluids")
 
 
 def endless_zone(tables: SceneTables) -> str | None:
-    """The zone that stands for rock without an end; None where blocks are blocks."""
+    """The zone that stands for unbounded rock; None in a scene of blocks."""
     return next((name for name, zone in (tables.zones or {}).items() if zone.body != "block"), None)
 
 
 def endless_of(tables: SceneTables, drawing: Drawing) -> EndlessRock | None:
-    """What a scene without faults says of such rock."""
+    """The unbounded rock of a scene without faults."""
     name = endless_zone(tables)
     if name is None:
         return None
@@ -47,7 +48,7 @@ def _fluid(table: FluidTable, drawing: Drawing) -> Fluid:
 
 
 def rising_history(table: Rising) -> History:
-    """The history that ``table`` gives, (3,) of a stress or (1,) of a pressure."""
+    """The history of ``table``, (3,) for a stress or (1,) for a pressure."""
     if table.value_pa is not None:
         return History.constant(np.atleast_1d(table.value_pa))
     if table.rate_pa_per_s is not None:
@@ -67,7 +68,7 @@ def _surface(drawing: Drawing, name: str | None) -> tuple[tuple[float, float], t
 
 
 def check_endless(c: Check) -> None:
-    """Such rock stands alone, and is loaded from far away or by fluids."""
+    """Unbounded rock must be the only block, loaded by remote stress or fluids."""
     t = c.tables
     if t.zones is None or t.loads is None:
         return
@@ -77,23 +78,23 @@ def check_endless(c: Check) -> None:
             if getattr(t.loads, key):
                 c.refuse(
                     ("loads", key, 0),
-                    f"loads.{key} act on rock without an end, and there are blocks only",
-                    'say body = "plane" or "half-plane" in the zone\'s table, or load edges by [[loads.tractions]]',
+                    f"loads.{key} act on unbounded rock, and there are blocks only",
+                    'set body = "plane" or "half-plane" in the zone\'s table, or load edges by [[loads.tractions]]',
                 )
         return
     body = t.zones[name].body
     for key, field in type(t.loads).model_fields.items():
         if key not in _ACTS and getattr(t.loads, key) != field.get_default():
             c.refuse(
-                ("loads", key), f"loads.{key} is for blocks, and zone {name!r} is rock without an end",
+                ("loads", key), f"loads.{key} is for blocks, and zone {name!r} is unbounded rock",
                 "load it by [[loads.remote]] and [[loads.fluids]]",
             )  # fmt: skip
     if t.dda is not None and (t.dda.dynamic_factor > 0 or t.dda.equilibrium):
         key = "dynamic_factor" if t.dda.dynamic_factor > 0 else "equilibrium"
-        c.refuse(("dda", key), f'cracks in rock without an end (body = "{body}") grow in statics only', "leave it out")
+        c.refuse(("dda", key), f'cracks in unbounded rock (body = "{body}") grow in statics only', "leave it out")
     for key in ("gauge", "monitors"):
         if getattr(t, key):
-            c.refuse((key,), f"points move with a block, and zone {name!r} is rock without an end", "leave it out")
+            c.refuse((key,), f"points move with a block, and zone {name!r} is unbounded rock", "leave it out")
     if c.drawing is None or c.drawing.blocks is None or name not in c.drawing.zones:
         return
     _alone(c, name)
@@ -104,7 +105,7 @@ def check_endless(c: Check) -> None:
 
 
 def _fluids(c: Check) -> None:
-    """Cracks that a fluid is pumped into are there; a fluid in cracks that nothing connects is reported."""
+    """Cracks into which a fluid is pumped must exist; a fluid in unconnected cracks is reported."""
     cracks = c.cracks
     for k, table in enumerate(c.tables.loads.fluids):
         for n, pattern in enumerate(table.cracks):
@@ -121,8 +122,8 @@ def _fluids(c: Check) -> None:
             shown = ", ".join(map(repr, parts[:4])) + (", …" if len(parts) > 4 else "")
             c.warn(
                 ("loads", "fluids", k),
-                f"it fills {len(parts)} cracks, or groups of them, that nothing connects ({shown})",
-                'name those it is pumped into: cracks = ["NAME"]',
+                f"it fills {len(parts)} unconnected cracks or groups of cracks ({shown})",
+                'name those into which it is pumped: cracks = ["NAME"]',
             )
 
 
@@ -130,8 +131,8 @@ def _alone(c: Check, name: str) -> None:
     n = c.blocks.n_blocks
     if n > 1:
         c.refuse(
-            ("zones", name, "body"), f"rock without an end holds cracks and holes only, and there are {n} blocks",
-            "draw one zone, without joints that cut it; what is hollow is a hole in it",
+            ("zones", name, "body"), f"unbounded rock contains cracks and holes only, and there are {n} blocks",
+            "draw one zone, without joints that cut it; draw cavities as holes in it",
         )  # fmt: skip
 
 
@@ -151,15 +152,15 @@ def _surface_is_straight(c: Check, zone: str) -> bool:
     on = np.concatenate([height[edges], height[blocks.next_vertex[edges]]])
     if np.abs(on).max() > off or height.max() > off:
         c.refuse(
-            place, f"the edges {name!r} are no straight line with all of zone {zone!r} on one side of it",
-            "a half-plane has one straight surface; a notch or a slope is a block of its own",
+            place, f"the edges {name!r} do not form a straight line with all of zone {zone!r} on one side of it",
+            "a half-plane has one straight surface; model a notch or a slope as a block",
         )  # fmt: skip
         return False
     return True
 
 
 def _surface_is_free(c: Check, zone: str) -> None:
-    """No stress from far away pulls at the free surface: nothing there would bear it."""
+    """Remote stress must leave the free surface free of traction."""
     if c.tables.zones[zone].surface is None:
         return
     _, outward = _surface(c.drawn, c.tables.zones[zone].surface)
@@ -173,14 +174,14 @@ def _surface_is_free(c: Check, zone: str) -> None:
             key = next(key for key in ("value_pa", "rate_pa_per_s", "values_pa") if getattr(table, key) is not None)
             c.refuse(
                 ("loads", "remote", k, key),
-                f"the free surface bears none of the traction ({pulled[0]:g}, {pulled[1]:g}) Pa that this stress has "
-                "there",
-                "only a stress along the surface stands in a half-plane: [σ, 0, 0] below a level one",
+                f"this stress has a traction of ({pulled[0]:g}, {pulled[1]:g}) Pa at the free surface",
+                "only a stress along the surface is possible in a half-plane: [σ, 0, 0] below a level one",
             )
 
 
 def _ends(c: Check, zone: str) -> None:
-    """Cracks end in the rock, at a hole or at the free surface: the outline of what is seen is no end of the rock."""
+    """Cracks must end in the rock, at a hole or at the free surface: the outline of the displayed part is not a
+    boundary."""
     blocks, cracks, name = c.blocks, c.cracks, c.tables.zones[zone].surface
     outline = np.arange(blocks.loop_start[0], blocks.loop_start[1])
     if name is not None:
@@ -192,6 +193,6 @@ def _ends(c: Check, zone: str) -> None:
             crack = cracks.names[cracks.crack[np.argmax((cracks.segments == node).any(axis=1))]]
             c.refuse(
                 c.drawn.path_of_crack(crack),
-                f"crack {crack!r} ends at ({at[0]:g}, {at[1]:g}) on the outline of zone {zone!r}, beyond which the rock goes on",
-                "draw the zone larger, or end the crack inside it",
+                f"crack {crack!r} ends at ({at[0]:g}, {at[1]:g}) on the outline of zone {zone!r}, beyond which the rock continues",
+                "enlarge the zone, or end the crack inside it",
             )

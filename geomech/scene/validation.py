@@ -1,4 +1,4 @@
-"""TOML data into tables; what pydantic says, in the scene's own words."""
+"""Validation of TOML data against the tables; pydantic's errors in the terms of a scene."""
 
 from __future__ import annotations
 
@@ -22,15 +22,14 @@ _COMPARISON = {
     "less_than_equal": ("le", "at most"),
 }
 
-#: A number with a comma where TOML wants a point.
+#: A number with a comma instead of a decimal point.
 DECIMAL_COMMA = r"[-+]?\d+,\d+(?:[eE][-+]?\d+)?"
 
 
 def validate(data: dict[str, Any], place: Callable[[Path], str]) -> tuple[SceneTables, list[Fault]]:
-    """The tables of a parsed scene and everything wrong with them.
+    """The tables of a parsed scene, and all their errors.
 
-    Where something is wrong the sections that are right are filled in and the others are None, so that checks across
-    sections can still run on what there is.
+    Valid sections are filled in and faulty ones are None, so that checks across sections can still run.
     """
     try:
         return SceneTables.model_validate(data), []
@@ -52,7 +51,7 @@ def validate(data: dict[str, Any], place: Callable[[Path], str]) -> tuple[SceneT
 
 
 def validate_sweep(data: dict[str, Any], place: Callable[[Path], str]) -> tuple[SweepTable | None, list[Fault]]:
-    """The table [sweep] of ``data``, and everything wrong with it; ``place`` says where a path below "sweep" stands."""
+    """The table [sweep] of ``data``, and all its errors; ``place`` gives the place of a path below "sweep"."""
     try:
         SceneTables.model_validate({"sweep": data})
     except ValidationError as error:
@@ -71,7 +70,7 @@ def nearest(name: str, known: list[str]) -> str:
 
 
 def _meant(key: str, known: list[str]) -> str:
-    """ "did you mean …? ": a key of the ``known`` ones of the table, or of another table, that reads like ``key``."""
+    """ "did you mean …? ": one of the ``known`` keys of the table, or of another table, that is spelled like ``key``."""
     everywhere = places_of_keys()
     close = difflib.get_close_matches(key, known, 1, cutoff=0.8)
     close = close or everywhere.get(key, [])[:3]
@@ -86,7 +85,7 @@ def _meant(key: str, known: list[str]) -> str:
 def _fault(item: Mapping[str, Any], place: Callable[[Path], str]) -> Fault:
     path: Path = tuple(item["loc"])
     kind, given, context = item["type"], item.get("input"), item.get("ctx", {})
-    # Members of a union and keys of a map add parts that stand nowhere in the file.
+    # Members of a union and keys of a map add parts that do not exist in the file.
     while (path and path[-1] in ("float", "str", "[key]")) or (path and str(path[-1]).startswith("constrained-")):
         path = path[:-1]
     table = table_at(path[:-1]) if path else None
@@ -119,12 +118,12 @@ def _fault(item: Mapping[str, Any], place: Callable[[Path], str]) -> Fault:
         if isinstance(path[-1], int) or table_at(path) or not what:
             what = {"float": "number", "string": "text", **wanted}.get(kind.split("_")[0], what)
         hint = _hint(given, what) if isinstance(given, str) else ""
-        return Fault(place(path), f"{written(given)} stands where {what or 'something else'} belongs", hint + meaning)
+        return Fault(place(path), f"{written(given)} given, expected {what or 'another type'}", hint + meaning)
     return Fault(place(path), item["msg"], meaning)
 
 
 def _header(path: Path) -> str:
-    """How what belongs at ``path`` begins in the file: a table, a table with a name, one of several, or a value."""
+    """Beginning of an entry at ``path`` in the file: a table, a table with a name, one of several, or a value."""
     table = table_at(path[:-1])
     field = field_of(table, path[-1]) if table else None
     kind, inner = kind_of(field.annotation) if field else ("value", None)
@@ -135,7 +134,7 @@ def _header(path: Path) -> str:
 
 
 def _hint(given: str, what: str) -> str:
-    """What to change where a text stands for something that is no text."""
+    """Suggestion where a text is given instead of another type."""
     if what.startswith('["'):
         return f'write an array, ["{given}"]: '
     if "number" in what and re.fullmatch(DECIMAL_COMMA, given.strip()):

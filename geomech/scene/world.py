@@ -1,8 +1,7 @@
-"""World coordinates: where the scene lies, and the scene moved to a local origin and back.
+"""World coordinates: location of the scene, and its shift to a local origin and back.
 
-All coordinates of a scene and of the files it names are of one frame, the world's. What is computed and written is
-local: world less origin. At five million metres north a coordinate has nine digits left for the rock instead of
-sixteen.
+All coordinates of a scene and of the files it names are in one frame, the world's. Computation and output are local:
+world coordinates minus origin. Five million metres north, a coordinate has nine digits for the rock instead of sixteen.
 """
 
 from __future__ import annotations
@@ -16,10 +15,10 @@ import numpy as np
 from ..shapes.parts import extent_of
 from .tables import SceneTables
 
-#: An axis is moved where coordinates are this many times as large as the drawing.
+#: An axis is shifted if coordinates exceed the drawing's size by this factor.
 FAR = 100.0
 
-#: What of a scene is a place: "xy" a point or any nesting of points, "y" a level.
+#: Location-dependent parts of a scene: "xy" a point or any nesting of points, "y" a level.
 PLACES: Mapping[str, Any] = {
     "geometry": {
         "zones": {"rectangle": "xy", "polygon": "xy", "holes": "xy"},
@@ -43,8 +42,11 @@ PLACES: Mapping[str, Any] = {
 
 
 def local_origin(given: tuple[float, float] | None, drawn: Iterable[np.ndarray], far_is_moved: bool) -> np.ndarray:
-    """(2,) world coordinates of the local origin: as ``given``, or, where that is None and ``far_is_moved``, a round
-    place at the lower left of what is ``drawn`` (arrays (n, 2)), on each axis that lies far from 0."""
+    """(2,) world coordinates of the local origin: ``given``, or chosen if that is None and ``far_is_moved``.
+
+    The choice is a round position at the lower left of the ``drawn`` points (arrays (n, 2)), on each axis that is far
+    from 0.
+    """
     if given is not None:
         return np.array(given, dtype=float)
     drawn = [np.asarray(points) for points in drawn if len(points)]
@@ -58,12 +60,12 @@ def local_origin(given: tuple[float, float] | None, drawn: Iterable[np.ndarray],
 
 
 def moved(tables: SceneTables, origin: tuple[float, float]) -> SceneTables:
-    """``tables`` with all places less ``origin``; a section that is faulty (None) stays so."""
+    """``tables`` with all positions minus ``origin``; a faulty section (None) stays so."""
     return _moved(tables, PLACES, origin) if any(origin) else tables
 
 
 def moved_section(section: Any, name: str, origin: np.ndarray) -> Any:
-    """The ``section`` of a scene called ``name``, with its places less ``origin``."""
+    """The ``section`` of a scene called ``name``, with its positions minus ``origin``."""
     return _moved(section, PLACES[name], tuple(origin.tolist()))
 
 

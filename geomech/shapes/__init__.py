@@ -2,7 +2,7 @@
 
 from importlib import import_module
 
-# Resolved on first use: Shapely and Gmsh are loaded by those who draw.
+# Imported on first use: only drawing needs Shapely and Gmsh.
 _PUBLIC = {
     "Cutting": "block_cutting.cutting",
     "EdgeLine": "parts",

@@ -1,4 +1,4 @@
-"""From a drawing to the model: one canonical way, whoever drew it."""
+"""Assembly of a drawing from any source into the model, in one canonical form."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from ..model.blocks.polygon import crossing_edges, signed_area
 from .block_cutting.crack_traces import crack_network
 from .parts import EdgeLine, Flaw, ShapeError, Trace, Zone, extent_of, grid_decimals
 
-#: Drawing tolerance in units of the drawing's largest side: crack ends nearer than this to an outline, a crack or
-#: another end are taken to touch it. A tenth of a micrometre on a hand specimen, far below any fabrication tolerance,
-#: far above the round-off of the coordinates.
+#: Drawing tolerance relative to the drawing's largest side: crack ends closer than this to an outline, a crack or
+#: another end touch it. A tenth of a micrometre on a hand specimen: far below fabrication tolerances, far above the
+#: round-off of coordinates.
 TOLERANCE = 1e-6
 
 
@@ -24,16 +24,16 @@ def assemble(
     edges: Sequence[EdgeLine] = (),
     tolerance: float | None = None,
 ) -> tuple[Blocks, Cracks]:
-    """Blocks (one a zone, in their order) and the noded crack network of a drawing.
+    """Blocks (one per zone, in their order) and the crack network of a drawing, with common nodes.
 
-    Canonical form: coordinates carry twelve significant digits; outlines run counter-clockwise and holes clockwise,
-    each from its lowest (then leftmost) vertex; holes are sorted by that vertex; cracks keep the order and the
-    direction in which they are drawn. Two drawings of one specimen therefore give the same arrays. Materials and
-    apertures are left at their defaults. ``tolerance`` in m, default 1e-6 of the drawing's largest side.
+    Canonical form: coordinates have twelve significant digits; outlines run counter-clockwise and holes clockwise, each
+    from its lowest (then leftmost) vertex; holes are sorted by that vertex; cracks keep the order and direction in
+    which they are drawn. Two drawings of one specimen therefore give the same arrays. Materials and apertures keep
+    their defaults. ``tolerance`` in m, default 1e-6 of the drawing's largest side.
 
-    Raises ShapeError with everything that is wrong: outlines that cross themselves or enclose nothing, holes outside,
-    zones that overlap, edge names that lie on no edge or clash, cracks outside the rock, across an outline or on top
-    of one another.
+    Raises ShapeError with all errors: outlines that cross themselves or enclose nothing, holes outside, zones that
+    overlap, edge names that lie on no edge or clash, cracks outside the rock, across an outline or on top of one
+    another.
     """
     everything = [loop for zone in zones for loop in zone.loops] + [line for t in traces for line in t.lines]
     drawn = [("zones", "zone", k, zone.name, zone.loops) for k, zone in enumerate(zones)]
@@ -57,7 +57,7 @@ def assemble(
         names.append(own_names)
     _refuse_overlaps(zones, polygons, tolerance, flaws)
     if any(flaw.part == "zones" for flaw in flaws):
-        # Cracks and edge names cannot be judged against outlines that are not there.
+        # Cracks and edge names cannot be checked without outlines.
         raise ShapeError(flaws)
 
     for k, line in enumerate(edges):
@@ -73,7 +73,7 @@ def assemble(
 
 
 def block_names(zone_names: Sequence[str]) -> list[str]:
-    """A name a block: the zone's own, or "zone 1", "zone 2" … where a zone has several."""
+    """One name per block: the zone's own, or "zone 1", "zone 2" … for several blocks of a zone."""
     count, names = Counter(zone_names), []
     seen: Counter[str] = Counter()
     for name in zone_names:
@@ -83,7 +83,7 @@ def block_names(zone_names: Sequence[str]) -> list[str]:
 
 
 def _canonical(k: int, zone: Zone, decimals: int, tolerance: float, flaws: list[Flaw]):
-    """Shapely polygon, loops and edge names of ``zone`` in canonical form; (None, [], []) after a flaw was found."""
+    """Shapely polygon, loops and edge names of ``zone`` in canonical form; (None, [], []) if there is a flaw."""
     import shapely
 
     def refuse(message: str, way_out: str):
@@ -98,7 +98,7 @@ def _canonical(k: int, zone: Zone, decimals: int, tolerance: float, flaws: list[
         loop = np.round(np.asarray(loop, dtype=float), decimals) + 0.0
         label = list(zone.edge_names[number]) if zone.edge_names is not None else [""] * len(loop)
         if len(loop) > 1 and (loop[0] == loop[-1]).all():
-            # The closing repetition: the edge that would leave it has no length.
+            # The repeated first vertex: the edge leaving it would have no length.
             loop, label = loop[:-1], label[: len(loop) - 1]
         if len(loop) < 3:
             return refuse(f"{what} has {len(loop)} corners", "a polygon needs at least three different corners")
@@ -144,7 +144,7 @@ def _canonical(k: int, zone: Zone, decimals: int, tolerance: float, flaws: list[
 
 
 def _turned(loop: np.ndarray, label: list[str], counter_clockwise: bool) -> tuple[np.ndarray, list[str]]:
-    """``loop`` in the house's sense, from its lowest, then leftmost vertex; edge names go with their edges."""
+    """``loop`` with the canonical orientation, from its lowest, then leftmost vertex; edge names follow their edges."""
     if (signed_area(loop) > 0) != counter_clockwise:
         loop, label = loop[::-1], [*label[-2::-1], label[-1]]
     first = int(np.lexsort((loop[:, 0], loop[:, 1]))[0])
@@ -152,7 +152,7 @@ def _turned(loop: np.ndarray, label: list[str], counter_clockwise: bool) -> tupl
 
 
 def _refuse_overlaps(zones: Sequence[Zone], polygons: list, tolerance: float, flaws: list[Flaw]) -> None:
-    """Note pairs of zones that share more than a sliver of ``tolerance`` along their common boundary."""
+    """Record pairs of zones that overlap by more than a sliver of ``tolerance`` along their common boundary."""
     import shapely
 
     present = [k for k, polygon in enumerate(polygons) if polygon is not None]
@@ -208,7 +208,7 @@ def _name_edges(k, line: EdgeLine, zones, loops, names, decimals: int, tolerance
                         Flaw(
                             "edges",
                             k,
-                            f"edge {line.name!r} lies on an edge of zone {zone.name!r} that is called {old!r} already",
+                            f"edge {line.name!r} lies on an edge of zone {zone.name!r} that is already called {old!r}",
                             "give each edge one name; end one line where the other begins",
                         )
                     )
@@ -230,7 +230,8 @@ def _name_edges(k, line: EdgeLine, zones, loops, names, decimals: int, tolerance
 
 
 def _overlaps(loop: np.ndarray, ends: np.ndarray, tolerance: float) -> tuple[np.ndarray, np.ndarray]:
-    """Where each edge of ``loop`` runs along the line ``ends``: distances along it (n,), (n,), m; none: both 0."""
+    """Interval on which each edge of ``loop`` runs along the line ``ends``: distances along it (n,), (n,), m; both 0
+    for none."""
     along = np.roll(loop, -1, axis=0) - loop
     length = np.hypot(along[:, 0], along[:, 1])
     along = along / length[:, None]
@@ -239,7 +240,7 @@ def _overlaps(loop: np.ndarray, ends: np.ndarray, tolerance: float) -> tuple[np.
     off = to[..., 1] * along[:, None, 0] - to[..., 0] * along[:, None, 1]
     low, high = position.min(axis=1), position.max(axis=1)
     start, stop = np.clip(low, 0, length), np.clip(high, 0, length)
-    # How far the line stands off the edge at both ends of the common piece, not at its own far ends.
+    # Distance of the line from the edge at both ends of the common interval, not at its own ends.
     span = np.where(np.abs(position[:, 1] - position[:, 0]) > tolerance, position[:, 1] - position[:, 0], np.inf)
     slope = (off[:, 1] - off[:, 0]) / span
     near = np.maximum(
@@ -250,7 +251,7 @@ def _overlaps(loop: np.ndarray, ends: np.ndarray, tolerance: float) -> tuple[np.
 
 
 def _with_piece(loop, label, edge, start, stop, ends, name, tolerance):
-    """``loop`` with the piece from ``start`` to ``stop`` (m along ``edge``) as an edge of its own called ``name``."""
+    """``loop`` with the interval from ``start`` to ``stop`` (m along ``edge``) as a separate edge called ``name``."""
     a, b = loop[edge], loop[(edge + 1) % len(loop)]
     length = float(np.hypot(*(b - a)))
     cuts = [s for s in (start, stop) if tolerance < s < length - tolerance]
@@ -262,7 +263,7 @@ def _with_piece(loop, label, edge, start, stop, ends, name, tolerance):
 
 
 def _on_edge(a: np.ndarray, b: np.ndarray, t: float, ends: np.ndarray) -> np.ndarray:
-    """The point at ``t`` of the edge: the line's own end where that is on the edge to round-off."""
+    """Point at ``t`` of the edge: the line's own end if that lies on the edge to round-off."""
     point = a + t * (b - a)
     nearest = ends[np.argmin(np.hypot(*(ends - point).T))]
     return nearest if np.hypot(*(nearest - point)) <= 1e-11 * (np.abs(point).max() + np.hypot(*(b - a))) else point

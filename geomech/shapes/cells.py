@@ -1,4 +1,4 @@
-"""Blocks divided into triangles or quadrilaterals by Gmsh: cells of a rock that is continuous through their faces."""
+"""Division of blocks into triangles or quadrilaterals by Gmsh: cells of rock that is continuous across their faces."""
 
 from __future__ import annotations
 
@@ -10,25 +10,28 @@ import numpy as np
 from ..model import Blocks
 from .gmsh_models.session import gmsh_session
 
-#: What stands between the name of a block and the number of its cell.
+#: Separator between the name of a block and the number of its cell.
 CELL = "#"
 
 
 class CannotMesh(RuntimeError):
-    """Gmsh has not divided a block."""
+    """Gmsh failed to divide a block."""
 
 
 def rock_of(name: str) -> str:
-    """The name of the block that the cell of this ``name`` is of; a block that is no cell is its own."""
+    """Name of the block to which the cell ``name`` belongs; a block that is not a cell is its own."""
     return name.partition(CELL)[0]
 
 
 def divided(
     blocks: Blocks, size: np.ndarray, shape: np.ndarray, between: Sequence[str] | None = None
 ) -> tuple[Blocks, np.ndarray]:
-    """``blocks`` of which those with a ``size`` (n_blocks,), m, not nan, are divided into cells of about that size, ``shape``
-    (n_blocks,) "triangles" or "quads"; and the block (n_cells,) that each is of. Sides of cells keep the names of the edges
-    that they lie on, those between cells have the name ``between`` (n_blocks,), if any. Raises CannotMesh that names the block."""
+    """``blocks`` with those that have a ``size`` divided into cells; and the block (n_cells,) of each.
+
+    ``size`` (n_blocks,) m is the approximate cell size, nan for undivided blocks; ``shape`` (n_blocks,) is "triangles"
+    or "quads". Sides of cells keep the names of the edges on which they lie, those between cells have the name
+    ``between`` (n_blocks,), if any. Raises CannotMesh naming the block.
+    """
     polygons, names, edge_names, parent, glued, n = [], [], [], [], [], 0
     start, labels = blocks.vertex_start, blocks.edge_names
     for b in range(blocks.n_blocks):
@@ -79,8 +82,8 @@ def divided(
 
 
 def _mesh(loops: list[np.ndarray], size: float, shape: str):
-    """Points (n, 2), cells (lists of 3 or 4 of them, counter-clockwise) and ((a, b), edge), a < b, for all their sides on
-    the edges of ``loops``, counted one after the other."""
+    """Points (n, 2), cells (lists of 3 or 4 of them, counter-clockwise), and ((a, b), edge), a < b, for all sides on
+    the edges of ``loops``, numbered one after the other."""
     with gmsh_session("cells") as gmsh:
         geo, mesh, option = gmsh.model.geo, gmsh.model.mesh, gmsh.option.setNumber
         lines, rings, corners = [], [], []
@@ -127,5 +130,5 @@ def _mesh(loops: list[np.ndarray], size: float, shape: str):
 
 
 def _of_kind(mesh, number: np.ndarray, kind: int, width: int, surface: int) -> list[list[int]]:
-    """The elements of Gmsh's ``kind`` with ``width`` nodes."""
+    """Elements of Gmsh's type ``kind`` with ``width`` nodes."""
     return number[mesh.getElementsByType(kind, surface)[1]].reshape(-1, width).tolist()

@@ -1,7 +1,7 @@
-"""Chords that stand for curves, and the ends of lines that were drawn on the curves themselves.
+"""Chords that approximate curves, and line ends that were drawn on the curves themselves.
 
-A chord leaves its curve by up to the chord tolerance, which is a hundred times what else is taken to touch. A line that
-ends on the curve as drawn would stop in the rock before the chord, or go on behind it: its end is moved onto the chord.
+A chord deviates from its curve by up to the chord tolerance, a hundred times the drawing tolerance. A line that ends on
+the drawn curve would stop in the rock before the chord, or extend beyond it: its end is moved onto the chord.
 """
 
 from __future__ import annotations
@@ -14,8 +14,8 @@ import numpy as np
 
 @dataclass(frozen=True, eq=False)
 class Chords:
-    """Straight pieces from ``start`` to ``end`` (n, 2), m, of which the curve leaves each by at most ``away`` (n,),
-    m."""
+    """Straight pieces from ``start`` to ``end`` (n, 2), m, and the largest distance ``away`` (n,) of the curve from
+    each, m."""
 
     start: np.ndarray
     end: np.ndarray
@@ -27,7 +27,8 @@ class Chords:
 
     @classmethod
     def of(cls, lines: Sequence[np.ndarray], away: Sequence[np.ndarray | float]) -> Chords:
-        """Those of polylines (n, 2); ``away`` of each is one number, or one a piece (n − 1,), 0 where it is straight."""
+        """Chords of polylines (n, 2); ``away`` of each is one number, or one per piece (n − 1,), 0 where it is
+        straight."""
         parts = [
             cls(line[:-1], line[1:], np.broadcast_to(np.asarray(own, dtype=float), len(line) - 1))
             for line, own in zip(lines, away, strict=True)
@@ -45,7 +46,7 @@ class Chords:
         return cls(whole.start[bent], whole.end[bent], whole.away[bent])
 
     def moved(self, origin: np.ndarray) -> Chords:
-        """Counted from ``origin`` (2,), m."""
+        """Relative to ``origin`` (2,), m."""
         return replace(self, start=self.start - origin, end=self.end - origin)
 
     def scaled(self, factor: float) -> Chords:
@@ -53,8 +54,8 @@ class Chords:
 
 
 def ended_on(items: Sequence, chords: Chords) -> list:
-    """``items`` (joints or cracks) with those ends of their lines that are within ``away`` of a chord moved onto the
-    nearest; a line's own chords do not count."""
+    """``items`` (joints or cracks) with line ends within ``away`` of a chord moved onto the nearest one; a line's own
+    chords do not count."""
     lines = [line for item in items for line in item.lines]
     feet = _feet(lines, chords)
     if not feet:
@@ -67,7 +68,7 @@ def ended_on(items: Sequence, chords: Chords) -> list:
             line = np.array(line, dtype=float)
             for which in (0, -1):
                 foot = feet.get((number, which))
-                # Both ends at one place would leave no line.
+                # With both ends at one place no line would be left.
                 if foot is not None and (len(line) > 2 or (foot != line[-1 - which]).any()):
                     line[which] = foot
             own.append(line)
@@ -77,7 +78,7 @@ def ended_on(items: Sequence, chords: Chords) -> list:
 
 
 def _feet(lines: Sequence[np.ndarray], chords: Chords) -> dict[tuple[int, int], np.ndarray]:
-    """(line, 0 or −1) of every end that chords reach, and the nearest point (2,) on them."""
+    """(line, 0 or −1) of every end within reach of chords, and the nearest point (2,) on them."""
     import shapely
 
     ends = [(k, which) for k, line in enumerate(lines) for which in (0, -1) if len(line) > 1]

@@ -1,7 +1,7 @@
-"""Meshes of other programs (Abaqus, Nastran, Medit, SU2, VTK) as meshes of Gmsh, by way of meshio.
+"""Meshes of other programs (Abaqus, Nastran, Medit, SU2, VTK) as Gmsh meshes, through meshio.
 
-A set of triangles or quadrilaterals is a zone, a set of line elements a joint, a crack or an edge, as physical groups of
-Gmsh are. A set called "block:…" parts blocks of one zone. Without sets, integers of cells ("zone", "material", a
+A set of triangles or quadrilaterals is a zone, a set of line elements a joint, a crack or an edge, as physical groups
+of Gmsh are. A set called "block:…" separates blocks of one zone. Without sets, integer cell data ("zone", "material", a
 reference or a tag) distinguish zones.
 """
 
@@ -15,19 +15,19 @@ import numpy as np
 
 from .gmsh_models.model_drawing import GmshModelError
 
-#: What meshio reads and writes without further packages, by suffix.
+#: Formats that meshio reads and writes without further packages, by suffix.
 SUFFIXES = (".inp", ".bdf", ".nas", ".mesh", ".su2", ".vtk", ".vtu")
-#: A set of this name is one block of a zone.
+#: Prefix of sets that are one block of a zone.
 BLOCK = "block:"
-#: Cell data that distinguish zones where no set does, the best first.
+#: Cell data that distinguish zones if no set does, in order of preference.
 _ZONE_DATA = ("zone", "material", "gmsh:physical", "medit:ref", "su2:tag", "nastran:ref", "cell_tags", "block_id")
 _LINES = {"line": 2, "line3": 2}
 _FACES = {"triangle": 3, "triangle6": 3, "quad": 4, "quad8": 4, "quad9": 4}
 
 
 class PhysicalMesh(NamedTuple):
-    """A mesh with named groups: ``points`` (n, 2); ``lines`` and ``faces`` are rows (name, entity, node, node, …), names
-    counted in ``line_names`` and ``face_names``, nodes in ``points``."""
+    """A mesh with named groups: ``points`` (n, 2); ``lines`` and ``faces`` are rows (name, entity, node, node, …), with
+    names as indices of ``line_names`` and ``face_names``, nodes as indices of ``points``."""
 
     points: np.ndarray
     line_names: Sequence[str]
@@ -54,13 +54,13 @@ def msh_text(mesh: PhysicalMesh) -> str:
 
 
 def as_gmsh_mesh(path: Path, folder: Path) -> Path:
-    """``path``, a mesh in a format of `SUFFIXES`, written into ``folder`` as a mesh of Gmsh. Raises GmshModelError for
-    what meshio cannot read and for meshes without faces in the plane."""
+    """``path``, a mesh in a format of `SUFFIXES`, written into ``folder`` as a Gmsh mesh. Raises GmshModelError for
+    files that meshio cannot read and for meshes without plane faces."""
     import meshio
 
     try:
         mesh = meshio.read(path)
-    except (Exception, SystemExit) as error:  # meshio's readers raise whatever damaged files lead them to
+    except (Exception, SystemExit) as error:  # meshio's readers raise many kinds of exceptions for damaged files
         raise GmshModelError(
             f"{path} cannot be read: {type(error).__name__}: {error}", "export it again, or save it as .msh"
         ) from error
@@ -102,7 +102,7 @@ def _with_groups(mesh, path: Path) -> PhysicalMesh:
 
 
 class _Names(dict):
-    """Numbers of names, given in the order in which they are first asked for."""
+    """Numbers of names, in the order of first use."""
 
     def __missing__(self, name: str) -> int:
         self[name] = len(self)
@@ -110,8 +110,8 @@ class _Names(dict):
 
 
 def _sets(mesh) -> list[list[list[str]]]:
-    """Of every element of every block of cells, the names of the sets that it is in; where no face is in any, the
-    integers that distinguish zones."""
+    """Names of the sets of every element of every cell block; if no face is in a set, the integers that distinguish
+    zones."""
     found: list[list[list[str]]] = [[[] for _ in cells.data] for cells in mesh.cells]
     for name, by_block in mesh.cell_sets.items():
         if name.startswith("gmsh:"):

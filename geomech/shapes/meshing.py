@@ -1,4 +1,4 @@
-"""Triangles inside a cracked block, for interior fields: fine at crack tips, torn along the cracks."""
+"""Triangulation of the interior of a cracked block for fields: fine at crack tips, split along the cracks."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ SLIVER = math.radians(1.0)
 
 @dataclass(frozen=True, eq=False)
 class InteriorMesh:
-    """A conforming triangle mesh whose two crack faces have nodes of their own.
+    """A conforming triangle mesh with separate nodes on both faces of cracks.
 
     points      (n, 2)   m
     triangles   (m, 3)   counter-clockwise
@@ -33,9 +33,11 @@ class InteriorMesh:
     side: np.ndarray
 
     def flattest(self) -> tuple[float, np.ndarray]:
-        """(rad, (2,) m) the least angle of any triangle, and where. Between cracks that nearly touch it is as small as
-        their
-        distance beside the triangles' sides, which follow the cracks (`mesh_interior`)."""
+        """(rad, (2,) m) smallest angle of any triangle, and its location.
+
+        Between cracks that nearly touch it is as small as their distance relative to the triangles' sides, which follow
+        the cracks (`mesh_interior`).
+        """
         corner = self.points[self.triangles]
         least, at = np.inf, 0
         for k in range(3):
@@ -53,19 +55,16 @@ def mesh_interior(
     tip_size: float | None = None,
     slope: float = 0.5,
 ) -> InteriorMesh:
-    """Mesh the block bounded by ``loops`` ((n, 2) each, the outline first, then holes) with ``cracks`` (nodes shared
-    where they meet) cut open.
+    """Mesh the block bounded by ``loops`` ((n, 2) each, the outline first, then holes), split along ``cracks``.
 
-    ``size`` is the length of a triangle's side away from cracks (default: two to four thousand triangles in all),
-    ``tip_size`` that at crack tips (default a tenth of it), both in m; along cracks sides are half of ``size``, and all
-    grow back to it by ``slope`` times the distance (a half: over two of its lengths). Nodes on cracks are
-    doubled, at junctions once a sector, at mouths too; tips stay single. Between cracks, or a crack and the outline,
-    that come
-    nearer to each other than sides are long triangles are as flat as that; those below 1° are reported in the log
-    with their
-    place: fields are shown at nodes and lose nothing, but another program's finite elements would. Raises ValueError
-    for sizes that are not
-    positive, RuntimeError where Gmsh cannot mesh the block.
+    Nodes are shared where cracks meet. ``size`` is the side of a triangle away from cracks (default: two to four
+    thousand triangles in all), ``tip_size`` that at crack tips (default a tenth of it), both in m; along cracks sides
+    are half of ``size``, and all grow back to it by ``slope`` times the distance (a half: over two of its lengths).
+    Nodes on cracks are doubled, at junctions one per sector, at mouths too; tips stay single. Between cracks, or a
+    crack and the outline, that are closer to each other than the sides of triangles, these are flat; those below 1° are
+    reported in the log with their place: fields are evaluated at nodes and are unaffected, but finite elements of
+    another program would be. Raises ValueError for sizes that are not positive, RuntimeError if Gmsh cannot mesh the
+    block.
     """
     loops = [np.asarray(loop, dtype=float) for loop in loops]
     area = abs(sum(abs(signed_area(loop)) * (1 if k == 0 else -1) for k, loop in enumerate(loops)))
@@ -89,7 +88,7 @@ def mesh_interior(
 
 
 def _with_mouths(loop: np.ndarray, mouths: list[tuple[int, np.ndarray]], tolerance: float):
-    """The corners of ``loop`` and the mouths on its edges in order: a list of (point, crack node or −1)."""
+    """Corners of ``loop`` and mouths on its edges in order: a list of (point, crack node or −1)."""
     following = np.roll(loop, -1, axis=0)
     along = following - loop
     square = np.einsum("nx,nx->n", along, along)
@@ -113,7 +112,7 @@ def _with_mouths(loop: np.ndarray, mouths: list[tuple[int, np.ndarray]], toleran
 
 
 def _mesh(loops, cracks: Cracks, size: float, tip_size: float, reach: float):
-    """(points, triangles, crack edges) as Gmsh makes them, crack lines embedded and not yet torn."""
+    """(points, triangles, crack edges) as made by Gmsh, with embedded crack lines, not yet split."""
     tolerance = 1e-9 * max(np.ptp(loop, axis=0).max() for loop in loops)
     mouths = [(int(n), cracks.nodes[n]) for n in np.flatnonzero(cracks.surface)]
     with gmsh_session("interior") as gmsh:
@@ -140,15 +139,16 @@ def _mesh(loops, cracks: Cracks, size: float, tip_size: float, reach: float):
         for name in ("MeshSizeExtendFromBoundary", "MeshSizeFromPoints", "MeshSizeFromCurvature"):
             option(f"Mesh.{name}", 0)
         option("Mesh.MeshSizeMax", size)
-        # By default Gmsh spends half of its time on smoothing, for a least angle of 31° in place of 23°, and a sixth on
-        # dividing lines to nine digits of their sizes. Fields are evaluated at the nodes: such a mesh shows them as
+        # By default Gmsh spends half of its time on smoothing, for a smallest angle of 31° instead of 23°, and a sixth
+        # on dividing lines to nine digits of their sizes. Fields are evaluated at the nodes: such a mesh shows them as
         # well.
         option("Mesh.Smoothing", 0)
         option("Mesh.LcIntegrationPrecision", 1e-3)
         tips = [tag_of[int(n)] for n in cracks.tips]
         if tips and tip_size < size:
             _refine(mesh, tips, lines, size, tip_size, reach)
-        # Delaunay is the quickest that honours embedded lines; the others are for the rare block it fails on.
+        # Delaunay is the fastest algorithm that respects embedded lines; the others are for the rare block on which it
+        # fails.
         for algorithm in (5, 6, 1):
             option("Mesh.Algorithm", algorithm)
             mesh.clear()
@@ -207,10 +207,10 @@ def _refine(mesh, tips, lines, size: float, tip_size: float, reach: float) -> No
 
 
 def _torn(points: np.ndarray, triangles: np.ndarray, crack_edges: np.ndarray) -> InteriorMesh:
-    """Give every sector of triangles about a node on a crack a node of its own.
+    """Give every sector of triangles around a node on a crack its own node.
 
-    The triangles about a node fall into sectors that crack edges divide; a tip has one, a point of a crack two, a
-    junction as many as cracks leave it.
+    Crack edges divide the triangles around a node into sectors: one at a tip, two at an interior point of a crack, as
+    many as cracks at a junction.
     """
     corner = points[triangles]
     a, b = corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]
@@ -249,7 +249,7 @@ def _torn(points: np.ndarray, triangles: np.ndarray, crack_edges: np.ndarray) ->
 
 
 def _sectors(node: int, corners: list[tuple[int, int]], triangles: np.ndarray, cut: set) -> list[list[tuple[int, int]]]:
-    """The (triangle, corner) pairs about ``node``, grouped by walking across edges that are not crack edges."""
+    """The (triangle, corner) pairs around ``node``, grouped by traversal of edges that are not crack edges."""
     across: dict[int, list[int]] = {}
     for i, (t, k) in enumerate(corners):
         for other in (int(triangles[t, (k + 1) % 3]), int(triangles[t, (k + 2) % 3])):
@@ -273,7 +273,7 @@ def _sectors(node: int, corners: list[tuple[int, int]], triangles: np.ndarray, c
 
 
 def _bisector(node: int, sector: list[tuple[int, int]], triangles: np.ndarray, points: np.ndarray) -> np.ndarray:
-    """Unit bisector of the ``sector``: ∫(cos θ, sin θ)dθ over it, which points the right way also beyond 180°."""
+    """Unit bisector of the ``sector``: ∫(cos θ, sin θ)dθ over it, which has the right direction also beyond 180°."""
     total = np.zeros(2)
     for t, k in sector:
         a = points[triangles[t, (k + 1) % 3]] - points[node]

@@ -1,4 +1,4 @@
-"""Short ways to draw: rectangles, and cracks by centre, length and angle."""
+"""Helper functions for drawing: rectangles, and cracks by centre, length and angle."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ def rectangle(x0: float, y0: float, x1: float, y1: float) -> np.ndarray:
 
 
 def straight_crack(centre: Sequence[float], length: float, angle: float) -> np.ndarray:
-    """(2, 2) ends of a crack of ``length`` m about ``centre``, at ``angle`` rad counter-clockwise from x; it runs
-    from its far end to the end the angle points to."""
+    """(2, 2) ends of a crack of ``length`` (m) with this ``centre``, at ``angle`` (rad) counter-clockwise from x; it
+    runs towards the end to which the angle points."""
     half = 0.5 * length * np.array([math.cos(angle), math.sin(angle)])
     middle = np.asarray(centre, dtype=float)
     return np.array([middle - half, middle + half])

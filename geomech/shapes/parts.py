@@ -1,4 +1,4 @@
-"""What a drawing is made of: zones of rock, traces of cracks, names on edges, and what is wrong with them."""
+"""Parts of a drawing: zones of rock, traces of cracks, names of edges; and their errors."""
 
 from __future__ import annotations
 
@@ -10,9 +10,12 @@ import numpy as np
 
 @dataclass(frozen=True, eq=False)
 class Zone:
-    """One polygon of rock: ``loops`` are (n, 2) arrays without the closing repetition, the outline first, then holes,
-    in either sense. ``edge_names[loop][edge]`` names the edge that leaves each vertex; None: nothing named yet.
-    Several zones of one name are several blocks of one kind."""
+    """One polygon of rock.
+
+    ``loops`` are (n, 2) arrays without repetition of the first vertex, the outline first, then holes, in either
+    orientation. ``edge_names[loop][edge]`` names the edge that leaves each vertex; None: no names yet. Several zones
+    with one name are several blocks of one kind.
+    """
 
     name: str
     loops: tuple[np.ndarray, ...]
@@ -21,20 +24,20 @@ class Zone:
 
 @dataclass(frozen=True, eq=False)
 class Trace:
-    """A crack as drawn: ``lines`` are polylines (n, 2), one, or several where the crack branches."""
+    """A crack as drawn: ``lines`` are polylines (n, 2), several if the crack branches."""
 
     name: str
     lines: tuple[np.ndarray, ...]
 
 
-#: What the names of block edges along joints begin with.
+#: Prefix of the names of block edges along joints.
 JOINT = "joint:"
 
 
 @dataclass(frozen=True, eq=False)
 class Joint:
-    """Joints of one kind as drawn: ``lines`` are polylines (n, 2) along which rock parts; ``name`` is what the block
-    edges on both sides are called, as "joint:bedding"."""
+    """Joints of one kind as drawn: ``lines`` are polylines (n, 2) along which rock is cut; ``name`` is that of the
+    block edges on both sides, such as "joint:bedding"."""
 
     name: str
     lines: tuple[np.ndarray, ...]
@@ -43,7 +46,7 @@ class Joint:
 @dataclass(frozen=True, eq=False)
 class Mark:
     """Lines or points of one name that cut nothing: ``name`` is "bolt:NAME", "water", "water:NAME" or "monitor:NAME"
-    (each may be without NAME), ``lines`` (n, 2) arrays, of one row for points."""
+    (each may lack NAME), ``lines`` are (n, 2) arrays, with one row for points."""
 
     name: str
     lines: tuple[np.ndarray, ...]
@@ -51,8 +54,7 @@ class Mark:
 
 @dataclass(frozen=True, eq=False)
 class EdgeLine:
-    """A name for all block edges that lie on the straight piece from ``start`` to ``end`` (of ``zone`` alone, if
-    given)."""
+    """A name for all block edges on the straight piece from ``start`` to ``end`` (only of ``zone``, if given)."""
 
     name: str
     start: tuple[float, float]
@@ -61,12 +63,12 @@ class EdgeLine:
 
 
 def is_mark(name: str) -> bool:
-    """Whether lines of this ``name`` are bolts or a water table, which cut nothing."""
+    """Whether lines with this ``name`` are bolts or a water table, which cut nothing."""
     return name.partition(":")[0] in ("bolt", "water")
 
 
 class Flaw(NamedTuple):
-    """One thing wrong with a drawing: ``part`` is "zones", "cracks", "joints" or "edges", ``index`` its place in that
+    """One error of a drawing: ``part`` is "zones", "cracks", "joints" or "edges", ``index`` the position in that
     list."""
 
     part: str
@@ -76,7 +78,7 @@ class Flaw(NamedTuple):
 
 
 class ShapeError(ValueError):
-    """Everything wrong with a drawing, as ``flaws``."""
+    """All errors of a drawing, as ``flaws``."""
 
     def __init__(self, flaws: list[Flaw]) -> None:
         self.flaws = list(flaws)
@@ -94,10 +96,10 @@ def extent_of(arrays) -> float:
 
 
 def grid_decimals(arrays) -> int:
-    """Decimals that keep twelve significant digits of the largest coordinate.
+    """Number of decimals that keeps twelve significant digits of the largest coordinate.
 
-    All coordinates of a drawing are rounded to that many decimals, once. A cosine taken by Gmsh and one taken by
-    Python then give the same number, and decimal input (0.03) stays the very number that was typed.
+    All coordinates of a drawing are rounded to that many decimals, once. A cosine from Gmsh and one from Python then
+    give the same number, and decimal input (0.03) stays the number that was typed.
     """
     arrays = [np.asarray(a, dtype=float) for a in arrays if len(a)]
     largest = max((float(np.abs(a).max()) for a in arrays), default=1.0)

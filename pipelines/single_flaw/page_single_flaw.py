@@ -51,7 +51,7 @@ def write_page(runs: Mapping[str, Wings], places: Mapping[str, Path], out: Path)
         settings(runs).add_to(page)
     add_curves(page, run)
     add_time(page, run.summary)
-    page.section("How to make it again")
+    page.section("How to reproduce it")
     page.code(
         "geomech run pipelines/single_flaw                  # this page\n"
         "geomech run pipelines/single_flaw --variant all    # with increments, faces and the paper's settings beside it"

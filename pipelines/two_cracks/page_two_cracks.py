@@ -42,7 +42,7 @@ def write_page(runs: Mapping[str, Watch], folder: Path, out: Path, overrides: Se
     )
     with tempfile.TemporaryDirectory() as drawings:
         _fill(page, runs, by_phi, folder, out, overrides, Path(drawings))
-    page.section("How to make it again")
+    page.section("How to reproduce it")
     page.code(
         "geomech run pipelines/two_cracks                  # the four specimens and this page\n"
         "geomech run pipelines/two_cracks --variant all    # and readings, faces, settings, convergence\n"

@@ -227,4 +227,4 @@ def test_an_edge_that_is_no_surface(faults):
         "rectangle = [-5.0, -5.0, 5.0, 0.0]", "polygon = [[-5, -5], [5, -5], [5, 1], [4, 0], [-5, 0]]"
     ).replace("line = [[-5.0, 0.0], [5.0, 0.0]]", "line = [[-5.0, 0.0], [4.0, 0.0]]")
     ((place, message),) = faults(notched)
-    assert "zones.rock.surface" in place and "no straight line" in message
+    assert "zones.rock.surface" in place and "do not form a straight line" in message

@@ -55,7 +55,7 @@ def scene(tmp_path):
 
 def test_a_fluid_in_one_crack_leaves_the_others_alone(scene):
     loaded = scene('cracks = ["frac*"]')
-    assert not any("nothing connects" in fault.message for fault in loaded.warnings)
+    assert not any("unconnected cracks" in fault.message for fault in loaded.warnings)
     first = next(cycle for cycle in geomech.cycles(loaded) if len(cycle.tips) and cycle.tips["k_eq"].max() > 0)
     pressure = 1e5 * first.state.time
     cracks = first.cracks
@@ -103,7 +103,7 @@ def test_fluids_add_up_and_come_out_of_holes():
 
 
 def test_cracks_that_nothing_connects_are_told_and_strangers_refused(scene):
-    (warning,) = [fault for fault in scene().warnings if "nothing connects" in fault.message]
+    (warning,) = [fault for fault in scene().warnings if "unconnected cracks" in fault.message]
     assert "3 cracks" in warning.message and "'fracture', 'fault', 'notch'" in warning.message
     with pytest.raises(SceneError, match="there is no crack 'fracure'"):
         scene('cracks = ["fracure"]')

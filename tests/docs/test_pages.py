@@ -46,7 +46,7 @@ def test_the_readme_is_short():
 def test_the_scene_of_the_readme_is_that_of_the_manual_and_loads(tmp_path):
     text = re.search(r"```toml\n(.*?)```", README.read_text(encoding="utf-8"), re.DOTALL).group(1)
     assert text == (DOCS / "start" / "my_slope.toml").read_text(encoding="utf-8")
-    assert len(text.splitlines()) <= 30
+    assert len(text.splitlines()) <= 20
     scene = load_scene(DOCS / "start" / "my_slope.toml")
     assert scene.problem().blocks.n_blocks == 78
 

@@ -66,7 +66,7 @@ def test_a_folder_left_without_a_word_is_told_and_taken_over(held, scene):
     other.wait()
     assert (folder / run_lock.FILE).is_file()
     run(load_scene(scene), folder)
-    assert f"left without a word by process {other.pid} on" in (folder / "run.log").read_text()
+    assert f"left without being closed by process {other.pid} on" in (folder / "run.log").read_text()
     assert not (folder / run_lock.FILE).exists()
 
 
@@ -145,5 +145,5 @@ def test_what_has_come_to_nothing_is_run_over(tmp_path):
         refuse_results([tmp_path])
     (tmp_path / "checkpoint").mkdir()
     (tmp_path / "checkpoint" / "cycle_0000003.checkpoint").write_bytes(b"")
-    with pytest.raises(FolderTaken, match="was broken off, with a checkpoint"):
+    with pytest.raises(FolderTaken, match="an interrupted run with a checkpoint"):
         refuse_results([tmp_path])

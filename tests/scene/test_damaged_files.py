@@ -90,7 +90,7 @@ def test_a_file_that_ends_its_reader_is_refused(tmp_path, monkeypatch):
     path = tmp_path / "model.brep"
     path.write_bytes(b"")
     monkeypatch.setattr(isolated_reader, "_CHILD", "import os, signal; os.kill(os.getpid(), signal.SIGSEGV)")
-    with pytest.raises(GmshModelError, match=r"model\.brep cannot be read: it ends its reader \(SIGSEGV\)"):
+    with pytest.raises(GmshModelError, match=r"model\.brep cannot be read: its reader crashed \(SIGSEGV\)"):
         read_gmsh_model(path)
 
 
@@ -124,7 +124,7 @@ def test_what_the_reader_finds_is_what_is_found_here(files, tmp_path, monkeypatc
 def test_a_name_that_is_no_utf8_is_refused_with_its_line(tmp_path):
     path = tmp_path / "model.geo"
     path.write_bytes(("// Höhe\n" + DRAWN).replace('"rock"', '"Höhle"').encode("latin-1"))
-    with pytest.raises(GmshModelError, match=r"model\.geo:8: a name with the byte 0xf6 is no UTF-8 text"):
+    with pytest.raises(GmshModelError, match=r"model\.geo:8: a name with the byte 0xf6 is not UTF-8 text"):
         read_gmsh_model(path)
     path.write_bytes(("// Höhe\n" + DRAWN).encode("latin-1"))
     assert len(read_gmsh_model(path).zones) == 2

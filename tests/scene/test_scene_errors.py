@@ -63,7 +63,7 @@ SPOILT = [
         "[run]",
         '[zones.rock]\nmaterial = "rock"\n[growth]\ninitiation = "surface"\n' + TUFF + "[run]",
         "materials.tuff",
-        "'tuff' has no fracture toughness, and cracks that are born in it",
+        "'tuff' has no fracture toughness, and cracks that initiate in it",
         "k_ic_pa_sqrt_m",
     ),
     (
@@ -101,7 +101,7 @@ SPOILT = [
         "for static runs, and dda.dynamic_factor",
         "set dda.dynamic_factor = 0",
     ),
-    ("[run]", '[run]\ncontrol = "toughness"', "run.control", 'belongs to stepping "events"', "run.stepping"),
+    ("[run]", '[run]\ncontrol = "toughness"', "run.control", 'requires stepping "events"', "run.stepping"),
     ("[run]", '[run]\nstop_at = ["sliding"]', "run.stop_at", "fixed steps report these", "run.events = "),
     (
         "[run]",
@@ -110,7 +110,7 @@ SPOILT = [
         "run.events names neither",
         'add "contacts"',
     ),
-    ("[run]", "[run]\nlongest_step_s = 3", "run.longest_step_s", 'belongs to stepping "events"', "run.stepping"),
+    ("[run]", "[run]\nlongest_step_s = 3", "run.longest_step_s", 'requires stepping "events"', "run.stepping"),
     ("density_kg_m3 = 2500", "density_kg_m3 = 2500\nrigid = true", "materials.rock.rigid", "holds a crack", "rigid"),
     ("[run]", "[dda]\nnewmark = [0.2, 0.5]\n[run]", "dda.newmark", "not stable at every time step", "trapezoidal"),
     ("[run]", "[dda]\nnewmark = [0.5, 0.5]\n[run]", "dda.newmark", "blocks that bounce gain energy", "trapezoidal"),
@@ -158,7 +158,7 @@ SPOILT = [
         "rate_pa_per_s = [0.0, -1e5]",
         "rate_pa_per_s = -1e5",
         "loads.tractions[0].rate_pa_per_s",
-        "where [x, y] belongs",
+        "expected [x, y]",
         "Pa/s",
     ),
     ("rate_pa_per_s = [0.0, -1e5]", "rate_pa_per_s = [0.0, -2e5]", "loads", "do not balance", "balance the tractions"),
@@ -459,7 +459,7 @@ def test_gravity_needs_something_fixed_unless_blocks_may_fall(scene_file):
     text = GOOD + "[loads]\n"
     text = GOOD.replace("[[loads.tractions]]", "[loads]\ngravity_m_s2 = [0.0, -9.81]\n\n[[loads.tractions]]", 1)
     (error,) = faults(scene_file, text)
-    assert "would fall" in error.message and "rest it on a zone of its own" in error.way_out
+    assert "would fall" in error.message and "place it on a fixed zone of its own" in error.way_out
     load_scene(scene_file(text), ["dda.dynamic_factor=1"])
     (error,) = faults(scene_file, text, overrides=["zones.rock.fixed=true"])
     assert "every load acts on fixed blocks (rock)" in error.message
@@ -491,7 +491,7 @@ def test_a_load_on_a_fixed_block_beside_a_loaded_one_is_told(scene_file):
 
 def test_loads_that_cancel_on_one_edge_are_told(scene_file):
     scene = load_scene(scene_file(GOOD.replace('edge = "load:bottom"', 'edge = "load:top"')))
-    assert "the tractions on 'load:top' cancel one another" in scene.warnings[0].message
+    assert "the tractions on 'load:top' cancel each other" in scene.warnings[0].message
 
 
 def test_no_hint_leads_to_an_edge_that_is_loaded_already(errors_of):
@@ -564,7 +564,7 @@ def test_leading_edge_must_be_loaded(scene_file):
 def test_weight_can_lead_only_where_it_acts(scene_file):
     text = GOOD.replace("[[loads.tractions]]", '[loads]\nleading_edge = "gravity"\n\n[[loads.tractions]]', 1)
     (error,) = faults(scene_file, text)
-    assert "no gravity that could lead" in error.message and "gravity_ramp_s" in error.way_out
+    assert "no gravity to be the leading load" in error.message and "gravity_ramp_s" in error.way_out
 
 
 def test_two_cracks_of_one_name(scene_file):
@@ -578,7 +578,7 @@ def test_coincident_cracks_are_named(scene_file):
         '[[geometry.cracks]]\nname = "twin"\ncentre = [0.5, 1.0]\nlength_m = 0.1\nangle_deg = 30\n\n[[geometry.edges]]'
     )
     (error,) = faults(scene_file, GOOD.replace("[[geometry.edges]]", again, 1))
-    assert "'flaw' and 'twin' lie on one another" in error.message and "geometry.cracks[1]" in error.place
+    assert "'flaw' and 'twin' coincide" in error.message and "geometry.cracks[1]" in error.place
 
 
 def test_a_drawing_is_not_a_scene(tmp_path):

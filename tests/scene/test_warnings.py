@@ -65,7 +65,7 @@ p20_per_m2 = 0.04
 zones = ["rock"]
 """
     )
-    (fault,) = [fault for fault in found if "which is not strained" in fault.message]
+    (fault,) = [fault for fault in found if "which does not strain" in fault.message]
     assert "more like it" in fault.message and "zones.rock.fixed" not in fault.place
     assert 'edges called "fixed"' in fault.way_out and "trim" in fault.way_out
 

@@ -120,9 +120,9 @@ def test_a_branching_crack_stays_one_crack():
         ([[[0.2, 0.2], [0.2, 0.2]]], 0, "coincide"),
         ([[[0.2, 0.2]]], 0, "1 point"),
         ([[[0.5, 0.5], [1.0, 0.7], [0.5, 0.9]]], 0, "touches the outline of zone 'rock' between its ends, at (1, 0.7)"),
-        ([[[0.2, 0.5], [0.6, 0.5]], [[0.8, 0.5], [0.4, 0.5]]], 1, "cracks 'a' and 'b' lie on one another"),
-        ([[[0.2, 0.5], [0.6, 0.5]], [[0.6, 0.5], [0.2, 0.5]]], 1, "cracks 'a' and 'b' lie on one another"),
-        ([[[0.2, 0.5], [0.6, 0.5], [0.4, 0.5]]], 0, "'a' lies on itself"),
+        ([[[0.2, 0.5], [0.6, 0.5]], [[0.8, 0.5], [0.4, 0.5]]], 1, "cracks 'a' and 'b' coincide"),
+        ([[[0.2, 0.5], [0.6, 0.5]], [[0.6, 0.5], [0.2, 0.5]]], 1, "cracks 'a' and 'b' coincide"),
+        ([[[0.2, 0.5], [0.6, 0.5], [0.4, 0.5]]], 0, "'a' coincides with itself"),
     ],
 )
 def test_bad_cracks_are_refused_by_name(lines, index, message):

@@ -181,7 +181,7 @@ def test_a_last_line_that_gmsh_does_not_read_is_told(tmp_path):
     path = tmp_path / "model.geo"
     path.write_text(MODEL.strip())
     (warning,) = read_gmsh_model(path).warnings
-    assert "last line does not end" in warning[0]
+    assert "last line has no line end" in warning[0]
 
 
 def test_a_scene_joins_a_models_joints_with_sets(tmp_path):

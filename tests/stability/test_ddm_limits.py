@@ -115,7 +115,7 @@ def test_thinner_slivers_are_refused():
         lines([[-0.4, 0], [0.4, 0]], [[-0.4, 1e-4], [0.4, 1e-4]]),
     ):
         with pytest.raises(
-            ValueError, match=r"too thin a piece of rock between them, about .* m: it would take more than"
+            ValueError, match=r"too thin a piece of rock between them, about .* m: the mesh would need more than"
         ):
             ddm.Body([SQUARE], cracks, ROCK)
 

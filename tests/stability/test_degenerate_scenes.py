@@ -118,7 +118,7 @@ def test_cracks_that_cannot_be_are_refused_where_they_stand(run, line, said):
 
 def test_cracks_on_one_another_are_refused(run):
     code, shown, _ = run(plate([("a", [[0, 0], [0.01, 0]]), ("b", [[0.01, 0], [0, 0]])]), verb="check")
-    assert code == cli.BAD_INPUT and "lie on one another" in shown
+    assert code == cli.BAD_INPUT and "coincide" in shown
 
 
 @pytest.mark.parametrize("gap", [0.0, 1e-9, -1e-9])

@@ -73,8 +73,8 @@ def test_folders_are_kept_of_failures_alone(swept):
 def test_the_page(swept):
     page = write_sweep_page(swept.folder).read_text(encoding="utf-8")
     for told in (
-        "probability of failure", "Wilson", "Convergence", "What it depends on", "Responses", "Where it moves",
-        "Mechanisms", "Typical, worst and median run", "Runs without an answer", "What it took",
+        "probability of failure", "Wilson", "Convergence", "Sensitivities", "Responses", "Moving region",
+        "Mechanisms", "Typical, worst and median run", "Runs without an answer", "Computing time",
         f"--set {FRICTION}=0", "Only 2 runs failed", "1 runs have no answer",
     ):  # fmt: skip
         assert told in page, told

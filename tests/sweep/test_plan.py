@@ -25,7 +25,7 @@ def refused(scene, given, **how) -> str:
         ({"vary": {"geometry.zones.7.polygon.1.0": "9,10"}}, "has 2 items"),
         ({"vary": {FRICTION: "40:20:5"}}, f"--vary {FRICTION}\n    the range 40:20:5 is empty"),
         ({"vary": {FRICTION: "80:100:5"}}, "100 is out of range"),
-        ({"vary": {FRICTION: "steep, flat"}}, '"steep" stands where number'),
+        ({"vary": {FRICTION: "steep, flat"}}, '"steep" given, expected number'),
         ({"vary": {COHESION: "normal(1e5, 5e4)"}, "runs": 9},
          "outside 0 to inf, which the key may be, with probability 0.023"),
         ({"vary": {COHESION: "uniform(-1, 1)"}, "runs": 9}, "set its bounds within"),

@@ -93,8 +93,8 @@ def test_comparison_sees_what_got_worse_and_allows_for_the_machine(tmp_path):
 
 def test_a_file_of_something_else_is_refused(tmp_path):
     (tmp_path / "other.json").write_text(json.dumps({"points": []}))
-    with pytest.raises(ValueError, match="holds no figures of a benchmark"):
+    with pytest.raises(ValueError, match="has no benchmark figures"):
         read(tmp_path / "other.json")
     (tmp_path / "torn.json").write_text('{"topics": ')
-    with pytest.raises(ValueError, match="is no JSON"):
+    with pytest.raises(ValueError, match="is not valid JSON"):
         read(tmp_path / "torn.json")

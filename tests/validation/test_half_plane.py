@@ -446,7 +446,7 @@ def test_many_cracks_are_iterated_on():
 
 def test_what_a_half_plane_refuses():
     crack = slot((0, -1), (1, -1))
-    with pytest.raises(ValueError, match="bears none of the traction"):
+    with pytest.raises(ValueError, match="surface of the half-plane is free of traction"):
         body(crack).solve(ddm.BodyLoad(remote_stress=[0, 1.0, 0]))
     with pytest.raises(ValueError, match="above the surface"):
         body(slot((0, -1), (0, 0.5)))
@@ -456,7 +456,9 @@ def test_what_a_half_plane_refuses():
         body(slot((0, -0.1), (0, -1), mouth=True))
     with pytest.raises(ValueError, match=r"along the boundary|less than 3°"):
         body(slot((0, 0), (1, -0.01), mouth=True))
-    with pytest.raises(ValueError, match=r"too thin a piece of rock between them, about .* m: it would take more than"):
+    with pytest.raises(
+        ValueError, match=r"too thin a piece of rock between them, about .* m: the mesh would need more than"
+    ):
         body(slot((-0.5, -1e-4), (0.5, -1e-4)))
     with pytest.raises(ValueError, match="hole 1: reaches the free surface"):
         body(crack, holes=[circle(16, (0, -5.0), 5.5)])

@@ -1,10 +1,10 @@
-"""Run time against error of blocks that bend: one block of order p, cells, uniformly strained sub-blocks, finite elements.
+"""Run time against error in bending: one block of order p, cells, uniformly strained sub-blocks, finite elements.
 
-A panel is clamped on its left side and loaded by a uniform shear traction on its right. The error is that of the energy it
-stores, which is half the work of the load: of a cantilever of slenderness 8 without Poisson's ratio, whose stress is smooth but at
-the ends, and of Cook's membrane, whose stress is singular at the upper corner of the clamp. Both are held against
-finite elements (`geomech.bench.peers.quadratic_quads`) of 66 690 unknowns, those of the membrane extrapolated to four digits.
-Everything is timed in one run of one process, from given blocks or a given grid to the energy.
+A panel is clamped on its left side and loaded by a uniform shear traction on its right. The error is that of its
+elastic energy, half the work of the load: for a cantilever of slenderness 8 with zero Poisson's ratio, whose stress is
+smooth except at the ends, and for Cook's membrane, whose stress is singular at the upper corner of the clamp. The
+reference is finite elements (`geomech.bench.peers.quadratic_quads`) with 66 690 unknowns, for the membrane extrapolated
+to four digits. Everything is timed in one run of one process, from given blocks or a given grid to the energy.
 """
 
 from __future__ import annotations
@@ -19,17 +19,22 @@ from ..figures import Measured, Point, stopwatch
 from ..peers import finite_elements
 
 ONE, CELLS, STRAINED, FEM = "one block", "cells", "sub-blocks of first order, glued", "finite elements, Q2 (scikit-fem)"
-#: 1/m: a clamp with a stiffness of so many E gives by less than 1e-6 of what the panel does; round-off in coordinates of 50 m
-#: would be forces on stiffer ones.
+#: 1/m: a clamp with this stiffness relative to E yields by less than 1e-6 of the panel's displacement; on a stiffer
+#: one, round-off in coordinates of 50 m would cause forces.
 _CLAMP = 1e6
-#: Repetitions, of which the shortest counts.
+#: Number of repetitions, of which the shortest counts.
 _TIMES = 3
 
 
 @dataclass(frozen=True)
 class Panel:
-    """``corners`` (4, 2) m counter-clockwise from the lower left, of ``rock``; ``columns`` to ``rows`` is as the coarsest grid,
-    ``traction`` Pa upwards on its right side, ``exact`` the energy that it stores, J/m."""
+    """A panel of ``rock``.
+
+    corners   (4, 2) m counter-clockwise from the lower left
+    columns, rows   of the coarsest grid
+    traction  Pa, upwards on its right side
+    exact     elastic energy, J/m
+    """
 
     corners: np.ndarray
     rock: Material
@@ -39,7 +44,7 @@ class Panel:
     exact: float
 
     def grid(self, n: int) -> list[np.ndarray]:
-        """Quadrilaterals (4, 2), ``n`` times as many each way as in the coarsest grid."""
+        """Quadrilaterals (4, 2), ``n`` times as many in each direction as in the coarsest grid."""
         s, t = np.meshgrid(np.linspace(0, 1, n * self.columns + 1), np.linspace(0, 1, n * self.rows + 1), indexing="ij")
         share = np.stack([(1 - s) * (1 - t), s * (1 - t), s * t, (1 - s) * t], axis=-1)
         at = share @ self.corners
@@ -72,8 +77,10 @@ def measure(quick: bool = False) -> Measured:
 
 
 def energy(panel: Panel, n: int, order: int, *, glued: bool = True) -> float:
-    """J/m that a ``panel`` of ``n`` times its coarsest grid stores (0: of one block), of cells of this ``order``, or of
-    sub-blocks of first order between which joints hold if not ``glued``."""
+    """Elastic energy, J/m, of ``panel`` divided into ``n`` times its coarsest grid (0: one block).
+
+    Cells have this ``order``; if not ``glued``, sub-blocks of first order are connected by joints.
+    """
     cells = [panel.corners] if n == 0 else panel.grid(n)
     polygons = [panel.corners[[0, 3]][[0, 1, 1, 0]] - [[0, 0], [0, 0], [1, 0], [1, 0]], *cells]
     right = panel.corners[1:3].mean(axis=0)[0]
@@ -99,7 +106,7 @@ def energy(panel: Panel, n: int, order: int, *, glued: bool = True) -> float:
 
 
 def _faces(blocks: Blocks) -> np.ndarray:
-    """(m, 2) edges of blocks that move and coincide."""
+    """(m, 2) edges of moving blocks that coincide."""
     seen: dict[tuple, int] = {}
     pairs = []
     for v in np.flatnonzero(~blocks.fixed[blocks.vertex_block]).tolist():
@@ -111,7 +118,7 @@ def _faces(blocks: Blocks) -> np.ndarray:
 
 
 def _points(sizes: int) -> Iterator[Point]:
-    """All methods for all panels; grids are refined twice from one to the next, and ``sizes`` of them are taken."""
+    """All methods for all panels; each grid is twice as fine as the previous one, for ``sizes`` grids."""
     refined = (1, 2, 4, 8)[:sizes]
     for problem, panel in PANELS.items():
         for order in (1, 2, 3, 5, 8)[: sizes + 1]:
@@ -136,7 +143,7 @@ def _points(sizes: int) -> Iterator[Point]:
 
 
 def _timed(problem: str, method: str, size: int, run) -> Point:
-    """The error and the shortest time of ``run``; the first may compile."""
+    """Error and shortest time of ``run``; the first one may compile."""
     found, times = run(), []
     for _ in range(_TIMES):
         spent_on = stopwatch()

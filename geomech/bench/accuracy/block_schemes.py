@@ -1,4 +1,4 @@
-"""Run time against error of the block solver's schemes: Shi's, Newmark's, α; springs against multipliers in contacts.
+"""Run time against error of the block solver's schemes: Shi's, Newmark's, α; springs and multipliers in contacts.
 
 Each problem has a closed form. Everything is timed in one run of one process, the shortest of some repetitions, from
 given blocks to the last state.
@@ -22,7 +22,7 @@ from ..cost import block_scenes
 from ..cost.block_scenes import GRAVITY, ROCK, WEIGHT
 from ..figures import Measured, Point, stopwatch
 
-#: Where the picture and the numbers go, below the working folder.
+#: Folder of the picture and the numbers, in the working folder.
 FOLDER = Path("outputs/bench_schemes")
 
 SHI, TRAPEZOIDAL, ALPHA, AUGMENTED = "Shi's scheme, springs", "Newmark (¼, ½), springs", "α-scheme, ϱ = 0.8, springs", (
@@ -38,7 +38,7 @@ METHODS = tuple(SCHEMES)
 
 
 def measure(quick: bool = False) -> Measured:
-    """The table; leaves ``work_precision.png`` and ``work_precision.json`` in `FOLDER`. ``quick`` takes the two
+    """The table; writes ``work_precision.png`` and ``work_precision.json`` to `FOLDER`. ``quick`` takes the two
     coarsest sizes."""
     from ...render.benchmarks.work_precision import draw
 
@@ -60,7 +60,7 @@ def measure(quick: bool = False) -> Measured:
 
 
 def errors() -> dict[str, float]:
-    """The errors of the coarsest sizes by their names in `measure`'s figures, each scene run once."""
+    """Errors of the coarsest sizes, with their names in `measure`'s figures; each scene is run once."""
     return {
         f"{problem}, {method}: {sizes[0]:g}": scene(sizes[0], SCHEMES[method])()
         for problem, (sizes, methods, scene) in PROBLEMS.items()
@@ -69,8 +69,8 @@ def errors() -> dict[str, float]:
 
 
 def _points(sizes_of_each: int | None) -> Iterator[Point]:
-    """The shortest of as many times as a tenth of a second has room for; of a method's coarsest size the first is not
-    counted, which may compile."""
+    """The shortest of as many runs as fit in a tenth of a second; the first of a method's coarsest size, which may
+    compile, does not count."""
     for problem, (sizes, methods, scene) in PROBLEMS.items():
         for method in methods:
             for size in sizes[:sizes_of_each]:
@@ -84,8 +84,10 @@ def _points(sizes_of_each: int | None) -> Iterator[Point]:
 
 
 def _wave(dt: float, scheme: dict) -> Callable[[], float]:
-    """A pulse of some ten blocks' length runs eight blocks far along a row of forty, bonded: error of all displacements
-    over the largest."""
+    """A pulse of about ten blocks' length travels eight blocks along a row of forty, bonded.
+
+    Error of all displacements, relative to the largest.
+    """
     n, youngs_modulus, density, joint, end = 40, 10e9, 2600.0, 20e9, 4.8e-3
     rock = Material("rock", youngs_modulus, 0.0, density=density)
     law = JointLaw("bonded", 0.5, 1e9, 1e9, normal_stiffness=joint, shear_stiffness=joint)
@@ -108,8 +110,10 @@ def _wave(dt: float, scheme: dict) -> Callable[[], float]:
 
 
 def _shaken(dt: float, scheme: dict) -> Callable[[], float]:
-    """A block on an incline of 20°, friction 30°, is shaken along the horizontal and slips at every swing: error of its
-    way, at all times, over the whole way."""
+    """A block on an incline of 20°, friction 30°, is shaken horizontally and slips at every swing.
+
+    Error of its displacement at all times, relative to the total.
+    """
     slope, friction, end = math.radians(20), math.radians(30), 1.2
     blocks, times = block_scenes.incline(slope), np.linspace(0.0, end, 2401)
     # Towards the upper side of the incline, which is on the left.
@@ -137,13 +141,13 @@ def _shaken(dt: float, scheme: dict) -> Callable[[], float]:
 
 
 def _column(penalty: float, scheme: dict) -> Callable[[], float]:
-    """Twenty blocks under their own weight, at rest: error of the shortening, which soft springs add to."""
+    """Twenty blocks at rest under their own weight: error of the shortening, to which soft springs contribute."""
     n = 20
     blocks = block_scenes.column(n)
     settings = DdaSettings(
         time_step=1.0, max_displacement_ratio=1.0, normal_penalty=penalty * ROCK.youngs_modulus, **scheme
     )
-    # On average a block carries what stands on it and half its own weight.
+    # On average a block carries the weight above it and half its own.
     carried = ROCK.density * GRAVITY * (np.arange(n) + 0.5)
     exact = column_shortening(carried, 1.0, 1.0, ROCK.plane_modulus, math.inf)
 

@@ -1,13 +1,12 @@
-"""How contact forces reach the cracks: K of the two-crack specimen between platens by each route, beside the crack
-solver alone.
+"""Transfer of contact forces to the cracks: K of the two-crack specimen between platens by each route, compared with
+the crack solver alone.
 
-The crack solver alone has the exact tractions, a uniform stress on the specimen's ends. Coupled runs get there through
-contacts: spread over faces ("contacts"), left at the corners where the springs are ("springs"), or given to Kelvin's
-solution there ("kelvin-springs": Khanizadeh Bahabadi et al. 2023, eqs. 2-4). Beside them the crack solver alone with
-the four corner forces' field in the infinite plane, which is what those equations give where they are taken at their
-word: without a block. Errors are the largest of the four tips', relative to the largest |K| of that mode among them. By
-time against error: the same runs with elements of several orders, which only the tractions of whole faces let come
-down.
+The crack solver alone has the exact tractions, a uniform stress on the specimen's ends. Coupled runs apply contact
+forces: distributed over faces ("contacts"), at the corners where the springs are ("springs"), or by Kelvin's solution
+there ("kelvin-springs": Khanizadeh Bahabadi et al. 2023, eqs. 2-4). In addition, the crack solver alone with the field
+of the four corner forces in the infinite plane, which is what those equations give literally: without a block. Errors
+are the largest of the four tips, relative to the largest |K| of that mode. Run time against error: the same runs with
+elements of several orders; only with the tractions of whole faces does the error decrease.
 """
 
 from __future__ import annotations
@@ -24,18 +23,18 @@ from ...output.tables.summary import write_json
 from ...reference.specimens.two_cracks import PHI_DEG
 from ..figures import Measured, Point, stopwatch
 
-#: Where the numbers go, below the working folder.
+#: Folder of the numbers, in the working folder.
 FOLDER = Path("outputs/bench_boundary")
 SPECIMEN = Path("pipelines/two_cracks/scene.toml")
-#: The routes of a coupled run, and the field of its forces without a block.
+#: Routes of a coupled run, and the field of its forces without a block.
 ROUTES, NO_BLOCK = ("contacts", "springs", "kelvin-springs"), "Kelvin's field alone"
-#: Axial stresses, Pa: where strain is nothing, and near what makes the cracks grow. The second is reached in such
+#: Axial stresses, Pa: at negligible strain, and near the stress at which the cracks grow, which is reached in these
 #: steps.
 STRESSES, STEP = (0.2e6, 40e6), 2e6
 
 
 def specimen(phi_deg: int, boundary_stress: str = "contacts", rate: float = STRESSES[0], end: float = 1.0) -> Problem:
-    """The specimen of the study in its own elements, tough enough for nothing to grow."""
+    """The specimen of the study with its elements, and a toughness that prevents growth."""
     from ...scene import load_scene
 
     wishes = [
@@ -67,7 +66,7 @@ def exact(problem: Problem, stress: float) -> np.ndarray:
 
 
 def without_block(problem: Problem, cycle: Cycle) -> np.ndarray:
-    """K of the cracks in the infinite plane under the point forces of ``cycle``'s block (a run by springs)."""
+    """K of the cracks in the infinite plane under the point forces of ``cycle``'s block (a run with springs)."""
     from ...ddm import Body, BodyLoad
 
     block = int(problem.cracks.block[0])
@@ -78,7 +77,7 @@ def without_block(problem: Problem, cycle: Cycle) -> np.ndarray:
 
 
 def errors(phi_deg: int, stress: float) -> dict[str, list[float]]:
-    """Route → largest error of K_I and of K_II at ``stress``, relative."""
+    """Route → largest relative error of K_I and of K_II at ``stress``."""
     from ...coupling import cycles
 
     rate, end = (stress, 1.0) if stress <= STEP else (STEP, stress / STEP)
@@ -96,7 +95,7 @@ def errors(phi_deg: int, stress: float) -> dict[str, list[float]]:
 
 
 def quick_errors() -> dict[str, float]:
-    """Those of the routes in a quick `measure`, by name."""
+    """Errors of the routes in a quick `measure`, by name."""
     phi, stress = PHI_DEG[0], STRESSES[0]
     return {
         _named(route, phi, stress, mode): error
@@ -110,8 +109,10 @@ def _named(route: str, phi_deg: int, stress: float, mode: str) -> str:
 
 
 def by_order(phi_deg: int, orders: Sequence[int] = (2, 3, 4, 6)) -> list[Point]:
-    """Time and error of the first load by every route, against order 10, in elements of these ``orders``; the block's
-    boundary has three times the elements of the study's own, so that it is the order that counts."""
+    """Time and error of the first load by every route, relative to order 10, with elements of these ``orders``.
+
+    The block's boundary has three times the elements of the study, so that the order determines the error.
+    """
     from ...coupling import cycles
 
     problem = specimen(phi_deg)
@@ -138,8 +139,8 @@ def _finer(settings: DdmSettings, order: int) -> DdmSettings:
 
 
 def paper_elements(phi_deg: int) -> list[float]:
-    """Largest error of K_I and of K_II that quadratic elements with equal nodes bring, exact tractions, four to a
-    crack."""
+    """Largest error of K_I and of K_II with four quadratic elements with equidistant nodes per crack, and exact
+    tractions."""
     problem = specimen(phi_deg)
     fine = replace(problem, ddm=replace(problem.ddm, order=8, nodes="chebyshev", elements_per_side=12))
     coarse = replace(problem, ddm=replace(problem.ddm, order=2, nodes="equal", elements_per_crack=4))
@@ -148,7 +149,7 @@ def paper_elements(phi_deg: int) -> list[float]:
 
 
 def measure(quick: bool = False) -> Measured:
-    """The table; leaves ``boundary.json`` and ``work_precision.png`` in `FOLDER`. ``quick``: φ = 0 at the small stress
+    """The table; writes ``boundary.json`` and ``work_precision.png`` to `FOLDER`. ``quick``: φ = 0 at the small stress
     only."""
     from ...render.benchmarks.work_precision import draw
 

@@ -1,4 +1,4 @@
-"""Stress intensity factors with default settings (or the order that is named) against `geomech.reference`."""
+"""Stress intensity factors with default settings (or the given order) compared with `geomech.reference`."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ PULL = np.array([0.0, 1.0, 0.0])
 
 
 def pulled(half_width: float, half_height: float, stress: float = 1.0, bending: float = 0.0):
-    """Uniform tension on both ends of a plate and a linear one, ``bending`` on the left and −``bending`` on the
+    """Uniform tension on both ends of a plate, plus a linear one, ``bending`` on the left and −``bending`` on the
     right."""
     from ...ddm import BodyLoad
 

@@ -1,4 +1,4 @@
-"""The problems that crack solvers are timed on: geometry, load, and the stress intensity factors to be met."""
+"""Problems on which crack solvers are timed: geometry, load, and reference stress intensity factors."""
 
 from __future__ import annotations
 
@@ -23,9 +23,11 @@ ROCK = Material("rock", 17e9, 0.21)
 
 @dataclass(frozen=True, eq=False)
 class CrackProblem:
-    """Open cracks ``polylines`` (``mouths``: which of their ends lie on the outline), in the plane under a remote
-    ``stress`` or in a rectangular ``outline`` with ``stress[1]`` on its two ends. ``reference`` (n_tips, 2)
-    K_I, K_II, or None: high order on a finer mesh."""
+    """Open cracks ``polylines``, in the infinite plane or in a rectangle.
+
+    ``mouths``: which of their ends lie on the outline. Load: a remote ``stress``, or ``stress[1]`` on the two ends of a
+    rectangular ``outline``. ``reference`` (n_tips, 2) K_I, K_II, or None: computed with high order on a finer mesh.
+    """
 
     name: str
     polylines: Sequence[np.ndarray]
@@ -53,8 +55,8 @@ class CrackProblem:
         return BodyLoad(np.array([[a, b], [c, d]]), np.array([[-pull, -pull], [pull, pull]]))
 
     def traction(self, points: np.ndarray, tangent: np.ndarray, on_boundary: np.ndarray) -> np.ndarray:
-        """(n, 2) what elements must add, along them and along the normal left of them: the load on the outline, the
-        negative of the plane's stress on cracks."""
+        """(n, 2) tractions to be compensated by elements, along them and along the normal left of them: the load on the
+        outline, the negative of the plane's stress on cracks."""
         t, n = tangent, np.column_stack([-tangent[:, 1], tangent[:, 0]])
         if self.outline is None:
             xx, yy, xy = self.stress
@@ -65,7 +67,7 @@ class CrackProblem:
         return np.column_stack([np.sum(force * t, axis=1), np.sum(force * n, axis=1)])
 
     def solve(self, settings: DdmSettings) -> Solution:
-        """Assembly and solution from nothing."""
+        """Assembly and solution from scratch."""
         from ...ddm import Body
 
         solution = Body([] if self.outline is None else [self.outline], self.cracks, ROCK, settings).solve(self.load)
@@ -78,13 +80,13 @@ class CrackProblem:
 
 
 def rectangle(half_width: float, half_height: float) -> np.ndarray:
-    """(4, 2) a plate about the origin, counter-clockwise."""
+    """(4, 2) a plate around the origin, counter-clockwise."""
     w, h = half_width, half_height
     return np.array([[-w, -h], [w, -h], [w, h], [-w, h]])
 
 
 def griffith() -> CrackProblem:
-    """A crack across a tension in the infinite plane (Griffith)."""
+    """A crack normal to tension in the infinite plane (Griffith)."""
     exact = np.array([[fracture.griffith(1.0, 1.0), 0.0]] * 2)
     return CrackProblem("Griffith crack", [np.array([[-1.0, 0.0], [1.0, 0.0]])], (0.0, 1.0, 0.0), reference=exact)
 
@@ -95,14 +97,16 @@ def _arc(line: np.ndarray) -> CrackProblem:
 
 
 def arc_of_chords(segments: int) -> CrackProblem:
-    """A quarter circle in equal biaxial tension as equal chords, as codes with equal elements draw it."""
+    """A quarter circle in equal biaxial tension as equal chords, as used by codes with equal elements."""
     q = np.linspace(math.pi / 4, 3 * math.pi / 4, segments + 1)
     return _arc(np.column_stack([np.cos(q), np.sin(q)]))
 
 
 def arc_of_tangents(segments: int) -> CrackProblem:
-    """The same as the polygon of tangents in Chebyshev points, tips among them: a chord has the wrong direction at a
-    tip, and the arc is followed best where it counts."""
+    """The same as a polygon of tangents at Chebyshev points, including the tips.
+
+    A chord has the wrong direction at a tip; here the arc is approximated best where it matters.
+    """
     touching = math.pi / 2 - math.pi / 4 * np.cos(np.linspace(0, math.pi, segments))
     between, half = 0.5 * (touching[1:] + touching[:-1]), 0.5 * np.diff(touching)
     corners = np.column_stack([np.cos(between), np.sin(between)]) / np.cos(half)[:, None]
@@ -130,8 +134,8 @@ def random_cracks() -> CrackProblem:
 
 
 def with_reference(problem: CrackProblem, quick: bool = False) -> CrackProblem:
-    """The problem with order 10 on half again as many elements, graded finely, for its reference; ``quick``: order 8 on
-    as many as ever, 1e-7 from that at most."""
+    """``problem`` with a reference by order 10 on 1.5 times as many elements, finely graded; ``quick``: order 8 on the
+    usual mesh, within 1e-7 of it."""
     if problem.reference is not None:
         return problem
     order, elements, sides, layers = (8, 4, 6, 6) if quick else (10, 6, 9, 8)

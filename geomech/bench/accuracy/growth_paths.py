@@ -1,12 +1,11 @@
 """Run time against error of a whole growth run: two offset edge cracks that hook around each other.
 
 A plate of 60 × 120 mm in tension; its edge cracks, 15 mm long and 10 mm apart, grow by 20 mm each, in 10, 20, 40 or 80
-increments, by maximum tangential stress (Erdogan & Sih 1963), with the load that just drives them. This solver corrects
+increments, by maximum tangential stress (Erdogan & Sih 1963), at the load that just drives them. This solver corrects
 its steps (`GrowthSettings.correct`); the others step along the tangent, as such codes do: constant elements with
-calibrated K, the quadratic elements with equal nodes, and finite elements that are meshed anew for every increment. The
-reference is this solver's without correction, extrapolated to no increment. The error is the
-larger of two: how far a tip is from where the reference has it at the same length, in lengths grown; and that of the
-load, relative to the load there.
+calibrated K, quadratic elements with equidistant nodes, and finite elements remeshed for every increment. The reference
+is this solver without correction, extrapolated to zero increment. The error is the larger of two: the distance of a tip
+from its reference position at the same length, relative to the growth; and the relative error of the load there.
 """
 
 from __future__ import annotations
@@ -25,14 +24,14 @@ from ..peers import constant_elements
 from .crack_problems import ROCK, CrackProblem, rectangle
 
 PROBLEM = "growth in 5 to 40 increments"
-#: m; half the distance of the cracks' lines, their length, what they grow by.
+#: m; half the distance between the cracks' lines, their length, their growth.
 OFFSET, LENGTH, GROWN = 5e-3, 15e-3, 20e-3
 TOUGH = Material("rock", ROCK.youngs_modulus, ROCK.poissons_ratio, k_ic=1e6)
-#: Elements of an increment of constant elements, and of them in one of the outline.
+#: Constant elements per increment, and ratio of those to the outline's.
 OF_AN_INCREMENT, ON_OUTLINE = 2, 2
-#: Triangles' sides: away from cracks, m, at tips in increments, and their growth.
+#: Sides of triangles: away from cracks (m), at tips (in increments), and their growth rate.
 AWAY, AT_TIPS, SLOPE = 4e-3, 0.1, 0.35
-#: Methods, the orders of this solver, and the increments of each; of a quick run.
+#: Methods, the orders of this solver, and the increments of each; those of a quick run.
 OWN, QUADRATIC, CONSTANT, FINITE = "own", "quadratic", "constant", "finite"
 ORDERS = (2, 4, 6)
 INCREMENTS = {OWN: (5, 10, 20, 40), QUADRATIC: (5, 10, 20, 40), CONSTANT: (10, 20, 40), FINITE: (5, 10, 20, 40)}
@@ -41,8 +40,8 @@ QUICK_ORDERS, QUICK_INCREMENTS = (4,), {OWN: (5, 10), QUADRATIC: (10,), CONSTANT
 
 @dataclass(frozen=True, eq=False)
 class Run:
-    """``tips`` (n+1, 2, 2) places of both tips before every increment and at the end, ``load`` (n+1,) there, Pa; the
-    unknowns of the last step."""
+    """``tips`` (n+1, 2, 2) positions of both tips before every increment and at the end, ``load`` (n+1,) there, Pa; the
+    number of unknowns of the last step."""
 
     tips: np.ndarray
     load: np.ndarray
@@ -50,7 +49,7 @@ class Run:
     seconds: float
 
     def errors(self, reference: Run) -> tuple[float, float]:
-        """Of the path and of the load, against another run where both stand at the same lengths."""
+        """Errors of the path and of the load, relative to another run at equal lengths."""
         ends = [len(run.load) - 1 for run in (self, reference)]
         own, its = (slice(None, None, n // math.gcd(*ends)) for n in ends)
         away = np.hypot(*np.moveaxis(self.tips[own] - reference.tips[its], -1, 0))
@@ -58,8 +57,7 @@ class Run:
 
 
 def rows(quick: bool, own: bool = False) -> Iterator[tuple[str, str, int, Run, tuple[float, float]]]:
-    """Method, what is fixed of it, increments, the run, and its errors of path and load; ``own``: of this solver
-    alone."""
+    """Method, its fixed parameter, increments, the run, and its errors of path and load; ``own``: this solver only."""
     from ..peers.finite_elements import available
 
     exact = reference(20) if quick else reference()
@@ -125,14 +123,14 @@ def reference(increments: int = 80, order: int = 4) -> Run:
 
 
 def of_quadratic_elements(increments: int) -> Run:
-    """Elements as long as increments."""
+    """With elements as long as increments."""
     n = round(increments * LENGTH / GROWN)
     sides = round(0.06 / (GROWN / increments))
     return of_this_solver(increments, DdmSettings(2, "equal", n, sides, grading_layers=0), correct=False)
 
 
 def of_constant_elements(increments: int) -> Run:
-    """Equal elements, all assembled anew for every increment."""
+    """With equal elements, all assembled again for every increment."""
     size = GROWN / increments / OF_AN_INCREMENT
 
     def factors(now: CrackProblem) -> tuple[np.ndarray, int]:
@@ -144,7 +142,7 @@ def of_constant_elements(increments: int) -> Run:
 
 
 def of_finite_elements(increments: int) -> Run:
-    """Meshed anew for every increment."""
+    """Remeshed for every increment."""
     from ..peers.finite_elements import disc_radii, tips_of
     from ..peers.quarter_point import Plate, Sizes
 
@@ -160,7 +158,8 @@ def of_finite_elements(increments: int) -> Run:
 
 
 def _along_tangents(increments: int, factors: Callable[[CrackProblem], tuple[np.ndarray, int]]) -> Run:
-    """Both tips go on by an increment at the criterion's angle; ``factors``: problem → K of its two tips, unknowns."""
+    """Both tips advance by an increment at the criterion's angle; ``factors``: problem → K of its two tips,
+    unknowns."""
     now = problem()
     spent_on = stopwatch()
     tips, load = [], []

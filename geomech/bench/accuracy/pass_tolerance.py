@@ -1,9 +1,9 @@
-"""How far blocks and cracks must agree: time and error of a wall with cracked bricks by the tolerance of the coupling's
-passes.
+"""Tolerance of the coupling passes: time and error of a wall with cracked bricks.
 
-A static step is repeated until the strain of every brick's cracks is the one that the blocks were moved with, to a
-tolerance. A loose one takes a single pass, as staggered schemes do; the error is that of the stress intensity factors,
-against a tolerance of 1e-10. (In motion cracks answer to their block's mean stress, and open ones take one pass.)
+A static step is repeated until the strain of every brick's cracks agrees, within a tolerance, with the one used in the
+block step. A loose tolerance needs a single pass, as in staggered schemes; the error is that of the stress intensity
+factors, relative to a tolerance of 1e-10. (In dynamics cracks follow their block's mean stress, and open ones need one
+pass.)
 """
 
 from __future__ import annotations
@@ -19,21 +19,21 @@ from ..figures import Point, stopwatch
 PROBLEM = "wall with cracked bricks, by tolerance of the passes"
 METHOD, ONE_PASS = "passes until strains agree", "one pass a step (staggered)"
 METHODS = (METHOD, ONE_PASS)
-#: Relative strain; the first takes a single pass.
+#: Relative strain; the first needs a single pass.
 TOLERANCES, EXACT = (1e3, 1e-1, 1e-2, 1e-3, 1e-4, 1e-6), 1e-10
-#: Bricks, those that are cracked, load steps.
+#: Number of bricks, of cracked ones, and of load steps.
 WALL, STEPS = (40, 8), 3
 
 
 @dataclass(frozen=True)
 class Passes(Point):
-    """``size`` is the tolerance, ``passes`` those of all steps."""
+    """``size`` is the tolerance, ``passes`` the total of all steps."""
 
     passes: int
 
 
 def errors() -> dict[str, float]:
-    """Those of K by the tolerance, by name."""
+    """Errors of K by tolerance, by name."""
     return by_name(points())
 
 
@@ -43,8 +43,8 @@ def by_name(found: list[Passes]) -> dict[str, float]:
 
 
 def points() -> list[Passes]:
-    """Errors and costs of runs, one a tolerance of passes."""
-    # The first run may compile, and is what the others are held against.
+    """Errors and costs of runs, one per tolerance."""
+    # The first run may compile, and is the reference for the others.
     exact, _, _ = _run(EXACT)
     out = []
     for tolerance in TOLERANCES:
@@ -56,7 +56,7 @@ def points() -> list[Passes]:
 
 
 def _run(tolerance: float) -> tuple[np.ndarray, int, float]:
-    """K of all tips at the end, the number of passes, and seconds of the steps, bodies made before."""
+    """K of all tips at the end, number of passes, and seconds of the steps, with bodies made before."""
     from ...coupling import cycles
     from ..cost.block_scenes import cracked_wall
 
@@ -79,7 +79,7 @@ def _until(tolerance: float) -> Iterator[None]:
     from ...coupling import load_pass
 
     before = load_pass.COMPLIANCE_TOLERANCE, load_pass.NO_ANSWER
-    # A loose tolerance takes what the coupling itself would call no answer.
+    # With a loose tolerance the coupling itself would report that it has not converged.
     load_pass.COMPLIANCE_TOLERANCE, load_pass.NO_ANSWER = tolerance, max(before[1], tolerance)
     try:
         yield

@@ -1,4 +1,4 @@
-"""What curves of run time against error say: times to an error, goals, and the table of `geomech bench ddm`."""
+"""Evaluation of run time–error curves: times to an error, goals, and the table of `geomech bench ddm`."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from . import growth_paths
 
 #: The methods, in the order of the table and the legend.
 OURS, LOW, QUADRATIC = "this solver, p = 2 … 10", "constant elements, √r at the tips", "quadratic elements, equal nodes"
-ASKED = "this solver, by the error asked for"
+ASKED = "this solver, by target error"
 FITTED, CALIBRATED, FEM = (
     "constant elements, K by √r fit",
     "constant elements, K calibrated",
@@ -19,16 +19,18 @@ FITTED, CALIBRATED, FEM = (
 )
 METHODS = (OURS, ASKED, LOW, QUADRATIC, FITTED, CALIBRATED, FEM)
 
-#: Goals: K to 1e-6 in so many seconds, and how many times less than constant elements at 1e-4; what growth is compared
-#: at, of which uncorrected steps take hundreds to come to it.
+#: Goals: K to 1e-6 in this time (s), and the ratio of times of constant elements at 1e-4; the error at which growth
+#: runs are compared, for which uncorrected steps need hundreds of increments.
 ONE_CRACK_S, SPECIMEN_S, RATIO, ERROR, GROWTH_ERROR = 1e-3, 30e-3, 200.0, 1e-4, 3e-3
 
 
 @dataclass(frozen=True)
 class Point:
-    """``size`` is what was varied: the order, the digits asked for, the elements of a crack, a refinement, or the
-    increments of a growth run; ``curve`` what was not, where a method has more than one. ``parts``: the errors that
-    ``error`` is the largest of."""
+    """``size`` is the varied parameter: order, target digits, elements per crack, refinement, or increments of a growth
+    run.
+
+    ``curve`` is the fixed parameter if a method has several curves; ``parts``: the errors whose maximum is ``error``.
+    """
 
     problem: str
     method: str
@@ -41,7 +43,7 @@ class Point:
 
     @property
     def name(self) -> str:
-        """One of a kind in a run."""
+        """Unique within a run."""
         return f"{self.problem}, {self.label}: {self.size}"
 
     @property
@@ -51,20 +53,20 @@ class Point:
 
 
 def curves(points: Sequence[Point], problem: str, method: str) -> list[list[Point]]:
-    """Those of a method, each by size."""
+    """Curves of a method, sorted by size."""
     mine = [p for p in points if (p.problem, p.method) == (problem, method)]
     names = dict.fromkeys(p.curve for p in mine)
     return [sorted((p for p in mine if p.curve == name), key=lambda p: p.size) for name in names]
 
 
 def _error_of(problem: str) -> float:
-    """At which methods are compared."""
+    """Error at which methods are compared."""
     return GROWTH_ERROR if problem == growth_paths.PROBLEM else ERROR
 
 
 def time_to(points: Sequence[Point], problem: str, method: str, error: float) -> float | None:
-    """Least time at which ``method`` has come down to ``error`` for good, interpolated in logarithms; None where it has
-    not in the time it was given."""
+    """Least time at which ``method`` has reached ``error`` for good, interpolated logarithmically; None if it has not
+    within its time limit."""
     times = [_down_to(curve, error) for curve in curves(points, problem, method)]
     return min((t for t in times if t is not None), default=None)
 
@@ -81,21 +83,21 @@ def _down_to(curve: list[Point], error: float) -> float | None:
 
 
 def own_time(points: Sequence[Point], problem: str, error: float) -> float | None:
-    """This solver's time to ``error``, by the order chosen or the error asked for."""
+    """This solver's time to ``error``, by chosen order or by target error."""
     times = [p.seconds for p in points if (p.problem, p.method) == (problem, ASKED) and p.error <= error]
     times += [t for t in [time_to(points, problem, OURS, error)] if t is not None]
     return min(times, default=None)
 
 
 def extrapolated(points: Sequence[Point], problem: str, method: str, error: float) -> float | None:
-    """Time at which ``method`` would come down to ``error`` if its error went on falling with its unknowns as between
-    its last two points, and its time grew no faster than they; None where the error does not fall."""
+    """Time at which ``method`` would reach ``error`` if its error continued to decrease with its unknowns as between
+    its last two points, and its time grew no faster than they; None if the error does not decrease."""
     found = curves(points, problem, method)
     if not found or len(found[-1]) < 2:
         return None
     before, last = found[-1][-2:]
     order = math.log(before.error / last.error) / math.log(last.unknowns / before.unknowns)
-    # Below a tenth it has come to a standstill, which no size will end.
+    # Below a tenth it has stagnated, which no size would change.
     return last.seconds * (last.error / error) ** (1 / order) if order > 0.1 else None
 
 
@@ -105,10 +107,10 @@ def _asked(points: Sequence[Point], problem: str, digits: int) -> float | None:
 
 
 def goals_of(points: Sequence[Point]) -> dict:
-    """What the goals come to, by name."""
+    """Results for the goals, by name."""
     problems = list(dict.fromkeys(p.problem for p in points))
     goals: dict = {f"{name}: s to 1e-6": time_to(points, name, OURS, 1e-6) for name in problems}
-    goals |= {f"{name}: s when 1e-6 is asked for": _asked(points, name, 6) for name in problems}
+    goals |= {f"{name}: s with target 1e-6": _asked(points, name, 6) for name in problems}
     goals["time at one error over this solver's"] = ratios = []
     for name in problems:
         error = _error_of(name)
@@ -136,7 +138,7 @@ def goals_of(points: Sequence[Point]) -> dict:
 
 
 def table(points: Sequence[Point], growth: dict, goals: dict) -> str:
-    """``growth``: what `growth_run.measure` found."""
+    """``growth``: the result of `growth_run.measure`."""
     lines = ["Stress intensity factors: error and time of assembly and solution", ""]
     for name in (n for n in dict.fromkeys(p.problem for p in points) if n != free_surface.PROBLEM):
         lines.append(f"{name}")
@@ -157,7 +159,7 @@ def table(points: Sequence[Point], growth: dict, goals: dict) -> str:
             f"growth, {g['increments']} increments at two tips of the specimen ({g['elements_at_the_end']} elements at "
             "the end)"
         ),
-        f"  an increment with what is known {1e3 * g['incremental_s']:.1f} ms, all {g['all_incremental_s']:.2f} s",
+        f"  an incremental step {1e3 * g['incremental_s']:.1f} ms, all {g['all_incremental_s']:.2f} s",
         f"  fresh bodies {1e3 * g['fresh_s']:.1f} ms ({g['fresh_s'] / g['incremental_s']:.1f} times),"
         + f" all {g['all_fresh_s']:.2f} s ({g['all_fresh_s'] / g['all_incremental_s']:.1f} times);"
         + f" K differs by {g['difference']:.1e}; {g['factorisations']} whole factorisations",

@@ -1,5 +1,5 @@
-"""Computed against published or closed-form values: the figures of the README's "How right", with default settings
-unless the row says otherwise."""
+"""Computed values compared with published or closed-form ones: the figures of the README's "How right", with default
+settings unless the row says otherwise."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from . import crack_accuracy
 from .crack_accuracy import Row, pulled
 
 PIPELINE = Path("pipelines/two_cracks")
-#: Where the picture goes, below the working folder.
+#: Folder of the picture, in the working folder.
 FOLDER = Path("outputs/bench_accuracy")
 
 
 def measure(quick: bool = False) -> Measured:
-    """The table; leaves ``accuracy.png`` in `FOLDER`. ``quick`` draws nothing."""
+    """The table; writes ``accuracy.png`` to `FOLDER`. ``quick`` draws nothing."""
     from ...render.benchmarks.bars import draw_bars
 
     found = table()

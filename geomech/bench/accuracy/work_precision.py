@@ -1,9 +1,9 @@
 """Run time against error of the stress intensity factors: this solver, constant and quadratic elements, finite
 elements.
 
-Everything is timed in one run of one process: assembly and solution from nothing (mesh included), the median of three
-repetitions or more after one that is not counted, which the error is of. The error is the largest of any tip's K_I or
-K_II, relative to the largest K; of growth runs (`growth_paths`), which are timed once, that of the path or the load.
+Everything is timed in one run of one process: assembly and solution from scratch (mesh included), the median of three
+or more repetitions after a first one, which gives the error. The error is the largest of any tip's K_I or K_II,
+relative to the largest K; for growth runs (`growth_paths`), which are timed once, that of the path or the load.
 """
 
 from __future__ import annotations
@@ -40,36 +40,38 @@ from .precision_table import (
     table,
 )
 
-#: Where the picture and the numbers go, below the working folder.
+#: Folder of the picture and the numbers, in the working folder.
 FOLDER = Path("outputs/bench_ddm")
 
-#: Below it an error is round-off (one element holds the whole solution of the Griffith crack).
+#: Smaller errors are round-off (one element contains the exact solution of the Griffith crack).
 LEAST = 1e-13
 
 Found = TypeVar("Found")
 
-#: The problem that a body of its own takes dearly, to which a quick run gives little.
+#: The problem with an expensive body, to which a quick run gives little time.
 MANY = "50 random cracks"
-#: Seconds that a method's last point may take about.
+#: Approximate time limit of a method's last point, s.
 LONGEST = 4.0
-#: Orders of this solver, digits asked for, elements of a crack of other methods, refinements of finite elements; those
-#: of a quick run for single cracks, bodies, and many cracks.
+#: Orders of this solver, target digits, elements per crack of other methods, refinements of finite elements; those of a
+#: quick run for single cracks, bodies, and many cracks.
 ORDERS, DIGITS, COUNTS, REFINEMENTS = range(2, 11), range(2, 9), [2**k for k in range(2, 13)], range(6)
 QUICK_ORDERS = {"arc": (2, 4, 6), MANY: (2, 3, 4)}
 QUICK_DIGITS = {"arc": (2, 4), MANY: (2, 4)}
 QUICK_COUNTS = {"Griffith crack": (4, 16, 64, 256), "arc": (4, 16, 64, 256), MANY: (2, 4)}
-#: Constant elements are not given more unknowns than these: their matrix takes 2 GB, and its solution as much again.
+#: Largest number of unknowns of constant elements: the matrix takes 2 GB, and its solution as much again.
 MOST_UNKNOWNS = 16000
 
 
 def measure(quick: bool = False) -> Measured:
-    """The table; leaves ``work_precision.png`` and ``work_precision.json`` in `FOLDER`. ``quick`` takes few sizes, the
-    same ones on every machine; else constant elements are given `RATIO` times this solver's time to `ERROR` at
-    least."""
+    """The table; writes ``work_precision.png`` and ``work_precision.json`` to `FOLDER`.
+
+    ``quick`` takes few sizes, the same ones on every machine; otherwise constant elements get at least `RATIO` times
+    this solver's time to `ERROR`.
+    """
     from ...ddm import Body
     from ...render.benchmarks.work_precision import draw
 
-    # Kernels are compiled before anything is measured, or read from where they are kept.
+    # Kernels are compiled, or loaded from the cache, before anything is measured.
     first = crack_problems.specimen()
     Body([first.outline], first.cracks, crack_problems.ROCK).solve(first.load)
     points = [point for name in PROBLEMS for point in _curves(name, quick)]
@@ -98,8 +100,8 @@ def measure(quick: bool = False) -> Measured:
 
 
 def errors() -> dict[str, float]:
-    """Those of a quick `measure` by the order chosen and by the digits asked for, without its times; without the many
-    cracks, whose reference is dear."""
+    """Errors of a quick `measure` by chosen order and by target digits, without times; without the many cracks, whose
+    reference is expensive."""
     out = {}
     for name, (make, _, ours) in PROBLEMS.items():
         if name == MANY:
@@ -117,9 +119,8 @@ def errors() -> dict[str, float]:
 
 
 def timed(work: Callable[[], Found]) -> tuple[Found, float]:
-    """What ``work`` gives, and the seconds that it takes when it is done again: the median of three times, or of as
-    many as a twentieth of a second has room for; that of the first alone where it takes more than a third of a
-    second."""
+    """Result of ``work``, and the time in seconds of its repetition: the median of three runs, or of as many as fit in
+    a twentieth of a second; that of the first one alone if it takes more than a third of a second."""
     spent_on = stopwatch()
     found = work()
     first = spent_on()
@@ -134,8 +135,8 @@ def timed(work: Callable[[], Found]) -> tuple[Found, float]:
 
 
 def _curves(name: str, quick: bool) -> Iterator[Point]:
-    """The sizes of a quick run, or `LONGEST` s a method, but constant elements `RATIO` times this solver's time to
-    `ERROR` where that is longer."""
+    """The sizes of a quick run, or `LONGEST` s per method, but for constant elements `RATIO` times this solver's time
+    to `ERROR` if that is longer."""
     orders, digits = (
         (QUICK_ORDERS.get(name, (2, 3, 4, 6, 8)), QUICK_DIGITS.get(name, (2, 4, 6))) if quick else (ORDERS, DIGITS)
     )
@@ -179,7 +180,7 @@ def _curves(name: str, quick: bool) -> Iterator[Point]:
 
 
 def _growth(quick: bool, own: bool = False) -> list[Point]:
-    """Whole growth runs; ``own``: this solver's alone."""
+    """Whole growth runs; ``own``: this solver only."""
     methods = {growth_paths.QUADRATIC: QUADRATIC, growth_paths.CONSTANT: CALIBRATED, growth_paths.FINITE: FEM}
     return [
         Point(
@@ -199,7 +200,7 @@ def _growth(quick: bool, own: bool = False) -> list[Point]:
 def _constant_elements(
     name: str, problem: CrackProblem | None, low: float, counts: Sequence[int], longest: float | None
 ) -> list[Point]:
-    """Both ways to K from one solution each: with the ``counts`` of elements, or on until the last takes ``longest``
+    """Both ways to K from one solution each: with the ``counts`` of elements, or more until the last takes ``longest``
     s."""
     rows: dict[str, list[Point]] = {FITTED: [], CALIBRATED: []}
     n, rest = counts[0], iter(counts[1:])
@@ -216,7 +217,7 @@ def _constant_elements(
         most = MOST_UNKNOWNS * n // unknowns
         if seconds >= longest or n >= most:
             return rows[FITTED] + rows[CALIBRATED]
-        # Most of it goes with the third power of n.
+        # The time is mostly proportional to n³.
         growth = max(1.1, (1.2 * longest / seconds) ** (1 / 3))
         n = min(2 * n if growth > 2 else math.ceil(n * growth), most)
 
@@ -237,7 +238,7 @@ def _one_crack(problem: CrackProblem, order: int):
 
 
 def _arc(_: None, order: int):
-    # Elements are straight: an order deserves a polygon that follows the arc as closely.
+    # Elements are straight: with increasing order the polygon must follow the arc more closely.
     return crack_problems.arc_of_tangents(round(8 * 1.6 ** (order - 2))), DdmSettings(order=order, elements_per_crack=1)
 
 
@@ -249,7 +250,7 @@ def _many(problem: CrackProblem, order: int):
     return problem, DdmSettings(order=order, elements_per_crack=2)
 
 
-#: Name → the problem (None: another one for every number of elements), elements of the outline's shortest side per
+#: Name → the problem (None: a different one for every number of elements), elements on the outline's shortest side per
 #: element of a crack, and our own mesh for an order.
 PROBLEMS = {
     "Griffith crack": (crack_problems.griffith, 0.0, _one_crack),

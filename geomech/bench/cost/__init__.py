@@ -1,1 +1,1 @@
-"""Benchmarks of cost: what steps, kernels, growth, output and start-up take."""
+"""Benchmarks of cost: steps, kernels, growth, output and start-up."""

@@ -1,11 +1,10 @@
-"""What a step of many blocks costs and how right it is: walls and jointed slopes of 100 to 10 000 blocks, more if asked
-for.
+"""Cost and accuracy of a step of many blocks: walls and jointed slopes of 100 to 10 000 blocks, more on request.
 
-Steps of 10 ms from rest under sudden weight, as many as some seconds have room for (one at least); the cost of an
-open–close iteration, one set of contact states or one step of the central path, is that of the step over its
-iterations. Settled steps go on from where static ones have brought the blocks to rest. Beside them the share of the
-contact search, the memory of the process, the exponents of the cost, other solutions of the last equations, which
-are told by time against residual, and errors against closed forms.
+Steps of 10 ms from rest under sudden weight, as many as fit in some seconds (at least one); the cost of an open–close
+iteration (one set of contact states, or one step of the central path) is that of the step over its iterations. Settled
+steps continue from where static ones have brought the blocks to rest. In addition: the share of the contact search, the
+memory of the process, the exponents of the cost, other solvers of the last equations (time against residual), and
+errors relative to closed forms.
 """
 
 from __future__ import annotations
@@ -36,42 +35,44 @@ from ..peers.block_iteration import (
 from . import block_scenes
 from .block_scenes import FRICTION, GRAVITY, JOINT, ROCK, WEIGHT
 
-#: Where the picture and the numbers go, below the working folder.
+#: Folder of the picture and the numbers, in the working folder.
 FOLDER = Path("outputs/bench_dda")
 TIME_STEP = 0.01
 SIZES = (100, 1000, 10_000)
-#: Blocks up to which the last equations are solved iteratively too (block Jacobi takes minutes beyond), in a quick run
-#: and else.
+#: Number of blocks up to which the last equations are also solved iteratively (block Jacobi takes minutes beyond), in a
+#: quick and in a full run.
 ITERATED = 100, 1000
-#: Blocks up to which other direct solutions of them are measured, and domains; of more, behind the last scene alone, for
-#: each takes a gigabyte.
+#: Number of blocks up to which other direct solvers are measured, and domains; of larger ones only with the last scene,
+#: because each takes a gigabyte.
 DIRECTLY = 20_000
-#: Residuals to which domains are then iterated: what the central path asks for, and what a step does.
+#: Residuals to which domains are then iterated: those required by the central path, and by a step.
 TO_PATH_AND_STEP = 1e-5, 1e-10
-#: CPU seconds from which on no further step is begun, in a quick run and else. (The first step of 100 000 bricks takes 26
-#: iterations, 110 s of CPU and 3.0 GiB, that of a slope of so many, halved twice, 580 s of CPU and 3.4 GiB.)
+#: CPU time, s, after which no further step is started, in a quick and in a full run. (The first step of 100 000 bricks
+#: takes 26 iterations, 110 s of CPU and 3.0 GiB, that of a slope of this size, halved twice, 580 s of CPU and 3.4 GiB.)
 LONGEST = 0.5, 6.0
-#: Of so many settled steps the first, which factors, is not counted. Up to so many blocks in a quick run: the static
-#: steps that bring blocks to rest take as long as those from rest; of slopes in any other, walls of more are at rest
-#: sooner.
+#: Number of settled steps; the first one, which factors, does not count. Largest number of blocks in a quick run: the
+#: static steps that bring blocks to rest take as long as those from rest; and of slopes in a full run, walls coming to
+#: rest sooner.
 SETTLED, SETTLES, SLOPES_SETTLE = 6, 150, 20_000
 SCENES = {"wall": block_scenes.wall, "jointed slope": block_scenes.slope}
 
-#: Shi's DDA in C (an optimised public build, measured on a machine of the same kind): blocks of a wall like ours →
-#: seconds an open–close iteration.
+#: Shi's DDA in C (an optimised public build, measured on a machine of the same kind): {blocks of a similar wall:
+#: seconds per open–close iteration}.
 SHI = {106: 0.0015, 411: 0.014, 1009: 0.084, 2003: 0.29, 4001: 0.99}
-#: Goals on two cores: blocks of a wall → seconds an iteration by the clock; exponent of the cost from 1 000 blocks on;
+#: Goals on two cores: {blocks of a wall: wall-clock seconds per iteration}; exponent of the cost from 1 000 blocks on;
 #: share of the search.
 GOALS, EXPONENT, SEARCH = {1000: 6e-3, 10_000: 0.1}, 1.1, 0.25
 
 
 @dataclass(frozen=True)
 class Cost:
-    """CPU seconds of the ``first`` step; medians over ``steps``: CPU seconds of a step, of an iteration, of its
-    solution, and of a step's contact search; ``by_the_clock``: seconds of an iteration of the quickest step, which
-    cores share; seconds and mean iterations of a ``settled`` step (nan: not measured); memory of the
-    process at its peak, MB; ``factored`` of every factorisation; ``imbalance``: error of weight − inertia =
-    reaction."""
+    """Cost of a scene.
+
+    CPU seconds of the ``first`` step; medians over ``steps``: CPU seconds of a step, of an iteration, of its solution,
+    and of a step's contact search; ``by_the_clock``: seconds per iteration of the quickest step, which several cores
+    share; seconds and mean iterations of a ``settled`` step (nan: not measured); peak memory of the process, MB;
+    ``factored`` of every factorisation; ``imbalance``: error of weight − inertia = reaction.
+    """
 
     scene: str
     blocks: int
@@ -118,7 +119,7 @@ def _watched() -> Iterator[Watch]:
 
     def timed(work, *given, **named):
         nonlocal inside
-        if inside:  # a rough solution may ask for an exact one
+        if inside:  # a rough solution may require an exact one
             return work(*given, **named)
         inside, spent_on = True, stopwatch()
         try:
@@ -143,8 +144,10 @@ def _watched() -> Iterator[Watch]:
 
 
 def measure(quick: bool = False, blocks: int | None = None) -> Measured:
-    """The table; leaves ``cost_of_size.png``, ``solvers.png`` and ``cost_of_size.json`` in `FOLDER`. ``quick`` stops at
-    1 000 blocks; ``blocks``: one more size, larger than the others."""
+    """The table; writes ``cost_of_size.png``, ``solvers.png`` and ``cost_of_size.json`` to `FOLDER`.
+
+    ``quick`` stops at 1 000 blocks; ``blocks``: one more size, larger than the others.
+    """
     from ...render.benchmarks.cost_of_size import draw, draw_solvers
 
     run(block_scenes.wall(100), 0.0)  # compiles
@@ -160,7 +163,7 @@ def measure(quick: bool = False, blocks: int | None = None) -> Measured:
         for other in others:
             found = {key: getattr(other, key) for key in ("method", "iterations", "seconds", "residual")}
             iterated.append({"scene": name, "blocks": cost.blocks, **found})
-    # Behind all others, for static steps of very many blocks take more memory.
+    # After all others, because static steps of very many blocks take more memory.
     for k, (n, name) in enumerate(scenes):
         if n <= SETTLES if quick else (name == "wall" or n <= SLOPES_SETTLE):
             at_rest = settled(SCENES[name](n))
@@ -189,7 +192,7 @@ def measure(quick: bool = False, blocks: int | None = None) -> Measured:
 
 
 def run(blocks: Blocks, longest: float) -> tuple[list[dict], Watch, object, object]:
-    """Steps until ``longest`` s of CPU are over: what each took, the watch, the last result and the system."""
+    """Steps until ``longest`` s of CPU are used: the time of each, the watch, the last result and the system."""
     from ... import dda
 
     system = dda.BlockSystem(blocks, [ROCK], [JOINT], settings=block_scenes.settings(TIME_STEP))
@@ -206,7 +209,7 @@ def run(blocks: Blocks, longest: float) -> tuple[list[dict], Watch, object, obje
             # Correctors solve again with the same factors: iterations are fewer than solutions.
             iterations = result.statistics["open_close_iterations"]
             if result.statistics["step_cuts"]:
-                # Attempts that were cut have taken theirs.
+                # Attempts that were cut count too.
                 iterations = max(iterations, system.work.factorisations - factored)
             rows.append(
                 {
@@ -239,7 +242,7 @@ def settled(blocks: Blocks) -> tuple[float, float]:
 
 def _measured(name: str, blocks: Blocks, longest: float, jacobi: bool, domains: bool) -> tuple[Cost, list[Iterated]]:
     rows, watch, result, system = run(blocks, longest)
-    # What a scene pays once, patterns and orderings, is in the first step.
+    # Patterns and orderings, which a scene computes once, are in the first step.
     regular = rows[1:] or rows
 
     def median(key: str) -> float:
@@ -282,7 +285,7 @@ def _measured(name: str, blocks: Blocks, longest: float, jacobi: bool, domains: 
 
 
 def _imbalance(blocks: Blocks, system, result) -> float:
-    """|Σ m (g + a) − reaction of the fixed blocks| over the weight, upwards."""
+    """Error |Σ m (g + a) − reaction of the fixed blocks| over the weight, vertical."""
     from ...dda.results import contact_resultants
 
     fixed = np.asarray(blocks.fixed, bool)
@@ -293,7 +296,7 @@ def _imbalance(blocks: Blocks, system, result) -> float:
 
 
 def peak_memory() -> float:
-    """MB that the process has held at most; nan where the system does not say."""
+    """Peak memory of the process, MB; nan if the system does not report it."""
     try:
         import resource
     except ImportError:
@@ -302,7 +305,7 @@ def peak_memory() -> float:
 
 
 def _exponent(costs: list[Cost], what: str) -> float:
-    """Of ``what`` in the number of blocks, by regression from the second size on (or all of two)."""
+    """Exponent of ``what`` in the number of blocks, by regression from the second size on (or from both of two)."""
     used = [c for c in costs if math.isfinite(getattr(c, what))]
     used = used[1:] if len(used) > 2 else used
     if len(used) < 2:
@@ -312,8 +315,11 @@ def _exponent(costs: list[Cost], what: str) -> float:
 
 
 def errors() -> dict[str, float]:
-    """Relative errors against closed forms: the way of a block that slides, the creep of one that sticks, the
-    shortening of a column of twenty blocks under its own weight, a wall's reaction at rest."""
+    """Relative errors against closed forms.
+
+    Displacement of a sliding block, creep of a sticking one, shortening of a column of twenty blocks under its own
+    weight, a wall's reaction at rest.
+    """
     from ... import dda
 
     def states(blocks: Blocks, dt: float, end: float, dynamic: bool = True):
@@ -332,7 +338,7 @@ def errors() -> dict[str, float]:
         crept / (0.5 * GRAVITY * math.sin(math.radians(30)) * end**2)
     )
     blocks = block_scenes.column(20)
-    # Without friction, so that every block may widen.
+    # Without friction, so that every block can expand laterally.
     system = dda.BlockSystem(blocks, [ROCK], [JointLaw("smooth")], settings=block_scenes.settings(1.0, dynamic=False))
     state = State.at_rest(blocks)
     for _ in range(3):
@@ -374,7 +380,7 @@ def _table(costs: list[Cost], exponents: dict[str, float], iterated: list[dict],
     )
     lines += [
         "",
-        "an iteration of a wall beside Shi's DDA in C (measured on a machine of the same kind, cost as n^1.8)",
+        "an iteration of a wall compared with Shi's DDA in C (measured on a machine of the same kind, cost as n^1.8)",
     ]
     known_n, known_s = np.log(list(SHI)), np.log(list(SHI.values()))
     for c in costs:

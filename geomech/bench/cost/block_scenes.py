@@ -1,4 +1,4 @@
-"""Block systems of any size for timing: a running-bond wall, a slope cut by two joint sets, a column, a block on an
+"""Block systems of any size for timing: a running-bond wall, a slope with two joint sets, a column, a block on an
 incline."""
 
 from __future__ import annotations
@@ -29,15 +29,14 @@ FRICTION = math.radians(35)
 JOINT = JointLaw("joint", friction_angle=FRICTION)
 GRAVITY = 9.81
 WEIGHT = Loads(gravity=History.constant((0.0, -GRAVITY)))
-#: Static steps (s) that bring blocks to rest: first short ones, in which inertia bounds how far contacts answer to one
-#: another. (A wall of 10 000 bricks takes 25 iterations in them, and hundreds, with steps cut, in one of 1 s from
-#: nothing.)
+#: Static steps (s) that bring blocks to rest: short ones first, in which inertia limits how far contacts influence each
+#: other. (A wall of 10 000 bricks takes 25 iterations in them; in a single one of 1 s, hundreds, with cuts.)
 CALMING = (3e-3, 0.03, 0.3, 1.0, 1.0)
 
 
 def wall(n: int) -> Blocks:
-    """About ``n`` bricks of 1 × 0.5 m in running bond, as wide as twice its height in bricks' sides, on a fixed
-    base."""
+    """About ``n`` bricks of 1 × 0.5 m in running bond on a fixed base; the numbers of bricks along the base and in
+    height have the ratio 2."""
     columns = max(4, round(math.sqrt(n / 2)))
     polygons = [_rectangle(-1, -1, columns + 1, 0)]
     for course in range(max(1, round(n / (columns + 0.5)))):
@@ -49,7 +48,7 @@ def wall(n: int) -> Blocks:
 
 
 def with_loose_brick(blocks: Blocks) -> Blocks:
-    """A wall's ``blocks``, and a brick that lies on the middle of it, the last of them."""
+    """The ``blocks`` of a wall, and a brick on top of its centre, the last one."""
     polygons = [blocks.vertices[a:b] for a, b in pairwise(blocks.vertex_start)]
     top, x = blocks.vertices[:, 1].max(), math.floor(0.5 * (blocks.vertices[:, 0].max() - 1)) + 0.3
     polygons.append(_rectangle(x, top, x + 1, top + 0.5))
@@ -57,8 +56,11 @@ def with_loose_brick(blocks: Blocks) -> Blocks:
 
 
 def slope(n: int) -> Blocks:
-    """About ``n`` blocks of a 60° slope between two joint sets: bedding that dips 20° into the rock and cross joints at
-    right angles from bed to bed, blocks of 1 × 1 m; those at its foot and back are fixed."""
+    """About ``n`` blocks of 1 × 1 m of a 60° slope with two joint sets.
+
+    Bedding dips 20° into the rock, with cross joints at right angles from bed to bed; blocks at its foot and back are
+    fixed.
+    """
     dip, steep = math.radians(20), math.radians(70)
     a, b = np.array([math.cos(dip), -math.sin(dip)]), np.array([math.cos(steep), math.sin(steep)])
     size = math.sqrt(n / 0.95)
@@ -81,20 +83,20 @@ def column(n: int) -> Blocks:
 
 
 def incline(angle: float) -> Blocks:
-    """A block of 1 × 1 m on a fixed plane that falls to the right at ``angle`` (rad)."""
+    """A block of 1 × 1 m on a fixed plane that dips to the right at ``angle`` (rad)."""
     turn = np.array([[math.cos(angle), -math.sin(angle)], [math.sin(angle), math.cos(angle)]])
     polygons = [_rectangle(-3, -1, 20, 0) @ turn, _rectangle(0, 0, 1, 1) @ turn]
     return Blocks.from_polygons(polygons, fixed=[True, False])
 
 
 def settings(dt: float, dynamic: bool = True) -> DdaSettings:
-    """Those of the scenes: steps of ``dt`` s, in motion or at rest."""
+    """Settings of the scenes: steps of ``dt`` s, dynamic or static."""
     return DdaSettings(time_step=dt, dynamic_factor=1.0 if dynamic else 0.0)
 
 
 def at_rest(blocks: Blocks) -> State:
-    """The blocks at rest under their weight: they begin with the vertical stress of what lies above them and relax in
-    static steps."""
+    """The blocks at rest under their weight: they start with the vertical stress of the overburden and relax in static
+    steps."""
     from ... import dda
 
     state = State.at_rest(blocks)
@@ -113,12 +115,13 @@ def _rectangle(x0: float, y0: float, x1: float, y1: float) -> np.ndarray:
     return np.array([[x0, y0], [x1, y0], [x1, y1], [x0, y1]], dtype=float)
 
 
-#: Of the wall with cracked bricks, s.
+#: Time step of the wall with cracked bricks, s.
 CRACKED_WALL_STEP = 0.01
 
 
 def cracked_wall(n: int, n_cracked: int) -> Problem:
-    """About ``n`` bricks, every so many of them with an open slot of 0.2 m across its middle that rises at 45°."""
+    """About ``n`` bricks, ``n_cracked`` of them, evenly distributed, with an open slot of 0.2 m at 45° in the
+    centre."""
     blocks = wall(n)
     cracked = np.linspace(1, blocks.n_blocks - 1, n_cracked).astype(int)
     reach = np.array([0.07, 0.07])

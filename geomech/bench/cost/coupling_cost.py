@@ -1,10 +1,11 @@
-"""What coupling costs beside the blocks: a wall of 1 000 bricks of which 100 hold a crack, and a specimen to
+"""Cost of the coupling relative to the blocks: a wall of 1 000 bricks of which 100 have a crack, and a specimen up to
 coalescence.
 
-The wall comes under its weight at once, in steps of 10 ms, and its rock is too tough for a crack to grow. Every step
-takes as many passes as the strain of the cracks needs to settle, one where they are open; a pass is a step of the
-blocks and a solution of every cracked brick. Bricks whose cracks cannot grow are left out of it after some steps, unless
-their tips are asked for, as a table of all tips does: the table has both. What a pass more or less is worth is told by time against error (`pass_tolerance`).
+The wall is loaded by its weight at once, in steps of 10 ms, and its rock is too tough for growth. Every step takes as
+many passes as the strain of the cracks needs to converge, one if they are open; a pass is a step of the blocks and a
+solution of every cracked brick. Bricks whose cracks cannot grow are skipped after some steps, unless all tips are
+requested, as for a table of all tips: the table has both. `pass_tolerance` gives time against error by the number of
+passes.
 """
 
 from __future__ import annotations
@@ -19,18 +20,18 @@ from ..accuracy import pass_tolerance
 from ..figures import Measured, stopwatch
 from . import block_scenes
 
-#: Where the numbers go, below the working folder.
+#: Folder of the numbers, in the working folder.
 FOLDER = Path("outputs/bench_coupling")
 SPECIMEN = Path("pipelines/two_cracks/scene.toml")
-#: Goals on two cores: coupling's share of a step beside the blocks' own; seconds of the specimen, warm.
+#: Goals on two cores: the coupling's share of a step relative to the blocks; seconds of the specimen, warm.
 RATIO, SECONDS = 1.0, 2.0
-#: What a run's phases call the blocks' own part.
+#: Phases of a run that belong to the blocks.
 BLOCKS = "dda"
 
 
 def of_wall(n: int, n_cracked: int, steps: int) -> dict:
-    """Medians over the passes of ``steps`` load steps in which bricks were left out, and of those before, but for the first:
-    seconds of the blocks' own and of the coupling."""
+    """Medians over the passes of ``steps`` load steps with skipped bricks, and of earlier ones except the first:
+    seconds of the blocks and of the coupling."""
     from ...coupling import cycles
     from ...coupling.crack_compliance.growth_screening import STOOD
 
@@ -40,8 +41,8 @@ def of_wall(n: int, n_cracked: int, steps: int) -> dict:
     for cycle in cycles(problem):
         spent = {phase: seconds - before.get(phase, 0.0) for phase, seconds in cycle.seconds.items()}
         before = cycle.seconds
-        # What a scene pays once, bodies, patterns and unit loads, is in the first step; bounds are in the last of those
-        # that bricks have to stand.
+        # Bodies, patterns and unit loads, which a scene computes once, are in the first step; bounds are in the last of
+        # those that bricks have to be stable in.
         if cycle.load_step > 1 and cycle.load_step != STOOD:
             count = int(cycle.statistics["compliance_passes"])
             passes.append(count)
@@ -68,7 +69,7 @@ def of_wall(n: int, n_cracked: int, steps: int) -> dict:
 
 
 def of_specimen(repeats: int) -> dict:
-    """The two-crack specimen to the end of its scene, after a run that warms up; the shortest of ``repeats``, s."""
+    """The two-crack specimen to the end of its scene, after a warm-up run; the shortest of ``repeats``, s."""
     from ...pipeline import cycles
 
     seconds, seen = [], []
@@ -81,8 +82,10 @@ def of_specimen(repeats: int) -> dict:
 
 
 def measure(quick: bool = False) -> Measured:
-    """The table; leaves ``coupling.json`` and ``work_precision.png`` in `FOLDER`. ``quick``: 200 bricks with 20
-    cracked, few steps, no specimen."""
+    """The table; writes ``coupling.json`` and ``work_precision.png`` to `FOLDER`.
+
+    ``quick``: 200 bricks with 20 cracked, few steps, no specimen.
+    """
     from ...coupling.load_pass import COMPLIANCE_TOLERANCE
     from ...render.benchmarks.work_precision import draw
 

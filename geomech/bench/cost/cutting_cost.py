@@ -1,7 +1,7 @@
-"""What it costs to cut rock into blocks: networks of 10² to 10⁵ blocks, blocks a second, memory, exponent.
+"""Cost of cutting rock into blocks: networks of 10² to 10⁵ blocks, blocks per second, memory, exponent.
 
-Processor time of one thread, which neighbours on the machine disturb less than a clock; the shortest of some repeats.
-What is cut is checked: the blocks' areas add up to the rock's.
+Processor time of one thread, which is less affected by other programs than the clock; the shortest of some repeats. The
+result is checked: the blocks' areas add up to the rock's.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from .block_cost import peak_memory
 
 FOLDER = Path("outputs/bench_geometry")
 SIZES = (100, 1000, 10_000, 100_000)
-#: The largest size of a quick run.
+#: Largest size of a quick run.
 QUICK = 4000
 #: Goals: exponent of the time in the number of blocks, seconds for the largest size.
 EXPONENT, SECONDS = 1.15, 10.0
@@ -33,8 +33,8 @@ ROCK = np.array([[0.0, 0.0], [SIDE, 0.0], [SIDE, SIDE], [0.0, SIDE]])
 
 @dataclass(frozen=True)
 class Cost:
-    """Seconds to make the joints of ``network`` and to cut them; ``memory`` of the process at its peak so far, MB;
-    ``lost``, the rock's area that no block has, relative."""
+    """Seconds to make the joints of ``network`` and to cut them; peak ``memory`` of the process so far, MB; ``lost``,
+    the relative area of rock that belongs to no block."""
 
     network: str
     blocks: int
@@ -47,7 +47,7 @@ class Cost:
 
 
 def two_sets(n: int, rng: np.random.Generator, share: float = 1.0) -> list[Joint]:
-    """Two sets that cross at 80°; of every line the part ``share`` is joint."""
+    """Two sets that cross at 80°; the fraction ``share`` of every line is joint."""
     spacing = SIDE / math.sqrt(n)
     out = []
     for name, angle in (("joint:a", 20.0), ("joint:b", 100.0)):
@@ -60,10 +60,10 @@ def two_sets(n: int, rng: np.random.Generator, share: float = 1.0) -> list[Joint
     return out
 
 
-#: Networks of about so many blocks.
+#: Networks with about this many blocks.
 NETWORKS: dict[str, Callable[[int, np.random.Generator], list[Joint]]] = {
     "two sets": two_sets,
-    # Every gap joins what it should have parted: 2.5 times the lines for as many blocks.
+    # Every gap connects the blocks on its sides: 2.5 times the lines for the same number of blocks.
     "with rock bridges": lambda n, rng: two_sets(round(2.5 * n), rng, 0.86),
     "Poisson lines": lambda n, rng: [poisson_lines("joint:a", ROCK, None, math.sqrt(math.pi * n) / SIDE, rng)],
     "Voronoi cells": lambda n, rng: [voronoi("joint:a", ROCK, SIDE**2 / n, rng)],
@@ -71,7 +71,7 @@ NETWORKS: dict[str, Callable[[int, np.random.Generator], list[Joint]]] = {
 
 
 def cost(network: str, n: int, repeats: int) -> Cost:
-    """What making ``n`` traces of a ``network`` and cutting rock by them costs, the least of ``repeats``."""
+    """Cost of making ``n`` traces of a ``network`` and cutting rock by them, the least of ``repeats``."""
     making, cutting = [], []
     for _ in range(repeats):
         began = time.process_time()
@@ -93,18 +93,18 @@ def cost(network: str, n: int, repeats: int) -> Cost:
 
 
 def exponent(costs: list[Cost]) -> float:
-    """Of the seconds of cutting in the number of blocks, by regression from the second size on: the first is all
+    """Exponent of the cutting time in the number of blocks, by regression from the second size on: the first is all
     overhead."""
     n, seconds = np.log([c.blocks for c in costs[1:]]), np.log([c.cutting for c in costs[1:]])
     return float(np.polyfit(n, seconds, 1)[0])
 
 
 def measure(quick: bool = False) -> Measured:
-    """The table; leaves ``cost_of_size.json`` and ``cost_of_size.png`` in `FOLDER`. ``quick``: up to `QUICK`
-    blocks, each size once."""
+    """The table; writes ``cost_of_size.json`` and ``cost_of_size.png`` to `FOLDER`. ``quick``: up to `QUICK` blocks,
+    each size once."""
     from ...render.benchmarks.cost_of_size import draw_cutting
 
-    # The first cut imports what all need.
+    # The first cut imports common modules.
     cost("two sets", 10, 1)
     costs = [
         cost(network, n, 1 if quick or n > 1000 else 3)

@@ -1,4 +1,4 @@
-"""What an increment of growth costs: rows and columns of new elements against a fresh body, 40 increments in a row."""
+"""Cost of a growth increment: rows and columns of new elements compared with a new body, 40 increments in a row."""
 
 from __future__ import annotations
 
@@ -14,9 +14,11 @@ from ..figures import stopwatch
 
 
 def measure(increments: int = 40) -> dict:
-    """Both outer tips of the two slots grow along wings of 0.5 mm increments that turn to the load. Medians over the
-    increments and sums, s, the largest difference of a K between both ways, relative to the largest K, and how often
-    all of the crack unknowns' equations were factored on the way."""
+    """Growth of both outer tips of the two slots along wings of 0.5 mm increments that turn to the load.
+
+    Medians over the increments and sums, s; the largest difference of a K between both ways, relative to the largest K;
+    and the number of complete factorisations of the crack equations.
+    """
     from ...ddm import Body
 
     problem = specimen()
@@ -49,7 +51,8 @@ def measure(increments: int = 40) -> dict:
 
 
 def _grown(cracks: Cracks, increments: int, length: float = 0.5e-3) -> Cracks:
-    """The two slots with a wing of so many ``increments`` at either outer tip: it leaves at 80° and turns upright."""
+    """The two slots with a wing of ``increments`` increments at either outer tip: it starts at 80° and turns
+    upright."""
     if not increments:
         return cracks
     nodes, segments, source = list(cracks.nodes), list(map(tuple, cracks.segments)), list(range(cracks.n_segments))

@@ -1,8 +1,8 @@
-"""What a command loads before it does anything: modules by layer, heavy libraries, and the kernels that it compiles.
+"""Start-up cost of a command: imported modules by layer, heavy libraries, and compiled kernels.
 
-Python tells the time of every import (``-X importtime``); Numba leaves an index file for every function it compiled. A
-command is cold when what it loads has to come from the disk: the files of the packages are put out of the system's
-memory before.
+Python reports the time of every import (``-X importtime``); Numba leaves an index file for every function it compiled.
+A command is cold if everything must be read from the disk: the files of the packages are removed from the system's
+cache before.
 """
 
 from __future__ import annotations
@@ -19,9 +19,9 @@ from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
 
-#: Libraries that a command which does not need them must not load.
+#: Libraries that a command which does not need them must not import.
 HEAVY = ("gmsh", "vtkmodules", "pyvista", "matplotlib", "meshio", "shapely", "scipy", "numba", "pydantic", "ezdxf")
-#: Layers of the table that are told by name; the rest are libraries of Python itself and of others.
+#: Layers listed by name in the table; the rest are libraries of Python itself and of others.
 LAYERS = ("geomech", "numpy", *HEAVY)
 
 #: In the arguments of a command: the folder of the last run.
@@ -43,7 +43,7 @@ class Loaded:
 
 
 def loaded(arguments: Sequence[str]) -> Loaded:
-    """What ``geomech`` loads with these ``arguments``. Raises subprocess.CalledProcessError when it fails."""
+    """Imports of ``geomech`` with these ``arguments``. Raises subprocess.CalledProcessError if it fails."""
     command = [sys.executable, "-X", "importtime", "-m", "geomech", *arguments]
     said = subprocess.run(command, check=True, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True).stderr
     seconds: Counter[str] = Counter()
@@ -55,7 +55,7 @@ def loaded(arguments: Sequence[str]) -> Loaded:
 
 
 def compiled(folder: Path) -> dict[str, int]:
-    """Package → functions in the kernel cache ``folder``."""
+    """{package: functions in the kernel cache ``folder``}."""
     counts: Counter[str] = Counter()
     for index in folder.rglob("*.nbi"):
         # Numba names the folder of a source file after the file's own folder.
@@ -64,8 +64,8 @@ def compiled(folder: Path) -> dict[str, int]:
 
 
 def table(commands: Mapping[str, Sequence[str]]) -> list[str]:
-    """A line a command: seconds by layer, heavy libraries loaded. A run's folder is ``RUN`` for those that come after
-    it."""
+    """One line per command: seconds by layer, heavy libraries loaded. ``RUN`` stands for a run's folder in later
+    commands."""
     lines = ["imports by layer, ms (each module's own time, told by Python, which slows them)"]
     with tempfile.TemporaryDirectory() as scratch:
         for label, arguments in commands.items():
@@ -79,20 +79,19 @@ def table(commands: Mapping[str, Sequence[str]]) -> list[str]:
 
 
 def seconds(command: Sequence[str], environment: Mapping[str, str] | None = None) -> float:
-    """Of ``command`` from launch to exit, by the clock or of the processors (the process's own and its children's),
-    whichever are fewer: waiting while other programs have the processor is left out. Raises
-    subprocess.CalledProcessError when it fails."""
+    """Time of ``command`` from launch to exit, by the clock or of the processors (including children), whichever is
+    less: waiting for the processor is excluded. Raises subprocess.CalledProcessError if it fails."""
     clock, before = time.perf_counter(), os.times()
     subprocess.run(command, env=environment, check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     waited, after = time.perf_counter() - clock, os.times()
     own = after.children_user - before.children_user + after.children_system - before.children_system
-    # Where the system does not count children's time there is the clock.
+    # Without children's processor times, the clock is used.
     return min(waited, own) if own > 0 else waited
 
 
 def put_out_of_memory(names: Sequence[str] = ("geomech", *HEAVY, "numpy", "llvmlite")) -> float | None:
-    """Have the system forget the files of packages, as far as no other program uses them: their size, MB; None where it
-    cannot be asked to."""
+    """Remove the files of packages from the system's cache, unless other programs use them: their size, MB; None if
+    that is not possible."""
     if not hasattr(os, "posix_fadvise"):
         return None
     size = 0
@@ -101,7 +100,7 @@ def put_out_of_memory(names: Sequence[str] = ("geomech", *HEAVY, "numpy", "llvml
         if found is None or found.origin is None:
             continue
         folder = Path(found.origin).parent
-        # Shared libraries of wheels lie beside the package.
+        # Shared libraries of wheels are in a folder next to the package.
         for place in (folder, folder.with_name(f"{name}.libs")):
             for path in (
                 place.rglob("*") if place.is_dir() and found.submodule_search_locations else [Path(found.origin)]
@@ -114,8 +113,8 @@ def put_out_of_memory(names: Sequence[str] = ("geomech", *HEAVY, "numpy", "llvml
 
 
 def kernels(scenes: Mapping[str, Sequence[str]], environment: Mapping[str, str]) -> list[str]:
-    """A line a scene: the kernels that its run compiles into an empty cache, by package, and `seconds` of that and of
-    the next run."""
+    """One line per scene: the kernels that its run compiles into an empty cache, by package, and `seconds` of that and
+    of the next run."""
     lines = ["kernels compiled by a first run (seconds of it, and of the next)"]
     for label, arguments in scenes.items():
         with tempfile.TemporaryDirectory() as cache:

@@ -1,4 +1,4 @@
-"""What an element–point pair costs: influence matrices and fields, one thread, near and far pairs, all kinds of
+"""Cost of an element–point pair: influence matrices and fields, one thread, near and far pairs, all kinds of
 elements."""
 
 from __future__ import annotations
@@ -19,12 +19,12 @@ from ...ddm.system import influence_matrix as matrices
 from ...ddm.system.influence_matrix import ElementSet, add_fields, influence
 from ..figures import Measured
 
-#: Where the picture goes, below the working folder.
+#: Folder of the picture, in the working folder.
 FOLDER = Path("outputs/bench_kernels")
 
 
 def measure(quick: bool = False) -> Measured:
-    """The table: ns a pair, CPU time of the fastest of some repeats; leaves ``kernels.png`` in `FOLDER`."""
+    """The table: ns per pair, CPU time of the fastest of some repeats; writes ``kernels.png`` to `FOLDER`."""
     from ...render.benchmarks.bars import draw_bars
 
     threads, matrices.THREADS = matrices.THREADS, 1

@@ -1,8 +1,8 @@
-"""Hundreds of cracks, and an outline of thousands of elements: iterating on compressed equations beside factoring them.
+"""Hundreds of cracks, and an outline of thousands of elements: iterative compared with direct solution.
 
 Cracks of lengths 1 to 6 in the infinite plane, each in a cell of its own, under one load that opens them; processor
-time of one thread or more, matrices and solution together, a body made anew. The outline is a square's, with one crack
-in it: what making it takes, and the first and another load.
+time of one or more threads, matrices and solution together, with a new body. The outline is that of a square with one
+crack: time to make it, and the first and another load.
 """
 
 from __future__ import annotations
@@ -14,17 +14,16 @@ import numpy as np
 
 from ..figures import Measured
 
-#: Cracks are the squares of these; networks beyond ``FACTORED`` cracks a side are not factored (minutes, many
-#: gigabytes).
-#: Where the picture goes, below the working folder.
+#: The numbers of cracks are the squares of these; networks beyond ``FACTORED`` cracks per side are not factored
+#: (minutes, many gigabytes).
 FOLDER = Path("outputs/bench_many")
 SIDES, FACTORED = (5, 7, 11, 16, 23, 36), 16
-#: Elements on a side of the square that is iterated on.
+#: Elements per side of the square that is solved iteratively.
 ON_A_SIDE = 500
 
 
 def measure(quick: bool = False) -> Measured:
-    """The table; leaves ``many.png`` in `FOLDER`. ``quick`` leaves out what takes more than a second."""
+    """The table; writes ``many.png`` to `FOLDER`. ``quick`` leaves out everything longer than a second."""
     from ...ddm import Body, BodyLoad
     from ...model import Cracks, DdmSettings, Material
     from ...reference.cracks.crack_arrays import cracks_in_cells

@@ -1,10 +1,10 @@
-"""What jointed slopes in motion cost, by size and time step, and how right they are for it.
+"""Cost and accuracy of jointed slopes in motion, by size and time step.
 
-Slopes of one family (`sliding_scenes`), scaled in their spacings to some 300 to 10 000 blocks, move from rest until the
-slab on the lowest daylighting bed has slid by some 13 mm. Told for each time step: open–close iterations a step, time
-of an iteration and of a simulated second, and the work of gravity on what moves, off that in the shortest steps and off
-the rigid slab's. Beside them a brick wall of as many blocks, as in `block_cost`: a ratio of two times of one run does
-not depend on the machine.
+Slopes of one family (`sliding_scenes`), with spacings scaled to some 300 to 10 000 blocks, move from rest until the
+slab on the lowest daylighting bed has slid by some 13 mm. For each time step: open–close iterations per step, time per
+iteration and per simulated second, and the work of gravity on the moving blocks, relative to that in the shortest steps
+and to the rigid slab's. For comparison a brick wall of as many blocks, as in `block_cost`: a ratio of two times of one
+run does not depend on the machine.
 """
 
 from __future__ import annotations
@@ -26,24 +26,28 @@ from ..slopes.sliding_scenes import Slab, Slope, slab
 from ..slopes.sliding_slopes import OF_SLIDE
 from . import block_cost, block_scenes
 
-#: Where the picture and the numbers go.
+#: Folder of the picture and the numbers.
 FOLDER = Path("outputs/bench_motion")
-#: Name of a size → m, spacing of the beds; that of cross joints is `ASPECT` times as wide.
+#: Name of a size → spacing of the beds, m; that of cross joints is `ASPECT` times as large.
 SPACINGS = {300: 2.6, 1000: 1.35, 3000: 0.76, 10_000: 0.41}
 ASPECT = 1.15
-#: s: steps, the shortest last, and the time until which the slopes move.
+#: s: time steps, the shortest last, and the duration of the motion.
 STEPS, END = (10e-3, 5e-3, 2.5e-3, 1.25e-3), 0.1
-#: Processor seconds that all steps of one length may take, in a quick run and else: of a run that takes longer the cost
-#: is told and no error. Steps that would take longer, by what those before have taken, are left out. Those of a wall.
+#: Processor time, s, for all steps of one length, in a quick and in a full run: of a run that takes longer, the cost is
+#: reported without an error. Steps that would take longer, judging by earlier ones, are left out. That of a wall.
 LONGEST, WALL = (3.0, 12.0), (0.5, 3.0)
 
 
 @dataclass(frozen=True)
 class Cost:
-    """Of a slope of so many ``blocks`` in steps of ``dt``, s: ``steps`` taken, mean open–close ``iterations`` a step
-    (those of attempts that were cut too); seconds of an ``iteration`` (the step over its iterations) and of a simulated
-    ``second``; ``moved`` share of the rock and ``work`` of gravity on it, J/m, ``off_slab`` over that on the rigid
-    slab, less 1 (nan where there is none). A run that was not finished has no work (nan)."""
+    """Cost of a slope of ``blocks`` blocks in steps of ``dt`` s.
+
+    steps        taken
+    iterations   mean number of open–close iterations per step, including attempts that were cut
+    iteration    seconds per iteration (the step over its iterations); ``second``: seconds per simulated second
+    moved        fraction of the rock that moved; ``work``: of gravity on it, J/m (nan: the run was not finished)
+    off_slab     work over that on the rigid slab, minus 1 (nan if there is none)
+    """
 
     blocks: int
     dt: float
@@ -62,8 +66,11 @@ class Cost:
 
 @dataclass(frozen=True)
 class Sized:
-    """A slope of about ``size`` blocks: its ``costs`` by falling time step, seconds of an iteration of a ``wall`` of as
-    many bricks, and why steps are ``missing``."""
+    """A slope of about ``size`` blocks.
+
+    ``costs`` by decreasing time step, seconds per iteration of a ``wall`` of as many bricks, and why steps are
+    ``missing``.
+    """
 
     size: int
     blocks: int
@@ -72,8 +79,8 @@ class Sized:
     missing: tuple[str, ...] = ()
 
     def errors(self) -> list[float]:
-        """Of every one of the costs: its work off that in the shortest steps, over it; nan of those in the shortest
-        steps themselves, and where a run was not finished."""
+        """Error of the work in each of the costs, relative to the shortest steps; nan for these, and for unfinished
+        runs."""
         finished = [cost for cost in self.costs if cost.finished]
         shortest = finished[-1] if finished else None
         return [
@@ -83,13 +90,13 @@ class Sized:
 
 
 def slope_of(size: int) -> Slope:
-    """About ``size`` blocks: those of `SPACINGS`, or scaled from them."""
+    """About ``size`` blocks: one of `SPACINGS`, or scaled from them."""
     spacing = SPACINGS.get(size) or round(SPACINGS[1000] * math.sqrt(1000 / size), 3)
     return Slope(35.0, 70.0, 3.0, spacing, round(ASPECT * spacing, 3))
 
 
 def measured(size: int, steps: Sequence[float], longest: float, wall: float) -> Sized:
-    """A slope in steps of each length (falling, s), of at most ``longest`` processor seconds each, and bricks for
+    """A slope in steps of each length (decreasing, s), with at most ``longest`` processor seconds each, and bricks for
     ``wall`` seconds."""
     slope = slope_of(size)
     problem = problem_of(tomllib.loads(slope.text(steps[0], END)))
@@ -108,14 +115,14 @@ def measured(size: int, steps: Sequence[float], longest: float, wall: float) -> 
         else:
             costs.append(found)
     rows, *_ = block_cost.run(block_scenes.wall(blocks), wall)
-    # Patterns and orderings, which a scene pays once, are in the first step.
+    # Patterns and orderings, which a scene computes once, are in the first step.
     regular = rows[1:] or rows
     of_wall = sum(row["seconds"] for row in regular) / sum(row["iterations"] for row in regular)
     return Sized(size, blocks, tuple(costs), of_wall, tuple(missing))
 
 
 def _cost(problem: Problem, slope: Slope, rigid: Slab | None, dt: float, longest: float) -> Cost | str:
-    """What steps of ``dt`` s cost, or why there is no telling."""
+    """Cost of steps of ``dt`` s, or the reason why it is not known."""
     settings = replace(problem.dda, time_step=dt)
     iterations: list[float] = []
     seconds: list[float] = []
@@ -130,7 +137,7 @@ def _cost(problem: Problem, slope: Slope, rigid: Slab | None, dt: float, longest
             asked, factored = min(length.dt, END - now.time), system.work.factorisations
             result = system.step(now, problem.loads, asked)
             length.after(result, asked)
-            # Attempts that were cut have taken theirs, which the step does not count.
+            # Attempts that were cut count, which the step does not include.
             counted = result.statistics["open_close_iterations"]
             iterations.append(max(counted, system.work.factorisations - factored))
             seconds.append(spent())
@@ -157,8 +164,11 @@ def _cost(problem: Problem, slope: Slope, rigid: Slab | None, dt: float, longest
 
 
 def measure(quick: bool = False, blocks: int | None = None) -> Measured:
-    """All sizes in all steps that some seconds have room for (``quick``: 300 and 1 000 blocks, to 2.5 ms); the table,
-    and ``motion.json`` and ``motion.png`` in `FOLDER`. ``blocks``: one more size, larger than the others."""
+    """All sizes in all steps that fit in the time limit (``quick``: 300 and 1 000 blocks, down to 2.5 ms).
+
+    Returns the table; writes ``motion.json`` and ``motion.png`` to `FOLDER`. ``blocks``: one more size, larger than the
+    others.
+    """
     from ...render.benchmarks.motion_cost import draw
 
     # Compiles, with the smallest slope.
@@ -173,7 +183,7 @@ def measure(quick: bool = False, blocks: int | None = None) -> Measured:
 
 
 def table(every: Sequence[Sized]) -> Measured:
-    """A line a size and time step, and figures of errors and times."""
+    """One line per size and time step, and figures of errors and times."""
     lines = [
         f"slopes that slide from rest for {END:g} s; work of gravity on what moves, off that in the shortest steps and "
         "off the rigid slab's;",

@@ -1,10 +1,8 @@
-"""What writing a large run costs: a wall of 10 000 bricks over 500 cycles, beside the steps themselves and beside other
-writers.
+"""Cost of writing a large run: a wall of 10 000 bricks over 500 cycles, compared with the steps and with other writers.
 
-A run of some steps says what a step costs while blocks move; its last cycle is then written as often as a long run
-would, moved on a little from one to the next, so that every number in the files is another. The share of writing is
-that of a cycle's writing in a step and its writing, both in seconds of processor, as if nothing were done side by side;
-the run itself waits for less.
+A run of some steps gives the cost of a step while blocks move; its last cycle is then written as often as in a long
+run, with a small motion from one to the next, so that all numbers in the files differ. The share of writing is its
+processor time relative to that of a step and writing, as if nothing ran in parallel; the run itself waits for less.
 """
 
 from __future__ import annotations
@@ -23,18 +21,21 @@ from ...output.tables.summary import write_json
 from ..figures import Measured, stopwatch
 from . import block_scenes
 
-#: Where the numbers go, below the working folder.
+#: Folder of the numbers, in the working folder.
 FOLDER = Path("outputs/bench_output")
 TIME_STEP = 1e-2
-#: Goal: share of a run of 10 000 blocks that writing may take (smaller walls step more quickly than they are written).
+#: Goal: share of writing in a run of 10 000 blocks (smaller walls step faster than they are written).
 SHARE = 0.1
 
 
 @dataclass(frozen=True)
 class Written:
-    """What `blocks` over so many ``cycles`` came to: seconds that the run waited a cycle and ``processor`` seconds of
-    all threads a cycle, bytes of its files a cycle and of the blocks' file a cell, and bytes of arrays (before they are
-    packed) a second until all was on disk, by the clock and of the processor."""
+    """Cost of writing `blocks` over ``cycles`` cycles.
+
+    Waiting time of the run and ``processor`` time of all threads, s per cycle; bytes of files per cycle, and of the
+    blocks' file per cell; bytes of arrays (uncompressed) per second until all is on disk, by the clock and of the
+    processor.
+    """
 
     blocks: int
     cells: int
@@ -64,7 +65,7 @@ def wall(n: int, end: float) -> Problem:
 
 
 def measure(quick: bool = False) -> Measured:
-    """The table; leaves ``output.json`` and ``output.png`` in `FOLDER`. ``quick``: 500 bricks, 30 cycles."""
+    """The table; writes ``output.json`` and ``output.png`` to `FOLDER`. ``quick``: 500 bricks, 30 cycles."""
     from ...render.benchmarks.bars import draw_bars
 
     n, cycles, steps = (500, 30, 8) if quick else (10_000, 500, 4)
@@ -117,12 +118,12 @@ def measure(quick: bool = False) -> Measured:
 
 
 def steps_of(problem: Problem) -> tuple[list[float], Cycle]:
-    """Processor seconds of every load step of ``problem`` but the first, nothing written, and its last cycle."""
+    """Processor seconds of every load step of ``problem`` except the first, without output, and its last cycle."""
     from ...coupling import cycles
 
     spent, cycle, began = [], None, 0.0
     for cycle in cycles(problem):
-        # What a run pays once, compiled kernels and orderings, is in the first step.
+        # Compiled kernels and orderings are in the first step.
         if cycle.load_step > 1:
             spent.append(time.process_time() - began)
         began = time.process_time()
@@ -130,7 +131,7 @@ def steps_of(problem: Problem) -> tuple[list[float], Cycle]:
 
 
 def moved_on(cycle: Cycle, count: int) -> Iterator[Cycle]:
-    """``count`` cycles after ``cycle``, each a little farther along its velocities and harder pressed."""
+    """``count`` cycles after ``cycle``, each with blocks moved along their velocities and larger forces."""
     for k in range(1, count + 1):
         vertices = cycle.state.vertices * (1.0 + 1e-7 * k)
         stress = cycle.state.stress * (1.0 + 1e-3 * k)
@@ -139,7 +140,7 @@ def moved_on(cycle: Cycle, count: int) -> Iterator[Cycle]:
 
 
 def series(problem: Problem, cycle: Cycle, count: int) -> Written:
-    """All series of ``count`` cycles like ``cycle``, into a folder that goes again (some gigabytes)."""
+    """All series of ``count`` cycles like ``cycle``, into a temporary folder (some gigabytes)."""
     from ...output.vtk.series import Series
 
     with tempfile.TemporaryDirectory() as scratch:
@@ -180,7 +181,7 @@ OURS = "this project"
 
 
 def _writers(problem: Problem, cycle: Cycle, repeats: int) -> dict[str, list[float]]:
-    """Name → seconds of each file; all hold the same arrays, zlib-packed in 64-bit numbers."""
+    """{name: seconds per file}; all hold the same arrays, zlib-compressed, in 64-bit numbers."""
     import meshio
     import pyvista
 

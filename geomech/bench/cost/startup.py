@@ -1,7 +1,7 @@
-"""Whole-process times of the things a user waits for: imports, `check`, a specimen run to its end, the first run.
+"""Whole-process times of what a user waits for: imports, `check`, a specimen run to its end, the first run.
 
-From launch to exit of a fresh Python, medians of repeated runs (`loading.seconds`). The first run compiles the kernels
-into an empty cache; all others find them compiled. A cold start is told by the clock.
+From launch to exit of a new Python process, medians of repeated runs (`import_cost.seconds`). The first run compiles
+the kernels into an empty cache; all others find them compiled. A cold start is measured by the clock.
 """
 
 from __future__ import annotations
@@ -20,8 +20,8 @@ from . import import_cost
 
 PIPELINE = Path("pipelines/two_cracks")
 
-#: What is told by layers: a scene drawn in its file, one drawn in Gmsh, runs of blocks alone and of cracks, and what is
-#: done with them. Of a quick run only the first and the run of cracks.
+#: Commands listed by layers: a scene drawn in its file, one drawn in Gmsh, runs of blocks and of cracks, and their
+#: evaluation. In a quick run only the first and the run of cracks.
 COMMANDS = {
     "--help": ["--help"],
     "check, drawn in TOML": ["check", str(PIPELINE / "toml.toml")],
@@ -36,12 +36,12 @@ COMMANDS = {
     "doctor": ["doctor"],
 }
 QUICK = ("--help", "run, cracks too (TOML)")
-#: Runs into an empty cache of kernels, beside the specimen's own.
+#: Runs with an empty kernel cache, in addition to the specimen's.
 FIRST_RUNS = {label: command for label, command in COMMANDS.items() if label == "run, blocks alone (Gmsh)"}
 
 
 def measure(quick: bool = False) -> Measured:
-    """The table. Runs in the project's folder (it needs ``pipelines/two_cracks``); FileNotFoundError elsewhere."""
+    """The table. Must run in the project's folder (it needs ``pipelines/two_cracks``); FileNotFoundError elsewhere."""
     if not PIPELINE.is_dir():
         raise FileNotFoundError(f"{PIPELINE} is not here: run this benchmark from the project's folder")
     repeats = 1 if quick else 5
@@ -71,8 +71,7 @@ def measure(quick: bool = False) -> Measured:
         if not quick:
             cold = [_cold([*geomech, "check", str(PIPELINE)]) for _ in range(3)]
             rows.append(("the same, cold: libraries read from the disk, by the clock", statistics.median(cold)))
-        # Each into a folder of its own: files that are there already are written over, which is quicker than making
-        # them.
+        # Each into a folder of its own: overwriting existing files is faster than creating them.
         for phi in (90,) if quick else (0, 30, 60, 90):
             count = 1 if quick else 3 if phi in (0, 90) else 2
             times = [import_cost.seconds(run(phi, f"phi_{phi}_{k}")) for k in range(count)]
@@ -90,7 +89,7 @@ def measure(quick: bool = False) -> Measured:
 
 
 def _cold(command: list[str]) -> float:
-    """Seconds by the clock; nan where the system cannot be made to forget its files."""
+    """Seconds by the clock; nan if the system's cache cannot be cleared."""
     if import_cost.put_out_of_memory() is None:
         return math.nan
     start = time.perf_counter()

@@ -1,13 +1,13 @@
-"""Other solutions of a step's equations, to be measured beside the direct one of `geomech.dda`: iterative ones, and the
-direct one of PARDISO (in Intel's MKL) where ``pip install 'geomech[pardiso]'`` has brought it.
+"""Other solvers of a step's equations, measured next to the direct one of `geomech.dda`: iterative ones, and the direct
+solver PARDISO (in Intel's MKL), if installed by ``pip install 'geomech[pardiso]'``.
 
-Friction that slides makes the equations unsymmetric, so both iterate on the unsymmetric matrix: stabilised biconjugate
-gradients (van der Vorst 1992) behind the blocks' own 6×6 inverses, and GMRES behind two levels of domains: overlapping
-ones solved directly in single precision (restricted additive Schwarz; Cai & Sarkis 1999) after one coarse field of six
-unknowns, the motion of a first-order block, for every few blocks.
+Sliding friction makes the equations unsymmetric, so that both iterate on the unsymmetric matrix: stabilised biconjugate
+gradients (van der Vorst 1992) with the blocks' own 6×6 inverses as preconditioner, and GMRES with two levels of
+domains: overlapping ones solved directly in single precision (restricted additive Schwarz; Cai & Sarkis 1999) after a
+coarse field of six unknowns, the motion of a first-order block, for every few blocks.
 
-Direct solutions are told with what a set of contacts costs whose springs have all changed: factors and substitutions,
-the order of elimination at hand (it holds while the list of contacts stands).
+The cost of direct solvers is that of a set of contacts whose springs have all changed: factors and substitutions, with
+a given elimination order (which is valid as long as the list of contacts does not change).
 """
 
 from __future__ import annotations
@@ -22,16 +22,15 @@ from ...dda.linear_solver.block_solver import BlockSolver
 from ...dda.linear_solver.multifrontal import Factors
 from ..figures import stopwatch
 
-#: Residuals at which iterations stop, relative to the right side (norms).
+#: Relative residuals (norms) at which iterations stop.
 TOLERANCES = 1e-2, 1e-4, 1e-7, 1e-10
-#: Blocks of a domain, rows of neighbours it is widened by, blocks of a coarse field (least time on walls of 10 000
-#: bricks).
+#: Blocks per domain, layers of neighbours added to it, blocks per coarse field (least time on walls of 10 000 bricks).
 DOMAIN, OVERLAP, AGGREGATE = 1000, 2, 30
 
 
 @dataclass(frozen=True)
 class Iterated:
-    """One method's solution of a step: iterations, seconds, and how far it is off."""
+    """One method's solution of a step: iterations, seconds, and error."""
 
     method: str
     iterations: int
@@ -41,7 +40,7 @@ class Iterated:
 
 
 def _rows(solver: BlockSolver) -> np.ndarray:
-    """(n_entries,) the row of each of the matrix's blocks."""
+    """(n_entries,) row of each of the matrix's blocks."""
     return np.repeat(np.arange(solver.n), np.diff(solver.pointer))
 
 
@@ -51,18 +50,18 @@ def pardiso_available() -> bool:
 
 
 def refactored(solver: BlockSolver, points: np.ndarray, data: np.ndarray, right: np.ndarray) -> Iterated:
-    """As `geomech.dda` does where nothing is left of another set of contacts; ``points`` (n, 2) m are the blocks'
+    """As in `geomech.dda` if nothing of an earlier set of contacts can be reused; ``points`` (n, 2) m are the blocks'
     centroids."""
     another = BlockSolver(points, _rows(solver), solver.columns)
-    another.factor(data)  # finds its memory
+    another.factor(data)  # allocates its memory
     spent_on = stopwatch()
     another.factor(data)
     x = another.solve(data, right)
-    return _row("direct, all factored anew", solver, data, right, x, 1, spent_on())
+    return _row("direct, all factored again", solver, data, right, x, 1, spent_on())
 
 
 def pardiso(solver: BlockSolver, data: np.ndarray, right: np.ndarray) -> Iterated:
-    """By PARDISO of MKL, for real unsymmetric matrices, on all cores; its ordering is no part of the time."""
+    """By PARDISO of MKL, for real unsymmetric matrices, on all cores, without the time of its ordering."""
     from pypardiso import PyPardisoSolver
     from scipy.sparse import bsr_matrix
 
@@ -72,7 +71,7 @@ def pardiso(solver: BlockSolver, data: np.ndarray, right: np.ndarray) -> Iterate
     try:
         method.factorize(matrix)
         spent_on = stopwatch()
-        method.set_phase(22)  # numbers alone, in the order found before
+        method.set_phase(22)  # numerical factorisation with the earlier ordering
         method._call_pardiso(matrix, right)
         method.set_phase(33)
         x = method._call_pardiso(matrix, right)
@@ -84,7 +83,7 @@ def pardiso(solver: BlockSolver, data: np.ndarray, right: np.ndarray) -> Iterate
 def block_jacobi(
     solver: BlockSolver, data: np.ndarray, right: np.ndarray, tolerance: float = TOLERANCES[-1], most: int = 3000
 ) -> Iterated:
-    """BiCGStab behind the diagonal blocks; gives up after ``most`` iterations."""
+    """BiCGStab with the diagonal blocks as preconditioner; gives up after ``most`` iterations."""
     from scipy.sparse.linalg import LinearOperator, bicgstab
 
     spent_on = stopwatch()
@@ -111,8 +110,8 @@ def two_levels(
     right: np.ndarray,
     tolerance: float = TOLERANCES[-1],
 ) -> Iterated:
-    """GMRES behind domains and coarse fields; ``points`` (n, 2) and ``sizes`` (n,) m are the blocks' centroids and
-    √area."""
+    """GMRES with domains and coarse fields as preconditioner; ``points`` (n, 2) and ``sizes`` (n,) m are the blocks'
+    centroids and √area."""
     spent_on = stopwatch()
     n, rows, columns = solver.n, _rows(solver), solver.columns
     blocks = data.reshape(-1, 6, 6)
@@ -148,8 +147,8 @@ def two_levels(
 def _flexible_gmres(
     matrix: Callable, behind: Callable, right: np.ndarray, tolerance: float, most: int = 100
 ) -> tuple[np.ndarray, int]:
-    """Solution and iterations; what stands ``behind`` need not be linear to round-off (Saad 1993): single precision is
-    not."""
+    """Solution and iterations of flexible GMRES (Saad 1993): the preconditioner ``behind`` need not be linear to
+    round-off, as in single precision."""
     size = float(np.linalg.norm(right))
     basis, directions = [right / size], []
     hessenberg, first = np.zeros((most + 1, most)), np.zeros(most + 1)
@@ -174,7 +173,7 @@ def _row(method: str, solver: BlockSolver, data, right, x, iterations: int, seco
 
 
 def _divided(points: np.ndarray, most: int) -> list[np.ndarray]:
-    """Blocks in halves of halves until none has more than ``most``."""
+    """Blocks divided recursively until no part has more than ``most``."""
     out, work = [], [np.arange(len(points))]
     while work:
         blocks = work.pop()
@@ -188,8 +187,8 @@ def _divided(points: np.ndarray, most: int) -> list[np.ndarray]:
 
 
 def _coarse(points, sizes, rows, columns, blocks) -> tuple[np.ndarray, np.ndarray, Factors]:
-    """(n, 6, 6) the blocks' unknowns in each field's, the field of each block, and the factored equations of the
-    fields."""
+    """(n, 6, 6) the blocks' unknowns in terms of each field's, the field of each block, and the factored equations of
+    the fields."""
     of = np.empty(len(points), np.int64)
     groups = _divided(points, AGGREGATE)
     for k, group in enumerate(groups):

@@ -1,11 +1,12 @@
-"""What is compared with: the ordinary constant-element code (Crouch 1976), a jump in the middle of every element.
+"""Method for comparison: the usual constant-element code (Crouch 1976), with a collocation point at the centre of each
+element.
 
-Boundary and cracks alike are elements of constant displacement discontinuity; tractions are collocated in the middle of
-elements and the dense system is solved by LU. There is no tip element. Two ways to a stress intensity factor:
+Boundary and cracks are elements of constant displacement discontinuity; tractions are collocated at the element centres
+and the dense system is solved by LU. There is no tip element. Two ways to a stress intensity factor:
 
     fit          D = d√r + e r√r fitted to the elements within two fifths of the half crack
     calibrated   from the tip element alone, D_1 times √(2/π): on equal elements behind a straight tip the discrete
-                 solution is D_j ∝ Γ(j+½)/Γ(j), so D_1 is √(π/2) times what √r has there (0.806 is often used, after
+                 solution is D_j ∝ Γ(j+½)/Γ(j), so D_1 is √(π/2) times the value of √r there (0.806 is often used, after
                  Olson 1991)
 """
 
@@ -18,7 +19,9 @@ from ..accuracy.crack_problems import ROCK, CrackProblem
 
 def stress_intensity(problem: CrackProblem, n_crack: int, n_side: int) -> tuple[np.ndarray, np.ndarray, int]:
     """(n_tips, 2) K_I, K_II by the fit and by calibration, tips in the order of the cracks, and the number of unknowns.
-    ``n_crack`` elements a crack; about ``n_side`` along the shortest side of the outline."""
+
+    ``n_crack`` elements per crack; about ``n_side`` along the shortest side of the outline.
+    """
     from ...ddm.system.influence_matrix import ElementSet, influence
 
     start, end, length = [], [], []
@@ -43,7 +46,7 @@ def stress_intensity(problem: CrackProblem, n_crack: int, n_side: int) -> tuple[
     matrix = influence(elements, elements, ROCK.poissons_ratio, 0.0)
     right = problem.traction(0.5 * (start + end), elements.tangent, np.arange(n) < n_boundary).ravel()
     if n_boundary:
-        # Moving the whole outline is without stress (turning it nearly so): three directions are lifted out.
+        # Translation of the whole outline is free of stress (rotation nearly so): three directions are deflated.
         middle = 0.5 * (start + end)[:n_boundary]
         t, m = elements.tangent[:n_boundary], elements.normal[:n_boundary]
         arm = (middle - middle.mean(axis=0)) / np.ptp(middle)
@@ -71,7 +74,7 @@ def stress_intensity(problem: CrackProblem, n_crack: int, n_side: int) -> tuple[
             near = (r < 0.2 * whole) | (np.arange(len(r)) < 3)
             powers = np.column_stack([r[near] ** 0.5, r[near] ** 1.5])
             line = np.linalg.lstsq(powers, jumps[rows[near]], rcond=None)[0][0]
-            # Slip and opening; at the start of a crack too, K_II > 0 goes with a positive slip.
+            # Slip and opening; also at the start of a crack, K_II > 0 corresponds to positive slip.
             fitted.append(size * line[::-1])
             calibrated.append(size * np.sqrt(2 / np.pi) * jumps[rows[0], ::-1] / np.sqrt(r[0]))
     return np.array(fitted), np.array(calibrated), 2 * n

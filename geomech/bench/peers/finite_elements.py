@@ -1,11 +1,11 @@
-"""What is compared with: finite elements (scikit-fem), with quarter points at the tips and K by interaction integrals
-(`quarter_point`).
+"""Method for comparison: finite elements (scikit-fem), with quarter-point elements at the tips and K by interaction
+integrals (`quarter_point`).
 
-Bodies are meshed whole. Cracks in the plane are meshed in a window that is made to move at its rim as the plane does
-there: by the closed form (Griffith crack, arc; the arc is meshed straight, by angle and logarithm of the radius, and
-carried over), or by this solver's reference (many cracks). Nothing is left to truncation then, which is in the finite
-elements' favour, as is that SuperLU is told that the matrix is symmetric. Times are of mesh, assembly, solution and
-integrals.
+Bodies are meshed as a whole. For cracks in the infinite plane a window is meshed, whose rim has the displacement of the
+plane: in closed form (Griffith crack, arc; the arc is meshed straight, by angle and logarithm of the radius, and
+mapped), or from this solver's reference (many cracks). There is no truncation error then, which favours the finite
+elements, as does the fact that SuperLU is told that the matrix is symmetric. Times are those of mesh, assembly,
+solution and integrals.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from ..accuracy.crack_problems import ROCK, CrackProblem, rectangle
 from ..figures import stopwatch
 from .quarter_point import Plate, Sizes
 
-#: Sides of triangles, in half cracks: away from cracks and at tips, and by how much they grow with the distance.
+#: Sides of triangles, in half cracks: away from cracks and at tips, and their growth rate with distance.
 REFINEMENTS = (
     (1.0, 0.25, 0.8),
     (0.5, 0.1, 0.5),
@@ -32,9 +32,9 @@ REFINEMENTS = (
     (0.3, 0.003, 0.18),
     (0.2, 0.001, 0.125),
 )
-#: A tip's disc ends at this part of the distance to what is next to it.
+#: The disc of a tip extends to this part of the distance from the next feature.
 DISC = 0.9
-#: The arc's half-angle, and how far its window reaches in the logarithm of the radius.
+#: Half-angle of the arc, and extent of its window in the logarithm of the radius.
 QUARTER, REACH = math.pi / 4, 1.2
 
 
@@ -44,8 +44,8 @@ def available() -> bool:
 
 
 def solver(problem: CrackProblem | None) -> Callable[[int], tuple[np.ndarray, int, float]]:
-    """Of a ``problem`` (None: the arc) the function refinement (0 … 5) → (n_tips, 2) K_I, K_II, the number of unknowns
-    and seconds."""
+    """For ``problem`` (None: the arc), a function refinement (0 … 5) → (n_tips, 2) K_I, K_II, number of unknowns and
+    seconds."""
     if problem is None:
         return _arc
     if problem.outline is not None:
@@ -71,11 +71,10 @@ def tips_of(
 def disc_radii(
     points: np.ndarray, length: np.ndarray, outline: np.ndarray, polylines: Sequence[np.ndarray]
 ) -> np.ndarray:
-    """(n,) radii of discs about the tips ``points`` that hold no more of a crack than the straight end behind the tip,
-    ``length`` (n,)."""
+    """(n,) radii of discs around the tips ``points`` that contain only the straight crack end of ``length`` (n,)."""
     lines = [np.vstack([outline, outline[:1]]), *polylines]
     away = np.array([[distance_to_edges(p, line[:-1], line[1:]) for line in lines] for p in points])
-    # Its own crack is no obstacle beyond its straight end.
+    # Its own crack is an obstacle beyond its straight end only.
     away[away < 1e-9 * np.ptp(outline)] = np.inf
     return DISC * np.minimum(away.min(axis=1), length)
 
@@ -112,8 +111,10 @@ def _window(problem: CrackProblem) -> Callable[[int], tuple[np.ndarray, int, flo
 
 
 def _arc(refinement: int, disc: float = 0.5) -> tuple[np.ndarray, int, float]:
-    """The crack r = 1 from 45° to 135° in equal biaxial tension, tips in the order of `crack_problems.arc_of_chords`;
-    ``disc``: the radius of their discs."""
+    """The crack r = 1 from 45° to 135° in equal biaxial tension, tips in the order of `crack_problems.arc_of_chords`.
+
+    ``disc``: the radius of their discs.
+    """
     spent_on = stopwatch()
     first, last = np.array([QUARTER, 0.0]), np.array([3 * QUARTER, 0.0])
     window = rectangle(3 * QUARTER, REACH) + 0.5 * (first + last)

@@ -1,4 +1,4 @@
-"""An edge crack in a half-plane: the free surface in the kernels, or as the outline of a block that is large enough."""
+"""An edge crack in a half-plane: the free surface in the kernels, or as the outline of a sufficiently large block."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ from ..accuracy.crack_problems import ROCK
 
 PROBLEM = "edge crack in a half-plane"
 IN_KERNELS, AS_BLOCK = "free surface in the kernels, asked for", "block, of so many depths of the crack:"
-#: Digits asked for; sizes of blocks: K is off by some (depth/size)².
+#: Target digits; sizes of blocks: the relative error of K is about (depth/size)².
 DIGITS, SIZES = (2, 4, 6, 8), (10, 40, 160, 640)
 
-#: (method, digits or size, unknowns, error of K, what to time)
+#: (method, digits or size, unknowns, error of K, function to time)
 Row = tuple[str, int, int, float, Callable[[], Solution]]
 
 
@@ -46,6 +46,6 @@ def _block(size: int) -> Solution:
     a, b, c, d = outline = np.array([[-size, -size], [size, -size], [size, 0.0], [-size, 0.0]], dtype=float)
     pull = np.array([1.0, 0.0])
     load = BodyLoad(np.array([[b, c], [d, a]]), np.array([[pull, pull], [-pull, -pull]]))
-    # Ten times less than what the size itself leaves.
+    # Ten times smaller than the error due to the size.
     settings = DdmSettings(target_error=min(1e-2, 0.1 / size**2))
     return Body([outline], _crack(), ROCK, settings).solve(load)

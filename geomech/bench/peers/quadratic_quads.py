@@ -10,8 +10,11 @@ from ...model import Material
 def stored_energy(
     corners: np.ndarray, columns: int, rows: int, rock: Material, traction: np.ndarray
 ) -> tuple[float, int]:
-    """J/m that a panel stores, and its unknowns: ``corners`` (4, 2) m counter-clockwise from the lower left, clamped on the
-    left, under a uniform ``traction`` (2,) Pa on the right. The grid's lines are those of `transfinite` quadrilaterals."""
+    """Elastic energy, J/m, of a panel clamped on the left under a uniform ``traction`` (2,) Pa on the right, and its
+    unknowns.
+
+    ``corners`` (4, 2) m counter-clockwise from the lower left. The grid lines are those of a transfinite mapping.
+    """
     from skfem import (
         Basis,
         BilinearForm,

@@ -1,10 +1,10 @@
-"""Cracked plates by finite elements as they are ordinarily used (scikit-fem): triangles of second degree, graded to the
-tips and torn along the cracks, quarter points at the tips, K from interaction integrals.
+"""Cracked plates by standard finite elements (scikit-fem): quadratic triangles, graded towards the tips and split along
+the cracks, quarter-point elements at the tips, K from interaction integrals.
 
-The midpoints of sides that end at a tip stand at a quarter of them, so that displacements go with √r in all directions
-of the triangle (Barsoum 1976; Henshell & Shaw 1975). K_I and K_II are those of the domain form of the interaction
-integral with Williams' fields (Yau, Wang & Corten 1980; Li, Shih & Needleman 1985), over all of a disc about the tip; of
-a curved crack its faces have a share.
+The midside nodes of sides that end at a tip are at a quarter of their length, so that displacements vary with √r in all
+directions of the triangle (Barsoum 1976; Henshell & Shaw 1975). K_I and K_II follow from the domain form of the
+interaction integral with Williams' fields (Yau, Wang & Corten 1980; Li, Shih & Needleman 1985), over a disc around the
+tip; faces of a curved crack contribute.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ import numpy as np
 from ...model import Cracks
 from ..accuracy.crack_problems import ROCK
 
-#: q is one up to this part of the disc's radius, and falls to zero from there.
+#: q is one up to this part of the disc's radius, and decreases to zero from there.
 PLATEAU = 0.3
 #: Polynomials up to this degree are integrated exactly.
 ORDER = 4
@@ -29,7 +29,7 @@ Field = Callable[[np.ndarray], np.ndarray]
 
 @dataclass(frozen=True)
 class Sizes:
-    """Lengths of triangles' sides, m: away from cracks, at tips, and by how much they grow with the distance."""
+    """Lengths of triangle sides, m: away from cracks, at tips, and their growth rate with distance."""
 
     away: float
     at_tips: float
@@ -39,7 +39,7 @@ class Sizes:
 class Plate:
     """A meshed plate with open cracks.
 
-    ``warp`` carries every node (n, 2) → (n, 2), the cracks along: what is meshed straight is then curved.
+    ``warp`` maps every node (n, 2) → (n, 2), cracks included: a straight mesh becomes curved.
     """
 
     def __init__(self, outline: np.ndarray, cracks: Cracks, sizes: Sizes, warp: Field | None = None) -> None:
@@ -50,7 +50,7 @@ class Plate:
         drawn = mesh_interior([outline], cracks, sizes.away, sizes.at_tips, sizes.slope)
         flat = MeshTri(np.ascontiguousarray(drawn.points.T), np.ascontiguousarray(drawn.triangles.T.astype(np.int64)))
         mesh = MeshTri2.from_mesh(flat)
-        # As it is meshed, to find the sides of the outline again.
+        # Before the mapping, to find the sides of the outline again.
         self.straight, places, middles = mesh.doflocs, mesh.doflocs.copy(), mesh.dofs.facet_dofs[0]
         if warp is not None:
             places = np.ascontiguousarray(warp(places.T).T)
@@ -69,7 +69,7 @@ class Plate:
 
     @cached_property
     def _sides(self) -> np.ndarray:
-        """(n,) number of the outline's side that a facet lies on, −1 on cracks, −2 inside; facets as in the mesh."""
+        """(n,) number of the outline's side on which a facet lies, −1 on cracks, −2 inside; facets as in the mesh."""
         ends = self.straight[:, self.mesh.facets].transpose(2, 1, 0)
         side = np.full(len(ends), -1)
         near = 1e-9 * np.ptp(self.outline)
@@ -89,19 +89,19 @@ class Plate:
         force = sum(
             _pull(self.basis.boundary(np.flatnonzero(self._sides == k)), sign * stress) for k, sign in ((0, -1), (2, 1))
         )
-        # Three numbers of a rigid motion: a corner, and the height of another.
+        # Three constraints of a rigid motion: a corner, and the height of another.
         x, y = self.mesh.p[:, : self.basis.nodal_dofs.shape[1]]
         low, right = int(np.argmin(x + y)), int(np.argmax(x - y))
         held = np.concatenate([self.basis.nodal_dofs[:, low], self.basis.nodal_dofs[1:, right]])
         return solve(*condense(self._stiffness(), force, D=held), solver=symmetric)
 
     def moved(self, displacement: Field) -> np.ndarray:
-        """Displacements when the whole outline moves as ``displacement`` (n, 2) → (n, 2) says, cracks without load."""
+        """Displacements if the whole outline moves by ``displacement`` (n, 2) → (n, 2), with unloaded cracks."""
         from skfem import condense, solve
 
         held = self.basis.get_dofs(facets=np.flatnonzero(self._sides >= 0)).flatten()
         u, at = np.zeros(self.basis.N), self.basis.doflocs[:, held]
-        # Unknowns come in pairs, x before y, of one place.
+        # Unknowns come in pairs, x before y, at one place.
         given = displacement(at.T)
         along = np.zeros(self.basis.N, np.int64)
         along[self.basis.nodal_dofs[1]], along[self.basis.facet_dofs[1]] = 1, 1
@@ -123,8 +123,10 @@ class Plate:
         return form.assemble(self.basis)
 
     def _faces(self, u: np.ndarray) -> _Faces:
-        """Displacement gradients on crack faces, in Gauss points along every facet. The mapping's inverse, by which a
-        basis would find them, has none at quarter points."""
+        """Displacement gradients on crack faces, at Gauss points along every facet.
+
+        The inverse mapping, which a basis would need, does not exist at quarter points.
+        """
         facets = np.flatnonzero(self._sides == -1)
         elements = self.mesh.f2t[0, facets]
         corners = self.mesh.t[:, elements]
@@ -135,7 +137,7 @@ class Plate:
         share = np.zeros((3, len(facets), len(t)))
         rows = np.arange(len(facets))
         share[first, rows], share[second, rows] = 1 - t, t
-        # (6, 2, …) slopes of shape functions by the first two of the three shares.
+        # (6, 2, …) derivatives of shape functions with respect to the first two area coordinates.
         pairs = ((0, 1), (1, 2), (0, 2))
         by = np.zeros((6, 3, len(facets), len(t)))
         for k in range(3):
@@ -163,8 +165,10 @@ class Plate:
         self, u: np.ndarray, points: np.ndarray, ways: np.ndarray, radii: np.ndarray, side: Sequence[Field] = ()
     ) -> np.ndarray:
         """(n, 2) K_I, K_II at tips ``points`` (n, 2) with unit directions ``ways`` (n, 2) of advance, from discs of
-        ``radii`` (n,). Of a curved crack ``side`` tells, a function a tip, on which side of it points lie: positive on
-        the left."""
+        ``radii`` (n,).
+
+        For a curved crack ``side``, one function per tip, gives the side on which points lie: positive on the left.
+        """
         from skfem import Basis, ElementTriP2
 
         field, dx = self.basis.interpolate(u).grad, self.basis.dx
@@ -180,11 +184,11 @@ class Plate:
             for mode in (0, 1):
                 out[row, mode] = np.sum(np.sum(_flow(field, x, tip, turn, mode, inside)[2] * dq, axis=0) * dx)
                 if faces is not None:
-                    # A point of a face lies on the side of its rock.
+                    # A point on a face belongs to the side of its rock.
                     beside = side[row](faces.at - 0.01 * radius * faces.normal)
                     normal = np.einsum("ab,b...->a...", turn, faces.normal)
                     a, b, flow = _flow(faces.gradient, faces.at, tip, turn, mode, beside)
-                    # What is left of the computed traction on a free face would only disturb.
+                    # The remaining computed traction on a free face would only disturb.
                     through = np.sum((flow - np.einsum("ij...,i...->j...", a, b)) * normal, axis=0)
                     q_here = _falling(np.hypot(*(faces.at - tip[:, None, None])) / radius)
                     out[row, mode] -= np.sum(q_here * through * faces.ds)
@@ -192,7 +196,7 @@ class Plate:
 
 
 class _Faces(NamedTuple):
-    """Gauss points on crack faces: place (2, …), displacement gradient (2, 2, …), normal out of the rock, length."""
+    """Gauss points on crack faces: position (2, …), displacement gradient (2, 2, …), normal out of the rock, length."""
 
     at: np.ndarray
     gradient: np.ndarray
@@ -201,7 +205,7 @@ class _Faces(NamedTuple):
 
 
 def symmetric(matrix, right: np.ndarray) -> np.ndarray:
-    """A sparse symmetric system by SuperLU, ordered for what it is: half the time of its own default."""
+    """Solve a sparse symmetric system with SuperLU with a symmetric ordering: half the time of its default."""
     from scipy.sparse.linalg import splu
 
     return splu(
@@ -216,18 +220,19 @@ def _pull(side, traction: float):
 
 
 def _falling(r: np.ndarray) -> np.ndarray:
-    """q at ``r`` radii of its disc: one about the tip, then down to zero at the rim, smoothly."""
+    """q at ``r`` radii of its disc: one around the tip, then smoothly down to zero at the rim."""
     s = np.clip((r - PLATEAU) / (1 - PLATEAU), 0, 1)
     return 1 - s * s * (3 - 2 * s)
 
 
 def _flow(gradient, x, tip, turn, mode: int, left: np.ndarray | None) -> np.ndarray:
-    """(2, …) σ_ij ∂v_i/∂x_1 + τ_ij ∂u_i/∂x_1 − σ_ik ∂v_i/∂x_k δ_1j in the tip's frame, v and τ Williams' of ``mode``."""
+    """(2, …) σ_ij ∂v_i/∂x_1 + τ_ij ∂u_i/∂x_1 − σ_ik ∂v_i/∂x_k δ_1j in the tip's frame, v and τ Williams' of
+    ``mode``."""
     gradient = np.einsum("ac,cd...,bd->ab...", turn, gradient, turn, optimize=True)
     local = np.einsum("ab,b...->a...", turn, x - tip[:, None, None])
     sign = 1.0
     if left is not None:
-        # Behind the tip, between the crack and its tangent, the field goes on from the crack's side.
+        # Behind the tip, between the crack and its tangent, the field of the crack's side is continued.
         other = (local[0] < 0) & (left * local[1] < 0)
         sign = np.where(other, -1.0, 1.0)
     other = _williams_gradient(local, mode, sign)

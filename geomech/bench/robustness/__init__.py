@@ -1,1 +1,1 @@
-"""Where the solvers stay right: maps over contrasts, slivers, steps and speeds."""
+"""Robustness of the solvers: maps over contrasts, slivers, steps and speeds."""

@@ -1,9 +1,9 @@
-"""The contact solver, its ways switched off one by one over the same problems: what each is worth.
+"""Ablation of the contact solver: its methods switched off one by one on the same problems.
 
-The problems are random slopes (their blocks alone), slopes and walls on which weight is put at once, in motion and in
-statics, with friction, cohesion and bonds, arches at their limit thickness, debris, and searches for a factor of safety.
-A problem has failed when it ends in an error or takes more than its processor seconds. Iterations are those of the
-steps that were accepted; what cuts cost besides shows in their number and in the seconds.
+The problems are random slopes (blocks only), slopes and walls under sudden weight, dynamic and static, with friction,
+cohesion and bonds, arches at their limit thickness, debris, and searches for a factor of safety. A problem has failed
+if it ends in an error or exceeds its processor time. Iterations are those of accepted steps; the cost of cuts appears
+in their number and in the time.
 """
 
 from __future__ import annotations
@@ -31,17 +31,17 @@ from ..slopes.random_slopes import scene_text
 from ..slopes.sliding_scenes import random_slope as sliding_slope
 from . import debris
 
-#: Processor seconds that a problem may take.
+#: Processor time limit of a problem, s.
 LIMIT = 40.0
-#: Seeds of random slopes, of slopes that slide and of slopes whose factor of safety is sought.
+#: Seeds of random slopes, of sliding slopes and of slopes with a factor of safety.
 SLOPES, SLIDING, FACTORS = range(40), (1, 4, 5, 8, 13, 18), range(10)
 QUICK_SLOPES, QUICK_SLIDING, QUICK_FACTORS = (3, 5, 12, 16, 32, 34), (13,), (0, 1)
 
 
 @dataclass
 class Count:
-    """What the steps of a problem took: ``iterations`` of each accepted one, ``cuts``, processor ``seconds``; whether
-    it was ``solved``."""
+    """Cost of a problem: ``iterations`` of each accepted step, ``cuts``, processor ``seconds``; whether it was
+    ``solved``."""
 
     iterations: list[float] = field(default_factory=list)
     cuts: int = 0
@@ -55,7 +55,7 @@ Run = Callable[[ContactSolver], None]
 
 @dataclass(frozen=True)
 class Problem:
-    """A problem of a ``group``: ``run`` goes through it with the ways of a contact solver."""
+    """A problem of a ``group``; ``run`` solves it with given settings of the contact solver."""
 
     group: str
     name: str
@@ -63,7 +63,7 @@ class Problem:
 
 
 def random_blocks(seed: int, solver: ContactSolver) -> None:
-    """The blocks of a random slope, whose cracks are closed."""
+    """The blocks of a random slope, with closed cracks."""
     problem = problem_of(tomllib.loads(scene_text(seed)))
     for _ in dda.run(
         problem.blocks, problem.materials, problem.joints, problem.loads, replace(problem.dda, contact_solver=solver),
@@ -83,7 +83,7 @@ def sliding(seed: int, solver: ContactSolver, dt: float = 4e-3, end: float = 0.2
 
 
 def sudden(blocks: Blocks, steps: int, dt: float, dynamic: bool, law: dict, solver: ContactSolver) -> None:
-    """So many ``steps`` of ``dt`` s from rest with all weight at once; ``law`` of the joints beside their friction."""
+    """``steps`` steps of ``dt`` s from rest under sudden weight; ``law`` of the joints in addition to friction."""
     joint = JointLaw("joint", **({"friction_angle": block_scenes.FRICTION} | law))
     settings = replace(block_scenes.settings(dt, dynamic), contact_solver=solver)
     system, state = dda.BlockSystem(blocks, [block_scenes.ROCK], [joint], settings=settings), State.at_rest(blocks)
@@ -92,7 +92,7 @@ def sudden(blocks: Blocks, steps: int, dt: float, dynamic: bool, law: dict, solv
 
 
 def at_rest(blocks: Blocks, law: dict, solver: ContactSolver) -> None:
-    """Static equilibrium from nothing."""
+    """Static equilibrium from scratch."""
     joint = JointLaw("joint", **({"friction_angle": block_scenes.FRICTION} | law))
     settings = replace(block_scenes.settings(1.0, dynamic=False), contact_solver=solver)
     system = dda.BlockSystem(blocks, [block_scenes.ROCK], [joint], settings=settings)
@@ -102,7 +102,7 @@ def at_rest(blocks: Blocks, law: dict, solver: ContactSolver) -> None:
 
 
 def arch(share: float, dynamic: bool, solver: ContactSolver, n: int = 25, radius: float = 10.0) -> None:
-    """A semicircular arch of ``share`` of the least thickness that stands (Milankovitch 1907)."""
+    """A semicircular arch of ``share`` times the least stable thickness (Milankovitch 1907)."""
     ratio = share * masonry.thinnest_arch(n)
     inner, outer = radius * (1 - 0.5 * ratio), radius * (1 + 0.5 * ratio)
     springings = [np.array([[a, -1.0], [b, -1], [b, 0], [a, 0]]) for a, b in ((inner, outer), (-outer, -inner))]
@@ -135,7 +135,7 @@ def factor(seed: int, solver: ContactSolver) -> None:
 
 
 def problems(quick: bool = False) -> list[Problem]:
-    """All that are run; ``quick``: a tenth of them."""
+    """All problems; ``quick``: a tenth of them."""
     wall, slope = block_scenes.wall, block_scenes.slope
     of = []
 
@@ -181,7 +181,7 @@ def problems(quick: bool = False) -> list[Problem]:
 
 @contextmanager
 def _counted(count: Count) -> Iterator[None]:
-    """All steps of block systems are counted."""
+    """Count all steps of block systems."""
     step = dda.BlockSystem.step
 
     def counted(self, *given, **named):
@@ -198,7 +198,7 @@ def _counted(count: Count) -> Iterator[None]:
 
 
 def counted(problem: Problem, solver: ContactSolver, seconds: float = LIMIT) -> Count:
-    """What ``problem`` takes by the ways of ``solver``, within so many processor ``seconds``."""
+    """Cost of ``problem`` with the settings ``solver``, within ``seconds`` processor seconds."""
     count, log = Count(), logging.getLogger("geomech")
 
     def run(_heard) -> Iterator[None]:
@@ -218,7 +218,7 @@ def counted(problem: Problem, solver: ContactSolver, seconds: float = LIMIT) -> 
     return count
 
 
-#: Settings that are measured beside those at hand: ways switched off, and numbers whose part of a way is.
+#: Settings to be compared with the present ones: methods switched off, and parameters.
 SWITCHED: dict[str, dict[str, Any]] = {
     "as it is": {},
     "no central path": {"central_path": False},
@@ -236,12 +236,12 @@ SWITCHED: dict[str, dict[str, Any]] = {
 def compared(
     switched: dict[str, dict[str, Any]], of: Sequence[Problem], seconds: float = LIMIT
 ) -> dict[str, list[Count]]:
-    """What each of the problems takes with each of the settings ``switched``."""
+    """Cost of each problem with each of the settings ``switched``."""
     return {name: [counted(each, ContactSolver(**given), seconds) for each in of] for name, given in switched.items()}
 
 
 def table(found: dict[str, list[Count]], of: Sequence[Problem]) -> str:
-    """A row for each of the settings over all problems, then the first one's by groups."""
+    """One row for each of the settings over all problems, then those of the first by group."""
     head = (
         f"{'':44}{'unsolved':>9}{'steps':>7}{'cuts':>6}{'iterations':>11}{'median':>8}{'95 %':>6}{'worst':>7}{'s':>8}"
     )
@@ -267,7 +267,7 @@ def _row(name: str, counts: Sequence[Count]) -> str:
 
 
 def measure(quick: bool = False) -> Measured:
-    """All problems with each of `SWITCHED` (``quick``: a tenth of them, as it is and without patches)."""
+    """All problems with each of `SWITCHED` (``quick``: a tenth of them, with the defaults and without patches)."""
     of = problems(quick)
     for each in of[:3]:
         counted(each, ContactSolver())  # compiles

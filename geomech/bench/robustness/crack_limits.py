@@ -1,9 +1,8 @@
-"""Where the crack solver, and cracked blocks, stay right: maps over gap, kink, sliver, ligament, offset, order,
-increment, friction, stiffness contrast, penalty and time step.
+"""Limits of the crack solver and of cracked blocks: maps over gap, kink, sliver, ligament, offset, order, increment,
+friction, stiffness contrast, penalty and time step.
 
-References are closed forms, or were computed by distributed dislocations or boundary collocation. A cell asks for the
-error that the solver says it has (`ddm.Solution.tip_errors`), as who doubts a result would: a warning there makes it
-reported.
+References are closed forms, or were computed with distributed dislocations or boundary collocation. Each cell requests
+the solver's error estimate (`ddm.Solution.tip_errors`), as a careful user would: a warning there counts as reported.
 """
 
 from __future__ import annotations
@@ -42,7 +41,7 @@ PULL = np.array([0.0, 1e6, 0.0])
 
 
 def maps(quick: bool) -> Iterator[Map]:
-    """All maps of the crack solver; every second value of each axis where ``quick``."""
+    """All maps of the crack solver; with ``quick`` every second value of each axis."""
 
     def some(*values: float) -> tuple[float, ...]:
         return values[::2] if quick else values
@@ -76,7 +75,7 @@ def maps(quick: bool) -> Iterator[Map]:
 
 def _outcome(solution: ddm.Solution, exact: np.ndarray) -> Outcome:
     """``exact`` (n_tips, 2) K_I, K_II."""
-    # Asked for first: it is what warns.
+    # Requested first: it issues the warning.
     _ = solution.tip_errors
     error = float(np.abs(factors(solution) - exact).max() / largest(exact))
     return Outcome(error, condition=solution.condition, residual=solution.residual)
@@ -88,7 +87,7 @@ def _in_plane(lines, stress: np.ndarray, order: int = 4, aperture: float = math.
 
 
 def collinear(gap: float, order: float) -> Outcome:
-    """K of two collinear cracks so far apart."""
+    """K of two collinear cracks at this distance."""
     solution = _in_plane([[[-1 - gap / 2, 0], [-gap / 2, 0]], [[gap / 2, 0], [1 + gap / 2, 0]]], PULL, int(order))
     inner, outer = fracture.collinear_pair(PULL[1], gap / 2, 1 + gap / 2)
     return _outcome(solution, np.array([[outer, 0], [inner, 0], [inner, 0], [outer, 0]]))
@@ -102,7 +101,7 @@ def kink(degrees: float, length: float) -> Outcome:
 
 
 def sliver(depth: float, order: float) -> Outcome:
-    """K of a crack so deep below a side."""
+    """K of a crack at this depth below a side."""
     far = 20.0
     block = rectangle(-far, -2 * far, far, 0)
     cracks = Cracks.from_polylines([np.array([[-1, -depth], [1, -depth]])], aperture=math.inf)
@@ -112,7 +111,7 @@ def sliver(depth: float, order: float) -> Outcome:
 
 
 def edge_crack(ratio: float, order: float) -> Outcome:
-    """K of an edge crack of this ratio of a strip's width."""
+    """K of an edge crack of this length relative to a strip's width."""
     width, half = 1.0, 3.0
     block = rectangle(0, -half, width, half)
     cracks = Cracks.from_polylines([np.array([[0, 0], [ratio, 0]])], aperture=math.inf, surface=[(True, False)])
@@ -128,7 +127,7 @@ def _pulled(block: np.ndarray, stress: float) -> ddm.BodyLoad:
 
 
 def far(offset: float, half: float) -> Outcome:
-    """K of a crack so far from the origin of coordinates, and of this half length."""
+    """K of a crack at this distance from the origin of coordinates, and of this half length."""
     angle = math.radians(30)
     way = half * np.array([math.cos(angle), math.sin(angle)])
     solution = _in_plane([np.array([-way, way]) + [offset, -offset]], MIXED)
@@ -142,7 +141,7 @@ def rubbing(friction: float, dip: float) -> Outcome:
     law = JointLaw("faces", friction_angle=math.radians(friction))
     solution = _in_plane([[-way, way]], stress, aperture=0.0, face_laws=[law])
     exact = np.tile(fracture.closed(stress, angle, 1.0, math.tan(law.friction_angle)), (2, 1))
-    # Where friction holds the faces, K is zero: what it would be without is the measure.
+    # If friction holds the faces, K is zero: the scale is its value without friction.
     size = max(abs(fracture.closed(stress, angle, 1.0)[1]), 1e-3 * abs(stress[1]))
     error = float(np.abs(factors(solution) - exact).max()) / size
     return Outcome(error, condition=solution.condition, residual=solution.residual)
@@ -200,7 +199,7 @@ def specimen(contrast: float, penalty: float, offset: float = 0.0, order: float 
 
 
 def falling(crack: float, dt: float) -> Outcome:
-    """A square with a slanted slot, dropped: weight and inertia leave it without stress."""
+    """A square with an inclined slot in free fall: weight and inertia cancel, so that it is free of stress."""
     side, height = 1.0, 1.0
     angle = math.radians(30)
     way = 0.5 * crack * np.array([math.cos(angle), math.sin(angle)])

@@ -1,7 +1,7 @@
-"""Blocks of any shape that fall, spin and pile up, for as long as one likes: an avalanche, and a drum that turns.
+"""Falling, spinning and piling blocks of any shape, for any duration: an avalanche, and a rotating drum.
 
-Nothing of it has a closed form; what holds in every step does: no block is inside another, blocks keep their areas, and
-energy comes from weight and from what turns the drum alone.
+There is no closed form; the invariants of every step are checked: no overlap of blocks, constant areas of blocks, and
+energy from weight and the rotation of the drum only.
 """
 
 from __future__ import annotations
@@ -19,16 +19,16 @@ from ...model import BlockMotion, Blocks, DdaSettings, History, JointLaw, Loads,
 from ..figures import Measured
 
 WEIGHT = History.constant([0.0, -9.81])
-#: Of the avalanche: rad; m, the slope's length and that of the ground before it.
+#: Avalanche: inclination, rad; m, lengths of the slope and of the ground in front of it.
 DIP, LENGTH, GROUND = np.radians(35), 60.0, 60.0
-#: rad/s: how fast the drum turns.
+#: rad/s: rotation of the drum.
 SPIN = 0.3
-#: Longest step, s; overlaps are looked for every so many steps.
+#: Longest step, s; overlaps are checked every so many steps.
 STEP, LOOKED_FOR = 1e-2, 20
 
 
 def _polygon(rng: np.random.Generator) -> np.ndarray:
-    """A polygon of three to seven corners about the origin, half a metre to a metre across."""
+    """A polygon of three to seven corners around the origin, half a metre to a metre across."""
     corners = rng.integers(3, 8)
     angle = np.sort(2 * np.pi * (np.arange(corners) + 0.6 * rng.random(corners)) / corners)
     return 0.45 * rng.uniform(0.7, 1.0) * np.column_stack([np.cos(angle), np.sin(angle)])
@@ -65,7 +65,7 @@ def avalanche(n: int) -> tuple[dda.BlockSystem, Loads]:
 
 
 def drum(n: int, sides: int = 36) -> tuple[dda.BlockSystem, Loads]:
-    """``n`` blocks in a ring of so many ``sides`` that turns about its axis, the origin: they fill a third of it."""
+    """``n`` blocks in a ring of ``sides`` sides that rotates about its axis, the origin; they fill a third of it."""
     rng = np.random.default_rng(5)
     radius = 0.75 + 0.66 * np.sqrt(n)
     angle = 2 * np.pi * np.arange(sides) / sides
@@ -82,9 +82,9 @@ def drum(n: int, sides: int = 36) -> tuple[dda.BlockSystem, Loads]:
 
 @dataclass
 class Followed:
-    """What was seen of a run: the last ``state``, the energy ``budget``, the deepest contact and overlap over √area of
-    the smallest block, the largest change of a block's area over it, the largest residual of the equations, and how
-    many steps and cuts it took."""
+    """Results of a run: the last ``state``, the energy ``budget``, the deepest contact and overlap over √area of the
+    smallest block, the largest relative change of a block's area, the largest residual of the equations, and the
+    numbers of steps and cuts."""
 
     state: State
     budget: dda.EnergyBudget
@@ -97,8 +97,7 @@ class Followed:
 
     @property
     def gained(self) -> float:
-        """Energy that has come from nowhere, by updating the geometry and by overlaps, over all that was turned
-        over."""
+        """Energy created by updating the geometry and by overlaps, over all energy turned over."""
         return max(0.0, self.budget.residual + self.budget.overlap) / self.budget.turnover
 
 
@@ -126,7 +125,7 @@ SCENES: dict[str, Callable[[int], tuple[dda.BlockSystem, Loads]]] = {"avalanche"
 
 
 def measure(quick: bool = False, seconds: float | None = None) -> Measured:
-    """A hundred blocks in each scene for 1.5 s, or so many ``seconds``; ``quick``: 25 for 0.6."""
+    """A hundred blocks in each scene for 1.5 s, or ``seconds``; ``quick``: 25 for 0.6 s."""
     n, seconds = (25, seconds or 0.6) if quick else (100, seconds or 1.5)
     lines = [
         f"{n} blocks for {seconds:g} s".ljust(22)

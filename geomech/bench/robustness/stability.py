@@ -1,8 +1,8 @@
-"""Where the solvers stay right. The block solver: maps over penalty, time step, contrasts, slivers, offsets, overlaps,
-speeds, debris, thin walls; cracks and cracked blocks: `crack_limits`.
+"""Limits of the block solver: maps over penalty, time step, contrasts, slivers, offsets, overlaps, speeds, debris, thin
+walls; those of cracks and cracked blocks are in `crack_limits`.
 
-Every cell is a small scene with a reference that was not computed with it: right (within the bound said), refused with
-a reason, reported (beyond the bound, and a warning says so), or wrong. The bounds leave room for true elasticity only.
+Every cell is a small scene with an independent reference: right (within the stated bound), refused with a reason,
+reported (beyond the bound, with a warning), or wrong. The bounds allow for true elasticity only.
 """
 
 from __future__ import annotations
@@ -21,9 +21,11 @@ from .stability_grid import OF_BLOCKS, OF_CRACKS, REFUSED, REPORTED, RIGHT, WRON
 
 
 def measure(quick: bool = False) -> Measured:
-    """The maps as text; the cells as JSON, and pictures of them, of blocks and of cracks, go to outputs/stability: in a
-    row for each map its errors and verdicts, then penetration, energy drift and steps cut, or condition number and
-    residual. ``quick`` takes every other value and fewer steps, and draws errors and verdicts only."""
+    """The maps as text; cells as JSON, and pictures of blocks and of cracks, in outputs/stability.
+
+    In a row for each map: errors and verdicts, then penetration, energy drift and cut steps, or condition number and
+    residual. ``quick`` takes every second value and fewer steps, and draws errors and verdicts only.
+    """
     from ...render.benchmarks.stability_map import draw
 
     of_blocks, of_cracks = list(_maps(quick)), list(crack_limits.maps(quick))
@@ -39,16 +41,16 @@ def measure(quick: bool = False) -> Measured:
     folder = Path("outputs/stability")
     folder.mkdir(parents=True, exist_ok=True)
     write_json(folder / "stability.json", [asdict(cell) for cell in every])
-    # Of a quick run the verdicts only: a picture takes as long as a map.
+    # In a quick run the verdicts only: a picture takes as long as a map.
     draw(of_blocks, every[:of_block_cells], folder / "stability.png", {} if quick else OF_BLOCKS)
     draw(of_cracks, every[of_block_cells:], folder / "stability_cracks.png", {} if quick else OF_CRACKS)
     lines.append(f"{folder}/stability.json, stability.png, stability_cracks.png")
-    # Not each cell's own: many are round-off. A cell that was right and is not, shows in the share.
+    # Not each cell's own error, many being round-off: a cell that is no longer right changes the share.
     return Measured.of("\n".join(lines), errors=not_right(every))
 
 
 def not_right(every: Sequence[Cell]) -> dict[str, float]:
-    """Of each map the share of its cells that are not right."""
+    """For each map the share of its cells that are not right."""
     verdicts: dict[str, list[str]] = {}
     for cell in every:
         verdicts.setdefault(cell.map, []).append(cell.verdict)
@@ -56,7 +58,7 @@ def not_right(every: Sequence[Cell]) -> dict[str, float]:
 
 
 def quick_shares(titles: Sequence[str]) -> dict[str, float]:
-    """The shares of those maps of blocks in a quick `measure` that have one of these ``titles``."""
+    """The shares of the maps of blocks with one of these ``titles`` in a quick `measure`."""
     return not_right([cell for grid in _maps(True) if grid.title in titles for cell in grid.cells()])
 
 
@@ -143,7 +145,7 @@ def _maps(quick: bool) -> Iterator[Map]:
 
 
 def thin_maps(quick: bool) -> Iterator[Map]:
-    """Thin walls, spikes and teeth, at speeds to 1000 m/s."""
+    """Thin walls, spikes and teeth, at speeds up to 1000 m/s."""
     topology = "overlap over half a wall, part of the blocks out, overlaps' energy over a hundredth of all"
     thin = (1e-3, 1e-1) if quick else (1e-3, 1e-2, 1e-1)
     fast = (30.0, 1000.0) if quick else (1.0, 30.0, 1000.0)

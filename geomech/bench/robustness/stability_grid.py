@@ -1,7 +1,7 @@
-"""A grid of small scenes with a reference each, and what became of them.
+"""A grid of small scenes with a reference each, and their outcomes.
 
-Every cell is right (within the bound said), refused with a reason, reported (beyond the bound, and a warning says so),
-or wrong.
+Every cell is right (within the stated bound), refused with a reason, reported (beyond the bound, with a warning), or
+wrong.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from .stability_scenes import Outcome
 
 RIGHT, REPORTED, REFUSED, WRONG = "right", "reported", "refused", "wrong"
 
-#: What cells of blocks, and of cracks, tell besides their error.
+#: Quantities of cells of blocks, and of cracks, in addition to the error.
 OF_BLOCKS = {
     "penetration": "worst penetration, over the block's size",
     "drift": "energy drift, over all that was turned over",
@@ -28,7 +28,7 @@ QUANTITIES = {**OF_CRACKS, **OF_BLOCKS}
 
 @dataclass(frozen=True)
 class Cell:
-    """One cell of a map: what it was asked for, what it came to, and how long that took."""
+    """One cell of a map: parameters, outcome, and time."""
 
     map: str
     row: str
@@ -46,7 +46,7 @@ class Cell:
 
 @dataclass(frozen=True)
 class Map:
-    """A grid of scenes: ``scene(row, column)`` for every pair of values; right where its error is below ``bound``."""
+    """A grid of scenes: ``scene(row, column)`` for every pair of values; right if the error is below ``bound``."""
 
     title: str
     measure: str
@@ -79,7 +79,7 @@ class Map:
 
 
 class _Warnings(logging.Handler):
-    """Keeps the first warning it hears."""
+    """Keeps the first warning."""
 
     def __init__(self) -> None:
         super().__init__(logging.WARNING)

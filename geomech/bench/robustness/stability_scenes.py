@@ -1,6 +1,6 @@
-"""Small scenes of blocks, each with a reference that was not computed with the block solver: what `stability` maps.
+"""Small scenes of blocks, each with a reference independent of the block solver, for the maps of `stability`.
 
-A scene takes the two values of its cell and tells its `Outcome`; ValueError and NotConverged from it are refusals.
+A scene takes the two values of its cell and returns its `Outcome`; ValueError and NotConverged are refusals.
 """
 
 from __future__ import annotations
@@ -22,10 +22,15 @@ WEIGHT = Loads(gravity=History.constant([0.0, -GRAVITY]))
 
 @dataclass(frozen=True)
 class Outcome:
-    """What a scene did: ``error`` in the measure that its map states; ``penetration`` in block sizes; ``gain`` of
-    mechanical energy over all there was; ``drift`` of energy, the larger of that gain and of what the balance of the
-    run leaves unexplained, over all energy turned over; ``cuts`` of steps; ``condition`` number and ``residual`` of the
-    equations. nan: there are none."""
+    """Outcome of a scene.
+
+    error         in the measure of its map
+    penetration   in block sizes
+    gain          of mechanical energy, over all there was
+    drift         of energy, the larger of that gain and the unexplained part of the balance, over all turned over
+    cuts          of steps
+    condition     number, and ``residual`` of the equations; nan: none
+    """
 
     error: float
     penetration: float = math.nan
@@ -42,7 +47,7 @@ def rectangle(x0: float, y0: float, x1: float, y1: float) -> np.ndarray:
 
 
 def turned(polygon: np.ndarray, angle: float) -> np.ndarray:
-    """A ``polygon`` turned about the origin by an ``angle``, rad."""
+    """``polygon`` rotated about the origin by ``angle``, rad."""
     c, s = math.cos(angle), math.sin(angle)
     return polygon @ np.array([[c, s], [-s, c]])
 
@@ -56,13 +61,13 @@ def _system(polygons, fixed, friction_deg: float, materials=None, material=None,
 
 @dataclass
 class _Watch:
-    """Worst penetration, energy gained, the run's balance, steps cut while a system moves."""
+    """Worst penetration, energy gain, the run's balance, and cut steps of a moving system."""
 
     system: dda.BlockSystem
     gain: float = 0.0
     penetration: float = 0.0
     cuts: int = 0
-    # What it would warn of is not for a run of blocks alone to hear.
+    # Its warnings do not apply to a run of blocks alone.
     budget: dda.EnergyBudget = field(default_factory=lambda: dda.EnergyBudget(warned=math.inf))
     _began: np.ndarray | None = None
     _scale: float = 1.0
@@ -74,7 +79,7 @@ class _Watch:
         self.budget = self.budget.after(result.energy, result.state.time)
 
     def run(self, state: State, loads: Loads, end: float, dt: float, max_steps: int = 10**6) -> State:
-        """Until ``end`` or for ``max_steps`` steps, mechanical energy watched."""
+        """Run until ``end`` or for ``max_steps`` steps, recording mechanical energy."""
         before = None
         for _ in range(max_steps):
             if state.time >= end * (1 - 1e-12):
@@ -98,7 +103,7 @@ class _Watch:
         free = ~self.system.blocks.fixed
         weight = (self.system.density * areas)[free]
         g = loads.gravity.at(state.time)
-        # From where blocks began: far from the origin the sum would have lost its digits.
+        # Relative to the initial position: far from the origin the sum would lose digits.
         self._began = moments[free, 1:3] if self._began is None else self._began
         potential = -float(weight @ ((moments[free, 1:3] - self._began) @ g))
         size = math.sqrt(float(areas[free].mean()))
@@ -148,7 +153,7 @@ def incline(friction: float, most: int, penalty: float, dt: float) -> Outcome:
 
 
 def small(most: int, side: float, dt: float) -> Outcome:
-    """The way that a square with this side slides down a slope."""
+    """Displacement of a square of this side that slides down a slope."""
     slope = math.radians(30)
     polygons = [turned(p, slope) for p in (rectangle(-60, -10, 60, 0), rectangle(4, 0, 4 + side, side))]
     system = _system(polygons, [True, False], 15.0, dynamic_factor=1.0)
@@ -158,21 +163,21 @@ def small(most: int, side: float, dt: float) -> Outcome:
 
 
 def far(most: int, offset: float, dt: float) -> Outcome:
-    """The same so far from the origin of coordinates, against the way at it."""
+    """The same at this distance from the origin of coordinates, compared with the displacement at the origin."""
     watch, way = _slide_from(offset, dt, most)
     return watch.outcome(abs(way / _slide_from(0.0, dt, most)[1] - 1))
 
 
 @functools.cache
 def _slide_from(offset: float, dt: float, most: int) -> tuple[_Watch, float]:
-    """The way of a block on an incline that lies so far from the origin, in 0.3 s or ``most`` steps."""
+    """Displacement of a block on an incline at this distance from the origin, in 0.3 s or ``most`` steps."""
     system, down = _inclined(15.0, 1.0, np.array([offset, -offset]))
     watch = _Watch(system)
     return watch, _slid(system, down, 0.3, dt, most, watch)[0]
 
 
 def _carried(system: dda.BlockSystem, loads: Loads = WEIGHT) -> tuple[np.ndarray, _Watch]:
-    """Contact forces and moment on each block in static equilibrium. Raises NotConverged where there is none."""
+    """Contact forces and moment on each block in static equilibrium. Raises NotConverged if there is none."""
     watch = _Watch(system)
     rest = dda.equilibrium(
         system, State.at_rest(system.blocks), loads, tolerance=1e-9, watch=lambda result, row: watch(result)
@@ -184,7 +189,7 @@ def _carried(system: dda.BlockSystem, loads: Loads = WEIGHT) -> tuple[np.ndarray
 
 
 def _weights_off(system: dda.BlockSystem, total: np.ndarray, gravity: float = GRAVITY) -> float:
-    """Largest difference of a free block's contact forces from its weight, over all the weight."""
+    """Largest difference between a free block's contact forces and its weight, over the total weight."""
     weight = system.density * system.blocks.areas() * gravity
     free = ~system.blocks.fixed
     off = np.hypot(total[free, 0], total[free, 1] - weight[free])
@@ -193,14 +198,14 @@ def _weights_off(system: dda.BlockSystem, total: np.ndarray, gravity: float = GR
 
 
 def column(stiffness: float, density: float) -> Outcome:
-    """The weight that a column of two unlike blocks brings to the ground."""
+    """The weight that a column of two different blocks transmits to the ground."""
     light, heavy = (
         Material("below", 10e9, 0.25, density=2600.0),
         Material("above", 10e9 * stiffness, 0.25, density=2600.0 * density),
     )
     polygons = [rectangle(-1, -1, 2, 0), rectangle(0, 0, 1, 1), rectangle(0, 1, 1, 2)]
     system = _system(polygons, [True, False, False], 30.0, [light, heavy], [0, 0, 1])
-    # No more weight than strains the softer block by 1e-4.
+    # Limited so that the weight strains the softer block by no more than 1e-4.
     gravity = 1e-4 * 10e9 * min(1.0, stiffness) / (2600.0 * max(1.0, density))
     total, watch = _carried(system, Loads(gravity=History.constant([0.0, -gravity])))
     return watch.outcome(_weights_off(system, total, gravity))
@@ -221,11 +226,11 @@ def sliver(aspect: float, wedge: float) -> Outcome:
 
 
 def grid_of_squares(side: float, bond: float) -> Outcome:
-    """The weight of a wall of squares, held by a ``bond``."""
+    """The weight of a wall of squares, in running bond if ``bond``."""
     n = int(side)
     squares = []
     for row in range(n):
-        # In bond, every other course ends in halves: a brick that overhangs by half is about to topple.
+        # In running bond every second course ends in halves: a brick that overhangs by half is about to topple.
         ends = [0, *np.arange(0.5, n), n] if bond and row % 2 else range(n + 1)
         squares += [rectangle(left, row, right, row + 1) for left, right in itertools.pairwise(ends)]
     polygons = [rectangle(-1, -1, n + 1, 0), *squares]
@@ -235,7 +240,7 @@ def grid_of_squares(side: float, bond: float) -> Outcome:
 
 
 def start(most: int, gap: float, dt: float) -> Outcome:
-    """A block that is let go above the ground with this gap."""
+    """A block released above the ground with this gap."""
     polygons = [rectangle(-1, -1, 2, 0), rectangle(0, gap, 1, 1 + gap)]
     system = _system(polygons, [True, False], 30.0, dynamic_factor=1.0, max_displacement_ratio=0.05)
     watch = _Watch(system)
@@ -245,13 +250,13 @@ def start(most: int, gap: float, dt: float) -> Outcome:
 
 
 def impact(speed: float, dt: float) -> Outcome:
-    """Two blocks that meet at this speed: momentum and energy."""
+    """Two blocks that collide at this speed: momentum and energy."""
     polygons = [rectangle(0, 0, 1, 1), rectangle(1.001, 0, 2.001, 1)]
     system = _system(polygons, [False, False], 30.0, dynamic_factor=1.0, max_displacement_ratio=0.05)
     state = State.at_rest(system.blocks)
     state.velocity[0, 0], state.velocity[1, 0] = speed, -0.5 * speed
     watch = _Watch(system)
-    # They meet after 7e-4/speed seconds, and part a millisecond later.
+    # They meet after 7e-4/speed seconds, and separate a millisecond later.
     end = watch.run(state, Loads(), 0.01 / speed + 20 * dt, dt, 1000)
     mass = system.density * system.blocks.areas()
     momentum = abs(mass @ (end.velocity[:, 0] - state.velocity[:, 0])) / (mass @ np.abs(state.velocity[:, 0]))

@@ -1,8 +1,8 @@
-"""Blocks with thin walls, spikes and teeth that must hold what they enclose, whatever the step: scenes for `stability`.
+"""Blocks with thin walls, spikes and teeth that must contain what they enclose, at any step: scenes for `stability`.
 
-The reference is topology: nothing lies in anything, and what was enclosed is enclosed. A scene's error is the largest of
-the depth of any overlap over half the wall's thickness (what flies fast presses springs in), of the part of the blocks
-that are out, and of the energy that overlaps brought in over a hundredth of all energy turned over: right below 1.
+The reference is topology: no overlaps, and enclosed blocks stay enclosed. The error of a scene is the largest of: the
+deepest overlap over half the wall's thickness (fast impacts compress springs), the fraction of the blocks that escaped,
+and the energy created by overlaps over a hundredth of all energy turned over; right below 1.
 """
 
 from __future__ import annotations
@@ -18,12 +18,12 @@ from ...dda.step_control.overlap_energy import WARNED, Overlap, OverlapWatch
 from ...model import Blocks, DdaSettings, JointLaw, Loads, Material, State
 from .stability_scenes import WEIGHT, Outcome, rectangle, turned
 
-#: Steps that a scene takes at most.
+#: Largest number of steps of a scene.
 MOST = 3000
 
 
 def _ring(x: float, y: float, half: float, wall: float) -> list[np.ndarray]:
-    """A square with a square hole: its middle, half its side and the thickness of its walls, m."""
+    """A square with a square hole: its centre, half its side and the thickness of its walls, m."""
     inner = half - wall
     return [
         rectangle(x - half, y - half, x + half, y + half),
@@ -39,7 +39,7 @@ def _hook(width: float, height: float, wall: float) -> np.ndarray:
 
 
 def _comb(teeth: int, tooth: float, length: float, pitch: float) -> np.ndarray:
-    """A comb whose ``teeth`` stand up from a back of the thickness of its ``length``."""
+    """A comb with ``teeth`` teeth on a back, whose thickness is that of a tooth's ``length``."""
     top = []
     for k in range(teeth - 1, -1, -1):
         x = k * pitch
@@ -59,7 +59,7 @@ def _run(
     rigid: bool = False, loads: Loads = WEIGHT, moving: Callable[[State], None] | None = None,
     out: Callable[[np.ndarray, Blocks], float] = lambda vertices, blocks: 0.0,
 ) -> Outcome:  # fmt: skip
-    """``moving`` gives the state its velocities, ``out`` tells the part of the blocks that have come out."""
+    """``moving`` gives the state its velocities, ``out`` returns the fraction of the blocks that have escaped."""
     blocks = Blocks.from_polygons(polygons, fixed=list(fixed))
     rock = Material("rock", 10e9, 0.25, density=2600.0, rigid=rigid)
     settings = DdaSettings(time_step=dt, dynamic_factor=1.0, max_displacement_ratio=ratio)
@@ -85,7 +85,7 @@ def _run(
 
 
 def _outside(x0: float, y0: float, x1: float, y1: float, first: int) -> Callable[[np.ndarray, Blocks], float]:
-    """The part of the blocks from ``first`` on whose middles are out of a box."""
+    """Fraction of the blocks from ``first`` on whose centres are outside a box."""
 
     def out(vertices: np.ndarray, blocks: Blocks) -> float:
         middle = blocks.mean_vertices(vertices)[first:]
@@ -95,7 +95,7 @@ def _outside(x0: float, y0: float, x1: float, y1: float, first: int) -> Callable
 
 
 def ring(rigid: bool, ratio: float, wall: float, speed: float) -> Outcome:
-    """A square of 20 cm that flies to and fro, turning, in a fixed ring of 2 m."""
+    """A square of 20 cm that flies back and forth, spinning, in a fixed ring of 2 m."""
 
     def moving(state: State) -> None:
         state.velocity[1, :3] = speed, 0.37 * speed, 0.5 * speed
@@ -108,7 +108,7 @@ def ring(rigid: bool, ratio: float, wall: float, speed: float) -> Outcome:
 
 
 def nested(ratio: float, wall: float, speed: float) -> Outcome:
-    """Three rings in one another, the smallest with a speed, in weight."""
+    """Three nested rings, the smallest with an initial speed, under gravity."""
 
     def moving(state: State) -> None:
         state.velocity[2, :3] = speed, 0.5 * speed, speed
@@ -121,9 +121,9 @@ def nested(ratio: float, wall: float, speed: float) -> Outcome:
 
 
 def chain(ratio: float, wall: float, speed: float) -> Outcome:
-    """Three hooks that hang in one another, the lowest torn down with a speed."""
+    """Three hooks hanging in one another, the lowest pulled down at a given speed."""
     hook = _hook(1.0, 1.0, wall)
-    # The second hangs with its upper arm in the first, turned about; the third in the second.
+    # The second hangs with its upper arm in the first, reversed; the third in the second.
     other = np.array([1.0, 1.0]) - hook + [0.6 - 2 * wall, -0.5]
     polygons = [hook, other, hook + [0.0, -1.0]]
 
@@ -152,9 +152,9 @@ def combs(ratio: float, tooth: float, speed: float) -> Outcome:
 
 
 def cogs(ratio: float, spin: float, teeth: float) -> Outcome:
-    """A cog that is thrown on another, both with sharp teeth."""
+    """A cog thrown at another, both with sharp teeth."""
     n = int(teeth)
-    # The tips of the second begin in gaps of the first, or above its tips.
+    # The tips of the second start in gaps of the first, or above its tips.
     polygons = [_cog(0.0, 0.0, n, 0.8, 1.0, 0.0), _cog(0.0, 2.02, n, 0.8, 1.0, 0.1 - 0.5 * math.pi)]
 
     def moving(state: State) -> None:
@@ -164,7 +164,7 @@ def cogs(ratio: float, spin: float, teeth: float) -> Outcome:
 
 
 def sticks(ratio: float, wall: float, speed: float) -> Outcome:
-    """Eight sticks of 1 m that fall on one another, askew, between two posts."""
+    """Eight sticks of 1 m that fall on one another, obliquely, between two posts."""
     polygons = [rectangle(-1.0, -0.5, 1.0, 0.0)]
     for k in range(8):
         polygons.append(turned(rectangle(-0.5, 0.0, 0.5, wall), 0.05 * (-1) ** k) + [0.02 * k, 0.1 * (k + 1)])
@@ -203,7 +203,7 @@ def box_of_debris(ratio: float, wall: float, speed: float) -> Outcome:
 
 
 def spike(rigid: bool, wall: float, speed: float) -> Outcome:
-    """A square that is thrown across a fixed spike, ``wall`` m thick at its foot and 1 m high."""
+    """A square thrown across a fixed spike, ``wall`` m thick at its foot and 1 m high."""
 
     def moving(state: State) -> None:
         state.velocity[1, 0] = speed

@@ -1,7 +1,7 @@
-"""What the search for a factor of safety costs: slopes of 200, 1 000 and 3 000 blocks whose beds dip out of the face.
+"""Cost of the search for a factor of safety: slopes of 200, 1 000 and 3 000 blocks whose beds dip out of the face.
 
-The beds' friction alone decides (`sliding_scenes`): every slab above a bed that daylights slides at
-F = tan φ/tan β, whatever cross joints cut it.
+Only the beds' friction matters (`sliding_scenes`): every slab above a daylighting bed slides at F = tan φ/tan β,
+whatever cross joints cut it.
 """
 
 from __future__ import annotations
@@ -17,11 +17,11 @@ from ..slopes.drawn_slopes import problem_of
 from ..slopes.limited_runs import TimeUp, at_most
 from ..slopes.sliding_scenes import BEDS, CROSS, Slope
 
-#: Blocks about, and processor seconds that the search may take.
+#: Approximate number of blocks, and processor time, s, allowed for the search.
 SIZES = {200: 4.0, 1000: 40.0, 3000: 240.0}
-#: Dip of the beds, degrees, and angle of the cross joints: upright, so that no column of blocks topples.
+#: Dip of the beds, degrees, and angle of the cross joints: vertical, so that no column of blocks topples.
 DIP, UPRIGHT = 27.0, 90.0
-#: m², rock of `sliding_scenes`; beds and cross joints are equally far apart.
+#: m², rock of `sliding_scenes`; beds and cross joints have equal spacings.
 _AREA = 1980.0
 #: Friction angles of the beds and of the cross joints here: the factor is tan 36°/tan 27° = 1.426.
 _BEDS, _CROSS = 36.0, 40.0
@@ -29,8 +29,8 @@ _BEDS, _CROSS = 36.0, 40.0
 
 @dataclass(frozen=True)
 class Cost:
-    """Of one search among ``blocks`` that can move: processor ``seconds`` (nan: more than it was given), ``error`` of
-    the factor, ``trials`` and their static ``steps``."""
+    """One search among ``blocks`` movable blocks: processor ``seconds`` (nan: over the limit), ``error`` of the factor,
+    ``trials`` and their static ``steps``."""
 
     blocks: int
     seconds: float
@@ -40,7 +40,7 @@ class Cost:
 
 
 def slope_of(blocks: int) -> Problem:
-    """The slope cut into about so many ``blocks``."""
+    """The slope cut into about this many ``blocks``."""
     spacing = math.sqrt(_AREA / blocks)
     slope = Slope(DIP, UPRIGHT, 0.0, spacing, spacing, 2.5 * spacing, 0.0)
     text = slope.text(0.01, 1.0)
@@ -50,7 +50,7 @@ def slope_of(blocks: int) -> Problem:
 
 
 def cost(blocks: int, limit: float) -> Cost:
-    """Of the slope of about so many ``blocks``, within ``limit`` processor seconds."""
+    """Cost for the slope with about this many ``blocks``, within ``limit`` processor seconds."""
     from ... import dda
 
     problem = slope_of(blocks)
@@ -69,7 +69,7 @@ def cost(blocks: int, limit: float) -> Cost:
 
 
 def measure_cost(quick: bool = False) -> Measured:
-    """A line a size, each within four times the seconds that it may take; ``quick``: the smallest alone."""
+    """One line per size, each within four times its goal; ``quick``: only the smallest."""
     lines = ["factor of safety of a slope that slides on its beds, processor seconds",
              "  blocks   seconds     goal     error   trials   steps"]  # fmt: skip
     cost(min(SIZES), math.inf)  # compiles

@@ -1,15 +1,15 @@
-"""Random slopes with a known factor of safety: a seed is a slope.
+"""Random slopes with a known factor of safety, one per seed.
 
-Five families, each with or without cohesion, water and anchors, with sharp toes and cut ones:
+Five families, each with or without cohesion, water and anchors, with sharp and with cut toes:
 
-    planar    a block on one plane before an upright tension crack (Hoek & Bray 1981, chapter 7)
+    planar    a block on one plane in front of a vertical tension crack (Hoek & Bray 1981, chapter 7)
     stepped   a block on two parallel planes with a riser between them, which opens
-    bilinear  an active block above a passive one, an upright joint between them (Jaeger 1971)
+    bilinear  an active block above a passive one, with a vertical joint between them (Jaeger 1971)
     wedge     the same with an inclined joint: the active block is a wedge
-    toppling  columns on an inclined base (Goodman & Bray 1976): one that slides, one that an anchor or glue keeps from
+    toppling  columns on an inclined base (Goodman & Bray 1976): one that slides, one that an anchor or a bond keeps from
               toppling, rows of them
 
-Lengths m, angles in degrees until they are used.
+Lengths in m, angles in degrees until they are used.
 """
 
 from __future__ import annotations
@@ -26,10 +26,10 @@ from .slope_limits import admissible_factor, sliding_factor
 
 GRAVITY, DENSITY = 9.81, 2600.0
 FAMILIES = ("planar", "bilinear", "stepped", "wedge", "toppling")
-#: Names of the edges that carry nothing at the limit.
+#: Names of the edges without forces at the limit.
 OPEN = ("joint:crack", "joint:riser")
 PLANE, BETWEEN = "joint:plane", "joint:between"
-#: Limit equilibrium must be admissible as to moments too: to this share, or another slope is drawn.
+#: Limit equilibrium must also satisfy moments to this part; otherwise another slope is drawn.
 _AS_GOOD = 1e-3
 #: Slopes are drawn until their factor lies between these.
 _LEAST, _MOST = 0.7, 6.0
@@ -37,12 +37,13 @@ _LEAST, _MOST = 0.7, 6.0
 
 @dataclass(frozen=True)
 class FactorSlope:
-    """A slope of a ``family``: its ``scene``, the factor of safety ``limit`` by limit equilibrium (nan: none is known)
-    and ``bound``, what the linear programme allows at most (inf: no factor makes the blocks move).
+    """A slope of a ``family`` with its ``scene``.
 
+    limit     factor of safety by limit equilibrium (nan: unknown)
+    bound     largest factor according to the linear programme (inf: the blocks never move)
     toe       "free" (the floor lies deep below it), "corner" (it ends in the corner with the floor), "0.1 m below" …
-    traits    what else it has: "cohesion", "water", "anchor", "sharp" …
-    anchor    m, by which its softest anchor has to stretch to take its yield force
+    traits    further features: "cohesion", "water", "anchor", "sharp" …
+    anchor    elongation, m, at which its softest anchor yields
     """
 
     seed: int
@@ -56,13 +57,13 @@ class FactorSlope:
 
     @property
     def expected(self) -> float:
-        """The factor it is held against: limit equilibrium's, or else the programme's."""
+        """Reference factor: that of limit equilibrium, or else of the programme."""
         return self.bound if math.isnan(self.limit) else self.limit
 
 
 @dataclass
 class _Drawn:
-    """A slope while it is drawn: polygons and named straight edges, laws, loads."""
+    """A slope under construction: polygons and named straight edges, laws, loads."""
 
     base: list[tuple[float, float]]
     blocks: dict[str, list[tuple[float, float]]]
@@ -88,8 +89,8 @@ class _Drawn:
         if self.cohesion:
             laws["default"] |= {"cohesion_pa": self.cohesion, "tensile_strength_pa": self.tension}
             if len(self.planes_drawn) > 1 or self.bolts:
-                # Several faces or bolts share the load: cohesion that broke at once would let them fail one by one,
-                # below what limit equilibrium says.
+                # Several faces or bolts share the load: cohesion lost at once would let them fail one by one, below
+                # limit equilibrium.
                 laws["default"]["residual_cohesion_pa"] = self.cohesion
         drawn = {name for name, _, _ in self.edges}
         if not self.same_law and drawn & set(OPEN):
@@ -118,8 +119,10 @@ class _Drawn:
 
 
 def random_slope(seed: int) -> FactorSlope:
-    """Of a ``seed``, whose remainder by five is the family; what comes out without a factor between 0.7 and 6, or with
-    one that moments do not admit, is drawn again."""
+    """The slope of a ``seed``, whose remainder by five selects the family.
+
+    Slopes without a factor between 0.7 and 6, or with one that moments do not admit, are drawn again.
+    """
     rng = np.random.default_rng([seed, 20])
     family = FAMILIES[seed % len(FAMILIES)]
     while True:
@@ -142,7 +145,7 @@ def _with_limits(drawn: _Drawn, seed: int, family: str) -> FactorSlope | None:
         except ValueError:
             return None
         if limit > bound * (1 + _AS_GOOD):
-            # Moments, not forces: it turns before it slides.
+            # Moments, not forces: it rotates before it slides.
             return None
     if not _LEAST < (bound if math.isnan(limit) else limit) < _MOST:
         return None
@@ -152,7 +155,7 @@ def _with_limits(drawn: _Drawn, seed: int, family: str) -> FactorSlope | None:
 
 
 def _frame(rng, toe: str, depth: float) -> list[tuple[float, float]]:
-    """The base before the toe at (0, 0): its floor, from the left to the toe."""
+    """The base in front of the toe at (0, 0): its floor, from the left to the toe."""
     floor = {"free": -rng.uniform(8, 14), "corner": 0.0}.get(toe)
     floor = -float(toe.split()[0]) if floor is None else floor
     corners = [(-30.0, min(floor, 0.0) - depth), (-30.0, floor)]
@@ -287,7 +290,7 @@ def _toppling(rng) -> _Drawn:
 
 
 def _base(before: list[tuple[float, float]], under: list[tuple[float, float]]) -> list[tuple[float, float]]:
-    """Under the blocks, whose lower side is ``under`` from the toe to the crest, and ``before`` the toe."""
+    """The base under the blocks, whose lower side is ``under`` from the toe to the crest, and ``before`` the toe."""
     (x, y), low = under[-1], before[0][1]
     return [before[0], (x + 60.0, low), (x + 60.0, y), *under[::-1], *before[:0:-1]]
 
@@ -308,7 +311,7 @@ def _strength(rng, drawn: _Drawn, cohesion: float) -> None:
 
 
 def _anchor(rng, drawn: _Drawn, start, block: str, dip: float, share: float | None = None) -> None:
-    """From ``start`` into the base behind, 5 to 25° below the level."""
+    """An anchor from ``start`` into the base behind, 5 to 25° below the horizontal."""
     polygon = np.array(drawn.blocks[block])
     weight = DENSITY * GRAVITY * abs(float(np.sum(
         polygon[:, 0] * np.roll(polygon[:, 1], -1) - polygon[:, 1] * np.roll(polygon[:, 0], -1)))) / 2  # fmt: skip

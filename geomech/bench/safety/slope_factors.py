@@ -1,8 +1,8 @@
-"""Random slopes (`factor_scenes`): the factor of safety that `geomech safety` finds, as drawn, mirrored and rotated,
-against limit equilibrium and the linear programme of static admissibility (`slope_limits`); and what it costs.
+"""Random slopes (`factor_scenes`): the factor of `geomech safety`, as drawn, mirrored and rotated, compared with limit
+equilibrium and the linear programme of static admissibility (`slope_limits`); and its cost.
 
-A slope is `RIGHT`, `REPORTED` (beyond the bound, and a warning says that something else than strength decides),
-`REFUSED` for a named reason, `LONG` (not finished in time) or `WRONG`: above or below in silence.
+A slope is `RIGHT`, `REPORTED` (beyond the bound, with a warning that something other than strength decides), `REFUSED`
+for a named reason, `LONG` (not finished in time) or `WRONG`: above or below without a warning.
 """
 
 from __future__ import annotations
@@ -35,13 +35,13 @@ from ..slopes.seed_rows import program, rows_of_seeds
 from .factor_cost import measure_cost
 from .factor_scenes import FAMILIES, FactorSlope, random_slope
 
-#: Relative difference of the factor from the expected one that is right.
+#: Largest relative difference from the expected factor that counts as right.
 BOUND = 1e-2
-#: Width of the bracket that is asked for.
+#: Requested width of the bracket.
 TOLERANCE = 2e-3
-#: Processor seconds that each search may take.
+#: Processor time limit of each search, s.
 LIMIT = 60.0
-#: Where rows and JSON go.
+#: Folder of rows and JSON.
 FOLDER = Path("outputs/bench_safety")
 SEEDS, QUICK_SEEDS = range(100), range(10)
 VARIANTS = {
@@ -82,7 +82,7 @@ class Factored:
 
     @property
     def off(self) -> float:
-        """The largest difference of a search from the expected factor, with its sign."""
+        """Largest difference of a search from the expected factor, with its sign."""
         offs = [s.off(self.expected) for s in self.searches if not math.isnan(s.factor)]
         return max(offs, key=abs, default=math.nan)
 
@@ -98,7 +98,7 @@ def _off(factor: float, expected: float) -> float:
 
 
 def factored(slope: FactorSlope, seconds: float = LIMIT, variants: Sequence[str] = tuple(VARIANTS)) -> Factored:
-    """The searches for the factor of ``slope``, each for at most so many processor ``seconds``."""
+    """Searches for the factor of ``slope``, each with at most ``seconds`` processor seconds."""
     searches = tuple(
         _search(slope, name, seconds) for name in variants if can_be_moved(slope.scene, VARIANTS[name])
     )  # fmt: skip
@@ -127,7 +127,7 @@ def _search(slope: FactorSlope, variant: str, seconds: float) -> Searched:
         said = tuple(getattr(found, "warnings", ()))
     except TimeUp as up:
         verdict, message = LONG, str(up)
-    except Exception as error:  # any error but the known ones is a finding
+    except Exception as error:  # any error other than the known ones is a finding
         message = str(error)
         if time_up(error) is not None:
             verdict = LONG
@@ -158,8 +158,10 @@ def _joined(*parts: Measured) -> Measured:
 def measure_many(
     seeds: Sequence[int], seconds: float = LIMIT, folder: Path = FOLDER, workers: int | None = None
 ) -> Measured:
-    """Every one of the ``seeds``, one on each core (``workers``), as text; rows and JSON go to ``folder``. Seeds that
-    the same program has run before, as the rows there tell, are not run again."""
+    """Every one of the ``seeds``, one on each core (``workers``), as text; rows and JSON are written to ``folder``.
+
+    Seeds already run by the same program, according to the rows there, are not run again.
+    """
     rows = rows_of_seeds(seeds, folder / "safety.jsonl", _row, program(_MODULES, f"{LIMIT:g} s"), None, workers)
     every = [_from_row(row) for row in rows]
     write_json(folder / "safety.json", [asdict(each) for each in every])
@@ -179,7 +181,7 @@ def _from_row(row: dict) -> Factored:
 
 
 def table(every: Sequence[Factored]) -> Measured:
-    """A line a slope, what came of every family, and the figures."""
+    """One line per slope, the outcome of every family, and the figures."""
     names = list(VARIANTS)
     lines = [
         "factor of safety off limit equilibrium (of rows of columns: off the largest factor with admissible contact "

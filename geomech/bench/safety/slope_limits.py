@@ -1,14 +1,14 @@
-"""Limits of blocks taken as rigid, found without the engine: the linear programme of static admissibility, and limit
-equilibrium of one or two blocks that slide.
+"""Limits of rigid blocks, independent of the solver: the linear programme of static admissibility, and limit
+equilibrium of one or two sliding blocks.
 
-Faces that two blocks share carry, at their ends, normal forces N₀, N₁ ≥ 0 and along them one shear force S with
+Faces shared by two blocks carry, at their ends, normal forces N₀, N₁ ≥ 0 and along them one shear force S with
 
     |S| ≤ (c ℓ + tan φ (N₀ + N₁))/F.
 
-Some set of them balances the loads on every block up to a largest F: no strength divided by more than that has any
-equilibrium of rigid blocks, so it bounds the factor of safety from above (static theorem; for friction, which dilates
-less than its angle, the factor may lie below it: Drescher & Detournay 1993, Géotechnique 43, 443-456). Forces in N per
-metre of thickness, moments about the origin.
+Some set of them balances the loads on every block up to a largest F: with strengths divided by more than that, rigid
+blocks have no equilibrium, so that it is an upper bound of the factor of safety (static theorem; for friction, which
+dilates less than its angle, the factor may be lower: Drescher & Detournay 1993, Géotechnique 43, 443-456). Forces in N
+per metre of thickness, moments about the origin.
 """
 
 from __future__ import annotations
@@ -21,18 +21,22 @@ import numpy as np
 
 from ...model import Blocks, Problem
 
-#: Faces lie on one another within this share of the blocks' extent.
+#: Faces coincide within this part of the blocks' extent.
 _ON_FACE = 1e-7
-#: Factors are sought up to this one; above it a slope is taken not to fail.
+#: Largest factor of the search; a slope above it is taken as stable.
 FARTHEST = 64.0
-#: Pieces of an edge over which the pressure of water is summed up.
+#: Number of pieces of an edge for the integration of water pressure.
 _PIECES = 2000
 
 
 @dataclass(frozen=True, eq=False)
 class Faces:
-    """Faces (m,) between ``block`` and ``other``, from ``start`` to ``end`` (m, 2) along the edge of ``block``, whose
-    outward ``normal`` (m, 2) points to ``other``; ``name`` of the edge, ``law`` the joint law's index."""
+    """Faces (m,) between ``block`` and ``other``.
+
+    start, end   (m, 2) along the edge of ``block``
+    normal       (m, 2) its outward normal, towards ``other``
+    name, law    name of the edge, index of the joint law
+    """
 
     block: np.ndarray
     other: np.ndarray
@@ -48,7 +52,7 @@ class Faces:
 
 
 def shared_faces(problem: Problem) -> Faces:
-    """Of the reference positions: where edges of two blocks lie on one another; not between fixed blocks."""
+    """Shared faces at the reference positions: where edges of two blocks coincide; not between fixed blocks."""
     blocks = problem.blocks
     start, end = blocks.vertices, blocks.vertices[blocks.next_vertex]
     along = end - start
@@ -116,9 +120,11 @@ def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 
 
 def admissible_factor(problem: Problem, open_faces: Collection[str] = (), tolerance: float = 1e-5) -> float:
-    """The largest F with admissible contact forces (0: none even at 1/64; inf: still at 64). ``open_faces``: names of
-    edges that carry nothing, such as tension cracks. Bolts pull with anything up to their yield force; a tensile
-    strength lets the ends of a face pull by half of what all of it holds."""
+    """Largest F with admissible contact forces (0: none even at 1/64; inf: still at 64).
+
+    ``open_faces``: names of edges without forces, such as tension cracks. Bolts may have any tension up to their yield
+    force; with a tensile strength each end of a face may carry half of the whole face's tension.
+    """
     programme = _Programme(problem, open_faces)
     low, high = 0.5, 2.0
     while not programme.balances(low):
@@ -136,7 +142,7 @@ def admissible_factor(problem: Problem, open_faces: Collection[str] = (), tolera
 
 
 class _Programme:
-    """Equilibrium of all free blocks by N₀, N₁, S of each face and the pull of each bolt."""
+    """Equilibrium of all free blocks with N₀, N₁, S of each face and the tension of each bolt."""
 
     def __init__(self, problem: Problem, open_faces: Collection[str]) -> None:
         from scipy import sparse
@@ -200,12 +206,12 @@ class _Programme:
 
 
 def sliding_factor(problem: Problem, planes: Collection[str], interface: str = "") -> float:
-    """Limit equilibrium of one block, or of two across ``interface``, that slide on ``planes`` (names of edges), with
-    every bolt at its yield force, other faces carrying nothing: forces alone, moments are not asked for.
+    """Limit equilibrium of one block, or of two across ``interface``, that slide on ``planes`` (names of edges).
 
-    Each block slides down its planes, which are parallel, with a velocity that keeps the interface closed; friction
-    and cohesion are fully mobilised against that motion everywhere (Jaeger 1971, Géotechnique 21, 97-134). Raises
-    ValueError where the interface would pull.
+    Every bolt has its yield force, other faces have no force; moments are not considered. Each block slides down its
+    planes, which are parallel, with a velocity that keeps the interface closed; friction and cohesion are fully
+    mobilised against that motion everywhere (Jaeger 1971, Géotechnique 21, 97-134). Raises ValueError if the interface
+    would be in tension.
     """
     faces, loads = shared_faces(problem), loads_on_blocks(problem)[:, :2]
     for bolt in problem.loads.bolts:
@@ -234,7 +240,8 @@ def sliding_factor(problem: Problem, planes: Collection[str], interface: str = "
                 sign = 1.0 if k == 0 else -1.0
                 by_normal, fixed = between.forces(factor)
                 matrix[rows, -1], right[rows] = sign * by_normal, right[rows] - sign * fixed
-        # Normal forces by all equations but that of the last block along its plane; what is left over there.
+        # Normal forces from all equations except that of the last block along its plane; the surplus is that of the
+        # latter.
         way = held[-1].way
         across = np.array([-way[1], way[0]])
         turn = np.eye(2 * len(free))
@@ -248,14 +255,14 @@ def sliding_factor(problem: Problem, planes: Collection[str], interface: str = "
         return factor
     normal = surplus(factor)[1]
     if (normal < 0).any():
-        raise ValueError("a face of the sliding blocks would have to pull")
+        raise ValueError("a face of the sliding blocks would be in tension")
     return factor
 
 
 @dataclass(frozen=True, eq=False)
 class _Held:
-    """What a face, or parallel ones, do to a block that slides along ``way``: N along ``normal``, and against the way
-    (c ℓ + tan φ N)/F."""
+    """Forces of a face, or of parallel ones, on a block that slides along ``way``: N along ``normal``, and against the
+    way (c ℓ + tan φ N)/F."""
 
     normal: np.ndarray
     way: np.ndarray
@@ -270,7 +277,7 @@ class _Held:
         return _Held(self.normal, math.copysign(1.0, slip) * self.tangent, self.friction, self.hold)
 
     def forces(self, factor: float) -> tuple[np.ndarray, np.ndarray]:
-        """By the normal force, and whatever that is."""
+        """Terms proportional to the normal force, and constant terms."""
         return self.normal - self.friction / factor * self.way, -self.hold / factor * self.way
 
 
@@ -285,7 +292,7 @@ def _held_on(
     rows = np.flatnonzero(first | second)
     if not len(rows):
         raise ValueError(f"no face called {', '.join(names)} holds the block")
-    # The push on the block is against its own outward normal.
+    # The force on the block is against its own outward normal.
     normal = (faces.normal * np.where(first, -1.0, 1.0)[:, None])[rows]
     if not (normal @ normal[0] > 1 - 1e-9).all():
         raise ValueError(f"the faces {', '.join(names)} of a block are not parallel")
@@ -296,7 +303,7 @@ def _held_on(
 
 
 def _root(surplus: Callable[[float], float]) -> float:
-    """The largest F at which the ``surplus`` of driving forces changes its sign, by bisection; inf without any."""
+    """Largest F at which the ``surplus`` of driving forces changes its sign, by bisection; inf without any."""
     trials = np.geomspace(FARTHEST, 0.02, 400)
     values = [surplus(float(each)) for each in trials]
     for k in range(len(trials) - 1):

@@ -1,1 +1,1 @@
-"""Random and sliding slopes: what must hold of any scene, and what may not change with the step."""
+"""Random and sliding slopes: invariants of any scene, and independence of the time step."""

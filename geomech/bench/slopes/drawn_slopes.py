@@ -1,8 +1,8 @@
-"""Scenes whose joint sets are drawn once and written out as polylines, so that the same joints can be mirrored,
-rotated, shifted and listed in another order.
+"""Scenes whose joint sets are drawn once and written as polylines, so that the same joints can be mirrored, rotated,
+shifted and reordered.
 
-A scene is the table that its TOML file holds. An isometry x → M x + s takes points to M x + s, vectors to M v and
-in-situ stress σ to M σ Mᵀ.
+A scene is the table of its TOML file. An isometry x → M x + s maps points to M x + s, vectors to M v and in-situ stress
+σ to M σ Mᵀ.
 """
 
 from __future__ import annotations
@@ -48,30 +48,30 @@ class Isometry:
 
     @property
     def keeps_depth(self) -> bool:
-        """Whether what is up stays up."""
+        """Whether the vertical direction is preserved."""
         return bool(np.array_equal(self.matrix[:, 1], [0.0, 1.0]))
 
     def points(self, points: Any) -> list:
-        """Points, or one point, of a scene, moved."""
+        """Images of points, or of one point, of a scene."""
         return (np.asarray(points, dtype=float) @ self.matrix.T + self.shift).tolist()
 
     def vector(self, vector: Any) -> list:
         return (np.asarray(vector, dtype=float) @ self.matrix.T).tolist()
 
     def stress(self, stress: Sequence[float]) -> np.ndarray:
-        """(xx, yy, xy), turned."""
+        """(xx, yy, xy), rotated."""
         xx, yy, xy = stress
         turned = self.matrix @ np.array([[xx, xy], [xy, yy]]) @ self.matrix.T
         return np.array([turned[0, 0], turned[1, 1], turned[0, 1]])
 
     def back(self, points: np.ndarray) -> np.ndarray:
-        """(n, 2) points as they were before."""
+        """(n, 2) original points."""
         return (points - self.shift) @ self.matrix
 
 
 def drawn(text: str) -> Scene:
-    """The scene of a TOML ``text`` with the traces of its joint sets as [[geometry.joints]], and the tolerance that
-    they are cut with in metres. Raises SceneError for a scene that is wrong."""
+    """The scene of a TOML ``text`` with the traces of its joint sets as [[geometry.joints]], and the cutting tolerance
+    in metres. Raises SceneError for an invalid scene."""
     scene = tomllib.loads(text)
     with tempfile.TemporaryDirectory() as folder:
         loaded = _load(scene, Path(folder))
@@ -88,18 +88,18 @@ def drawn(text: str) -> Scene:
 
 
 def moved(scene: Scene, by: Isometry) -> Scene:
-    """``scene`` taken by an isometry: outlines, joints, named edges, monitors, gravity, water, bolts, base motion and
+    """``scene`` mapped by an isometry: outlines, joints, named edges, monitors, gravity, water, bolts, base motion and
     in-situ stress.
 
-    Raises ValueError where water, whose pressure grows with the depth along y, would be turned, and for tables that
-    these scenes do not have.
+    Raises ValueError for rotated water, whose pressure increases with depth along y, and for tables that these scenes
+    do not have.
     """
     unknown = set(scene.get("loads", {})) - {"gravity_m_s2", "gravity_ramp_s", "water", "bolts", "base", "in_situ"}
     unknown |= set(scene["geometry"]) & {"model", "cracks", "traces", "joint_sets", "origin"}
     if unknown:
         raise ValueError(f"no isometry of {', '.join(sorted(unknown))} is known here")
     if not can_be_moved(scene, by):
-        raise ValueError("pressure of water grows with the depth along y: a scene with water cannot be turned")
+        raise ValueError("water pressure increases with depth along y: a scene with water cannot be rotated")
     out = copy.deepcopy(scene)
     geometry, loads = out["geometry"], out.get("loads", {})
     for zone in geometry["zones"]:
@@ -124,12 +124,12 @@ def moved(scene: Scene, by: Isometry) -> Scene:
 
 
 def can_be_moved(scene: Scene, by: Isometry) -> bool:
-    """Whether a scene can: water lies level."""
+    """Whether a scene can be mapped: water stays level."""
     return "water" not in scene.get("loads", {}) or by.keeps_depth
 
 
 def reordered(scene: Scene, rng: np.random.Generator) -> Scene:
-    """``scene`` with its joints listed in another order, and each drawn from its other end."""
+    """``scene`` with its joints in another order, and each drawn from its other end."""
     out = copy.deepcopy(scene)
     joints = out["geometry"]["joints"]
     out["geometry"]["joints"] = [
@@ -139,13 +139,13 @@ def reordered(scene: Scene, rng: np.random.Generator) -> Scene:
 
 
 def frictionless(scene: Scene, time_step: float) -> Scene:
-    """``scene`` in motion from rest under its weight by ``time_step`` s, its joints and cracks without strength."""
+    """``scene`` in motion from rest under its weight by ``time_step`` s, with joints and cracks without strength."""
     out = copy.deepcopy(scene)
     for law in out.get("joints", {}).values():
         kept = {key: law[key] for key in ("edges", "between") if key in law}
         law.clear()
         law.update(kept, friction_angle_deg=0.0)
-    # Neither is rest under in-situ stress without friction, nor does weight that grows in statics come to rest.
+    # Without friction there is neither rest under in-situ stress nor static equilibrium under growing weight.
     for key in ("in_situ", "gravity_ramp_s"):
         out["loads"].pop(key, None)
     out["dda"].pop("equilibrium", None)
@@ -155,13 +155,13 @@ def frictionless(scene: Scene, time_step: float) -> Scene:
 
 
 def problem_of(scene: Scene) -> Problem:
-    """The problem of a scene. Raises SceneError for one that is wrong."""
+    """The problem of a scene. Raises SceneError for an invalid one."""
     with tempfile.TemporaryDirectory() as folder:
         return _load(scene, Path(folder)).problem()
 
 
 def with_noise(problem: Problem, size: float, rng: np.random.Generator) -> Problem:
-    """``problem`` with each vertex of each block off by up to ``size`` of the blocks' extent."""
+    """``problem`` with each vertex of each block moved by up to ``size`` of the blocks' extent."""
     vertices = problem.blocks.vertices
     off = size * float(np.ptp(vertices, axis=0).max()) * rng.uniform(-1, 1, vertices.shape)
     return replace(problem, blocks=problem.blocks.with_vertices(vertices + off))

@@ -1,9 +1,9 @@
-"""Random slopes, jointed and cracked (`random_slopes`), run end to end with what must hold of any scene held against
-every cycle (`slope_invariants`).
+"""Random slopes, jointed and cracked (`random_slopes`), run end to end, with invariants of any scene
+(`slope_invariants`) checked in every cycle.
 
-A slope is `RIGHT`; `REPORTED`: something did not hold, and a warning of the run says so; `REFUSED` for one of the
-`refusals`; `LONG`: its time was up, and all held until then; or `WRONG`: something did not hold in silence, or another
-error came. Seconds are those of the processor, so that the verdict does not depend on what else runs.
+A slope is `RIGHT`; `REPORTED`: an invariant was violated, with a warning of the run; `REFUSED` for one of the
+`refusals`; `LONG`: it reached its time limit without a violation; or `WRONG`: an invariant was violated without a
+warning, or another error occurred. Times are processor times, so that the verdict does not depend on other programs.
 """
 
 from __future__ import annotations
@@ -23,20 +23,23 @@ from .refusals import REASONS
 from .seed_rows import program, rows_of_seeds
 from .slope_invariants import INVARIANTS, Invariants
 
-#: Seeds of scenes that take a second or so, with cracks and without.
+#: Seeds of scenes that take about a second, with cracks and without.
 LIGHT = (3, 5, 12, 16, 32, 34)
-#: Processor seconds that a slope may take.
+#: Processor time limit of a slope, s.
 LIMIT = 30.0
-#: Where the rows, the table and the picture of many slopes go.
+#: Folder of the rows, the table and the picture of many slopes.
 FOLDER = Path("outputs/bench_slopes")
-#: Modules here that a slope's run depends on.
+#: Modules here on which a slope's run depends.
 _MODULES = ("fuzzed_slopes", "limited_runs", "random_slopes", "slope_invariants", "refusals")
 
 
 @dataclass(frozen=True)
 class Watched:
-    """What became of a ``seed``: ``reason`` is the name of that of a refusal, ``message`` the error's; ``faults`` (in
-    silence) and ``reported`` (a warning says so) name the cycle; ``worst`` of every invariant's quantity."""
+    """Outcome of a ``seed``.
+
+    ``reason`` is the name of a refusal's reason, ``message`` the error's; ``faults`` (without a warning) and
+    ``reported`` (with one) name the cycle; ``worst`` of every invariant's quantity.
+    """
 
     seed: int
     verdict: str
@@ -55,7 +58,7 @@ class Watched:
 
     @property
     def why(self) -> str:
-        """A line on what did not hold, why it was refused, or what happened."""
+        """One line about a violation, a refusal, or the events."""
         if self.verdict == WRONG and not self.faults:
             return self.message.strip().splitlines()[-1]
         if self.faults or self.reported:
@@ -66,8 +69,8 @@ class Watched:
 
 
 def watched(seed: int, seconds: float = LIMIT, text: str | None = None) -> Watched:
-    """Load and run the scene of a ``seed`` (or ``text``) for at most so many processor ``seconds``, every cycle
-    checked."""
+    """Load and run the scene of a ``seed`` (or ``text``) for at most ``seconds`` processor seconds, checking every
+    cycle."""
     from ...coupling import cycles
     from ...scene import load_scene
 
@@ -105,7 +108,7 @@ def watched(seed: int, seconds: float = LIMIT, text: str | None = None) -> Watch
 
 
 def measure(quick: bool = False) -> Measured:
-    """What became of the first forty seeds, each within ten seconds (``quick``: of six that are light), as text."""
+    """Outcome of the first forty seeds, each within ten seconds (``quick``: of six light ones), as text."""
     every = [watched(seed, 10.0) for seed in (LIGHT if quick else range(40))]
     return _measured(every)
 
@@ -113,8 +116,11 @@ def measure(quick: bool = False) -> Measured:
 def measure_many(
     seeds: Sequence[int], seconds: float = LIMIT, folder: Path = FOLDER, workers: int | None = None
 ) -> Measured:
-    """What became of the ``seeds``, one on each core (``workers``), as text; rows, JSON and a picture go to ``folder``.
-    Seeds that the same program has run before, as the rows there tell, are not run again."""
+    """Outcome of the ``seeds``, one on each core (``workers``), as text; rows, JSON and a picture are written to
+    ``folder``.
+
+    Seeds already run by the same program, according to the rows there, are not run again.
+    """
     from ...render.benchmarks.slope_outcomes import draw
 
     rows = folder / "slopes.jsonl"
@@ -132,7 +138,7 @@ def _row_of_run(seconds: float, seed: int) -> dict:
 
 
 def _compile() -> None:
-    """Have the kernels ready: what compiling them takes is no slope's."""
+    """Compile the kernels beforehand: their compile time does not belong to a slope."""
     for seed in LIGHT:
         watched(seed, 600.0)
 
@@ -150,7 +156,7 @@ def _measured(every: Sequence[Watched]) -> Measured:
 
 
 def outcome(every: Sequence[Watched]) -> Iterator[str]:
-    """Verdicts, reasons of refusals with what they mean, and the worst of every invariant, as lines."""
+    """Verdicts, reasons of refusals with their meaning, and the worst of every invariant, as lines."""
     counts, reasons = Counter(w.verdict for w in every), Counter(w.reason for w in every if w.verdict == REFUSED)
     yield f"{len(every)} slopes: " + "  ".join(f"{counts[verdict]} {verdict}" for verdict in VERDICTS)
     for reason in REASONS:
@@ -175,7 +181,7 @@ def outcome(every: Sequence[Watched]) -> Iterator[str]:
 
 
 def _row(w: Watched) -> dict:
-    """A row of the table on a page: flat."""
+    """A row of the table on a page, without nesting."""
     return {
         "seed": w.seed, "verdict": w.verdict, "reason": w.reason, "blocks": w.blocks, "tips": w.tips,
         "cycles": w.cycles,

@@ -1,6 +1,6 @@
-"""Runs of scenes within a time of the processor: how each ended, and what it warned of.
+"""Runs of scenes with a limit of processor time: how each ended, and its warnings.
 
-Seconds are those of the processor, so that an outcome does not depend on what else runs.
+Times are processor times, so that an outcome does not depend on other programs.
 """
 
 from __future__ import annotations
@@ -21,11 +21,11 @@ RIGHT, REPORTED, REFUSED, LONG, WRONG = VERDICTS = ("right", "reported", "refuse
 
 
 class TimeUp(BaseException):
-    """No error of the run's own: nothing may catch it."""
+    """Not an error of the run: nothing may catch it."""
 
 
 class Heard(logging.Handler):
-    """The warnings ``said`` so far."""
+    """The warnings so far, ``said``."""
 
     def __init__(self) -> None:
         super().__init__(logging.WARNING)
@@ -37,8 +37,8 @@ class Heard(logging.Handler):
 
 @dataclass(frozen=True)
 class Ended:
-    """How a run ended: `RIGHT` (to its end), `REFUSED` for one of the `refusals` (``reason`` is its name), `LONG`: its
-    time was up, or `WRONG`: another error came. ``message`` is the error's; ``cycles`` were finished."""
+    """End of a run: `RIGHT` (to its end), `REFUSED` for one of the `refusals` (``reason`` is its name), `LONG`: time
+    limit, or `WRONG`: another error. ``message`` is the error's; ``cycles`` were finished."""
 
     verdict: str = RIGHT
     reason: str = ""
@@ -49,7 +49,7 @@ class Ended:
 
 
 def limited(run: Callable[[Heard], Iterable], seconds: float) -> Ended:
-    """Exhausts ``run``, which is given the `Heard` and yields once a cycle, within so many processor ``seconds``."""
+    """Exhaust ``run``, which takes the `Heard` and yields once per cycle, within ``seconds`` processor seconds."""
     heard, log, began = Heard(), logging.getLogger("geomech"), time.process_time()
     log.addHandler(heard)
     verdict, reason, message, number = RIGHT, "", "", 0
@@ -62,7 +62,7 @@ def limited(run: Callable[[Heard], Iterable], seconds: float) -> Ended:
     except Exception as error:
         up = time_up(error)
         if up is not None:
-            # It came within a compiled function, which makes another error of it.
+            # It came inside a compiled function, which converts it to another error.
             verdict, message = LONG, str(up)
         else:
             reason = reason_of(error, begun=number > 0) or ""
@@ -74,7 +74,7 @@ def limited(run: Callable[[Heard], Iterable], seconds: float) -> Ended:
 
 
 def time_up(error: BaseException | None) -> TimeUp | None:
-    """What ``error`` was made of or followed upon, if that is the end of the time."""
+    """The cause of ``error``, if that is the time limit."""
     while error is not None and not isinstance(error, TimeUp):
         error = error.__cause__ or error.__context__
     return error
@@ -82,8 +82,7 @@ def time_up(error: BaseException | None) -> TimeUp | None:
 
 @contextmanager
 def at_most(seconds: float) -> Iterator[None]:
-    """Raises `TimeUp`, saying where it was, after so many ``seconds`` of the processor; where there are no timers,
-    never."""
+    """Raises `TimeUp`, with the place, after ``seconds`` processor seconds; on systems without timers, never."""
     if not hasattr(signal, "setitimer") or threading.current_thread() is not threading.main_thread():
         yield
         return

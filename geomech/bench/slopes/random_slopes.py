@@ -1,4 +1,4 @@
-"""Random benched slopes, jointed and cracked, as scene files: a seed is a scene."""
+"""Random benched slopes, jointed and cracked, as scene files, one per seed."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ def scene_text(seed: int) -> str:
             f"{frequency:.2f}"
         )
     elif not dynamic and rng.random() < 0.3:
-        # The stress is that of the weight, which is there from the start.
+        # The stress is in equilibrium with the weight, which acts from the start.
         lines.remove("gravity_ramp_s = 3.0")
         lines.append(
             f"[loads.in_situ]\nsurface_m = {height}\nunit_weight_n_per_m3 = {9.81 * density:.0f}\nk0 = "
@@ -82,7 +82,7 @@ def scene_text(seed: int) -> str:
 
 
 def _outline(rng) -> tuple[list[tuple[float, float]], float, float]:
-    """The rock, counter-clockwise from its toe, how wide it is and how high."""
+    """The rock, counter-clockwise from its toe, with its width and height."""
     corners, x, y = [], 0.0, 0.0
     for _ in range(int(rng.integers(1, 4))):
         rise = rng.uniform(3, 6)

@@ -1,4 +1,4 @@
-"""The reasons for which a slope may be refused. What is refused with any other message is counted as wrong."""
+"""Valid reasons for the refusal of a slope. A refusal with any other message counts as wrong."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from ... import dda, ddm
 
 @dataclass(frozen=True)
 class Reason:
-    """Errors of ``kind`` whose message has ``pattern``: ``name`` in tables and pictures, ``meaning`` in a sentence;
+    """Errors of ``kind`` whose message matches ``pattern``: ``name`` in tables and pictures, ``meaning`` in a sentence;
     ``drawn``: only before anything has moved or grown."""
 
     name: str
@@ -70,7 +70,7 @@ REASONS = (
 
 
 def reason_of(error: Exception, begun: bool = True) -> str | None:
-    """The name of the reason that ``error`` gives, before or (``begun``) after the first cycle; None: it is none of
+    """Name of the reason given by ``error``, before or (``begun``) after the first cycle; None if it is none of
     `REASONS`."""
     for reason in REASONS:
         fits = type(error) is reason.kind and not (begun and reason.drawn)

@@ -1,4 +1,4 @@
-"""Rows of many seeds, one a line of a file: seeds that the same program has run before are not run again."""
+"""Rows of many seeds, one per line of a file: seeds already run by the same program are not run again."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from concurrent.futures import ProcessPoolExecutor, as_completed
 from pathlib import Path
 from typing import Any
 
-#: Parts of the package that a slope's run depends on.
+#: Parts of the package on which a slope's run depends.
 PARTS = ("model", "shapes", "scene", "dda", "ddm", "coupling")
 
 
@@ -25,8 +25,8 @@ def rows_of_seeds(
 ) -> list[dict[str, Any]]:
     """``work`` of each of the ``seeds``, a row with "seed", in their order; one on each core (``workers``).
 
-    Rows are kept in ``path`` with ``of``, the digest of the program (`program`) and of what else they depend on.
-    ``start`` runs first in each worker, as to compile kernels. ``work`` and ``start`` are pickled.
+    Rows are kept in ``path`` with ``of``, the digest of the program (`program`) and of other inputs. ``start`` runs
+    first in each worker, for instance to compile kernels. ``work`` and ``start`` are pickled.
     """
     path.parent.mkdir(parents=True, exist_ok=True)
     known = {row["seed"]: row for row in read_rows(path) if row.get("program") == of}
@@ -46,8 +46,7 @@ def rows_of_seeds(
 
 
 def program(modules: Iterable[str], also: str = "") -> str:
-    """A digest of the sources that a slope's run depends on, of these ``modules`` of the benchmarks, and of what
-    ``also`` says."""
+    """Digest of the sources on which a slope's run depends, of these ``modules`` of the benchmarks, and of ``also``."""
     package, digest = Path(__file__).parents[2], hashlib.sha256(also.encode())
     here = [path for name in modules for path in sorted((package / "bench").rglob(f"{name}.py"))]
     for path in [*here, *sorted(path for part in PARTS for path in (package / part).rglob("*.py"))]:
@@ -56,7 +55,7 @@ def program(modules: Iterable[str], also: str = "") -> str:
 
 
 def read_rows(path: Path) -> Iterator[dict[str, Any]]:
-    """The rows of a file; lines that were cut off as they were written are left out."""
+    """The rows of a file; incomplete lines are left out."""
     if not path.exists():
         return
     for line in path.read_text(encoding="utf-8").splitlines():

@@ -1,14 +1,14 @@
-"""Slopes whose beds dip out of the face, cut by cross joints: a family of scenes that slide.
+"""Slopes whose beds dip out of the face, cut by cross joints: a family of sliding scenes.
 
 The rock is 60 m wide and 40 m high, with a face from the toe (42, 20) to the crest (30, 40), on a fixed base. Beds dip
-more steeply than their friction angle and less steeply than the face: what lies above the lowest bed that daylights on
+more steeply than their friction angle and less steeply than the face: the rock above the lowest bed that daylights on
 the face slides as one rigid slab, with the acceleration
 
     a = g (sin β − tan φ cos β)
 
-of every block (β dip, φ friction angle of the beds; Hoek & Bray 1981, plane failure without water). The
-upper beds then carry just the shear at which they would slide too, so that none has to. (It takes blocks that need not
-turn: slender columns at the face may topple.)
+of every block (β dip, φ friction angle of the beds; Hoek & Bray 1981, plane failure without water). The upper beds then
+carry exactly the shear at which they would slide too, so that none has to. (This requires blocks that do not rotate:
+slender columns at the face may topple.)
 """
 
 from __future__ import annotations
@@ -24,11 +24,11 @@ GRAVITY = 9.81
 #: Friction angles, degrees, of beds and of cross joints.
 BEDS, CROSS = 20.0, 30.0
 TOE, CREST = (42.0, 20.0), (30.0, 40.0)
-#: Pa, Young's modulus: 40 m of such rock settle by 0.2 mm under their weight, ρgH²/(2E), which is 1 % of the slab's
-#: fall in 0.3 s at the least dip. (At 20 GPa it would be 5 %.)
+#: Young's modulus, Pa: 40 m of such rock settle by 0.2 mm under their weight, ρgH²/(2E), 1 % of the slab's fall in 0.3
+#: s at the least dip. (At 20 GPa it would be 5 %.)
 STIFF = 100e9
-#: Blocks smaller than this share of spacing × spacing join a neighbour: rarely, for it may be one across a bed, which
-#: is then no plane any more.
+#: Blocks smaller than this part of spacing × spacing are merged with a neighbour: rarely, because it may be one across
+#: a bed, which is then no longer plane.
 SMALLEST = 2e-3
 _ROCK = "[[0, 0], [60, 0], [60, 20], [42, 20], [30, 40], [0, 40]]"
 _BASE = "[[-2, -2], [62, -2], [62, 20], [60, 20], [60, 0], [0, 0], [0, 40], [-2, 40]]"
@@ -38,9 +38,12 @@ _ON_BED = 1e-6
 
 @dataclass(frozen=True)
 class Slope:
-    """Angles in degrees from the horizontal: beds fall to the right (``dip`` > 0), ``cross`` joints rise to it and vary
-    by ``deviation``; spacings, and ``length`` and ``gap`` of staggered cross joints (0: right through), in m;
-    ``seed`` of the sets."""
+    """Geometry of a slope.
+
+    Angles in degrees from the horizontal: beds dip to the right (``dip`` > 0), ``cross`` joints rise to it and vary by
+    ``deviation``; spacings, and ``length`` and ``gap`` of staggered cross joints (0: continuous), in m; ``seed`` of the
+    sets.
+    """
 
     dip: float
     cross: float
@@ -54,7 +57,7 @@ class Slope:
 
     @property
     def acceleration(self) -> float:
-        """Of the rigid slab along the beds, m/s²."""
+        """Acceleration of the rigid slab along the beds, m/s²."""
         dip = math.radians(self.dip)
         return GRAVITY * (math.sin(dip) - math.tan(math.radians(BEDS)) * math.cos(dip))
 
@@ -88,8 +91,8 @@ class Slope:
 
 
 def random_slope(seed: int) -> Slope:
-    """Of a ``seed``: dip 25 to 45°, cross joints at 50 to 90°, spacings of 1 to 5 m, cross joints right through or
-    staggered."""
+    """The slope of a ``seed``: dip 25 to 45°, cross joints at 50 to 90°, spacings of 1 to 5 m, continuous or staggered
+    cross joints."""
     rng = np.random.default_rng(seed)
     bed_spacing, cross_spacing = rng.uniform(1.0, 5.0), rng.uniform(1.0, 5.0)
     length = gap = 0.0
@@ -104,8 +107,12 @@ def random_slope(seed: int) -> Slope:
 
 @dataclass(frozen=True, eq=False)
 class Slab:
-    """What lies above the lowest bed that daylights on the face: ``blocks`` (n_blocks,) True of them, ``mass`` kg/m,
-    and the ``dip`` of the bed, rad. ``whole``: no block reaches through the bed."""
+    """The rock above the lowest bed that daylights on the face.
+
+    blocks   (n_blocks,) True for its blocks; ``mass``: kg/m
+    dip      of the bed, rad
+    whole    no block extends through the bed
+    """
 
     blocks: np.ndarray
     mass: float
@@ -113,19 +120,19 @@ class Slab:
     whole: bool
 
     def work(self, acceleration: float, seconds: float) -> float:
-        """Of gravity on the rigid slab after so many ``seconds`` from rest, J/m: Σ m g sin β · ½ a t²."""
+        """Work of gravity on the rigid slab after ``seconds`` from rest, J/m: Σ m g sin β · ½ a t²."""
         return self.mass * GRAVITY * math.sin(self.dip) * 0.5 * acceleration * seconds**2
 
 
 def slab(slope: Slope, problem: Problem) -> Slab | None:
-    """From the blocks as drawn; None where no bed daylights on the face."""
+    """From the blocks as drawn; None if no bed daylights on the face."""
     blocks = problem.blocks
     dip = math.radians(slope.dip)
     normal = np.array([math.sin(dip), math.cos(dip)])
     bed = blocks.edges_named("joint:bedding")
     ends = np.stack([blocks.vertices[bed], blocks.vertices[blocks.next_vertex[bed]]])
     height = ends.mean(axis=0) @ normal
-    # Beds through the face; parts of them below the bench, to the right of the toe, are others.
+    # Beds through the face; those below the bench, to the right of the toe, are others.
     low, high = np.array(TOE) @ normal, np.array(CREST) @ normal
     through = height[(height > low + _ON_BED) & (height < high - _ON_BED)]
     if not len(through):
@@ -137,7 +144,7 @@ def slab(slope: Slope, problem: Problem) -> Slab | None:
     middle = np.array([blocks.area_moments(b)[1] for b in range(blocks.n_blocks)])
     top = np.maximum.reduceat(blocks.vertices[:, 1], blocks.vertex_start[:-1])
     free = ~np.asarray(blocks.fixed, bool)
-    # The same plane goes on below the bench, where nothing daylights: all of that lies below the toe.
+    # The same plane continues below the bench, where nothing daylights: that part lies below the toe.
     over = free & (middle @ normal > lowest) & (middle[:, 1] > TOE[1])
     crossed = free & (least < -_ON_BED) & (most > _ON_BED) & (top > TOE[1] + _ON_BED)
     density = np.array([material.density for material in problem.materials])[blocks.material]

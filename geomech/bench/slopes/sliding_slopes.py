@@ -1,8 +1,8 @@
-"""Jointed slopes that slide (`sliding_scenes`), in steps of 8 to 0.5 ms: the mass that moves and the work of gravity on
-it, against those in the shortest steps, and against the rigid slab above the lowest bed that daylights.
+"""Sliding jointed slopes (`sliding_scenes`) in steps of 8 to 0.5 ms: moving mass and work of gravity, compared with the
+shortest steps and with the rigid slab above the lowest daylighting bed.
 
-A slope is `RIGHT`, `REPORTED` (beyond a bound, and a warning of the run says that its result is not to be relied on),
-`REFUSED` for a named reason, `LONG` (not finished in time) or `WRONG`.
+A slope is `RIGHT`, `REPORTED` (beyond a bound, with a warning of the run that its result is unreliable), `REFUSED` for
+a named reason, `LONG` (not finished in time) or `WRONG`.
 """
 
 from __future__ import annotations
@@ -26,17 +26,17 @@ from .seed_rows import program, rows_of_seeds
 from .sliding_scenes import Slope, random_slope, slab
 from .slope_invariance import WARNED
 
-#: s: steps, the shortest last, and the time at which the slopes are compared.
+#: s: time steps, the shortest last, and the time of the comparison.
 STEPS, END = (8e-3, 4e-3, 2e-3, 1e-3, 0.5e-3), 0.3
-#: Shares of the rock, and of the works of gravity, that runs and the rigid slab may differ by.
+#: Largest differences between runs and the rigid slab, as fractions of the rock and of the work of gravity.
 BOUND = 3e-2
-#: Rock that has gone farther than this share of the rigid slab's way ½ a t² moves: weight settles rock by less.
+#: Rock moves if its displacement exceeds this part of the rigid slab's, ½ a t²: weight causes smaller settlements.
 OF_SLIDE = 0.1
-#: Processor seconds that each run of a slope may take.
+#: Processor time limit of each run of a slope, s.
 LIMIT = 120.0
-#: Where the rows, the JSON and the picture go.
+#: Folder of the rows, the JSON and the picture.
 FOLDER = Path("outputs/bench_sliding")
-#: Seeds of slopes of 70 to 160 blocks, some ten seconds each; seeds, s of the steps, and s of the time of a quick run.
+#: Seeds of slopes of 70 to 160 blocks, some ten seconds each; seeds, time steps (s) and duration (s) of a quick run.
 SEEDS = (1, 4, 5, 8, 13, 18)
 QUICK_SEEDS, QUICK_STEPS, QUICK_END = (1, 13, 18), (8e-3, 4e-3, 2e-3), 0.1
 _MODULES = (
@@ -47,9 +47,12 @@ _MODULES = (
 
 @dataclass(frozen=True)
 class Slid:
-    """What a slope has done by ``end``, s, in ``steps`` of so many s each: ``moved`` share of the rock, ``work`` of
-    gravity on it in J/m, mean open–close ``iterations`` a step (nan: not finished). ``slab_share`` and ``slab_work`` of
-    the rigid slab: nan where no bed daylights, or a block reaches through the one that does."""
+    """Results of a slope at ``end``, s, with ``steps`` (s).
+
+    moved        fraction of the rock that moved; ``work``: of gravity on it, J/m (nan: not finished)
+    iterations   mean number of open–close iterations per step
+    slab_share, slab_work   of the rigid slab: nan if no bed daylights, or a block extends through the one that does
+    """
 
     seed: int
     verdict: str
@@ -67,11 +70,11 @@ class Slid:
     seconds: float = 0.0
 
     def scatter(self) -> float:
-        """The largest difference of a work from that in the shortest steps, over it."""
+        """Largest relative difference of a work from that in the shortest steps."""
         return max((abs(work / self.work[-1] - 1) for work in self.work[:-1]), default=math.nan)
 
     def off_slab(self) -> float:
-        """The work in the shortest steps over that on the rigid slab, less 1."""
+        """Work in the shortest steps over that on the rigid slab, minus 1."""
         return self.work[-1] / self.slab_work - 1
 
 
@@ -90,8 +93,8 @@ class _Run:
 def slid(
     slope: Slope, steps: Sequence[float] = STEPS, end: float = END, seconds: float = LIMIT, bound: float = BOUND
 ) -> Slid:
-    """``slope`` from rest until ``end``, s, in ``steps`` of each length (descending, s), each run for at most so many
-    processor ``seconds``."""
+    """``slope`` from rest until ``end``, s, in ``steps`` of each length (decreasing, s), each run with at most
+    ``seconds`` processor seconds."""
     problem = problem_of(tomllib.loads(slope.text(steps[-1], end)))
     rigid = slab(slope, problem)
     comparable = rigid is not None and rigid.whole
@@ -132,7 +135,7 @@ def _run(problem: Problem, dt: float, threshold: float, seconds: float) -> _Run:
 
 
 def _faults(found: Slid, runs: Sequence[_Run], bound: float) -> tuple[list[str], list[str]]:
-    """What goes beyond the ``bound`` in silence, and what a warning reports."""
+    """Violations of the ``bound`` without a warning, and those with one."""
     faults: list[str] = []
     reported: list[str] = []
 
@@ -148,7 +151,7 @@ def _faults(found: Slid, runs: Sequence[_Run], bound: float) -> tuple[list[str],
     hold(abs(found.moved[-1] - found.slab_share), "share off the slab's by", finest)
     hold(abs(found.off_slab()) if found.slab_work else math.nan, "work off the slab's by", finest)
     faults += [run.ended.message.strip().splitlines()[-1] for run in runs if run.ended.verdict == WRONG]
-    # Refused at one step and not at another: said, but not the same.
+    # Refused at one step and not at another: reported, but not the same.
     refused = [run.ended.reason for run in runs if run.ended.verdict == REFUSED]
     if refused and len(refused) < len(runs):
         reported += [f"{len(refused)} of {len(runs)} runs refused: {refused[0]}"]
@@ -176,8 +179,11 @@ def measure_many(
     seeds: Sequence[int], seconds: float = LIMIT, folder: Path = FOLDER, workers: int | None = None,
     steps: Sequence[float] = STEPS, end: float = END,
 ) -> Measured:  # fmt: skip
-    """Every one of the ``seeds``, one on each core (``workers``), as text; rows, JSON and a picture go to ``folder``.
-    Seeds that the same program has run before, as the rows there tell, are not run again."""
+    """Every one of the ``seeds``, one on each core (``workers``), as text; rows, JSON and a picture are written to
+    ``folder``.
+
+    Seeds already run by the same program, according to the rows there, are not run again.
+    """
     from ...render.benchmarks.sliding_slopes import draw
 
     also = f"{seconds:g} s, {[float(dt) for dt in steps]}, {end:g} s"
@@ -194,7 +200,7 @@ def measure_many(
 
 
 def compile_kernels() -> None:
-    """Run a slope that is not measured, so that none that is has to wait for a compiler."""
+    """Run a slope that is not measured, so that no measured one has to wait for compilation."""
     slid(random_slope(18), (8e-3,), 0.024)
 
 
@@ -203,7 +209,7 @@ def _row_of_run(steps: tuple[float, ...], end: float, seconds: float, seed: int)
 
 
 def table(every: Sequence[Slid]) -> Measured:
-    """A line a slope: the works of gravity over that in the shortest steps, and off the rigid slab's."""
+    """One line per slope: the works of gravity relative to that in the shortest steps, and to the rigid slab's."""
     steps = every[0].steps
     lines = [
         f"work of gravity on what has moved by {every[0].end:g} s, at dt over that at {1e3 * steps[-1]:g} ms, less 1; "

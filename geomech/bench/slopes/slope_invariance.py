@@ -1,12 +1,12 @@
-"""Random slopes (`random_slopes`) run again where nothing of the outcome may change: in shorter steps, mirrored,
-rotated, shifted, with joints listed in another order, and with noise on the vertices.
+"""Random slopes (`random_slopes`) run again under changes that must not affect the result: shorter steps, mirrored,
+rotated, shifted, with joints in another order, and with noise on the vertices.
 
 Joints are drawn once (`drawn_slopes`), so that all variants have the same blocks. Over the whole run in steps of dt,
-dt/2 and dt/4, the moved share of the rock and the work of gravity on it (`moved_mass`) are compared. Over the first
-steps, with friction as drawn and without any, every block's displacement and the energies are compared with those of
-the slope as drawn. A slope is `RIGHT`, `REPORTED` (beyond a bound, and a warning of one of the two runs compared says
-that its result is not to be relied on), `REFUSED` (as drawn already, for a named reason), `LONG` (some run was not
-finished, the others agree) or `WRONG`.
+dt/2 and dt/4, the moving fraction of the rock and the work of gravity on it (`moved_mass`) are compared. Over the first
+steps, with friction as drawn and without, every block's displacement and the energies are compared with those of the
+slope as drawn. A slope is `RIGHT`, `REPORTED` (beyond a bound, with a warning of one of the two compared runs that its
+result is unreliable), `REFUSED` (already as drawn, for a named reason), `LONG` (some run was not finished, the others
+agree) or `WRONG`.
 """
 
 from __future__ import annotations
@@ -40,24 +40,24 @@ from .random_slopes import scene_text
 from .seed_rows import program, rows_of_seeds
 from .slope_invariants import INVARIANTS
 
-#: Processor seconds that each of the runs of a slope may take.
+#: Processor time limit of each run of a slope, s.
 LIMIT = 30.0
-#: Where the rows, the JSON and the picture go.
+#: Folder of the rows, the JSON and the picture.
 FOLDER = Path("outputs/bench_slopes")
-#: The step is divided by these.
+#: Divisors of the time step.
 DIVISIONS = (1, 2, 4)
-#: Steps over which variants of the geometry are compared, and s, the step of those without friction: blocks then fall
-#: by some 0.4 mm, against which 1e-12 of the extent is below a tenth of the bound.
+#: Number of steps over which variants of the geometry are compared, and the step, s, of those without friction: blocks
+#: then fall by some 0.4 mm, relative to which 1e-12 of the extent is below a tenth of the bound.
 FIRST, FRICTIONLESS_STEP = 3, 3e-3
-#: Works are compared over the larger of what gravity does, and what it would do on this share of the rock over the
-#: displacement from which rock counts as moving: what does next to nothing is not magnified.
+#: Works are compared relative to the larger of gravity's work, and its work on this fraction of the rock over the
+#: displacement from which rock counts as moving: negligible motion is not magnified.
 LEAST_SHARE = 0.01
-#: Of a vertex, over the extent of the blocks: round-off of coordinates.
+#: Noise of a vertex, relative to the extent of the blocks: round-off of coordinates.
 NOISE = 1e-12
-#: Centroids of a block in two variants are nearer to each other than this share of the extent: parts of a block that
-#: cracks have cut lie where the cracks run, and how far apart is compared.
+#: Centroids of a block in two variants are closer to each other than this part of the extent: parts of a block cut by
+#: cracks depend on the crack paths, and their distance is compared.
 SAME_BLOCK = 1e-2
-#: m: how far a shifted slope lies from where it was drawn.
+#: m: distance of a shifted slope from its drawn location.
 FAR = 1e4
 
 VARIANTS: dict[str, Isometry | None] = {
@@ -71,7 +71,7 @@ VARIANTS: dict[str, Isometry | None] = {
 
 @dataclass(frozen=True)
 class Bound:
-    """What a quantity may differ by, and what it is relative to."""
+    """Bound of a quantity, and the scale to which it is relative."""
 
     bound: float
     meaning: str
@@ -92,7 +92,7 @@ BOUNDS = {
         )
     },
 }
-#: Words of warnings by which a run says that its result is not to be relied on.
+#: Words of warnings in which a run says that its result is unreliable.
 WARNED = ("nothing holds", *sorted({words for invariant in INVARIANTS.values() for words in invariant.reported}))
 _MODULES = (
     "drawn_slopes", "limited_runs", "moved_mass", "random_slopes", "refusals", "slope_invariance", "slope_invariants",
@@ -101,9 +101,13 @@ _MODULES = (
 
 @dataclass(frozen=True)
 class Invariance:
-    """What became of a ``seed``: ``moved`` share of the rock and ``work`` of gravity, J/m, in steps of dt, dt/2 and
-    dt/4 (nan: not finished); ``scatter`` by name of a `Bound`; ``faults`` (in silence) and ``reported`` (a warning says
-    so) as lines; ``left_out``: variants that were not compared, and why."""
+    """Outcome of a ``seed``.
+
+    moved      fraction of the rock; ``work``: of gravity, J/m, in steps of dt, dt/2 and dt/4 (nan: not finished)
+    scatter    by name of a `Bound`
+    faults     (without a warning) and ``reported`` (with one), as lines
+    left_out   variants that were not compared, and why
+    """
 
     seed: int
     verdict: str
@@ -120,7 +124,7 @@ class Invariance:
 
     @property
     def worst(self) -> dict[str, float]:
-        """As the picture asks for it."""
+        """For the picture."""
         return self.scatter
 
     @property
@@ -130,7 +134,7 @@ class Invariance:
 
 @dataclass(frozen=True, eq=False)
 class _Run:
-    """How a run ``ended``, and where it has brought the blocks: None if it did not come to its end."""
+    """How a run ``ended``, and the final state of the blocks: None if it did not reach its end."""
 
     ended: Ended
     at: BlockDisplacements | None = None
@@ -147,7 +151,7 @@ class _Run:
 
 
 def invariance(seed: int, seconds: float = LIMIT, text: str | None = None) -> Invariance:
-    """The slope of a ``seed`` (or of ``text``) in all variants, each run for at most so many processor ``seconds``."""
+    """The slope of a ``seed`` (or of ``text``) in all variants, each run with at most ``seconds`` processor seconds."""
     try:
         scene = drawn(scene_text(seed) if text is None else text)
         first = problem_of(scene)
@@ -167,7 +171,7 @@ def invariance(seed: int, seconds: float = LIMIT, text: str | None = None) -> In
 
 
 class _Compared:
-    """The runs of a slope, as they are compared one by one."""
+    """The runs of a slope, compared one by one."""
 
     def __init__(self, seed: int, scene: Scene, seconds: float) -> None:
         self.seed, self.scene, self.seconds = seed, scene, seconds
@@ -261,7 +265,7 @@ class _Compared:
         return _Run(ended, at, np.array([statistics.get("gravity_work", 0.0), *energies]))
 
     def _both(self, what: str, one: _Run, other: _Run) -> bool:
-        """Whether both came to their end; one refused, or in error, where the other is not, is told of."""
+        """Whether both reached their end; a refusal or an error of only one is recorded."""
         ends = {run.ended.verdict for run in (one, other)}
         if ends == {RIGHT}:
             return True
@@ -297,8 +301,8 @@ def _until(problem: Problem, end: float) -> Problem:
 
 
 def _difference(base: _Run, run: _Run, by: Isometry) -> float | None:
-    """The largest difference of a block's displacement over the largest displacement, of its place over the extent, or
-    of an energy over the largest energy, whichever is most; None: they are not the same blocks."""
+    """The largest of: difference of a block's displacement over the largest displacement, of its position over the
+    extent, or of an energy over the largest energy; None if the blocks are not the same."""
     from scipy.spatial import cKDTree
 
     one, other = base.at, run.at
@@ -318,8 +322,11 @@ def _difference(base: _Run, run: _Run, by: Isometry) -> float | None:
 def measure_invariance(
     seeds: Sequence[int], seconds: float = LIMIT, folder: Path = FOLDER, workers: int | None = None
 ) -> Measured:
-    """Every one of the ``seeds``, one on each core (``workers``), as text; rows, JSON and a picture go to ``folder``.
-    Seeds that the same program has run before, as the rows there tell, are not run again."""
+    """Every one of the ``seeds``, one on each core (``workers``), as text; rows, JSON and a picture are written to
+    ``folder``.
+
+    Seeds already run by the same program, according to the rows there, are not run again.
+    """
     from ...render.benchmarks.slope_outcomes import draw
 
     rows = rows_of_seeds(
@@ -343,7 +350,7 @@ def measure_invariance(
 
 
 def compile_kernels() -> None:
-    """Run slopes that are not measured, so that none that is has to wait for a compiler."""
+    """Run slopes that are not measured, so that no measured one has to wait for compilation."""
     from .fuzzed_slopes import LIGHT, watched
 
     for seed in LIGHT:
@@ -355,7 +362,7 @@ def _row_of_run(seconds: float, seed: int) -> dict:
 
 
 def table(every: Sequence[Invariance]) -> Measured:
-    """A line a seed, the worst of every quantity beside its bound, and the share of slopes that are wrong."""
+    """One line per seed, the worst of every quantity next to its bound, and the fraction of wrong slopes."""
     lines = [
         "moved: share of the rock that goes farther than 1 mm (in short runs, a tenth of free fall), in steps of dt, "
         "dt/2, dt/4;",

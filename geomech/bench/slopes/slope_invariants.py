@@ -1,4 +1,4 @@
-"""What must hold of any scene, held against every cycle of a run, and how near each came to its bound."""
+"""Invariants of any scene, checked in every cycle of a run, and the values closest to their bounds."""
 
 from __future__ import annotations
 
@@ -17,8 +17,11 @@ from ...model import OPEN, Cycle, Problem
 
 @dataclass(frozen=True)
 class Invariant:
-    """``bound`` of a quantity that is relative to what ``meaning`` says; a run that goes beyond it is wrong, unless a
-    warning with one of the words ``reported`` says so: in this step or the one before, or (``lasting``) in any before."""
+    """``bound`` of a quantity relative to the scale given in ``meaning``.
+
+    A run beyond it is wrong, unless a warning with one of the words ``reported`` says so: in this step or the one
+    before, or (``lasting``) in any earlier one.
+    """
 
     meaning: str
     bound: float
@@ -26,11 +29,10 @@ class Invariant:
     lasting: bool = True
 
 
-#: A block and cracks that do not agree strain too much, lie in their neighbours, and are out of balance by their
+#: A block and cracks that disagree have too much strain, overlap their neighbours, and are out of balance by their
 #: strain.
 _HANGS, _STRAINED = "no common strain", "beyond the elastic range"
-#: Faces in a blade of rock, of which the crack solver says where, over which length and by how much they miss their
-#: laws.
+#: Faces in a blade of rock, for which the crack solver reports place, length and violation of their laws.
 _UNSETTLED = "left with a violation"
 
 INVARIANTS = {
@@ -42,7 +44,7 @@ INVARIANTS = {
         (_HANGS, _STRAINED),
     ),
     "motion": Invariant("equations of motion of all blocks, over the largest force", 1e-6),
-    # Beyond the strain, see `Invariants._balance`.
+    # In excess of the strain, see `Invariants._balance`.
     "balance": Invariant(
         "loads of a cracked block out of balance, over their size", 1e-5, (_HANGS, _STRAINED, "out of balance")
     ),
@@ -71,8 +73,8 @@ INVARIANTS = {
 
 
 class Invariants:
-    """The cycles so far: ``worst`` of every quantity, ``faults`` of what went beyond its bound without a word, and
-    those that a warning ``reported`` of. ``heard`` gives the warnings so far."""
+    """The cycles so far: ``worst`` of every quantity, ``faults`` beyond a bound without a warning, and those
+    ``reported`` by one. ``heard`` gives the warnings so far."""
 
     def __init__(self, problem: Problem, heard: Callable[[], list[str]]) -> None:
         self.heard = heard
@@ -80,7 +82,7 @@ class Invariants:
         self.faults: list[str] = []
         self.reported: list[str] = []
         self._static = problem.dda.dynamic_factor == 0.0
-        # Corners that pass each other within their rounding lie in each other by a part of it.
+        # Corners that pass each other within their rounding length overlap by a part of it.
         self._rounded = ROUNDED_OVERLAP * problem.dda.corner_rounding
         self._tough = np.array([material.k_ic for material in problem.materials])
         self._bond = max(law.tensile_strength for law in problem.face_laws)
@@ -88,7 +90,7 @@ class Invariants:
         self._time = self._area = 0.0
         self._strain = 0.0
         self._standing: tuple[int, float, str] | None = None
-        # How many warnings there had been at the last cycle, and at the one before.
+        # Number of warnings at the last cycle, and at the one before.
         self._heard_at = (0, 0)
 
     def check(self, cycle: Cycle) -> None:
@@ -105,7 +107,7 @@ class Invariants:
         self._heard_at = (self._heard_at[1], len(self.heard()))
 
     def end(self) -> None:
-        """After the last cycle of a run that came to its end: tips stand in it."""
+        """After the last cycle of a run that reached its end: its tips are at rest."""
         for name, value, where in self._stood():
             self._take(name, value, f"at the end: {where}")
 
@@ -135,11 +137,11 @@ class Invariants:
     def _balance(self, cycle: Cycle) -> Iterator[tuple[str, float, str]]:
         reported = cycle.statistics
         yield "motion", reported.get("unbalanced", 0.0), "the blocks"
-        # Contacts that are pressed in, or stand apart, act off the outlines by as much; strained blocks, by their
-        # corners' angles. (Found: up to 0.5 of the strain at the start of the step.)
+        # Contacts with penetration or mismatch act off the outlines by that distance; those of strained blocks, by
+        # their corners' angles. (Found: up to 0.5 of the strain at the start of the step.)
         yield "balance", reported.get("traction_imbalance", 0.0), "cracked blocks"
         yield "agreement", reported.get("compliance_mismatch", 0.0), "cracked blocks"
-        # As the budget counts it: works, or what is stored where next to nothing moves.
+        # As in the budget: relative to works, or to stored energy where hardly anything moves.
         works, stores = ("gravity_work", "load_work", "crack_work", "friction_loss"), ("kinetic", "elastic", "contact")
         turned = sum(abs(reported.get(name, 0.0)) for name in works)
         turned = max(turned, sum(reported.get(f"{name}_energy", 0.0) for name in stores))
@@ -148,7 +150,7 @@ class Invariants:
         yield "budget", abs(reported.get("budget_residual", 0.0)), "blocks and cracks"
 
     def _growth(self, cycle: Cycle) -> Iterator[tuple[str, float, str]]:
-        # Whether the tips of a cycle stand is known when the next one is that of another load.
+        # Whether the tips of a cycle are at rest is known when the next one belongs to another load.
         if self._standing is not None and cycle.growth_pass == 0:
             yield from self._stood()
         self._standing = None
@@ -167,7 +169,7 @@ class Invariants:
         shut = np.zeros(0, bool) if faces is None else np.isfinite(cycle.cracks.aperture[faces.segment])
         if not shut.any():
             return
-        # The nodes of collocation: between them polynomials may dip.
+        # The collocation nodes: between them polynomials may dip.
         opening, normal, state = faces.opening[shut, 1:-1], faces.traction[shut, 1:-1, 0], faces.state[shut, 1:-1]
         aperture = cycle.cracks.aperture[faces.segment[shut]][:, None]
         scale = max(float(np.abs(faces.opening).max()), float(np.abs(faces.slip).max()), 1e-12)

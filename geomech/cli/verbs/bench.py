@@ -1,4 +1,4 @@
-"""``geomech bench``: what things cost and how right they are, now and against figures of before."""
+"""``geomech bench``: cost and accuracy, now and compared with earlier figures."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from ..verb import DONE, FAILED, BadInput, Verbs, add_verb, check_writable
 def declare(verbs: Verbs) -> None:
     """The verb's arguments."""
     bench = add_verb(
-        verbs, "bench", _bench, "measure what things cost and how right they are (run it in the project's folder)",
+        verbs, "bench", _bench, "measure cost and accuracy (run it in the project's folder)",
         "geomech bench startup\ngeomech bench --quick --out before.json\ngeomech bench --quick --against before.json",
     )  # fmt: skip
     bench.add_argument("topics", nargs="*", metavar="TOPIC", help=f"{', '.join(TOPICS)} (default: all)")
@@ -25,26 +25,29 @@ def declare(verbs: Verbs) -> None:
         "--out", type=Path, metavar="FILE", help="where the figures go, JSON (default outputs/bench/figures.json)"
     )
     bench.add_argument(
-        "--against", type=Path, metavar="FILE", help="figures of an earlier run: say what got slower or less accurate"
+        "--against",
+        type=Path,
+        metavar="FILE",
+        help="figures of an earlier run: report what became slower or less accurate",
     )
     bench.add_argument(
         "--seeds", metavar="FIRST-LAST",
-        help="of safety, slopes and sliding: run these, one on each core, and leave rows (and a picture) in "
+        help="for safety, slopes and sliding: run these seeds, one on each core, and leave rows (and a picture) in "
              "outputs/bench_safety, outputs/bench_slopes or outputs/bench_sliding; seeds that have been run before, by "
              "the same program, are not run again",
     )  # fmt: skip
     bench.add_argument(
         "--invariance", action="store_true",
-        help="of slopes, with --seeds: hold the moved mass, its gravity work, displacements and energies of each "
-             "against those in shorter steps, mirrored, rotated, shifted, with joints in another order and with noise",
+        help="for slopes, with --seeds: compare moved mass, its gravity work, displacements and energies of each "
+             "with those in shorter steps, mirrored, rotated, shifted, with joints in another order and with noise",
     )  # fmt: skip
     bench.add_argument(
         "--blocks",
         type=int,
         metavar="N",
-        help="of dda: a wall and a slope of so many too (100000: 12 minutes, 7 GB); of motion: a slope of so many too",
+        help="for dda: also a wall and a slope of this many blocks (100000: 12 minutes, 7 GB); for motion: also such a slope",
     )
-    bench.add_argument("--seconds", type=float, metavar="S", help="of debris: follow it for so long (60: an hour)")
+    bench.add_argument("--seconds", type=float, metavar="S", help="for debris: simulated time, s (60: an hour)")
 
 
 def _bench(options: argparse.Namespace) -> int:
@@ -110,7 +113,7 @@ def _bench(options: argparse.Namespace) -> int:
 
 
 def _seeds(options: argparse.Namespace) -> range:
-    """The seeds that are asked for; none: the benchmark's own."""
+    """The requested seeds; none: the benchmark's own."""
     if options.seeds is None:
         return range(0)
     if not {"safety", "slopes", "sliding"} & set(options.topics):

@@ -1,4 +1,4 @@
-"""``geomech build``: the blocks that a scene is cut into, written and drawn before anything runs."""
+"""``geomech build``: the blocks into which a scene is cut, written and drawn before a run."""
 
 from __future__ import annotations
 
@@ -15,8 +15,7 @@ from ..verb import DONE, BadInput, Verbs, add_verb, check_folder, check_writable
 def declare(verbs: Verbs) -> None:
     """The verb's arguments."""
     build = add_verb(
-        verbs, "build", _build, "write the blocks that a scene is cut into, and a picture of them, before anything "
-                                "runs",
+        verbs, "build", _build, "write and draw the blocks into which a scene is cut, before a run",
         "geomech build slope.toml\ngeomech build slope.toml --set geometry.seed=7 --out /tmp/seed7",
     )  # fmt: skip
     build.description = str(build.description) + (
@@ -53,7 +52,7 @@ def _build(options: argparse.Namespace) -> int:
         _refused(lambda: check_format(options.export))
     first = load_scene(options.scene, options.overrides, None, to_run=False)
     scenes = scenes_asked(first, options, to_run=False)
-    # What was mended stands among the lines of each scene.
+    # Repairs are listed with the lines of each scene.
     say_warnings(scenes.values(), but=MENDED)
     for name, scene in scenes.items():
         folder = options.out or (default_folder(options.scene) / (name or "") / "build")
@@ -84,7 +83,7 @@ def _build(options: argparse.Namespace) -> int:
 
 
 def _refused(export: Callable[[], str | None]) -> str | None:
-    """What ``export`` returns; what it refuses is bad input."""
+    """The result of ``export``; its refusals count as bad input."""
     try:
         return export()
     except ValueError as error:

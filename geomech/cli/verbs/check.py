@@ -1,4 +1,4 @@
-"""``geomech check``: every error of a scene at once, or what the scene holds."""
+"""``geomech check``: all errors of a scene at once, or its content."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from ..verb import DONE, Verbs, add_verb
 def declare(verbs: Verbs) -> None:
     """The verb's arguments."""
     check = add_verb(
-        verbs, "check", _check, "read a scene, build its geometry and say every error in it at once",
+        verbs, "check", _check, "read a scene, build its geometry and report all its errors",
         "geomech check pipelines/two_cracks\ngeomech check scene.toml --set growth.criterion=g",
     )  # fmt: skip
     scene_arguments(check)
-    check.add_argument("--keys", action="store_true", help="list every key a scene may have, and what it means")
+    check.add_argument("--keys", action="store_true", help="list all keys of a scene with their meaning")
 
 
 def _check(options: argparse.Namespace) -> int:

@@ -1,4 +1,4 @@
-"""``geomech doctor``: what this machine lacks, and how to mend it."""
+"""``geomech doctor``: missing parts of the installation, and how to add them."""
 
 from __future__ import annotations
 
@@ -10,12 +10,10 @@ from ..verb import DONE, FAILED, Verbs, add_verb
 def declare(verbs: Verbs) -> None:
     """The verb's arguments."""
     doctor = add_verb(
-        verbs, "doctor", _doctor, "check this machine: libraries, caches; say how to mend what is missing",
+        verbs, "doctor", _doctor, "check this machine: libraries, caches; show how to install what is missing",
         "geomech doctor\ngeomech doctor --warm",
     )  # fmt: skip
-    doctor.add_argument(
-        "--warm", action="store_true", help="compile the kernels that ordinary scenes call on, before the first does"
-    )
+    doctor.add_argument("--warm", action="store_true", help="compile the kernels that ordinary scenes use, in advance")
 
 
 def _doctor(options: argparse.Namespace) -> int:

@@ -8,21 +8,21 @@ from pathlib import Path
 from ..runs import open_run
 from ..verb import DONE, BadInput, Verbs, add_verb, check_folder
 
-#: Pixels, as for a scene's own render.width_px.
+#: Limits of the width in pixels, as for render.width_px in a scene.
 LEAST_WIDTH = 64
-#: Options that ask for a picture of one field.
+#: Options that request a picture of one field.
 _OF_FIELDS = ("field", "cycle", "time", "range", "scale", "mp4", "compression_positive", "format")
 
 
 def declare(verbs: Verbs) -> None:
     """The verb's arguments."""
     render = add_verb(
-        verbs, "render", _render, "draw a run: what it came to as a picture, its course as a movie, its curves",
+        verbs, "render", _render, "draw a run: pictures of its end, a movie, and curves",
         "geomech render outputs/two_cracks/phi_30 --component yy --no-gif\n"
         "geomech render outputs/my_slope --field slip --time 0.3 --scale 1",
     )  # fmt: skip
     render.description = str(render.description) + (
-        " What is not said here, the scene's [render] table says. With --field, --cycle, --time, --range, --scale or "
+        " Other settings come from the scene's [render] table. With --field, --cycle, --time, --range, --scale or "
         "--mp4 it draws one field; several runs get the same colours."
     )
     render.add_argument("runs", type=Path, nargs="+", metavar="RUN", help="run folder, or several to compare")
@@ -33,14 +33,14 @@ def declare(verbs: Verbs) -> None:
                         help="displacement, velocity, slip, opening, force, K, principal, a stress component, or any "
                              "written field such as contacts.gap or velocity.X")  # fmt: skip
     moment = render.add_mutually_exclusive_group()
-    moment.add_argument("--cycle", type=int, metavar="N", help="draw this cycle, or the last one written before it")
+    moment.add_argument("--cycle", type=int, metavar="N", help="draw this cycle, or the last written one before it")
     moment.add_argument("--time", type=float, metavar="S", help="draw this time, s")
     render.add_argument("--range", type=float, nargs=2, metavar=("LOW", "HIGH"), help="span of the colours, SI units")
     render.add_argument("--scale", type=float, metavar="X", help="factor on displacements; 1 is true to scale")
     render.add_argument("--size", metavar="WxH", help="pixels, as 1600 or 1600x900")
     render.add_argument("--width", type=int, metavar="PX", help="width of the pictures")
     render.add_argument("--compression-positive", action="store_true", help="stresses with compression positive")
-    render.add_argument("--format", choices=("png", "pdf", "svg"), help="of a field's picture (default png)")
+    render.add_argument("--format", choices=("png", "pdf", "svg"), help="format of a field's picture (default png)")
     render.add_argument("--gif", action=argparse.BooleanOptionalAction, default=None, help="draw the movie")
     render.add_argument("--mp4", action="store_true", help="draw the movie as MP4 (needs imageio-ffmpeg)")
 
@@ -61,7 +61,7 @@ def _render(options: argparse.Namespace) -> int:
 
 
 def _size(options: argparse.Namespace) -> tuple[int | None, int | None]:
-    """(width, height) in pixels; None where not asked for."""
+    """(width, height) in pixels; None if not given."""
     width, height = options.width, None
     if options.size is not None:
         parts = options.size.lower().split("x")
@@ -70,7 +70,7 @@ def _size(options: argparse.Namespace) -> tuple[int | None, int | None]:
         width, height = int(parts[0]), int(parts[1]) if len(parts) == 2 else None
     for pixels, what in ((width, "width"), (height, "height")):
         if pixels is not None and pixels < LEAST_WIDTH:
-            raise BadInput(f"a {what} of {pixels} pixels shows nothing; give at least {LEAST_WIDTH}")
+            raise BadInput(f"a {what} of {pixels} pixels is too small; give at least {LEAST_WIDTH}")
     return width, height
 
 

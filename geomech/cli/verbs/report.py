@@ -1,5 +1,5 @@
-"""Pages of runs: ``geomech report``, a table and a page with tables, curves and pictures; ``geomech view``, runs in the
-browser, cycle by cycle, while they last."""
+"""``geomech report``: a table, and a page with tables, curves and pictures; ``geomech view``: runs in the browser,
+cycle by cycle, also while they run."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ def declare(verbs: Verbs) -> None:
     """The verbs' arguments."""
     _declare_view(verbs)
     report = add_verb(
-        verbs, "report", _report, "tabulate what runs came to, and write a page with tables, curves and pictures",
+        verbs, "report", _report, "tabulate the results of runs, and write a page with tables, curves and pictures",
         "geomech report outputs/two_cracks/phi_0\ngeomech report outputs/two_cracks\ngeomech report outputs/bench_ddm\n"
         "geomech report outputs/slope_sweep",
     )  # fmt: skip
     report.description = (
         str(report.description)
-        + " The page is one file that needs nothing else: of a run, of runs side by side, of a sweep, or of what a benchmark left."
+        + " The page is one self-contained file: of a run, of several runs side by side, of a sweep, or of a benchmark."
     )
     report.add_argument(
         "runs", nargs="+", type=Path, metavar="RUN", help="run folders, folders of run folders, or a benchmark's folder"
@@ -37,25 +37,28 @@ def declare(verbs: Verbs) -> None:
         help="where the page goes (default report.html in RUN, runs.html where RUN holds several)",
     )
     report.add_argument(
-        "--play", action=argparse.BooleanOptionalAction, default=True, help="a slider over the cycles in the page"
+        "--play",
+        action=argparse.BooleanOptionalAction,
+        default=True,
+        help="include a player with a slider over the cycles",
     )
     report.add_argument("--page", action=argparse.BooleanOptionalAction, default=True, help="write the page")
 
 
 def _declare_view(verbs: Verbs) -> None:
     view = add_verb(
-        verbs, "view", _view, "play runs in the browser, cycle by cycle, also while they last",
+        verbs, "view", _view, "play runs in the browser, cycle by cycle, also while they run",
         "geomech view outputs/two_cracks/phi_30\ngeomech view outputs/two_cracks/phi_0 outputs/two_cracks/phi_30\n"
         "geomech view outputs/slope --out slope.html",
     )  # fmt: skip
     view.add_argument("runs", nargs="+", type=Path, metavar="RUN", help="run folders, up to four side by side")
     view.add_argument(
-        "--out", type=Path, metavar="FILE", help="write the page as one file that needs no server, and open nothing"
+        "--out", type=Path, metavar="FILE", help="write the page as one self-contained file, and do not open it"
     )
     view.add_argument(
         "--megabytes", type=float, default=8.0, metavar="N", help="size of that file, in which cycles are thinned (8)"
     )
-    view.add_argument("--port", type=int, default=0, help="port of the server (default: any that is free)")
+    view.add_argument("--port", type=int, default=0, help="port of the server (default: any free one)")
     view.add_argument(
         "--host",
         default="127.0.0.1",
@@ -106,12 +109,12 @@ def _view(options: argparse.Namespace) -> int:
         raise BadInput(f"--port: {options.port} is no port; give 0 to 65535")
     folders = [_only_run(place) for place in options.runs]
     if len(folders) > MOST_RUNS:
-        raise BadInput(f"{len(folders)} runs are more than fit side by side; give up to {MOST_RUNS}")
+        raise BadInput(f"{len(folders)} runs do not fit side by side; give up to {MOST_RUNS}")
     return _write(options, folders) if options.out is not None else _serve(options, folders)
 
 
 def _only_run(place: Path) -> Path:
-    """The run in ``place``; the only one below it where it holds none itself."""
+    """The run in ``place``; else the only one below it."""
     below = run_folders(place)
     folder = below[0] if len(below) == 1 else place
     open_run(folder)
@@ -124,7 +127,7 @@ def _write(options: argparse.Namespace, folders: list[Path]) -> int:
 
     check_writable("--out", options.out)
     if not 0.01 <= options.megabytes <= 1000:
-        raise BadInput(f"--megabytes: {options.megabytes:g} is no size of a page; give 0.01 to 1000")
+        raise BadInput(f"--megabytes: {options.megabytes:g} is not a possible size of a page; give 0.01 to 1000")
     try:
         path = write_player([open_run(folder) for folder in folders], options.out, int(1e6 * options.megabytes))
     except NothingToPlay as error:
@@ -139,12 +142,12 @@ def _serve(options: argparse.Namespace, folders: list[Path]) -> int:
     try:
         viewer = Viewer(folders, options.host, options.port)
     except PortInUse as error:
-        raise BadInput(f"--port: {error}; leave it out, and a free one is taken") from None
+        raise BadInput(f"--port: {error}; leave it out to use a free one") from None
     except OSError as error:
         raise BadInput(f"--host: {options.host} is no address of this machine ({error.strerror})") from None
     say(f"{viewer.title}: {viewer.address}")
     if not viewer.local:
-        say("whoever has this address can see the runs; it is not encrypted, so use it in a network you trust")
+        say("anyone with this address can see the runs; it is not encrypted, so use it in a trusted network only")
     if options.browser and not _opened(viewer.address):
         say("no browser could be opened here: open the address in yours; from another machine, first\n"
             f"    ssh -L {viewer.port}:localhost:{viewer.port} THIS_MACHINE")  # fmt: skip
@@ -158,7 +161,7 @@ def _serve(options: argparse.Namespace, folders: list[Path]) -> int:
 
 def _opened(address: str) -> bool:
     if sys.platform.startswith("linux") and not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
-        return False  # what could open here would take the terminal
+        return False  # a browser that could be opened here would run in this terminal
     try:
         return webbrowser.open(address)
     except webbrowser.Error:

@@ -1,4 +1,4 @@
-"""``geomech resume``: a run goes on from its last checkpoint."""
+"""``geomech resume``: continue a run from its last checkpoint."""
 
 from __future__ import annotations
 
@@ -14,22 +14,21 @@ from .run import prepare_for_a_run
 def declare(verbs: Verbs) -> None:
     """The verb's arguments."""
     resume = add_verb(
-        verbs, "resume", _resume, "go on with a run that was interrupted, killed, or is to last longer, from its last "
-                                  "checkpoint",
+        verbs, "resume", _resume, "continue a run from its last checkpoint: interrupted, killed, or to be extended",
         "geomech resume outputs/two_cracks/phi_30\ngeomech resume outputs/slope --set run.end_time_s=20",
     )  # fmt: skip
     resume.description = str(resume.description) + (
-        " The results are the same to the last bit as without the interruption. A run ends its cycle and stores "
-        "its state on Ctrl-C or SIGTERM; a second one ends it at once. A run that a "
-        "script has put in the background ignores Ctrl-C and ends on SIGTERM (`kill`)."
+        " The results are bit for bit those without the interruption. A run ends its cycle and stores "
+        "its state on Ctrl-C or SIGTERM; a second one ends it at once. A run started in the "
+        "background by a script ignores Ctrl-C and ends on SIGTERM (`kill`)."
     )
     resume.add_argument("run", type=Path, metavar="RUN", help="run folder")
     resume.add_argument(
         "--set", action="append", default=[], metavar="KEY=VALUE", dest="overrides",
-        help="change a key that does not change what has happened: run.end_time_s, run.stop_at, output.every … "
+        help="change a key that does not affect the past: run.end_time_s, run.stop_at, output.every … "
         "(may be repeated)",
     )  # fmt: skip
-    resume.add_argument("--quiet", action="store_true", help="say nothing but errors")
+    resume.add_argument("--quiet", action="store_true", help="print nothing but errors")
     trust_argument(resume)
 
 

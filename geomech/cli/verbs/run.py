@@ -1,4 +1,4 @@
-"""``geomech run``: a scene, all variants of it, or a pipeline folder with a script of its own."""
+"""``geomech run``: a scene, all its variants, or a pipeline folder with a script of its own."""
 
 from __future__ import annotations
 
@@ -21,9 +21,11 @@ def declare(verbs: Verbs) -> None:
     scene_arguments(run)
     run.add_argument("--out", type=Path, metavar="DIR", help="run folder (default outputs/NAME[/VARIANT])")
     run.add_argument(
-        "--overwrite", action="store_true", help="replace what an earlier run has left in the run folder (else refused)"
+        "--overwrite",
+        action="store_true",
+        help="replace the results of an earlier run in the run folder (otherwise refused)",
     )
-    run.add_argument("--quiet", action="store_true", help="say nothing but errors")
+    run.add_argument("--quiet", action="store_true", help="print nothing but errors")
 
 
 def _run(options: argparse.Namespace) -> int:
@@ -46,12 +48,12 @@ def _run_all(options: argparse.Namespace) -> int:
     from ...pipeline import refuse_results, run
     from ...scene import load_scene
 
-    # Every variant is read before the first one runs: an error in the last should not cost an hour.
+    # All variants are read before the first one runs: an error in the last should not cost an hour.
     scenes = scenes_asked(load_scene(place, options.overrides, None), options)
     if not options.quiet:
         say_warnings(scenes.values())
     base = options.out or default_folder(place)
-    # One variant with --out goes into exactly that folder.
+    # A single variant with --out goes into exactly that folder.
     alone = options.out and len(scenes) == 1
     folders = {name: base if name is None or alone else base / name for name in scenes}
     refuse_results(folders.values())
@@ -61,7 +63,7 @@ def _run_all(options: argparse.Namespace) -> int:
 
 
 def _run_script(place: Path, options: argparse.Namespace) -> int:
-    """Hand a pipeline's own script what the command line says, its variants by name."""
+    """Pass the command line to a pipeline's own script, with the names of its variants."""
     variants = options.variants
     if (place / "scene.toml").is_file():
         from ...scene import load_scene
@@ -71,7 +73,7 @@ def _run_script(place: Path, options: argparse.Namespace) -> int:
         if not options.quiet:
             say_warnings(scenes_asked(first, options).values())
     elif "all" in variants:
-        raise BadInput(f"{place} holds no scene.toml that says what its variants are: name them")
+        raise BadInput(f"{place} holds no scene.toml with variants: name them")
     from ...output.console.at_work import AtWork
 
     script = _load_script(place / "run.py")
@@ -95,22 +97,22 @@ def _load_script(path: Path) -> Any:
 
 
 def prepare_for_a_run() -> None:
-    """Let SIGTERM and SIGHUP end this process as Ctrl-C does, and spare it the searches for reference loops that a
-    run pays for in vain."""
+    """Let SIGTERM and SIGHUP end this process like Ctrl-C, and switch off Python's search for reference cycles, which
+    costs time and finds nothing."""
     import atexit
     import gc
     import signal
     import threading
 
     if threading.current_thread() is threading.main_thread():
-        # A batch system's SIGTERM and the SIGHUP of a terminal that is gone end a run as Ctrl-C does, with its summary
-        # written. `nohup` ignores the latter.
+        # SIGTERM of a batch system and SIGHUP of a closed terminal end a run like Ctrl-C, with its summary written.
+        # `nohup` ignores the latter.
         for number in (signal.SIGTERM, signal.SIGHUP):
             if signal.getsignal(number) is not signal.SIG_IGN:
                 signal.signal(number, signal.default_int_handler)
-    # A cycle makes thousands of short-lived arrays and no reference loops worth speaking of: looking for loops every
-    # 700 of them costs a twentieth of a run.
+    # A cycle makes thousands of short-lived arrays and hardly any reference cycles: searching for them after every 700
+    # objects takes a twentieth of a run.
     gc.set_threshold(50_000, 20, 20)
-    # Python ends with three searches for loops in all that was ever imported, a third of a second: leave these to the
+    # At exit Python searches three times for cycles in everything imported, a third of a second: this is left to the
     # operating system.
     atexit.register(gc.freeze)

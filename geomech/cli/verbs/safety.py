@@ -1,4 +1,4 @@
-"""``geomech safety``: the factor of safety by strength reduction."""
+"""``geomech safety``: factor of safety by strength reduction."""
 
 from __future__ import annotations
 
@@ -14,15 +14,15 @@ from ..verb import DONE, BadInput, Verbs, add_verb, check_writable
 def declare(verbs: Verbs) -> None:
     """The verb's arguments."""
     safety = add_verb(
-        verbs, "safety", _safety, "find by what factor the strength of joints may be divided before the blocks go",
+        verbs, "safety", _safety, "find the factor by which the strength of joints can be divided before the blocks fail",
         "geomech safety slope.toml\n"
         "geomech safety slope.toml --along bedding fault --json safety.json --picture mechanism.png\n"
         "geomech safety slope.toml --divide cohesion=1.25 friction=1.25 tension=1.0",
     )  # fmt: skip
     safety.description = (safety.description or "") + (
         " tan φ, cohesion and tensile strength of the joints are divided by F until no static equilibrium is left. "
-        "Blocks are whole: where cracks lead into blocks that can move, what rock bridges hold would count as if it "
-        "could not break, and no factor is given unless it is asked for --without-cracks."
+        "Blocks are intact: where cracks end in blocks that can move, rock bridges would count as unbreakable, and a "
+        "factor is given only with --without-cracks."
     )
     scene_arguments(safety)
     safety.add_argument(
@@ -32,24 +32,26 @@ def declare(verbs: Verbs) -> None:
     safety.add_argument(
         "--divide", nargs="+", action="extend", metavar="STRENGTH=X",
         help="partial factors of a design code on cohesion, friction (tan φ) and tension (tensile strength) of all "
-             "joints, as cohesion=1.25: divided before, the factor comes on top of them",
+             "joints, as cohesion=1.25: applied first, the factor is in addition to them",
     )  # fmt: skip
     safety.add_argument(
         "--tolerance", type=float, default=2e-3, metavar="X", help="relative width of the bracket (2e-3)"
     )
-    safety.add_argument("--at", type=float, metavar="S", help="time whose loads act, s (default: the scene's end)")
+    safety.add_argument(
+        "--at", type=float, metavar="S", help="time at which the loads are taken, s (default: the scene's end)"
+    )
     safety.add_argument(
         "--without-cracks", action="store_true",
-        help="leave cracks inside blocks out, as if rock bridges never broke: the factor is then a bound from above",
+        help="leave out cracks inside blocks, as if rock bridges never broke: the factor is then an upper bound",
     )  # fmt: skip
     safety.add_argument(
         "--json", "--out", type=Path, metavar="FILE", dest="out",
-        help="write all that is printed, and every trial, to a JSON file as well",
+        help="also write everything printed, and every trial, to a JSON file",
     )  # fmt: skip
     safety.add_argument(
         "--picture", type=Path, metavar="FILE", help="draw the mechanism (PNG, PDF or SVG by the file's name)"
     )
-    safety.add_argument("--quiet", action="store_true", help="say nothing of the trials while they are made")
+    safety.add_argument("--quiet", action="store_true", help="do not report trials as they are made")
 
 
 def _safety(options: argparse.Namespace) -> int:
@@ -80,7 +82,7 @@ def _safety(options: argparse.Namespace) -> int:
                 watch=None if options.quiet else tell, without_cracks=options.without_cracks,
             )  # fmt: skip
         except CracksInBlocks as error:
-            raise BadInput(f"{error}; --without-cracks gives a bound from above") from error
+            raise BadInput(f"{error}; --without-cracks gives an upper bound") from error
         except NothingToReduce as error:
             raise BadInput(str(error)) from error
         title = "factor of the blocks without their cracks" if report.cracks else "factor of safety"
@@ -104,6 +106,6 @@ def _caution(left_out: tuple[str, ...]) -> str:
     from ...model import counted
 
     return (
-        f"not the factor of safety but a bound from above: {counted(len(left_out), 'crack')} left out, "
-        "what rock bridges hold taken as unbreakable"
+        f"not the factor of safety but an upper bound: {counted(len(left_out), 'crack')} left out, "
+        "rock bridges taken as unbreakable"
     )

@@ -1,4 +1,4 @@
-"""``geomech examples | new | schema``: what a new user starts from."""
+"""``geomech examples | new | schema``: starting points for new users."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from ..verb import DONE, BadInput, Verbs, add_verb, check_writable
 def declare(verbs: Verbs) -> None:
     """The verb's arguments."""
     listed = add_verb(
-        verbs, "examples", _examples, "list the examples that came with geomech, or copy one here",
+        verbs, "examples", _examples, "list the examples installed with geomech, or copy one here",
         "geomech examples\ngeomech examples copy two_cracks\ngeomech run two_cracks",
     )  # fmt: skip
     listed.add_argument("what", nargs="?", choices=("list", "copy"), default="list", help="list (default) or copy")
     listed.add_argument("name", nargs="?", help="which example to copy")
     listed.add_argument("--to", type=Path, metavar="DIR", help="the new folder (default ./NAME)")
     begun = add_verb(
-        verbs, "new", _new, "begin a scene of one's own: a commented scene.toml and its Gmsh model",
+        verbs, "new", _new, "start a new scene: a commented scene.toml and its Gmsh model",
         "geomech new slope my_slope\ngeomech build my_slope\ngeomech safety my_slope",
     )  # fmt: skip
     begun.add_argument("kind", help="slope, specimen or tunnel")
@@ -29,7 +29,7 @@ def declare(verbs: Verbs) -> None:
         "geomech schema --out scene.schema.json\n"
         '# then, as the first line of a scene: #:schema ./scene.schema.json',
     )  # fmt: skip
-    schema.add_argument("--out", type=Path, metavar="FILE", help="where to (default: the standard output)")
+    schema.add_argument("--out", type=Path, metavar="FILE", help="output file (default: the standard output)")
 
 
 def _examples(options: argparse.Namespace) -> int:
@@ -56,7 +56,7 @@ def _examples(options: argparse.Namespace) -> int:
 
 
 def _to_run(into: Path, files: list[Path]) -> Path:
-    """What a copied example is run by."""
+    """The command that runs a copied example."""
     if {Path("scene.toml"), Path("run.py")} & set(files):
         return into
     return into / next(file for file in files if file.suffix == ".toml")
@@ -87,5 +87,5 @@ def _schema(options: argparse.Namespace) -> int:
         print(text, end="")
     else:
         options.out.write_text(text, encoding="utf-8")
-        print(f"{options.out}: put `#:schema {options.out.name}` into the first line of a scene next to it")
+        print(f"{options.out}: put `#:schema {options.out.name}` in the first line of a scene in the same folder")
     return DONE

@@ -15,7 +15,7 @@ from .run import prepare_for_a_run
 def declare(verbs: Verbs) -> None:
     """The verb's arguments."""
     made = add_verb(
-        verbs, "sweep", _sweep, "make many runs of a scene: what varies, how often it fails, and how sure that is",
+        verbs, "sweep", _sweep, "run a scene many times with varying input: probability of failure with its confidence interval",
         "geomech sweep slope.toml --vary 'joints.beds.friction_angle_deg=20:40:5'\n"
         "geomech sweep slope.toml --seeds 0-499 --measure safety\n"
         "geomech sweep slope.toml --vary 'joints.beds.friction_angle_deg=normal(30, 4)' --runs 1000 --sampling sobol\n"
@@ -33,8 +33,8 @@ def declare(verbs: Verbs) -> None:
              "triangular(20,30,40), beta(0,1,2,5), exponential(0.08,0,0.16); normal(35,5,15,60) is cut off "
              "(may be repeated)",
     )  # fmt: skip
-    made.add_argument("--seeds", metavar="FIRST-LAST", help="joint seeds, a run each, as 0-499")
-    made.add_argument("--runs", type=int, metavar="N", help="samples of what is distributed")
+    made.add_argument("--seeds", metavar="FIRST-LAST", help="joint seeds, one run each, as 0-499")
+    made.add_argument("--runs", type=int, metavar="N", help="number of samples of the random variables")
     made.add_argument(
         "--sampling", choices=("monte-carlo", "latin-hypercube", "sobol", "saltelli"),
         help="how they are sampled; saltelli gives Sobol' sensitivities (default monte-carlo)",
@@ -45,14 +45,14 @@ def declare(verbs: Verbs) -> None:
         action="append",
         default=[],
         metavar="KEY,KEY=R",
-        help="two random variables that go together, with their correlation (may be repeated)",
+        help="two correlated random variables, with their correlation (may be repeated)",
     )
     made.add_argument(
         "--derive",
         action="append",
         default=[],
         metavar="KEY=EXPRESSION",
-        help="a key that follows from what varies (may be repeated)",
+        help="a key computed from the variables (may be repeated)",
     )
     made.add_argument("--measure", choices=("safety", "run"), help="factor of safety (default), or a run to its end")
     made.add_argument("--fails", metavar="EXPRESSION", help="when a slope counts as failed (factor_of_safety < 1)")
@@ -61,30 +61,30 @@ def declare(verbs: Verbs) -> None:
         action="append",
         default=[],
         metavar="NAME=EXPRESSION",
-        help="one more column, of others, of the summary or of max(history.NAME) (may be repeated)",
+        help="a further column, from other columns, the summary or max(history.NAME) (may be repeated)",
     )
-    made.add_argument("--along", nargs="+", metavar="JOINT", help="of safety: weaken these joints alone")
+    made.add_argument("--along", nargs="+", metavar="JOINT", help="for safety: weaken these joints only")
     made.add_argument(
-        "--without-cracks", action="store_true", default=None, help="of safety: leave cracks in blocks out"
+        "--without-cracks", action="store_true", default=None, help="for safety: leave out cracks inside blocks"
     )
     made.add_argument("--rare", choices=("subset", "importance"), help="method for probabilities below 1e-2")
-    made.add_argument("--keep", choices=("none", "failed", "all"), help="whose run folders are kept (none)")
+    made.add_argument("--keep", choices=("none", "failed", "all"), help="which run folders are kept (none)")
     made.add_argument(
         "--table", type=Path, metavar="FILE", help="settings as TOML (default: sweep.toml in the folder of the scene)"
     )
     made.add_argument(
         "--set", action="append", default=[], metavar="KEY=VALUE", dest="overrides", help="override a key of the scene"
     )
-    made.add_argument("--variant", metavar="NAME", help="a variant that the scene names")
+    made.add_argument("--variant", metavar="NAME", help="a variant of the scene")
     made.add_argument("--limit", type=int, metavar="N", help="refuse more runs than this (10 000)")
-    made.add_argument("--workers", type=int, metavar="N", help="processes on this machine (default: one a core)")
+    made.add_argument("--workers", type=int, metavar="N", help="processes on this machine (default: one per core)")
     made.add_argument("--scheduler", metavar="ADDRESS", help="a dask.distributed scheduler, as tcp://host:8786")
     made.add_argument("--out", type=Path, metavar="DIR", help="folder of the sweep (default outputs/NAME_sweep)")
-    made.add_argument("--resume", action="store_true", help="go on with the sweep in the folder")
+    made.add_argument("--resume", action="store_true", help="continue the sweep in the folder")
     made.add_argument("--overwrite", action="store_true", help="replace the sweep in the folder")
-    made.add_argument("--plan", action="store_true", help="say what would be run, and run nothing")
-    made.add_argument("--log", action="store_true", help="a line a run")
-    made.add_argument("--quiet", action="store_true", help="say nothing but the result")
+    made.add_argument("--plan", action="store_true", help="show what would be run, without running it")
+    made.add_argument("--log", action="store_true", help="print one line per run")
+    made.add_argument("--quiet", action="store_true", help="print nothing but the result")
     made.add_argument("--no-page", action="store_true", help="write no report.html")
     trust_argument(made)
 
@@ -123,7 +123,7 @@ def _sweep(options: argparse.Namespace) -> int:
                 plan, folder, engine, resume=options.resume, overwrite=options.overwrite, telling=telling
             )
         except KeyboardInterrupt:
-            say(f"what has ended is kept; to go on: geomech sweep {options.scene} --out {folder} --resume")
+            say(f"finished runs are kept; to continue: geomech sweep {options.scene} --out {folder} --resume")
             raise
     except (CannotResume, EngineRefused) as error:
         raise BadInput(str(error)) from error
@@ -143,11 +143,11 @@ def _stored(folder: Path, read_sweep: Any) -> Any:
     try:
         return read_sweep(folder).plan
     except FileNotFoundError:
-        raise BadInput(f"{folder} holds no sweep to go on with") from None
+        raise BadInput(f"{folder} holds no sweep to continue") from None
 
 
 def described(plan: Any) -> str:
-    """What a sweep is going to do."""
+    """Summary of the planned sweep."""
     settings = plan.settings
     lines = [f"{plan.title}: " + (f"{settings['rare']} simulation" if settings["rare"] else f"{len(plan.table)} runs")
              + f", measure {settings['measure']}"]  # fmt: skip
@@ -159,7 +159,7 @@ def described(plan: Any) -> str:
 
 
 def _given(options: argparse.Namespace) -> dict[str, Any]:
-    """The settings that the command line gives."""
+    """Settings from the command line."""
     given: dict[str, Any] = {
         name: getattr(options, name)
         for name in ("seeds", "runs", "seed", "measure", "fails", "along", "without_cracks", "rare", "keep")

@@ -31,7 +31,7 @@ from .added_compliance import stress_rotation
 
 if TYPE_CHECKING:
     from ...ddm import Body, FaceMemory, Solution
-    from ...ddm.loads.uniform_stress_response import EvenSolution
+    from ...ddm.loads.uniform_stress_response import UniformStressSolution
 
 #: Softness from which a block counts as soft in statics: compliance that its cracks, all open, add in some direction,
 #: over that of its rock. (An edge crack through half of a square adds 4.)
@@ -47,7 +47,7 @@ SOFTEST = 30.0
 class ByMeanStress:
     """The blocks with this response, and the solutions under their mean stress in the last pass (block →)."""
 
-    solutions: dict[int, Solution | EvenSolution] = field(default_factory=dict)
+    solutions: dict[int, Solution | UniformStressSolution] = field(default_factory=dict)
     #: Memory of frictional crack faces in these solutions at the end of the last step.
     _memory: dict[int, FaceMemory] = field(default_factory=dict)
     #: Mean stress of the last pass in the block's own axes, Pa, and `limit` at that time.
@@ -95,7 +95,7 @@ class ByMeanStress:
         elastic: np.ndarray,
         began: FaceMemory | None = None,
         skip: bool = True,
-    ) -> Solution | EvenSolution:
+    ) -> Solution | UniformStressSolution:
         """Solution of ``body``, rotated by ``rotation`` rad, under its mean ``stress`` (3,), Pa, current axes, times
         its `limit`. With ``skip``, scaled from solutions under unit stresses where that is exact. Faces start with
         their memory of such solutions, or with ``began`` where there is none. Raises `ddm.NotConverged`."""
@@ -116,7 +116,7 @@ class ByMeanStress:
         """Whether the softness of ``block`` was limited in the last pass."""
         return not np.array_equal(self.stress[block][1], np.eye(3))
 
-    def strained(self, block: int, solution: Solution | EvenSolution) -> tuple[np.ndarray, np.ndarray]:
+    def strained(self, block: int, solution: Solution | UniformStressSolution) -> tuple[np.ndarray, np.ndarray]:
         """Mean stress of the last pass (3,), Pa, and the crack strain (3,) that ``solution`` gives the block; in its
         own axes."""
         stress, limit = self.stress[block]

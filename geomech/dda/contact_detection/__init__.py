@@ -1,1 +1,1 @@
-"""Which vertices and edges of blocks meet, and where the springs of their contacts stand."""
+"""Contact detection: entrance edges, contact points and normals, and the locations of contact springs."""

@@ -37,26 +37,30 @@ from .thin_walls import from_outside
 
 #: At time zero, faces nearer than this many times the domain's size touch and are bonded by cohesion and tension.
 _TOUCH = 1e-7
-#: Contacts whose normals are nearer in direction than this (cosine) are on one line.
+#: Contacts lie on one line if the cosine of the angle between their normals exceeds this.
 _ALIGNED = 0.99
 _UNKNOWN = -2
 _NEVER = -1
-#: The gaps of blocks that turn are followed to this part of the smaller block's size (√area).
+#: The gaps of rotating blocks are followed to this part of the smaller block's size (√area).
 _PRECISION = 1e-5
-#: What lies behind a line by less than this part of the smaller block's size (√area) when they first touch was pushed
-#: there by others' give, or by the rounding of arcs.
-_HAIR = 1e-4
-#: Sound crosses a model so often, and so many steps are taken, until its blocks bear what is put on them at the start. (The
-#: weight of a slope of 1 000 blocks, put on suddenly, sinks into eased springs by 6 % of the work of its first 0.3 s, after
-#: so long by 0.1 %.)
+#: A vertex behind a line by less than this part of the smaller block's size (√area) at first touch was brought there by
+#: deformation of neighbours, or by the rounding of arcs.
+_TOUCHING_DEPTH = 1e-4
+#: Blocks carry the initial loads after this many transits of sound through the model, and this many steps. (The weight
+#: of a slope of 1 000 blocks, suddenly applied, sinks into softened springs by 6 % of the work of its first 0.3 s;
+#: after this time by 0.1 %.)
 _TRANSITS, _STEPS = 4.0, 20
-#: Contacts are searched for at this many times the depth to which the last step has let any penetrate, whatever the window.
+#: Contacts are searched for within this many times the deepest penetration of the last step, whatever the window.
 _DEEPER = 2.0
 
 
 class _Met(NamedTuple):
-    """What meets: rows of `find_contacts` (``table``), ``geometry`` and ``parent`` as of `describe_contacts`, and the joint
-    ``law`` of each, (n,)."""
+    """Vertices and edges that meet.
+
+    table      rows of `find_contacts`
+    geometry, parent   as in `describe_contacts`
+    law        (n,) joint law
+    """
 
     table: np.ndarray
     geometry: np.ndarray
@@ -67,8 +71,8 @@ class _Met(NamedTuple):
 class ContactFinder:
     """Finds the contacts of ``blocks`` and gives each its law and springs.
 
-    ``joint_index`` as for `BlockSystem`; ``modulus`` (n_blocks,) Pa: E' of each block, from which penalties follow;
-    ``rigid`` (n_blocks,) those that do not strain; ``mass`` (n_blocks,) kg/m; ``work`` counts searches.
+    ``joint_index`` as in `BlockSystem`; ``modulus`` (n_blocks,) Pa: E' of each block, which determines penalties;
+    ``rigid`` (n_blocks,) blocks without strain; ``mass`` (n_blocks,) kg/m; ``work`` counts searches.
     """
 
     def __init__(
@@ -92,15 +96,15 @@ class ContactFinder:
         self._table = JointTable.of(joints)
         self._rebounds = bool(np.isfinite(self._table.restitution).any())
         self._stiff = ~np.isnan(self._table.normal_stiffness)
-        # What bonds, waves cross as they do rock.
+        # Waves cross bonded faces as they cross rock.
         self._yields = ~self._stiff & (self._table.tension == 0.0) & (self._table.cohesion == 0.0)
         self._mass = np.where(blocks.fixed, np.inf, mass)
-        #: s, from when on springs are eased to what steps resolve.
-        self._eased_from = np.inf
-        self._eases = settings.springs == "resolved" and bool(self._yields.any())
-        if self._eases and settings.dynamic_factor > 0.0:
-            self._eased_from = max(
-                _TRANSITS * _transit(blocks, modulus * self._area, mass), _STEPS * settings.time_step
+        #: s, time from which springs are softened to a stiffness that the steps resolve.
+        self._softened_from = np.inf
+        self._softens = settings.springs == "resolved" and bool(self._yields.any())
+        if self._softens and settings.dynamic_factor > 0.0:
+            self._softened_from = max(
+                _TRANSITS * _sound_transit_time(blocks, modulus * self._area, mass), _STEPS * settings.time_step
             )
         self._stiff_along = ~np.isnan(self._table.shear_stiffness)
         self._by_length = self._stiff & self._stiff_along
@@ -113,32 +117,32 @@ class ContactFinder:
         self._owner = np.ascontiguousarray(blocks.vertex_block, np.int64)
         self._flat = blocks.in_side
         self._rigid = rigid
-        # Triangles follow a rock that bends; multipliers hold what springs would give.
+        # Triangles follow the bending of a rock mass; multipliers replace springs.
         self._bends = (np.diff(self._start) > 3) & ~rigid & ~blocks.fixed & (settings.contact == "penalty")
         if blocks.order is not None:
-            # These bend themselves.
+            # Blocks of higher order bend by themselves.
             self._bends &= np.asarray(blocks.order) <= 1
-        #: Whether contacts are found at the corners of faces only: points along faces are found from them.
+        #: Whether contacts are found at the corners of faces only; points along faces then follow from them.
         self.at_corners = False
-        #: (n_blocks,) m: how far deflection moves a point of each block from where its vertices say, at most.
+        #: (n_blocks,) m: largest distance of a point of a deflected block from its place in the first-order block.
         self.deflection = np.zeros(blocks.n_blocks)
-        #: (n_blocks,) m: how far its sides lie off the straight lines between their corners, at most.
+        #: (n_blocks,) m: largest distance of a block's deflected sides from the straight lines between their corners.
         self.sag = np.zeros(blocks.n_blocks)
         self._rounding, self._longest = corner_lengths(blocks, settings.corner_rounding)
-        #: (n_vertices,) m: the lengths over which corners are rounded.
+        #: (n_vertices,) m: rounding lengths of corners.
         self.rounding = np.minimum(self._rounding, self._longest)
-        #: Whether toes hold: `SHARP`, `ROUNDED` or `FREE` (`toes`).
+        #: Treatment of toes: `SHARP`, `ROUNDED` or `FREE` (`toe_contacts`).
         self.toes = SHARP
-        #: Whether faces keep all their cohesion for as long as they touch anywhere (`whole_faces`).
+        #: Whether faces keep their full cohesion as long as they touch anywhere (`whole_faces`).
         self.whole_faces = False
         self._corners = ToeCorners(
             self._next, self._previous, self._owner, self.rounding, np.sqrt(self._area)[self._owner], blocks.vertices
         )
         #: Pairs of cells that meet, as numbers a · n_blocks + b.
         self.joined = _meeting_cells(blocks)
-        #: Those that have parted: they touch, and no bond holds them.
+        #: Pairs of cells that have separated: they may touch, and no bond joins them.
         self.parted = np.zeros(0, np.int64)
-        #: Which (k,) of the contacts at corners are kept, where not all are.
+        #: Numbers (k,) of the corner contacts to keep; None keeps all.
         self.kept_corners: Callable[[ContactSet], np.ndarray] | None = None
         self._always_fixed = np.ascontiguousarray(blocks.fixed, dtype=np.bool_)
         self.widths = widths(blocks.vertices, self._next, self._start, self._area)
@@ -146,7 +150,7 @@ class ContactFinder:
         self._size = float(np.ptp(blocks.vertices, axis=0).max())
 
     def take_out(self, removed: np.ndarray | None) -> None:
-        """Find no more contacts of the blocks ``removed`` (n_blocks,)."""
+        """Exclude the blocks ``removed`` (n_blocks,) from detection."""
         self._removed = removed
         self._fixed = self._always_fixed if removed is None else self._always_fixed | removed
         self._near = NearPairs(self._start, self._fixed, self._work)
@@ -163,11 +167,15 @@ class ContactFinder:
         motion: np.ndarray | None = None,
         margin: float = np.inf,
     ) -> ContactSet:
-        """Every vertex within ``window`` (m, of all pairs of blocks or of each) of an edge it may touch, with what ``state.contacts`` remembers of it;
-        without corners that the bonds around them join, if ``glue_holds``; the springs of
-        faces that have a stiffness of their own at their corners, if ``lumped``; those of the bonds ``broken``
-        (vertex·n_vertices + edge), too. ``motion`` (n_vertices, 2) m is what vertices are expected to move by in the step:
-        it says on which sides corners meet; corners that stay apart then, with ``margin`` m to spare, are left out."""
+        """All contacts within ``window``, with the history that ``state.contacts`` holds for them.
+
+        window   m, search distance, one for all pairs of blocks or one for each
+        glue_holds   True leaves out corner pairs that the bonds around them join
+        lumped   True places the springs of faces with a joint stiffness at their corners
+        broken   bonds (vertex·n_vertices + edge) whose springs are at the corners as well
+        motion   (n_vertices, 2) m, expected motion of the vertices in the step, which decides on which sides corners meet
+        margin   m; corners that stay apart by more than this are left out
+        """
         old = np.ascontiguousarray(state.contacts)
         met = self._meeting(old, vertices, window, motion, margin)
         parent, geometry, law = met.parent, met.geometry, met.law
@@ -180,15 +188,15 @@ class ContactFinder:
             geometry[:, 4] = nodes.left(geometry[:, 4])
             parent = nodes.heirs(met.parent, np.ascontiguousarray(old["state"]))
         block, other = self._owner[met.table[:, 0]], self._owner[met.table[:, 1]]
-        springs = self._springs(block, other, law, geometry[:, 4], state.time >= self._eased_from)
+        springs = self._springs(block, other, law, geometry[:, 4], state.time >= self._softened_from)
         remembered = self._remembered(old, parent, state.time, geometry, springs, self._stiff[law])
         if len(self.parted):
             remembered["bonded"][
                 np.isin(np.minimum(block, other) * len(self._area) + np.maximum(block, other), self.parted)
             ] = 0
-        eased = 0.0
-        if self._eases and len(old):
-            eased = self._keep_forces(old, parent, geometry, springs, remembered, law)
+        softened = 0.0
+        if self._softens and len(old):
+            softened = self._keep_forces(old, parent, geometry, springs, remembered, law)
         if self._table.curved.any():
             self._pass_on_wear(old, block, other, geometry, remembered)
         remembered["lift"] = self._lifts(old, parent, met, vertices, remembered)
@@ -225,7 +233,7 @@ class ContactFinder:
             springs=springs,
             relies_on_glue=glued is not None,
             faces=BondedFaces.of(block, other, geometry, bonded) if bonded.any() else None,
-            released=eased,
+            released=softened,
             **remembered,
         )
         if self.whole_faces:
@@ -239,10 +247,12 @@ class ContactFinder:
     def _meeting(
         self, old: np.ndarray, vertices: np.ndarray, window: float | Windows, motion: np.ndarray | None, margin: float
     ) -> _Met:
-        """What meets, arguments as of `find`, ``old`` the CONTACT rows of the last step; without what cannot have come to
-        its edge from outside, and pairs of edges that have no joint law."""
+        """Vertices and edges that meet; arguments as of `find`, ``old`` the CONTACT rows of the last step.
+
+        Vertices that cannot have reached their edge from outside, and pairs of edges without a joint law, are left out.
+        """
         names = contact_records.names(old, len(vertices))
-        near = self._reaching(window, vertices, old, names.lift, names.gap)
+        near = self._widened_windows(window, vertices, old, names.lift, names.gap)
         rank = np.argsort(names.keys, kind="stable")
         corners = Corners(
             convex_corners(vertices, self._next, self._previous), self._rounding, self._longest, self._pressed(old),
@@ -269,17 +279,20 @@ class ContactFinder:
     def _lifts(
         self, old: np.ndarray, parent: np.ndarray, met: _Met, vertices: np.ndarray, remembered: dict[str, np.ndarray]
     ) -> np.ndarray:
-        """(n,) m: the lifts of what has ``met``, so that nothing begins with a force that no work has brought; ``parent``
-        (n,) the rows of the ``old`` contacts that it continues, ``remembered`` what it keeps of these."""
+        """(n,) m: lifts of the contacts ``met``, chosen so that no contact begins with a force that no work has
+        produced.
+
+        ``parent`` (n,) are the rows of ``old`` that they continue, ``remembered`` their history.
+        """
         table, geometry, lift, state = met.table, met.geometry, remembered["lift"], remembered["state"]
         block, other = self._owner[table[:, 0]], self._owner[table[:, 1]]
-        # A step that rounding smooths is none, and a vertex that lies a hair behind a line which it has not touched brings
-        # no energy: there contacts begin without force.
-        hair = _HAIR * np.sqrt(np.minimum(self._area[block], self._area[other]))
+        # A step that rounding smooths away does not count, and a vertex that is slightly behind a line that it has not
+        # touched brings no energy: contacts begin without force there.
+        hair = _TOUCHING_DEPTH * np.sqrt(np.minimum(self._area[block], self._area[other]))
         smoothed = (table[:, 3] == SMOOTHED) | ((geometry[:, 3] > -hair) & (len(old) > 0))
         smoothed &= (state == OPEN) & (remembered["bonded"] == 0) & (geometry[:, 3] < lift)
         lift = np.where(smoothed, geometry[:, 3], lift)
-        # What has come up a ramp goes on from there as it is pressed.
+        # A vertex that has climbed a ramp continues from there with its penetration.
         up = np.flatnonzero((table[:, 3] == SMOOTHED) & (state != OPEN) & (parent >= 0))
         up = up[old["tilt"][parent[up]] != 0.0] if len(up) else up
         lift[up] = np.minimum(0.0, geometry[up, 3] - old["gap"][parent[up]])
@@ -290,7 +303,8 @@ class ContactFinder:
         return lift
 
     def _with_springs_in_faces(self, found: ContactSet, vertices: np.ndarray, broken: np.ndarray | None) -> ContactSet:
-        """The contacts ``found``, the springs of whole faces inside these; those of the bonds ``broken`` at the corners."""
+        """The contacts ``found``, with the springs of whole faces inside the faces; those of the bonds ``broken`` at
+        the corners."""
         if not (self._stiff.any() or found.inset.any()):
             return found
         inside = found.inset & (found.bonded == 1)
@@ -307,7 +321,8 @@ class ContactFinder:
         return replace(found, by_length=self._stiff_along[found.law]).placed(points)
 
     def _face_points(self, found: ContactSet, vertices: np.ndarray, inside: np.ndarray) -> FacePoints | None:
-        """Where springs stand in faces of the contacts ``found``, those of bonds where these are ``inside`` (n,)."""
+        """Locations of springs in the faces of the contacts ``found``; bonds have theirs inside the face where
+        ``inside`` (n,)."""
         borne = FaceForces(found.normal, found.bare, (found.bonded == 1) & (found.springs.tension > 0))
         return FacePoints.of(
             found.block, found.other, found.geometry, np.where(inside, 2, self._stiff[found.law]), borne,
@@ -317,8 +332,12 @@ class ContactFinder:
     def _softened(
         self, found: ContactSet, vertices: np.ndarray, ends: np.ndarray, length: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Part of its ``length`` (m,) that the springs of a face with these ``ends`` (m, 2) among the contacts ``found`` are
-        apart: they give by its rotation what its blocks would bend; and the part of their stiffness that they have."""
+        """Distance between the springs of a face, relative to its ``length`` (m,), and the share of stiffness that they
+        have.
+
+        ``ends`` (m, 2) are the face's contacts among ``found``. The face's rotation stands for the bending of its
+        blocks.
+        """
         first = ends[:, 0]
         across, point = found.geometry[first, 1:3], found.geometry[first, 5:7]
         behind = [
@@ -327,17 +346,21 @@ class ContactFinder:
         ]
         share = np.minimum(1.0, length / np.maximum(length, np.maximum(behind[0][:, 1], behind[1][:, 1])))
         give = behind[0][:, 0] + behind[1][:, 0]
-        # One block between rigid ones bends to and fro, by a third of what either half would, if at all: they hold it.
+        # A block between two rigid ones bends in an S, if at all, by a third of what either half alone would: the rigid
+        # ones hold it.
         give[self._rigid[found.block[first]] | self._rigid[found.other[first]]] = 0.0
         own = 2.0 / (share * found.springs.normal[first] * length**2)
         return np.sqrt(own / np.maximum(own, give)), share
 
-    def _reaching(
+    def _widened_windows(
         self, window: float | Windows, vertices: np.ndarray, old: np.ndarray, lift: float, gap: float
     ) -> Windows:
-        """``window`` of each pair, wide enough for what the contacts ``old`` hold: faces that slid apart press at a
-        distance, those that do not fit pass each other by as much; what soft springs have let in deeper than that touches
-        still. ``lift`` is the largest, ``gap`` the lowest of them."""
+        """``window`` of each pair, widened where the contacts ``old`` act at a distance or penetrate deeply.
+
+        Faces with mismatch after sliding press at a distance, up to the largest ``lift``; faces that do not fit pass
+        each other by as much, down to the lowest ``gap``; and contacts of soft springs that are deeper than the window
+        still touch.
+        """
         if not isinstance(window, Windows):
             pairs = self._near.of(vertices, max(window + lift, -_DEEPER * gap))
             window = Windows(pairs, np.full(len(pairs), window))
@@ -353,12 +376,14 @@ class ContactFinder:
         return Windows(window.pairs, reach)
 
     def _from_outside(self, table: np.ndarray, vertices: np.ndarray, known: np.ndarray, pressed: np.ndarray):
-        """(n,) whether vertices of the rows of `find_contacts` may have come to their edges from outside: rows that are
-        ``known`` (n,), as they continue contacts that press or begin to behind the line, and corners that meet corners,
-        have; faces of blocks are ``pressed`` (n_blocks,) m in."""
+        """(n,) whether vertices of the rows of `find_contacts` may have reached their edges from outside.
+
+        Rows that are ``known`` (n,), because they continue contacts that press or that begin behind the line, and
+        corners that meet corners, have. ``pressed`` (n_blocks,) m is the penetration of each block's faces.
+        """
         vertex, edge = table[:, 0], table[:, 1]
         block, other = self._owner[vertex], self._owner[edge]
-        shallow = _HAIR * np.sqrt(np.minimum(self._area[block], self._area[other]))
+        shallow = _TOUCHING_DEPTH * np.sqrt(np.minimum(self._area[block], self._area[other]))
         shallow += _DEEPER * np.maximum(pressed[block], pressed[other])
         keep = from_outside(
             vertex, edge, self._off_lines(vertices, vertex, edge), vertices, self._next, self._previous, self._start,
@@ -367,15 +392,15 @@ class ContactFinder:
         return keep | (table[:, 2] >= 0)
 
     def _springs(
-        self, block: np.ndarray, other: np.ndarray, law: np.ndarray, length: np.ndarray, eased: bool
+        self, block: np.ndarray, other: np.ndarray, law: np.ndarray, length: np.ndarray, softened: bool
     ) -> Springs:
-        """Springs of contacts (n,), ``eased`` to what the steps of a run resolve."""
+        """Springs of contacts (n,); ``softened`` softens them to what the time steps of a run resolve."""
         kn, ks = self._settings.normal_penalty, self._settings.shear_penalty
         if kn is None:
             normal = penalties(block, other, length, self._modulus, self._area, self._fixed, self._rigid)
-            if eased:
-                eased_to = resolved(normal, block, other, self._mass, self._settings.time_step)
-                normal = np.where(self._yields[law], eased_to, normal)
+            if softened:
+                softened_to = resolved(normal, block, other, self._mass, self._settings.time_step)
+                normal = np.where(self._yields[law], softened_to, normal)
         else:
             normal = np.full(len(block), float(kn))
         return contact_springs(
@@ -388,24 +413,25 @@ class ContactFinder:
         )
 
     def _remembered(self, old, parent, time, geometry, springs, stiff):
-        """What contacts keep of their rows ``parent`` (−1: new) in ``old``, by the names of `ContactSet`."""
+        """History that contacts keep from their rows ``parent`` (−1: new) of ``old``, by the field names of
+        `ContactSet`."""
         known = parent >= 0
 
         (contact_state, bonded), (normal, shear, slip, wear, lift, stretch, bare), inset = contact_records.inherited(
             old, parent
         )
         if not known.all():
-            # New contacts that touch already are tried closed first.
+            # New contacts that already touch are tried as closed first.
             fresh = ~known & (geometry[:, 3] <= _TOUCH * self._size) & (geometry[:, 3] > -_TOUCH * self._size)
             if len(old) == 0 and time == 0.0:
                 bonded[fresh & (geometry[:, 4] > 0)] = 1
             contact_state[fresh] = STICK
         bonded[(springs.cohesion == 0) & (springs.tension == 0)] = 0
-        # Friction on a normal force that pulls by its round-off acts the other way: taken for the sense of the sliding
-        # it would turn that about in every step, and with it the matrix of blocks at rest.
+        # Where the normal force is tensile by round-off, friction reverses: taken as the sense of sliding, this would
+        # reverse it in every step, and change the matrix of blocks at rest.
         pulls = springs.friction * normal + springs.sliding < 0.0
         direction = np.where(contact_state == SLIP, np.sign(shear), 0.0) * np.where(pulls, -1.0, 1.0)
-        # Bonds of blocks that bend are there from the start, or never.
+        # Bonds between bending blocks exist from the start, or not at all.
         if len(old) == 0 and time == 0.0 and self._bends.any():
             inset = (bonded == 1) & (springs.tension > 0) & ~stiff
         rough = (springs.peak > 0) | (bonded > 0)
@@ -417,22 +443,25 @@ class ContactFinder:
         }  # fmt: skip
 
     def _keep_forces(self, old, parent, geometry, springs, remembered, law) -> float:
-        """Faces that press with other springs than before keep the force, not the gap: what has come to bear on springs that
-        were not eased sinks in no further for these. J/m that the old springs had stored beyond what the new ones do."""
+        """Keep the force, not the gap, of closed contacts whose spring stiffness has changed.
+
+        What stiff springs carry does not sink in when they are softened. Returns the energy, J/m, by which the old
+        springs' exceeded that of the new ones.
+        """
         known = np.flatnonzero((parent >= 0) & (remembered["state"] != OPEN) & self._yields[law])
         before, now = old["stiffness"][parent[known]], springs.normal[known]
         ratio = np.where(before > 0.0, before / now, 1.0)
         gap, lift = geometry[known, 3], remembered["lift"][known]
         pressed = np.minimum(gap - lift, 0.0)
         remembered["lift"][known] = np.where(pressed < 0.0, gap - ratio * pressed, lift)
-        # Of penalties, those along the face are as stiff as those across.
+        # Penalty springs have equal normal and shear stiffness.
         along = np.where(
             self._stiff_along[law[known]], 0.0, remembered["shear"][known] ** 2 / (ratio * springs.shear[known])
         )
         return 0.5 * float(((1.0 - ratio) * (before * pressed**2 + along)).sum())
 
     def _pressed(self, old: np.ndarray) -> np.ndarray:
-        """(n_blocks,) m: how deep the faces of each block were last pressed in."""
+        """(n_blocks,) m: deepest penetration of each block's faces in the last step."""
         deepest = np.zeros(len(self._area))
         closed = old["state"] != OPEN
         for blocks in (old["block"][closed], old["other"][closed]):
@@ -451,8 +480,10 @@ class ContactFinder:
         return tilt
 
     def _pass_on_wear(self, old, block, other, geometry, remembered) -> None:
-        """Contacts that have not touched are as worn, and as far lifted, as the nearest that slides along their
-        direction between the same two blocks: these have moved by as much everywhere."""
+        """Give contacts that have not touched the wear and lift of the nearest sliding contact on the same line.
+
+        Between two given blocks all contacts along one direction have moved by the same amount.
+        """
         touched = old[(old["wear"] > 0) & (old["state"] != OPEN)]
         if not len(touched):
             return
@@ -471,21 +502,21 @@ class ContactFinder:
 
     @property
     def stiff_laws(self) -> np.ndarray:
-        """(n_laws,) which laws have a normal stiffness of their own."""
+        """(n_laws,) bool: laws with a normal joint stiffness."""
         return self._stiff
 
     @property
     def stiff_along_laws(self) -> np.ndarray:
-        """(n_laws,) which laws have a shear stiffness of their own."""
+        """(n_laws,) bool: laws with a shear joint stiffness."""
         return self._stiff_along
 
     @property
     def closure(self) -> np.ndarray:
-        """(n_laws,) m: the closure that each law tends to; infinite for a straight spring."""
+        """(n_laws,) m: maximum closure of each law; infinite for a linear spring."""
         return self._table.closure
 
     def on_penalty(self, found: ContactSet) -> tuple[np.ndarray, np.ndarray]:
-        """(n,) twice: contacts whose normal, and whose shear springs are the solver's penalties, not a joint's
+        """Two (n,) bool arrays: contacts whose normal, and whose shear spring is the solver's penalty, not a joint
         stiffness."""
         t, lone = self._table, found.geometry[:, 4] <= 0
         by_peak = t.stiff_by_peak[found.law] & ~lone
@@ -495,13 +526,14 @@ class ContactFinder:
         )
 
     def curved(self, found: ContactSet) -> CurvedJoints | None:
-        """The contacts of ``found`` whose laws are no straight lines; None where there are none."""
+        """The contacts of ``found`` with nonlinear laws; None where there are none."""
         if not (self._table.curved.any() and self._table.curved[found.law].any()):
             return None
         return CurvedJoints(self._table, found)
 
     def restitution(self, found: ContactSet) -> np.ndarray | None:
-        """(n,) e of the contacts of ``found``, nan where their law names none; None where no law does."""
+        """(n,) coefficients of restitution e of the contacts of ``found``, nan where their law has none; None where no
+        law has."""
         return self._table.restitution[found.law] if self._rebounds else None
 
     def _laws(self, edge: np.ndarray, mate: np.ndarray) -> np.ndarray:
@@ -521,7 +553,7 @@ class ContactFinder:
         return law
 
     def part(self, blocks: Blocks, parted: np.ndarray) -> None:
-        """Let the cells touch whose glued faces have ``parted`` (m,)."""
+        """Let cells touch from now on whose bonded faces have ``parted`` (m,)."""
         edges = np.asarray(blocks.glued)[parted]
         pair = np.sort(blocks.vertex_block[edges], axis=1)
         self.parted = np.unique(pair[:, 0] * blocks.n_blocks + pair[:, 1])
@@ -530,22 +562,23 @@ class ContactFinder:
         )
 
     def laws_of(self, edge: np.ndarray, mate: np.ndarray) -> np.ndarray:
-        """(n,) the joint laws between the edges ``edge`` and ``mate`` (n,); −1 where they do not touch."""
+        """(n,) joint laws between the edges ``edge`` and ``mate`` (n,); −1 where they do not touch."""
         return self._laws(edge, mate)
 
     def _one_rock(self, vertex: np.ndarray, edge: np.ndarray) -> np.ndarray:
-        """(n,) True where the blocks of ``vertex`` and ``edge`` (n,) are cells that meet, glued, in a face or a corner."""
+        """(n,) bool: the blocks of ``vertex`` and ``edge`` (n,) are cells bonded to each other in a face or a
+        corner."""
         one, two = self._owner[vertex], self._owner[edge]
         if not len(self.joined):
             return np.zeros(len(vertex), bool)
         return np.isin(np.minimum(one, two) * len(self._area) + np.maximum(one, two), self.joined)
 
     def near_boxes(self, box: np.ndarray) -> np.ndarray:
-        """(k, 2) all pairs of blocks whose boxes ``box`` (n_blocks, 4) meet, and some whose do not."""
+        """(k, 2) all pairs of blocks whose boxes ``box`` (n_blocks, 4) intersect, and some others."""
         return self._near.of_boxes(box, 0.1 * self.widths)
 
     def may_touch(self, vertex: np.ndarray, edge: np.ndarray) -> np.ndarray:
-        """(n,) False for a ``vertex`` of which neither edge may touch the ``edge``, and for blocks that are taken out."""
+        """(n,) bool: False for a ``vertex`` neither of whose edges may touch the ``edge``, and for removed blocks."""
         law = np.maximum(self._laws(edge, vertex), self._laws(edge, self._previous[vertex]))
         out = (law != _NEVER) & ~self._one_rock(vertex, edge)
         if self._removed is not None:
@@ -553,15 +586,15 @@ class ContactFinder:
         return out
 
     def past_midpoint(self, vertices: np.ndarray, vertex: np.ndarray, edge: np.ndarray) -> np.ndarray:
-        """(n,) True where a ``vertex`` lies behind its ``edge`` by more than half of what the block is thick there."""
+        """(n,) bool: a ``vertex`` lies behind its ``edge`` by more than half the block's thickness there."""
         return ~from_outside(
             vertex, edge, self._off_lines(vertices, vertex, edge), vertices, self._next, self._previous, self._start,
             self._owner, np.zeros(len(vertex), np.bool_), np.full(len(vertex), -1.0),
         )  # fmt: skip
 
     def gaps(self, vertices: np.ndarray, before: np.ndarray, found: ContactSet) -> np.ndarray:
-        """(n,) m of the contacts ``found`` on the geometry ``before``, at their corners, once the blocks are where
-        ``vertices`` are."""
+        """(n,) m: gaps, at their corners, of the contacts ``found`` on the geometry ``before`` with the blocks moved to
+        ``vertices``."""
         gap = self._off_lines(vertices, found.vertex, found.edge)
         rounded = np.flatnonzero(found.corner >= 0)
         if len(rounded):
@@ -572,22 +605,23 @@ class ContactFinder:
         return gap
 
     def _off_lines(self, vertices: np.ndarray, vertex: np.ndarray, edge: np.ndarray) -> np.ndarray:
-        """(n,) m of ``vertex`` (n,) outside the line of ``edge`` (n,) on the geometry ``vertices``."""
+        """(n,) m: distance of ``vertex`` (n,) from the line of ``edge`` (n,), positive outside, for the geometry
+        ``vertices``."""
         start = vertices[edge]
         along, out = vertices[self._next[edge]] - start, vertices[vertex] - start
         return (out[:, 0] * along[:, 1] - out[:, 1] * along[:, 0]) / np.hypot(along[:, 0], along[:, 1])
 
     def toes_among(self, found: ContactSet, vertices: np.ndarray) -> np.ndarray:
-        """(n,) m by which toes among the contacts ``found`` stand off; below zero for other contacts."""
+        """(n,) m: gaps of the toes among the contacts ``found``; negative for other contacts."""
         parts = found.vertex, found.edge, found.corner, found.geometry
         return stand_off(*parts, vertices, self._corners, self.toes)
 
     def carried(self, vertices: np.ndarray, rows: np.ndarray) -> np.ndarray:
-        """CONTACT ``rows`` carried to the new geometry ``vertices`` (gap and forces as they are)."""
+        """CONTACT ``rows`` moved to the geometry ``vertices`` (gap and forces unchanged)."""
         return contact_records.carried(rows, vertices, self._next)
 
     def where(self, found: ContactSet, contact: int) -> str:
-        """Which contact of ``found`` it is, for messages; empty for −1."""
+        """Location of contact number ``contact`` of ``found`` in messages; empty for −1."""
         if contact < 0:
             return ""
         x, y = found.geometry[contact, 5:7]
@@ -596,7 +630,7 @@ class ContactFinder:
 
 
 def _meeting_cells(blocks: Blocks) -> np.ndarray:
-    """(k,) a · n_blocks + b, a < b, of all cells a and b that meet in a corner of glued faces."""
+    """(k,) a · n_blocks + b, a < b, of all cells a and b that share a corner of bonded faces."""
     if blocks.glued is None:
         return np.zeros(0, np.int64)
     from scipy.sparse import csr_array
@@ -613,28 +647,30 @@ def _meeting_cells(blocks: Blocks) -> np.ndarray:
     return np.array(sorted(pairs), np.int64)
 
 
-def _transit(blocks: Blocks, stiffness: np.ndarray, mass: np.ndarray) -> float:
-    """s that sound takes across ``blocks`` of E' A ``stiffness`` and ``mass`` (n_blocks,), at its slowest."""
+def _sound_transit_time(blocks: Blocks, stiffness: np.ndarray, mass: np.ndarray) -> float:
+    """Time, s, in which sound crosses ``blocks`` of stiffness E' A and ``mass`` (n_blocks,), along the slowest path."""
     heavy = mass > 0.0
     slowest = float(np.sqrt(np.min(stiffness[heavy] / mass[heavy], initial=np.inf)))
     return float(np.hypot(*np.ptp(blocks.vertices, axis=0))) / slowest
 
 
 def _at_their_corners(found: ContactSet, stood: FacePoints | None, out: np.ndarray, inset: np.ndarray) -> ContactSet:
-    """The contacts ``found``, the springs of those that come ``out`` (n,) of their faces, inside which they ``stood``,
-    at the corners with the forces that they had: these are then where the faces, that do not fit any more, begin to
-    press and to pull. Forces of springs alone: what dashpots bore over the last step would stay in them as energy from
-    nowhere."""
+    """The contacts ``found``, with springs of those that come ``out`` (n,) of their faces moved from ``inset`` to the
+    corners.
+
+    The forces that they had are kept: from the corners, faces that no longer match begin to press and to pull. Only
+    spring forces count: what dashpots carried in the last step would remain as energy without a source.
+    """
     if stood is None:
         return replace(found, inset=inset)
     gap, full = found.geometry[:, 3], found.springs
     soft, before = stood.springs(full, np.zeros(len(gap), bool)), stood.between_corners(found.gap_before)
     spring = stood.at_corners(-soft.normal * before) / full.normal
     closed = (found.state != OPEN) | (found.bonded > 0)
-    told = np.where(closed, gap + spring, np.minimum(gap, 0.0))
-    # Blocks that were bent by the moment on their faces, as springs inside these are, are bent no more.
+    gap_kept = np.where(closed, gap + spring, np.minimum(gap, 0.0))
+    # Blocks that were bent by the moments on their faces while the springs were inside are no longer bent.
     bent = 0.5 * (soft.normal * before**2 - full.normal * spring**2)
     bent += 0.5 * found.shear**2 * (1.0 / soft.shear - 1.0 / full.shear)
     return replace(
-        found, lift=np.where(out, told, found.lift), inset=inset, unbent=float(bent[out & closed].sum())
+        found, lift=np.where(out, gap_kept, found.lift), inset=inset, unbent=float(bent[out & closed].sum())
     )  # fmt: skip

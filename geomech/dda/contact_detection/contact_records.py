@@ -1,4 +1,4 @@
-"""CONTACT rows: filled, read and inherited row by row in compiled loops, ten times as fast as NumPy field by field."""
+"""CONTACT rows written, read and inherited in compiled loops, ten times as fast as NumPy field by field."""
 
 from __future__ import annotations
 
@@ -13,8 +13,14 @@ _jit = kept(fastmath=False, error_model="numpy", nogil=True)
 
 
 class Names(NamedTuple):
-    """Of contacts (n,): ``vertex`` and ``edge`` (n,), their ``keys`` vertex·n_vertices + edge (n,), ``normal`` (n, 2), the
-    largest size of a ``lift``, and the lowest ``gap`` of a closed one, or 0, m."""
+    """Identity of contacts (n,).
+
+    vertex, edge   (n,)
+    keys           (n,) vertex·n_vertices + edge
+    normal         (n, 2)
+    lift           largest magnitude of a lift, m
+    gap            lowest gap of a closed contact, or 0, m
+    """
 
     vertex: np.ndarray
     edge: np.ndarray
@@ -43,8 +49,10 @@ def names(rows, n_vertices):
 
 @_jit
 def inherited(rows, parent):
-    """What contacts keep of their rows ``parent`` (n,) in CONTACT ``rows``, nothing where it is −1: state and bonded
-    (2, n); normal and shear force, slip, wear, lift, stretch and bare (7, n); inset (n,)."""
+    """History that contacts inherit from their rows ``parent`` (n,) of CONTACT ``rows``; zero where ``parent`` is −1.
+
+    Returns state and bonded (2, n); normal and shear force, slip, wear, lift, stretch and bare (7, n); inset (n,).
+    """
     n = len(parent)
     kinds, sizes, inset = np.zeros((2, n), np.int64), np.zeros((7, n)), np.zeros(n, np.bool_)
     for c in range(n):
@@ -58,8 +66,8 @@ def inherited(rows, parent):
 
 
 class Pairing(NamedTuple):
-    """Of contacts (n,): vertex and edge, their blocks ``block`` and ``other``, the joint ``law``, and whether their spring
-    stands ``inset`` from the vertex."""
+    """Vertex and edge of contacts (n,), their blocks ``block`` and ``other``, the joint ``law``, and whether their
+    spring is ``inset`` from the vertex."""
 
     vertex: np.ndarray
     edge: np.ndarray
@@ -70,8 +78,8 @@ class Pairing(NamedTuple):
 
 
 class StepEnd(NamedTuple):
-    """Contacts (n,) as a step has left them: state and bond, gap m, forces N, ``slip`` in the step and what it
-    ``lifted``, m."""
+    """Contacts (n,) at the end of a step: state and bond, gap (m), forces (N), ``slip`` in the step, and the lift that
+    it caused (``lifted``, m)."""
 
     state: np.ndarray
     bonded: np.ndarray
@@ -83,7 +91,7 @@ class StepEnd(NamedTuple):
 
 
 class SlipBefore(NamedTuple):
-    """Slip, wear and lift of contacts (n,) as a step began, m."""
+    """Slip, wear and lift of contacts (n,) at the start of a step, m."""
 
     slip: np.ndarray
     wear: np.ndarray
@@ -91,8 +99,8 @@ class SlipBefore(NamedTuple):
 
 
 class ContactShape(NamedTuple):
-    """Where contacts (n,) are: ``acting`` (n, 7) as in `ContactSet.geometry`, tributary ``length`` m, ``tilt`` of the
-    normal to the edge's, rad, and normal ``stiffness`` N/m."""
+    """Geometry of contacts (n,): ``acting`` (n, 7) as in `ContactSet.geometry`, tributary ``length`` (m), ``tilt`` of
+    the normal relative to the edge's (rad), and normal ``stiffness`` (N/m)."""
 
     acting: np.ndarray
     length: np.ndarray
@@ -102,8 +110,8 @@ class ContactShape(NamedTuple):
 
 @_jit
 def fill(rows, pairing, end, before, shape):
-    """Fill CONTACT ``rows`` (n,) from plain tuples: ``pairing`` (`Pairing`), ``end`` (`StepEnd`), ``before``
-    (`SlipBefore`) and ``shape`` (`ContactShape`)."""
+    """Fill CONTACT ``rows`` (n,) from plain tuples with the fields of `Pairing`, `StepEnd`, `SlipBefore` and
+    `ContactShape`."""
     vertex, edge, block, other, law, inset = pairing
     state, bonded, gap, normal_force, shear_force, slip, lifted = end
     slipped, worn, lift = before
@@ -117,7 +125,7 @@ def fill(rows, pairing, end, before, shape):
         row.normal[0], row.normal[1] = acting[c, 1], acting[c, 2]
         row.point[0], row.point[1] = acting[c, 5], acting[c, 6]
         row.slip, row.wear = slipped[c] + slip[c], worn[c] + abs(slip[c])
-        # Sliding back undoes what sliding has lifted; faces that do not fit each other (less than nothing) stay so.
+        # Sliding back reverses the lift of dilation; faces that do not fit each other (negative lift) stay so.
         row.lift = max(lift[c] + lifted[c], min(lift[c], 0.0))
         row.bare = row.stretch = 0.0
         row.tilt, row.stiffness = tilt[c], stiffness[c]
@@ -140,7 +148,7 @@ def _carry(out, rows, vertices, next_vertex):
 
 
 def carried(rows: np.ndarray, vertices: np.ndarray, next_vertex: np.ndarray) -> np.ndarray:
-    """CONTACT ``rows`` on the geometry ``vertices`` (gap and forces as they are)."""
+    """CONTACT ``rows`` on the geometry ``vertices`` (gap and forces unchanged)."""
     out = np.empty(len(rows), CONTACT)
     _carry(out, rows, vertices, next_vertex)
     return out

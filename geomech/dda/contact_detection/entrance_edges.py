@@ -1,15 +1,15 @@
-"""Entrance edges: which vertices may contact which edges of two blocks near each other (Shi 1988).
+"""Entrance edges: which vertices may contact which edges of two neighbouring blocks (Shi 1988).
 
 A vertex contacts the interior of an edge when its corner points away from the edge. Where two corners meet, the
 entrance lines are the edges that have the other corner entirely on their outer side (Shi 1988). Parallel entrance lines
-(flush faces with coincident corners) count as one. It is represented by the vertex that lies within the other's edge,
-or, where the faces are inclined to each other, by the corner whose own face leans away. Where each corner lies within
-the other's edge, both are ends of a short common face, and both represent the line. Two corners meet only if neither is
-nearer to a neighbour of the other: on outlines with edges shorter than the window, as cracks leave them, all corners
-are within reach of all, and lines of distant ones are crossed by blocks that do not touch.
+(flush faces with coincident corners) count as one. Such a line is represented by the vertex that lies within the
+other's edge or, where the faces are inclined to each other, by the corner whose own face leans away. Where each corner
+lies within the other's edge, both are ends of a short common face, and both represent the line. Two corners meet only
+if neither is nearer to a neighbour of the other: on outlines with edges shorter than the window, as cracks leave them,
+all corners are within reach of each other, and lines of distant ones are crossed by blocks that do not touch.
 
 Where two entrance lines remain, the corners are rounded (`rounded_corners`), and one contact represents both: at the
-point and in the direction in which the rounded corners first meet in the step.
+point and with the normal at which the rounded corners first meet in the step.
 """
 
 from __future__ import annotations
@@ -24,20 +24,20 @@ from .rounded_corners import EASED, meeting, rounding_length
 
 # Faces inclined into each other by less than this angle (sine, about 3°) count as face-to-face contacts.
 _ANGLE = 0.05
-# A corner outside an edge whose neighbour is nearer to it may yet come first or as well where their face leans to the
-# edge by less than this (sine): what hits with one end of a face turns flat in the same step.
+# A corner outside an edge may also touch it first, though its neighbour is nearer, if their face is inclined to the
+# edge by less than this (sine): a block that hits with one end of a face rotates flat in the same step.
 _TURN = 0.25
 # Entrance lines whose directions differ by less than this are the same line.
 _PARALLEL = 0.0025
-# Of two corners on one line the one that the other's face does not lean past, by more than this (sine), stands for it.
+# Of two corners on one line, the one represents it past which the other's face does not lean by more than this (sine).
 _LEAN = 0.01
-# Corners that lie within each other's edges by more than this part of them are the two ends of a common face.
+# Corners that lie within each other's edges by more than this part of the edges are the two ends of a common face.
 _ENDS = 1e-4
-# A corner is nearer to one corner than to another when the squared distances differ by more than this part.
+# Squared distances of corners must differ by more than this part to count as different.
 _NEARER = 1e-2
-#: A vertex and a face; two corners; two corners that may overlap by a little.
+#: Kinds: a vertex and a face; two corners; two corners whose small overlap rounding smooths.
 FACE, CORNERS, SMOOTHED = 0, 1, 2
-# Corners whose lines may come within the window of both are so many windows apart at most.
+# Corners whose lines may come within the window of both are at most this many windows apart.
 _CORNERS = 1.5
 # Least search distance in rounding lengths.
 _ZONE = 2.0
@@ -56,8 +56,8 @@ def _dot_to(vertices, origin, target, nx, ny):
 
 @part(fastmath=False, error_model="numpy", nogil=True, **UNCOUNTED)
 def _against(vertices, next_vertex, previous_vertex, vertex, edge):
-    """Vertex against edge: (by how much its neighbours point away from the edge, as a sine, outward normal x, y, gap,
-    distance along, length)."""
+    """Vertex against edge: (sine by which its neighbours point away from the edge, outward normal x, y, gap, distance
+    along, length)."""
     a, b = edge, next_vertex[edge]
     dx, dy = vertices[b, 0] - vertices[a, 0], vertices[b, 1] - vertices[a, 1]
     length = np.sqrt(dx * dx + dy * dy)
@@ -72,8 +72,11 @@ def _against(vertices, next_vertex, previous_vertex, vertex, edge):
 
 @part(fastmath=False, error_model="numpy", nogil=True, **UNCOUNTED)
 def _may_turn_to(vertices, next_vertex, previous_vertex, vertex, nx, ny, gap, window):
-    """Whether a ``vertex`` outside an edge of the normal (nx, ny) by this ``gap``, with neighbours outside as well, may
-    be turned to it though one is nearer, in a step in which corners come nearer by the ``window`` at most."""
+    """Whether ``vertex`` may rotate against an edge in a step although a neighbour is nearer to it.
+
+    The vertex and its neighbours are outside the edge with the normal (nx, ny), the vertex by ``gap``; corners approach
+    by at most ``window`` in the step.
+    """
     for neighbour in (next_vertex[vertex], previous_vertex[vertex]):
         dx, dy = vertices[neighbour, 0] - vertices[vertex, 0], vertices[neighbour, 1] - vertices[vertex, 1]
         length, rise = np.sqrt(dx * dx + dy * dy), dx * nx + dy * ny
@@ -84,7 +87,7 @@ def _may_turn_to(vertices, next_vertex, previous_vertex, vertex, nx, ny, gap, wi
 
 @part(fastmath=False, error_model="numpy", nogil=True, **UNCOUNTED)
 def _nearer(vertices, here, one, other):
-    """True if vertex ``here`` is nearer to vertex ``one`` than to ``other``."""
+    """Whether vertex ``here`` is nearer to vertex ``one`` than to ``other``."""
     ax, ay = vertices[here, 0] - vertices[one, 0], vertices[here, 1] - vertices[one, 1]
     bx, by = vertices[here, 0] - vertices[other, 0], vertices[here, 1] - vertices[other, 1]
     return ax * ax + ay * ay < (bx * bx + by * by) * (1.0 - _NEARER)
@@ -99,7 +102,7 @@ def _by(vertices, v, w, window):
 
 @part(fastmath=False, error_model="numpy", nogil=True, **UNCOUNTED)
 def _meet(vertices, next_vertex, previous_vertex, v, w):
-    """True if corners ``v`` and ``w`` meet: neither is nearer to a neighbour of the other along its outline."""
+    """Whether corners ``v`` and ``w`` meet: neither is nearer to a neighbour of the other along its outline."""
     return not (
         _nearer(vertices, v, next_vertex[w], w)
         or _nearer(vertices, v, previous_vertex[w], w)
@@ -110,10 +113,9 @@ def _meet(vertices, next_vertex, previous_vertex, v, w):
 
 @part(fastmath=False, error_model="numpy", nogil=True, **UNCOUNTED)
 def _shallower(vertices, next_vertex, previous_vertex, vertex, gap, other):
-    """Whether an edge with this ``gap`` is what ``vertex`` meets at a corner, rather than the corner's ``other``
-    edge."""
-    away, _, _, beside, _, _ = _against(vertices, next_vertex, previous_vertex, vertex, other)
-    return away < -_ANGLE or gap >= beside
+    """Whether ``vertex`` meets the edge with this ``gap`` at a corner, rather than the corner's ``other`` edge."""
+    away, _, _, other_gap, _, _ = _against(vertices, next_vertex, previous_vertex, vertex, other)
+    return away < -_ANGLE or gap >= other_gap
 
 
 @part(fastmath=False, error_model="numpy", nogil=True, **UNCOUNTED)
@@ -131,7 +133,7 @@ def _place(keys, key):
 
 @part(fastmath=False, error_model="numpy", nogil=True, **UNCOUNTED)
 def _add(table, count, first, vertex, edge):
-    """Row of (vertex, edge) among the rows from ``first`` on, appended if new; ``table`` must have room."""
+    """Number of the row (vertex, edge) among the rows from ``first`` on, appended if new; ``table`` must have room."""
     for row in range(first, count):
         if table[row, 0] == vertex and table[row, 1] == edge:
             return row
@@ -143,7 +145,7 @@ def _add(table, count, first, vertex, edge):
 
 
 class Corners(NamedTuple):
-    """Data of corners for the contact search.
+    """Corner data of the contact search.
 
     convex    (n_vertices,)    bool
     rounding  (n_vertices,)    m, their rounding lengths
@@ -164,15 +166,17 @@ class Corners(NamedTuple):
 def find_contacts(
     outlines: Outlines, pairs: np.ndarray, window: float | np.ndarray, old_keys: np.ndarray, corners: Corners
 ) -> tuple[np.ndarray, np.ndarray]:
-    """All contacts of the ``pairs`` (k, 2) of blocks, the lower number first, that are nearer than ``window`` (m, of all or
-    (k,) of each), pair by pair: a table (n, 4) of vertex, edge, the corner of the edge's block that the vertex meets where
-    it is two rounded corners that meet (−1: a vertex meets a line), and what meets: `FACE`, `CORNERS`, or `SMOOTHED` where
-    these may overlap by a step that rounding smooths; and (n, 3) the normal that pushes the vertex's block and the gap (m) of
-    rounded corners.
+    """All contacts of ``pairs`` (k, 2) of blocks (lower number first) nearer than ``window``, pair by pair.
+
+    ``window`` is one distance, m, or (k,) of each pair; ``corners`` is a `Corners`. Returns
+
+    table (n, 4)  vertex; edge; the corner of the edge's block that the vertex meets where two rounded corners meet (−1:
+                  the vertex meets a line); and the kind: `FACE`, `CORNERS`, or `SMOOTHED` where rounding smooths a small
+                  overlap of corners
+    met (n, 3)    the normal that pushes the vertex's block, and the gap (m) of rounded corners
 
     ``old_keys`` (sorted vertex·n_vertices + edge of the last step's contacts) settles which of two equivalent
-    representations of a corner on a corner is kept, so that contacts do not change names on round-off; ``corners`` is a
-    `Corners`.
+    representations of a corner on a corner is kept, so that contacts do not change names with round-off.
     """
     box = boxes(outlines.vertices, outlines.vertex_start[:-1])
     room, windows = 32 + 8 * len(box), _each(window, len(pairs))
@@ -187,7 +191,7 @@ def find_contacts(
 
 @kept(fastmath=False, error_model="numpy", nogil=True)
 def convex_corners(vertices, next_vertex, previous_vertex):
-    """(n_vertices,) bool: a flat vertex counts as convex, for faces that were split at a node still touch there."""
+    """(n_vertices,) bool: a flat vertex counts as convex, because faces divided at a node still touch there."""
     convex = np.empty(vertices.shape[0], np.bool_)
     for i in range(vertices.shape[0]):
         k, j = previous_vertex[i], next_vertex[i]
@@ -198,8 +202,12 @@ def convex_corners(vertices, next_vertex, previous_vertex):
 
 
 class Outlines(NamedTuple):
-    """The outlines of blocks: ``vertices`` (n_vertices, 2) m, the numbers of the ``next_vertex`` and the
-    ``previous_vertex`` of each (n_vertices,), and where those of a block begin, ``vertex_start`` (n_blocks + 1,)."""
+    """Outlines of blocks.
+
+    vertices        (n_vertices, 2) m
+    next_vertex, previous_vertex   (n_vertices,) numbers
+    vertex_start    (n_blocks + 1,) first vertex of each block
+    """
 
     vertices: np.ndarray
     next_vertex: np.ndarray
@@ -208,16 +216,21 @@ class Outlines(NamedTuple):
 
 
 class _Rows(NamedTuple):
-    """Room for the rows of `find_contacts`."""
+    """Storage for the rows of `find_contacts`."""
 
     table: np.ndarray
     met: np.ndarray
 
 
 class _Lines(NamedTuple):
-    """The entrance lines of two corners, four at most: the ``vertex`` and the ``edge`` that stand for each, its ``twin``,
-    the line of the other end of the same face (−1: none), and ``shape`` (4, 7): normal that pushes the first block (2), gap,
-    distance outside the edge, edge length, distance inside, sine away from it; ``places`` (5,), as `meeting` needs them."""
+    """The entrance lines of two corners, at most four.
+
+    vertex, edge  representative of each
+    twin          line of the other end of the same face, −1 for none
+    shape         (4, 7): normal that pushes the first block (2), gap, distance outside the edge, edge length, distance
+                  inside, sine away from it
+    places        (5,) working space of `meeting`
+    """
 
     vertex: np.ndarray
     edge: np.ndarray
@@ -227,8 +240,8 @@ class _Lines(NamedTuple):
 
 
 class _Near(NamedTuple):
-    """Two blocks ``a`` and ``b`` whose contacts are searched for within a ``window`` m, and where: in the strip that both boxes
-    share, widened by what can be in reach."""
+    """Two blocks ``a`` and ``b``, the search distance ``window`` (m), and the strip in which both may be reached: the
+    intersection of their boxes, widened."""
 
     a: int
     b: int
@@ -241,15 +254,15 @@ class _Near(NamedTuple):
 
 @kept(fastmath=False, error_model="numpy", nogil=True, **UNCOUNTED)
 def _look_at(rows, lines, box, pairs, windows, outlines, old_keys, corners):
-    """Fill ``rows`` with the contacts of ``pairs`` within ``windows`` (k,) and return their number, or −1 when they have
-    no room for them.
+    """Fill ``rows`` with the contacts of ``pairs`` within ``windows`` (k,).
 
-    ``box`` (n_blocks, 4) is the blocks' least x, y and greatest x, y.
+    Returns their number, or −1 if the storage is too small. ``box`` (n_blocks, 4): least x, y and greatest x, y of
+    blocks.
     """
     count, start = 0, outlines.vertex_start
     for pair in range(pairs.shape[0]):
         a, b = pairs[pair, 0], pairs[pair, 1]
-        # Where corners are rounded their lines do not act by themselves.
+        # Lines of rounded corners do not act separately.
         zone = rounding_length(
             min(corners.rounding[start[a]], corners.rounding[start[b]]), np.inf,
             max(corners.pressed[a], corners.pressed[b]),
@@ -275,8 +288,10 @@ def _look_at(rows, lines, box, pairs, windows, outlines, old_keys, corners):
 
 @part(fastmath=False, error_model="numpy", nogil=True, **UNCOUNTED)
 def _corners_on_corners(rows, lines, first, near, outlines, old_keys, corners):
-    """Add the contacts of corners that meet corners to ``rows`` that end at ``first``; how many rows there are then, −1
-    where they have no room."""
+    """Append contacts of corners with corners to the rows that end at ``first``.
+
+    Returns the new number of rows, or −1 if the storage is too small.
+    """
     vertices, start, count = outlines.vertices, outlines.vertex_start, first
     for v in range(start[near.a], start[near.a + 1]):
         if not corners.convex[v] or not _in_strip(near, vertices[v, 0], vertices[v, 1]):
@@ -297,17 +312,17 @@ def _corners_on_corners(rows, lines, first, near, outlines, old_keys, corners):
 
 @part(fastmath=False, error_model="numpy", nogil=True, **UNCOUNTED)
 def _in_strip(near, x, y):
-    """Whether (x, y) may be in reach of both blocks."""
+    """Whether (x, y) may be within reach of both blocks."""
     return near.x_lo <= x <= near.x_hi and near.y_lo <= y <= near.y_hi
 
 
 @part(fastmath=False, error_model="numpy", nogil=True, **UNCOUNTED)
 def _entrance_lines(lines, outlines, old_keys, v, w):
-    """Find the ``lines`` through which corner ``v`` can enter corner ``w``, and their number."""
+    """Find the ``lines`` through which corner ``v`` can enter corner ``w``; returns their number."""
     vertices, next_vertex, previous_vertex = outlines.vertices, outlines.next_vertex, outlines.previous_vertex
     n_lines, shape = 0, lines.shape
     for c in range(4):
-        # Vertices of the later block stand first: at an exact tie they own the contact.
+        # Vertices of the later block come first: in an exact tie they represent the contact.
         if c < 2:
             vertex, edge, sign = w, (v if c == 0 else previous_vertex[v]), -1.0
         else:
@@ -344,7 +359,7 @@ def _entrance_lines(lines, outlines, old_keys, v, w):
 
 @part(fastmath=False, error_model="numpy", nogil=True, **UNCOUNTED)
 def _stands_better(lines, same, old_keys, n_vertices, vertex, edge, away, outside, length):
-    """Whether ``vertex`` and ``edge`` stand better for the line ``same`` than those that do."""
+    """Whether ``vertex`` and ``edge`` represent the line ``same`` better than its present representative."""
     shape = lines.shape
     near = 1e-9 * max(length, shape[same, 4])
     if abs(away - shape[same, 6]) > _LEAN:
@@ -359,7 +374,7 @@ def _stands_better(lines, same, old_keys, n_vertices, vertex, edge, away, outsid
 
 @part(fastmath=False, error_model="numpy", nogil=True, **UNCOUNTED)
 def _least_crossed(lines, n_lines):
-    """The line that is least crossed, and of those in other directions the one that is; −1 for none."""
+    """The line with the least penetration, and the one with the least of those in other directions; −1 for none."""
     one, two, shape = -1, -1, lines.shape
     for k in range(n_lines):
         if one < 0 or shape[k, 2] > shape[one, 2]:
@@ -372,8 +387,10 @@ def _least_crossed(lines, n_lines):
 
 @part(fastmath=False, error_model="numpy", nogil=True, **UNCOUNTED)
 def _add_corners(rows, first, count, lines, n_lines, near, vertices, v, w, corners):
-    """Add the contacts of the corners ``v`` and ``w`` to ``rows``, of which those of the pair begin at ``first``; how many
-    rows there are then."""
+    """Append the contacts of corners ``v`` and ``w`` to ``rows``; those of the pair of blocks begin at ``first``.
+
+    Returns the new number of rows.
+    """
     table, met, window, shape = rows.table, rows.met, near.window, lines.shape
     one, two = _least_crossed(lines, n_lines)
     line, length, reach = 1, 0.0, window
@@ -392,7 +409,7 @@ def _add_corners(rows, first, count, lines, n_lines, near, vertices, v, w, corne
         if line == 0:
             if gap > reach or gap < -window:
                 return count
-            # It goes by the name of the line whose normal is nearer to its own.
+            # The contact is named after the line whose normal is nearer to its own.
             k = one
             if mx * shape[two, 0] + my * shape[two, 1] > mx * shape[one, 0] + my * shape[one, 1]:
                 k = two
@@ -419,8 +436,10 @@ def _add_corners(rows, first, count, lines, n_lines, near, vertices, v, w, corne
 
 @part(fastmath=False, error_model="numpy", nogil=True, **UNCOUNTED)
 def _corners_on_edges(rows, first, count, near, outlines, convex):
-    """Add the contacts of corners that meet edges or lie in re-entrant corners to ``rows``, of which those of the pair
-    begin at ``first``; how many rows there are then, −1 where they have no room."""
+    """Append contacts of corners with edges, and in re-entrant corners, to ``rows``.
+
+    Those of the pair begin at ``first``. Returns the new number of rows, or −1 if the storage is too small.
+    """
     vertices, start = outlines.vertices, outlines.vertex_start
     for role in range(2):
         i, j = (near.a, near.b) if role == 0 else (near.b, near.a)
@@ -438,7 +457,7 @@ def _corners_on_edges(rows, first, count, near, outlines, convex):
 
 @part(fastmath=False, error_model="numpy", nogil=True, **UNCOUNTED)
 def _meets_edge(outlines, convex, window, v, edge):
-    """Whether corner ``v`` meets this ``edge``, not one of the corners at its ends."""
+    """Whether corner ``v`` meets the interior of this ``edge``."""
     vertices, next_vertex, previous_vertex = outlines.vertices, outlines.next_vertex, outlines.previous_vertex
     x, y, end = vertices[v, 0], vertices[v, 1], next_vertex[edge]
     if (
@@ -456,22 +475,23 @@ def _meets_edge(outlines, convex, window, v, edge):
             return False
         if not _may_turn_to(vertices, next_vertex, previous_vertex, v, nx, ny, gap, window):
             return False
-    # In a re-entrant corner a vertex may be past an edge's end by what it penetrates, not round the next corner.
+    # In a re-entrant corner a vertex may be past an edge's end by its penetration, but not round the next corner.
     if along < 0.0 and not convex[edge] and _nearer(vertices, v, previous_vertex[edge], edge):
         return False
     if along > length and not convex[end] and _nearer(vertices, v, next_vertex[end], end):
         return False
-    # Corner to corner is done apart, for corners that meet; of others the shallower edge is met within its ends.
+    # Pairs of corners are treated separately; elsewhere the shallower edge is met within its ends.
     at_start = convex[edge] and (along <= window or _by(vertices, v, edge, window))
-    if at_start and (along < 0.0 or not _is_met_beside(outlines, v, gap, edge, previous_vertex[edge])):
+    if at_start and (along < 0.0 or not _met_next_to_corner(outlines, v, gap, edge, previous_vertex[edge])):
         return False
     at_end = convex[end] and (along >= length - window or _by(vertices, v, end, window))
-    return not at_end or (not along > length and _is_met_beside(outlines, v, gap, end, end))
+    return not at_end or (not along > length and _met_next_to_corner(outlines, v, gap, end, end))
 
 
 @part(fastmath=False, error_model="numpy", nogil=True, **UNCOUNTED)
-def _is_met_beside(outlines, v, gap, corner, other):
-    """Whether ``v`` meets an edge with this ``gap`` at its ``corner``: neither that nor the ``other`` edge there."""
+def _met_next_to_corner(outlines, v, gap, corner, other):
+    """Whether ``v`` meets an edge with this ``gap`` next to its ``corner``: neither at the corner nor on the ``other``
+    edge."""
     vertices, next_vertex, previous_vertex = outlines.vertices, outlines.next_vertex, outlines.previous_vertex
     if _meet(vertices, next_vertex, previous_vertex, v, corner):
         return False
@@ -479,13 +499,13 @@ def _is_met_beside(outlines, v, gap, corner, other):
 
 
 def _each(window, n: int) -> np.ndarray:
-    """(n,) m: one ``window`` for all, or each its own."""
+    """(n,) m: the same ``window`` for all, or one of each."""
     return np.ascontiguousarray(np.broadcast_to(np.asarray(window, float), n))
 
 
 class Known(NamedTuple):
-    """The contacts of the last step (m,): ``vertex``, ``edge`` and ``normal`` (m, 2), and the ``order`` (m,) in which their
-    keys vertex·n_vertices + edge ascend."""
+    """Contacts of the last step (m,): ``vertex``, ``edge``, ``normal`` (m, 2), and the ``order`` (m,) that sorts their
+    keys vertex·n_vertices + edge."""
 
     vertex: np.ndarray
     edge: np.ndarray
@@ -496,12 +516,15 @@ class Known(NamedTuple):
 def describe_contacts(
     table: np.ndarray, met: np.ndarray, outlines: Outlines, window: float | np.ndarray, known: Known
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Geometry of the rows of `find_contacts`, ``table`` and ``met``, and what they inherit of those ``known``; ``window``
-    m, of all or (n,) of each.
+    """Geometry and history of the rows ``table``, ``met`` of `find_contacts`.
 
-    Returns (geometry, mate, parent): geometry (n, 7) = position, normal x, y, gap, tributary length, vertex x, y; mate
-    (n,) the edge of the vertex's own block that faces the touched edge; parent (n,) the row of the last step's contacts
-    whose force and slip it continues, −1 if new.
+    ``window`` (m) is one distance or (n,) of each; ``known`` are the last step's contacts. Returns (geometry, mate,
+    parent):
+
+    geometry (n, 7)  position, normal x, y, gap, tributary length, vertex x, y
+    mate (n,)        edge of the vertex's own block that faces the touched edge
+    parent (n,)      row of the last step's contact whose force and slip it continues, −1 if new
+
     The tributary length is half the overlap of the faces that meet there, 0 for a lone corner.
     """
     geometry, mate = _geometry(table, met, outlines)
@@ -510,7 +533,7 @@ def describe_contacts(
 
 @kept(fastmath=False, error_model="numpy", nogil=True)
 def _geometry(table, met, outlines):
-    """The first two of `describe_contacts`."""
+    """Geometry and mates of `describe_contacts`."""
     vertices, next_vertex, previous_vertex = outlines.vertices, outlines.next_vertex, outlines.previous_vertex
     n = table.shape[0]
     geometry = np.empty((n, 7))
@@ -525,7 +548,7 @@ def _geometry(table, met, outlines):
         after = _has_row(table, row, next_vertex[edge])
         geometry[row, 4], mate[row] = _tributary(outlines, vertex, edge, nx, ny, along, length, before, after)
         if table[row, 2] >= 0:
-            # Rounded corners have no face in common.
+            # Rounded corners have no common face.
             geometry[row, 4] = 0.0
             geometry[row, 1], geometry[row, 2], geometry[row, 3] = met[row, 0], met[row, 1], met[row, 2]
     return geometry, mate
@@ -533,8 +556,8 @@ def _geometry(table, met, outlines):
 
 @part(fastmath=False, error_model="numpy", nogil=True, **UNCOUNTED)
 def _has_row(table, row, edge):
-    """Whether the vertex of this ``row`` of the ``table`` also touches the line of another ``edge``; rows of one vertex
-    follow one another."""
+    """Whether the vertex of this ``row`` of ``table`` also touches the line of another ``edge``; rows of one vertex are
+    consecutive."""
     for step in (-1, 1):
         k = row + step
         while 0 <= k < table.shape[0] and table[k, 0] == table[row, 0]:
@@ -546,9 +569,12 @@ def _has_row(table, row, edge):
 
 @part(fastmath=False, error_model="numpy", nogil=True, **UNCOUNTED)
 def _tributary(outlines, vertex, edge, nx, ny, along, length, before, after):
-    """Half the overlap of the faces that meet where ``vertex`` touches an ``edge`` of the outward normal (nx, ny) and this
-    ``length`` so far ``along`` it, m; and the edge of the vertex's own block that faces it. ``before`` and ``after``:
-    whether the vertex touches the edges before and after this one too, whose faces are counted there."""
+    """Half the overlap, m, of the faces that meet where ``vertex`` touches ``edge``, and the facing edge of its block.
+
+    The edge has the outward normal (nx, ny) and this ``length``; the contact is at the distance ``along`` it.
+    ``before`` and ``after``: whether the vertex also touches the edges before and after this one, whose faces are
+    counted there.
+    """
     vertices, next_vertex, previous_vertex = outlines.vertices, outlines.next_vertex, outlines.previous_vertex
     tributary, facing, mate = 0.0, np.inf, vertex
     for own in (vertex, previous_vertex[vertex]):
@@ -559,8 +585,7 @@ def _tributary(outlines, vertex, edge, nx, ny, along, length, before, after):
         if cosine < facing:
             facing = cosine
             mate = own
-        # As near to an end as this, the corner stands for the end, too, and faces the edges on both sides of a flat
-        # node.
+        # This near to an end, the corner represents the end too, and faces the edges on both sides of a flat node.
         ends = _ENDS * max(length, own_length)
         for turn in range(3):
             face = edge
@@ -586,7 +611,7 @@ def _tributary(outlines, vertex, edge, nx, ny, along, length, before, after):
 
 @kept(fastmath=False, error_model="numpy", nogil=True)
 def _parents(table, geometry, outlines, window, known):
-    """The last of `describe_contacts`, each row with its own ``window`` (n,)."""
+    """Parents of `describe_contacts`; each row has its own ``window`` (n,)."""
     vertices, next_vertex = outlines.vertices, outlines.next_vertex
     n, n_vertices = table.shape[0], vertices.shape[0]
     parent = np.full(n, -1, np.int64)
@@ -613,8 +638,11 @@ def _parents(table, geometry, outlines, window, known):
 
 @part(fastmath=False, error_model="numpy", nogil=True, **UNCOUNTED)
 def _renamed(keys, taken, known, previous_vertex, vertex, corner, nx, ny):
-    """The contact that is ``known`` of ``vertex`` at a ``corner``, with the normal (nx, ny), under another name: the next
-    edge round the corner, or the roles exchanged; −1 for none. It is ``taken`` then."""
+    """Number of the last step's contact that continues under another name: the next edge round the ``corner``, or with
+    vertex and edge exchanged.
+
+    Its normal is (nx, ny). Returns −1 for none; marks it as ``taken``.
+    """
     n_vertices = previous_vertex.shape[0]
     for c in range(4):
         if c == 0:

@@ -1,7 +1,7 @@
-"""Springs inside joint faces: their positions give a face the normal force and the moment of its linear gap.
+"""Springs inside joint faces, at positions where they give the normal force and moment of the face's linear gap.
 
-Blocks that strain uniformly part along a straight line, with the gap g(s) along their face. A joint of stiffness kₙ
-(Pa/m) without tension carries the pressure −kₙ g where g < 0, on the part c of the face length ℓ:
+The faces of uniformly strained blocks separate along a straight line, with the gap g(s). A joint of stiffness kₙ (Pa/m)
+without tension carries the pressure −kₙ g where g < 0, on the part c of the face length ℓ:
 
     N = −kₙ ∫ g ds,    M = −kₙ ∫ g s ds    over that part; c = ℓ or c = 3 (ℓ/2 − e), e = M/N (a triangle of pressure).
 
@@ -18,17 +18,17 @@ across the face and the distance h from it to the face, rotates by
     θ = M h / (E' I / 2h)        (rectangle: M h / (E' ℓ³/12); Kawai 1978 gives rigid blocks this compliance
     throughout),
 
-and the two springs stand as far inside the corners as gives this rotation. Tangentially both act at the middle of the
-face: a bending block is stretched along its faces by a strain that varies across it, as its neighbours are, and
-tangential springs at two places would prevent that. Bricks in courses, bricks in bond and bonded cells of any shape
-then bend as a beam does, the better the more of them there are. Otherwise they lock: displacements that agree at the
-corners and are linear in every block allow no bending. (Triangles, with three springs, do not lock.) The springs have
-the part ℓ/w of the penalty stiffness, with the width w = √(12 I / A) of the block along the face: under one stress all
-faces of a block then deform equally. Were short faces as stiff as long ones, they would carry many times the stress of
-the rock and fail at a fraction of the strength.
+and the two springs are placed inside the corners at the distance that gives this rotation. Tangentially both act at the
+centre of the face: the faces of a bending block are strained by an amount that varies across the block, and likewise
+its neighbours', and tangential springs at two places would prevent that. Bricks in courses, bricks in bond and bonded
+cells of any shape then bend like a beam, the more accurately the more of them there are. Otherwise they lock:
+displacements that agree at the corners and are linear in every block allow no bending. (Triangles, with three springs,
+do not lock.) The springs have the part ℓ/w of the penalty stiffness, with the width w = √(12 I / A) of the block along
+the face: under uniform stress all faces of a block then deform equally. If short faces were as stiff as long ones, they
+would carry many times the stress of the rock and fail at a fraction of the strength.
 
 CONTACT rows hold forces at the corners, where contacts are found: the pair of corner forces with the same resultant and
-moment, which causes the same stress. (The shear force that a state carries over is that of the springs.)
+moment, which causes the same stress. (The shear force carried over to the next step is that of the springs.)
 """
 
 from __future__ import annotations
@@ -44,18 +44,18 @@ from ...model import OPEN
 from ..joint_laws.bonds import WITHOUT_GAPS, BondedFaces, on_lines
 from ..joint_laws.penalty_springs import Springs
 
-#: Distance of the two Gauss points of an interval, in parts of it.
+#: Distance between the two Gauss points of an interval, relative to its length.
 _GAUSS = 1 / np.sqrt(3.0)
-#: A part in contact that is known but for this much of its length is known: forces but for its square. The next step
-#: begins from the geometry, so that statics go on to the end.
+#: The part in contact counts as found when its ends change by less than this part of the face; forces are then accurate
+#: to its square. The next step begins from the geometry, so that statics converge.
 _KNOWN = 1e-2
-#: Springs that are this much of their face apart are at its corners.
+#: Springs at this relative distance from each other are at the corners of the face.
 _AT_CORNERS = 0.99
 
 
 class FaceForces(NamedTuple):
-    """What contacts (n,) have last borne: ``normal`` N, the part of the face from the corner on that was ``bare`` of touch,
-    and whether a bond ``holds`` that may pull."""
+    """Last forces of contacts (n,): ``normal`` (N), the part ``bare`` of the face, from the corner on, without contact,
+    and whether a bond ``holds`` that may carry tension."""
 
     normal: np.ndarray
     bare: np.ndarray
@@ -64,33 +64,32 @@ class FaceForces(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class FacePoints:
-    """Faces (m,) with a contact at either end whose springs stand inside them, as a step takes them to touch.
+    """Faces (m,) with a contact at either end and springs inside, with the parts that are assumed in contact.
 
     ends      (m, 2)  rows of the step's `ContactSet`
     corners   (n, 7)  geometry of all its rows, at the corners
     length    (m,)    m
-    part      (m, 2)  where the part in contact begins and ends, in parts of the face from its first end
-    held      (m,)    bonds may pull: the part is the whole face
-    shortest  (m,)    no part is shorter: below, the springs are those of a corner (`contact_springs.least_face`)
-    apart     (m,)    distance of the two springs, in parts of the part
-    bends     (m,)    bonds that give as their blocks would bend: along the face both springs stand in its middle
-    share     (m,)    the part of the stiffness at the corners that its springs have
-    went      (m, 2)  how far its ends have gone with the last iteration of the step
-    stride    (m,)    the part of the way to where they seem to be that they go: half the last one's, or less, after
-              turning about
+    part      (m, 2)  start and end of the part in contact, relative to the face, from its first end
+    tensile   (m,)    bonds may carry tension: the part is the whole face
+    shortest  (m,)    least length of a part: below it, the springs are those of a corner (`contact_springs.least_face`)
+    apart     (m,)    distance between the two springs, relative to the part
+    bends     (m,)    bonds that deform as their blocks would bend: tangentially both springs act at the face's centre
+    share     (m,)    share of the stiffness at the corners that its springs have
+    last_change  (m, 2)  change of the part's ends in the last iteration of the step
+    relaxation   (m,)    relaxation factor of the change of the ends: halved at every reversal
     """
 
     ends: np.ndarray
     corners: np.ndarray
     length: np.ndarray
     part: np.ndarray
-    held: np.ndarray
+    tensile: np.ndarray
     shortest: np.ndarray
     apart: np.ndarray
     bends: np.ndarray
     share: np.ndarray
-    went: np.ndarray
-    stride: np.ndarray
+    last_change: np.ndarray
+    relaxation: np.ndarray
 
     @classmethod
     def of(
@@ -99,14 +98,17 @@ class FacePoints:
         other: np.ndarray,
         geometry: np.ndarray,
         stiff: np.ndarray,
-        borne: FaceForces,
+        last: FaceForces,
         least: np.ndarray,
         softened: Callable[[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]],
     ) -> FacePoints | None:
-        """Faces among contacts (n,), ``stiff`` 1 where the law has a stiffness, 2 where a bond is to bend with its
-        blocks, 0 for neither, with what they have ``borne``; ``least`` m of face that the stiffness is at least that
-        of; ``softened(ends, length)`` the ``apart`` and ``share`` of bonds. None without any."""
-        holds = borne.holds
+        """Faces among contacts (n,); None without any.
+
+        ``stiff``: 1 where the law has a stiffness, 2 where a bond represents the bending of its blocks, 0 for neither;
+        ``last``: their last forces; ``least`` (m): the stiffness is at least that of this length of face;
+        ``softened(ends, length)`` gives ``apart`` and ``share`` of bonds.
+        """
+        holds = last.holds
         some = np.flatnonzero((stiff > 0) & (geometry[:, 4] > 0))
         if len(some) < 2:
             return None
@@ -115,32 +117,32 @@ class FacePoints:
         ends, places = some[start[two, None] + [0, 1]], along[start[two, None] + [0, 1]]
         length = np.abs(places[:, 1] - places[:, 0])
         whole = np.abs(geometry[ends, 4].sum(axis=1) - length) <= WITHOUT_GAPS * length
-        # A bond at one end alone (the other end is where a crack has cut the face) stays at its corner: on a part that
-        # comes and goes with what presses it would be another spring in every step, and bring energy.
+        # A bond at one end only (the other end is where a crack has cut the face) stays at its corner: on a part that
+        # changes with the pressure it would be another spring in every step, and create energy.
         whole &= (stiff[ends[:, 0]] == stiff[ends[:, 1]]) & (holds[ends[:, 0]] == holds[ends[:, 1]])
         if not whole.any():
             return None
         ends, length = ends[whole], length[whole]
-        held, shortest = holds[ends].all(axis=1), np.minimum(2 * least[ends].max(axis=1) / length, 1.0)
+        tensile, shortest = holds[ends].all(axis=1), np.minimum(2 * least[ends].max(axis=1) / length, 1.0)
         apart, share, glued = np.full(len(ends), _GAUSS), np.ones(len(ends)), stiff[ends[:, 0]] == 2
         if glued.any():
             shortest[glued] = 1.0
             apart[glued], share[glued] = softened(ends[glued], length[glued])
             inside = (apart < _AT_CORNERS) | (share < _AT_CORNERS)
-            ends, length, held, shortest, apart, share, glued = (
-                each[inside] for each in (ends, length, held, shortest, apart, share, glued)
+            ends, length, tensile, shortest, apart, share, glued = (
+                each[inside] for each in (ends, length, tensile, shortest, apart, share, glued)
             )
-        part = _left(borne.bare[ends], _pressed(borne.normal[ends], held, shortest), held, shortest)
+        part = _left(last.bare[ends], _pressed(last.normal[ends], tensile, shortest), tensile, shortest)
         still, full = np.zeros_like(part), np.ones(len(part))
-        return cls(ends, geometry, length, part, held, shortest, apart, glued, share, still, full)
+        return cls(ends, geometry, length, part, tensile, shortest, apart, glued, share, still, full)
 
     def pressed_by(self, normal: np.ndarray) -> FacePoints:
         """The same faces, in contact on the parts that carry the corner forces ``normal`` (n,) N."""
-        return replace(self, part=_pressed(normal[self.ends], self.held, self.shortest))
+        return replace(self, part=_pressed(normal[self.ends], self.tensile, self.shortest))
 
     def before(self, bare: np.ndarray, stiff_in_shear: np.ndarray) -> FacePoints:
         """The same faces on the parts that the last step has left in contact, ``bare`` (n,) as in `ContactSet`: those
-        whose shear stiffness goes by their length (``stiff_in_shear``), the others where they are."""
+        whose shear stiffness is proportional to their length (``stiff_in_shear``); the others unchanged."""
         first, second = bare[self.ends].T
         known = (first >= 0) & (second >= 0) & (first + second < 1) & stiff_in_shear[self.ends[:, 0]]
         return replace(self, part=np.where(known[:, None], np.stack([first, 1 - second], axis=1), self.part))
@@ -149,7 +151,8 @@ class FacePoints:
         """(n,) initial shear force of these springs, N, from the ``shear`` (n,) of the springs of the faces ``was``.
 
         That shear is taken as a linear stress along the old part. It continues where old and new parts overlap, with
-        the resultant and moment of the overlap, and with no more stored energy."""
+        the resultant and moment of the overlap, and without an increase of stored energy.
+        """
         out = shear.copy()
         if (was.part == self.part).all():
             return out
@@ -162,7 +165,7 @@ class FacePoints:
         moment = mean * (b**2 - a**2) / 2 + tilt * (b**3 - a**3) / 3
         first, second = (self.place.T - middle) / half
         on_low = (second * total - moment) / (second - first)
-        # A line fitted to a stress that ends within the part changes sign beyond.
+        # A line fitted to a stress that vanishes within the part changes sign beyond.
         one_way = on_first * on_second >= 0
         on_low = np.where(one_way, np.clip(on_low, np.minimum(total, 0.0), np.maximum(total, 0.0)), on_low)
         moved = (was.part != self.part).any(axis=1)
@@ -188,7 +191,7 @@ class FacePoints:
         out = self.corners.copy()
         near, far = self.ends, self.ends[:, ::-1]
         vertex, across = self.corners[near, 5:7], self.corners[near, 1:3]
-        # The far end of the face: the far vertex, or its foot on the face where that vertex belongs to the other
+        # The far end of the face: the far vertex, or its projection on the face where that vertex belongs to the other
         # block.
         beyond = self.corners[far, 3]
         along = vertex[:, 1] - vertex[:, 0]
@@ -202,9 +205,10 @@ class FacePoints:
         return out
 
     def share_shear(self, vectors: np.ndarray, block: np.ndarray) -> None:
-        """Give both springs of bending faces the tangential motion at the middle of the face, in place.
+        """Give both springs of bending faces the tangential motion at the centre of the face, in place.
 
-        ``vectors`` (n, 2, 12) as `contact_vectors`; ``block`` (n,) that of the vertex."""
+        ``vectors`` (n, 2, 12) as `contact_vectors`; ``block`` (n,) that of the vertex.
+        """
         if not self.bends.any():
             return
         one, two = self.ends[self.bends].T
@@ -257,8 +261,8 @@ class FacePoints:
     def at_corners(self, force: np.ndarray) -> np.ndarray:
         """(n,) corner forces, N, with the resultant and moment of the springs' ``force`` (n,), normal or shear.
 
-        For shear forces, whose lever arms (the gaps) are also linear along the face, they stretch the blocks
-        equally."""
+        For shear forces, whose lever arms (the gaps) are also linear along the face, they strain the blocks equally.
+        """
         out, (first, second) = force.copy(), self.place.T
         on_first, on_second = force[self.ends].T
         out[self.ends[:, 0]] = on_first * (1 - first) + on_second * (1 - second)
@@ -283,45 +287,50 @@ class FacePoints:
     def better(self, gap: np.ndarray, state: np.ndarray, holds: np.ndarray) -> FacePoints | None:
         """The faces with the parts that are in contact at the end of a step; None where these are the assumed parts.
 
-        ``gap`` (n,) m and ``state`` (n,) of the springs; ``holds`` (n,) bool: bonds that may carry tension.
+        ``gap`` (n,) m and ``state`` (n,) are those of the springs; ``holds`` (n,) bool: bonds that may carry tension.
 
-        A part with one parted spring carries no moment, and its gaps give no length: the resultant acts beyond the
-        other spring, so that the part grows to that side, or is halved where the face ends there. A part grows by at
-        most its length at either end, because on a part that is too short the block rotates too far. (A spring may be
-        open and not parted: its dashpot releases it earlier.)
+        A part with one open spring carries no moment, and its gaps do not determine its length: the resultant acts
+        beyond the other spring, so that the part grows to that side, or is halved where the face ends there. A part
+        grows by at most its length at either end, because on a part that is too short the block rotates too far. (A
+        spring may be open without a positive gap: its dashpot releases it earlier.)
         """
-        held = holds[self.ends].all(axis=1)
-        part = _touching(self.gap_at_corners(gap)[self.ends], held, self.shortest, self.part)
+        tensile = holds[self.ends].all(axis=1)
+        part = _touching(self.gap_at_corners(gap)[self.ends], tensile, self.shortest, self.part)
         low, high = self.part.T
         length = high - low
         part = np.clip(part, (low - length)[:, None], (high + length)[:, None])
-        # A part that has moved to the other side is looked for on both.
+        # A part that has moved to the other side is searched for on both.
         over = (part[:, 0] >= high) | (part[:, 1] <= low)
         part[over] = np.stack([np.minimum(part[:, 0], low), np.maximum(part[:, 1], high)], axis=1)[over]
         first, second = ((state[self.ends] != OPEN) | (gap[self.ends] <= 0)).T
-        lame = (first != second) & ~held & (length > self.shortest)
+        one_open = (first != second) & ~tensile & (length > self.shortest)
         half = np.maximum(0.5 * length, self.shortest)
         to_low = np.where(low > 0, [np.maximum(low - length, 0.0), high], [low, low + half])
         to_high = np.where(high < 1, [low, np.minimum(high + length, 1.0)], [high - half, high])
-        part[lame] = np.where(first, to_low, to_high).T[lame]
-        # Faces that rotate the same block may alternate without end: the step is halved at every reversal.
+        part[one_open] = np.where(first, to_low, to_high).T[one_open]
+        # Faces that rotate the same block may alternate indefinitely: the step is halved at every reversal.
         way = part - self.part
-        stride = np.where((way * self.went).sum(axis=1) < 0, 0.5 * self.stride, self.stride)
-        way *= stride[:, None]
+        relaxation = np.where((way * self.last_change).sum(axis=1) < 0, 0.5 * self.relaxation, self.relaxation)
+        way *= relaxation[:, None]
         off = np.abs(way).max(axis=1) > _KNOWN * (part[:, 1] - part[:, 0])
         if not off.any():
             return None
         way[~off] = 0.0
-        return replace(self, part=self.part + way, went=np.where(off[:, None], way, self.went), stride=stride)
+        return replace(
+            self, part=self.part + way, last_change=np.where(off[:, None], way, self.last_change), relaxation=relaxation
+        )
 
 
 @kept(fastmath=False, error_model="numpy", nogil=True)
 def give_by_bending(owner, across, point, vertices, following, start, modulus, bends):
-    """(m, 2): what the block ``owner`` (m,) turns by (rad/(N m)) behind the face across the normal ``across`` (m, 2)
-    through ``point`` (m, 2), h / (E' I / 2h) with its second moment I along the face and the distance h from its
-    centroid; and its width along the face, √(12 I / A) (m); 0 for blocks that do not bend. ``vertices`` (n, 2), the
-    next of each ``following`` (n,), those of a block from ``start`` on, its ``modulus`` Pa. (A face that is shorter
-    than the block is wide turns the whole of that width.)"""
+    """(m, 2): compliance h / (E' I / 2h), rad/(N m), of the block ``owner`` (m,) behind a face, and its width √(12 I /
+    A), m.
+
+    The face has the normal ``across`` (m, 2) through ``point`` (m, 2); I is the block's second moment along the face, h
+    the distance of its centroid. Both are 0 for blocks that do not bend. ``vertices`` (n, 2), ``following`` (n,) the
+    next vertex of each, ``start`` the first of each block, ``modulus`` in Pa. (A face shorter than the block is wide
+    rotates the whole width.)
+    """
     out = np.zeros((owner.shape[0], 2))
     for f in range(owner.shape[0]):
         b = owner[f]
@@ -331,7 +340,7 @@ def give_by_bending(owner, across, point, vertices, following, start, modulus, b
         area = first = second = far = 0.0
         for v in range(start[b], start[b + 1]):
             w = following[v]
-            # Along the face, and normal to it.
+            # Components along the face and normal to it.
             s = (vertices[v, 1] - point[f, 1]) * nx - (vertices[v, 0] - point[f, 0]) * ny
             d = (vertices[v, 0] - point[f, 0]) * nx + (vertices[v, 1] - point[f, 1]) * ny
             r = (vertices[w, 1] - point[f, 1]) * nx - (vertices[w, 0] - point[f, 0]) * ny
@@ -347,32 +356,34 @@ def give_by_bending(owner, across, point, vertices, following, start, modulus, b
     return out
 
 
-def _touching(gap: np.ndarray, held: np.ndarray, shortest: np.ndarray, before: np.ndarray) -> np.ndarray:
-    """(m, 2) part of each face in contact, from the ``gap`` (m, 2) at its ends, m; open faces keep the part
+def _touching(gap: np.ndarray, tensile: np.ndarray, shortest: np.ndarray, before: np.ndarray) -> np.ndarray:
+    """(m, 2) part of each face in contact, from the ``gap`` (m, 2), m, at its ends; open faces keep the part
     ``before``."""
     first, second = gap.T
     with np.errstate(divide="ignore", invalid="ignore"):
         zero = first / (first - second)
     low = np.where((first > 0) & (second < 0), np.minimum(zero, 1 - shortest), 0.0)
     high = np.where((first < 0) & (second > 0), np.maximum(zero, shortest), 1.0)
-    low, high = np.where(held, 0.0, low), np.where(held, 1.0, high)
-    out = ((first > 0) & (second > 0) & ~held)[:, None]
+    low, high = np.where(tensile, 0.0, low), np.where(tensile, 1.0, high)
+    out = ((first > 0) & (second > 0) & ~tensile)[:, None]
     return np.where(out, before, np.stack([low, high], axis=1))
 
 
-def _left(bare: np.ndarray, pressed: np.ndarray, held: np.ndarray, shortest: np.ndarray) -> np.ndarray:
-    """(m, 2) the part of each face that is left beside what is ``bare`` (m, 2) from its ends on, where something is;
-    the part ``pressed`` (m, 2) of all others."""
+def _left(bare: np.ndarray, pressed: np.ndarray, tensile: np.ndarray, shortest: np.ndarray) -> np.ndarray:
+    """(m, 2) the part of each face without what is ``bare`` (m, 2) at its ends, where something is; elsewhere the part
+    ``pressed`` (m, 2)."""
     first, second = bare.T
-    some = (first >= 0) & (second >= 0) & (first + second > 0) & (1 - first - second >= shortest * (1 - 1e-9)) & ~held
+    some = (
+        (first >= 0) & (second >= 0) & (first + second > 0) & (1 - first - second >= shortest * (1 - 1e-9)) & ~tensile
+    )
     return np.where(some[:, None], np.stack([first, 1 - second], axis=1), pressed)
 
 
-def _pressed(normal: np.ndarray, held: np.ndarray, shortest: np.ndarray) -> np.ndarray:
-    """(m, 2) the part of each face that the forces ``normal`` (m, 2) at its ends press on: c/ℓ = 3 (1/2 − e/ℓ), at most
-    1."""
+def _pressed(normal: np.ndarray, tensile: np.ndarray, shortest: np.ndarray) -> np.ndarray:
+    """(m, 2) the part of each face on which the forces ``normal`` (m, 2) at its ends press: c/ℓ = 3 (1/2 − e/ℓ), at
+    most 1."""
     total = normal.sum(axis=1)
     with np.errstate(divide="ignore", invalid="ignore"):
-        share = np.where((total > 0) & ~held, np.clip(normal[:, 1] / total, 0.0, 1.0), 0.5)
+        share = np.where((total > 0) & ~tensile, np.clip(normal[:, 1] / total, 0.0, 1.0), 0.5)
     length = np.clip(3 * np.minimum(share, 1 - share), shortest, 1.0)
     return np.stack([np.where(share > 0.5, 1 - length, 0.0), np.where(share > 0.5, 1.0, length)], axis=1)

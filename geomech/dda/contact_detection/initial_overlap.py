@@ -112,5 +112,5 @@ def refuse_overlap(blocks: Blocks, vertices: np.ndarray, moments: np.ndarray) ->
         f"{names[a]!r} and {names[b]!r} overlap by {depth:.3g} m near x = {x:.6g}, y = {y:.6g} m before they have moved"
     )
     if share > REFUSED:
-        raise ValueError(f"{what}: draw them apart, or cut one out of the other")
+        raise ValueError(f"{what}: draw them apart, or subtract one from the other")
     log.warning("%s; their contact pushes them apart", what)

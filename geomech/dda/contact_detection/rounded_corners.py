@@ -23,7 +23,7 @@ import numpy as np
 from ...compiled import UNCOUNTED, part
 
 #: A normal within this angle (cosine; 0.2 rad) of that of one line is replaced by it: so shallow a ramp is lower than a
-#: fiftieth of the rounding length, and no step that was drawn.
+#: fiftieth of the rounding length and was not drawn as a step.
 _ON_LINE = 0.98
 #: Height of that ramp over the rounding length, 1 − cos 0.2.
 EASED = 0.02
@@ -69,8 +69,8 @@ def meeting(x, y, dx, dy, nx1, ny1, gap1, nx2, ny2, gap2, length, places):
     mx, my, gap, line = _nearest(x, y, nx1, ny1, nx2, ny2, gap1, gap2, radius, cx, cy, way)
     if gap > 0.0:
         here, zx, zy = (mx, my, gap, line), x - cx, y - cy
-        # Where on the path x comes first to the wedge, or nearest to it: lines are met, or near, at an end of the path
-        # or where it crosses them, the arc also where the path passes its centre.
+        # Where x first reaches the wedge on its path, or comes nearest: lines are reached at an end of the path or
+        # where it crosses them, the arc also where the path passes its centre.
         rate1, rate2, travel = dx * nx1 + dy * ny1, dx * nx2 + dy * ny2, dx * dx + dy * dy
         along = zx * dx + zy * dy
         places[0], n = 1.0, 1
@@ -98,12 +98,12 @@ def meeting(x, y, dx, dy, nx1, ny1, gap1, nx2, ny2, gap2, length, places):
             px, py, near, on = _nearest(
                 x + t * dx, y + t * dy, nx1, ny1, nx2, ny2, gap1 + t * rate1, gap2 + t * rate2, radius, cx, cy, way
             )
-            # Of places in the wedge the first, before them all others the nearest.
+            # Of positions in the wedge the first; otherwise the nearest.
             earlier = (least > tiny or t < first) if near <= tiny else near < least
             if earlier:
                 least, first, mx, my, line = near, t, px, py, on
         gap = zx * mx + zy * my - radius
-        # The line to come is none to stand on as long as the corner is behind it, beside the wedge.
+        # The line ahead does not support the corner as long as the corner is behind it, outside the wedge.
         if (line == 1 and gap1 < -EASED * length) or (line == 2 and gap2 < -EASED * length):
             mx, my, gap, line = here
     if line == 1 or (mx * nx1 + my * ny1 > _ON_LINE and gap1 > -EASED * length):

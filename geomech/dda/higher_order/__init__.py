@@ -1,1 +1,1 @@
-"""Blocks of higher order: displacement that is a complete polynomial of order p in each block, so that blocks bend."""
+"""Blocks of higher order: displacement in each block is a complete polynomial of order p, so that blocks can bend."""

@@ -1,11 +1,11 @@
-"""One step of blocks of unlike order: `Attempt` with deflection.
+"""Time step of blocks of different orders: `Attempt` with the unknowns of deflection.
 
-The unknowns of deflection stand beside the six first ones in one system (`six_row_system`), integrated in time by the
-same scheme in the frame that rotates with the block,
+They form one system with the first six unknowns of each block (`six_row_system`), integrated by the same scheme in the
+frame that rotates with the block,
 
     2 M/dt² Δq = 2 M q̇/dt + f − K q − θ K Δq − c K Δq/dt + contacts,
 
-where c is the damping of the block's mean strain. Contacts along faces are points, each with its state
+where c is the damping of the block's mean strain. Contacts along faces are integration points, each with its own state
 (`face_points`).
 """
 
@@ -31,19 +31,19 @@ from .six_row_system import fill_own, moved
 
 
 class BendingAttempt(Attempt):
-    """As `Attempt`, of a system with ``deflected`` blocks; ``found`` are contacts at corners."""
+    """As `Attempt`, for a system with ``deflected`` blocks; ``found`` are the contacts at corners."""
 
     def __init__(self, system, start: StepStart, dt: float, found: ContactSet, cuts: int) -> None:
         state = start.state
         self.blocks: DeflectedBlocks = system.deflected
         known = self.blocks.at_rest() if state.deflection is None else state.deflection
         self.deflection = np.ascontiguousarray(known[:, 0])
-        #: (k,) m/s of deflection that the step begins with.
+        #: (k,) m/s, rates of deflection at the start of the step.
         self.rates = system.settings.dynamic_factor * known[:, 1]
         super().__init__(system, start, dt, self._on_faces(system, state, start.vertices, found), cuts)
 
     def _on_faces(self, system, state, vertices: np.ndarray, corners: ContactSet) -> FaceContacts:
-        """The contacts found at ``corners``, with points along faces and what deflection adds to their gaps."""
+        """Contacts at ``corners`` and at points along faces, with the contribution of deflection to their gaps."""
         finder = system.finder
         by_length = finder.stiff_laws[corners.law], finder.stiff_along_laws[corners.law]
         found = FaceContacts.along_faces(corners, self.blocks.order, state.face_points, by_length)
@@ -53,7 +53,7 @@ class BendingAttempt(Attempt):
         return replace(found, deflected=self._gaps(found.geometry[:, 1:3], found, state.rotation, self.deflection))
 
     def _gaps(self, normal: np.ndarray, found: ContactSet, angle: np.ndarray, q: np.ndarray) -> np.ndarray:
-        """(n,) m that deflections ``q`` (k,) open contacts by across ``normal`` (n, 2)."""
+        """(n,) m: contribution of deflections ``q`` (k,) to the gaps of contacts with the normals ``normal`` (n, 2)."""
         padded, out = self.blocks.padded(q), np.zeros(len(found))
         for owner, points, sign in zip((found.block, found.other), self.touching, (1.0, -1.0), strict=True):
             matrix = self.blocks.directions(points, owner, angle)
@@ -69,7 +69,7 @@ class BendingAttempt(Attempt):
             self.density * self.moments[:, 0] / (12.0 * system.stiffness[:, 0, 0])
         )
         size = np.sqrt(self.moments[:, 0])
-        # Strains and deflection share inertia on the axes of the start, on which strains are unknowns.
+        # Strains, unknowns on the axes of the start of the step, and deflection are coupled by inertia.
         self.shared = self.density[:, None, None] * blocks.coupling(self.state.rotation) / size[:, None, None]
         self.bending_load = blocks.loads(self.points, self.edges, self.midpoint.vertices, self.angle)
         stored, rates = blocks.stiffness_times(self.deflection), blocks.padded(self.rates)
@@ -91,8 +91,11 @@ class BendingAttempt(Attempt):
         self._own_matrices(bending, inertia * self.shared, inertia * self.density * blocks.basis.area)
 
     def _own_matrices(self, bending: np.ndarray, shared: np.ndarray, mass: np.ndarray) -> None:
-        """The blocks' own matrices, one after the other: ``bending`` (n_blocks, m, m) stiffness of deflection, what it
-        has in common with strains, ``shared`` (n_blocks, 3, m), and its ``mass`` (n_blocks,) on the diagonal."""
+        """The blocks' own matrices, one after the other.
+
+        ``bending`` (n_blocks, m, m) is the stiffness of deflection, ``shared`` (n_blocks, 3, m) its coupling with
+        strains, and ``mass`` (n_blocks,) its mass on the diagonal.
+        """
         blocks, moving = self.blocks, self.system.moving
         self.own_at, pieces, at = np.full(len(self.order), -1), [], 0
         for order in np.unique(blocks.order[moving]).tolist():
@@ -116,7 +119,7 @@ class BendingAttempt(Attempt):
         try:
             return super()._settled(pattern, matrix, right, found, gap, vectors, springs, curved)
         except Unsettled as failure:
-            # Others know contacts by their corners.
+            # Everything outside this step knows contacts by their corners.
             if failure.contact < 0:
                 raise
             raise Unsettled(str(failure), found.points.corner_of(failure.contact)) from failure
@@ -128,7 +131,7 @@ class BendingAttempt(Attempt):
         full[self.order[moving], 3:6] += self.coupled_right[moving]
         full.ravel()[self._deflection_at(pattern)] = self.own_right[blocks.owner, blocks.which]
         if self._constrained() is not None:
-            # What is held has changed the six first rows and columns.
+            # Constraints have changed the first six rows and columns.
             own = own.copy()
             for b in moving.tolist():
                 width = 6 * int(blocks.rows[b])
@@ -146,27 +149,28 @@ class BendingAttempt(Attempt):
         )  # fmt: skip
 
     def _deflection_at(self, pattern) -> np.ndarray:
-        """(k,) where the unknowns of deflection stand among all."""
+        """(k,) positions of the unknowns of deflection among all unknowns."""
         return 6 * pattern.more[self.blocks.owner] + self.blocks.which
 
     def _rows(self, found: ContactSet, vectors: np.ndarray) -> np.ndarray:
-        """(n, 2, 2, w): way, side, the contacts' motion per unit of all unknowns of the side's block."""
+        """(n, 2, 2, w): direction, side, relative motion per unit of the unknowns of the side's block."""
         blocks, n = self.blocks, len(found)
         out = np.zeros((n, 2, 2, max(blocks.width, 6)))
         out[..., :6] = vectors.reshape(n, 2, 2, 6)
         geometry = self.midpoint.contacts(found.geometry, found.block, found.other, self.along_edges(found))
         normal = geometry[:, 1:3]
-        ways = np.stack([normal, np.stack([-normal[:, 1], normal[:, 0]], axis=1)], axis=1)
+        directions = np.stack([normal, np.stack([-normal[:, 1], normal[:, 0]], axis=1)], axis=1)
         for side, (owner, points, sign) in enumerate(
             zip((found.block, found.other), self.touching, (1.0, -1.0), strict=True)
         ):
             matrix = blocks.directions(points, owner, self.angle)
             m = matrix.shape[2]
-            out[:, :, side, 6 : 6 + m] = sign * np.einsum("nwa,naj->nwj", ways, matrix, optimize=True)
+            out[:, :, side, 6 : 6 + m] = sign * np.einsum("nwa,naj->nwj", directions, matrix, optimize=True)
         return out
 
     def _bent(self) -> bool:
-        """As `Attempt._bent`: whether the step is to be solved again with gaps that follow the arcs of its motion."""
+        """As `Attempt._bent`: whether the step must be solved again with gaps that follow the circular arcs of its
+        motion."""
         system, found = self.system, self.found
         if not len(found) or not self.n_free:
             return False
@@ -186,7 +190,7 @@ class BendingAttempt(Attempt):
         return True
 
     def _follow(self, increment: np.ndarray, vertices: np.ndarray) -> None:
-        """Let the contacts follow the arcs of ``increment`` (n_blocks, 6), with which deflection turns."""
+        """Let contacts follow the arcs of the motion ``increment`` (n_blocks, 6), with which deflection rotates."""
         super()._follow(increment, vertices)
         found, system, start = self.found, self.system, self.state.rotation
         change = self._deflected_by()
@@ -195,20 +199,20 @@ class BendingAttempt(Attempt):
         acting = self.midpoint.contacts(found.geometry, found.block, found.other, self.along_edges(found))[:, 1:3]
         extra = []
         for turned in (lambda n: n, lambda n: np.stack([-n[:, 1], n[:, 0]], axis=1)):
-            went = self._gaps(turned(normal), found, start + increment[:, 2], self.deflection + change)
-            went -= self._gaps(turned(found.geometry[:, 1:3]), found, start, self.deflection)
-            extra.append(went - self._gaps(turned(acting), found, start + self.turn, change))
+            gap_change = self._gaps(turned(normal), found, start + increment[:, 2], self.deflection + change)
+            gap_change -= self._gaps(turned(found.geometry[:, 1:3]), found, start, self.deflection)
+            extra.append(gap_change - self._gaps(turned(acting), found, start + self.turn, change))
         self.found = replace(found, arc=found.arc + extra[0], swing=found.swing + extra[1])
 
     def _deflected_by(self) -> np.ndarray:
-        """(k,) m of deflection in the step, as it was solved last."""
+        """(k,) m: increment of deflection in the last solution of the step."""
         return self.unknowns.ravel()[self._deflection_at(self.pattern)]
 
     def _move(self) -> None:
         super()._move()
         blocks, static = self.blocks, self.system.scheme.static
         change = self.bent_by = self._deflected_by()
-        # At rest there is no rate; in motion that of the step's end, in the frame of the block.
+        # Statics have no rates; dynamics keep those at the end of the step, in the frame of the block.
         self.new_rates = np.zeros_like(change) if static else 2.0 * change / self.dt - self.rates
         mean = blocks.padded(2.0 / self.dt**2 * (change - self.dt * self.rates))
         blocks.acceleration = np.sqrt((mean * mean).sum(axis=1))
@@ -233,7 +237,7 @@ class BendingAttempt(Attempt):
         )
 
     def _stop(self, imposed) -> None:
-        """Contacts of blocks that bend keep the speeds that the step gives them."""
+        """Contacts of blocks that bend keep the velocities that the step gives them."""
 
     def _imbalance(self, right: np.ndarray, load: np.ndarray, largest: float) -> tuple[float, float]:
         found, settled, n = self.found, self.settled, self.n_free
@@ -264,7 +268,7 @@ class BendingAttempt(Attempt):
         u0, u1 = blocks.elastic_energy(self.deflection), blocks.elastic_energy(self.deflection + change)
         padded = blocks.padded(change)
         worked = float((self.bending_load * padded).sum())
-        # Work of inertia, with the mean acceleration of the step: of deflection on itself, and what strains share.
+        # Work of inertia with the mean acceleration of the step: of deflection alone, and of its coupling with strains.
         rate = 2.0 / dt**2 * (change - dt * self.rates)
         mean = self.acceleration[:, 3:]
         inertia = float(density @ (blocks.basis.area * (padded * blocks.padded(rate)).sum(axis=1)))
@@ -302,7 +306,7 @@ class BendingAttempt(Attempt):
         )
 
     def _mass_of(self, change: np.ndarray, padded: np.ndarray, coupling: np.ndarray, density: np.ndarray) -> float:
-        """Δuᵀ M Δu of deflection on itself and with strains, twice the latter."""
+        """Δuᵀ M Δu of deflection, with its coupling to strains counted twice."""
         own = density @ (self.blocks.basis.area * (padded * padded).sum(axis=1))
         shared = np.einsum("b,be,bej,bj->", density, self.increment[:, 3:], coupling, padded, optimize=True)
         return float(own + 2.0 * shared)
@@ -314,7 +318,7 @@ class BendingAttempt(Attempt):
         return replace(result, state=replace(result.state, deflection=deflection, face_points=memory))
 
     def _points_at_the_end(self) -> np.ndarray:
-        """(n, 2) m: the contacts' points of the vertices' blocks at the end of the step."""
+        """(n, 2) m: contact points on the vertices' blocks at the end of the step."""
         blocks = self.system.blocks
         mean = blocks.mean_vertices(self.new_vertices)
         reference, weights = blocks.affine_fit

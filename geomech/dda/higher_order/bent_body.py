@@ -1,4 +1,4 @@
-"""Displacement and stress inside a block of higher order, for writers and pictures."""
+"""Displacement and stress inside a block of higher order, for output files and pictures."""
 
 from __future__ import annotations
 
@@ -13,8 +13,13 @@ from .deflected_blocks import DeflectedBlocks, rotation_of
 
 @dataclass(frozen=True, eq=False)
 class BentBody:
-    """A ``block`` of the ``deflected`` blocks, with its deflection ``q`` (m,), mean ``strain`` (3,) and mean ``stress`` (3,)
-    Pa in its own frame, which has turned by ``angle`` (rad)."""
+    """A ``block`` of the ``deflected`` blocks.
+
+    q       (m,) deflection
+    strain  (3,) mean strain, in the block's frame
+    stress  (3,) mean stress, Pa, in the block's frame
+    angle   rotation of that frame, rad
+    """
 
     deflected: DeflectedBlocks
     block: int
@@ -24,8 +29,10 @@ class BentBody:
     angle: float
 
     def fields(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Stress (n, 3), Pa, and displacement (n, 2), m, without the block's rigid motion, at undeformed ``points``
-        (n, 2), in the block's frame."""
+        """Stress (n, 3), Pa, and displacement (n, 2), m, without rigid motion, at undeformed ``points`` (n, 2).
+
+        Both refer to the block's frame.
+        """
         basis = self.deflected.basis
         m = len(self.q)
         bent = basis.strain(points, self.block)[..., :m] @ self.q
@@ -36,13 +43,14 @@ class BentBody:
         return self.stress + bent @ self.deflected.elastic[self.block].T, own
 
     def deflection(self, points: np.ndarray) -> np.ndarray:
-        """(n, 2) m by which undeformed ``points`` (n, 2) lie off where the block's vertices say, in fixed axes."""
+        """(n, 2) m: displacement of undeformed ``points`` (n, 2) beyond that of the first-order block, in fixed
+        axes."""
         moved = self.deflected.basis.displacement(points, self.block)[..., : len(self.q)] @ self.q
         return moved @ rotation_of(np.array(self.angle)).T
 
 
 def bent_bodies(deflected: DeflectedBlocks | None, state: State, motion: Motion) -> dict[int, BentBody]:
-    """block → its body, of all blocks of higher order in ``state``, whose affine ``motion`` is known."""
+    """{block: body} of all blocks of higher order in ``state`` with known affine ``motion``."""
     if deflected is None:
         return {}
     known = deflected.at_rest() if state.deflection is None else state.deflection

@@ -1,11 +1,12 @@
-"""Blocks that deflect: their inertia and stiffness, where their deflection is felt, and the loads on it.
+"""Blocks of higher order: inertia, stiffness and loads of their deflection.
 
 With the mean strain rates ε̇ and the deflection q of one block (`deflection_basis`), in the frame that rotates with it,
 
     kinetic energy  ½ ρ (A q̇² + 2 ε̇ᵀ Q G q̇),   elastic energy  ½ qᵀ K q,   work  ∫ tᵀ R P dq ds,
 
-besides those of its six first unknowns; G = ∫ (∂u/∂ε)ᵀ P dA, and Q takes strains to the block's frame. The weight does
-no work on deflection. A block that spins at ω is bent by centrifugal forces, ρ ω² (G₁ + G₂).
+in addition to those of its first six unknowns; G = ∫ (∂u/∂ε)ᵀ P dA, and Q transforms strains to the block's frame.
+Weight does no work on deflection. A block that rotates at the angular velocity ω is bent by centrifugal forces, ρ ω²
+(G₁ + G₂).
 """
 
 from __future__ import annotations
@@ -23,8 +24,8 @@ from .polygon_quadrature import gauss_points
 
 log = logging.getLogger(__name__)
 
-#: rad by which deflection turns a block's outline, or strain: beyond the first small displacements are off by a thousandth
-#: and the block is reported, beyond the second the run ends.
+#: Slope or strain of a block's outline due to deflection, rad: above the first, small-displacement theory is in error
+#: by a thousandth and the block is reported; above the second the run ends.
 LARGE, TOO_LARGE = 0.05, 0.5
 
 
@@ -35,7 +36,7 @@ def rotation_of(angle: np.ndarray) -> np.ndarray:
 
 
 def strain_turned_back(angle: np.ndarray) -> np.ndarray:
-    """(n, 3, 3) Q: strains (εx, εy, γxy) on fixed axes → on axes turned by ``angle`` (n,) rad."""
+    """(n, 3, 3) Q: maps strains (εx, εy, γxy) on fixed axes to axes rotated by ``angle`` (n,) rad."""
     c, s = np.cos(angle), np.sin(angle)
     return np.stack(
         [
@@ -48,10 +49,12 @@ def strain_turned_back(angle: np.ndarray) -> np.ndarray:
 
 
 class DeflectedBlocks:
-    """The ``blocks`` of a system of which some have an order above 1; ``order`` (n_blocks,) is 1 where they do not bend.
+    """The ``blocks`` of a system, some of which have an order above 1; ``order`` (n_blocks,) is 1 where they do not
+    bend.
 
-    ``rows`` (n_blocks,) of six unknowns each, 0 of ``fixed`` blocks; ``density`` (n_blocks,) kg/m³ and ``elastic``
-    (n_blocks, 3, 3) Pa, of the undeformed blocks; their order is that of the ``blocks`` unless another is given."""
+    ``rows`` (n_blocks,) of six unknowns each, 0 for ``fixed`` blocks; ``density`` (n_blocks,) kg/m³ and ``elastic``
+    (n_blocks, 3, 3) Pa of the undeformed blocks. The order is that of the ``blocks`` unless another is given.
+    """
 
     def __init__(
         self, blocks: Blocks, fixed: np.ndarray, density: np.ndarray, elastic: np.ndarray,
@@ -63,21 +66,21 @@ class DeflectedBlocks:
         self.rows = np.where(fixed, 0, 1 + -(-n_deflections(self.order) // 6)).astype(np.int64)
         self.bending = np.flatnonzero(self.order > 1)
         self.mass_density, self.elastic = density, elastic
-        #: (n_blocks,) m/s²: the mean acceleration of deflection in the last step.
+        #: (n_blocks,) m/s²: mean acceleration of deflection in the last step.
         self.acceleration = np.zeros(blocks.n_blocks)
-        #: The largest slope of a deflection that was reported.
+        #: Largest slope of a deflection that has been reported.
         self.reported = 0.0
-        #: Width of a contact's row of one block.
+        #: Length of a contact's row for one block.
         self.width = 6 * int(self.rows.max(initial=1))
         end = blocks.vertices[blocks.next_vertex]
         most = self.basis.coupling.shape[2]
-        #: (n_blocks, m, m) K, Pa, zeros beyond a block's own unknowns.
+        #: (n_blocks, m, m) K, Pa, padded with zeros.
         self.stiffness = np.zeros((blocks.n_blocks, most, most))
         for b in self.bending.tolist():
             some = slice(blocks.vertex_start[b], blocks.vertex_start[b + 1])
             own = self.basis.stiffness(b, blocks.vertices[some], end[some], elastic[b])
             self.stiffness[b, : len(own), : len(own)] = own
-        #: (k,) of each unknown its block, and which it is of this one's.
+        #: (k,) the block of each unknown, and its number within the block.
         self.owner = np.repeat(np.arange(blocks.n_blocks), np.diff(self.basis.start))
         self.which = np.arange(self.n_unknowns) - self.basis.start[self.owner]
 
@@ -86,18 +89,20 @@ class DeflectedBlocks:
         return self.basis.n_unknowns
 
     def at_rest(self) -> np.ndarray:
-        """(k, 2) no deflection."""
+        """(k, 2) zero deflection and rate."""
         return np.zeros((self.n_unknowns, 2))
 
     def padded(self, values: np.ndarray) -> np.ndarray:
-        """(n_blocks, m) of the unknowns of all blocks ``values`` (k,), zeros beyond a block's own."""
+        """(n_blocks, m) the unknowns ``values`` (k,) of all blocks, padded with zeros."""
         out = np.zeros((len(self.order), self.basis.coupling.shape[2]))
         out[self.owner, self.which] = values
         return out
 
     def material_points(self, vertices: np.ndarray, points: np.ndarray, owner: np.ndarray) -> np.ndarray:
-        """(n, 2) where ``points`` (n, 2) of the blocks ``owner`` (n,) lie in the undeformed block, its ``vertices``
-        (n_vertices, 2) being those of its strained shape."""
+        """(n, 2) undeformed positions of ``points`` (n, 2) of the blocks ``owner`` (n,), m.
+
+        ``vertices`` (n_vertices, 2) are those of the strained, undeflected blocks.
+        """
         blocks = self.blocks
         reference, weights = blocks.affine_fit
         mean = blocks.mean_vertices(vertices)
@@ -108,8 +113,11 @@ class DeflectedBlocks:
         return reference[owner] + np.einsum("nab,nb->na", back[owner], points - mean[owner])
 
     def touching(self, found: ContactSet, vertices: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """(n, 2) twice: the undeformed points of the vertices' blocks and of the edges' that touch in ``found`` (n,), the
-        strained vertices being at ``vertices`` (n_vertices, 2)."""
+        """Two (n, 2) arrays: undeformed positions, on the vertices' blocks and on the edges', of the contacts ``found``
+        (n,).
+
+        ``vertices`` (n_vertices, 2) are the strained ones, m.
+        """
         geometry = found.geometry
         foot = geometry[:, 5:7] - geometry[:, 3:4] * geometry[:, 1:3]
         return (
@@ -118,19 +126,20 @@ class DeflectedBlocks:
         )
 
     def directions(self, points: np.ndarray, owner: np.ndarray, angle: np.ndarray) -> np.ndarray:
-        """R P (n, 2, m) at undeformed ``points`` (n, 2) of blocks ``owner`` (n,) that have turned by ``angle``
-        (n_blocks,)."""
+        """R P (n, 2, m) at undeformed ``points`` (n, 2) of blocks ``owner`` (n,) rotated by ``angle`` (n_blocks,)."""
         return np.einsum("nab,nbj->naj", rotation_of(angle[owner]), self.basis.displacement(points, owner))
 
     def displaced(self, vertices: np.ndarray, points: np.ndarray, owner: np.ndarray, angle: np.ndarray, q: np.ndarray):
-        """(n, 2) m: what deflections ``q`` (k,) move ``points`` (n, 2) by, of blocks ``owner`` (n,) with these strained
-        ``vertices`` that have turned by ``angle`` (n_blocks,)."""
+        """(n, 2) m: displacement of ``points`` (n, 2) due to deflections ``q`` (k,).
+
+        The blocks ``owner`` (n,) have these strained ``vertices`` and are rotated by ``angle`` (n_blocks,).
+        """
         undeformed = self.material_points(vertices, points, owner)
         return np.einsum("naj,nj->na", self.directions(undeformed, owner, angle), self.padded(q)[owner])
 
     @cached_property
     def _outline(self) -> tuple[np.ndarray, np.ndarray]:
-        """P (n, k, 2, m) at k undeformed points of n edges of bending blocks, both ends among them, and the blocks
+        """P (n, k, 2, m) at k undeformed points of n edges of bending blocks, their ends included, and the blocks
         (n,)."""
         blocks = self.blocks
         some = np.flatnonzero(self.order[blocks.vertex_block] > 1)
@@ -142,8 +151,8 @@ class DeflectedBlocks:
         return matrix.reshape(len(some), len(at), 2, -1), owner
 
     def largest(self, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """(n_blocks,) twice, m: how far deflections ``q`` (k,) move a point of the outline at most, and how far off the
-        straight line between the ends of its edge."""
+        """Two (n_blocks,) arrays, m: largest displacement of the outline due to deflections ``q`` (k,), and largest
+        distance of an edge from the straight line between its ends."""
         out, sag = np.zeros(len(self.order)), np.zeros(len(self.order))
         if q.any():
             matrix, owner = self._outline
@@ -155,8 +164,8 @@ class DeflectedBlocks:
         return out, sag
 
     def corners(self, vertices: np.ndarray, angle: np.ndarray, q: np.ndarray) -> np.ndarray:
-        """(n_vertices, 2) m where corners are, from the strained ``vertices`` of blocks that have turned by ``angle``
-        (n_blocks,), with deflections ``q`` (k,)."""
+        """(n_vertices, 2) m: corners of blocks with deflections ``q`` (k,), from their strained ``vertices``, for
+        rotations ``angle`` (n_blocks,)."""
         if not q.any():
             return vertices
         some = np.flatnonzero(self.order[self.blocks.vertex_block] > 1)
@@ -167,7 +176,7 @@ class DeflectedBlocks:
 
     @cached_property
     def _slopes(self) -> tuple[np.ndarray, np.ndarray]:
-        """∇P (n, 4, m) at the ends and the middles of all edges of bending blocks, and the blocks (n,)."""
+        """∇P (n, 4, m) at the ends and midpoints of all edges of bending blocks, and the blocks (n,)."""
         blocks = self.blocks
         some = np.flatnonzero(self.order[blocks.vertex_block] > 1)
         start, end = blocks.vertices[some], blocks.vertices[blocks.next_vertex[some]]
@@ -175,8 +184,11 @@ class DeflectedBlocks:
         return self.basis.gradient(np.concatenate([start, 0.5 * (start + end)]), owner), owner
 
     def check_small(self, state: State) -> None:
-        """Log a warning that names a block where deflection turns or strains its outline by more than `LARGE`, and each
-        time that has doubled; raise `NotConverged` beyond `TOO_LARGE`."""
+        """Check that the deflections of ``state`` are small.
+
+        Logs a warning that names a block where deflection rotates or strains its outline by more than `LARGE`, again
+        each time the value has doubled; raises `NotConverged` above `TOO_LARGE`.
+        """
         if state.deflection is None or not state.deflection[:, 0].any():
             return
         matrix, owner = self._slopes
@@ -185,24 +197,26 @@ class DeflectedBlocks:
         most, name = float(slope[worst]), repr(self.blocks.names[owner[worst]])
         if most > TOO_LARGE:
             raise NotConverged(
-                f"{name} is bent by {most:.3g} rad at t = {state.time:g} s: its deflection is that of small "
-                "displacements. Its loads are beyond its stiffness, or it is to be drawn as several blocks"
+                f"{name} is bent by {most:.3g} rad at t = {state.time:g} s, too much for small-displacement "
+                "theory: its loads are too large for its stiffness, or it must be drawn as several blocks"
             )
         if most > LARGE and most >= 2.0 * self.reported:
             self.reported = most
             log.warning(
-                "t = %g s: %s is bent by %.2g rad, and its deflection is that of small displacements: off by about half the "
-                "square of that; draw it as several blocks",
+                "t = %g s: %s is bent by %.2g rad; small-displacement theory is in error by about half the "
+                "square of that: draw it as several blocks",
                 state.time, name, most,
             )  # fmt: skip
 
     def deflection_of(self, state: State) -> tuple[np.ndarray, np.ndarray]:
-        """As `largest` of the deflections of ``state``."""
+        """As `largest`, for the deflections of ``state``."""
         return self.largest(self.at_rest()[:, 0] if state.deflection is None else state.deflection[:, 0])
 
     def loads(self, points: np.ndarray, edges: np.ndarray, vertices: np.ndarray, angle: np.ndarray) -> np.ndarray:
-        """(n_blocks, m) generalised forces of POINT_FORCE rows ``points`` and EDGE_FORCE rows ``edges``, N, on blocks with
-        these strained ``vertices`` that have turned by ``angle`` (n_blocks,)."""
+        """(n_blocks, m) generalised forces, N, of POINT_FORCE rows ``points`` and EDGE_FORCE rows ``edges``.
+
+        The blocks have these strained ``vertices`` and are rotated by ``angle`` (n_blocks,).
+        """
         out = np.zeros((len(self.order), self.basis.coupling.shape[2]))
         points, edges = points[self.order[points["block"]] > 1], edges[self.order[edges["block"]] > 1]
         if len(points):
@@ -222,22 +236,22 @@ class DeflectedBlocks:
         return out
 
     def kinetic(self, rates: np.ndarray, strain_rates: np.ndarray, angle: np.ndarray, density: np.ndarray) -> float:
-        """J/m that ``rates`` (k,) of deflection add to the kinetic energy of blocks with these ``strain_rates``
-        (n_blocks, 3), turned by ``angle`` (n_blocks,), of ``density`` (n_blocks,)."""
+        """Kinetic energy, J/m, due to ``rates`` (k,) of deflection, including its coupling with ``strain_rates``
+        (n_blocks, 3); blocks are rotated by ``angle`` (n_blocks,) and have this ``density`` (n_blocks,)."""
         q = self.padded(rates)
         shared = np.einsum("bi,bij,bjm,bm->b", strain_rates, self._shared(angle), self.basis.coupling, q, optimize=True)
         return float(density @ (0.5 * self.basis.area * (q * q).sum(axis=1) + shared))
 
     def elastic_energy(self, q: np.ndarray) -> float:
-        """J/m of deflections ``q`` (k,)."""
+        """Elastic energy, J/m, of deflections ``q`` (k,)."""
         return 0.5 * float((self.padded(q) * self.stiffness_times(q)).sum())
 
     def stiffness_times(self, q: np.ndarray) -> np.ndarray:
-        """(n_blocks, m) N: K q of deflections ``q`` (k,)."""
+        """(n_blocks, m) N: K q for deflections ``q`` (k,)."""
         return np.einsum("bij,bj->bi", self.stiffness, self.padded(q))
 
     def coupling(self, angle: np.ndarray) -> np.ndarray:
-        """(n_blocks, 3, m) Qᵀ G of blocks turned by ``angle`` (n_blocks,), m³."""
+        """(n_blocks, 3, m) Qᵀ G of blocks rotated by ``angle`` (n_blocks,), m³."""
         return np.einsum("bij,bjm->bim", self._shared(angle), self.basis.coupling)
 
     @staticmethod

@@ -1,4 +1,4 @@
-"""Deflection of blocks of order p: what a complete polynomial displacement has beyond Shi's six unknowns.
+"""Basis of deflection: the part of a complete polynomial displacement that is not in Shi's six unknowns.
 
 The displacement of a block of order p is
 
@@ -10,13 +10,12 @@ part such that
 
     ∫ P dA = 0,   ∫ X × P dA = 0,   ∫ ε(P) dA = 0,   ∫ Pᵢ · Pⱼ dA = A δᵢⱼ:
 
-deflection carries neither momentum nor mean strain, and d keeps the meaning it has in a block of first order: its
-strains are the mean strains of the block, and stress and stiffness of first order are those of the mean. The mass
-matrix of q is ρ A times the identity; strain rates and deflection share inertia (`DeflectionBasis.coupling`), but no
-stiffness.
+deflection has neither momentum nor mean strain, and d keeps its meaning of a first-order block: its strains are the
+mean strains of the block, and first-order stress and stiffness are those of the mean. The mass matrix of q is ρ A times
+the identity; strain rates and deflection are coupled by inertia (`DeflectionBasis.coupling`), but not by stiffness.
 
-Products of Legendre polynomials in the block's principal axes, scaled to its bounding box, and Cholesky's factors of
-their Gram matrix, taken twice, keep the basis orthonormal to round-off up to p = 8.
+Products of Legendre polynomials in the block's principal axes, scaled to its bounding box, and the Cholesky factor of
+their Gram matrix, applied twice, keep the basis orthonormal to round-off up to p = 8.
 """
 
 from __future__ import annotations
@@ -29,12 +28,12 @@ from ...compiled import kept, part
 from ..kinematics.displacement_matrix import displacement_matrix
 from .polygon_quadrature import polygon_points
 
-#: The highest order of a block, and of a basis: what a higher order would take up is estimated by two more.
+#: The highest order of a block, and of a basis: the error estimate uses two orders more.
 HIGHEST, _HIGHEST_BASIS = 8, 10
 
 
 def n_deflections(order: np.ndarray | int) -> np.ndarray | int:
-    """How many unknowns of deflection a block of this ``order`` has."""
+    """Number of unknowns of deflection of a block of this ``order``."""
     return (order + 1) * (order + 2) - 6
 
 
@@ -88,12 +87,14 @@ def _evaluate(owner, points, order, centre, to_box, coefficients, gradients):
 
 
 def _principal_box(loop: np.ndarray, points: np.ndarray, weights: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Centre (2,) and matrix (2, 2) to the square [−1, 1]² of the bounding box of the vertices ``loop`` (n, 2) along
-    the principal axes of the area with these ``points`` and ``weights``."""
+    """Centre (2,) and matrix (2, 2) that map the block's bounding box along its principal axes to the square [−1, 1]².
+
+    ``loop`` (n, 2) are the vertices; ``points`` and ``weights`` integrate over the area.
+    """
     area = weights.sum()
     arm = points - weights @ points / area
     second = np.einsum("k,ka,kb->ab", weights, arm, arm)
-    # No axes are principal for a square or a disc: those of the coordinates are as good.
+    # A square or a disc has no principal axes: the coordinate axes serve.
     deviator = 0.5 * (second[0, 0] - second[1, 1]), second[0, 1]
     even = np.hypot(*deviator) <= 1e-9 * (second[0, 0] + second[1, 1])
     angle = 0.0 if even else 0.5 * np.arctan2(deviator[1], deviator[0])
@@ -110,16 +111,16 @@ def _integral(weights: np.ndarray, one: np.ndarray, two: np.ndarray) -> np.ndarr
 
 @dataclass(frozen=True, eq=False)
 class DeflectionBasis:
-    """The basis of deflection of blocks, of each its own order.
+    """Basis of deflection of blocks, each with its own order.
 
     order         (n_blocks,)            p; 1: the block has no deflection
-    start         (n_blocks + 1,)        where the unknowns of each block begin among those of all
+    start         (n_blocks + 1,)        first unknown of each block among those of all blocks
     area          (n_blocks,)            m², undeformed
     centroid      (n_blocks, 2)          m, undeformed
-    centre        (n_blocks, 2)          of the box in which the polynomials are Legendre's, m
+    centre        (n_blocks, 2)          m, of the box on which the Legendre polynomials are defined
     to_box        (n_blocks, 2, 2)       from X − centre to the square [−1, 1]²
-    coefficients  (n_blocks, k, 2, m)    of the products of Legendre polynomials; zeros beyond a block's own
-    coupling      (n_blocks, 3, m)       ∫ (∂u/∂ε)ᵀ P dA, the inertia that strain rates and deflection share, m³
+    coefficients  (n_blocks, k, 2, m)    of the products of Legendre polynomials; padded with zeros
+    coupling      (n_blocks, 3, m)       ∫ (∂u/∂ε)ᵀ P dA, the inertia that couples strain rates and deflection, m³
     """
 
     order: np.ndarray
@@ -135,9 +136,11 @@ class DeflectionBasis:
     def of(
         cls, vertices: np.ndarray, next_vertex: np.ndarray, vertex_start: np.ndarray, order: np.ndarray
     ) -> DeflectionBasis:
-        """The basis of undeformed blocks with ``vertices`` (n_vertices, 2), the next of each ``next_vertex``, those of a
-        block from ``vertex_start`` on, and this ``order`` (n_blocks,). Raises ValueError for an order that is not 1 to
-        10."""
+        """Basis of undeformed blocks of this ``order`` (n_blocks,).
+
+        ``vertices`` (n_vertices, 2) m; ``next_vertex`` (n_vertices,); ``vertex_start`` first vertex of each block.
+        Raises ValueError for an order that is not 1 to 10.
+        """
         order = np.ascontiguousarray(order, np.int64)
         if len(order) and not (order.min() >= 1 and order.max() <= _HIGHEST_BASIS):
             raise ValueError(f"the order of a basis is 1 to {_HIGHEST_BASIS}, got {order.min()} to {order.max()}")
@@ -171,15 +174,15 @@ class DeflectionBasis:
         return int(self.start[-1])
 
     def of_block(self, block: int) -> slice:
-        """Where the deflection of ``block`` stands among that of all."""
+        """Slice of the unknowns of ``block`` among those of all blocks."""
         return slice(int(self.start[block]), int(self.start[block + 1]))
 
     def displacement(self, points: np.ndarray, owner: np.ndarray | int) -> np.ndarray:
-        """P (n, 2, m) at undeformed ``points`` (n, 2) of the blocks ``owner``; zeros beyond a block's own unknowns."""
+        """P (n, 2, m) at undeformed ``points`` (n, 2) of the blocks ``owner``; padded with zeros."""
         return self._evaluated(points, owner, False)
 
     def strain(self, points: np.ndarray, owner: np.ndarray | int) -> np.ndarray:
-        """ε(P) (n, 3, m), engineering shear strain, 1/m, arguments as of `displacement`."""
+        """ε(P) (n, 3, m), engineering shear strain, 1/m; arguments as of `displacement`."""
         slope = self._evaluated(points, owner, True)
         return np.stack([slope[:, 0], slope[:, 3], slope[:, 1] + slope[:, 2]], axis=1)
 
@@ -188,7 +191,7 @@ class DeflectionBasis:
         return self._evaluated(points, owner, True)
 
     def stiffness(self, block: int, start: np.ndarray, end: np.ndarray, elastic: np.ndarray) -> np.ndarray:
-        """(m, m) ∫ ε(P)ᵀ C ε(P) dA of ``block``, Pa, with edges from ``start`` to ``end`` (n, 2) and C ``elastic``
+        """(m, m) ∫ ε(P)ᵀ C ε(P) dA of ``block``, Pa; its edges run from ``start`` to ``end`` (n, 2), C is ``elastic``
         (3, 3) Pa."""
         points, weights = polygon_points(start, end, self.centroid[block], 2 * int(self.order[block]) - 2)
         strain = self.strain(points, block)[..., : n_deflections(int(self.order[block]))]
@@ -201,11 +204,12 @@ class DeflectionBasis:
         return _evaluate(owner, points, self.order, self.centre, self.to_box, self.coefficients, gradients)
 
     def _orthonormalise(self, block: int, points: np.ndarray, weights: np.ndarray) -> None:
-        """Fill the coefficients of ``block`` and its coupling, with ``points`` and ``weights`` exact for degree 2 p."""
+        """Compute the coefficients and the coupling of ``block``; ``points`` and ``weights`` are exact for degree 2
+        p."""
         order, coefficients = int(self.order[block]), self.coefficients[block]
         own, area = int(n_deflections(order)), self.area[block]
         for j in range(own):
-            # Terms of first order, 3 of them, come last, as the affine part.
+            # The 3 terms of first order come last, as the affine part.
             coefficients[3 + j // 2, j % 2, j] = 1.0
         for _ in range(2):
             self._without_affine_part(block, points, weights)
@@ -220,7 +224,7 @@ class DeflectionBasis:
         self.coupling[block] = _integral(weights, by_strain, values)
 
     def _without_affine_part(self, block: int, points: np.ndarray, weights: np.ndarray) -> None:
-        """Take the rigid motion, by mass, and the mean strain off the columns of ``block``."""
+        """Subtract rigid motion (by mass) and mean strain from the columns of ``block``."""
         matrix = displacement_matrix(points, self.centroid[block])
         values, strain = self.displacement(points, block), self.strain(points, block)
         mean = np.tensordot(weights, strain, 1) / self.area[block]

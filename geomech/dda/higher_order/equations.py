@@ -1,4 +1,4 @@
-"""The equations of a step of blocks of unlike order, in given contact states."""
+"""Equations of a step of blocks of different orders, in given contact states."""
 
 from __future__ import annotations
 
@@ -14,7 +14,11 @@ from .six_row_system import SixRowPattern, fill, moved, springs_in_states
 
 @dataclass(eq=False)
 class HigherOrderEquations(Equations):
-    """As `Equations`, with ``base`` the flat matrix without contacts, and ``right`` (n, 6) and ``rows`` (n_contacts, 2, 2, w) of all unknowns (`six_row_system`)."""
+    """As `Equations`, for all unknowns (`six_row_system`).
+
+    ``base`` is the flat matrix without contacts; ``right`` (n, 6) and ``rows`` (n_contacts, 2, 2, w) refer to all
+    unknowns.
+    """
 
     base: np.ndarray = None
     rows: np.ndarray = None

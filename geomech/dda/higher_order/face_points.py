@@ -1,18 +1,17 @@
-"""Contact along faces of blocks of higher order: integration points, each with its own state of contact.
+"""Contact along faces of blocks of higher order, at integration points with a contact state each.
 
 Where two straight sides touch, their contact stress is integrated with the Gauss–Lobatto rule,
 
     ∫ f ds ≈ ℓ Σ wᵢ f(sᵢ),   exact for polynomials of degree 2n − 3 with n = p + 2 points, p the higher order of both,
 
-so that a uniform and, with it, any stress of a degree up to p + 1 loads every deflection as its integral does (patch
-test). Joints with a stiffness kₙ (Pa/m) have springs kₙ ℓ wᵢ; penalty springs are proportional to wᵢ and, at both ends of
-a face, as stiff as those of a corner (`penalty_springs`): the points at which a block tips over do not give way by more
-than corners do, and a corner that stays in contact when its face parts keeps its spring and its force. Each point
-opens, sticks and slides by itself.
+so that stress of degree up to p + 1 loads every deflection as its exact integral does (patch test). Joints with a
+stiffness kₙ (Pa/m) have springs kₙ ℓ wᵢ. Penalty springs are proportional to wᵢ and, at both ends of a face, as stiff
+as those of a corner (`penalty_springs`): the points over which a block tips yield no more than corners do, and a corner
+that stays in contact when its face opens keeps its spring and its force. Each point opens, sticks and slides by itself.
 
-The gap at a point is that of the strained blocks, linear between the ends of the face, and n · (u_a − u_b) of their
-deflections. CONTACT rows, one at each end of a face, carry the resultant and the moment of its points; what points
-remember from step to step are FACE_POINT rows of the state.
+The gap at a point is that of the strained blocks, linear between the ends of the face, plus n · (u_a − u_b) of their
+deflections. CONTACT rows, one at each end of a face, hold the resultant and the moment of its points; the history of
+the points is in the FACE_POINT rows of the state.
 """
 
 from __future__ import annotations
@@ -30,11 +29,11 @@ from ..open_close.contact_set import ContactSet
 from ..open_close.settled_states import Settled
 from .polygon_quadrature import lobatto_points
 
-#: Memory of a `ContactSet` by the names of FACE_POINT rows.
+#: History of a `ContactSet`, by the names of FACE_POINT rows.
 _MEMORY = {"state": "state", "bonded": "bonded", "normal": "normal_force", "shear": "shear_force", "slip": "slip",
            "wear": "wear", "lift": "lift"}  # fmt: skip
 
-#: Places of points along faces are told apart to this part of them.
+#: Positions of points along faces are distinguished to this part of the face.
 _NAMED = 1_000_000
 
 
@@ -44,16 +43,16 @@ class Faces:
 
     ends     (m, 2)  rows of the corners
     length   (m,)    m, between the ends
-    inner    (k,)    rows of corners between the ends, of vertices within a straight side: they bear nothing by themselves
+    inner    (k,)    rows of corners between the ends, at vertices within a straight side: they carry no force themselves
     inner_at (k,)    the point nearest to each of these, among all contacts
     lone     (k,)    rows of the corners that belong to no face; they come first among all contacts
-    first    (m,)    where the points of each face begin among all contacts
-    count    (m,)    how many there are
-    place    (n,)    of all contacts, along the face from 0 to 1; 0 of lone ones
-    face     (n,)    of all contacts; −1 of lone ones
-    share    (n,)    part of the face that each has
-    stiffer  (n,)    by how much penalty springs are stiffer than shares of two corners, so that those at the ends of a face
-                     are as stiff as a corner's
+    first    (m,)    first point of each face among all contacts
+    count    (m,)    number of points of each face
+    place    (n,)    coordinate of all contacts along the face from 0 to 1; 0 for lone corners
+    face     (n,)    face of all contacts; −1 for lone corners
+    share    (n,)    weight of each contact in its face
+    stiffer  (n,)    ratio of the stiffness of penalty springs to that of two corners' shares, which makes those at the
+                     ends of a face as stiff as a corner's
     swapped  (m,)    the vertex at the second end belongs to the block whose edge is touched at the first
     corners  (n_corners, 7)   geometry of the corners
     """
@@ -74,8 +73,7 @@ class Faces:
 
     @classmethod
     def of(cls, found: ContactSet, order: np.ndarray) -> Faces:
-        """The faces of the contacts ``found`` at corners; ``order`` (n_blocks,) of the blocks, 1 of those that do not
-        bend."""
+        """Faces of the contacts ``found`` at corners; ``order`` (n_blocks,) is 1 for blocks that do not bend."""
         geometry = found.geometry
         some = np.flatnonzero((geometry[:, 4] > 0) & (found.corner < 0))
         ends, length, inner = np.zeros((0, 2), np.int64), np.zeros(0), np.zeros((0, 3))
@@ -120,7 +118,7 @@ class Faces:
 
     @cached_property
     def inside(self) -> np.ndarray:
-        """(k,) all contacts that are points of faces."""
+        """(k,) the contacts that are points of faces."""
         return np.flatnonzero(self.face >= 0)
 
     def _both(self, value: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -129,26 +127,26 @@ class Faces:
         return value[at[:, 0]], value[at[:, 1]]
 
     def far_ends(self, corners: ContactSet) -> np.ndarray:
-        """(n, 2) vertex and edge at the far end of the face of each contact; −1 of lone ones."""
+        """(n, 2) vertex and edge at the far end of the face of each contact; −1 for lone corners."""
         out = np.full((len(self.face), 2), -1)
         ends = self.ends[self.face[self.inside], 1]
         out[self.inside] = np.stack([corners.vertex[ends], corners.edge[ends]], axis=1)
         return out
 
     def corner_of(self, contact: int) -> int:
-        """The row of a corner of the face of a ``contact``."""
+        """The row of a corner of the face of ``contact``."""
         face = int(self.face[contact])
         return int(self.lone[contact]) if face < 0 else int(self.ends[face, 0])
 
     def between(self, value: np.ndarray) -> np.ndarray:
-        """(n,) of all contacts, linear between the corners' ``value`` (n_corners,)."""
+        """(n,) linear interpolation of the corners' ``value`` (n_corners,) to all contacts."""
         at_first, at_second = self._both(value)
         place = self.place[self.inside]
         return np.concatenate([value[self.lone], at_first + place * (at_second - at_first)])
 
     def spread(self, force: np.ndarray) -> np.ndarray:
-        """(n,) forces of all contacts, of faces the linear stress whose resultant and moment the ``force`` (n_corners,) at
-        their ends has."""
+        """(n,) forces of all contacts: in faces, the linear stress with the resultant and moment of ``force``
+        (n_corners,)."""
         first, second = self._both(force)
         place = self.place[self.inside]
         linear = (4.0 * first - 2.0 * second) * (1.0 - place) + (4.0 * second - 2.0 * first) * place
@@ -174,7 +172,7 @@ class Faces:
         return out
 
     def least(self, value: np.ndarray) -> np.ndarray:
-        """(n_corners,) the least ``value`` (n,) of a corner's face."""
+        """(n_corners,) the least ``value`` (n,) of each corner's face."""
         out = self.of_corners(value)
         lowest = np.full(len(self.ends), np.inf)
         np.minimum.at(lowest, self.face[self.inside], value[self.inside])
@@ -183,14 +181,14 @@ class Faces:
         return out
 
     def geometry(self) -> np.ndarray:
-        """(n, 7) geometry of all contacts, of points of faces that of the edge at the first end; the position along the
-        edge stands for that of the corner."""
+        """(n, 7) geometry of all contacts; points of faces have that of the edge at the first end, with their own
+        position along it."""
         out = np.empty((len(self.face), 7))
         out[: len(self.lone)] = self.corners[self.lone]
         first, second = self._both(self.corners)
         place, swapped = self.place[self.inside, None], self.swapped[self.face[self.inside], None]
         gap = first[:, 3:4] + place * (second[:, 3:4] - first[:, 3:4])
-        # Where the vertex at the far end belongs to the edge's block, the other block's point is its foot there.
+        # Where the vertex at the far end belongs to the edge's block, the other block's point is its projection.
         far = np.where(swapped, second[:, 5:7] - second[:, 3:4] * second[:, 1:3], second[:, 5:7])
         inside = out[len(self.lone) :]
         inside[:, 0] = first[:, 0]
@@ -200,8 +198,11 @@ class Faces:
         return out
 
     def springs(self, corner: Springs, by_length: tuple[np.ndarray, np.ndarray]) -> Springs:
-        """The springs of all contacts from those of the corners; ``by_length`` (n_corners,) twice: which of them have a
-        stiffness by the length of their face, across it and along it."""
+        """Springs of all contacts from those of the corners.
+
+        ``by_length`` (n_corners,) twice: corners whose normal, and whose shear stiffness is proportional to face
+        length.
+        """
         first, second = self._both(self.corners[:, 4])
         # Corners within a side have a part of its length, but add no penalty springs.
         whole = np.concatenate([np.ones(len(self.lone)), self.length[self.face[self.inside]] / (first + second)])
@@ -223,13 +224,15 @@ class Faces:
         return Springs(**own)
 
     def share_shear(self, vectors: np.ndarray, block: np.ndarray) -> None:
-        """Points of faces slide where they are."""
+        """Unlike springs in first-order faces, points of faces slide where they are."""
 
 
 @dataclass(frozen=True, eq=False)
 class FaceContacts(ContactSet):
-    """Contacts with integration points along faces (``points``), the corners in ``lumped``; ``deflected`` (n,) m is what
-    deflections of the blocks add to the gaps as the step begins."""
+    """Contacts with integration points along faces (``points``), and the corners in ``lumped``.
+
+    ``deflected`` (n,) m is the contribution of the blocks' deflections to the gaps at the start of the step.
+    """
 
     deflected: np.ndarray | float = 0.0
 
@@ -237,8 +240,11 @@ class FaceContacts(ContactSet):
     def along_faces(
         cls, corners: ContactSet, order: np.ndarray, memory: np.ndarray | None, by_length: tuple[np.ndarray, np.ndarray]
     ) -> FaceContacts:
-        """The contacts found at ``corners``, with points along whole faces, which remember the FACE_POINT rows
-        ``memory``; ``by_length`` as of `Faces.springs`."""
+        """Contacts at ``corners``, with points along whole faces, and their history from the FACE_POINT rows
+        ``memory``.
+
+        ``by_length`` as in `Faces.springs`.
+        """
         faces = Faces.of(corners, order)
         own = {}
         for field in fields(ContactSet):
@@ -254,11 +260,11 @@ class FaceContacts(ContactSet):
             "inset": np.zeros(len(faces.face), bool),
         }  # fmt: skip
         out = cls(**own)
-        return out._as_the_ends_say()._remembering(memory)
+        return out._states_of_ends()._with_history(memory)
 
-    def _as_the_ends_say(self) -> FaceContacts:
-        """Points that remember nothing: closed where both ends of their face are, bonded where both are, under the linear
-        stress with the forces of the ends."""
+    def _states_of_ends(self) -> FaceContacts:
+        """Initial state of points without history: closed or bonded where both ends of their face are, with the linear
+        stress of the ends' forces."""
         faces, corners, inside = self.points, self.lumped, self.points.inside
         state, bonded = self.state.copy(), self.bonded.copy()
         first, second = faces._both(corners.state)
@@ -271,10 +277,10 @@ class FaceContacts(ContactSet):
             self, state=state, bonded=bonded, normal=normal, shear=shear, slip=faces.between(corners.slip),
             wear=faces.between(corners.wear), stretch=np.zeros(len(state)),
             direction=np.where(state == SLIP, np.sign(shear), 0.0),
-        )._tried_as_friction_has_it()  # fmt: skip
+        )._with_friction_states()  # fmt: skip
 
-    def _remembering(self, memory: np.ndarray | None) -> FaceContacts:
-        """With what the FACE_POINT rows ``memory`` say of the same places of the same two blocks."""
+    def _with_history(self, memory: np.ndarray | None) -> FaceContacts:
+        """With the history of the FACE_POINT rows ``memory`` for the same places of the same two blocks."""
         if memory is None or not len(memory):
             return self
         own = {name: getattr(self, name).copy() for name in _MEMORY}
@@ -284,16 +290,16 @@ class FaceContacts(ContactSet):
         rows = memory[at[known]]
         for name, column in _MEMORY.items():
             own[name][known] = rows[column]
-        # Points of another part of the face bear the stress that there was.
+        # Points of another part of the face carry the stress that was there.
         inside = self.points.face[known] >= 0
         ratio = np.where(inside & (rows["length"] > 0), length[known] / np.maximum(rows["length"], 1e-300), 1.0)
         for name in ("normal", "shear"):
             own[name][known] *= ratio
         own["bonded"] = np.where((self.springs.cohesion == 0) & (self.springs.tension == 0), 0, own["bonded"])
         own["direction"] = np.where(own["state"] == SLIP, np.sign(own["shear"]), 0.0)
-        return replace(self, **own)._tried_as_friction_has_it()
+        return replace(self, **own)._with_friction_states()
 
-    def _tried_as_friction_has_it(self) -> FaceContacts:
+    def _with_friction_states(self) -> FaceContacts:
         rough = (self.springs.peak > 0) | (self.bonded > 0)
         state = self.state.copy()
         state[(state == SLIP) & rough & (self.direction == 0)] = STICK
@@ -305,7 +311,7 @@ class FaceContacts(ContactSet):
         return self.geometry[:, 3] + self.deflected - self.lift
 
     def placed(self, points) -> FaceContacts:
-        raise TypeError("points of faces stand where they are")
+        raise TypeError("points of faces do not move along their face")
 
     def along(self, arc: np.ndarray, swing: np.ndarray) -> FaceContacts:
         faces = self.points
@@ -354,8 +360,10 @@ class FaceContacts(ContactSet):
         return rows
 
     def memory(self, settled: Settled, shear: np.ndarray, points: np.ndarray) -> np.ndarray:
-        """FACE_POINT rows as the step, so ``settled``, leaves the contacts, with ``shear`` (n,) N as it ends, where their
-        ``points`` (n, 2) m are then."""
+        """FACE_POINT rows at the end of the step with the ``settled`` contacts.
+
+        ``shear`` (n,) N is the shear force and ``points`` (n, 2) m the position of the contacts at that time.
+        """
         rows = np.zeros(len(self), FACE_POINT)
         faces = self.points
         rows["block"], rows["other"] = self.block, self.other
@@ -372,8 +380,11 @@ class FaceContacts(ContactSet):
 def _whole_sides(
     found: ContactSet, some: np.ndarray, start: np.ndarray, along: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Sides that touch all along among the contacts ``some`` (k,), face by face from ``start`` (m + 1,), ``along`` (k,) m:
-    rows of their ends (m, 2), lengths (m,), and rows, faces and places (0 to 1) of corners between the ends (n, 3)."""
+    """Sides that touch along their whole length among the contacts ``some`` (k,), which are sorted by face.
+
+    ``start`` (m + 1,) is the first contact of each face, ``along`` (k,) m the coordinate. Returns rows of the sides'
+    ends (m, 2), lengths (m,), and rows, faces and coordinates (0 to 1) of corners between the ends (n, 3).
+    """
     ends, length, inner = [], [], []
     for first, last in zip(start[:-1].tolist(), start[1:].tolist(), strict=True):
         if last - first < 2:
@@ -396,11 +407,11 @@ def _whole_sides(
 
 
 def _matching(found: FaceContacts, memory: np.ndarray) -> np.ndarray:
-    """(n,) the row of ``memory`` of each contact of ``found``, −1 where there is none: the same point, a corner that was
-    the end of a face, or the nearest point between the same two sides."""
+    """(n,) row of ``memory`` for each contact of ``found``, −1 for none: the same point, a corner that was the end of a
+    face, or the nearest point between the same two sides."""
     faces, n = found.points, len(found)
     far = faces.far_ends(found.lumped)
-    # Places along a face, in millionths, are names.
+    # Coordinates along a face, in millionths, identify points.
     mine = np.column_stack([found.vertex, found.edge, far, np.round(faces.place * _NAMED)]).astype(np.int64)
     names = [memory[name] for name in ("vertex", "edge", "far_vertex", "far_edge")]
     theirs = np.column_stack([*names, np.round(memory["place"] * _NAMED)]).astype(np.int64)
@@ -419,8 +430,10 @@ def _matching(found: FaceContacts, memory: np.ndarray) -> np.ndarray:
 def _nearest(
     found: FaceContacts, memory: np.ndarray, mine: np.ndarray, theirs: np.ndarray, unknown: np.ndarray
 ) -> np.ndarray:
-    """(k,) as `_matching` for the contacts ``unknown`` (k,), which ``memory`` does not know by the names ``mine`` (n, 5) and
-    ``theirs``: corners by their vertex and edge, other points by where they lie."""
+    """(k,) as `_matching`, for the contacts ``unknown`` (k,) that are not in ``memory``.
+
+    ``mine`` (n, 5) and ``theirs`` identify contacts: corners by their vertex and edge, other points by their position.
+    """
     alone, place = theirs[:, 2] < 0, theirs[:, 4]
     corner = {}
     for rows, ends in ((alone | (place == 0), theirs[:, :2]), (~alone & (place == _NAMED), theirs[:, 2:4])):

@@ -1,20 +1,21 @@
-"""Cells of a continuous rock: blocks that are glued along their faces by symmetric interior penalty.
+"""Cells of continuous rock: blocks bonded along their faces by the symmetric interior penalty method.
 
-With the jump [u] = u_a − u_b of the displacement on a face between cells a and b, the normal n out of a, and the mean
-{t} = ½ (σ_a + σ_b) n of their stresses there, a face has the energy
+With the jump [u] = u_a − u_b of displacement on a face between cells a and b, the normal n out of a, and the mean {t} =
+½ (σ_a + σ_b) n of their tractions, a face has the energy
 
     Π = ∫ (½ τ [u]·[u] − {t}·[u]) ds,
 
-and bears the traction {t} − τ [u]. The exact solution has no jump and the
-traction σ n, so that the glue is consistent: what converges with the size and the order of cells is the solution of the
-continuous rock, and no stiffness of glue has to be chosen. Π is half a sum of squares,
+and transmits the traction {t} − τ [u]. The exact solution has no jump and the traction σ n, so that the method is
+consistent: it converges with the size and the order of cells to the solution of the continuum, and no bond stiffness
+has to be chosen. Π is half a sum of squares,
 
     Π = ½ ∫ (τ [u − {t}/τ]² − {t}²/τ) ds,
 
-the form in which faces are added to the equations: springs of stiffness τ and of −1/τ, at the p + 1 Gauss points of a face.
+the form in which faces are added to the equations: springs of stiffness τ and of −1/τ, at the p + 1 Gauss points of a
+face.
 
-Energies stay positive if τ > λ/2, with λ the largest that ∫ |σ n|² ds on the glued faces of a cell can be over its ∫ σ:ε dA. It
-is an eigenvalue, computed for each cell whatever its shape; τ is twice the larger λ of both cells.
+Energies stay positive if τ > λ/2, with λ the largest possible ratio of ∫ |σ n|² ds on the bonded faces of a cell to its
+∫ σ:ε dA. It is an eigenvalue, computed for each cell; τ is twice the larger λ of both cells.
 """
 
 from __future__ import annotations
@@ -33,31 +34,32 @@ from .face_points import Faces
 from .polygon_quadrature import gauss_points
 from .six_row_system import SixRowPattern, add_force, add_pair, moved
 
-#: τ over the larger λ of the two cells; more than a half is stable. Displacements of a cantilever of cells hardly change from 1 to
-#: 10 (`tests/dda/higher_order/test_glued_cells.py`).
+#: τ over the larger λ of the two cells; above a half is stable. Displacements of a cantilever of cells hardly change
+#: from 1 to 10 (`tests/dda/higher_order/test_glued_cells.py`).
 PENALTY = 2.0
-#: Corners of cells of one rock lie in one place if they are no farther apart than this part of the cells' size (√area).
+#: Corners of cells of one rock coincide if their distance is below this part of the cells' size (√area).
 _SAME = 1e-3
-#: Faces part together that bear as much as the most stressed one, but for this part of it: those that symmetry makes equal.
+#: Faces separate together whose stress is within this part of the highest: those that symmetry makes equal.
 _TOGETHER = 0.01
 
 
 def traction_of(normal: np.ndarray) -> np.ndarray:
-    """(n, 2, 3) M: stress (σxx, σyy, σxy) → its components across and along a face with this unit ``normal`` (n, 2)."""
+    """(n, 2, 3) M: maps stress (σxx, σyy, σxy) to the normal and shear traction on a face with unit ``normal`` (n,
+    2)."""
     x, y = normal[:, 0], normal[:, 1]
     return np.stack(
         [np.stack([x * x, y * y, 2 * x * y], axis=1), np.stack([-x * y, x * y, x * x - y * y], axis=1)], axis=1
     )
 
 
-def _ways(normal: np.ndarray) -> np.ndarray:
-    """(n, 2, 2) the directions across and along faces."""
+def _face_directions(normal: np.ndarray) -> np.ndarray:
+    """(n, 2, 2) directions normal to and along faces."""
     return np.stack([normal, np.stack([-normal[:, 1], normal[:, 0]], axis=1)], axis=1)
 
 
 @dataclass(frozen=True, eq=False)
 class GluedFaces:
-    """The glued faces (m,) of ``cells`` and their Gauss points (n,).
+    """The bonded faces (m,) of ``cells`` and their Gauss points (n,).
 
     block, other  (m,)    the cells a and b
     face          (n,)    of each point
@@ -78,7 +80,7 @@ class GluedFaces:
 
     @classmethod
     def of(cls, cells: DeflectedBlocks) -> GluedFaces:
-        """The faces that the blocks of ``cells`` say are glued."""
+        """The faces in ``cells.glued``."""
         blocks = cells.blocks
         edge, mate = np.asarray(blocks.glued, np.int64).reshape(-1, 2).T
         block, other = blocks.vertex_block[edge], blocks.vertex_block[mate]
@@ -99,7 +101,7 @@ class GluedFaces:
         return faces
 
     def kept(self, keep: np.ndarray) -> GluedFaces:
-        """The faces of which ``keep`` (m,) is True."""
+        """The faces for which ``keep`` (m,) is True."""
         number, some = np.cumsum(keep) - 1, keep[self.face]
         return replace(
             self, block=self.block[keep], other=self.other[keep], face=number[self.face[some]],
@@ -108,11 +110,11 @@ class GluedFaces:
 
     @property
     def owners(self) -> tuple[np.ndarray, np.ndarray]:
-        """(n,) twice: the cells a and b of each point."""
+        """Two (n,) arrays: the cells a and b of each point."""
         return self.block[self.face], self.other[self.face]
 
     def _steepest(self) -> np.ndarray:
-        """(n_blocks,) λ, Pa/m; 0 of blocks without glued faces."""
+        """(n_blocks,) λ, Pa/m; 0 for blocks without bonded faces."""
         from scipy.linalg import eigh
 
         cells, out = self.cells, np.zeros(len(self.cells.order))
@@ -135,8 +137,10 @@ class GluedFaces:
         return out
 
     def places(self, vertices: np.ndarray, angle: np.ndarray, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """(n, 2) twice, m: where the points of a and of b are, with these strained ``vertices``, rotation ``angle``
-        (n_blocks,) and deflections ``q`` (k,)."""
+        """Two (n, 2) arrays, m: current positions of the points on a and on b.
+
+        ``vertices`` are the strained ones, ``angle`` (n_blocks,) rotations and ``q`` (k,) deflections.
+        """
         blocks, padded = self.cells.blocks, self.cells.padded(q)
         mean = blocks.mean_vertices(vertices)
         reference, weights = blocks.affine_fit
@@ -152,12 +156,12 @@ class GluedFaces:
 
 @dataclass(frozen=True, eq=False)
 class Glue:
-    """The glue in one step: 2 n springs, those of τ and those of −1/τ, across and along.
+    """The bonds of cells in one step: 2 n springs, those of τ and those of −1/τ, in normal and shear direction.
 
     faces    `GluedFaces`
-    vectors  (2 n, 2, 2, w)  way, side, per unit of all unknowns of the side's cell: of u − {t}/τ (m), and of {t} (Pa)
-    springs  (2 n,)          stiffness times length, and −1/τ times it
-    before   (2 n, 2)        what these stand at as the step begins
+    vectors  (2 n, 2, 2, w)  direction, side, per unit of all unknowns of the side's cell: of u − {t}/τ (m), and {t} (Pa)
+    springs  (2 n,)          stiffness times length, and −1/τ times length
+    before   (2 n, 2)        elongation at the start of the step
     """
 
     faces: GluedFaces
@@ -170,8 +174,10 @@ class Glue:
         cls, faces: GluedFaces, state: State, vertices: np.ndarray, q: np.ndarray, midpoint: MidpointConfiguration,
         turn: np.ndarray,
     ) -> Glue:  # fmt: skip
-        """The glue of cells with deflections ``q`` (k,) in ``state``, whose forces act at the ``midpoint``, where cells have
-        turned by ``turn`` (n_blocks,) since."""
+        """The bonds of cells with deflections ``q`` (k,) in ``state``.
+
+        Forces act at the ``midpoint`` configuration, to which cells have rotated by ``turn`` (n_blocks,).
+        """
         cells, owners, n = faces.cells, faces.owners, len(faces.face)
         start, angle = state.rotation, state.rotation + turn
         size, padded = np.sqrt(midpoint.moments[:, 0]), cells.padded(q)
@@ -180,7 +186,7 @@ class Glue:
             return np.einsum("nab,nb->na", rotation_of(0.5 * (at[owners[0]] + at[owners[1]])), faces.normal)
 
         first, second = faces.places(vertices, start, q)
-        begun, acting = normal(start), _ways(normal(angle))
+        begun, acting = normal(start), _face_directions(normal(angle))
         middle = 0.5 * (midpoint.points(first, owners[0]) + midpoint.points(second, owners[1]))
         jump, mean = np.zeros((n, 2, 2, max(cells.width, 6))), np.zeros((n, 2, 2, max(cells.width, 6)))
         bears = np.zeros((n, 2))
@@ -199,7 +205,7 @@ class Glue:
             bears += 0.5 * (
                 np.einsum("nws,ns->nw", across, state.stress[owner]) + np.einsum("nwj,nj->nw", own, padded[owner])
             )
-        apart = np.einsum("nwa,na->nw", _ways(begun), first - second)
+        apart = np.einsum("nwa,na->nw", _face_directions(begun), first - second)
         give = 1.0 / faces.penalty
         return cls(
             faces, np.concatenate([jump - give[:, None, None, None] * mean, mean]),
@@ -208,12 +214,12 @@ class Glue:
         )  # fmt: skip
 
     def blocks(self, order: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """As of `six_row_system.fill`."""
+        """As in `six_row_system.fill`."""
         one, two = self.faces.owners
         return np.tile(one, 2), np.tile(two, 2), order
 
     def push(self, right: np.ndarray, pattern: SixRowPattern) -> None:
-        """Add the forces of the glue as the step begins to ``right`` (6 n,)."""
+        """Add the bond forces at the start of the step to ``right`` (6 n,)."""
         _push(
             right,
             self.blocks(pattern.order),
@@ -223,39 +229,40 @@ class Glue:
         )
 
     def stiffen(self, data: np.ndarray, pattern: SixRowPattern, n_contacts: int, weight: float) -> None:
-        """Add the stiffness, times ``weight``, to the flat matrix ``data``; in the ``pattern`` faces come after ``n_contacts``."""
+        """Add the bond stiffness, times ``weight``, to the flat matrix ``data``; in ``pattern`` bonded faces follow
+        ``n_contacts`` contacts."""
         at = n_contacts + np.tile(self.faces.face, 2)
         _stiffen(
             data, pattern.places, pattern.step, at, self.blocks(pattern.order), self.vectors, weight * self.springs
         )
 
     def change(self, unknowns: np.ndarray, pattern: SixRowPattern) -> np.ndarray:
-        """(2 n, 2) by how much the springs change with all ``unknowns`` (6 n,) of the step."""
+        """(2 n, 2) elongation of the springs due to all ``unknowns`` (6 n,) of the step."""
         return moved(unknowns, self.blocks(pattern.order), (pattern.more, pattern.rows), self.vectors)
 
     def forces(self, change: np.ndarray, n_blocks: int) -> np.ndarray:
-        """(n_blocks, 6) N on the six first unknowns of the solver, once the springs have changed by ``change`` (2 n, 2)."""
+        """(n_blocks, 6) N: bond forces on the solver's first six unknowns after the elongation ``change`` (2 n, 2)."""
         out, push = np.zeros((n_blocks, 6)), -self.springs[:, None] * (self.before + change)
         for side, owner in enumerate(self.faces.owners):
             np.add.at(out, np.tile(owner, 2), np.einsum("nw,nwj->nj", push, self.vectors[:, :, side, :6]))
         return out
 
     def energy(self, change: np.ndarray | float = 0.0) -> float:
-        """J/m once the springs have changed by ``change`` (2 n, 2)."""
+        """Energy, J/m, after the elongation ``change`` (2 n, 2)."""
         return 0.5 * float((self.springs[:, None] * (self.before + change) ** 2).sum())
 
     def work(self, change: np.ndarray, weight: float) -> float:
-        """J/m done against the glue in a step in which its springs change by ``change`` (2 n, 2), with the forces at this
-        ``weight`` of it."""
+        """Work, J/m, done against the bonds in a step with the elongation ``change`` (2 n, 2) and forces at this
+        ``weight`` of the step."""
         return float((self.springs[:, None] * (self.before + weight * change) * change).sum())
 
     def traction(self, change: np.ndarray) -> np.ndarray:
-        """(n, 2) Pa, tension and shear that the points bear once the springs have changed by ``change`` (2 n, 2)."""
+        """(n, 2) Pa: tension and shear at the points after the elongation ``change`` (2 n, 2)."""
         n = len(self.faces.face)
         return -self.faces.penalty[:, None] * (self.before + change)[:n]
 
     def mean_traction(self, change: np.ndarray) -> np.ndarray:
-        """(m, 2) Pa, the mean of `traction` on each face."""
+        """(m, 2) Pa: mean `traction` on each face."""
         faces, out = self.faces, np.zeros((len(self.faces.block), 2))
         np.add.at(out, faces.face, faces.weight[:, None] * self.traction(change))
         return out / np.bincount(faces.face, faces.weight, len(out))[:, None]
@@ -263,8 +270,8 @@ class Glue:
 
 @dataclass(frozen=True, eq=False)
 class GlueStrength:
-    """What the glued faces (m,) of cells bear: ``tension`` and ``cohesion``, Pa, and the ``friction`` (tangent) by which pressure
-    adds to it; infinite of faces that hold."""
+    """Strength of the bonded faces (m,) of cells: ``tension`` and ``cohesion``, Pa, and ``friction`` (tangent);
+    infinite for faces that cannot separate."""
 
     tension: np.ndarray
     cohesion: np.ndarray
@@ -272,10 +279,11 @@ class GlueStrength:
 
     @classmethod
     def of(cls, laws: list[JointLaw | None]) -> GlueStrength:
-        """Of faces with these ``laws``, None of those that hold. Raises ValueError for a law without tensile strength."""
+        """Strength of faces with these ``laws``, None for faces that cannot separate. Raises ValueError for a law
+        without tensile strength."""
         weak = next((law for law in laws if law is not None and not law.tensile_strength > 0), None)
         if weak is not None:
-            raise ValueError(f"cells cannot part by the joint {weak.name!r}: it has no tensile strength")
+            raise ValueError(f"cells cannot separate by the joint {weak.name!r}: it has no tensile strength")
         given = [
             (np.inf, np.inf, 0.0) if law is None else (law.tensile_strength, law.cohesion, law.friction) for law in laws
         ]
@@ -286,12 +294,14 @@ class GlueStrength:
 
     @property
     def any(self) -> bool:
-        """Whether any face can part."""
+        """Whether any face can separate."""
         return bool(np.isfinite(self.tension).any())
 
     def parting(self, parted: np.ndarray, mean: np.ndarray) -> np.ndarray | None:
-        """(m,) the faces that have ``parted``, and those of the others, with this ``mean`` traction (n, 2), that bear more than
-        their strength and nearly as much as any; None where none does."""
+        """(m,) faces that have ``parted`` or do so under the ``mean`` traction (n, 2); None if no further one does.
+
+        Of the others, those separate whose stress exceeds their strength and is nearly the highest relative to it.
+        """
         left = np.flatnonzero(~parted)
         pull, shear = mean[:, 0], np.abs(mean[:, 1])
         shear_strength = self.cohesion[left] - np.minimum(pull, self.tension[left]) * self.friction[left]
@@ -305,9 +315,11 @@ class GlueStrength:
 
 @dataclass(frozen=True, eq=False)
 class KeptCorners:
-    """Which contacts at corners are kept: not those of ``cells`` that meet another block in a corner alone, where a face of a
-    cell beside them ends. One rock bears by its faces, however it is divided. ``joined`` (k,): a · n_blocks + b of cells
-    a < b that meet."""
+    """Selects contacts at corners: a cell that meets another block only at a corner where a face of a neighbouring cell
+    ends is left out, because rock carries its stress through faces, however it is divided into cells.
+
+    ``joined`` (k,): a · n_blocks + b of cells a < b that meet.
+    """
 
     cells: DeflectedBlocks
     joined: np.ndarray
@@ -343,7 +355,7 @@ _jit = kept(fastmath={"contract"}, error_model="numpy", nogil=True)
 
 @_jit
 def _push(right, blocks, rows, vectors, force):
-    """Subtract ``force`` (n, 2) across and along of each spring from ``right``."""
+    """Subtract the normal and shear ``force`` (n, 2) of each spring from ``right``."""
     block, other, order = blocks
     more, count = rows
     for c in range(len(block)):
@@ -355,7 +367,8 @@ def _push(right, blocks, rows, vectors, force):
 
 @_jit
 def _stiffen(data, places, step, at, blocks, vectors, springs):
-    """Add ``springs`` (n,), as stiff across as along, to the flat matrix; ``at`` (n,) of the pattern's pairs."""
+    """Add ``springs`` (n,), of equal normal and shear stiffness, to the flat matrix; ``at`` (n,) are pairs of the
+    pattern."""
     where, own_at, upper, lower, rows = places
     block, other, order = blocks
     given = np.empty((2, 2, vectors.shape[3]))

@@ -1,20 +1,20 @@
-"""The order of each block, found as the run goes: an estimate of what a higher order would take up, and who is raised.
+"""Adaptive order of blocks: an estimate of the work that a higher order would take up, and the choice of new orders.
 
-A block of order p is in equilibrium with its loads and contact forces f in its own unknowns only. In those of the orders
-p + 1 and p + 2, h, forces are left over, r = f_h − K_hl q_l − inertia. With these forces on it, the block would take up
-the work
+A block of order p is in equilibrium with its loads and contact forces f in its own unknowns l only. In those of orders
+p + 1 and p + 2, h, the residual r = f_h − K_hl q_l − inertia remains. Under it the block, if it were of order p + 2,
+would take up the work
 
-    W = ½ rᵀ S⁻¹ r,   S = K_hh − K_hl K_ll⁻¹ K_lh,
+    W = ½ rᵀ S⁻¹ r,   S = K_hh − K_hl K_ll⁻¹ K_lh
 
-if it were of order p + 2 (a hierarchical error estimate). Since bases are orthonormalised degree by degree
-(`deflection_basis`), that of order p is the beginning of that of order p + 2, and Cholesky's factor of S gives the part
-of p + 1 as well. Contacts yield to deflection, so that this is too much, by a hundred times where friction locks uniformly
-strained blocks to each other. Of blocks that it would raise, W is therefore found again on a patch: K takes in the springs
-of their contacts, and l the six first unknowns of the block and of those that it touches; what these bear from others stays.
+(a hierarchical error estimate). Bases are orthonormalised degree by degree (`deflection_basis`), so that the basis of
+order p is the first part of that of order p + 2, and the Cholesky factor of S gives the part of p + 1 as well. Contacts
+yield to deflection, so that W is too large, by a factor of a hundred where friction locks uniformly strained blocks to
+each other. For blocks that it would raise, W is therefore computed again on a patch: K includes the springs of their
+contacts, and l the first six unknowns of the block and of its neighbours; the neighbours' other contact forces stay.
 
-A block is raised while W is more than a ``target`` part of the energy E of all blocks whose order is found: what they store
-and move with, what their joints store, and what friction has taken of them. So a block that bends while nothing else
-happens is raised, and one among hundreds, or that slides on joints by more than it strains, is left.
+A block is raised while W exceeds a ``target`` part of the energy E of all blocks with automatic order: their elastic
+and kinetic energy, that stored in their joints, and the loss by friction. A block that bends while nothing else happens
+is therefore raised; one among hundreds, or one that slides by more than it is strained, is not.
 """
 
 from __future__ import annotations
@@ -32,16 +32,20 @@ from .face_points import FaceContacts
 
 log = logging.getLogger(__name__)
 
-#: Orders above a block's own whose work is estimated: of beams, every other one is at rest by symmetry.
-_AHEAD = 2
-#: Unknowns of a patch are held by this part of its rock's stiffness, for its matrix to be regular.
-_HELD = 1e-9
+#: Orders above a block's own whose work is estimated: in beams every other order is zero by symmetry.
+_ORDERS_ABOVE = 2
+#: Unknowns of a patch are constrained by springs of this part of the rock's stiffness, to make its matrix regular.
+_REGULARISATION = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
 class _Group:
-    """Blocks of one order (n,), how many deflections they have, how many up to the next order; K_hl (n, h, l), and the
-    inverse of Cholesky's factor of S (n, h, h)."""
+    """Blocks of one order (n,).
+
+    own, next   number of deflections, and number up to the next order
+    shared      (n, h, l) K_hl
+    inverse     (n, h, h) inverse Cholesky factor of S
+    """
 
     blocks: np.ndarray
     own: int
@@ -51,15 +55,18 @@ class _Group:
 
     @classmethod
     def of(cls, trial: DeflectedBlocks, blocks: np.ndarray, order: int) -> _Group:
-        own, following, all_ = (int(n_deflections(p)) for p in (order, order + 1, order + _AHEAD))
+        own, following, all_ = (int(n_deflections(p)) for p in (order, order + 1, order + _ORDERS_ABOVE))
         matrix = trial.stiffness[blocks][:, :all_, :all_]
         low, shared, high = matrix[:, :own, :own], matrix[:, own:, :own], matrix[:, own:, own:]
         left = high - shared @ np.linalg.solve(low, np.swapaxes(shared, 1, 2)) if own else high
         return cls(blocks, own, following - own, shared, np.linalg.inv(np.linalg.cholesky(left)))
 
     def most(self, force: np.ndarray, deflection: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """(n, h) N and (n,) J/m: what is left over of ``force`` (n_blocks, m), less inertia, on blocks with this
-        ``deflection`` (n_blocks, m), and the work that the next two orders would take up if contacts did not yield."""
+        """(n, h) N and (n,) J/m: residual forces, and the work that the next two orders would take up in rigid
+        contacts.
+
+        ``force`` (n_blocks, m), less inertia, acts on blocks with this ``deflection`` (n_blocks, m).
+        """
         own, size = self.own, self.own + self.inverse.shape[1]
         left = force[self.blocks, own:size]
         left = left - np.einsum("bhl,bl->bh", self.shared, deflection[self.blocks, :own])
@@ -68,11 +75,13 @@ class _Group:
 
 
 class OrderChoice:
-    """The orders of the ``blocks`` of a system, those of `AUTO_ORDER` from 1 upwards until the next two would take up less
-    than a ``target`` part of the energy of all such blocks; ``fixed`` (n_blocks,), ``density`` (n_blocks,) kg/m³, ``elastic``
-    and ``compliance`` (n_blocks, 3, 3), Pa and 1/Pa, of the undeformed blocks.
+    """Orders of the ``blocks`` of a system.
 
-    ``first`` (n_blocks,) are the orders that a run begins with, ``judged`` counts estimates."""
+    Blocks with `AUTO_ORDER` are raised from 1 until the next two orders would take up less than a ``target`` part of
+    the energy of all such blocks. ``fixed`` (n_blocks,), ``density`` (n_blocks,) kg/m³, ``elastic`` and ``compliance``
+    (n_blocks, 3, 3), Pa and 1/Pa, are those of the undeformed blocks. ``first`` (n_blocks,) are the orders at the start
+    of a run, ``judged`` counts estimates.
+    """
 
     def __init__(
         self, blocks: Blocks, fixed: np.ndarray, density: np.ndarray, elastic: np.ndarray, compliance: np.ndarray,
@@ -89,28 +98,31 @@ class OrderChoice:
         self.judged = 0
 
     def deflected(self, order: np.ndarray) -> DeflectedBlocks | None:
-        """The blocks with these orders (n_blocks,); None where all are of the first and none are cells."""
+        """The blocks with these orders (n_blocks,); None where all are of first order and none are cells."""
         if not (order > 1).any() and self.blocks.glued is None:
             return None
         return DeflectedBlocks(self.blocks, self._fixed, self._density, self._elastic, order)
 
     def raised(self, order: np.ndarray, deflected: DeflectedBlocks | None, attempt) -> np.ndarray | None:
-        """(n_blocks,) the orders with which a step is to be done again that blocks of these ``order`` (n_blocks,), the
-        ``deflected`` ones if any are, have ``attempt``-ed; None where they are as high as is asked for, or can be."""
-        energy, held = self._energy(attempt), None
+        """(n_blocks,) orders with which a step must be repeated; None where no block is to be, or can be, raised.
+
+        The step ``attempt`` was made with blocks of these ``order`` (n_blocks,), the ``deflected`` ones if there are
+        any.
+        """
+        energy, before_step = self._energy(attempt), None
         if deflected is not None:
             ended = attempt.deflection + attempt.bent_by
-            held = deflected.padded(ended)
-            energy += 0.5 * float((held * deflected.stiffness_times(ended))[self.found].sum())
+            before_step = deflected.padded(ended)
+            energy += 0.5 * float((before_step * deflected.stiffness_times(ended))[self.found].sum())
         if not energy > 0.0:
             return None
         self.judged += 1
         trial = self._trial_of(order)
         faces = _FaceForces.of(trial, attempt)
         force, deflection = self._forces(trial, faces, attempt), np.zeros_like(trial.basis.coupling[:, 0])
-        if held is not None:
-            width = min(held.shape[1], deflection.shape[1])
-            deflection[self.found, :width] = held[self.found, :width]
+        if before_step is not None:
+            width = min(before_step.shape[1], deflection.shape[1])
+            deflection[self.found, :width] = before_step[self.found, :width]
         out, limit = order.copy(), self.target * energy
         for group in self._groups:
             left, most = group.most(force, deflection)
@@ -132,10 +144,10 @@ class OrderChoice:
         return out
 
     def _trial_of(self, order: np.ndarray) -> DeflectedBlocks:
-        """The blocks whose order is found with those above it that are estimated."""
-        asked = np.where(self.found, order + _AHEAD, 1)
-        if self._trial is None or not np.array_equal(self._trial.order, asked):
-            self._trial = DeflectedBlocks(self.blocks, self._fixed, self._density, self._elastic, asked)
+        """The blocks with automatic order, with the higher orders that are estimated."""
+        order_above = np.where(self.found, order + _ORDERS_ABOVE, 1)
+        if self._trial is None or not np.array_equal(self._trial.order, order_above):
+            self._trial = DeflectedBlocks(self.blocks, self._fixed, self._density, self._elastic, order_above)
             self._groups = [
                 _Group.of(self._trial, np.flatnonzero(self.found & (order == p)), p)
                 for p in np.unique(order[self.found]).tolist()
@@ -149,7 +161,7 @@ class OrderChoice:
         out -= density[:, None] * np.einsum("bej,be->bj", trial.coupling(angle), attempt.acceleration[:, 3:])
         spun = density * attempt.carried[:, 2] ** 2
         out += spun[:, None] * (trial.basis.coupling[:, 0] + trial.basis.coupling[:, 1])
-        force = np.einsum("nw,nwa->na", faces.force, faces.ways)
+        force = np.einsum("nw,nwa->na", faces.force, faces.directions)
         for owner, at, sign in zip(faces.owners, faces.points, (1.0, -1.0), strict=True):
             some = self.found[owner] & force.any(axis=1)
             matrix = trial.directions(at[some], owner[some], angle)
@@ -157,7 +169,8 @@ class OrderChoice:
         return out
 
     def _energy(self, attempt) -> float:
-        """J/m: what blocks whose order is found store and move with, and what their contacts store and have taken."""
+        """J/m: elastic and kinetic energy of blocks with automatic order, energy stored in their contacts and lost
+        there."""
         found, settled, some = attempt.found, attempt.settled, self.found
         stress, velocity, moments = attempt.new_stress[some], attempt.velocity[some], attempt.moments[some]
         mass = attempt.density[some] * moments[:, 0]
@@ -176,13 +189,13 @@ class OrderChoice:
             return
         self._reported.add(block)
         log.warning(
-            "t = %g s: %r has order %d, the highest, and more would take up %.2g of the energy (dda.order_target = %g): %s. "
+            "t = %g s: %r has order %d, the highest, and higher orders would take up %.2g of the energy (dda.order_target = %g): %s. "
             "Draw it as several blocks, or allow a larger part",
             time, self.blocks.names[block], HIGHEST, left, self.target, self._why(block),
         )  # fmt: skip
 
     def _why(self, block: int) -> str:
-        """What makes polynomials converge slowly in ``block``."""
+        """Why polynomials converge slowly in ``block``."""
         own = np.flatnonzero(self.blocks.vertex_block == block)
         at, following = self.blocks.vertices, self.blocks.next_vertex
         before, after = at[own] - at[self.blocks.previous_vertex[own]], at[following[own]] - at[own]
@@ -196,19 +209,19 @@ class OrderChoice:
 
 @dataclass(frozen=True, eq=False)
 class _FaceForces:
-    """The contacts (n,) of an attempt as points along faces.
+    """Contacts (n,) of an attempt as points along faces.
 
     owners   (n,) twice            blocks of the vertices and of the edges
-    ways     (n, 2, 2)             across and along the face
+    directions     (n, 2, 2)             directions normal to and along the face
     force    (n, 2)                N, normal and shear
-    springs  (n, 2)                Pa, of those that hold; zeros of others
-    points   (n, 2) twice          undeformed, of both blocks
-    rigid    (n, 2, 6) twice       motion across and along per unit of the six first unknowns of both blocks
-    angle, area, fixed (n_blocks,) rotation, area and which blocks do not move
+    springs  (n, 2)                Pa, of closed contacts; zero for others
+    points   (n, 2) twice          undeformed, on both blocks
+    rigid    (n, 2, 6) twice       normal and tangential motion per unit of the first six unknowns of both blocks
+    angle, area, fixed (n_blocks,) rotation, area, and which blocks are fixed
     """
 
     owners: tuple[np.ndarray, np.ndarray]
-    ways: np.ndarray
+    directions: np.ndarray
     force: np.ndarray
     springs: np.ndarray
     points: tuple[np.ndarray, np.ndarray]
@@ -219,7 +232,7 @@ class _FaceForces:
 
     @classmethod
     def of(cls, trial: DeflectedBlocks, attempt) -> _FaceForces:
-        """The contacts of an ``attempt``, those at corners spread along faces."""
+        """Contacts of ``attempt``, those at corners distributed along faces."""
         found, settled, laws = attempt.found, attempt.settled, attempt.system.finder
         if isinstance(found, FaceContacts):
             normal, shear, state = settled.normal_force, settled.shear_force, settled.state
@@ -235,13 +248,13 @@ class _FaceForces:
         owners, midpoint = (found.block, found.other), attempt.midpoint
         geometry = midpoint.contacts(found.geometry, *owners, attempt.along_edges(found))
         across = geometry[:, 1:3]
-        ways = np.stack([across, np.stack([-across[:, 1], across[:, 0]], axis=1)], axis=1)
+        directions = np.stack([across, np.stack([-across[:, 1], across[:, 0]], axis=1)], axis=1)
         rigid = tuple(
-            np.einsum("nwa,naj->nwj", ways, displacement_matrix(geometry[:, 5:7], midpoint.centroid[owner]))
+            np.einsum("nwa,naj->nwj", directions, displacement_matrix(geometry[:, 5:7], midpoint.centroid[owner]))
             for owner in owners
         )
         return cls(
-            owners, ways, np.stack([normal, shear], axis=1),
+            owners, directions, np.stack([normal, shear], axis=1),
             np.stack(
                 [
                     np.where(state != OPEN, found.springs.normal, 0.0),
@@ -254,27 +267,29 @@ class _FaceForces:
         )  # fmt: skip
 
     def work(self, trial: DeflectedBlocks, block: int, group: _Group, left: np.ndarray) -> tuple[float, float]:
-        """J/m that the next order of a ``block`` of the ``group`` would take up, and the next two, of the forces ``left``
-        (h,) on a patch, with its contacts and those that it touches."""
+        """J/m: work that the next order of ``block`` (of ``group``) would take up, and the next two, on a patch.
+
+        The residual forces ``left`` (h,) act on the patch, which includes its contacts and neighbours.
+        """
         own, m = group.own, group.own + len(left)
         holds = self.springs.any(axis=1)
         sides = [np.flatnonzero((owner == block) & holds) for owner in self.owners]
         others = [self.owners[1 - side][rows] for side, rows in enumerate(sides)]
         near = np.unique(np.concatenate(others))
         near = near[~self.fixed[near]]
-        # The unknowns: deflection, those estimated last; then six of the block and six of each that it touches.
+        # Unknowns: deflection, those to be estimated last; then six of the block and six of each neighbour.
         size = m + 6 + 6 * len(near)
         matrix = np.zeros((size, size))
         matrix[:m, :m] = trial.stiffness[block, :m, :m]
         for k, b in enumerate((block, *near.tolist())):
             at, stiff = m + 6 * k + np.arange(6), trial.elastic[b]
             matrix[np.ix_(at[3:], at[3:])] = self.area[b] * stiff
-            # Nothing holds a patch that is free as a whole, and nothing pushes it.
-            matrix[at, at] += _HELD * stiff[0, 0] * np.where(np.arange(6) < 2, 1.0, self.area[b])
+            # A patch that is free as a whole is unconstrained, and in equilibrium.
+            matrix[at, at] += _REGULARISATION * stiff[0, 0] * np.where(np.arange(6) < 2, 1.0, self.area[b])
         for side, rows, other in zip((0, 1), sides, others, strict=True):
             motion = np.zeros((len(rows), 2, size))
             bends = trial.directions(self.points[side][rows], np.full(len(rows), block), self.angle)[..., :m]
-            motion[..., :m] = np.einsum("nwa,naj->nwj", self.ways[rows], bends)
+            motion[..., :m] = np.einsum("nwa,naj->nwj", self.directions[rows], bends)
             motion[..., m : m + 6] = self.rigid[side][rows]
             for c in np.flatnonzero(~self.fixed[other]).tolist():
                 first = m + 6 + 6 * int(np.searchsorted(near, other[c]))
@@ -288,9 +303,9 @@ class _FaceForces:
         return 0.5 * float(share[: group.next] @ share[: group.next]), 0.5 * float(share @ share)
 
 
-def relaid(deflection: np.ndarray, before: np.ndarray, order: np.ndarray) -> np.ndarray:
-    """(k, 2) the ``deflection`` of blocks whose orders were ``before`` (n_blocks,) and are ``order`` now, no lower: what is
-    new is at rest."""
+def extended_deflection(deflection: np.ndarray, before: np.ndarray, order: np.ndarray) -> np.ndarray:
+    """(k, 2) the ``deflection`` of blocks raised from the orders ``before`` (n_blocks,) to ``order``: new unknowns are
+    zero."""
     old, new = n_deflections(before), n_deflections(order)
     start = np.cumsum(new) - new
     kept = np.arange(int(old.sum())) - np.repeat(np.cumsum(old) - old, old) + np.repeat(start, old)

@@ -1,12 +1,12 @@
-"""The linear system of blocks of unlike order: rows of six for all.
+"""Linear system of blocks of different orders, with rows of six unknowns for all.
 
-A block of order p has (p + 1)(p + 2) unknowns, its six first and its deflection after them: 2, 5, 7, 12 or 15 rows of
-six for p = 2, 4, 5, 7, 8, and 4 or 10 for p = 3, 6 with four unknowns to spare, which are set to zero. So the solvers
-of blocks of first order (`linear_solver`), whose unknowns stand by six, serve for all orders: a block is as many nodes
-of their graph as it has rows of six, the factors cost what its unknowns cubed do, and blocks of order 1 are what they
-were.
+A block of order p has (p + 1)(p + 2) unknowns, its first six and then its deflection: 2, 5, 7, 12 or 15 rows of six for
+p = 2, 4, 5, 7, 8, and 4 or 10 for p = 3, 6 with four unknowns to spare, which are set to zero. The solvers for
+first-order blocks (`linear_solver`), which use blocks of 6 × 6, therefore serve all orders: a block is as many nodes of
+their graph as it has rows of six, the cost of factors grows with the cube of its unknowns, and blocks of order 1 are
+treated as before.
 
-A contact answers a motion Δu of its two blocks by dN = −kₙ (n − κ t)·Δu and dS = −kₛ t·Δu + μ dN, with n and t the
+A contact responds to a motion Δu of its two blocks by dN = −kₙ (n − κ t)·Δu and dS = −kₛ t·Δu + μ dN, with n and t the
 motion across and along the face per unit of all unknowns of both blocks (`fill`, as `linear_solver.assembly`).
 """
 
@@ -27,12 +27,12 @@ _jit = kept(fastmath={"contract"}, error_model="numpy", nogil=True)
 
 @dataclass(frozen=True, eq=False)
 class SixRowPattern(assembly.Pattern):
-    """Where rows of six of blocks meet in the flat matrix, with ``n`` such rows in all.
+    """Locations in the flat matrix of the 6 × 6 blocks of pairs of rows of six; ``n`` is the number of rows of six.
 
-    rows      (n_blocks,)  how many of a block's own; 0 of fixed ones. The first is ``order[block]``, …
+    rows      (n_blocks,)  number of rows of each block; 0 for fixed ones. The first is ``order[block]``, …
     more      (n_blocks,)  … the others begin here
-    where     (k,)         places of 6 × 6 blocks: row after row of two blocks that meet
-    own       (n_blocks,)  where those of a block with itself begin in ``where``
+    where     (k,)         locations of 6 × 6 blocks: row after row of two blocks that meet
+    own       (n_blocks,)  start of each block's own entries in ``where``
     """
 
     rows: np.ndarray = None
@@ -43,7 +43,7 @@ class SixRowPattern(assembly.Pattern):
 
     @property
     def places(self) -> tuple[np.ndarray, ...]:
-        """As of `fill`."""
+        """As in `fill`."""
         return self.where, self.own, self.upper, self.lower, self.rows
 
 
@@ -51,9 +51,11 @@ def six_row_pattern(
     order: np.ndarray, rows: np.ndarray, block: np.ndarray, other: np.ndarray, points: np.ndarray,
     kept_pattern: SixRowPattern | None = None,
 ) -> SixRowPattern:  # fmt: skip
-    """The pattern of blocks with ``rows`` (n_blocks,) rows of six, 0 of those without unknowns, ``order`` (n_blocks,)
-    the numbers of the others, of which ``block`` and ``other`` (n_contacts,) meet; ``points`` (n_blocks, 2) m lie in
-    them. The solver of a ``kept_pattern`` serves on where no others meet than in it."""
+    """The pattern of blocks with ``rows`` (n_blocks,) rows of six, 0 for those without unknowns.
+
+    ``order`` (n_blocks,) numbers the others, of which ``block`` and ``other`` (n_contacts,) meet; ``points`` (n_blocks,
+    2) m lie inside them. The solver of ``kept_pattern`` is reused if it contains all pairs.
+    """
     n_blocks, free = len(order), np.flatnonzero(order >= 0)
     n = int(rows.sum())
     extra = np.where(order >= 0, rows - 1, 0)
@@ -102,7 +104,7 @@ def six_row_pattern(
 
 @part(fastmath={"contract"}, error_model="numpy", nogil=True)
 def _add_own(data, where, first, step, rows, matrix, begin):
-    """Add a block's own ``matrix``, which begins at ``begin``, with ``rows`` rows of six."""
+    """Add a block's own ``matrix``, stored from ``begin`` on, with ``rows`` rows of six."""
     size = 6 * rows
     for i in range(rows):
         for j in range(rows):
@@ -115,8 +117,11 @@ def _add_own(data, where, first, step, rows, matrix, begin):
 
 @part(fastmath={"contract"}, error_model="numpy", nogil=True)
 def add_pair(data, where, first, step, rows, others, given, along):
-    """Add push ⊗ pull + drag ⊗ across of a contact: ``given`` (2, w) push and drag of the block with ``rows`` rows of six,
-    ``along`` (2, w) pull and across of the one with ``others``."""
+    """Add push ⊗ pull + drag ⊗ across of a contact.
+
+    ``given`` (2, w): push and drag of the block with ``rows`` rows of six; ``along`` (2, w): pull and across of the one
+    with ``others``.
+    """
     push, drag, pull, across = given[0], given[1], along[0], along[1]
     for i in range(rows):
         for j in range(others):
@@ -129,8 +134,11 @@ def add_pair(data, where, first, step, rows, others, given, along):
 
 @_jit
 def fill_own(data, places, step, own, order):
-    """Fill the flat matrix ``data`` with the blocks' ``own`` matrices, and where each begins (n_blocks,); ``places`` as of
-    `fill`, ``order`` of the pattern."""
+    """Fill the flat matrix ``data`` with the blocks' matrices: ``own`` holds them one after the other, and the start of
+    each.
+
+    ``places`` as in `fill`, ``order`` of the pattern.
+    """
     where, own_at, _, _, rows = places
     data[:] = 0.0
     for b in range(len(rows)):
@@ -140,11 +148,12 @@ def fill_own(data, places, step, own, order):
 
 @_jit
 def fill(data, base, places, step, blocks, vectors, laws):
-    """Fill the flat matrix ``data`` with the ``base`` that is the same in all states, and with contacts, as
-    `assembly.assemble`.
+    """Fill the flat matrix ``data`` with ``base``, which does not depend on contact states, and with contacts.
 
-    ``places``: ``where``, ``own``, ``upper``, ``lower`` and ``rows`` of the pattern; ``blocks``: block and other of contacts, and the pattern's order; ``vectors`` (n_contacts,
-    2, 2, w): way, side, unknowns of the side's block; ``laws``: kₙ, kₛ, μ and κ (n_contacts,)."""
+    As `assembly.assemble`. ``places``: ``where``, ``own``, ``upper``, ``lower`` and ``rows`` of the pattern;
+    ``blocks``: block and other of contacts, and the pattern's order; ``vectors`` (n_contacts, 2, 2, w): direction,
+    side, unknowns of the side's block; ``laws``: kₙ, kₛ, μ and κ (n_contacts,).
+    """
     where, own_at, upper, lower, rows = places
     block, other, order = blocks
     normal, shear, slope, lift = laws
@@ -173,7 +182,8 @@ def fill(data, base, places, step, blocks, vectors, laws):
 
 @part(fastmath={"contract"}, error_model="numpy", nogil=True)
 def add_force(right, first, more, count, along, push, drag):
-    """Add ``push`` across and ``drag`` along a face, ``along`` (2, w) of one block, to the right side."""
+    """Add ``push`` normal to and ``drag`` along a face, with the rows ``along`` (2, w) of one block, to the right
+    side."""
     for a in range(count):
         at = 6 * first + a if a < 6 else 6 * more + a - 6
         right[at] += push * along[0, a] + drag * along[1, a]
@@ -181,11 +191,13 @@ def add_force(right, first, more, count, along, push, drag):
 
 @_jit
 def springs_in_states(right, blocks, rows, vectors, states, springs):
-    """Add to ``right`` (6 n,) what closed contacts bear without motion; their stiffness across and along, the part of the
-    normal force that slides (n_contacts,) each, and whether the matrix is symmetric (`assembly.assemble_contacts`).
+    """Add the forces of closed contacts at zero motion to ``right`` (6 n,).
 
-    ``blocks``: block and other of contacts, and the pattern's order; ``rows``: ``more`` and ``rows`` of the pattern;
-    ``states``: state, direction, gap and initial shear force; ``springs``: kₙ, kₛ, friction, sliding force and lift."""
+    Returns their normal and shear stiffness, the ratio of sliding shear to normal force (n_contacts,) each, and whether
+    the matrix is symmetric (`assembly.assemble_contacts`). ``blocks``: block and other of contacts, and the pattern's
+    order; ``rows``: ``more`` and ``rows`` of the pattern; ``states``: state, direction, gap and initial shear force;
+    ``springs``: kₙ, kₛ, friction, sliding force and lift.
+    """
     block, other, order = blocks
     more, count = rows
     state, direction, gap, shear0 = states
@@ -211,7 +223,7 @@ def springs_in_states(right, blocks, rows, vectors, states, springs):
 
 @_jit
 def moved(unknowns, blocks, rows, vectors):
-    """(n_contacts, 2): motion across and along the face, of ``unknowns`` (6 n,); the rest as for
+    """(n_contacts, 2): motion across and along the face due to ``unknowns`` (6 n,); other arguments as in
     `springs_in_states`."""
     block, other, order = blocks
     more, count = rows

@@ -1,4 +1,4 @@
-"""What blocks of higher order cannot do yet, refused by name."""
+"""Features that blocks of higher order do not support yet, refused by name."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from .deflection_basis import HIGHEST
 def refuse_unsupported(
     blocks: Blocks, materials: Sequence[Material], joints: Sequence[JointLaw], settings: DdaSettings
 ) -> None:
-    """Raise ValueError where ``blocks``, of which some have an order above 1, ask for what these cannot do."""
+    """Raise ValueError for features of the model that ``blocks`` with orders above 1 do not support."""
     order = np.ones(blocks.n_blocks, int) if blocks.order is None else np.asarray(blocks.order)
     if not (((order >= 1) & (order <= HIGHEST)) | (order == AUTO_ORDER)).all():
         raise ValueError(f"the order of a block is 1 to {HIGHEST}, got {order.min()} to {order.max()}")
@@ -34,30 +34,30 @@ def refuse_unsupported(
         refuse(bends & blocks.constrained.any(axis=1), "guided blocks of higher order are not supported yet")
     law = next((law for law in joints if law.roughness is not None or not law.straight), None)
     if law is not None:
-        refuse(bends, f"beside it no joint law may be curved yet, as {law.name!r} is")
+        refuse(bends, f"nonlinear joint laws such as {law.name!r} are not supported with it yet")
     law = next((law for law in joints if law.restitution is not None), None)
     if law is not None:
-        refuse(bends, f"beside it no joint may have a coefficient of restitution yet, as {law.name!r} has")
+        refuse(bends, f"a coefficient of restitution, as {law.name!r} has, is not supported with it yet")
     beta, gamma = settings.newmark
     if settings.spectral_radius is not None or (settings.dynamic_factor > 0 and gamma != 2 * beta):
-        refuse(bends, "it moves by Newmark's scheme with γ = 2β only, the trapezoidal rule or Shi's")
+        refuse(bends, "it supports Newmark's scheme with γ = 2β only, the trapezoidal rule or Shi's")
     if settings.springs != "stiff":
-        refuse(bends, 'its contacts are stiff springs: leave dda.springs at "stiff"')
+        refuse(bends, 'its contacts must be stiff springs: leave dda.springs at "stiff"')
     if settings.contact != "penalty":
-        refuse(bends, 'its contacts are penalty springs or joints with a stiffness: leave dda.contact at "penalty"')
+        refuse(bends, 'its contacts must be penalty springs or joints with a stiffness: leave dda.contact at "penalty"')
 
 
 def refuse_unsupported_loads(loads: Loads) -> None:
-    """Raise ValueError for ``loads`` that blocks of higher order cannot bear yet."""
+    """Raise ValueError for ``loads`` that blocks of higher order do not support yet."""
     for name, what in (
         ("bolts", "bolts"), ("block_motions", "prescribed motion of blocks"),
         ("point_motions", "prescribed motion of points"), ("viscous_boundaries", "viscous boundaries"),
         ("excavations", "excavations"),
     ):  # fmt: skip
         if getattr(loads, name):
-            raise ValueError(f"{what} are not supported beside blocks of an order above 1 yet")
+            raise ValueError(f"{what} are not supported with blocks of an order above 1 yet")
     if loads.base is not None and loads.base.frame == "ground":
         raise ValueError(
-            'a base that shakes in the frame "ground" is not supported beside blocks of an order above 1 yet: take the '
+            'a base that shakes in the frame "ground" is not supported with blocks of an order above 1 yet: take the '
             'frame "base"'
         )

@@ -37,7 +37,7 @@ def check_bolts(bolts: Sequence[Bolt], fixed: np.ndarray) -> None:
     """Raise ValueError that names a bolt without an end in a moving block."""
     for bolt in bolts:
         if fixed[bolt.block] and (bolt.other == GROUND or fixed[bolt.other]):
-            raise ValueError(f"bolt {bolt.name!r} holds nothing: both its ends are fixed")
+            raise ValueError(f"bolt {bolt.name!r} has no effect: both its ends are in fixed blocks")
 
 
 def labels(bolts: Sequence[Bolt]) -> list[str]:

@@ -16,7 +16,7 @@ _OF_BLOCK = 1e-3
 _OF_DRAWING = 2e-6
 
 
-class StrayLoads:
+class LoadChecks:
     """Checks every load on given blocks once."""
 
     def __init__(self, blocks: Blocks) -> None:
@@ -87,7 +87,9 @@ class StrayLoads:
     def _refuse_unshaken(self, base: BaseMotion) -> None:
         """Raise ValueError for a base motion of blocks that are not fixed: it would have no effect on them."""
         if not self._blocks.fixed.any():
-            raise ValueError("the ground shakes, but no block is fixed that would go with it: fix what others stand on")
+            raise ValueError(
+                "the ground shakes, but no block is fixed that would move with it: fix the blocks on which others rest"
+            )
         for block in base.blocks or ():
             if not self._blocks.fixed[block]:
                 raise ValueError(
@@ -99,4 +101,4 @@ class StrayLoads:
         what = f"a viscous boundary is on edges named {boundary.edge_name!r}"
         edges = self._blocks.edges_that_exist(boundary.edge_name, what)
         if self._blocks.fixed[self._blocks.vertex_block[edges]].all():
-            raise ValueError(f"{what}, but the blocks that have them are fixed, where it brakes nothing")
+            raise ValueError(f"{what}, but the blocks that have them are fixed, where it has no effect")

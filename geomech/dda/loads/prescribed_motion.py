@@ -65,7 +65,7 @@ class Pairs:
     shift: np.ndarray
 
 
-class ImposedMotion:
+class PrescribedMotion:
     """Motion that ``loads`` prescribe from ``start`` to ``end`` (s), on the midpoint configuration ``midpoint``.
 
     ``totals`` (k,) are the values at ``end``, ``before`` those at the start as the last step left them (None: the
@@ -121,7 +121,7 @@ class ImposedMotion:
         if self.fixed[motion.block]:
             if max(at) > 2:
                 raise ValueError(
-                    f"{self._name(motion.block)} is fixed, and so rigid: its strains cannot be imposed, only u0, v0 "
+                    f"{self._name(motion.block)} is fixed and therefore rigid: its strains cannot be prescribed, only u0, v0 "
                     "and r0"
                 )
             self.increment[motion.block, at] += by
@@ -137,7 +137,9 @@ class ImposedMotion:
         acts = self._midpoint.points(now[None], np.array([b]))[0]
         self._rows[number]["block"], self._rows[number]["at"], self._rows[number]["point"] = b, motion.at, acts
         if self.fixed[b]:
-            raise ValueError(f"a point of {self._name(b)} is to be moved, but the block is fixed: give its own motion")
+            raise ValueError(
+                f"a point of {self._name(b)} has a prescribed motion, but the block is fixed: prescribe the motion of the block"
+            )
         rows = motion.axes @ self._midpoint.displacement(acts, b)
         if motion.kind == "displacement":
             # Towards the total position, so that the next step corrects the second-order error of a rotation.
@@ -150,7 +152,7 @@ class ImposedMotion:
 
     @property
     def driven(self) -> list[int]:
-        """Blocks that are not fixed and have given motion: nothing that strikes them changes it."""
+        """Blocks that are not fixed and have prescribed motion: impacts do not change it."""
         return list(self._given)
 
     def _add(self, block: int, row: np.ndarray, by: float, rate: float, source: int) -> None:
@@ -211,10 +213,10 @@ class ImposedMotion:
         constraint = np.array(given.rows) / self._scale(b)
         m = len(constraint)
         if m > 6:
-            raise ValueError(f"{self._name(b)}: {m} motions are imposed on its six unknowns")
+            raise ValueError(f"{self._name(b)}: {m} motions are prescribed for its six unknowns")
         basis, r = np.linalg.qr(constraint.T, mode="complete")
         if np.abs(np.diag(r)).min() <= _DEPENDENT * np.abs(r).max():
-            raise ValueError(f"{self._name(b)}: the motions imposed on it contradict or repeat one another")
+            raise ValueError(f"{self._name(b)}: the motions prescribed for it contradict or repeat one another")
         known = np.linalg.solve(r[:m].T, np.array(given.increment))
         before, own = (matrix[row].copy(), right[row].copy()), []
         for pairs in sets:

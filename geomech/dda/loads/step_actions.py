@@ -16,7 +16,7 @@ from ..results import contact_resultants
 from .bolts import ROUNDS, BoltSet, check_bolts, labels
 from .force_records import POINT_FORCE
 from .load_vectors import LoadMap
-from .prescribed_motion import ImposedMotion, Pairs
+from .prescribed_motion import Pairs, PrescribedMotion
 
 #: (pattern, matrix, right side, contacts, gaps) → settled contacts.
 Settle = Callable[[Pattern, np.ndarray, np.ndarray, ContactSet, np.ndarray], Settled]
@@ -52,10 +52,10 @@ class StepActions:
         def point_at(block: int, at: tuple[float, float]) -> np.ndarray:
             return load_map.point(block, at, vertices)
 
-        self.imposed: ImposedMotion | None = None
+        self.imposed: PrescribedMotion | None = None
         shaken = loads.base is not None and loads.base.frame == "ground"
         if shaken or loads.block_motions or loads.point_motions:
-            self.imposed = ImposedMotion(
+            self.imposed = PrescribedMotion(
                 blocks, fixed, removed, loads, midpoint, point_at, state.imposed, state.time, end
             )
         self.bolts: BoltSet | None = None

@@ -22,7 +22,7 @@ _GAUSS = 0.5 + np.array([-0.5, 0.5]) / np.sqrt(3.0)
 
 
 @dataclass(frozen=True, eq=False)
-class QuietEdges:
+class ViscousEdges:
     """Dashpots on edges of moving blocks: traction = ``drag`` (2 ``incoming`` − velocity).
 
     ``edge``, ``block`` (n,); ``ends`` (n, 2, 2) m; ``drag`` (n, 2, 2) Pa s/m; ``incoming`` (n, 2) m/s."""
@@ -43,7 +43,7 @@ class QuietEdges:
         density: np.ndarray,
         stiffness: np.ndarray,
         fixed: np.ndarray,
-    ) -> QuietEdges:
+    ) -> ViscousEdges:
         """Dashpots of ``boundaries`` at ``time`` s on the current ``vertices``, without edges of ``fixed`` (n_blocks,)
         blocks; ``density`` (n_blocks,) kg/m³, ``stiffness`` (n_blocks, 3, 3) Pa."""
         edges, waves = [], []

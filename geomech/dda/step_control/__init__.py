@@ -1,1 +1,1 @@
-"""How long a step may be, how far blocks may move in it, and whether anything went through anything."""
+"""Limits of a time step: its length, how far blocks may move, and detection of vertices that crossed an outline."""

@@ -1,4 +1,4 @@
-"""Time steps that follow from how the last ones went."""
+"""Adaptive time step: chosen from open–close iterations, cuts and displacement of the last steps."""
 
 from __future__ import annotations
 
@@ -7,22 +7,25 @@ from dataclasses import dataclass
 from ...model import DdaSettings
 from ..results import StepResult
 
-#: A run begins with this part of the longest step: what acts at once is met by steps that see it come on.
+#: The first step is this part of the longest: loads that act at once are then resolved as they set in.
 FIRST = 1 / 32
-#: After an easy step, settled in so few open–close iterations and not cut, the next one is longer by this factor, …
+#: The step grows by this factor after a step that converged within so many open–close iterations without a cut, …
 EASY, GROWTH = 6, 1.5
-#: … after one that took more than this, or was cut, shorter by that: what is hard to settle comes on within the step.
+#: … and shrinks by that factor after one that needed more than this, or was cut: such changes happen within the step.
 HARD, SHRINKAGE = 18, 0.5
-#: The displacement allowed in a step is used to this part: so much of it is left for loads that grow.
+#: Share of the allowed displacement that a step is planned to use; the rest allows for growing loads.
 USE = 0.8
-#: Steps asked for are never shorter than this part of the longest; what still fails is cut by the step itself.
+#: Shortest step that is planned, relative to the longest; steps that still fail are cut by the step itself.
 SHORTEST = 1e-4
 
 
 @dataclass(eq=False)
 class StepLength:
-    """How long the next step of a run is to be, s: ``settings.time_step``, or with ``settings.automatic_time_step``
-    between that and a ten thousandth of it, by the last step's open–close iterations, cuts and displacement."""
+    """Length of the next step of a run, s.
+
+    It is ``settings.time_step``; with ``settings.automatic_time_step``, between that and a ten-thousandth of it,
+    depending on the last step's open–close iterations, cuts and displacement.
+    """
 
     settings: DdaSettings
 
@@ -31,13 +34,13 @@ class StepLength:
         self.dt = FIRST * longest if self.settings.automatic_time_step else longest
 
     def after(self, result: StepResult, asked: float) -> None:
-        """Take account of a step that was to last ``asked`` s."""
+        """Take account of a step that was planned to last ``asked`` s."""
         if not self.settings.automatic_time_step:
             return
         facts = result.statistics
         cut, iterations = facts["step_cuts"] > 0, facts["open_close_iterations"]
         if asked < self.dt or (result.dt < asked and not cut):
-            # The run or a stage ended in it, or speed alone shortened it: no sign of how a whole step would have gone.
+            # The run or a stage ended in this step, or speed alone shortened it: it says nothing about a full step.
             return
         share = facts["limit_share"]
         factor = min(GROWTH, USE / share) if share > 0.0 else GROWTH

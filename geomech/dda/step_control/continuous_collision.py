@@ -1,16 +1,17 @@
-"""What has gone through the outline of a block in a step, found along the paths of vertices.
+"""Continuous collision detection: vertices that crossed the outline of a block in a step, along their paths.
 
-In the frame of an edge, which moves with its block, a vertex goes from (s, g) to (s′, g′): its place along the edge and
-its gap as the step begins and as it ends; between them the path is straight but for r²/8 of its distance from the edge
-where the blocks turn by r (continuous collision detection: Provot 1997; Li et al. 2020, Lan et al. 2022 for affine
-bodies). Of two outlines a vertex of one goes first through an edge of the other, but for corners that meet tip to tip on
-a common line: there two edges cross in the end. A vertex has gone
+In the frame of an edge, which moves with its block, a vertex moves from (s, g) to (s′, g′), its coordinate along the
+edge and its gap at the start and at the end of the step; the path is straight to within r²/8 of its distance from the
+edge for a rotation r (Provot 1997; Li et al. 2020, Lan et al. 2022 for affine bodies). When two outlines cross, a
+vertex of one passes through an edge of the other first, except for corners that meet tip to tip on a common line: there
+two edges cross in the end. A vertex has gone
 
-- *into* a block where it lies inside as the step ends, deeper than it did and than contacts of the block press;
-- *through* it where it leaves by an edge f, from deeper behind that than contacts press, and has come in by another, e,
-  and the way along the outline from there is longer than what a corner may be cut by.
+- *into* a block if at the end of the step it lies inside, deeper than before and than the penetration of contacts;
+- *through* it if it leaves by an edge f, from deeper behind it than the penetration of contacts, after having entered by
+  another edge e from which the way along the outline is longer than a corner that may be cut.
 
-Contacts of the step hold what they are there to hold; what is found here went in where none was, or none was closed.
+Crossings at closed contacts are the contact solver's; the ones found here happened where there was no contact, or none
+was closed.
 """
 
 from __future__ import annotations
@@ -21,17 +22,16 @@ import numpy as np
 
 from ...compiled import UNCOUNTED, kept, part
 
-#: Vertices may lie in a block by this part of the smaller block's size, √area, the radius of corners, …
+#: Depth to which vertices may lie in a block, relative to the smaller block's size √area (the radius of corners), …
 _DEPTH = 1e-5
-#: … and by so many times what contacts at that vertex are pressed in by.
+#: … and relative to the penetration of contacts at that vertex.
 _PRESSED = 2.0
-#: Where rounded corners pass each other, one may lie in the other by this part of their rounding length, so near to it
-#: in rounding lengths: an arc leaves 1 − cos 45° of the corner that it rounds.
+#: Where rounded corners pass each other, one may lie in the other by this part of their rounding length, if it is this
+#: near in rounding lengths: an arc removes 1 − cos 45° of the corner that it rounds.
 ROUNDED_OVERLAP, _NEAR = 0.3, 1.6
-#: What goes round a corner may cut it: by this part of the smaller block's size along the outline, or so many rounding
-#: lengths.
+#: Part of the outline that a vertex may cut at a corner: relative to the smaller block's size, or in rounding lengths.
 _CORNER, _CUT = 1e-2, 2.5
-#: Edges of rounded corners that pass each other cross by so many rounding lengths at most.
+#: Edges of rounded corners that pass each other cross by at most this many rounding lengths.
 _TIPS = 1.2
 #: Kinds of crossings.
 INTO, THROUGH = 0, 1
@@ -39,7 +39,8 @@ INTO, THROUGH = 0, 1
 
 @part(fastmath=False, error_model="numpy", nogil=True, **UNCOUNTED)
 def depth_inside(x, y, vertices, next_vertex, first, last):
-    """(how far (x, y) lies inside the polygon of the edges from ``first`` to ``last``, m, 0 outside; its nearest edge)."""
+    """Depth, m, of (x, y) inside the polygon of the edges from ``first`` to ``last``, 0 outside; and its nearest
+    edge."""
     winding, least, nearest = 0, np.inf, -1
     for e in range(first, last):
         f = next_vertex[e]
@@ -61,7 +62,7 @@ def depth_inside(x, y, vertices, next_vertex, first, last):
 
 @part(fastmath=False, error_model="numpy", nogil=True, **UNCOUNTED)
 def _seen(vertices, next_vertex, x, y, e):
-    """(gap, place along, length) of (x, y) before edge ``e``."""
+    """(gap, coordinate along, length) of (x, y) relative to edge ``e``."""
     f = next_vertex[e]
     dx, dy = vertices[f, 0] - vertices[e, 0], vertices[f, 1] - vertices[e, 1]
     length = np.sqrt(dx * dx + dy * dy)
@@ -71,8 +72,8 @@ def _seen(vertices, next_vertex, x, y, e):
 
 @part(fastmath=False, error_model="numpy", nogil=True, **UNCOUNTED)
 def _way(vertices, next_vertex, e, at, f, to):
-    """Length of the outline between a place ``at`` (0 to 1) on edge ``e`` and one ``to`` on edge ``f``, the shorter way
-    round; inf on different outlines of one block. m."""
+    """Length, m, of the outline between the position ``at`` (0 to 1) on edge ``e`` and ``to`` on edge ``f``, the
+    shorter way round; inf on different outlines of one block."""
     if e == f:
         _, _, length = _seen(vertices, next_vertex, 0.0, 0.0, e)
         return abs(to - at) * length
@@ -97,7 +98,8 @@ def _way(vertices, next_vertex, e, at, f, to):
 
 @part(fastmath=False, error_model="numpy", nogil=True, **UNCOUNTED)
 def _rounded_off(v, vertices, rounding, first, last):
-    """The rounding length of corner ``v`` with the nearest of those from ``first`` to ``last``, m; 0 where none is near."""
+    """Common rounding length, m, of corner ``v`` and the nearest of those from ``first`` to ``last``; 0 where none is
+    near."""
     longest = 0.0
     for w in range(first, last):
         length = min(rounding[v], rounding[w])
@@ -109,8 +111,12 @@ def _rounded_off(v, vertices, rounding, first, last):
 
 @part(fastmath=False, error_model="numpy", nogil=True, **UNCOUNTED)
 def _crossed(vertices, next_vertex, start, a, b, pressed, least, length):
-    """A vertex and an edge of two blocks of which edges cross, and by how much the nearest end of both is beyond the
-    other's line, m; −1 where they cross by no more than contacts press there, ``least`` and the ``length`` of tips."""
+    """A vertex and an edge of two blocks whose edges cross, and how far the nearest end of both is beyond the other's
+    line.
+
+    The depth is in m. Returns −1 where they cross by no more than the penetration of contacts there, ``least``, and the
+    ``length`` of rounded tips.
+    """
     for e in range(start[a], start[a + 1]):
         f = next_vertex[e]
         ex, ey = vertices[e, 0], vertices[e, 1]
@@ -141,8 +147,12 @@ def _crossed(vertices, next_vertex, start, a, b, pressed, least, length):
 
 
 class Paths(NamedTuple):
-    """Outlines ``before`` and ``after`` a step (n_vertices, 2) m, the ``next_vertex`` of each (n_vertices,), and where those
-    of a block begin, ``vertex_start`` (n_blocks + 1,)."""
+    """Outlines at the start and end of a step.
+
+    before, after   (n_vertices, 2) m
+    next_vertex     (n_vertices,)
+    vertex_start    (n_blocks + 1,) first vertex of each block
+    """
 
     before: np.ndarray
     after: np.ndarray
@@ -151,8 +161,12 @@ class Paths(NamedTuple):
 
 
 class Allowed(NamedTuple):
-    """What is no crossing: ``pressed`` (n_vertices,) m is the deepest that contacts at a vertex are pressed in by, ``size``
-    (n_blocks,) √area and ``rounding`` (n_vertices,) the lengths over which corners are rounded, m."""
+    """Tolerances.
+
+    pressed    (n_vertices,) m, deepest penetration of contacts at each vertex
+    size       (n_blocks,) m, √area
+    rounding   (n_vertices,) m, rounding lengths of corners
+    """
 
     pressed: np.ndarray
     size: np.ndarray
@@ -161,8 +175,8 @@ class Allowed(NamedTuple):
 
 @part(fastmath=False, error_model="numpy", nogil=True, **UNCOUNTED)
 def _entered_by(paths, v, f, left, first, last):
-    """The edge by which vertex ``v`` has last come in before it ``left`` by the edge ``f`` (the part of the step), and
-    where along it; −1 for none."""
+    """The edge by which vertex ``v`` last entered before it ``left`` by edge ``f`` (a fraction of the step), and where
+    along it; −1 for none."""
     before, after, next_vertex = paths.before, paths.after, paths.next_vertex
     x0, y0, x1, y1 = before[v, 0], before[v, 1], after[v, 0], after[v, 1]
     entry, at, when = -1, 0.0, -1.0
@@ -180,12 +194,15 @@ def _entered_by(paths, v, f, left, first, last):
 
 @part(fastmath=False, error_model="numpy", nogil=True, **UNCOUNTED)
 def _gone_through(paths, v, first, last, allowed, longest):
-    """The edge by which vertex ``v`` has come into the block with the vertices from ``first`` to ``last``, through which
-    it has gone, and how deep, m; −1 for none. It is none of what is ``allowed`` m deep, or cuts a corner of the
-    ``longest`` way round, m."""
+    """The edge by which vertex ``v`` entered the block with vertices ``first`` to ``last`` and passed through, and the
+    depth.
+
+    The depth is in m. Returns −1 for none, for crossings within the tolerances ``allowed``, and for corners cut by at
+    most ``longest`` m of outline.
+    """
     before, after, next_vertex = paths.before, paths.after, paths.next_vertex
     x0, y0, x1, y1 = before[v, 0], before[v, 1], after[v, 0], after[v, 1]
-    was, beside = np.inf, -1
+    was, nearest = np.inf, -1
     for f in range(first, last):
         g0, s0, _ = _seen(before, next_vertex, x0, y0, f)
         if g0 >= -allowed:
@@ -198,14 +215,14 @@ def _gone_through(paths, v, first, last, allowed, longest):
         if out < 0.0 or out > 1.0:
             continue
         if was == np.inf:
-            was, beside = depth_inside(x0, y0, before, next_vertex, first, last)
+            was, nearest = depth_inside(x0, y0, before, next_vertex, first, last)
         if was > 0.0 and was > allowed:
-            continue  # it lay deep in the block before: no way out is the wrong one
-        # By which edge it has come in: the last one before it left, or the one that it lay on.
+            continue  # it was deep in the block before: no way out is wrong
+        # The edge by which it entered: the last one before it left, or the one on which it was.
         entry, at = _entered_by(paths, v, f, left, first, last)
         if entry < 0 and was > 0.0:
-            _, at, _ = _seen(before, next_vertex, x0, y0, beside)
-            entry, at = beside, min(1.0, max(0.0, at))
+            _, at, _ = _seen(before, next_vertex, x0, y0, nearest)
+            entry, at = nearest, min(1.0, max(0.0, at))
         if entry >= 0 and _way(before, next_vertex, entry, at, f, out) > longest:
             return entry, min(-g0, g1)
     return -1, 0.0
@@ -213,8 +230,10 @@ def _gone_through(paths, v, first, last, allowed, longest):
 
 @part(fastmath=False, error_model="numpy", nogil=True, **UNCOUNTED)
 def _of_vertex(paths, box, allow, v, j, smaller):
-    """How vertex ``v`` has crossed the outline of block ``j`` (−1: not at all), by which edge, and how deep, m; ``smaller``
-    m is the size of the smaller block."""
+    """Kind of crossing of vertex ``v`` with the outline of block ``j`` (−1: none), the edge, and the depth.
+
+    ``smaller`` (m) is the size of the smaller block.
+    """
     before, after = paths.before, paths.after
     first, last = paths.vertex_start[j], paths.vertex_start[j + 1]
     x0, y0, x1, y1 = before[v, 0], before[v, 1], after[v, 0], after[v, 1]
@@ -234,8 +253,8 @@ def _of_vertex(paths, box, allow, v, j, smaller):
 
 
 @part(fastmath=False, error_model="numpy", nogil=True, **UNCOUNTED)
-def _tell(found, count, pair, vertex, edge, kind, depth):
-    """Write a crossing to the row ``count`` of ``found`` where it has room; how many there are then."""
+def _record(found, count, pair, vertex, edge, kind, depth):
+    """Write a crossing to row ``count`` of ``found`` if there is room; returns the new count."""
     if count < found.shape[0]:
         found[count, 0], found[count, 1], found[count, 2] = pair, vertex, edge
         found[count, 3], found[count, 4] = kind, depth
@@ -244,7 +263,7 @@ def _tell(found, count, pair, vertex, edge, kind, depth):
 
 @kept(fastmath=False, error_model="numpy", nogil=True, **UNCOUNTED)
 def _find(pairs, paths, box, allow, found):
-    """Number of crossings of ``pairs``, the first of them in ``found`` (m, 6) as far as it has room."""
+    """Number of crossings of ``pairs``; ``found`` (m, 6) receives as many as it has room for."""
     count, start = 0, paths.vertex_start
     for k in range(pairs.shape[0]):
         a, b = pairs[k, 0], pairs[k, 1]
@@ -257,22 +276,25 @@ def _find(pairs, paths, box, allow, found):
             for v in range(start[i], start[i + 1]):
                 kind, edge, depth = _of_vertex(paths, box, allow, v, j, smaller)
                 if kind >= 0:
-                    count = _tell(found, count, k, v, edge, kind, depth)
+                    count = _record(found, count, k, v, edge, kind, depth)
         if count > known:
             continue
         least, length = _DEPTH * smaller, _TIPS * min(allow.rounding[start[a]], allow.rounding[start[b]])
         pressed, following = allow.pressed, paths.next_vertex
         vertex, edge, depth = _crossed(paths.after, following, start, a, b, pressed, least, length)
         if vertex >= 0 and _crossed(paths.before, following, start, a, b, pressed, least, length)[0] < 0:
-            count = _tell(found, count, k, vertex, edge, INTO, depth)
+            count = _record(found, count, k, vertex, edge, INTO, depth)
     return count
 
 
 def crossings(
     paths: Paths, pairs: np.ndarray, box: np.ndarray, allow: Allowed
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Crossings of the ``pairs`` (k, 2) of blocks in a step on these ``paths``: pair, vertex, the edge that it went in by,
-    kind, and depth, m, (n,) each. ``box`` (n_blocks, 4) holds each block before and after."""
+    """Crossings of ``pairs`` (k, 2) of blocks in a step along ``paths``.
+
+    ``box`` (n_blocks, 4) encloses each block before and after. Returns pair, vertex, edge of entry, kind, and depth
+    (m), (n,) each.
+    """
     room = 64
     while True:
         found = np.empty((room, 6))

@@ -1,8 +1,8 @@
-"""Energy that overlaps bring in: reported at one fraction of all energy turned over, the end of a run at another.
+"""Energy created by overlaps: a warning at one fraction of all energy turned over, the end of the run at another.
 
-Contacts that close with a vertex that lies in a block already push it out, with the work ½ k g² of springs that nothing
-has pressed. Blocks that do not go into each other bring none; what was drawn with an overlap brings its own in the first
-step (`EnergyBudget.drawn`).
+A contact that closes with its vertex already inside a block pushes it out, with the work ½ k g² of springs that nothing
+has compressed. Blocks that do not overlap create none; overlaps in the drawing create theirs in the first step
+(`EnergyBudget.drawn`).
 """
 
 from __future__ import annotations
@@ -16,12 +16,13 @@ from ..results import NotConverged
 
 log = logging.getLogger(__name__)
 
-#: Fractions of all energy turned over: what is reported, and what makes the run meaningless.
+#: Fractions of all energy turned over: for the warning, and for the end of the run.
 WARNED, ENDED = 0.01, 0.1
 
 
 class Overlap(NamedTuple):
-    """The overlap that brought most ``energy`` (J/m) into a step: of which blocks, how ``deep`` (m), and where (m)."""
+    """The overlap that created most ``energy`` (J/m) in a step: its blocks, its depth ``deep`` (m), and its location
+    (m)."""
 
     energy: float
     block: int
@@ -32,31 +33,33 @@ class Overlap(NamedTuple):
 
 
 class OverlapWatch:
-    """Logs a warning, once, when overlaps have brought in `WARNED` of all energy turned over, and ends the run at
-    `ENDED`. ``names`` of blocks are those of the step."""
+    """Logs one warning when overlaps have created `WARNED` of all energy turned over, and ends the run at `ENDED`.
+
+    ``names`` are those of the blocks of the step.
+    """
 
     def __init__(self) -> None:
-        self._told = False
+        self._warned = False
         self._worst: Overlap | None = None
         self._when = 0.0
 
     def check(self, budget: EnergyBudget, overlap: Overlap | None, names: Sequence[str], time: float) -> None:
-        """Look at the ``budget`` after a step to ``time`` s, whose worst ``overlap`` is None where there was none.
+        """Check the ``budget`` after a step to ``time`` s; ``overlap`` is the largest of the step, None without one.
 
-        Raises NotConverged naming the blocks, the place and the time of the largest one.
+        Raises NotConverged naming blocks, place and time of the largest one.
         """
         if overlap is not None and budget.steps > 1 and (self._worst is None or overlap.energy > self._worst.energy):
             self._worst, self._when = overlap, time
         share, worst = budget.by_overlap, self._worst
-        if share <= WARNED or worst is None or (self._told and share <= ENDED):
+        if share <= WARNED or worst is None or (self._warned and share <= ENDED):
             return
         a, b = (names[k] if names else f"block {k}" for k in (worst.block, worst.other))
         what = (
-            f"blocks that overlap have brought {share:.2g} of all energy turned over into the run, most of it at "
-            f"t = {self._when:.6g} s: {a!r} and {b!r} lay {worst.deep:.3g} m in each other near x = {worst.x:.6g}, "
+            f"overlapping blocks have created {share:.2g} of all energy turned over in the run, most of it at "
+            f"t = {self._when:.6g} s: {a!r} and {b!r} overlapped by {worst.deep:.3g} m near x = {worst.x:.6g}, "
             f"y = {worst.y:.6g} m; shorten dda.time_step_s, or merge slivers (geometry.smallest_block_m2)"
         )
         if share > ENDED:
             raise NotConverged(what)
-        self._told = True
+        self._warned = True
         log.warning("t = %g s: %s", time, what)

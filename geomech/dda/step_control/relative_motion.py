@@ -1,15 +1,15 @@
-"""How far two near blocks may move against each other in a step, and how far apart their contacts are searched for.
+"""Limit of the relative motion of two neighbouring blocks in a step, and the search distance of their contacts.
 
-The relative displacement of blocks a and b is the affine field u_a(x) − u_b(x); where both may be in the step it is
-largest at a corner of the box that their boxes, widened by it, share. A pair's *motion* is that, so that neither what
-moves along with both nor what lies elsewhere counts. From the velocity V with which a step begins,
+The relative displacement of blocks a and b is the affine field u_a(x) − u_b(x). The *motion* of a pair is its largest
+magnitude where both may be in the step, which is at a corner of the intersection of their boxes, widened by the motion
+itself: common motion and motion elsewhere do not count. The velocity V at the start of a step gives
 
     motion ≤ V dt + g dt²,      window = 1.1 (V dt + g dt²) + margin,
 
-bounds how far a contact is searched for. Contacts keep the lines and the edges of the step's start. A pair may therefore
-move by `SHARE` of the geometric mean of its blocks' sizes (`widths`), after it has gone the way that lies between the two, and
-turn by `TURN` against each other: what a third block is like does not matter, nor how the model lies. What is not
-predicted (impacts, loads that set in) is checked after the step (`continuous_collision`).
+the second being the search distance of contacts. Contacts keep the lines and edges of the step's start. After closing
+the distance between them, a pair may therefore move by `SHARE` of the geometric mean of its blocks' sizes (`widths`),
+and rotate by `TURN` relative to each other, whatever the size of other blocks and of the model. What the velocity does
+not predict (impacts, sudden loads) is checked after the step (`continuous_collision`).
 """
 
 from __future__ import annotations
@@ -21,21 +21,21 @@ import numpy as np
 from ...compiled import kept, part
 from ..contact_detection.neighbour_search import NearPairs, boxes
 
-#: Two blocks move against each other by this part of the geometric mean of their sizes in a step …
+#: Two blocks may move relative to each other by this part of the geometric mean of their sizes in a step …
 SHARE = 0.1
-#: … and turn by this, rad: what lines of contacts that stay on the axes of the start are good for.
+#: … and rotate by this, rad, because contacts keep their directions during a step.
 TURN = 0.15
-#: Contacts are searched for this part of the smaller block's size farther than the velocity leads, …
+#: Search distance of contacts: this part of the smaller block's size in addition to the predicted motion …
 _MARGIN = 0.02
-#: … and this many times as far as it leads.
+#: … times this factor.
 _WIDER = 1.1
-#: A step that speed limits uses this part of what it may move: round-off and what blocks hit take the rest.
+#: Share of the allowed motion that a step limited by speed uses; round-off and impacts take the rest.
 _AIM = 0.99
 
 
 @part(fastmath=False, error_model="numpy", nogil=True)
 def _relative(affine, centroid, a, b, x, y):
-    """Length of the relative displacement of blocks ``a`` and ``b`` at (x, y)."""
+    """Magnitude of the relative displacement of blocks ``a`` and ``b`` at (x, y)."""
     ax, ay, bx, by = x - centroid[a, 0], y - centroid[a, 1], x - centroid[b, 0], y - centroid[b, 1]
     p, q = affine[a], affine[b]
     u = p[0] + p[2] * ax + p[3] * ay - q[0] - q[2] * bx - q[3] * by
@@ -45,7 +45,7 @@ def _relative(affine, centroid, a, b, x, y):
 
 @part(fastmath=False, error_model="numpy", nogil=True)
 def _motion(affine, centroid, box, a, b, more):
-    """Largest relative displacement where ``a`` and ``b`` may meet in it, with ``more`` besides; −1 where nowhere."""
+    """Largest relative displacement where ``a`` and ``b`` may meet, plus ``more``; −1 where they cannot meet."""
     x0, x1 = min(box[a, 0], box[b, 0]), max(box[a, 2], box[b, 2])
     y0, y1 = min(box[a, 1], box[b, 1]), max(box[a, 3], box[b, 3])
     motion = np.inf
@@ -65,7 +65,7 @@ def _motion(affine, centroid, box, a, b, more):
 
 @part(fastmath=False, error_model="numpy", nogil=True)
 def _apart(vertices, next_vertex, start, a, b):
-    """Least distance of a vertex of one of two blocks from the outline of the other, m."""
+    """Least distance, m, between the vertices of either block and the outline of the other."""
     least = np.inf
     for turn in range(2):
         i, j = (a, b) if turn == 0 else (b, a)
@@ -83,8 +83,12 @@ def _apart(vertices, next_vertex, start, a, b):
 
 @kept(fastmath=False, error_model="numpy", nogil=True)
 def _longest(pairs, affine, turn, centroid, box, vertices, next_vertex, start, size, dt, g):
-    """(time, pair): the longest step up to ``dt`` in which all ``pairs`` stay within what they may move, and the pair
-    that shortens it, −1 for none; ``affine`` and ``turn`` are what the velocity makes of ``dt``."""
+    """(time, pair): the longest step up to ``dt`` in which all ``pairs`` stay within their limits, and the limiting
+    pair.
+
+    The pair is −1 for none; ``affine`` and ``turn`` are the displacement and rotation that the velocity causes in
+    ``dt``.
+    """
     longest, which = dt, -1
     for k in range(pairs.shape[0]):
         a, b = pairs[k, 0], pairs[k, 1]
@@ -95,7 +99,7 @@ def _longest(pairs, affine, turn, centroid, box, vertices, next_vertex, start, s
         speed, spin = motion / dt, abs(turn[a] - turn[b]) / dt
         if speed * longest + 0.5 * g * longest * longest > _AIM * may and motion > 0.0:
             may = _AIM * (may + _apart(vertices, next_vertex, start, a, b))
-            # Root of speed t + g t²/2 = may in the form that keeps its digits when g is small.
+            # Root of speed t + g t²/2 = limit, in the form that is accurate for small g.
             time = 2.0 * may / (speed + np.sqrt(speed * speed + 2.0 * g * may))
             if time < longest:
                 longest, which = time, k
@@ -106,7 +110,7 @@ def _longest(pairs, affine, turn, centroid, box, vertices, next_vertex, start, s
 
 @kept(fastmath=False, error_model="numpy", nogil=True)
 def _windows(pairs, affine, centroid, box, size, fall):
-    """(k,) m, of ``pairs`` that may meet; −1 for the others. ``fall`` is g dt², m."""
+    """(k,) m: search distances of ``pairs`` that may meet; −1 for the others. ``fall`` is g dt², m."""
     out = np.empty(pairs.shape[0])
     for k in range(pairs.shape[0]):
         a, b = pairs[k, 0], pairs[k, 1]
@@ -118,7 +122,7 @@ def _windows(pairs, affine, centroid, box, size, fall):
 
 @kept(fastmath=False, error_model="numpy", nogil=True)
 def _shares(pairs, affine, turn, centroid, box, vertices, next_vertex, start, size):
-    """(k, 2): motion of ``pairs``, m, and the part of what they may move and turn that this is."""
+    """(k, 2): motion of ``pairs``, m, and its ratio to the allowed motion and rotation."""
     out = np.zeros((pairs.shape[0], 2))
     for k in range(pairs.shape[0]):
         a, b = pairs[k, 0], pairs[k, 1]
@@ -132,13 +136,13 @@ def _shares(pairs, affine, turn, centroid, box, vertices, next_vertex, start, si
 
 @dataclass(frozen=True, eq=False)
 class Windows:
-    """Contacts of the ``pairs`` (k, 2) of blocks, ascending, are searched for within ``reach`` (k,) m of each."""
+    """Search distances ``reach`` (k,) m of ``pairs`` (k, 2) of blocks, ascending."""
 
     pairs: np.ndarray
     reach: np.ndarray
 
     def widened(self, pairs: np.ndarray, reach: np.ndarray, n_blocks: int) -> Windows:
-        """With ``reach`` (m,) m at least for the ``pairs`` (m, 2)."""
+        """The windows with at least ``reach`` (m,) m for ``pairs`` (m, 2)."""
         if not len(pairs):
             return self
         both = np.concatenate([self.pairs, pairs])
@@ -148,11 +152,12 @@ class Windows:
         return Windows(np.stack([keys // n_blocks, keys % n_blocks], axis=1), out)
 
     def reaches_beyond(self, before: Windows) -> bool:
-        """Whether these reach farther than the windows ``before``, which they have widened."""
+        """Whether any search distance exceeds that of the windows ``before``."""
         return len(self.pairs) > len(before.pairs) or bool((self.reach > before.reach).any())
 
     def of_contacts(self, block: np.ndarray, other: np.ndarray, n_blocks: int) -> np.ndarray:
-        """(n,) the pair of each contact between ``block`` and ``other`` (n,); −1 where it is none of these."""
+        """(n,) number of the pair of each contact between ``block`` and ``other`` (n,); −1 where it is not in the
+        list."""
         if not len(self.pairs):
             return np.full(len(block), -1)
         keys = self.pairs[:, 0] * n_blocks + self.pairs[:, 1]
@@ -162,21 +167,26 @@ class Windows:
 
 
 def widths(vertices: np.ndarray, next_vertex: np.ndarray, vertex_start: np.ndarray, area: np.ndarray) -> np.ndarray:
-    """(n_blocks,) m: what a block's contacts see of its size, √area, or where it is thin or has teeth 4 area/perimeter:
-    the side of a square, about twice the thickness of a wall."""
+    """(n_blocks,) m: effective size of blocks: √area, or 4 area/perimeter where a block is thin or has teeth (the side
+    of a square; about twice the thickness of a wall)."""
     edges = np.hypot(*(vertices[next_vertex] - vertices).T)
     return np.minimum(np.sqrt(area), 4.0 * area / np.add.reduceat(edges, vertex_start[:-1]))
 
 
 class Approach:
-    """Pairs of one system of blocks that come near each other in a step. ``next_vertex`` (n_vertices,),
-    ``vertex_start`` (n_blocks + 1,), ``size`` (n_blocks,) m as of `widths`; ``near`` finds pairs."""
+    """Pairs of blocks that may approach each other in a step.
+
+    next_vertex    (n_vertices,)
+    vertex_start   (n_blocks + 1,)
+    size           (n_blocks,) m, `widths`
+    near           finds pairs
+    """
 
     def __init__(self, next_vertex: np.ndarray, vertex_start: np.ndarray, size: np.ndarray, near: NearPairs) -> None:
         self._next, self._start, self._size, self._near = next_vertex, vertex_start, size, near
 
     def _of(self, box: np.ndarray, affine: np.ndarray, centroid: np.ndarray, fall: float, more: float) -> np.ndarray:
-        """Pairs that ``affine`` (n_blocks, 6) may bring together, and some that it does not."""
+        """Pairs that the displacement ``affine`` (n_blocks, 6) may bring together, and some others."""
         own = np.abs(affine[:, :2]).max(axis=1)
         half = 0.5 * (box[:, 2:] - box[:, :2])
         off = np.abs(0.5 * (box[:, 2:] + box[:, :2]) - centroid) + half
@@ -190,16 +200,21 @@ class Approach:
     def longest(
         self, vertices: np.ndarray, affine: np.ndarray, turn: np.ndarray, centroid: np.ndarray, dt: float, g: float
     ) -> tuple[float, tuple[int, int] | None]:
-        """The longest step, up to ``dt`` s, that no pair shortens, and the pair of blocks that does; ``affine``
-        (n_blocks, 6) and ``turn`` (n_blocks,) rad as the velocity makes them of ``dt``, ``g`` m/s²."""
+        """The longest step, up to ``dt`` s, that no pair shortens, and the limiting pair of blocks.
+
+        ``affine`` (n_blocks, 6) and ``turn`` (n_blocks,) rad are the displacement and rotation that the velocity causes
+        in ``dt``; ``g`` in m/s².
+        """
         box = boxes(vertices, self._start[:-1])
         pairs = self._of(box, affine, centroid, 0.5 * g * dt * dt, 0.0)
         time, which = _longest(pairs, affine, turn, centroid, box, vertices, self._next, self._start, self._size, dt, g)
         return time, None if which < 0 else (int(pairs[which, 0]), int(pairs[which, 1]))
 
     def windows(self, vertices: np.ndarray, affine: np.ndarray, centroid: np.ndarray, fall: float, more: float):
-        """`Windows` of a step in which the velocity moves blocks by ``affine``, ``fall`` m is g dt²; ``more`` m is
-        what contacts that press at a distance add."""
+        """`Windows` of a step in which the velocity causes the displacement ``affine``.
+
+        ``fall`` (m) is g dt²; ``more`` (m) is added for contacts that press at a distance.
+        """
         box = boxes(vertices, self._start[:-1])
         pairs = self._of(box, affine, centroid, fall, more)
         reach = _windows(pairs, affine, centroid, box, self._size, fall + more)
@@ -209,8 +224,8 @@ class Approach:
     def shares(
         self, pairs: np.ndarray, vertices: np.ndarray, affine: np.ndarray, turn: np.ndarray, centroid: np.ndarray
     ) -> np.ndarray:
-        """(k, 2): by how much ``pairs`` (k, 2) have moved against each other where they may meet, m, and the part of
-        what they may move and turn in a step that this is."""
+        """(k, 2): relative motion of ``pairs`` (k, 2) where they may meet, m, and its ratio to the allowed motion and
+        rotation."""
         box = boxes(vertices, self._start[:-1])
         return _shares(
             np.ascontiguousarray(pairs), affine, turn, centroid, box, vertices, self._next, self._start, self._size

@@ -1,9 +1,9 @@
-"""Limits of a time step: how long it may be, where it looks for contacts, and whether a corner went through a block.
+"""Limits of a time step: its length, the search distance of contacts, and whether a corner crossed an outline.
 
-Three limits shorten a step. No vertex moves by more than ``max_displacement_ratio`` of half the domain's diagonal, a
-bound on what the run is asked to resolve; no two blocks that touch, or may come to, move or turn against each other by
-more than the lines of their contacts are good for (`approach`); and nothing goes into or through a block
-(`crossings`). `Work.shortened` counts which blocks have shortened steps, and why.
+Three limits shorten a step: no vertex moves by more than ``max_displacement_ratio`` of half the domain's diagonal, the
+resolution that the user asks for; no two blocks in or near contact move or rotate relative to each other by more than
+the contact geometry of the step is valid for (`relative_motion`); and no vertex enters or passes through a block
+(`continuous_collision`). `Work.shortened` counts the blocks that shortened steps, by reason.
 """
 
 from __future__ import annotations
@@ -30,26 +30,26 @@ if TYPE_CHECKING:
 
 log = logging.getLogger(__name__)
 
-#: A step that speed limits uses this part of what it may move: round-off, arcs and what blocks hit take the rest, so
-#: that it need not be cut.
+#: Share of the allowed motion that a step limited by speed uses: round-off, arcs and impacts take the rest, so that the
+#: step need not be cut.
 _AIM = 0.99
-#: Where something went in, contacts are searched for this many times as far as the blocks have moved.
+#: Where a vertex crossed an outline, contacts are searched for within this many times the blocks' motion.
 _WIDER = 1.5
-#: Blocks that are bonded to each other, or to a third, misfit where they meet by this part of the smaller one's size at
-#: most, as their strains and rotations differ.
+#: Largest mismatch of blocks that are bonded to each other, or to a third, relative to the smaller one's size, due to
+#: their different strains and rotations.
 _MISFIT = 1e-3
 
 
 #: Contacts that penetrate by more than this fraction of the thinner block's size are checked for passing through it.
 _DEEP = 0.01
-#: Overlaps that bring more than this fraction of the energy of all blocks in a step are new ones.
+#: Overlaps that create more than this fraction of the energy of all blocks in a step count as new.
 _GIVEN = 1e-3
-#: Why steps are shortened, and what to do about it.
+#: Reasons why steps are shortened, and the remedy.
 DISPLACEMENT, APPROACH, CROSSING, UNSETTLED = "displacement", "relative motion", "crossing", "contact states"
 WAY_OUT = {
     DISPLACEMENT: "raise dda.max_displacement_ratio if motion need not be followed so finely",
-    APPROACH: "small blocks that move fast next to others shorten steps: merge them (geometry.smallest_block_m2)",
-    CROSSING: "what is thinner than a step's motion takes shorter steps: merge slivers (geometry.smallest_block_m2), or "
+    APPROACH: "small blocks that move fast past others shorten steps: merge them (geometry.smallest_block_m2)",
+    CROSSING: "blocks thinner than a step's motion require shorter steps: merge slivers (geometry.smallest_block_m2), or "
     "shorten dda.time_step_s",
     UNSETTLED: "shorten dda.time_step_s, or merge small blocks (geometry.smallest_block_m2)",
 }
@@ -57,8 +57,12 @@ WAY_OUT = {
 
 @dataclass(frozen=True, eq=False)
 class Used:
-    """The ``share`` of what it may move that a step has used; what has used it in words (``reason``), by its kind
-    (``why``) and its ``blocks``; and how far the pairs that touch have ``moved`` against each other."""
+    """Motion of a step relative to the limits.
+
+    share           largest ratio of motion to its limit
+    reason, why, blocks   in words, by kind, and the blocks concerned
+    moved           relative motion of the pairs in contact
+    """
 
     share: float
     reason: str
@@ -69,9 +73,13 @@ class Used:
 
 @dataclass(frozen=True, eq=False)
 class Crossed:
-    """What went into or through a block in a step: ``reason`` in words, the ``pairs`` (k, 2) of blocks concerned with
-    how far they moved against each other, ``motion`` (k,) m; whether anything went ``through``, and the worst two
-    ``blocks``."""
+    """Crossings of outlines in a step.
+
+    reason   in words
+    pairs, motion   (k, 2) blocks concerned and (k,) their relative motion, m
+    through  whether a vertex passed through a block
+    blocks   the worst two
+    """
 
     reason: str
     pairs: np.ndarray
@@ -81,7 +89,7 @@ class Crossed:
 
 
 class StepLimits:
-    """The limits of one system's steps; ``half_diagonal`` (m) is that of the domain."""
+    """Step limits of one system; ``half_diagonal`` (m) is that of the domain."""
 
     def __init__(
         self, finder: ContactFinder, settings: DdaSettings, half_diagonal: float, vertex_start: np.ndarray,
@@ -95,12 +103,12 @@ class StepLimits:
     def predicted(
         self, vertices: np.ndarray, carried: np.ndarray, moments: np.ndarray, dt: float, gravity: np.ndarray
     ) -> float:
-        """``dt`` shortened where the velocity ``carried`` (n_blocks, 6) alone would go beyond the limits."""
+        """``dt``, shortened where the velocity ``carried`` (n_blocks, 6) alone would exceed the limits."""
         if not carried.any():
             return dt
         g = float(np.hypot(*gravity))
         speed, may = float(fastest_vertex(carried, vertices, self._start, moments)), _AIM * self.displacement
-        # Root of speed t + g t²/2 = may in the form that keeps its digits when g is small.
+        # Root of speed t + g t²/2 = limit, in the form that is accurate for small g.
         longest = 2.0 * may / (speed + np.sqrt(speed * speed + 2.0 * g * may))
         shorter = min(dt, longest)
         pair = None
@@ -118,15 +126,18 @@ class StepLimits:
         self, vertices: np.ndarray, carried: np.ndarray, moments: np.ndarray, dt: float, gravity: np.ndarray,
         lift: float = 0.0,
     ) -> Windows:  # fmt: skip
-        """Where a step of ``dt`` looks for contacts; ``lift`` m is the most by which any presses at a distance. Without
-        velocity no motion is expected."""
+        """Search distances of contacts in a step of ``dt``; ``lift`` (m) is the largest distance at which a contact
+        presses.
+
+        Without velocity no motion is expected.
+        """
         fall = float(np.hypot(*gravity)) * dt * dt if carried.any() else 0.0
         return self._finder.approach.windows(
             vertices, affine_motion(dt * carried), np.ascontiguousarray(moments[:, 1:3]), fall, lift
         )
 
     def used(self, attempt: AttemptedStep, result: StepResult) -> Used:
-        """What a step has used of what it may move."""
+        """Motion of a step relative to the limits."""
         affine = affine_motion(attempt.increment)
         closed = result.contacts[result.contacts["state"] != OPEN]
         n = len(self._size)
@@ -145,7 +156,7 @@ class StepLimits:
             reason = (
                 f"{self._named(a)} and {self._named(b)} move {shares[worst, 0]:.3g} m and turn "
                 f"{abs(attempt.increment[a, 2] - attempt.increment[b, 2]):.3g} rad against each other, "
-                f"{shares[worst, 1]:.3g} times what their contacts are good for"
+                f"{shares[worst, 1]:.3g} times the limit for their contacts"
             )
             return Used(float(shares[worst, 1]), reason, moved, APPROACH, (a, b))
         block = int(np.argmax(np.abs(attempt.increment[:, :2]).max(axis=1)))
@@ -155,7 +166,7 @@ class StepLimits:
         return Used(float(of_all), reason, moved, DISPLACEMENT, (block,))
 
     def crossed(self, attempt: AttemptedStep, result: StepResult) -> Crossed | None:
-        """What has gone into or through a block without a contact; None for nothing."""
+        """Crossings of block outlines in a step at places without a contact; None for none."""
         if len(self._size) < 2:
             return None
         before, after = attempt.path(result.state.vertices)
@@ -190,9 +201,11 @@ class StepLimits:
         return Crossed(reason, concerned, _WIDER * motion, bool((kind == THROUGH).any()), (a, b))
 
     def _pressed(self, rows: np.ndarray, n_vertices: int) -> np.ndarray:
-        """(n_vertices,) m: how deep CONTACT ``rows`` at each vertex, or at an edge that it ends, are pressed in. Nodes
-        within the faces of joints that give have no contacts: there it is the deepest of their block."""
-        # Faces that have to come nearer than the geometry says, to meet, lie in each other by that.
+        """(n_vertices,) m: deepest penetration of CONTACT ``rows`` at each vertex, or at an edge that ends there.
+
+        Nodes inside the faces of joints with a stiffness have no contacts: they get the deepest value of their block.
+        """
+        # Faces that must come nearer than the geometry shows to meet overlap by that amount.
         deep = np.maximum(0.0, -rows["lift"])
         deep = np.where(rows["state"] != OPEN, np.maximum(deep, -(rows["gap"] + rows["lift"])), deep)
         out = np.zeros(n_vertices)
@@ -205,7 +218,7 @@ class StepLimits:
             for vertices in (rows["vertex"], rows["edge"], self._next[rows["edge"]]):
                 np.maximum.at(out, vertices, deep)
         if self._finder.at_corners:
-            # Sides that bend lie off the straight lines between their corners.
+            # Sides that bend deviate from the straight lines between their corners.
             sag, both = self._finder.sag, np.zeros(len(self._size))
             for one, two in ((rows["block"], rows["other"]), (rows["other"], rows["block"])):
                 np.maximum.at(both, one, sag[one] + sag[two])
@@ -213,9 +226,12 @@ class StepLimits:
         return out
 
     def pressed_apart(self, attempt: AttemptedStep, result: StepResult) -> Crossed | None:
-        """What pushes blocks apart out of which they have not come in: contacts that close in a step with a vertex that
-        lay behind their edge as it began, if that brings more than `_GIVEN` of the energy there is; not what was drawn
-        so. A shorter step looks for contacts less far away, and meets them where they are met first."""
+        """Blocks pushed apart that had not penetrated each other; None for none.
+
+        These are contacts that close in a step with a vertex that was behind their edge at its start, if that creates
+        more than `_GIVEN` of the present energy, and was not drawn so. A shorter step searches contacts within a
+        shorter distance, and finds them where they first touch.
+        """
         energy = result.energy
         if energy.overlap <= _GIVEN * max(energy.stored, energy.before) or not len(attempt.state.contacts):
             return None
@@ -229,8 +245,8 @@ class StepLimits:
         return Crossed(reason, np.zeros((0, 2), np.int64), np.zeros(0), False, (a, b))
 
     def warn_of_penetration(self, result: StepResult) -> None:
-        """Log a warning, once for two blocks, where a corner is pressed in beyond the middle of what it presses on: there
-        springs no longer know from which side it came."""
+        """Log a warning, once for two blocks, where a corner penetrates beyond the middle of the block that it presses
+        on: springs then no longer know from which side it came."""
         rows = result.contacts
         least = np.minimum(self._size[rows["block"]], self._size[rows["other"]])
         rows = rows[(rows["state"] != OPEN) & (-(rows["gap"] + rows["lift"]) > _DEEP * least)]
@@ -245,13 +261,13 @@ class StepLimits:
             self._warned_of.add(pair)
             x, y = vertices[vertex[k]]
             log.warning(
-                "t = %g s: a corner of %s is pressed %.3g m into %s near x = %.6g, y = %.6g m, beyond the middle of what it "
-                "presses on: contacts are too soft for this speed (dda.normal_penalty_pa)",
+                "t = %g s: a corner of %s is pressed %.3g m into %s near x = %.6g, y = %.6g m, beyond the middle of that "
+                "block: contacts are too soft for this speed (dda.normal_penalty_pa)",
                 result.state.time, self._named(pair[0]), -rows["gap"][k], self._named(pair[1]), x, y,
             )  # fmt: skip
 
     def shortens(self, why: str, *blocks: int) -> None:
-        """Count a step that one block has shortened, or two; the tenth, the hundredth … is logged."""
+        """Count a step shortened by one block or two; the 1st, 10th, 100th … is logged."""
         names = tuple(self._finder.names[b] for b in blocks[:2])
         one, two = (*names, "", "")[:2]
         key = why, one, two
@@ -266,8 +282,8 @@ class StepLimits:
 
 
 def _glued(pairs: np.ndarray, bonded: np.ndarray) -> np.ndarray:
-    """(k,) whether the blocks of each of ``pairs`` (k, 2) are bonded to each other, or both to a third, by the CONTACT rows
-    ``bonded``."""
+    """(k,) bool: the blocks of each of ``pairs`` (k, 2) are bonded to each other, or both to a third, by the CONTACT
+    rows ``bonded``."""
     joined: dict[int, set[int]] = {}
     for a, b in zip(bonded["block"].tolist(), bonded["other"].tolist(), strict=True):
         joined.setdefault(a, {a}).add(b)

@@ -21,7 +21,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...model import Cracks, GrowthSettings
-from ..mesh.shared_mouths import beside, chain_between, own_mouth_at, part_mouths
+from ..mesh.shared_mouths import chain_between, own_mouth_at, part_mouths, point_along_edge
 from .approach_limit import longest_advance
 from .crack_network import Network, Obstacle, Point, Row, nearest_on, passage
 from .tie_tolerance import ONE_WAY, in_order, reached
@@ -233,7 +233,7 @@ def _advance_one(work: _Work, step: _Step, grown: np.ndarray) -> None:
         if mouth is not None:
             if node is not None:
                 continue
-            at = beside(mouth, obstacle, step.start, work.sliver)
+            at = point_along_edge(mouth, obstacle, step.start, work.sliver)
         if node is None and _grazes(step.start, at, obstacle):
             _, at = nearest_on(step.start, obstacle.a, obstacle.b)
             end = min(math.dist(at, obstacle.a), math.dist(at, obstacle.b))

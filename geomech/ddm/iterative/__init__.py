@@ -1,1 +1,2 @@
-"""Systems too large to factor: fast multipoles, GMRES, and a coarse space for long cracks."""
+"""Iterative solution of systems too large to factor: fast multipole method, GMRES, and a coarse space for long
+cracks."""

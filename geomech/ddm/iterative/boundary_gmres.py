@@ -1,10 +1,10 @@
-"""The boundary's equations where they are too many to factor: multipoles, GMRES, neighbourhoods factored.
+"""Boundary equations too large to factor: fast multipole products, GMRES, factored patches as preconditioner.
 
-Unknown are displacements that enter as jumps, so A_ΓΓ is of the kind that cracks have and the same neighbourhoods
-(`iterative.Patches`) make GMRES converge: 38 products at 10 000 unknowns, 53 at 20 000, on a square as on a rough
-ellipse. The lifted rigid motions are in the neighbourhoods too; one that holds a whole small hole would be singular
-without them. Where supports hold the boundary the unknowns are reactions, line forces; these are few compared with the
-boundary and stay dense.
+The unknowns are displacements, which enter as jumps, so that A_ΓΓ has the structure of crack equations and the same
+patches (`gmres.Patches`) make GMRES converge: 38 products at 10 000 unknowns, 53 at 20 000, on a square and on a rough
+ellipse. The patches include the deflated rigid motions; a patch that contains a whole small hole would otherwise be
+singular. On supported parts of the boundary the unknowns are reactions, i.e. line forces; they are few compared with
+the boundary, and their columns stay dense.
 """
 
 from __future__ import annotations
@@ -20,27 +20,31 @@ from .fast_multipole import Compressed
 from .gmres import Patches, gmres, scales
 
 #: Boundary unknowns from which "auto" and "compressed" iterate on them. Matrices and one load take 0.7 s at 4000
-#: (factored 2.5 s) and 1.5 s at 6100 (7.1 s), processor time, where elements are alike, and 2.8 s at 6000 (6.3 s) on an
-#: outline of eight corners with a hole of twelve, graded to elements of 1e-8 of the longest; another load 0.2, 0.4 and
-#: 1.6 s (0.01 s), so that factors are the better for some fifteen loads at this number, and for three on the graded one.
+#: (factored 2.5 s) and 1.5 s at 6100 (7.1 s), processor time, with uniform elements, and 2.8 s at 6000 (6.3 s) on an
+#: outline of eight corners with a hole of twelve, graded to 1e-8 of the longest element; each further load takes 0.2,
+#: 0.4 and 1.6 s (0.01 s). Factoring therefore pays off from some fifteen loads on at this size, and from three on the
+#: graded outline.
 CROSSOVER = 6000
-#: Elements join a neighbourhood that are no farther from it than so many times their length: on even outlines as many
-#: products as with all that are near (24 at 4000 unknowns, with 4 it is 30).
+#: Elements join a patch if their distance from it is at most this many times their own length: on uniform outlines as
+#: few products as with all near elements (24 at 4000 unknowns; 30 with a value of 4).
 NEAR = 12.0
-#: Entries of the reactions' dense columns up to which a supported boundary is solved iteratively (a gigabyte).
+#: Largest number of entries of the dense reaction columns with which a supported boundary is solved iteratively (1 GB).
 MOST_REACTIONS = 128_000_000
 
 
 def is_iterated(solver: str, n_unknowns: int, holds: Holds | None = None, holes_supported: bool = False) -> bool:
-    """Whether ``solver`` iterates on so many boundary unknowns, of which supports have those of ``holds``; where they
-    hold a hole (`hole_supports`) the boundary is factored."""
+    """Whether ``solver`` iterates on the boundary unknowns.
+
+    ``n_unknowns`` is their number, ``holds`` describes the supported ones; with a supported hole (`hole_supports`) the
+    boundary is factored.
+    """
     if solver == "dense" or n_unknowns < CROSSOVER or holes_supported:
         return False
     return holds is None or n_unknowns * holds.sources.n_unknowns <= MOST_REACTIONS
 
 
-class HeldMatrix:
-    """A_ΓΓ of a boundary that is supported in part: ``jumps`` on all of it as an operator, and the columns of reactions."""
+class SupportedBoundaryMatrix:
+    """A_ΓΓ of a partly supported boundary: the operator ``jumps`` on all of it, and the dense columns of reactions."""
 
     def __init__(self, jumps: Compressed, holds: Holds, nu: float, tol: float):
         self._jumps, self._holds = jumps, holds
@@ -56,8 +60,8 @@ class HeldMatrix:
         return self._holds.joined(self._jumps.transposed_times(v), v @ self._reactions)
 
 
-class HeldJumps:
-    """Traction on the boundary from displacement of what supports hold, as an operator on its values (h_unknowns,)."""
+class PrescribedJumps:
+    """Traction on the boundary from prescribed displacement, as an operator on its values (h_unknowns,)."""
 
     def __init__(self, jumps: Compressed, holds: Holds):
         self._jumps, self._places, self._n = jumps, holds.boundary.unknowns(holds.elements), holds.boundary.n_unknowns
@@ -71,14 +75,16 @@ class HeldJumps:
 
 
 class IteratedBoundary:
-    """What stands for a `Factor` of ``matrix``, A_ΓΓ of the ``elements``, with ``rigid`` (n, k) and ``weights`` (k, n)
-    lifted as `boundary` has it; ``between(elements)`` is the matrix between some of them. ``products`` counts those
-    with the matrix."""
+    """Iterative counterpart of a `Factor` of ``matrix``, A_ΓΓ of the ``elements``.
+
+    ``rigid`` (n, k) and ``weights`` (k, n) deflate rigid motions as in `boundary_system`; ``between(elements)`` is the
+    matrix between some of the elements. ``products`` counts products with the matrix.
+    """
 
     def __init__(
         self,
         elements: ElementSet,
-        matrix: Compressed | HeldMatrix,
+        matrix: Compressed | SupportedBoundaryMatrix,
         rigid: np.ndarray,
         weights: np.ndarray,
         extent: float,
@@ -88,8 +94,8 @@ class IteratedBoundary:
     ):
         self._matrix, self._rigid, self._weights, self._extent = matrix, rigid, weights, extent
         self.n, self.products = elements.n_unknowns, 0
-        # Elements at corners and at the ends of supports are shorter by far than others: by itself, round-off in their
-        # equations is more than what is left of all the rest (8.9e-9 where the shortest is 1e-8 of the longest).
+        # Elements at corners and at support ends are far shorter than others: unscaled, round-off in their equations
+        # exceeds the residual of all the rest (8.9e-9 where the shortest is 1e-8 of the longest).
         self.scale = scales(elements)
         self._last: tuple[np.ndarray, np.ndarray] | None = None
 
@@ -103,21 +109,21 @@ class IteratedBoundary:
 
     @property
     def rcond(self) -> float:
-        """The worst neighbourhood's: of the whole, none is known."""
+        """The worst patch's; that of the whole system is unknown."""
         return self._patches.rcond
 
     def times(self, u: np.ndarray, transposed: bool = False) -> np.ndarray:
-        """The lifted A_ΓΓ times ``u`` (n,)."""
+        """The deflated A_ΓΓ times ``u`` (n,)."""
         if transposed:
             return self._matrix.transposed_times(u) + (u @ self._rigid) @ self._weights / self._extent
         return self._matrix @ u + self._rigid @ (self._weights @ u) / self._extent
 
-    def roughly(self, right: np.ndarray, transposed: bool = False) -> np.ndarray:
-        """Neighbourhoods' answer to ``right`` (n,)."""
+    def precondition(self, right: np.ndarray, transposed: bool = False) -> np.ndarray:
+        """Preconditioner: the patches' solution for ``right`` (n,)."""
         return self._patches.solve_transposed(right) if transposed else self._patches.solve(right)
 
     def solve(self, right: np.ndarray, transposed: bool = False) -> np.ndarray:
-        """Solution for ``right`` (n,) or (n, k), of the ``transposed`` system if asked. Raises NotSolved."""
+        """Solution for ``right`` (n,) or (n, k); of the ``transposed`` system on request. Raises NotSolved."""
         if right.ndim == 2:
             out = np.empty_like(right)
             for k, column in enumerate(right.T):
@@ -125,13 +131,14 @@ class IteratedBoundary:
             return out
         first = None
         if self._last is not None and not transposed:
-            # As much of the last solution as its right-hand side is in this one: a load that comes again costs nothing.
+            # First guess: the last solution times the projection onto its right-hand side, so that a repeated load is
+            # free.
             before, u = self._last
             first = float(before @ right) / float(before @ before) * u
         u, n = gmres(
             lambda v: self.times(v, transposed),
             right,
-            lambda v: self.roughly(v, transposed),
+            lambda v: self.precondition(v, transposed),
             first,
             scale=self.scale,
         )

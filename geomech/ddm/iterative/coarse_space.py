@@ -1,9 +1,9 @@
-"""A coarse level for long cracks: the interaction of the patches of one crack, in a few elements.
+"""Coarse level for long cracks: the interaction of a crack's patches, with few elements.
 
-Neighbourhoods solved by themselves (`iterative.Patches`) carry news along a crack by one patch an iteration. Here runs
-of a long crack's elements are replaced by one straight element each, of moderate order, and its equations are factored.
-A residual r is split by R, the polynomial on every such element that fits it best: the smooth part R r is solved for on
-the coarse elements, which is right as far as their density is; the patches get what is left of r.
+Patches that are solved separately (`gmres.Patches`) pass information along a crack by one patch per iteration. Here
+runs of a long crack's elements are replaced by one straight element each, of moderate order, and its equations are
+factored. A residual r is split by R, the least-squares polynomial on each coarse element: R r is solved for on the
+coarse elements, and the patches solve for the rest of r.
 """
 
 from __future__ import annotations
@@ -14,20 +14,19 @@ from ..kernels import shape_functions
 from ..system.dense_lu import Factor
 from ..system.influence_matrix import ElementSet, influence
 
-#: Elements of a crack from which it has a coarse level: as many as some patches.
+#: Number of elements from which a crack has a coarse level: that of some patches.
 LONG = 180
-#: Elements that one coarse element stands for, at most, and its order.
+#: Largest number of elements that one coarse element represents, and its order.
 RUN, ORDER = 25, 5
-#: A run ends where the crack has turned by more than this since it began, rad. Straight elements for what is not
-#: straight (22° to either side) misled the patches: 500 products instead of 120.
+#: A run ends where the crack has turned by more than this since it began, rad. Straight elements on curved runs (22° to
+#: either side) misled the patches: 500 products instead of 120.
 STRAIGHT = np.radians(8.0)
-#: Cracks that turn too often for runs of so many elements have no coarse level.
+#: Cracks that turn so often that runs would be shorter than this have no coarse level.
 SHORTEST = 8
 
 
 class CoarseLevel:
-    """The coarse elements of the long cracks among ``elements``, if there are any; ``crack`` (n,) is the crack of
-    each."""
+    """Coarse elements of the long cracks among ``elements``, if any; ``crack`` (n,) is the crack of each element."""
 
     def __init__(self, elements: ElementSet, crack: np.ndarray, nu: float, tol: float):
         runs = [run for chain in _chains(elements, crack) for run in _long_runs(elements, chain)]
@@ -48,17 +47,20 @@ class CoarseLevel:
         self._prescribed: np.ndarray | None = None
 
     def change(self, prescribed: np.ndarray) -> None:
-        """From now on the unknowns ``prescribed`` (n,) bool are zero; a coarse component is, where most of its nodes are."""
+        """From now on the unknowns ``prescribed`` (n,) bool are zero; a coarse component is zero if most of its nodes
+        are."""
         if not self.n or (self._prescribed is not None and np.array_equal(self._prescribed, prescribed)):
             return
         self._prescribed = prescribed.copy()
         most = np.array([prescribed[part.unknowns].mean(axis=1) > 0.5 for part in self._parts])
         self._free = ~np.repeat(most.ravel(), ORDER + 1)
-        self._factor = Factor(self._matrix[np.ix_(self._free, self._free)], "coarse elements leave a part without hold")
+        self._factor = Factor(
+            self._matrix[np.ix_(self._free, self._free)], "coarse elements leave a part unconstrained"
+        )
 
     def split(self, right: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Roughly S⁻¹ of the smooth part of ``right`` (n,), and what is left of ``right``; zero where unknowns are
-        held."""
+        """Approximate S⁻¹ of the smooth part of ``right`` (n,), and the rest of ``right``; zero where unknowns are
+        prescribed."""
         if not self.n:
             return np.zeros_like(right), right
         smooth = np.concatenate([(right[part.unknowns] @ part.fit.T).ravel() for part in self._parts])
@@ -74,7 +76,7 @@ class CoarseLevel:
         return out, rest
 
     def split_transposed(self, smooth: np.ndarray, rest: np.ndarray) -> np.ndarray:
-        """`split` as a matrix of two parts, transposed: (n,) from what multiplies either of its results."""
+        """Transpose of `split`: (n,) from the multipliers of its two results."""
         if not self.n:
             return rest
         smooth, out = np.where(self._prescribed, 0.0, smooth), np.where(self._prescribed, 0.0, rest)
@@ -89,8 +91,11 @@ class CoarseLevel:
 
 
 class _Part:
-    """One coarse element: ``unknowns`` (2, m) of the fine elements it stands for, by component; ``fit`` (p+1, m) from
-    values at their nodes to its own nodes, ``at_nodes`` (m, p+1) back, ``density`` (m, p+1) its density at theirs."""
+    """One coarse element.
+
+    ``unknowns`` (2, m) are those of the fine elements it represents, by component; ``fit`` (p+1, m) maps values at
+    their nodes to its own nodes, ``at_nodes`` (m, p+1) back; ``density`` (m, p+1) is its density at their nodes.
+    """
 
     def __init__(self, elements: ElementSet, run: np.ndarray, kind: int):
         per, length = elements.per, elements.length[run]
@@ -115,7 +120,7 @@ def _stops(kind: int) -> bool:
 
 
 def _chains(elements: ElementSet, crack: np.ndarray):
-    """Elements (m,) of long cracks, in stretches in which each begins where the last one ends."""
+    """Elements (m,) of long cracks, in chains in which each begins where the last one ends."""
     count = np.bincount(crack) if len(crack) else np.zeros(0, int)
     for k in np.flatnonzero(count >= LONG):
         own = np.flatnonzero(crack == k)
@@ -124,7 +129,7 @@ def _chains(elements: ElementSet, crack: np.ndarray):
 
 
 def _long_runs(elements: ElementSet, chain: np.ndarray) -> list[np.ndarray]:
-    """``chain`` in pieces of `RUN` elements or less that hardly turn; none where they would be short."""
+    """``chain`` in pieces of at most `RUN` elements that hardly turn; none where they would be short."""
     runs = list(_runs(elements, chain))
     return runs if len(chain) >= SHORTEST * len(runs) else []
 

@@ -1,4 +1,4 @@
-"""The crack unknowns' equations where they are too many to factor: compressed influence, GMRES over neighbourhoods."""
+"""Crack equations too large to factor: fast multipole products and GMRES with patches as preconditioner."""
 
 from __future__ import annotations
 
@@ -17,27 +17,31 @@ from .gmres import Patches, gmres, scales
 if TYPE_CHECKING:
     from .image_multipole import BelowSurface
 
-#: Crack unknowns from which "auto" compresses. One load is quicker so, matrices included, from 1200, one with closing
-#: faces from 2000; factors answer further loads on the same cracks sooner.
+#: Crack unknowns from which "auto" iterates. From 1200 on one load is faster so, matrices included; with closing faces
+#: from 2000 on. With factors further loads on the same cracks are faster.
 CROSSOVER = 2500
-#: The same where cracks have grown from some that were factored: factors are bordered with what is new.
+#: The same where cracks have grown from some that were factored: factors are bordered with the new elements.
 GROWN_CROSSOVER = 4500
-#: Crack unknowns up to which "auto" factors after all what the iteration does not solve (a gigabyte, half a minute).
+#: Crack unknowns up to which "auto" falls back to factors if the iteration fails (1 GB, half a minute).
 FACTORABLE = 12000
 
 
 def is_compressed(solver: str, n_unknowns: int, factored: bool = False) -> bool:
-    """Whether ``solver`` ("auto", "dense", "compressed") iterates on so many crack unknowns; ``factored``: the cracks have
-    grown from some of which there are factors. Raises ValueError."""
+    """Whether ``solver`` ("auto", "dense", "compressed") iterates on ``n_unknowns`` crack unknowns.
+
+    ``factored``: the cracks have grown from some with factors. Raises ValueError.
+    """
     if solver not in ("auto", "dense", "compressed"):
         raise ValueError(f'solver: expected "auto", "dense" or "compressed", got {solver!r}')
     many = GROWN_CROSSOVER if factored else CROSSOVER
     return n_unknowns > 0 and (solver == "compressed" or (solver == "auto" and n_unknowns >= many))
 
 
-class Following:
-    """What the boundary does when crack faces move, A_ΓΓ⁻¹ A_ΓC, as an operator: ``solve(right, transposed)`` applies
-    A_ΓΓ⁻¹, ``influence`` is A_ΓC."""
+class BoundaryResponse:
+    """Response of the boundary to moving crack faces, A_ΓΓ⁻¹ A_ΓC, as an operator.
+
+    ``solve(right, transposed)`` applies A_ΓΓ⁻¹, ``influence`` is A_ΓC.
+    """
 
     def __init__(self, solve: Callable[..., np.ndarray], influence: np.ndarray):
         self._solve, self._influence = solve, influence
@@ -52,7 +56,7 @@ class Following:
 class Reduced:
     """S = A_CC − A_CΓ A_ΓΓ⁻¹ A_ΓC as an operator."""
 
-    def __init__(self, cracks: Compressed | BelowSurface, on_cracks: np.ndarray, following: Following):
+    def __init__(self, cracks: Compressed | BelowSurface, on_cracks: np.ndarray, following: BoundaryResponse):
         self.cracks, self._on_cracks, self._following = cracks, on_cracks, following
 
     def __matmul__(self, w: np.ndarray) -> np.ndarray:
@@ -66,8 +70,10 @@ class Reduced:
 
 
 class Coupled:
-    """The equations of boundary and cracks together, boundary first, where both are iterated on: S by itself would take
-    an iteration on the boundary for each of its products."""
+    """Equations of boundary and cracks together, boundary first, where both are solved iteratively.
+
+    S by itself would need an iterative solution on the boundary for each of its products.
+    """
 
     def __init__(self, reduced: Reduced, boundary: IteratedBoundary, on_boundary: np.ndarray, on_cracks: np.ndarray):
         self._reduced, self._boundary = reduced, boundary
@@ -85,22 +91,24 @@ class Coupled:
         cracks = self._reduced.cracks @ w
         return np.concatenate([own + self._on_boundary @ w, cracks + self._on_cracks @ u])
 
-    def roughly(self, v: np.ndarray, of_cracks: Callable[[np.ndarray], np.ndarray], transposed: bool) -> np.ndarray:
-        """Neighbourhoods' answer: the boundary's, and the cracks' to what that leaves them (transposed: the other
-        way)."""
+    def precondition(
+        self, v: np.ndarray, of_cracks: Callable[[np.ndarray], np.ndarray], transposed: bool
+    ) -> np.ndarray:
+        """Preconditioner: the boundary's patches, then the cracks' patches for the remaining right-hand side
+        (transposed: in reverse order)."""
         u, w = v[: self.first], v[self.first :]
         if transposed:
             w = of_cracks(w)
-            return np.concatenate([self._boundary.roughly(u - w @ self._on_cracks, True), w])
-        u = self._boundary.roughly(u)
+            return np.concatenate([self._boundary.precondition(u - w @ self._on_cracks, True), w])
+        u = self._boundary.precondition(u)
         return np.concatenate([u, of_cracks(w - self._on_cracks @ u)])
 
 
 class IterativeCrackSystem:
-    """`crack_system.CrackSystem` for many unknowns: ``matrix`` is S as an operator; see there. ``coupled``: the
-    equations together with those of a boundary that is iterated on too.
+    """Iterative counterpart of `schur_complement.CrackSystem`; ``matrix`` is S as an operator.
 
-    ``products`` counts those with S. The last solution is the first guess of the next one.
+    ``coupled``: the equations together with those of a boundary that is solved iteratively too. ``products`` counts
+    products with S. The last solution is the first guess for the next.
     """
 
     def __init__(
@@ -122,13 +130,13 @@ class IterativeCrackSystem:
         self._last: tuple[np.ndarray, np.ndarray] | None = None
 
     def opened(self, right: np.ndarray) -> np.ndarray:
-        """Zeros: there is no inverse that would come free with every load."""
+        """Zeros: no inverse is available at no cost."""
         return np.zeros_like(right)
 
     def constrained(
         self, right: np.ndarray, closed: np.ndarray, fixed: np.ndarray, opened: np.ndarray | None = None
     ) -> tuple[np.ndarray, np.ndarray]:
-        """As `crack_system.CrackSystem.constrained`. Raises NotSolved."""
+        """As in `schur_complement.CrackSystem.constrained`. Raises NotSolved."""
         if right.ndim == 2:
             columns = [self.constrained(r, closed, f) for r, f in zip(right.T, fixed.T)]
             return tuple(np.column_stack(part) for part in zip(*columns))
@@ -141,7 +149,7 @@ class IterativeCrackSystem:
         return w, reaction
 
     def solve(self, right: np.ndarray, rows: Rows) -> np.ndarray:
-        """(n,) jumps that are zero where prescribed and obey the other ``rows``. Raises NotSolved."""
+        """(n,) jumps that are zero where prescribed and satisfy the other ``rows``. Raises NotSolved."""
         moving = np.flatnonzero(rows.mixed)
 
         def times(v: np.ndarray) -> np.ndarray:
@@ -156,19 +164,20 @@ class IterativeCrackSystem:
             smooth, rest = self._coarse.split(np.where(rows.prescribed, 0.0, v))
             return smooth + self._patches.solve(rest)
 
-        def roughly(v: np.ndarray) -> np.ndarray:
-            return of_cracks(v) if self._coupled is None else self._coupled.roughly(v, of_cracks, False)
+        def precondition(v: np.ndarray) -> np.ndarray:
+            return of_cracks(v) if self._coupled is None else self._coupled.precondition(v, of_cracks, False)
 
         self._patches.change(rows)
         self._coarse.change(rows.prescribed)
         right = np.concatenate([np.zeros(self._first), np.where(rows.prescribed, 0.0, right)])
-        found, n = gmres(times, right, roughly, self._guess(right, rows.prescribed), scale=self._scale)
+        found, n = gmres(times, right, precondition, self._guess(right, rows.prescribed), scale=self._scale)
         self.products += n
         self._last = right, found
         return found[self._first :]
 
     def solve_transposed(self, right: np.ndarray, rows: Rows) -> np.ndarray:
-        """(n,) what multiplies right-hand sides of `solve` in ``right`` ᵀ w; zero where prescribed. Raises NotSolved."""
+        """(n,) multipliers of the right-hand sides of `solve` in ``right`` ᵀ w; zero where prescribed. Raises
+        NotSolved."""
         moving = np.flatnonzero(rows.mixed)
 
         def times(v: np.ndarray) -> np.ndarray:
@@ -187,18 +196,18 @@ class IterativeCrackSystem:
             v = np.where(rows.prescribed, 0.0, v)
             return self._coarse.split_transposed(v, self._patches.solve_transposed(v))
 
-        def roughly(v: np.ndarray) -> np.ndarray:
-            return of_cracks(v) if self._coupled is None else self._coupled.roughly(v, of_cracks, True)
+        def precondition(v: np.ndarray) -> np.ndarray:
+            return of_cracks(v) if self._coupled is None else self._coupled.precondition(v, of_cracks, True)
 
         self._patches.change(rows)
         self._coarse.change(rows.prescribed)
         right = np.concatenate([np.zeros(self._first), np.where(rows.prescribed, 0.0, right)])
-        found, n = gmres(times, right, roughly, scale=self._scale)
+        found, n = gmres(times, right, precondition, scale=self._scale)
         self.products += n
         return found[self._first :]
 
     def _guess(self, right: np.ndarray, prescribed: np.ndarray) -> np.ndarray | None:
-        """The last solution, as much of it as its right-hand side is in this one."""
+        """The last solution, scaled by the projection of its right-hand side onto this one."""
         if self._last is None:
             return None
         before, w = self._last
@@ -210,15 +219,15 @@ class IterativeCrackSystem:
         return guess
 
     def changed(self, rows: Rows) -> tuple[np.ndarray, Iterated]:
-        """As `crack_system.CrackSystem.changed`."""
+        """As in `schur_complement.CrackSystem.changed`."""
         return np.flatnonzero(~rows.prescribed), Iterated(self, rows)
 
     def rcond(self, closed: np.ndarray) -> float:
-        """Reciprocal condition of the patches solved with, the worst one: of the whole, none is known."""
+        """Reciprocal condition number of the worst patch; that of the whole system is unknown."""
         return self.rcond_of(self._holding(closed))
 
     def rcond_of(self, rows: Rows) -> float:
-        """As `rcond`, of changed ``rows``."""
+        """As `rcond`, with changed ``rows``."""
         self._patches.change(rows)
         return self._patches.rcond
 
@@ -227,7 +236,7 @@ class IterativeCrackSystem:
 
 
 class Iterated:
-    """What stands for a `Factor` of the equations of ``system`` with changed ``rows``."""
+    """Iterative counterpart of a `Factor` of the equations of ``system`` with changed ``rows``."""
 
     def __init__(self, system: IterativeCrackSystem, rows: Rows):
         self._system, self._rows = system, rows
@@ -238,7 +247,7 @@ class Iterated:
         return self._system.rcond_of(self._rows)
 
     def solve(self, right: np.ndarray, transposed: bool = False) -> np.ndarray:
-        """Free unknowns for ``right`` (n_free,) or (n_free, k), of the ``transposed`` equations if asked."""
+        """Free unknowns for ``right`` (n_free,) or (n_free, k); of the ``transposed`` equations on request."""
         if right.ndim == 2:
             return np.column_stack([self.solve(column, transposed) for column in right.T])
         whole = np.zeros(self._system.n)
@@ -256,11 +265,13 @@ def compressed(
     nu: float,
     tol: float,
     boundary: IteratedBoundary | None = None,
-) -> tuple[Following, IterativeCrackSystem]:
-    """A_ΓΓ⁻¹ A_ΓC and the crack system of a body; ``crack`` (n,) is the crack of every element, ``solve(right,
-    transposed)`` applies A_ΓΓ⁻¹, ``on_boundary`` is A_ΓC and ``on_cracks`` is A_CΓ; ``boundary``: what stands for its
-    factors where it is iterated on too."""
-    following = Following(solve, on_boundary)
+) -> tuple[BoundaryResponse, IterativeCrackSystem]:
+    """A_ΓΓ⁻¹ A_ΓC and the crack system of a body, both as operators.
+
+    ``crack`` (n,) is the crack of every element, ``solve(right, transposed)`` applies A_ΓΓ⁻¹, ``on_boundary`` is A_ΓC
+    and ``on_cracks`` is A_CΓ; ``boundary`` replaces the boundary's factors where it is solved iteratively too.
+    """
+    following = BoundaryResponse(solve, on_boundary)
     if cracks.half_plane is None:
         own = Compressed(cracks, cracks, nu, tol)
     else:

@@ -1,20 +1,20 @@
-"""The influence of many elements on many others without its matrix: dense near by, complex multipoles far off.
+"""Fast multipole method for the influence of many elements on many others, without storing the matrix.
 
 The stress of displacement jumps derives from two analytic functions (Kolosov–Muskhelishvili),
 
     (σxx + σyy)/2 = −Re Φ(z),      (σyy − σxx)/2 + i σxy = −½ conj(z − z0) Φ'(z) + Ψ(z),
 
-Ψ belonging to the centre z0. An element of half length c, tangent e and middle z0 with jumps p along and q across it,
-times 2μ and with A_k the Cauchy moments of `full_plane`, has
+with Ψ relative to the centre z0. An element of half length c, tangent e and midpoint z0, with jumps p along and q
+normal to it, times 2μ, and with A_k the Cauchy moments of `full_plane`, has
 
     Φ = f/c Σ (q_k − i p_k) A_k'(ζ),   Ψ = e⁻² [½ (z − z0) Φ' − i f/c Σ p_k A_k'(ζ)],   f = 1/(4π(1−ν)), ζ = (z − z0)/(c
                                        e),
 
-and both have Laurent series in c/(z − z0) whose coefficients are the moments of the shape functions, exactly. So the
-fast multipole method (Greengard & Rokhlin 1987; for plane elasticity Greengard, Kropinski & Mayo 1996) needs no
-compression of blocks and no sampling: series of clusters are moved up a tree, between well separated clusters and down
-again, all in batches. Translations between clusters are D B D' with one matrix B of binomials, so a product is mostly
-matrix products.
+Both have Laurent series in c/(z − z0) whose coefficients are exactly the moments of the shape functions. The fast
+multipole method (Greengard & Rokhlin 1987; for plane elasticity Greengard, Kropinski & Mayo 1996) therefore needs no
+block compression and no sampling: series of clusters are shifted up a tree, translated between well separated clusters
+and shifted down again, all in batches. Translations between clusters are D B D' with one matrix B of binomials, so that
+a product consists mostly of matrix products.
 """
 
 from __future__ import annotations
@@ -28,17 +28,17 @@ import numpy as np
 from ..kernels import shape_functions
 from ..system.influence_matrix import ElementSet, influence
 
-#: Clusters are far from one another when every further term of the series is at most this part of the one before.
+#: Clusters are well separated if each further term of the series is at most this part of the one before.
 RATE = 0.45
-#: Elements of the smallest clusters.
+#: Number of elements in the smallest clusters.
 LEAF = 12
-#: Pairs of clusters translated at once, so that the batch stays in the cache.
+#: Pairs of clusters translated at a time, so that the batch stays in the cache.
 _BATCH = 1024
 
 
 @dataclass(frozen=True, eq=False)
 class Tree:
-    """Clusters of elements, halved in turn across their longer side.
+    """Binary tree of element clusters, each split across its longer side.
 
     order           (n,)   elements, those of a cluster next to one another
     first, last     (m,)   a cluster's elements are order[first:last]
@@ -94,7 +94,7 @@ class Tree:
 
 
 def pairs_of(targets: Tree, sources: Tree) -> tuple[np.ndarray, np.ndarray]:
-    """(k, 2) far pairs of clusters (target, source) and (m, 2) near pairs of leaves; together they are everything."""
+    """(k, 2) far pairs of clusters (target, source) and (m, 2) near pairs of leaves; together they cover all pairs."""
     far, near = [], []
     t, s = np.zeros(1, int), np.zeros(1, int)
     while len(t):
@@ -118,7 +118,7 @@ def pairs_of(targets: Tree, sources: Tree) -> tuple[np.ndarray, np.ndarray]:
 
 @lru_cache
 def _binomials(n: int) -> np.ndarray:
-    """(n, n) of k over m."""
+    """(n, n) binomial coefficients, k over m."""
     return np.array([[float(math.comb(k, m)) for m in range(n)] for k in range(n)])
 
 
@@ -138,8 +138,10 @@ def _spread(base: np.ndarray, n: int, coefficients: np.ndarray) -> np.ndarray:
 
 
 def _outer_shift(delta: np.ndarray, ratio: np.ndarray, n: int) -> np.ndarray:
-    """(m, n, n) Laurent series about a centre into that about another: ``delta`` how far the old stands from the new
-    and ``ratio`` the old radius, both in new radii."""
+    """(m, n, n) shift of a Laurent series to another centre.
+
+    ``delta`` is the old centre relative to the new one and ``ratio`` the old radius, both in units of the new radius.
+    """
     choose = _binomials(n + 1)
     k, j = np.arange(n)[:, None], np.arange(n)[None, :]
     return _spread(delta, n, choose[k + 1, np.maximum(k - j, 0)]) * (ratio[:, None] ** (np.arange(n) + 2))[:, None, :]
@@ -149,7 +151,7 @@ class Compressed:
     """`influence` of ``sources`` on ``targets`` as an operator; see there for ``nu``, ``tol`` and the order of
     unknowns.
 
-    ``error``: of a traction, relative to the largest of the far field. ``stored`` bytes are kept, near blocks for most.
+    ``error``: of a traction, relative to the largest of the far field. ``stored``: bytes, mostly of near blocks.
     """
 
     def __init__(self, targets: ElementSet, sources: ElementSet, nu: float, tol: float, error: float = 1e-10):
@@ -158,7 +160,7 @@ class Compressed:
         self.target_tree = Tree.over(targets)
         self.source_tree = self.target_tree if sources is targets else Tree.over(sources)
         self.far, self.near = pairs_of(self.target_tree, self.source_tree)
-        # The derivatives cost a few powers more than the potential.
+        # The derivatives need a few more powers than the potential.
         self.terms = math.ceil(math.log(error) / math.log(RATE)) + 6
         self._near_blocks(nu, tol)
         self._from_elements = self._outgoing(nu)
@@ -176,7 +178,7 @@ class Compressed:
     # Construction ----------------------------------------------------------------------------------------------------
 
     def _near_blocks(self, nu: float, tol: float) -> None:
-        """``blocks``: rows, columns (unknowns) and the dense matrix of every target leaf against all near it."""
+        """``blocks``: rows, columns (unknowns) and the dense matrix of every target leaf against all near leaves."""
         self.blocks = []
         starts = np.flatnonzero(np.r_[True, np.diff(self.near[:, 0]) > 0]) if len(self.near) else []
         for group in np.split(self.near, starts[1:]) if len(self.near) else []:
@@ -233,7 +235,7 @@ class Compressed:
         return np.ascontiguousarray(np.concatenate([along, across], axis=1)[tree.order])
 
     def _upward(self) -> list[tuple[np.ndarray, ...]]:
-        """Level by level from the leaves: parents, children, and what makes the children's series the parents'."""
+        """Level by level from the leaves: parents, children, and the matrices that shift the children's series."""
         tree, n, out = self.source_tree, self.terms, []
         for level in tree.levels[-2::-1]:
             parent = level[tree.child[level, 0] >= 0]
@@ -305,7 +307,8 @@ class Compressed:
         return out.ravel()
 
     def transposed_times(self, y: np.ndarray) -> np.ndarray:
-        """(m,) the transposed operator on ``y`` (n,): every step of a product turned round, complex ones conjugated."""
+        """(m,) transposed operator on ``y`` (n,): the steps of a product in reverse order, complex factors
+        conjugated."""
         out = self._from_far(y) if len(self.far) else np.zeros(self.shape[1])
         for rows, columns, matrix in self.blocks:
             out[columns] += y[rows] @ matrix
@@ -337,7 +340,7 @@ class Compressed:
         return out.ravel()
 
     def _translate_back(self, inner: np.ndarray, outer: np.ndarray) -> None:
-        """`_translate` transposed."""
+        """`_translate`, transposed."""
         before, after, arm, choose = (np.conj(part) for part in self._between)
         n = self.terms
         degree = np.arange(2, n + 1)
@@ -355,7 +358,7 @@ class Compressed:
             outer[s[starts]] += np.add.reduceat(series, starts, axis=0)
 
     def _translate(self, outer: np.ndarray, inner: np.ndarray) -> None:
-        """Add to the ``inner`` series what the ``outer`` ones of far clusters are about their centres."""
+        """Add the ``outer`` series of far clusters to the ``inner`` series about their centres."""
         before, after, arm, choose = self._between
         n = self.terms
         degree = np.arange(2, n + 1)
@@ -372,13 +375,13 @@ class Compressed:
 
 
 def _leaf_of(tree: Tree) -> np.ndarray:
-    """(n,) the leaf of every element."""
+    """(n,) leaf of every element."""
     leaf = np.empty(len(tree.order), int)
     leaf[tree.order] = np.repeat(tree.leaves, tree.last[tree.leaves] - tree.first[tree.leaves])
     return leaf
 
 
 def _recentre_outer(phi: np.ndarray, psi: np.ndarray, step: np.ndarray, radius: np.ndarray) -> None:
-    """Make ``psi`` (m, n, k) belong to a centre that stands ``step`` (m,) from the series' own; Laurent, in place."""
+    """Move the centre of the Laurent series ``psi`` (m, n, k) by ``step`` (m,), in place."""
     degree = np.arange(2, phi.shape[1] + 1)[:, None]
     psi[:, 1:] += (0.5 * np.conj(step) / radius)[:, None, None] * degree * phi[:, :-1]

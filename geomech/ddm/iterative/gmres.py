@@ -1,10 +1,9 @@
-"""GMRES with neighbourhoods factored, for equations of cracks or of a boundary that are too many to factor.
+"""GMRES with factored patches, for crack or boundary equations that are too large to factor.
 
-Most of a crack network's stiffness lies within cracks and between neighbours. The elements are cut into patches; each,
-with the rest of the cracks that it cuts, is solved for exactly and its own unknowns are kept of that (restricted
-additive Schwarz, Cai & Sarkis 1999). What that leaves to the iteration is smooth: 15 to 40 products for networks of any
-size. Cracks that many patches cut have a few coarse elements besides (`coarse_space`), which carry their ends' news to one
-another.
+Most of a crack network's stiffness is within cracks and between neighbours. The elements are divided into patches; each
+is solved exactly together with the rest of the cracks that it cuts, and only its own unknowns are kept (restricted
+additive Schwarz, Cai & Sarkis 1999). The remaining error is smooth: 15 to 40 products for networks of any size. Cracks
+cut by many patches also get a few coarse elements (`coarse_space`), which couple their ends.
 """
 
 from __future__ import annotations
@@ -20,16 +19,16 @@ from .fast_multipole import Tree
 
 #: Elements of a patch. Larger ones cost more to factor than they save in products.
 PATCH = 60
-#: Of the cracks that a patch cuts, elements nearer to its middle than this many of its radii join it.
+#: Of the cracks that a patch cuts, elements nearer to its centre than this many of its radii join it.
 REACH = 1.5
-#: Residual of a solution, relative to the right-hand side. Contact distinguishes closed from open at 1e-10.
+#: Relative residual of a solution. Contact distinguishes closed from open at 1e-10.
 TOLERANCE = 1e-11
-#: What is good enough when round-off stops the residual.
+#: Accepted residual where round-off stops the convergence.
 ENOUGH = 1e-9
 
 
 class NotSolved(np.linalg.LinAlgError):
-    """An iterative solution did not reach its tolerance, as where cracks cut a part of the body off."""
+    """An iterative solution did not reach its tolerance, for instance where cracks separate a part from the body."""
 
 
 def gmres(
@@ -42,10 +41,10 @@ def gmres(
     limit: int = 1000,
     scale: np.ndarray | None = None,
 ) -> tuple[np.ndarray, int]:
-    """x with |right − A x| ≤ ``tolerance`` |right| and the number of products ``times``, from the guess ``first``;
-    equations count by their ``scale`` (n,), if it is given.
+    """x with |right − A x| ≤ ``tolerance`` |right|, and the number of products ``times``, from the guess ``first``.
 
-    Preconditioned from the right (Saad & Schultz 1986), so that it is the true residual that falls. Raises NotSolved.
+    Equations are weighted by ``scale`` (n,), if given. Preconditioned from the right (Saad & Schultz 1986), so that the
+    true residual decreases. Raises NotSolved.
     """
     if scale is not None:
         return gmres(
@@ -65,7 +64,7 @@ def gmres(
         x, rest, products = first.copy(), right - times(first), 1
     left = float(np.linalg.norm(rest))
     while left > tolerance * size:
-        # The residual as it follows from the recurrence runs ahead of the true one.
+        # The residual that follows from the recurrence falls below the true one.
         change, n = _cycle(times, precondition, rest, left, 0.1 * tolerance * size, restart)
         x = x + change
         rest = right - times(x)
@@ -75,14 +74,14 @@ def gmres(
             if left <= ENOUGH * size:
                 break
             raise NotSolved(
-                f"the cracks' equations are left with a residual of {left / size:.1e} after {products} products; do "
-                "cracks cut a part of the body off?"
+                f"the iterative solution of the crack equations stopped at a residual of {left / size:.1e} after "
+                f"{products} products; do cracks separate a part from the body?"
             )
     return x, products
 
 
 def _cycle(times, precondition, rest: np.ndarray, left: float, goal: float, longest: int) -> tuple[np.ndarray, int]:
-    """The change of x within one Krylov space of ``rest``, whose norm is ``left``, and the number of products."""
+    """Change of x within one Krylov space of ``rest``, whose norm is ``left``, and the number of products."""
     basis = [rest / left]
     triangle = np.zeros((longest, longest))
     turns = np.zeros((longest, 2))
@@ -92,7 +91,7 @@ def _cycle(times, precondition, rest: np.ndarray, left: float, goal: float, long
     while k < longest and abs(target[k]) > goal:
         v = times(precondition(basis[k]))
         column = np.zeros(k + 2)
-        # Twice, or the basis loses its orthogonality with the last digits of the residual.
+        # Orthogonalised twice; once would lose orthogonality in the last digits of the residual.
         for _ in range(2):
             for i, u in enumerate(basis):
                 h = u @ v
@@ -120,16 +119,20 @@ def _cycle(times, precondition, rest: np.ndarray, left: float, goal: float, long
 
 
 def scales(elements: ElementSet) -> np.ndarray:
-    """(n_unknowns,) what equations have to be multiplied by where elements differ much in length: tractions go with one
-    over it, and those of the shortest alone would decide when a solution is good enough."""
+    """(n_unknowns,) row scales where element lengths differ much.
+
+    Tractions are proportional to 1/length: unscaled, those of the shortest elements alone would decide the convergence.
+    """
     return np.repeat(elements.length / elements.length.max(), 2 * elements.per) if elements.n else np.zeros(0)
 
 
 class Patches:
-    """An approximate inverse of the cracks' equations; ``crack`` (n,) is the crack of every element;
-    ``between(elements)`` the matrix between some of them where it is not their influence alone. No element joins a
-    patch that is farther from its own than ``lengths`` times its length: what is graded towards another corner is too
-    small to matter here, and too much of it to be factored again."""
+    """Additive Schwarz preconditioner; ``crack`` (n,) is the crack of every element.
+
+    ``between(elements)`` is the matrix between some of them where it is not their influence alone. An element joins a
+    patch only if its distance from it is at most ``lengths`` times its own length: elements graded towards another
+    corner hardly matter here and are too many to factor again.
+    """
 
     def __init__(
         self,
@@ -156,11 +159,11 @@ class Patches:
                 near = near[away <= lengths * elements.length[near]]
             whole = np.union1d(own, near)
             self._patches.append((whole, elements.unknowns(np.sort(own))))
-        #: By patch, once `change` has said which equations are meant.
+        #: For each patch, once `change` has set the equations.
         self._factors: dict[int, tuple[bytes, np.ndarray, np.ndarray, np.ndarray, Factor]] = {}
 
     def change(self, rows: Rows) -> None:
-        """From now on the equations are those of ``rows``; only patches to which that is news are factored."""
+        """Use the equations ``rows`` from now on; only patches whose equations differ are factored."""
         for k, (elements, own) in enumerate(self._patches):
             unknowns = self._elements.unknowns(elements)
             prescribed, mixed, spring = rows.prescribed[unknowns], rows.mixed[unknowns], rows.spring[unknowns]
@@ -176,7 +179,7 @@ class Patches:
                 matrix = matrix[np.ix_(~prescribed, ~prescribed)]
             free = unknowns[~prescribed]
             kept = np.flatnonzero(np.isin(free, own))
-            self._factors[k] = key, free, kept, free[kept], Factor(matrix, "cracks cut a part of the body off")
+            self._factors[k] = key, free, kept, free[kept], Factor(matrix, "cracks separate a part from the body")
 
     def _influence(self, elements: np.ndarray) -> np.ndarray:
         part = self._elements.take(elements)
@@ -188,14 +191,14 @@ class Patches:
         return min(factor.rcond for *_, factor in self._factors.values())
 
     def solve(self, right: np.ndarray) -> np.ndarray:
-        """Roughly S⁻¹ ``right`` (n,); zero where unknowns are prescribed."""
+        """Approximate S⁻¹ ``right`` (n,); zero where unknowns are prescribed."""
         out = np.zeros_like(right)
         for _, free, kept, to, factor in self._factors.values():
             out[to] = factor.solve(right[free])[kept]
         return out
 
     def solve_transposed(self, right: np.ndarray) -> np.ndarray:
-        """The transposed of `solve`."""
+        """Transpose of `solve`."""
         out = np.zeros_like(right)
         for _, free, kept, to, factor in self._factors.values():
             own = np.zeros(len(free))

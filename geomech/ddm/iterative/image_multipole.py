@@ -1,8 +1,8 @@
-"""What a free surface adds to the influence of many elements on many others, without its matrix.
+"""Fast multipole method for the contribution of a free surface to the influence of many elements on many others.
 
-Points of the rock see the mirror images of the sources (`half_plane_images`), or, what is the same, their own images see
-the sources: so the series of `fast_multipole` are brought to clusters of the targets' mirror images m = conj z, and only
-what is made of them there differs. With φ' = −Φ/2 and ψ' = Ψ + ½ conj(z₀) Φ' for Ψ about z₀,
+Points in the rock see the mirror images of the sources (`half_plane_images`) or, equivalently, their own images see the
+sources: the series of `fast_multipole` are translated to clusters of the targets' mirror images m = conj z, and only
+their evaluation differs. With φ' = −Φ/2 and ψ' = Ψ + ½ conj(z₀) Φ' for Ψ about z₀,
 
     conj φ₁' = K = ½ Φ + ½ (m − conj z₀) Φ' − Ψ,   conj φ₁'' = K',   conj φ̄₀' = −½ Φ.
 """
@@ -18,7 +18,7 @@ from .fast_multipole import Compressed, _leaf_of, _powers
 
 
 class Mirrored(Compressed):
-    """What the surface of their half-plane adds to the influence of ``sources`` on ``targets``; else as
+    """Contribution of the half-plane's surface to the influence of ``sources`` on ``targets``; otherwise as
     `Compressed`."""
 
     def __init__(self, targets: ElementSet, sources: ElementSet, nu: float, tol: float, error: float = 1e-10):
@@ -30,7 +30,7 @@ class Mirrored(Compressed):
         )
         flip = np.array([1.0, -1.0])
         above = replace(self._rock_targets, start=self._rock_targets.start * flip, end=self._rock_targets.end * flip)
-        # The second derivative and the arm to it cost more powers than tractions in the plane.
+        # The second derivative and its arm need more powers than tractions in the infinite plane.
         super().__init__(above, below, nu, tol, 0.01 * error)
 
     def _near(self, rows: np.ndarray, columns: np.ndarray, nu: float, tol: float) -> np.ndarray:
@@ -64,7 +64,7 @@ class Mirrored(Compressed):
 
 
 class BelowSurface:
-    """The influence of ``elements`` on themselves in their half-plane, as an operator (see `Compressed`)."""
+    """Influence of ``elements`` on themselves in their half-plane, as an operator (see `Compressed`)."""
 
     def __init__(self, elements: ElementSet, nu: float, tol: float):
         self.targets = elements

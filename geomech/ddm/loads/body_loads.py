@@ -1,4 +1,5 @@
-"""Loads on a body: tractions on pieces of its boundary, body forces, remote stress, pressure in the cracks."""
+"""Loads on an elastic body: boundary tractions, body forces, remote stress, pressure in cracks and holes, point
+loads."""
 
 from __future__ import annotations
 
@@ -11,7 +12,7 @@ from ...model import History
 
 
 class OutOfEquilibrium(ValueError):
-    """Loads whose resultants do not vanish: no static solution exists.
+    """Raised where the loads' resultants do not vanish, so that no static solution exists.
 
     ``force`` (2,) N/m, ``moment`` N about the centroid, ``relative`` to the sum of the loads' magnitudes.
     """
@@ -26,8 +27,10 @@ class OutOfEquilibrium(ValueError):
 
 @dataclass(frozen=True)
 class Pressure:
-    """Of a fluid: ``value`` Pa at ``about`` (x, y), growing by ``gradient`` Pa/m. Water with its level at y0 is
-    ``Pressure(0, (0, -9.81e3), (0, y0))``. Raises ValueError when something is not finite."""
+    """Fluid pressure: ``value`` Pa at ``about`` (x, y), growing by ``gradient`` Pa/m.
+
+    Water with its level at y0 is ``Pressure(0, (0, -9.81e3), (0, y0))``. Raises ValueError if a number is not finite.
+    """
 
     value: float = 0.0
     gradient: tuple[float, float] = (0.0, 0.0)
@@ -44,36 +47,35 @@ class Pressure:
 
 @dataclass(frozen=True, eq=False)
 class BodyLoad:
-    """All parts are optional and add up.
+    """Loads on a body. All parts are optional and are superposed.
 
-    segments             (m, 2, 2)  straight pieces of the boundary, anywhere on it, directed along it
-    tractions            (m, 2, 2)  traction (Pa, x and y) at the start and end of each, linear between
-    body_force           (2,)       N/m³ at ``about``; in a half-plane, where it makes stress grow with depth,
-                         everywhere
+    segments             (m, 2, 2)  straight pieces of the boundary, directed along it
+    tractions            (m, 2, 2)  traction (Pa, x and y) at the start and end of each, linear in between
+    body_force           (2,)       N/m³ at ``about``; in a half-plane, where stress then grows with depth, everywhere
     body_force_gradient  (2, 2)     N/m⁴: b(x) = body_force + gradient (x − about)
-    about                (2,)       m; the centroid when left out
-    k0                   in a half-plane, the stress along its surface that goes with the body force, per stress out of
-                         it; left out, ν/(1−ν), that of rock that could not widen
-    remote_stress        (3,)       Pa: a uniform stress that is there besides; on a finite body the tractions
-                                    that carry it act on the outline in addition to ``tractions``. Holes are free of it.
+    about                (2,)       m; by default the centroid
+    k0                   in a half-plane, ratio of the stress along the surface to the stress normal to it that the
+                         body force causes; by default ν/(1−ν), rock that is confined laterally
+    remote_stress        (3,)       Pa: a uniform stress in addition. On a finite body the tractions in equilibrium
+                                    with it act on the outline, in addition to ``tractions``; holes are free of them.
                                     In a half-plane it must be parallel to the surface
-    crack_pressure       scalar or (n_segments,)  Pa, of a fluid in the cracks, positive when it presses; or a
+    crack_pressure       scalar or (n_segments,)  Pa, of a fluid in the cracks, positive in compression; or a
                          `Pressure`, or a function of points (n, 2) to (n,)
-    hole_pressure        the same in all holes, or of each: a number, Pa, or a `Pressure`
-    displacements        for every support of the body what it imposes, m: None (zero), constant (2,), linear (2, 2)
-                         from its values at the support's ends, or a function of points (n, 2); components that the
-                         support does not hold are ignored
-    sides                {where: traction}: an edge's number or a straight piece ((x, y), (x, y)) to a traction (Pa, x
-                         and y) that is constant (2,), linear (2, 2) from its values at the ends, or a function of
-                         points (n, 2) to (n, 2)
-    points, forces       (k, 2) m and N/m: point loads, inside the rock or on its boundary. They are singular, except
-                         on holes and where the plane beyond the boundary holds rock: there a hundredth of the extent
-                         carries them
-    kelvin               True: those on the boundary, too, are Kelvin's in the infinite plane. The rock beyond the
-                         boundary then keeps its share of them, about half on a side, three quarters at a right-angled
-                         corner: no element's displacement is singular enough to bring it back
+    hole_pressure        the same in all holes, or a list with a number (Pa) or a `Pressure` for each
+    displacements        for every support of the body the prescribed displacement, m: None (zero), constant (2,),
+                         linear (2, 2) from its values at the support's ends, or a function of points (n, 2);
+                         components in directions that the support leaves free are ignored
+    sides                {where: traction}: the number of an edge or a straight piece ((x, y), (x, y)), to a traction
+                         (Pa, x and y) that is constant (2,), linear (2, 2) from its values at the ends, or a function
+                         of points (n, 2) to (n, 2)
+    points, forces       (k, 2) m and N/m: point loads inside the rock or on its boundary. They are singular, except
+                         on holes and where the plane beyond the boundary contains rock: there they are distributed
+                         over a hundredth of the extent
+    kelvin               True: point loads on the boundary also are Kelvin's solution for the infinite plane. The rock
+                         beyond the boundary then carries part of them, about half on an edge, three quarters at a
+                         right-angled corner: no element's displacement is singular enough to correct that
 
-    Raises ValueError naming the part that is not finite or of the wrong shape.
+    Raises ValueError naming the part that is not finite or has the wrong shape.
     """
 
     segments: np.ndarray | None = None
@@ -92,7 +94,7 @@ class BodyLoad:
     kelvin: bool = False
 
     def scaled(self, factor: float) -> BodyLoad:
-        """``factor`` times everything."""
+        """The load multiplied by ``factor``."""
         changed = {
             name: _times(getattr(self, name), factor)
             for name in ("tractions", "body_force", "body_force_gradient", "remote_stress", "crack_pressure", "forces")
@@ -108,10 +110,10 @@ class BodyLoad:
         return replace(self, **changed, displacements=displacements, hole_pressure=holes, sides=sides)
 
     def with_added(self, other: BodyLoad) -> BodyLoad:
-        """Both loads together. Raises ValueError when body forces are given about different points, or point loads in
-        different ways."""
+        """Sum of the two loads. Raises ValueError if body forces are given about different points, or if point loads
+        are Kelvin's in only one of them."""
         if self.kelvin != other.kelvin and self.points is not None and other.points is not None:
-            raise ValueError("point loads on the boundary cannot be Kelvin's in one load and not in the other")
+            raise ValueError("cannot add loads of which only one has kelvin = True for point loads on the boundary")
         joined = {
             name: _joined(getattr(self, name), getattr(other, name))
             for name in ("segments", "tractions", "points", "forces")
@@ -153,7 +155,7 @@ class BodyLoad:
         )
 
     def hole_pressures(self, n_holes: int) -> list[Pressure]:
-        """That of every hole, [] when there is none. Raises ValueError when there are not as many."""
+        """Pressure in each hole, [] if there is none. Raises ValueError if their number does not match."""
         given = self.hole_pressure
         if np.ndim(given) == 0 and not isinstance(given, Pressure) and given == 0:
             return []
@@ -166,8 +168,8 @@ class BodyLoad:
         return [p if isinstance(p, Pressure) else Pressure(float(p)) for p in given]
 
     def face_pressure(self, points: np.ndarray, segment: np.ndarray, n_segments: int) -> np.ndarray | float:
-        """(n, m) Pa at ``points`` (n, m, 2) on crack elements of ``segment`` (n,), or what broadcasts to it. Raises
-        ValueError."""
+        """(n, m) Pa at ``points`` (n, m, 2) on crack elements of ``segment`` (n,), or an array that broadcasts to it.
+        Raises ValueError."""
         p = self.crack_pressure
         if isinstance(p, Pressure):
             return p.at(points)
@@ -223,7 +225,7 @@ class BodyLoad:
 
 
 def _times(value, factor: float):
-    """``factor`` times an array, a pressure or a function; None stays."""
+    """``factor`` times an array, a pressure or a function; None stays None."""
     if value is None:
         return None
     if callable(value):
@@ -234,7 +236,7 @@ def _times(value, factor: float):
 
 
 def _plus(a, b):
-    """The sum of two arrays, pressures, functions or None (nothing)."""
+    """Sum of two arrays, pressures, functions or None (zero)."""
     if a is None or b is None:
         return b if a is None else a
     if not callable(a) and not callable(b):
@@ -251,13 +253,13 @@ def _plus(a, b):
 
     for value in (a, b):
         if not callable(value) and not isinstance(value, Pressure) and np.shape(value) not in ((), (2,)):
-            raise ValueError("what differs from place to place by a list of values cannot be added to a function")
+            raise ValueError("a list of values cannot be added to a function of position")
     return lambda points: part(a, points) + part(b, points)
 
 
 def _number(p) -> float:
     if np.ndim(p):
-        raise ValueError("a pressure that is linear in position cannot be added to one of each crack")
+        raise ValueError("a pressure that is linear in position cannot be added to a list with one for each crack")
     return float(p)
 
 
@@ -287,7 +289,7 @@ def _side(where, value) -> tuple:
 
 
 def resultants(segments: np.ndarray, tractions: np.ndarray, about: np.ndarray) -> tuple[np.ndarray, float, float]:
-    """(force (2,), moment about ``about``, sum of the sizes of all forces) of linear tractions on ``segments``."""
+    """(force (2,), moment about ``about``, sum of force magnitudes) of linear tractions on ``segments``."""
     if not len(segments):
         return np.zeros(2), 0.0, 0.0
     arms, forces = _arms_and_forces(segments, tractions, about)
@@ -296,14 +298,16 @@ def resultants(segments: np.ndarray, tractions: np.ndarray, about: np.ndarray) -
 
 
 def first_moments(segments: np.ndarray, tractions: np.ndarray, about: np.ndarray) -> np.ndarray:
-    """(2, 2) ∫ r ⊗ t ds of linear ``tractions`` on ``segments``, with the arms r from ``about``, N m."""
+    """(2, 2) ∫ r ⊗ t ds of linear ``tractions`` on ``segments``, with r from ``about``, N m."""
     arms, forces = _arms_and_forces(segments, tractions, about)
     return arms.reshape(-1, 2).T @ forces.reshape(-1, 2)
 
 
 def _arms_and_forces(segments: np.ndarray, tractions: np.ndarray, about: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """(m, 2, 2) twice, of which the products at all ends add up to those of arms and tractions along the segments: ∫ x
-    t of two functions linear along a length L is L/6 Σ x_i t_j, those of the same end counted twice."""
+    """Two (m, 2, 2) arrays with Σ arms · forces = ∫ x t ds.
+
+    For two linear functions along a length L the integral is L/6 Σ x_i t_j, terms with i = j counted twice.
+    """
     ends = segments - about
     along = ends[:, 1] - ends[:, 0]
     forces = (np.hypot(along[:, 0], along[:, 1]) / 6)[:, None, None] * tractions
@@ -312,13 +316,15 @@ def _arms_and_forces(segments: np.ndarray, tractions: np.ndarray, about: np.ndar
 
 @dataclass(frozen=True, eq=False)
 class LoadHistory:
-    """Loads whose sizes are functions of time: ``parts`` are pairs of a `BodyLoad` and a factor, a number, a function
-    of time (s), or a `model.History` of one component."""
+    """Loads that vary with time: ``parts`` are pairs of a `BodyLoad` and a factor.
+
+    A factor is a number, a function of time (s), or a `model.History` of one component.
+    """
 
     parts: Sequence[tuple[BodyLoad, float | Callable[[float], float] | History]]
 
     def at(self, time: float) -> BodyLoad:
-        """What acts at ``time``."""
+        """The load at ``time`` (s)."""
         out: BodyLoad | None = None
         for load, factor in self.parts:
             if isinstance(factor, History):

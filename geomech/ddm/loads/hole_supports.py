@@ -1,8 +1,8 @@
-"""Held holes: what ties them to the rest of the body.
+"""Supports on holes: constraints that tie a supported hole to the rest of the body.
 
-The plane inside a hole is free of traction for any rigid motion of its own, so where a support holds the hole's
-boundary that motion has to be put to zero: equations in displacement. By reciprocity the displacement at a point is the
-work that Kelvin's field of a unit force there does on line forces, and its tractions on displacement jumps.
+Any rigid motion of the plane inside a hole is free of traction. Where a support constrains the hole's boundary, that
+motion must be set to zero: equations in displacement. By reciprocity, the displacement at a point is the work that the
+Kelvin field of a unit force at that point does on line forces, and its tractions do on displacement jumps.
 """
 
 from __future__ import annotations
@@ -13,21 +13,21 @@ from ..kernels import shape_functions
 from ..kernels.point_forces import KelvinLoad
 from ..system.influence_matrix import ElementSet
 
-#: Gauss points on a source; the anchored points stand off by several elements.
+#: Gauss points per source; the constrained points are several elements away.
 _POINTS = 24
 
 
 class Anchors:
-    """The rigid motions of holes that supports resist.
+    """Rigid motions of holes that supports constrain.
 
-    rows  (n, r) what each of them is in the boundary's rows: where traction is short of equations
+    rows  (n, r) their distribution over the boundary's equations, in which traction leaves r of them undetermined
 
-    Linear functionals of sources, times 2μ: `of_jumps`, `of_forces`, `of_points` give the r motions that these impart
-    to the holes' inside.
+    `of_jumps`, `of_forces` and `of_points` give the r motions, times 2μ, that sources impart to the inside of the
+    holes.
     """
 
     def __init__(self, nu: float, extent: float):
-        # Kelvin's stresses do not depend on μ: with 2μ = 1 his displacement is 2μ times itself.
+        # Kelvin's stresses do not depend on μ; with 2μ = 1 his displacement is the true one times 2μ.
         self._unit, self._extent = _Unit(nu), extent
         self.rows = np.empty((0, 0))
         self._forces: list[list[tuple[np.ndarray, np.ndarray]]] = []
@@ -35,13 +35,13 @@ class Anchors:
     def add(
         self, rows: np.ndarray, combinations: np.ndarray, middle: np.ndarray, radius: float, loop: np.ndarray
     ) -> None:
-        """The ``combinations`` (3, k) of x, y and turn (that moves points at ``radius`` from ``middle`` by one) of a
-        hole ``loop`` (m, 2); ``rows`` (n, k) of them."""
+        """Add the ``combinations`` (3, k) of translation in x, in y and rotation of the hole ``loop`` (m, 2), with
+        their ``rows`` (n, k). A unit rotation moves points at ``radius`` from ``middle`` by one."""
         self.rows = rows if not self.rows.size else np.hstack([self.rows, rows])
-        centre, room = _roomiest(loop)
+        centre, room = _deepest_point(loop)
         arm = middle - centre
         for x, y, turn in combinations.T:
-            # Coefficients of a rigid motion: those of u(middle) = u(centre) + ω × arm, and ω radius.
+            # Coefficients of the rigid motion: u(middle) = u(centre) + ω × arm, and ω radius.
             couple = 0.25 * room
             spin = (-x * arm[1] + y * arm[0] + turn * radius) / (2 * couple)
             self._forces.append(
@@ -54,7 +54,7 @@ class Anchors:
 
     @property
     def number(self) -> int:
-        """r."""
+        """The number of motions, r."""
         return len(self._forces)
 
     def _fields(self):
@@ -77,7 +77,7 @@ class Anchors:
         return out.reshape(len(out), -1)
 
     def of_forces(self, start: np.ndarray, end: np.ndarray, degree: int) -> np.ndarray:
-        """(r, m, 2, degree + 1) from line forces t^k along and across straight pieces."""
+        """(r, m, 2, degree + 1) from line forces t^k along and normal to straight pieces."""
         x, w = np.polynomial.legendre.leggauss(_POINTS)
         d = end - start
         half = 0.5 * np.hypot(*d.T)
@@ -104,7 +104,7 @@ class Anchors:
 
 
 class _Unit:
-    """A material of 2μ = 1."""
+    """A material with 2μ = 1."""
 
     shear_modulus = 0.5
 
@@ -113,7 +113,7 @@ class _Unit:
 
 
 def _quadrature(sources: ElementSet) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Points (n, q, 2), shape functions there (n, q, p+1) and weights (n, q), for square roots at either end."""
+    """Points (n, q, 2), shape functions (n, q, p+1) and weights (n, q), for square roots at either end."""
     x, w = np.polynomial.legendre.leggauss(_POINTS)
     angle = 0.5 * np.pi * (x + 1)
     t, w = -np.cos(angle), 0.5 * np.pi * w * np.sin(angle)
@@ -121,8 +121,8 @@ def _quadrature(sources: ElementSet) -> tuple[np.ndarray, np.ndarray, np.ndarray
     return sources.at(t), values[sources.kind], 0.5 * sources.length[:, None] * w
 
 
-def _roomiest(loop: np.ndarray) -> tuple[np.ndarray, float]:
-    """A point (2,) inside ``loop`` far from its edges, and how far."""
+def _deepest_point(loop: np.ndarray) -> tuple[np.ndarray, float]:
+    """A point (2,) inside ``loop`` far from its edges, and its distance from them."""
     from ..mesh.geometry_checks import _to_segments
     from ..mesh.point_location import inside
 

@@ -1,4 +1,4 @@
-"""What a load comes to on a given body: fields and line forces, placed on its boundary."""
+"""Loads applied to a given body: particular fields and line forces on its boundary."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from ..interfaces import CrackedBody
     from .hole_supports import Anchors
 
-#: Where a point load cannot be singular it is spread over this part of the extent of the body.
+#: Where a point load cannot be singular it is distributed over this part of the body's extent.
 SPREAD = 0.01
 
 
@@ -28,11 +28,11 @@ class Applied:
     """``load`` on a body.
 
     particular   field of the body force and the uniform stress
-    segments, tractions  (m, 2, 2) linear tractions, the load's own and those that sides and spread point loads come to
-    functions    tractions that are functions
-    kelvin       point loads inside the rock, or wherever they are asked to be Kelvin's
+    segments, tractions  (m, 2, 2) linear tractions: the load's own, those of sides, and distributed point loads
+    functions    tractions given as functions
+    kelvin       point loads inside the rock, or all of them with ``load.kelvin``
     wedges       point loads on its boundary
-    left_over    minus what the wedges' fields are on the boundary
+    left_over    minus the tractions of the wedges' fields on the boundary
     """
 
     load: BodyLoad
@@ -46,22 +46,22 @@ class Applied:
 
     @property
     def plain(self) -> bool:
-        """Whether there are linear tractions and the particular field only."""
+        """Whether the load consists of linear tractions and the particular field only."""
         return self.functions is None and not self.kelvin and not self.wedges
 
     @property
     def lines(self) -> list[LineForces]:
-        """Line forces besides the segments."""
+        """Line forces other than the segments."""
         return [part for part in (self.functions, self.left_over) if part is not None]
 
     def on(
         self, targets: ElementSet, on_boundary: bool, nu: float, tol: float, anchors: Anchors | None = None
     ) -> np.ndarray:
-        """(n_unknowns,) traction at the collocation nodes of ``targets`` from what is not `plain`; ``anchors`` of the
-        boundary's supported holes."""
+        """(n_unknowns,) traction at the collocation nodes of ``targets`` from all parts that are not `plain`;
+        ``anchors`` are those of supported holes."""
         out = np.zeros(targets.n_unknowns)
         points = targets.nodes.reshape(-1, 2)
-        # On the boundary, the wedges' own traction is what its line forces stand for.
+        # On the boundary the line forces stand for the wedges' own traction.
         for p in (*self.kelvin, *(() if on_boundary else self.wedges)):
             out += on_elements(targets, p.stress(points))
         for part in self.lines:
@@ -75,20 +75,20 @@ class Applied:
         return out
 
     def stress(self, points: np.ndarray) -> np.ndarray:
-        """(n, 3) Pa, all but the line forces."""
+        """(n, 3) stress, Pa, of all parts except line forces."""
         return self.particular.stress(points) + sum(p.stress(points) for p in (*self.kelvin, *self.wedges))
 
     def displacement(self, points: np.ndarray) -> np.ndarray:
-        """(n, 2) m, all but the line forces."""
+        """(n, 2) displacement, m, of all parts except line forces."""
         return self.regular(points) + sum(p.displacement(points) for p in self.kelvin)
 
     def regular(self, points: np.ndarray) -> np.ndarray:
-        """(n, 2) m, displacement that the boundary's unknowns do not contain."""
+        """(n, 2) displacement, m, that is not contained in the boundary's unknowns."""
         return self.particular.displacement(points) + sum(p.displacement(points) for p in self.wedges)
 
 
 def apply(load: BodyLoad, body: CrackedBody) -> Applied:
-    """What ``load`` is on ``body``. Raises ValueError naming what does not fit it."""
+    """``load`` applied to ``body``. Raises ValueError naming the part that does not fit the body."""
     none = np.empty((0, 2, 2))
     out = Applied(
         load,
@@ -113,7 +113,7 @@ def apply(load: BodyLoad, body: CrackedBody) -> Applied:
             segment, against, edge = onto_boundary(sides_for(body.mesh, segment), segment, name, body._extent)
             value = value[::-1] if against and not callable(value) and value.ndim == 2 else value
         if callable(value):
-            # A free surface has no elements that the load could be cut at.
+            # A free surface has no elements that could be divided at the load.
             parts = pieces(boundary, edge, segment) if edge < len(edges) else (segment[:1], segment[1:])
             functions.append(approximate(value, *parts, name))
         else:
@@ -137,7 +137,7 @@ def _particular(load: BodyLoad, body: CrackedBody) -> Particular | GrowingWithDe
         body.half_plane.check_force(gradient)
         return GrowingWithDepth.of(body.half_plane, force, load.k0, uniform, body.material)
     if load.k0 is not None:
-        raise ValueError("k0: stress that grows with depth stands in a half-plane only")
+        raise ValueError("k0: stress that grows with depth is possible in a half-plane only")
     if not body.outlined and (force.any() or gradient.any()):
         raise ValueError("a body force needs a body with an outline")
     if load.about is not None:
@@ -146,7 +146,7 @@ def _particular(load: BodyLoad, body: CrackedBody) -> Particular | GrowingWithDe
 
 
 def _point(out: Applied, body: CrackedBody, k: int, point, force, segments: list, tractions: list) -> None:
-    """Add point load ``k`` as what it is where it stands."""
+    """Add point load ``k`` as the kind of load that its location requires."""
     from ..mesh.point_location import inside
 
     edges, loop, rock = body.mesh.edges, body.mesh.edge_loop, body.half_plane
@@ -167,7 +167,7 @@ def _point(out: Applied, body: CrackedBody, k: int, point, force, segments: list
         out.kelvin.append(_kelvin(body, point, force))
         return
     length = np.hypot(*d[edge])
-    # At a corner: `edge` is to be the one that starts there.
+    # At a corner: `edge` becomes the one that starts there.
     if s[edge] * length <= OFF * body._extent or (1 - s[edge]) * length <= OFF * body._extent:
         if s[edge] > 0.5:
             edge = int(np.flatnonzero(np.all(edges[:, 0] == edges[edge, 1], axis=1))[0])
@@ -176,7 +176,8 @@ def _point(out: Applied, body: CrackedBody, k: int, point, force, segments: list
     else:
         before, corner, at = edge, False, a[edge] + s[edge] * d[edge]
     if out.load.kelvin:
-        # At a corner no element's node is near; along a side a node may be, and would take all of it.
+        # Not at a corner, where no element's node is near; along an edge a node may be near, and would take the whole
+        # load.
         core = 0.0 if corner else min(SPREAD * body._extent, s[edge] * length, (1 - s[edge]) * length)
         out.kelvin.append(_kelvin(body, at, force, 0.5 * core))
         return
@@ -190,7 +191,7 @@ def _point(out: Applied, body: CrackedBody, k: int, point, force, segments: list
     if body.outlined and loop[edge] == 0 and not _meets(edges, at, -axis, {edge, before}, body._extent):
         out.wedges.append(WedgeLoad(at, force, axis, turn, body.material))
         return
-    # Displacement would be cut inside the rock. Spread, the force keeps its line of action.
+    # Displacement would have a branch cut inside the rock. Distributed, the force keeps its line of action.
     room = (1 - s[edge]) * length if not corner else length
     width = min(SPREAD * body._extent, room if corner else min(room, s[edge] * length))
     if corner:
@@ -208,7 +209,7 @@ def _kelvin(body: CrackedBody, point: np.ndarray, force: np.ndarray, core: float
 
 
 def _meets(edges: np.ndarray, origin: np.ndarray, way: np.ndarray, own: set[int], extent: float) -> bool:
-    """Whether a ray meets any of ``edges`` but its ``own``."""
+    """Whether a ray meets any of ``edges`` other than ``own``."""
     rest = np.delete(np.arange(len(edges)), list(own))
     side = (edges[rest] - origin) @ np.array([-way[1], way[0]])
     ahead = (edges[rest] - origin) @ way
@@ -217,7 +218,7 @@ def _meets(edges: np.ndarray, origin: np.ndarray, way: np.ndarray, own: set[int]
 
 
 def _left_over(wedge: WedgeLoad, body: CrackedBody) -> LineForces:
-    """Minus the tractions of the ``wedge``'s field on the boundary, away from its own sides."""
+    """Minus the tractions of the ``wedge``'s field on the boundary, away from the wedge's own sides."""
     edges, parts = body.mesh.edges, []
     for edge in range(len(edges)):
         d = edges[edge, 1] - edges[edge, 0]
@@ -236,8 +237,10 @@ def _left_over(wedge: WedgeLoad, body: CrackedBody) -> LineForces:
 
 
 def check_equilibrium(applied: Applied, body: CrackedBody, tolerance: float) -> None:
-    """Raise OutOfEquilibrium unless force and moment vanish within ``tolerance`` of the loads' size; with supports, as
-    far as no support resists them."""
+    """Raise OutOfEquilibrium unless force and moment vanish within ``tolerance`` of the loads' magnitude.
+
+    With supports, only the components that no support resists are checked.
+    """
     force, gradient = applied.particular.force, applied.particular.gradient
     total, moment, size = np.zeros(2), 0.0, 0.0
 

@@ -1,4 +1,4 @@
-"""What supports do to a body."""
+"""Reactions of the supports of an elastic body."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ if TYPE_CHECKING:
 class Reactions:
     """Tractions that supports exert on a body, at the nodes of the supported elements, and their resultants.
 
-    support   (n,)          which support holds each element
+    support   (n,)          the support of each element
     points    (n, p+1, 2)   m
-    traction  (n, p+1, 2)   Pa, x and y, in the supported directions (in others the load's own traction acts)
+    traction  (n, p+1, 2)   Pa, x and y, in the supported directions (in the others the applied traction acts)
     force     (n_supports, 2)  N/m
     moment    (n_supports,)    N, about the body's centroid
     """
@@ -32,14 +32,14 @@ class Reactions:
 
 
 def reactions(body: CrackedBody, density: np.ndarray, particular: Particular) -> Reactions:
-    """The reactions of ``body`` from their ``density`` (h_unknowns,) in local components."""
+    """Reactions of ``body`` from the ``density`` (h_unknowns,) of reactions, in local components."""
     n = len(body.supports)
     holds = body._outside.holds
     if holds is None:
         none = np.zeros((0, body.boundary.per, 2))
         return Reactions(np.zeros(0, int), none, none, np.zeros((0, 2)), np.zeros(0))
     s = holds.sources
-    # A uniform field that is there besides is carried by tractions of its own.
+    # A superposed uniform field is in equilibrium with its own tractions.
     out = -s.normal
     stress = particular.uniform
     carried = np.stack(

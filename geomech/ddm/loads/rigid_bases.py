@@ -1,15 +1,16 @@
-"""Faces that stand on a straight, rigid base: how they press, from force and moment of what they bear.
+"""Contact pressure of faces on a straight, rigid base, from the force and moment that they transmit.
 
-A body in equilibrium is loaded on a straight piece of its boundary by a pressure p ≥ 0 of which only force N and moment
-M are known. A rigid base that can neither pull nor be entered leaves the face straight where it presses,
+A body in equilibrium is loaded on a straight piece of its boundary by a pressure p ≥ 0 of which only the force N and
+the moment M are known. The base is rigid, cannot pull and cannot be penetrated, so that the face is straight where it
+presses,
 
     p ≥ 0,    g = δ + θ s − u ≥ 0,    p g = 0,    ∫ p ds = N,    ∫ p s ds = M,
 
-u the displacement out of the body, s the place along the face, δ and θ how the base stands: as many unknowns as known
-resultants, so that what the rest of the body is in equilibrium with is kept to round-off. p is linear on each of the
-pieces of the face, u is weighted with the same hats (a boundary part of Signorini's problem: Kikuchi & Oden 1988, §6).
-How a unit of pressure moves the face comes from the body's kept factors; faces of cracks that close meanwhile change
-it, and all is done again until the pressure stays. Shear that goes with the pressure (Coulomb) goes with it here.
+with u the displacement out of the body, s the coordinate along the face, δ and θ the base's translation and rotation:
+as many unknowns as given resultants, so that the body's equilibrium is kept to round-off. p is linear on each piece of
+the face, and u is weighted with the same hat functions (a boundary part of Signorini's problem: Kikuchi & Oden 1988,
+§6). The compliance of the face comes from the body's factors. If crack faces close meanwhile, it changes, and the
+solution is repeated until the pressure does not change. Shear proportional to the pressure (Coulomb) is included.
 """
 
 from __future__ import annotations
@@ -30,25 +31,28 @@ if TYPE_CHECKING:
     from ..solution import Solution
     from .body_loads import BodyLoad
 
-#: Pressures are found when they change by less than this part of the largest.
+#: Pressures have converged when they change by less than this part of the largest.
 SETTLED = 1e-9
-#: … in so many solutions of the body; for one state of the cracks' faces it takes two.
+#: Largest number of solutions of the body; for given states of the crack faces two suffice.
 MOST = 12
-#: Changes of what presses where, in one search.
+#: Largest number of changes of the contact area in one search.
 _CHANGES = 200
-#: Pulls and entries below this part of what there is are round-off.
+#: Tension and penetration below this part of the largest values are round-off.
 _NOTHING = 1e-10
-#: An element belongs to a face that it is off by less than this part of the body's size.
+#: An element belongs to a face if it is off its line by less than this part of the body's size.
 _OFF = 1e-6
-#: Points of Gauss on what hats and elements share.
+#: Gauss points on the common interval of a hat function and an element.
 _POINTS, _WEIGHTS = np.polynomial.legendre.leggauss(5)
 _log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True, eq=False)
 class Base:
-    """A face on a base: ``rows`` (m,) of the load's segments, one after the other along the outline, and the traction
-    (2,) that goes with a unit of pressure."""
+    """A face on a base.
+
+    rows          (m,) numbers of the load's segments, in order along the outline
+    per_pressure  (2,) traction per unit of pressure
+    """
 
     rows: np.ndarray
     per_pressure: np.ndarray
@@ -61,8 +65,10 @@ def on_bases(
     warm: Solution | None = None,
     history: Solution | FaceMemory | None = None,
 ) -> Solution:
-    """The solution of ``body`` (without supports) under ``load``, whose tractions on ``bases`` say no more than force
-    and moment: they are replaced by what a rigid base makes of them. Raises what `Body.solve` does."""
+    """Solution of ``body`` (without supports) under ``load`` with rigid-base pressures on ``bases``.
+
+    The load's tractions on ``bases`` are used only for their force and moment. Raises what `Body.solve` raises.
+    """
     faces = _Faces(body, load.segments, bases)
     pressure = faces.pressures(load.tractions)
     right = faces.resultants @ pressure
@@ -74,22 +80,22 @@ def on_bases(
         still = faces.moved(warm) - gives @ pressure
         found = faces.settled(gives, still, right)
         if found is None:
-            _log.debug("no state of a face on its base was found: it presses as it did")
+            _log.debug("no contact area of a face on its rigid base was found: its pressure is left as it was")
             return warm
         change = np.abs(found - pressure).max()
         if change <= SETTLED * np.abs(found).max():
             return warm
         pressure = found
         load = replace(load, tractions=faces.tractions(load.tractions, pressure))
-    _log.debug("pressures on bases still change by %.1e", change)
+    _log.debug("pressures on rigid bases have not converged: last relative change %.1e", change)
     return body.solve(load, warm=warm, history=history)
 
 
 class _Faces:
-    """The ``bases`` of a body, all nodes of their pressures in one row.
+    """The ``bases`` of a body, the nodes of all their pressures in one array.
 
     weights     (n, n_boundary_unknowns): ∫ hat · u ds from the nodal displacement (local) of the boundary
-    resultants  (2 n_bases, n): force and moment about its start of each base
+    resultants  (2 n_bases, n): force, and moment about its start, of each base
     """
 
     def __init__(self, body: Body, segments: np.ndarray, bases: Sequence[Base]):
@@ -113,13 +119,13 @@ class _Faces:
             for i, j, near in ((0, 1, places[:-1]), (1, 0, places[1:])):
                 at = self.first[k] + i + np.arange(len(length))
                 resultants[2 * k, at] += 0.5 * length
-                # ∫ hat s ds: a third of the way from its own node to the other.
+                # ∫ hat s ds: the centroid is a third of the way from its own node to the other.
                 far = places[j : j + len(length)]
                 resultants[2 * k + 1, at] += 0.5 * length * (2 * near + far) / 3
         return weights, resultants
 
     def pressures(self, tractions: np.ndarray) -> np.ndarray:
-        """(n,) Pa at the nodes, of ``tractions`` (m, 2, 2) that go on from piece to piece."""
+        """(n,) pressure, Pa, at the nodes from ``tractions`` (m, 2, 2) that are continuous from piece to piece."""
         out = []
         for base in self.bases:
             own, way = tractions[base.rows], base.per_pressure
@@ -135,7 +141,7 @@ class _Faces:
         return out
 
     def compliance(self, solution: Solution) -> np.ndarray:
-        """(n, n) ∫ hat · u ds of unit pressures, m²/Pa, while the cracks' faces keep the states of ``solution``."""
+        """(n, n) ∫ hat · u ds of unit pressures, m²/Pa, with the states of the crack faces in ``solution``."""
         body = self.body
         key = self._key + b"states" + solution.face_states.key
         if key not in body.on_bases:
@@ -146,8 +152,8 @@ class _Faces:
         return body.on_bases[key][:, :n] * way[:, 0] + body.on_bases[key][:, n:] * way[:, 1]
 
     def _of_tractions(self, solution: Solution) -> np.ndarray:
-        """(n, 2 n) the same of unit tractions at the nodes, along x and then along y: shear changes its share of the
-        pressure from step to step."""
+        """(n, 2 n) the same for unit tractions at the nodes, along x and then along y: the ratio of shear to pressure
+        changes from step to step."""
         body, n = self.body, int(self.first[-1])
         rows = np.concatenate([base.rows for base in self.bases])
         y, reduced = body.unit_answers(self.segments[rows])
@@ -166,15 +172,17 @@ class _Faces:
         return self.weights @ moves / (2 * body.material.shear_modulus)
 
     def moved(self, solution: Solution) -> np.ndarray:
-        """(n,) ∫ hat · u ds of all of ``solution``, m²."""
+        """(n,) ∫ hat · u ds of ``solution``, m²."""
         body, g = self.body, self.body.boundary
         besides = solution._applied.regular(g.nodes.reshape(-1, 2)).reshape(g.nodes.shape)
         local = np.stack([np.einsum("enc,ec->en", besides, axis) for axis in (g.tangent, g.normal)], axis=1)
         return self.weights @ (solution._u / (2 * body.material.shear_modulus) + local.ravel())
 
     def settled(self, gives: np.ndarray, still: np.ndarray, right: np.ndarray) -> np.ndarray | None:
-        """(n,) the pressures under which nothing pulls and nothing enters its base: Newton's method for what presses
-        where, one node at a time once it does not get on; None where even that ends nowhere."""
+        """(n,) pressures without tension or penetration, or None.
+
+        Newton's method on the contact area; it changes one node at a time once it stops converging.
+        """
         n, resultants = len(still), self.resultants
         size = np.abs(still).max() + np.abs(gives).max() * np.abs(right).max() / np.abs(resultants).max()
         presses, fewest, patience = np.ones(n, bool), n + 1, 5
@@ -184,7 +192,7 @@ class _Faces:
             matrix[: len(on), : len(on)] = gives[np.ix_(on, on)]
             matrix[: len(on), len(on) :] = -resultants[:, on].T
             matrix[len(on) :, : len(on)] = resultants[:, on]
-            # Unknowns and equations of one size each.
+            # Unknowns and equations scaled to similar magnitudes.
             scale = np.concatenate(
                 [np.full(len(on), np.sqrt(np.abs(gives).max())), np.abs(resultants[:, on]).max(axis=1)]
             )
@@ -214,8 +222,11 @@ class _Faces:
 
 
 def _weights(g: ElementSet, start: np.ndarray, end: np.ndarray, places: np.ndarray, extent: float) -> np.ndarray:
-    """(len(places), n_unknowns): ∫ hat · u ds over the straight face from ``start`` to ``end`` with nodes at ``places``
-    m from its start, u the displacement out of the body from its nodal values (local) on ``g``."""
+    """(len(places), n_unknowns): ∫ hat · u ds over the straight face from ``start`` to ``end``.
+
+    The nodes are at ``places`` (m) from its start; u is the displacement out of the body, from its nodal values (local)
+    on ``g``.
+    """
     out = np.zeros((len(places), g.n, 2, g.per))
     way = (end - start) / places[-1]
     a, b = (g.start - start) @ way, (g.end - start) @ way

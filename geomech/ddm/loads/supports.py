@@ -1,8 +1,8 @@
-"""Supports: pieces of the boundary on which displacement is imposed instead of traction, in both directions or in one.
+"""Supports: pieces of the boundary on which displacement is prescribed instead of traction, in one direction or both.
 
-On an element that a support holds, the known displacement goes to the right-hand side and the unknown is the reaction,
-a Kelvin line force with the shape functions that displacement has elsewhere. Each support fixes one or both of a pair of directions of
-every element, so that rollers may stand at any angle to the side they are on.
+On a supported element the known displacement moves to the right-hand side, and the reaction becomes the unknown: a
+Kelvin line force with the shape functions that displacement has elsewhere. Each support constrains one or both of a
+pair of directions on every element, so that rollers may be inclined to the edge they are on.
 """
 
 from __future__ import annotations
@@ -15,25 +15,25 @@ import numpy as np
 from ..mesh.edge_location import onto_boundary
 from ..system.influence_matrix import ElementSet, influence, line_influence
 
-#: A rigid motion that supports let move by less than this fraction of its size is prevented.
-_HELD = 1e-9
-#: Graded layers at the end of a support beyond the settings': inside a side, where reactions grow like r^(−½), and at a
-#: corner. At order 4 these leave 1e-5 and 2e-6 in K_I of a crack in the block, without them 6e-4 and 2e-5.
+#: A rigid motion counts as prevented if supports leave less than this part of it.
+_PREVENTED = 1e-9
+#: Graded layers at the end of a support in addition to the settings': inside an edge, where reactions vary like r^(−½),
+#: and at a corner. At order 4 these leave 1e-5 and 2e-6 in K_I of a crack in the block; without them 6e-4 and 2e-5.
 INSIDE_LAYERS, CORNER_LAYERS = 8, 4
 _KINDS = ("both", "normal", "tangent", "x", "y")
 
 
 @dataclass(frozen=True)
 class Support:
-    """A piece of a body's boundary that is supported.
+    """A supported piece of a body's boundary.
 
     on     the number of an edge (the outline's first, then the holes'), or a straight piece of the boundary ((x, y),
            (x, y)), m
-    hold   "both" (pinned), "normal" (a roller: free to slide along the side), "tangent", "x", "y", or a direction (x,
+    hold   "both" (pinned), "normal" (a roller: free to slide along the edge), "tangent", "x", "y", or a direction (x,
            y)
-    name   what messages call it
+    name   used in messages
 
-    The displacement is zero unless `BodyLoad.displacements` says otherwise. Raises ValueError naming the support.
+    The displacement is zero unless `BodyLoad.displacements` prescribes it. Raises ValueError naming the support.
     """
 
     on: int | tuple[tuple[float, float], tuple[float, float]]
@@ -55,13 +55,17 @@ class Support:
             return
         way = np.asarray(self.hold, dtype=float)
         if way.shape != (2,) or not np.isfinite(way).all() or not np.hypot(*way) > 0:
-            raise ValueError(f"{called}: a direction to hold is two numbers that are not both zero, got {self.hold!r}")
+            raise ValueError(
+                f"{called}: a supported direction is two numbers that are not both zero, got {self.hold!r}"
+            )
         object.__setattr__(self, "hold", tuple((way / np.hypot(*way)).tolist()))
 
 
 def place(supports: Sequence[Support], edges: np.ndarray, extent: float) -> np.ndarray:
-    """(k, 2, 2) where the ``supports`` stand, each along the one of ``edges`` (m, 2, 2) it is on. Raises ValueError
-    naming the support: no such edge, off the boundary, no length, overlap."""
+    """(k, 2, 2) location of the ``supports``, each along the one of ``edges`` (m, 2, 2) on which it lies.
+
+    Raises ValueError naming the support: no such edge, off the boundary, no length, overlap.
+    """
     out = np.empty((len(supports), 2, 2))
     on = np.empty(len(supports), int)
     for k, support in enumerate(supports):
@@ -86,12 +90,11 @@ def place(supports: Sequence[Support], edges: np.ndarray, extent: float) -> np.n
 def marks(
     supports: Sequence[Support], placed: np.ndarray, loops: Sequence[np.ndarray], layers: int
 ) -> list[tuple[np.ndarray, int]]:
-    """Where the boundary needs nodes and how many graded layers there: the ends of the ``placed`` supports on
-    ``loops``.
+    """Boundary points that must be nodes, with their graded layers: the ends of the ``placed`` supports on ``loops``.
 
-    Reactions are singular there like r^(−½) inside a side. At a corner they are so between a pinned and a free side,
-    but not at a right angle between a roller and a free side (mirrored there, the corner is none) or between two supported
-    sides.
+    Reactions are singular like r^(−½) at an end inside an edge. At a corner they are singular between a pinned and a
+    free edge, but not at a right angle between a roller and a free edge (mirrored, the corner vanishes) or between two
+    supported edges.
     """
     tiny = 1e-9 * np.ptp(loops[0], axis=0).max()
     before = np.concatenate([np.roll(loop, 1, axis=0) for loop in loops])
@@ -116,20 +119,20 @@ def marks(
 
 
 def called(supports: Sequence[Support], k: int) -> str:
-    """What messages call support ``k``."""
+    """Name of support ``k`` in messages."""
     return f"support {supports[k].name!r}" if supports[k].name else f"support {k}"
 
 
 class Holds:
-    """Which elements of a boundary are supported, in which directions.
+    """Supported elements of a boundary and their supported directions.
 
     elements    (h,)      numbers of supported elements
-    support     (h,)      the support that holds each
+    support     (h,)      the support of each
     directions  (h, 2, 2) two unit vectors, local (along, normal) components
     held        (h, 2)    bool, in which of the two the element is supported
     sources     the supported elements
 
-    Unknown reactions are multiplied by their element's length, which makes their columns as large as those of
+    Unknown reactions are multiplied by their element's length, so that their columns have the magnitude of those of
     displacements.
     """
 
@@ -177,7 +180,7 @@ class Holds:
         return self._turn(local, self.directions)
 
     def local(self, turned: np.ndarray) -> np.ndarray:
-        """The way back."""
+        """The inverse of `turned`."""
         return self._turn(turned, self.directions.transpose(0, 2, 1))
 
     def _turn(self, values: np.ndarray, by: np.ndarray) -> np.ndarray:
@@ -189,7 +192,8 @@ class Holds:
     def swapped(
         self, targets: ElementSet, elements: np.ndarray, matrix: np.ndarray, nu: float, tol: float
     ) -> np.ndarray:
-        """The columns ``matrix`` of displacement jumps on boundary ``elements`` with those of reactions where supported."""
+        """The columns ``matrix`` of displacement jumps on boundary ``elements``, with reaction columns where
+        supported."""
         at = self.number[elements]
         which = np.flatnonzero(at >= 0)
         if not len(which) or not len(matrix):
@@ -199,14 +203,14 @@ class Holds:
         return matrix
 
     def mixed(self, jumps: np.ndarray, forces: np.ndarray) -> np.ndarray:
-        """Columns (r, n_unknowns) of unit ``jumps`` on the boundary with those of unit ``forces`` (r, h_unknowns) where
-        held."""
+        """Columns (r, n_unknowns) of unit ``jumps`` on the boundary, with those of unit ``forces`` (r, h_unknowns)
+        where supported."""
         out = np.asfortranarray(jumps).copy(order="F")
         self._swap(out, np.asfortranarray(forces), self.elements, np.arange(len(self.elements)))
         return out
 
     def _swap(self, matrix: np.ndarray, force: np.ndarray, which: np.ndarray, at: np.ndarray) -> None:
-        # By columns, as they stand in memory.
+        # Column by column, in memory order.
         rows, per = len(matrix), self.boundary.per
         columns = matrix.T.reshape(-1, 2, per, rows)
         force = force.T.reshape(len(which), 2, per, rows) / self.sources.length[at][:, None, None, None]
@@ -218,14 +222,15 @@ class Holds:
         return influence(targets, self.sources, nu, tol)
 
     def imposed(self, displacement: np.ndarray) -> np.ndarray:
-        """(h_unknowns,) the prescribed part of ``displacement`` (h, p+1, 2) at the supported elements' nodes, local components."""
+        """(h_unknowns,) the prescribed part of ``displacement`` (h, p+1, 2) at the supported elements' nodes, local
+        components."""
         s = self.sources
         local = np.stack([np.einsum("hnc,hc->hn", displacement, axis) for axis in (s.tangent, s.normal)], axis=1)
         turned = np.einsum("hjc,hcn->hjn", self.directions, local) * self.supported[:, :, None]
         return np.einsum("hjc,hjn->hcn", self.directions, turned).ravel()
 
     def split(self, x: np.ndarray, imposed: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """From unknowns ``x`` (n_unknowns,) the displacement of the whole boundary, local, and the reactions
+        """Split unknowns ``x`` (n_unknowns,) into displacement of the whole boundary, local, and reactions
         (h_unknowns,)."""
         b = self.boundary
         rows = x.reshape(b.n, 2, b.per)
@@ -237,7 +242,7 @@ class Holds:
         return free.ravel(), reaction.ravel()
 
     def joined(self, displacement: np.ndarray, reactions: np.ndarray) -> np.ndarray:
-        """(n_unknowns,) the transposed of `split`: where the boundary is supported from ``reactions``, else from
+        """(n_unknowns,) transpose of `split`: from ``reactions`` where the boundary is supported, else from
         ``displacement``."""
         b = self.boundary
         out = self.turned(displacement).reshape(b.n, 2, b.per)
@@ -247,21 +252,23 @@ class Holds:
         return out.ravel()
 
     def free_motions(self, modes: np.ndarray) -> np.ndarray:
-        """(3, k) the combinations of rigid ``modes`` (n_unknowns, 3), local, that no support resists."""
+        """(3, k) combinations of the rigid ``modes`` (n_unknowns, 3), local, that no support resists."""
         supported = self.turned(modes)[self.unknowns]
-        # Each row by the root of the boundary it stands for, so that the measure does not depend on the mesh.
+        # Each row is weighted by the root of the length it represents, so that the measure does not depend on the mesh.
         b = self.boundary
         share = np.broadcast_to(b.quadrature[:, None, :], (b.n, 2, b.per)).ravel()[self.unknowns]
         _, size, ways = np.linalg.svd(np.sqrt(np.abs(share) / b.length.sum())[:, None] * supported)
         size = np.concatenate([size, np.zeros(3 - len(size))])
-        return ways[size <= _HELD].T
+        return ways[size <= _PREVENTED].T
 
 
 def values_at(
     value: np.ndarray | Callable[[np.ndarray], np.ndarray] | None, segment: np.ndarray, points: np.ndarray, name: str
 ) -> np.ndarray:
-    """(n, 2) what ``value`` is at ``points`` (n, 2): a constant (2,), linear along ``segment`` from (2, 2) its values
-    at the ends, or a function of points; None is zero. Raises ValueError with ``name``."""
+    """(n, 2) values at ``points`` (n, 2) of a constant (2,), a pair (2, 2) linear along ``segment``, or a function.
+
+    None is zero. Raises ValueError with ``name``.
+    """
     if value is None:
         return np.zeros((len(points), 2))
     if callable(value):

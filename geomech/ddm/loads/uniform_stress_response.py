@@ -1,8 +1,8 @@
-"""A body under a uniform stress: while its crack faces keep their states, three solutions determine all others.
+"""Response of a cracked body to uniform stress: while crack faces keep their states, four solutions give all others.
 
-With smooth faces of which some are closed, jumps w and face pressures are affine in the stress σ (xx, yy,
-xy): w = J σ + w₀, the same for the reaction, and so the strain of the cracks and K; the energy around them is quadratic.
-The answer is the solution as long as no closed face is pulled and none of the open ones overlap.
+With smooth faces of which some are closed, jumps w and face pressures are affine in the stress σ (xx, yy, xy): w = J σ
++ w₀. The same holds for the reactions, hence for crack strain and K; the energy is quadratic. The result is the
+solution as long as no closed face is in tension and no open faces overlap.
 """
 
 from __future__ import annotations
@@ -18,13 +18,16 @@ from .unit_load_cache import on_elements
 if TYPE_CHECKING:
     from ..interfaces import CrackedBody, SolvedBody
 
-#: Responses for so many sets of closed faces are kept.
+#: Number of sets of closed faces for which responses are cached.
 KEPT = 4
 
 
-class EvenResponse:
-    """The jumps (n, 4), times 2μ, of ``body`` under unit stresses, last column without any, while the openings that are
-    ``closed`` (n,) bool stay used up. Raises LinAlgError when cracks cut a part off and closed faces do not hold it."""
+class UniformStressResponse:
+    """Jumps (n, 4), times 2μ, of ``body`` under three unit stresses and under none (last column).
+
+    The faces ``closed`` (n,) bool have no opening left. Raises LinAlgError if cracks separate a part that the closed
+    faces do not hold in place.
+    """
 
     def __init__(self, body: CrackedBody, closed: np.ndarray) -> None:
         c = body.faces
@@ -38,23 +41,24 @@ class EvenResponse:
             self.jumps[:, 3], pressed[:, 3] = body.crack_system.constrained(np.zeros(c.n_unknowns), closed, fixed)
         gap = self.jumps.copy()
         gap[:, 3] += aperture
-        # What must not be negative, row by row: gaps of open faces that can meet, pressures of closed ones.
+        # Quantities that must not be negative, row by row: gaps of open faces that can meet, pressures of closed ones.
         self._holds = np.where(closed[:, None], pressed, gap)[can_close]
 
     def holds(self, stress: np.ndarray) -> bool:
-        """Whether faces stay in these states under ``stress`` (3,), Pa."""
+        """Whether faces keep these states under ``stress`` (3,), Pa."""
         return not len(self._holds) or bool((self._holds[:, :3] @ stress + self._holds[:, 3]).min() >= 0.0)
 
 
-class EvenSolution:
-    """``body`` under an even ``stress`` (3,), Pa, by its ``response``: what a `Solution` knows of its cracks."""
+class UniformStressSolution:
+    """Solution of ``body`` under a uniform ``stress`` (3,), Pa, from its ``response``: the crack part of a
+    `Solution`."""
 
     memory = None
     began = None
     frictional_work = filling_energy = 0.0
     given_way = 0.0, Released()
 
-    def __init__(self, body: CrackedBody, response: EvenResponse, stress: np.ndarray) -> None:
+    def __init__(self, body: CrackedBody, response: UniformStressResponse, stress: np.ndarray) -> None:
         self.body, self.closed, self._response = body, response.closed, response
         self._stress = np.array([*stress, 1.0])
 
@@ -65,24 +69,24 @@ class EvenSolution:
 
     @cached_property
     def crack_strain(self) -> np.ndarray:
-        """(3,) as of a `Solution`."""
+        """(3,) as in a `Solution`."""
         return self._of("strain", lambda: self.body.strain_weights @ self._response.jumps) @ self._stress
 
     @cached_property
     def crack_energy(self) -> float:
-        """J/m, as of a `Solution`: ½ ∫ (t₀ − t)·[u] ds, of which t₀ − t = −S w."""
+        """J/m, as in a `Solution`: ½ ∫ (t₀ − t)·[u] ds, with t₀ − t = −S w."""
         return float(self._stress @ self._of("energy", self._energy) @ self._stress)
 
     @cached_property
     def face_states(self) -> FaceStates:
-        """The states of contact, as the equations of the faces have them."""
+        """The contact states of the faces, as in the face equations."""
         c = self.body.faces
         closed = self.closed.reshape(c.n, 2, c.per)[:, 1].ravel()
         return FaceStates(closed, np.zeros(closed.size, np.int8), np.zeros(closed.size, bool))
 
     @cached_property
     def tips(self) -> np.ndarray:
-        """TIP rows, as of a `Solution`."""
+        """TIP rows, as in a `Solution`."""
         known, element, last, _, touching = self.body.tip_elements
         rows, c = known.copy(), self.body.faces
         if not len(rows):
@@ -104,7 +108,7 @@ class EvenSolution:
         return 0.5 * (form + form.T)
 
     def _factors(self) -> np.ndarray:
-        """(2 n_tips, 4) K_I of all tips, then K_II, before faces that touch are asked."""
+        """(2 n_tips, 4) K_I of all tips, then K_II, before the contact of faces at the tips is taken into account."""
         body, c = self.body, self.body.faces
         _, element, _, lead, _ = body.tip_elements
         each = self._response.jumps.reshape(c.n, 2, c.per, 4)[element]
@@ -113,7 +117,7 @@ class EvenSolution:
         return np.concatenate([opening, slip])
 
     def _of(self, name: str, found) -> np.ndarray:
-        """What the response comes to, found once."""
+        """The response combined for this stress; computed once."""
         known = vars(self._response)
         if name not in known:
             known[name] = found()
@@ -121,26 +125,33 @@ class EvenSolution:
 
 
 def scales(body: CrackedBody) -> bool:
-    """Whether solutions of ``body`` under an even stress are scaled from those under unit ones while its faces keep
-    their states: where these have no memory of their own, without holes, which bear an even stress otherwise, and with
-    factors."""
+    """Whether solutions of ``body`` under uniform stress may be scaled from those under unit stresses.
+
+    This holds while faces keep their states, if faces have no memory, there are no holes, which disturb a uniform
+    stress, and the equations are factored.
+    """
     return body.outlined and len(body.loops) == 1 and not (body.rough or body.supports or body.compressed)
 
 
-def even_response(body: CrackedBody, closed: np.ndarray) -> EvenResponse:
-    """How the cracks of a ``body`` that `scales` answer to an even stress while these openings, (n_crack_unknowns,)
-    bool, are ``closed``; kept with it."""
+def uniform_stress_response_of(body: CrackedBody, closed: np.ndarray) -> UniformStressResponse:
+    """Response of a ``body`` that `scales` to uniform stress with the openings ``closed``, (n_crack_unknowns,) bool;
+    cached with the body."""
     key = np.packbits(closed).tobytes()
-    if key not in body.even:
-        if len(body.even) >= KEPT:
-            body.even.pop(next(iter(body.even)))
-        body.even[key] = EvenResponse(body, closed)
-    return body.even[key]
+    if key not in body.uniform_responses:
+        if len(body.uniform_responses) >= KEPT:
+            body.uniform_responses.pop(next(iter(body.uniform_responses)))
+        body.uniform_responses[key] = UniformStressResponse(body, closed)
+    return body.uniform_responses[key]
 
 
-def scaled(body: CrackedBody, stress: np.ndarray, warm: SolvedBody | EvenSolution | None = None) -> EvenSolution | None:
-    """The solution of ``body`` under an even ``stress`` (3,), Pa, where its faces keep the states of ``warm``, an earlier
-    solution of this geometry (None: all are open); None where they do not, or where that takes a solution to know."""
+def scaled(
+    body: CrackedBody, stress: np.ndarray, warm: SolvedBody | UniformStressSolution | None = None
+) -> UniformStressSolution | None:
+    """Solution of ``body`` under a uniform ``stress`` (3,), Pa, if its faces keep the states of ``warm``.
+
+    ``warm`` is an earlier solution of this geometry (None: all faces are open). Returns None if they do not keep them,
+    or if that cannot be known without solving.
+    """
     if not scales(body) or not body.faces.n:
         return None
     closed = np.zeros(body.faces.n_unknowns, bool)
@@ -148,10 +159,10 @@ def scaled(body: CrackedBody, stress: np.ndarray, warm: SolvedBody | EvenSolutio
         if warm.body.crack_system is not body.crack_system:
             return None
         closed = warm.closed
-    response = body.even.get(np.packbits(closed).tobytes())
+    response = body.uniform_responses.get(np.packbits(closed).tobytes())
     if response is None and not closed.any():
-        response = even_response(body, closed)
+        response = uniform_stress_response_of(body, closed)
     if response is None or not response.holds(stress):
         return None
     body.work.solutions_scaled += 1
-    return EvenSolution(body, response, stress)
+    return UniformStressSolution(body, response, stress)

@@ -1,4 +1,5 @@
-"""What unit loads do on a body's boundary and cracks, remembered: loads mostly come again and only change in size."""
+"""Responses to unit loads on a body's boundary and cracks, cached because loads mostly recur and change in size
+only."""
 
 from __future__ import annotations
 
@@ -19,19 +20,20 @@ if TYPE_CHECKING:
     from ..interfaces import LoadParts
     from .hole_supports import Anchors
 
-#: Loads on so many different segments are remembered.
+#: Number of different segments whose loads are cached.
 _REMEMBERED = 400
-#: Edges or segments whose forces are worked out at once: all of a large boundary's on itself would fill the memory.
+#: Number of edges or segments whose forces are computed at a time: those of a large boundary on itself would fill
+#: memory.
 _AT_ONCE = 256
 
 
 class UnitLoad:
-    """What unit loads do, one a column of ``applied``: tractions g on the boundary above r on the cracks.
+    """Response to unit loads, one per column of ``applied``: tractions g on the boundary above r on the cracks.
 
-    Loads that come again are ``answered`` once and then only scaled: (g, r, y, r' = r − A_CΓ y, S⁻¹ r') with y = A_ΓΓ⁻¹
-    g, of which ``eliminated`` is y, the part that outlasts growth. ``segment`` is where tractions act, ``against``
-    whether they were given against the boundary's direction; or ``densities`` (m, 2, 3, columns) are what acts on the m
-    edges of the body.
+    Loads that recur are ``answered`` once and then scaled: (g, r, y, r' = r − A_CΓ y, S⁻¹ r') with y = A_ΓΓ⁻¹ g. Of
+    these, ``eliminated`` holds y, the part that growth leaves valid. ``segment`` is where tractions act, ``against``
+    whether they were given against the boundary's direction; alternatively ``densities`` (m, 2, 3, columns) act on the
+    m edges of the body.
     """
 
     def __init__(
@@ -48,23 +50,25 @@ class UnitLoad:
 
 
 class Eliminated:
-    """A ``load`` (n,) on the boundary, ``y`` = A_ΓΓ⁻¹ load and A_CΓ y ``on_faces`` (n_elements, width), both of which
-    outlast growth; ``new`` are the elements where the latter is not worked out yet."""
+    """The parts that growth leaves valid: ``y`` = A_ΓΓ⁻¹ load and A_CΓ y ``on_faces`` (n_elements, width).
+
+    ``load`` (n,) acts on the boundary; ``new`` are the elements for which A_CΓ y is still to be computed.
+    """
 
     def __init__(self, load: np.ndarray, y: np.ndarray, on_faces: np.ndarray, new: np.ndarray | None = None):
         self.load, self.y, self.on_faces = load, y, on_faces
         self.new = np.empty(0, int) if new is None else new
 
     def grown(self, was: np.ndarray) -> Eliminated:
-        """The same between elements whose numbers were ``was`` (n_elements,), −1 where new."""
+        """The same for elements whose earlier numbers are ``was`` (n_elements,), −1 where new."""
         missing = np.zeros(len(self.on_faces) + 1, bool)
-        missing[-1] = missing[self.new] = True  # its end stands for −1
+        missing[-1] = missing[self.new] = True  # index −1 refers to its end
         at = np.where(missing[was], 0, was)
         on_faces = self.on_faces[at] if len(self.on_faces) else np.empty((len(was), self.on_faces.shape[1]))
         return Eliminated(self.load, self.y, on_faces, np.flatnonzero(missing[was]))
 
     def complete(self, cg: np.ndarray | KeptRows, faces: ElementSet) -> None:
-        """Work out what is missing, with A_CΓ, ``cg``."""
+        """Compute missing entries, with A_CΓ ``cg``."""
         if not len(self.new):
             return
         rows = cg.of(self.new) if isinstance(cg, KeptRows) else cg[faces.unknowns(self.new)]
@@ -73,10 +77,10 @@ class Eliminated:
 
 
 class UnitLoads:
-    """The unit loads of a body with elements ``mesh``; see `onto_boundary` for ``extent``, `full_plane` for ``tol``.
+    """Unit loads of a body with elements ``mesh``; see `onto_boundary` for ``extent``, `full_plane` for ``tol``.
 
-    ``outlined``: whether the first loop is an outline; if not, all are holes in the infinite plane. ``anchors``: of the
-    boundary's supported holes.
+    ``outlined``: whether the first loop is an outline; otherwise all loops are holes in the infinite plane. ``anchors``
+    are those of supported holes.
     """
 
     def __init__(
@@ -100,7 +104,7 @@ class UnitLoads:
         self._last: Eliminated | None = None
 
     def inherit(self, old: UnitLoads, c_old: np.ndarray) -> None:
-        """Take over the loads of ``old``, a body with the same boundary; ``c_old`` are the crack elements' old
+        """Take over the loads of ``old``, a body with the same boundary; ``c_old`` are the crack elements' earlier
         numbers."""
         n_g = self.boundary.n_unknowns
         if old._last is not None:
@@ -129,7 +133,7 @@ class UnitLoads:
         self._recent = keys
 
     def of(self, applied: LoadParts) -> list[tuple[UnitLoad, np.ndarray]]:
-        """The unit loads of which what is ``applied`` is made, all but functions and point loads, and their sizes."""
+        """The unit loads that make up ``applied``, without functions and point loads, and their sizes."""
         load, particular = applied.load, applied.particular
         units = self._unit_segments(applied.segments, applied.tractions)
         sizes: dict[str | int, np.ndarray] = {}
@@ -162,7 +166,8 @@ class UnitLoads:
         """
         n_g, n_c = self.boundary.n_unknowns, self.faces.n_unknowns
         n = n_g + n_c
-        # Every part of a unit load is a load of its own; where each takes an iteration, their sum takes one.
+        # Each part of a unit load is a load of its own; where each needs an iterative solution, their sum needs only
+        # one.
         worth = not boundary.iterated
         again = [unit for unit, _ in units if unit.used and unit.answered is None and worth]
         if again:
@@ -184,7 +189,7 @@ class UnitLoads:
         return total[:n_g], total[n_g:n], total[n : n + n_g], total[n + n_g : 2 * n], total[2 * n :]
 
     def _answer(self, units: list[UnitLoad], boundary: BoundarySystem, cg: np.ndarray, opened) -> None:
-        """Work out what the ``units`` come to."""
+        """Compute the responses to the ``units``."""
         n_g = self.boundary.n_unknowns
         self._eliminate(units, boundary)
         for unit in units:
@@ -192,7 +197,7 @@ class UnitLoads:
             unit.answered = np.concatenate([unit.applied, unit.eliminated, reduced, opened(reduced)])
 
     def _eliminate(self, units: list[UnitLoad], boundary: BoundarySystem) -> None:
-        """Work out y of those of the ``units`` that have none."""
+        """Compute y of those ``units`` that have none."""
         n_g, fresh = self.boundary.n_unknowns, [unit for unit in units if unit.eliminated is None]
         if fresh:
             y = boundary.solve(np.hstack([unit.applied[:n_g] for unit in fresh]))
@@ -205,14 +210,14 @@ class UnitLoads:
         """y (n_boundary_unknowns, 4 m) and r' (n_crack_unknowns, 4 m), see `UnitLoad`, of ``segments`` (m, 2, 2)."""
         units = [unit for unit, _ in self._unit_segments(segments, np.zeros((len(segments), 2, 2)))]
         self._eliminate(units, boundary)
-        # A segment that was given against the boundary's direction has its ends changed about.
+        # The ends of a segment given against the boundary's direction are swapped.
         order = [[2, 3, 0, 1] if unit.against else [0, 1, 2, 3] for unit in units]
         y = np.hstack([unit.eliminated[:, columns] for unit, columns in zip(units, order)])
         direct = [unit.applied[self.boundary.n_unknowns :, columns] for unit, columns in zip(units, order)]
         return y, np.hstack(direct) - cg @ y
 
     def _unit_segments(self, segments: np.ndarray, tractions: np.ndarray) -> list[tuple[UnitLoad, np.ndarray]]:
-        """The ``segments`` (m, 2, 2) and their (4,) tractions."""
+        """The unit loads of the ``segments`` (m, 2, 2) and their (4,) tractions."""
         if not len(segments):
             return []
         edges = sides_for(self.mesh, segments)
@@ -236,8 +241,11 @@ class UnitLoads:
         return [(u, (ends[::-1] if u.against else ends).ravel()) for u, ends in zip(units, tractions)]
 
     def _linear_forces(self, targets: ElementSet, segments: np.ndarray) -> np.ndarray:
-        """(m, n_unknowns, 4) traction from unit (x, y) forces at the start, then at the end of straight segments,
-        linear along them; seen from outside the boundary."""
+        """(n_unknowns, 4 m) traction from unit forces along x and y at the start, then at the end, of straight
+        segments.
+
+        The forces vary linearly along each segment; tractions are those on the outside of the boundary.
+        """
         tol = 2 * OFF * self.extent
         unit = line_forces(targets, segments[:, 0], segments[:, 1], 1, self.nu, tol, -1.0)
         if targets is self.boundary:
@@ -255,18 +263,18 @@ class UnitLoads:
         return np.ascontiguousarray(out)
 
     def _hole(self, number: int) -> np.ndarray:
-        """Edges of a hole."""
+        """Edges of hole ``number``."""
         return np.flatnonzero(self.mesh.edge_loop == number + (0 if self.in_plane else 1))
 
     def _centre(self, number: int) -> np.ndarray:
         return self.mesh.edges[self._hole(number), 0].mean(axis=0)
 
     def _edge_load(self, name: str | int) -> UnitLoad:
-        """What acts on whole edges.
+        """Densities of loads on whole edges.
 
         "force": the six body forces b_x, b_y, B_xx, B_xy, B_yx, B_yy, in a half-plane the three slopes; "remote": the
-        three uniform stresses of the plane or the body, which holes leave without traction; a number: pressure in that
-        hole, constant and growing with x and with y from its centre.
+        three uniform stresses of the plane or the body, of which holes remain free; a number: pressure in that hole,
+        constant, and growing with x and with y from its centre.
         """
         densities = self._edge_densities(name)
         applied = [self._from_edges(self.boundary, densities), self._on_faces(name, self.faces, densities)]
@@ -279,7 +287,7 @@ class UnitLoads:
         if not isinstance(name, int):
             out = np.stack([edge_densities(self.mesh.edges, unit) for unit in self._particular(name)], axis=-1)
             if name == "remote" and not self.in_plane:
-                out[self.mesh.edge_loop == 0] = 0.0  # the outline bears it
+                out[self.mesh.edge_loop == 0] = 0.0  # the outline carries it
             return out
         a, b = self.mesh.edges[:, 0], self.mesh.edges[:, 1]
         densities = np.zeros((len(a), 2, 3, 3))
@@ -292,7 +300,7 @@ class UnitLoads:
         return densities
 
     def _particular(self, name: str) -> list[Particular | GrowingWithDepth]:
-        """The particular fields of unit body forces or of unit remote stresses."""
+        """Particular fields of unit body forces or of unit remote stresses."""
         none, rock = np.zeros(2), self.faces.half_plane
         if name == "force" and rock is not None:
             return [GrowingWithDepth(rock, none, unit, np.zeros(3), self.material) for unit in np.eye(3)]
@@ -313,7 +321,7 @@ class UnitLoads:
         return out
 
     def _on_faces(self, name: str | int, faces: ElementSet, densities: np.ndarray) -> np.ndarray:
-        """What a load on whole edges does to the crack elements ``faces``."""
+        """Tractions of a load on whole edges on the crack elements ``faces``."""
         out = self._from_edges(faces, densities)
         if not isinstance(name, int):
             points = faces.nodes.reshape(-1, 2)
@@ -322,7 +330,7 @@ class UnitLoads:
 
 
 def on_elements(c: ElementSet, stress: np.ndarray) -> np.ndarray:
-    """(n_unknowns,) traction (along, normal) at the collocation nodes of ``stress`` (3,) or (n_nodes, 3)."""
+    """(n_unknowns,) traction (along, normal) at the collocation nodes from ``stress`` (3,) or (n_nodes, 3)."""
     s = np.broadcast_to(stress, (c.n, c.per, 3)) if np.ndim(stress) == 1 else stress.reshape(c.n, c.per, 3)
     t, n = c.tangent[:, None], c.normal[:, None]
     tx = s[..., 0] * n[..., 0] + s[..., 2] * n[..., 1]

@@ -1,1 +1,1 @@
-"""Elements on outlines and cracks, and the checks that the geometry must pass before."""
+"""Boundary and crack elements, and the checks that a geometry must pass before it is meshed."""

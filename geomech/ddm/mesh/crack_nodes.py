@@ -1,4 +1,5 @@
-"""The nodes of a crack network: what ends where, where a crack goes straight on, which pieces meet."""
+"""Topology of a crack network: the segment ends at each node, nodes where a crack runs straight on, shared end
+points."""
 
 from __future__ import annotations
 
@@ -14,8 +15,11 @@ _jit = kept(error_model="numpy", nogil=True)
 
 
 def ends_at(cracks: Cracks) -> tuple[np.ndarray, np.ndarray]:
-    """Of node k the ends ``ends[first[k]:first[k + 1]]``, twice the segment's number and one more at its end, in the
-    order of the segments: (n_nodes + 1,) ``first`` and (2 n_segments,) ``ends``."""
+    """Segment ends at each node, in the order of the segments.
+
+    Returns (n_nodes + 1,) ``first`` and (2 n_segments,) ``ends``: node k has ``ends[first[k]:first[k + 1]]``, where 2 s
+    is the start and 2 s + 1 the end of segment s.
+    """
     return _ends_at(np.ascontiguousarray(cracks.segments, dtype=np.int64), cracks.valence)
 
 
@@ -35,8 +39,11 @@ def _ends_at(segments, valence):
 
 @_jit
 def straight_on(nodes, segments, surface, size, shut, first, ends, kink, jump):
-    """(n_nodes,) bool: nodes of two segments, of one crack or of two, that turn by less than ``kink``, rad, with elements, of
-    ``size`` (n_segments,), of which none is ``jump`` times as long as the other, and not both ``shut`` (n_segments,)."""
+    """(n_nodes,) bool: nodes of exactly two segments that need no grading.
+
+    The segments turn by less than ``kink`` (rad), the ratio of their element sizes ``size`` (n_segments,) is below
+    ``jump``, and they are not both ``shut`` (n_segments,), i.e. drawn closed. ``first``, ``ends``: see `ends_at`.
+    """
     out = np.zeros(len(nodes), np.bool_)
     for k in range(len(nodes)):
         if surface[k] or first[k + 1] - first[k] != 2:
@@ -54,9 +61,11 @@ def straight_on(nodes, segments, surface, size, shut, first, ends, kink, jump):
 
 @_jit
 def cut(nodes, segments, tip, pieces, fractions):
-    """Start and end (n, 2), kind and segment (n,) of the elements of all segments, ``pieces`` (n_segments,) of each;
-    ``fractions`` are those of the segments, one after the other, where they are cut, ``tip`` (n_nodes,) which nodes are
-    tips."""
+    """Start and end (n, 2), kind and segment (n,) of the elements of all segments.
+
+    ``pieces`` (n_segments,) is the number of elements of each segment; ``fractions`` are the interior division points
+    of the segments, one segment after the other; ``tip`` (n_nodes,) marks the nodes that are crack tips.
+    """
     n, k = pieces.sum(), 0
     start, end = np.empty((n, 2)), np.empty((n, 2))
     kind, source = np.full(n, shape_functions.ORDINARY), np.empty(n, np.int64)
@@ -77,7 +86,7 @@ def cut(nodes, segments, tip, pieces, fractions):
 
 
 def share_ends(pieces: np.ndarray) -> np.ndarray:
-    """(m, m) bool: which of ``pieces`` (m, 2, 2) end in a common point, to the bit, themselves among them."""
+    """(m, m) bool: which of ``pieces`` (m, 2, 2) have an end point in common, bit for bit; the diagonal is True."""
     flat = np.ascontiguousarray(pieces).reshape(-1, 2)
     return _share_ends(flat, np.argsort(flat[:, 0]))
 

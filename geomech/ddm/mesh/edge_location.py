@@ -1,4 +1,4 @@
-"""Where a straight piece that a user names lies on a body's boundary."""
+"""Locates a straight piece that the user names on the boundary of a body."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ import numpy as np
 if TYPE_CHECKING:
     from .elements import Mesh
 
-#: A segment may stand this far off the boundary, in units of the extent; it is put onto it.
+#: Largest distance of such a segment from the boundary, relative to the extent; within it the segment is projected.
 OFF = 1e-6
 
 
 def sides_for(mesh: Mesh, points: np.ndarray) -> np.ndarray:
-    """(m, 2, 2) the edges of ``mesh`` and, in a half-plane, a piece of its surface that goes beyond all of ``points``
-    (..., 2)."""
+    """(m, 2, 2) the edges of ``mesh`` and, in a half-plane, a piece of its surface that extends beyond all of
+    ``points`` (..., 2)."""
     rock = mesh.cracks.half_plane
     if rock is None:
         return mesh.edges
@@ -24,10 +24,10 @@ def sides_for(mesh: Mesh, points: np.ndarray) -> np.ndarray:
 
 
 def onto_boundary(edges: np.ndarray, segment: np.ndarray, name: str, extent: float) -> tuple[np.ndarray, bool, int]:
-    """``segment`` (2, 2) put onto the one of ``edges`` (m, 2, 2) it lies on, whether it runs against that edge, and
-    which.
+    """Project ``segment`` (2, 2) onto that of ``edges`` (m, 2, 2) on which it lies.
 
-    Raises ValueError with ``name`` when it is off by more than `OFF` times ``extent``, or has no length.
+    Returns the projected segment, whether it runs against the edge's direction, and the edge's number. Raises
+    ValueError with ``name`` when the distance exceeds `OFF` times ``extent`` or the segment has no length.
     """
     a, d = edges[:, 0], edges[:, 1] - edges[:, 0]
     length = np.hypot(*d.T)

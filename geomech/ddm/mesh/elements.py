@@ -1,12 +1,11 @@
-"""From outlines and cracks to elements: a pure function of the geometry, so what has not changed is the same to the
-bit.
+"""Elements of outlines and cracks, a pure function of the geometry: unchanged parts get identical elements.
 
-Sides are cut to nearly equal elements, graded towards corners and crack mouths; a straight initial crack has
-``elements_per_crack`` elements, every grown increment one. Density has weak singularities at kinks, junctions and
-mouths: there element sizes shrink geometrically. Last, elements that are long beside their distance to others are
-halved. A slight kink loses its grading again when the tip is three increments past it, where it no longer matters for
-the stress intensity. A sharp one keeps it: where a wing leaves a flaw, the corner carries the wedge that drives the
-wing's tip however far away (without grading its K_I was 13 % low at 1.2 flaw lengths).
+Edges are divided into nearly equal elements, graded towards corners and crack mouths. A straight initial crack has
+``elements_per_crack`` elements; each growth increment is one element. Displacement has weak singularities at kinks,
+junctions and mouths: element sizes shrink geometrically towards them. Finally, elements that are too long for their
+distance to others are halved. A slight kink is no longer graded once the tip is three increments past it, where it does
+not affect the stress intensity factors. A sharp kink stays graded: where a wing leaves a flaw, the wedge of rock at the
+corner drives the wing at any length (without grading, K_I was 13 % low at a wing of 1.2 flaw lengths).
 """
 
 from __future__ import annotations
@@ -21,27 +20,31 @@ from ...model import Cracks, DdmSettings
 from ...model.blocks.polygon import signed_area
 from ..system.influence_matrix import ElementSet
 from .crack_nodes import cut, ends_at, share_ends, straight_on
-from .grading import BESIDE, KINK, Grading
+from .grading import KINK, NEAR_CORNER, Grading
 from .half_plane import ON_SURFACE, HalfPlane
 from .proximity import keep_apart
 
-#: Neighbouring segments whose elements differ more than this in length are graded.
+#: Neighbouring segments are graded where the ratio of their element lengths exceeds this.
 JUMP = 10.0 * (1 + 1e-9)
-#: Increments between a slight kink and the tip from which the kink is not graded any more.
-FORGOTTEN = 3
-#: Sides that turn by less than this go straight on, rad, …
+#: Number of increments between a slight kink and the tip beyond which the kink is not graded.
+LEFT_BEHIND = 3
+#: Edges that turn by less than this continue straight, rad; …
 STRAIGHT = math.radians(0.1)
-#: … and elements there are of one length when the longer is less than so many times the shorter.
+#: … their elements get one length when the ratio of the lengths is below this.
 ALIKE = 1.2
-#: A mouth nearer to an element's end than this part of its length moves the end instead of cutting a sliver.
+#: A mouth nearer to an element's end than this part of its length moves that end; no shorter element is made.
 SLIVER = 0.08
 
 
 @dataclass(frozen=True, eq=False)
 class Mesh:
-    """``boundary`` elements (source: edge) and ``cracks`` elements (source: segment); ``edges`` (m, 2, 2) the outline
-    and ``edge_loop`` (m,) the loop of each. ``sides`` are what of the cracks the boundary's elements depend on, these
-    before any are halved, and which edges go straight on."""
+    """The elements of a body.
+
+    boundary, cracks   elements; their source is the edge or the crack segment
+    edges, edge_loop   (m, 2, 2) edges of all loops and (m,) the loop of each
+    sides              what the boundary elements depend on, these elements before halving, and the straight runs of
+                       edges
+    """
 
     boundary: ElementSet
     cracks: ElementSet
@@ -66,9 +69,12 @@ def mesh(
     known: Mesh | None = None,
     half_plane: HalfPlane | None = None,
 ) -> Mesh:
-    """Elements of a body with outline ``loops`` (counter-clockwise, holes clockwise; holes alone or [] for the
-    infinite plane). ``marks``: further points (2,) of the boundary that are to be nodes, with graded layers at each.
-    ``known``: a mesh of the same, but for the cracks. ``half_plane``: the rock is this; its surface has no elements."""
+    """Elements of a body with outline ``loops``, counter-clockwise; holes run clockwise.
+
+    ``loops`` may hold holes alone, or be [] for the infinite plane. ``marks``: further points (2,) of the boundary that
+    must be nodes, with the number of graded layers at each. ``known``: a mesh of the same body with other cracks.
+    ``half_plane``: the half-plane that the rock fills; its surface needs no elements.
+    """
     edges, edge_loop = outline_edges(loops) if known is None else (known.edges, known.edge_loop)
     points = np.concatenate([edges.reshape(-1, 2), cracks.nodes])
     extent = np.ptp(points, axis=0).max() if len(points) else 0.0
@@ -78,7 +84,7 @@ def mesh(
         (cracks.nodes[k], _layers_at(cracks, k, sides_of_rock, grading))
         for k in (np.flatnonzero(cracks.surface & (cracks.valence > 0)) if len(edges) else ())
     ]
-    corners = _corners_beside(cracks, loops, settings, grading)
+    corners = _corners_near_cracks(cracks, loops, settings, grading)
     key: tuple = float(extent), tuple((*point, deep) for point, deep in [*mouths, *corners])
     if known is not None and known.sides[0] == key:
         sides = known.sides
@@ -104,7 +110,7 @@ def mesh(
         start, end, kind, source = start[own], end[own], kind[own], source[own]
     on_crack = source >= len(edges)
     rest = ~on_crack
-    # A rigid rotation of a boundary must be in its elements' span, or it is not without stress.
+    # The boundary elements must represent a rigid rotation, which otherwise would cause stress.
     order = max(settings.order, 1)
     sides_now = ElementSet(start[rest], end[rest], kind[rest], source[rest], order, settings.nodes, half_plane)
     if known is not None and _alike(known.boundary, sides_now):
@@ -127,23 +133,25 @@ def mesh(
 
 
 def _with_images(half_plane: HalfPlane, ends, kind, source, touching, near: float):
-    """``ends`` (starts, ends and pieces, (n, 2) or (n, 2, 2)), kinds, sources and what touches, with the images that
-    the free surface makes of them behind: it is they that elements below it must not be long beside."""
+    """Add the images behind the free surface, from which elements below it must keep their distance as well.
+
+    ``ends`` are the starts, the ends and the pieces, (n, 2) or (n, 2, 2); kinds, sources and the table of touching
+    pieces are extended in the same way.
+    """
     ends = tuple(np.concatenate([x, half_plane.images(x, near)]) for x in ends)
     n = len(touching)
     both = np.zeros((2 * n, 2 * n), bool)
     both[:n, :n] = both[n:, n:] = touching
     pieces = ends[2][:n]
-    # A piece that begins at the surface meets its own image there, and those of its neighbours.
+    # A piece that begins at the surface touches its own image there, and the images of its neighbours.
     above = np.abs(half_plane.frame(pieces)[..., 1]) <= near
     meets = np.diag(above.any(axis=1)) | (touching & above.any(axis=1) & above.any(axis=1)[:, None])
     both[:n, n:], both[n:, :n] = meets, meets.T
     return ends, np.concatenate([kind, kind]), np.concatenate([source, source + n]), both
 
 
-def _corners_beside(cracks: Cracks, loops: list[np.ndarray], settings: DdmSettings, grading: Grading):
-    """Re-entrant corners of the outline that cracks come near to, and the layers that each takes: (point (2,),
-    layers)."""
+def _corners_near_cracks(cracks: Cracks, loops: list[np.ndarray], settings: DdmSettings, grading: Grading):
+    """Re-entrant corners of the outline near which cracks run: (point (2,), graded layers) of each."""
     if grading.target is not None or not cracks.n_segments:
         return []
     found = []
@@ -152,22 +160,23 @@ def _corners_beside(cracks: Cracks, loops: list[np.ndarray], settings: DdmSettin
         angles = interior_angles(loop)
         for k in np.flatnonzero(angles > np.pi + KINK):
             off = _distance(loop[k], ends)
-            # A crack that begins at the corner has a mouth there.
-            near = off.min() < BESIDE * span / settings.elements_per_side and off.min() > 1e-7 * span
+            # A crack that begins at the corner has its mouth there.
+            near = off.min() < NEAR_CORNER * span / settings.elements_per_side and off.min() > 1e-7 * span
             if near:
-                found.append((loop[k], grading.beside_crack(float(angles[k]))))
+                found.append((loop[k], grading.near_crack(float(angles[k]))))
     return found
 
 
 def _distance(point: np.ndarray, ends: np.ndarray) -> np.ndarray:
-    """(n,) m from ``point`` (2,) to segments with these ``ends`` (n, 2, 2)."""
+    """(n,) distance, m, from ``point`` (2,) to segments with the ends ``ends`` (n, 2, 2)."""
     along, to = ends[:, 1] - ends[:, 0], point - ends[:, 0]
     part = np.clip((to * along).sum(axis=1) / np.maximum((along**2).sum(axis=1), 1e-300), 0.0, 1.0)
     return np.hypot(*(to - part[:, None] * along).T)
 
 
 def _spans(loops: list[np.ndarray]) -> list[float]:
-    """m, the size that a loop's elements are parts of: √area of the outline, of holes alone each its own."""
+    """Length, m, to which a loop's element size is relative: √area of the outline; of the infinite plane, each hole's
+    own."""
     spans = [math.sqrt(abs(signed_area(loop))) for loop in loops]
     return spans[:1] * len(loops) if loops and signed_area(loops[0]) > 0 else spans
 
@@ -204,7 +213,7 @@ def _boundary(loops, edges, mouths, settings, grading, extent, marks):
             lines.append(_with_mouths(edges[edge], fractions, [*mouths, *marks], grading, span, extent))
         for i in np.flatnonzero(np.abs(angles[first[k] : first[k + 1]] - np.pi) < STRAIGHT):
             before, after = first[k] + (i - 1) % n_edges, first[k] + i
-            lines[before], lines[after] = _evened(lines[before], lines[after], grading.ratio)
+            lines[before], lines[after] = _equalised(lines[before], lines[after], grading.ratio)
     nodes = [np.stack([line[:-1], line[1:]], axis=1) for line in lines]
     source = [np.full(len(line) - 1, edge) for edge, line in enumerate(lines)]
     pairs = np.concatenate(nodes)
@@ -220,7 +229,7 @@ def interior_angles(loop: np.ndarray) -> np.ndarray:
 
 
 def _side(edge, length: float, size: float, at_start: int, at_end: int, grading: Grading, extent: float) -> np.ndarray:
-    """(n + 1,) fractions along a side, from 0 to 1."""
+    """(n + 1,) fractions from 0 to 1 that divide an edge."""
     n = max(1, math.ceil(length / size - 1e-9))
     if n == 1 and at_start and at_end:
         n = 2
@@ -230,11 +239,12 @@ def _side(edge, length: float, size: float, at_start: int, at_end: int, grading:
     return np.array([0.0, *(f / n for f in fine), 1.0])
 
 
-def _evened(before: np.ndarray, after: np.ndarray, ratio: float) -> tuple[np.ndarray, np.ndarray]:
-    """The points (n, 2) of two sides that go straight on, with elements of one length where they meet.
+def _equalised(before: np.ndarray, after: np.ndarray, ratio: float) -> tuple[np.ndarray, np.ndarray]:
+    """Points (n, 2) of two edges that continue straight, with elements of equal length where they meet.
 
-    Loads mostly end there. Their tractions jump, and what that leaves of singularities at nodes cancels between
-    elements that are mirror images (beside longer neighbours a short load lost 0.3 % of its force, so 1e-6).
+    Loads mostly end at such points. Tractions jump there, and the resulting singularities at the nodes cancel between
+    elements that are mirror images (next to a longer neighbour a short load lost 0.3 % of its force, with equal ones
+    1e-6).
     """
     ends = [np.hypot(*(before[-1] - before[-2])), np.hypot(*(after[1] - after[0]))]
     short, long = min(ends), max(ends)
@@ -252,7 +262,7 @@ def _evened(before: np.ndarray, after: np.ndarray, ratio: float) -> tuple[np.nda
 
 
 def _with_mouths(edge, fractions, mouths, grading, span, extent) -> np.ndarray:
-    """(n, 2) points along an ``edge`` with ``mouths`` (point, layers) as nodes, graded; elsewhere as without them."""
+    """(n, 2) points along an ``edge`` with ``mouths`` (point, layers) as graded nodes."""
     a, b = edge
     along = b - a
     length = math.hypot(*along)
@@ -264,7 +274,7 @@ def _with_mouths(edge, fractions, mouths, grading, span, extent) -> np.ndarray:
         rel = mouth - a
         f = float(rel @ along) / length**2
         off = abs(rel[0] * along[1] - rel[1] * along[0]) / length
-        # At a corner there is nothing to split.
+        # At a corner there is no element to divide.
         if off <= 1e-7 * span and 1e-7 * span < f * length < length - 1e-7 * span:
             here.append((f, mouth, layers))
     for f, mouth, layers in sorted(here, key=lambda mark: mark[0]):
@@ -297,7 +307,8 @@ def _cracks(cracks: Cracks, settings: DdmSettings, grading: Grading, extent: flo
     drawn = cracks.birth_cycle == 0
     total = np.bincount(cracks.crack, weights=np.where(drawn, length, 0.0), minlength=cracks.crack.max() + 1)
     share = np.where(drawn, length / np.maximum(total[cracks.crack], 1e-300), 0.0)
-    # To nine digits first: of a crack drawn in two halves, 2½ of five elements each, both get as many.
+    # Rounded to nine digits first: both halves of a crack drawn in two, with 2½ of five elements each, get the same
+    # number.
     count = np.maximum(1, np.rint(np.round(settings.elements_per_crack * share, 9)).astype(int))
     layers = _node_layers(cracks, length / count, grading, edges)
     inner: list[float] = []
@@ -323,14 +334,14 @@ def _cracks(cracks: Cracks, settings: DdmSettings, grading: Grading, extent: flo
 
 
 def _node_layers(cracks: Cracks, size: np.ndarray, grading: Grading, edges: np.ndarray) -> np.ndarray:
-    """(n_segments, 2) graded layers at the start and end of every segment; ``size`` its element length."""
+    """(n_segments, 2) graded layers at the start and end of every segment; ``size`` is its element length."""
     layers = np.zeros((cracks.n_segments, 2), int)
     closed, surface = _closed(cracks), cracks.surface
     first, ends = ends_at(cracks)
     plain = (cracks.valence == 0) | ((cracks.valence == 1) & ~surface)
     if grading.target is None:
         nodes, segments = np.ascontiguousarray(cracks.nodes), np.ascontiguousarray(cracks.segments, dtype=np.int64)
-        # Well below what counts, which round-off does not decide here.
+        # Well below the lengths that matter, so that round-off does not decide.
         plain |= straight_on(nodes, segments, surface, size, closed, first, ends, 0.9 * KINK, 0.9 * JUMP)
     for node in np.flatnonzero(~plain).tolist():
         here = [divmod(end, 2) for end in ends[first[node] : first[node + 1]].tolist()]
@@ -342,13 +353,13 @@ def _node_layers(cracks: Cracks, size: np.ndarray, grading: Grading, edges: np.n
                 continue
         else:
             (s, e), (r, f) = here
-            # Straight on means that one arrives where the other leaves.
+            # Straight on: one segment arrives in the direction in which the other leaves.
             turn = _heading(cracks, s) - _heading(cracks, r) + (math.pi if e == f else 0.0)
             turn = abs(math.remainder(turn, 2 * math.pi))
             if closed[s] and closed[r]:
                 deep = grading.at_closed_kink(turn)
             else:
-                deep = grading.at_kink(turn, turn > KINK and _forgotten(cracks, first, ends, here))
+                deep = grading.at_kink(turn, turn > KINK and _left_behind(cracks, first, ends, here))
             if deep:
                 layers[s, e] = layers[r, f] = deep
         least = min(float(size[s]) for s, _ in here)
@@ -360,32 +371,32 @@ def _node_layers(cracks: Cracks, size: np.ndarray, grading: Grading, edges: np.n
 
 
 def _heading(cracks: Cracks, segment: int) -> float:
-    """The direction of a segment, rad."""
+    """Direction of a segment, rad."""
     (ax, ay), (bx, by) = cracks.nodes[cracks.segments[segment]].tolist()
     return math.atan2(by - ay, bx - ax)
 
 
 def _closed(cracks: Cracks) -> np.ndarray:
-    """(n_segments,) bool: drawn segments without an aperture, kinks between which are graded however slight."""
+    """(n_segments,) bool: segments drawn without an aperture; kinks between them are graded however slight."""
     return (cracks.aperture == 0) & (cracks.birth_cycle == 0)
 
 
 def _layers_at(cracks: Cracks, node: int, edges: np.ndarray, grading: Grading) -> int:
-    """Graded layers at a junction or mouth."""
+    """Graded layers at a junction or a mouth."""
     if grading.target is None and cracks.surface[node]:
         return grading.layers
     return grading.at_node(wedges(cracks, node, edges), "mouth" if cracks.surface[node] else "crack")
 
 
 def wedges(cracks: Cracks, node: int, edges: np.ndarray) -> np.ndarray:
-    """(n,) angles of rock, rad, between the faces that meet at a ``node``, which may lie on the boundary."""
+    """(n,) angles, rad, of the wedges of rock between the faces that meet at ``node``, which may be on the boundary."""
     here = np.argwhere(cracks.segments == node)
     to = cracks.nodes[cracks.segments[here[:, 0], 1 - here[:, 1]]] - cracks.nodes[node]
     rays = np.arctan2(to[:, 1], to[:, 0])
     if not cracks.surface[node] or not len(edges):
         rays = np.sort(rays)
         return np.diff(np.r_[rays, rays[0] + 2 * np.pi])
-    # On the boundary rock runs from the direction in which it goes on, turning left, to that from which it came.
+    # On the boundary rock lies counter-clockwise from the edge that leaves to the edge that arrives.
     a, d = edges[:, 0], edges[:, 1] - edges[:, 0]
     rel, length = cracks.nodes[node] - a, np.hypot(*d.T)
     along = np.sum(rel * d, axis=1) / length
@@ -400,13 +411,13 @@ def wedges(cracks: Cracks, node: int, edges: np.ndarray) -> np.ndarray:
     return np.diff(np.sort(np.r_[0.0, turn, np.mod(last - first, 2 * np.pi)]))
 
 
-def _forgotten(cracks: Cracks, first: np.ndarray, ends: np.ndarray, here) -> bool:
-    """Whether the chain that grew from a kink has left it ``FORGOTTEN`` increments behind; ``first`` and ``ends`` as of
+def _left_behind(cracks: Cracks, first: np.ndarray, ends: np.ndarray, here) -> bool:
+    """Whether the chain grown from a kink has at least ``LEFT_BEHIND`` increments; ``first`` and ``ends`` as in
     `ends_at`."""
     s, e = max(here, key=lambda at: cracks.birth_cycle[at[0]])
     if cracks.birth_cycle[s] == 0:
         return False
-    for _ in range(FORGOTTEN - 1):
+    for _ in range(LEFT_BEHIND - 1):
         node = cracks.segments[s, 1 - e]
         if first[node + 1] - first[node] != 2:
             return False
@@ -421,19 +432,19 @@ def _alike(one: ElementSet, other: ElementSet) -> bool:
 
 
 def _straight_on(loops: list[np.ndarray]) -> np.ndarray | None:
-    """(m,) numbers of sides from bend to bend, that of each edge; None where every vertex is a bend."""
+    """(m,) for each edge the number of its straight run between bends; None where every vertex is a bend."""
     bends = [np.abs(interior_angles(loop) - np.pi) >= STRAIGHT for loop in loops]
     if all(bend.all() for bend in bends):
         return None
-    # A loop's last edges belong to its first ones when it begins on a straight.
+    # A loop that begins within a straight run: its last edges belong to its first run.
     n_edges = sum(len(bend) for bend in bends)
     return np.concatenate([np.cumsum(bend) % max(bend.sum(), 1) + n_edges * k for k, bend in enumerate(bends)])
 
 
 def _touching(side: np.ndarray | None, pieces: np.ndarray, n_edges: int, cracks: Cracks, extent: float) -> np.ndarray:
-    """(m, m) which of ``pieces`` (m, 2, 2), edges and segments, meet in a node; edges of one ``side`` (`_straight_on`)
-    count as one."""
-    # Nodes by coordinates, so that corners, junctions and drawn end points that coincide count alike.
+    """(m, m) which of ``pieces`` (m, 2, 2), edges and segments, share a node; edges of one straight run ``side``
+    (`_straight_on`) count as one."""
+    # Nodes are compared by coordinates, so that corners, junctions and drawn end points that coincide are one.
     out = share_ends(pieces)
     if side is not None:
         out[:n_edges, :n_edges] |= side[:, None] == side

@@ -1,4 +1,4 @@
-"""What a body may look like: outlines that bound an area, cracks inside it that do not cross or coincide."""
+"""Checks of outlines and cracks: outlines bound an area; cracks lie inside it and neither cross nor coincide."""
 
 from __future__ import annotations
 
@@ -11,28 +11,28 @@ from ...model.blocks.polygon import signed_area
 from .geometry_prefilter import clearly_valid
 from .point_location import inside, outlined
 
-#: Coordinates must resolve a segment to this part of its length: K is off by some fifty times that (its elements are
-#: shorter).
+#: Coordinates must resolve a segment to this part of its length: the relative error of K is some fifty times as large
+#: (its elements are shorter).
 FEWEST_DIGITS = 1e-5
 #: Lengths below this part of the extent are zero.
 _SMALL = 1e-9
-#: Faces that enclose less rock than this at a kink of a crack, or at its mouth, are refused: there K begins to be off
-#: by more than grading mends.
+#: Smaller angles of rock between the faces at a kink of a crack, or at its mouth, are refused: grading no longer keeps
+#: K accurate there.
 SHARPEST_FOLD, SHARPEST_MOUTH = np.radians(10.0), np.radians(3.0)
-#: How points that coincide come to be one node.
+#: How to give coinciding points one node.
 JOIN = "make one node of points that coincide: Cracks.from_polylines(…, join=True)"
-#: More pairs of segments than this, new ones with all, are compared by their boxes first.
+#: Beyond this number of pairs (new segments × all segments), bounding boxes are compared first.
 _EACH_WITH_ALL = 1_000_000
-#: Pairs of boxes compared at a time: a few bits each, and no more memory for ten thousand segments than for two
-#: thousand.
+#: Pairs of boxes compared at a time: memory stays the same for two or ten thousand segments.
 _PAIRS_AT_ONCE = 4_000_000
 
 
 def check_outline(loops: list[np.ndarray], holes: Sequence[np.ndarray] = ()) -> list[np.ndarray]:
-    """``loops`` (an outline and its holes, or none) and further ``holes``, which may run either way, as float arrays.
+    """Check ``loops`` (an outline and its holes, or none) and further ``holes``, which may run either way; float
+    arrays.
 
-    Raises ValueError naming the loop: shape, finiteness, repeated vertices, sense of rotation (outline
-    counter-clockwise, holes clockwise), crossing edges, holes outside the outline or in each other.
+    Raises ValueError naming the loop: shape, finiteness, repeated vertices, orientation (outline counter-clockwise,
+    holes clockwise), crossing edges, holes outside the outline or inside each other.
     """
     out = [_checked(loop, "the outline" if k == 0 else f"hole {k}") for k, loop in enumerate(loops)]
     for k, loop in enumerate(out):
@@ -82,10 +82,13 @@ def _checked(loop: np.ndarray, name: str) -> np.ndarray:
 
 
 def check_cracks(cracks: Cracks, edges: np.ndarray, loops: list[np.ndarray], fresh: np.ndarray | None = None) -> None:
-    """Raise ValueError naming the crack: not finite, no length, outside the rock, on the boundary without being a
-    mouth, crossing the outline or lying along it, crossing, covering or touching another without a shared node, folding
-    back on itself or leaving the boundary at an angle too sharp to be resolved. ``fresh`` (n_segments,) bool limits the
-    comparison to segments that are new."""
+    """Check the cracks of a network against each other and against the outline.
+
+    Raises ValueError naming the crack: not finite, zero length, outside the rock, on the boundary without being a
+    mouth, crossing the outline or lying along it, crossing, covering or touching another crack without a shared node,
+    folding back on itself, or leaving the boundary at too sharp an angle. Only segments that are ``fresh``
+    (n_segments,) are compared with the others.
+    """
     n = cracks.n_segments
     if n == 0:
         return
@@ -129,7 +132,7 @@ def check_cracks(cracks: Cracks, edges: np.ndarray, loops: list[np.ndarray], fre
 
 
 def _check_sizes(cracks: Cracks, segments: np.ndarray, span: float, name) -> None:
-    """Lengths that coordinates can tell, and apertures that are none below zero."""
+    """Segment lengths must be resolved by the coordinates, apertures not negative."""
     if (cracks.lengths <= 1e-12 * span).any():
         raise ValueError(f"{name(int(np.argmin(cracks.lengths)))}: a crack segment has no length")
     if not (cracks.aperture >= 0).all():
@@ -147,7 +150,7 @@ def _check_sizes(cracks: Cracks, segments: np.ndarray, span: float, name) -> Non
 def _check_ends(
     cracks: Cracks, segments: np.ndarray, new: np.ndarray, edges: np.ndarray, loops: list[np.ndarray], span: float, name
 ) -> None:
-    """The ends of segments that are ``new`` (k,): on the boundary if they are mouths, else in the rock."""
+    """Ends of the ``new`` (k,) segments: mouths must be on the boundary, other ends in the rock."""
     mouth = cracks.surface[cracks.segments]
     ends = segments[new].reshape(-1, 2)
     distance = _to_segments(ends, edges).reshape(-1, 2)
@@ -165,7 +168,7 @@ def _check_ends(
 
 
 def _check_crossing(cracks: Cracks, segments: np.ndarray, at: np.ndarray, edges: np.ndarray, span: float, name) -> None:
-    """The segments ``at`` (k,), each against one of ``edges`` (k, 2, 2): it may neither cross it nor lie along it."""
+    """Segments ``at`` (k,), each against one of ``edges`` (k, 2, 2): they may neither cross nor lie along it."""
     one, mouth = segments[at], cracks.surface[cracks.segments]
     for k in np.flatnonzero(_crossing(one, edges)):
         s = at[k]
@@ -178,7 +181,7 @@ def _check_crossing(cracks: Cracks, segments: np.ndarray, at: np.ndarray, edges:
 
 
 def _check_pairs(cracks: Cracks, segments: np.ndarray, new: np.ndarray, span: float, name) -> None:
-    """New segments against all: none may cross or cover another, nor end on one with which it shares no node."""
+    """New segments against all others: none may cross or cover another, nor end on one without a shared node."""
     i, j = _boxes_meet(segments[new], segments, _SMALL * span)
     i = new[i]
     i, j = i[i != j], j[i != j]
@@ -202,15 +205,15 @@ def _check_pairs(cracks: Cracks, segments: np.ndarray, new: np.ndarray, span: fl
 
 
 def _touching(cracks: Cracks, segments: np.ndarray, s: int, end: int, other: int, span: float, name) -> str:
-    """What is said where an end of segment ``s`` stands on the ``other``."""
+    """Message for an end of segment ``s`` that lies on the segment ``other``."""
     x, y = at = segments[s, end]
     at_end = np.hypot(*(segments[other] - at).T) <= _SMALL * span
     if cracks.crack[s] == cracks.crack[other]:
         comes_back = "ends where it began" if at_end.any() else "comes back to itself"
-        told = f"{name(s)}: {comes_back}, at ({x:g}, {y:g}), without a shared node"
+        message = f"{name(s)}: {comes_back}, at ({x:g}, {y:g}), without a shared node"
     else:
-        told = f"{name(s)} and {name(other)} touch at ({x:g}, {y:g}) without a shared node"
-    return f"{told}: {JOIN if at_end.any() else f'give {name(other)} a point there too, and {JOIN}'}"
+        message = f"{name(s)} and {name(other)} touch at ({x:g}, {y:g}) without a shared node"
+    return f"{message}: {JOIN if at_end.any() else f'give {name(other)} a point there too, and {JOIN}'}"
 
 
 def _check_mouths(cracks: Cracks, new: np.ndarray, edges: np.ndarray, span: float, name) -> None:
@@ -219,7 +222,7 @@ def _check_mouths(cracks: Cracks, new: np.ndarray, edges: np.ndarray, span: floa
         x = cracks.nodes[cracks.segments[new[s], e]]
         way = cracks.nodes[cracks.segments[new[s], 1 - e]] - x
         here = edges[_to_pairs(np.broadcast_to(x, (len(edges), 2)), edges) <= 1e-7 * span]
-        # The directions in which the boundary goes on from here.
+        # Directions of the two boundary edges at the mouth.
         ahead = (here - x).reshape(-1, 2)
         size = np.hypot(*ahead.T)
         ahead, size = ahead[size > 1e-7 * span], size[size > 1e-7 * span]
@@ -239,7 +242,7 @@ def _check_folds(cracks: Cracks, new: np.ndarray, name) -> None:
     met = fresh[one // 2] | fresh[two // 2]
     one, two = one[met], two[met]
     node = cracks.nodes[flat[one]]
-    # The other end of a segment stands beside this one.
+    # The far end of one segment lies close to the other.
     u, v = cracks.nodes[flat[one ^ 1]] - node, cracks.nodes[flat[two ^ 1]] - node
     folded = np.sum(u * v, axis=1) > np.cos(SHARPEST_FOLD) * np.hypot(*u.T) * np.hypot(*v.T)
     for k in np.flatnonzero(folded)[:1]:
@@ -254,7 +257,7 @@ def _check_folds(cracks: Cracks, new: np.ndarray, name) -> None:
 
 
 def _to_pairs(points: np.ndarray, segments: np.ndarray) -> np.ndarray:
-    """(n,) distance of each of ``points`` (n, 2) to its own segment (n, 2, 2)."""
+    """(n,) distance of each of ``points`` (n, 2) from its own segment (n, 2, 2)."""
     a, d = segments[:, 0], segments[:, 1] - segments[:, 0]
     rel = points - a
     s = np.clip(np.sum(rel * d, axis=1) / np.sum(d * d, axis=1), 0.0, 1.0)
@@ -273,7 +276,7 @@ def _side_of(p, segments):
 
 
 def _boxes_meet(first: np.ndarray, second: np.ndarray, slack: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
-    """Pairs (i, j) of segments whose boxes, wider by ``slack``, have a point in common, in the order of i, then j."""
+    """Pairs (i, j) of segments whose boxes, widened by ``slack``, overlap; sorted by i, then j."""
     low, high = first.min(axis=1) - slack, first.max(axis=1) + slack
     other_low, other_high = second.min(axis=1), second.max(axis=1)
     rows, columns = [], []
@@ -293,7 +296,7 @@ def _boxes_meet(first: np.ndarray, second: np.ndarray, slack: float = 0.0) -> tu
 
 
 def _crossing(one: np.ndarray, other: np.ndarray) -> np.ndarray:
-    """(k,) bool: pairs of segments (k, 2, 2) that cross properly: each has the other's ends on both sides, beyond
+    """(k,) bool: pairs of segments (k, 2, 2) that cross properly: each has the ends of the other on both sides, beyond
     round-off."""
     scale = max(np.abs(one).max(initial=0.0), np.abs(other).max(initial=0.0))
     tol1 = 1e-10 * scale * np.hypot(*(other[:, 1] - other[:, 0]).T)
@@ -306,7 +309,7 @@ def _crossing(one: np.ndarray, other: np.ndarray) -> np.ndarray:
 
 
 def _overlapping(one: np.ndarray, other: np.ndarray, span: float) -> np.ndarray:
-    """(k,) bool: pairs of segments (k, 2, 2) that lie on one line and share more than a point."""
+    """(k,) bool: collinear pairs of segments (k, 2, 2) that share more than a point."""
     d = one[:, 1] - one[:, 0]
     length = np.hypot(*d.T)
     t = d / length[:, None]
@@ -318,7 +321,7 @@ def _overlapping(one: np.ndarray, other: np.ndarray, span: float) -> np.ndarray:
 
 
 def _to_segments(points: np.ndarray, segments: np.ndarray) -> np.ndarray:
-    """(n,) distance of points to the nearest of ``segments``."""
+    """(n,) distance of points from the nearest of ``segments``."""
     a, d = segments[:, 0], segments[:, 1] - segments[:, 0]
     rel = points[:, None] - a
     s = np.clip(np.sum(rel * d, axis=2) / np.sum(d * d, axis=1), 0.0, 1.0)
@@ -326,7 +329,7 @@ def _to_segments(points: np.ndarray, segments: np.ndarray) -> np.ndarray:
 
 
 def new_segments(cracks: Cracks, earlier: Cracks) -> np.ndarray:
-    """(n_segments,) bool: which segments of ``cracks`` are none of the ``earlier`` ones, bit for bit."""
+    """(n_segments,) bool: segments of ``cracks`` that are not, bit for bit, among the ``earlier`` ones."""
     known = {row.tobytes() for row in np.ascontiguousarray(earlier.nodes[earlier.segments])}
     return np.array(
         [row.tobytes() not in known for row in np.ascontiguousarray(cracks.nodes[cracks.segments])], dtype=bool

@@ -1,5 +1,8 @@
-"""Cracks that are plainly well: nothing crosses, touches or folds by a wide margin, so that no fault need be looked
-for. Growth adds a few segments at a time, and nearly always they stand clear of everything."""
+"""Quick pre-check of a crack network: nothing crosses, touches or folds, by a wide margin.
+
+Growth adds a few segments at a time, nearly always clear of all others; only where this pre-check fails do the full
+checks run (`geometry_checks`).
+"""
 
 from __future__ import annotations
 
@@ -9,11 +12,12 @@ import numpy as np
 
 from ...compiled import kept, part
 
-#: A new segment that is nearer than this part of the extent to what it shares no node with is looked at closely.
+#: Full checks are needed where a new segment is nearer than this part of the extent to one with which it shares no
+#: node.
 CLEAR = 1e-6
-#: The same of one that shares a node and leaves it within this angle of the other's direction.
+#: The same where it shares a node and leaves within this angle of the other's direction.
 SPREAD = math.cos(math.radians(11.0))
-#: Coordinates may have steps of this part of a segment's length; with half of what is allowed nothing is in doubt.
+#: Coordinate resolution relative to a segment's length: half of what the full check allows.
 DIGITS = 0.5e-5
 
 _jit = kept(error_model="numpy", nogil=True)
@@ -22,10 +26,10 @@ _part = part(error_model="numpy", nogil=True)
 
 @_jit
 def clearly_valid(nodes, segments, surface, aperture, fresh, edges, n_rock, outlined):
-    """Whether no rule of `validity.check_cracks` can be broken.
+    """Whether no rule of `geometry_checks.check_cracks` can be broken.
 
-    ``nodes`` (n, 2), ``segments`` (m, 2), ``surface`` (n,), ``aperture`` and ``fresh`` (m,): of the network and which
-    of its segments are new; ``edges`` (k, 2, 2) of all loops, of which the first ``n_rock`` bound the rock, with an
+    ``nodes`` (n, 2), ``segments`` (m, 2), ``surface`` (n,), ``aperture`` and ``fresh`` (m,) describe the network and
+    its new segments; ``edges`` (k, 2, 2) are those of all loops, of which the first ``n_rock`` bound the rock, with an
     outline among them if ``outlined``.
     """
     span, far = _extent(nodes, segments, aperture, edges)
@@ -50,8 +54,8 @@ def clearly_valid(nodes, segments, surface, aperture, fresh, edges, n_rock, outl
 
 @_part
 def _extent(nodes, segments, aperture, edges):
-    """The larger side of the box of all segments and edges, and their largest coordinate; −1 where coordinates are not
-    finite, or an ``aperture`` is below zero."""
+    """Larger side of the bounding box, and the largest coordinate; −1 where coordinates are not finite or an aperture
+    is negative."""
     low_x, low_y, high_x, high_y = np.inf, np.inf, -np.inf, -np.inf
     for s in range(len(segments)):
         if not aperture[s] >= 0:
@@ -71,8 +75,8 @@ def _extent(nodes, segments, aperture, edges):
 
 @_part
 def _clear(nodes, segments, s, edges, near):
-    """Whether segment ``s`` stays clear of all ``edges`` and other segments, by ``near`` m or, where they share a node, by
-    an angle."""
+    """Whether segment ``s`` keeps a distance ``near`` (m) from all edges and other segments or, with a shared node, an
+    angle."""
     i, j = segments[s, 0], segments[s, 1]
     ax, ay, bx, by = nodes[i, 0], nodes[i, 1], nodes[j, 0], nodes[j, 1]
     for k in range(len(edges)):
@@ -89,7 +93,7 @@ def _clear(nodes, segments, s, edges, near):
             continue
         if (i == p and j == q) or (i == q and j == p):
             return False
-        # From the node that they share.
+        # Measured from the shared node.
         ux, uy, vx, vy = bx - ax, by - ay, dx - cx, dy - cy
         if j in (p, q):
             ux, uy = -ux, -uy
@@ -102,7 +106,7 @@ def _clear(nodes, segments, s, edges, near):
 
 @_part
 def _in_rock(x, y, edges, n_rock, outlined):
-    """By the even–odd rule."""
+    """Whether a point is in the rock, by the even–odd rule."""
     odd = False
     for k in range(n_rock):
         ax, ay, bx, by = edges[k, 0, 0], edges[k, 0, 1], edges[k, 1, 0], edges[k, 1, 1]
@@ -113,7 +117,7 @@ def _in_rock(x, y, edges, n_rock, outlined):
 
 @_part
 def _apart(ax, ay, bx, by, cx, cy, dx, dy, near):
-    """Whether two segments, a to b and c to d, are farther apart than ``near``."""
+    """Whether the segments ab and cd are farther apart than ``near``."""
     if (
         min(ax, bx) > max(cx, dx) + near
         or min(cx, dx) > max(ax, bx) + near
@@ -136,7 +140,7 @@ def _apart(ax, ay, bx, by, cx, cy, dx, dy, near):
 
 @_part
 def _off(px, py, ax, ay, bx, by):
-    """From a point to a segment."""
+    """Distance of a point from a segment."""
     dx, dy = bx - ax, by - ay
     s = min(1.0, max(0.0, ((px - ax) * dx + (py - ay) * dy) / (dx * dx + dy * dy)))
     return math.hypot(px - ax - s * dx, py - ay - s * dy)

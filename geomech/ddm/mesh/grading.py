@@ -1,9 +1,9 @@
-"""How finely elements shrink into corners, kinks, junctions and mouths, where displacement is not smooth.
+"""Grading of elements towards corners, kinks, junctions and mouths, where displacement is not smooth.
 
-Between two free faces that enclose an angle α of rock displacement goes like r^λ(α) (Williams 1952). Elements that
-shrink by ``ratio`` a layer leave an error of A ratio^(λ m) in the stress intensity factors after m layers. Either m is
-given, for every node alike, or it follows from the error that is asked for, with the A(α) that were measured on kinks
-of 7° to 150°, notches and slanted mouths (`tests/validation/test_automatic.py` holds what comes of it).
+In a wedge of rock of angle α between free faces displacement varies like r^λ(α) (Williams 1952). With elements that
+shrink by ``ratio`` from layer to layer, m layers leave a relative error A ratio^(λ m) in the stress intensity factors.
+Either m is given, the same at every node, or it follows from the target error, with A(α) measured on kinks of 7° to
+150°, notches and inclined mouths (`tests/validation/test_automatic.py` checks the resulting errors).
 """
 
 from __future__ import annotations
@@ -15,33 +15,32 @@ import numpy as np
 
 from ...model import DdmSettings
 
-#: A turn by 20° or more, whatever its round-off, is a kink that is graded, rad.
+#: A kink turns by 20° or more, allowing for round-off, rad; kinks are graded.
 KINK = math.radians(20) - 1e-9
-#: A turn by more than this is a sharp kink, graded for good.
+#: Turns above this are sharp kinks, which stay graded as cracks grow.
 SHARP_KINK = math.radians(60)
-#: Relative error of K that two layers a kink are meant to leave; every layer more or less halves or doubles it. Kinks
-#: get as many beyond the two as their own exponent asks for: 5e-4 whatever the turn (two for all left 3e-3 at 60°), as
-#: K of a kink by 20°, the first that is graded, has without any.
+#: Relative error of K for which kinks get two layers; a factor of about two in the error is one layer. Further layers
+#: depend on the kink's own exponent: 5e-4 at any angle (two layers for all left 3e-3 at 60°), the error of an ungraded
+#: kink of 20°, the smallest that is graded.
 KINK_ERROR, KINK_LAYERS = 5e-4, 2
-#: Beyond this a crack folds back on itself and the faces that nearly meet take smaller elements still: by a factor of e
-#: for each of these angles (without: K of folds by 150° and 168° 2e-3 and 2e-2 off, with a target up to 0.5).
+#: Beyond this turn the faces of a folded crack nearly meet and take smaller elements: by a factor e for each of these
+#: angles (without it, K of folds of 150° and 168° was off by 2e-3 and 2e-2, at targets up to 0.5).
 FOLD, FOLD_SHRINKS = math.radians(120), math.radians(20 / 3)
-#: Turns of closed cracks from this on are graded, however slight. What slips through a kink along one face would enter
-#: the other: slip goes like r to this power there whatever the turn (0.36 to 0.45 by the layers' effect on kinks by 2°
-#: to 45°, 1 to 0.01 of their crack), and ungraded ones leave this error of K, in proportion to the turn up to that
-#: beside it.
+#: Closed cracks are graded at turns above this, however slight. Slip past a kink would make one face enter the other,
+#: so it varies like r to this power at any turn (0.36 to 0.45 from the effect of layers on kinks of 2° to 45°, 1 to
+#: 0.01 of their crack); ungraded kinks leave this relative error of K, proportional to the turn up to the angle given
+#: with it.
 CLOSED_KINK, CLOSED_EXPONENT, CLOSED_ERROR, CLOSED_TURN = math.radians(5) - 1e-9, 0.41, 1.1e-2, math.radians(25)
-#: Re-entrant corners of the outline that a crack comes nearer to than so many of the outline's elements get as many
-#: layers as leave this error of K there, unless none are wanted: three, which serve elsewhere, left 1.5e-2 beside a
-#: right-angled one (`tests/ddm/mesh/test_corner_beside_crack.py`).
-BESIDE, CORNER_ERROR = 3.0, 2e-3
-#: Layers that any node gets; the smallest element stays above `Grading.finest` anyhow.
+#: Re-entrant corners of the outline with a crack within this many outline elements get the layers that leave this error
+#: of K, unless no layers are wanted: three, enough elsewhere, left 1.5e-2 at a right-angled corner
+#: (`tests/ddm/mesh/test_corner_beside_crack.py`).
+NEAR_CORNER, CORNER_ERROR = 3.0, 2e-3
+#: Most layers at any node; `Grading.finest` bounds the smallest element in any case.
 MOST_LAYERS = 16
-#: An element of length h at a distance r from the origin loses 1e-13 r/h of K, since its collocation points are
-#: rounded; what grading leaves at a sharp kink of a segment L falls like √(h/L). Their sum is least near h = 1e-7 r^⅔
-#: L^⅓.
+#: An element of length h at a distance r from the origin has an error 1e-13 r/h of K, because collocation points are
+#: rounded; grading at a sharp kink of a segment L leaves an error ∝ √(h/L). The sum is least near h = 1e-7 r^⅔ L^⅓.
 _FINEST = 1e-7
-#: No element is shorter than this part of the extent, whatever number of layers is asked for.
+#: Shortest element relative to the extent, for any number of layers.
 _SHORTEST = 1e-12
 
 _ANGLES = np.radians(
@@ -54,17 +53,19 @@ _EXPONENTS = np.array(
 
 
 def exponent(angle: float) -> float:
-    """Real part of the least exponent λ, but rigid motions and λ = 1, of a wedge of rock of ``angle`` (rad) between
-    free faces: roots of sin λα = ± λ sin α (Williams 1952), interpolated."""
+    """Real part of the smallest exponent λ of a wedge of rock of ``angle`` (rad) between free faces.
+
+    Rigid motions and λ = 1 excepted: roots of sin λα = ± λ sin α (Williams 1952), interpolated.
+    """
     return float(np.interp(angle, _ANGLES, _EXPONENTS))
 
 
 def ungraded(angle: float, where: str) -> tuple[float, float]:
-    """Relative error of K that a wedge of rock of ``angle`` makes where elements are not graded into it (measured), and
-    the power of the element's length with which it falls; ``where`` is "crack", "outline" or "mouth".
+    """Relative error of K caused by an ungraded wedge of rock of ``angle`` (rad), and the power of the element's length
+    to which it is proportional (measured); ``where`` is "crack", "outline" or "mouth".
 
-    At the outline it is larger: elements there are long beside their distance to a crack. And where one face of a wedge
-    is loaded, but for right angles under a normal load, the wedge turns like r log r, however blunt.
+    It is larger at the outline, whose elements are long compared with their distance from a crack. Where one face of a
+    wedge is loaded, the wedge rotates like r log r at any angle, except at right angles under a normal load.
     """
     turn = angle - math.pi
     if abs(turn) < 1e-6:
@@ -78,15 +79,18 @@ def ungraded(angle: float, where: str) -> tuple[float, float]:
 
 
 def at_graded_kink(turn: float) -> float:
-    """A of the error A ratio^(λ m) that m layers at a kink by ``turn`` (rad) leave in K of a kink a tenth as long as
-    its crack, the worst of those measured (20° to 120°: within 30 %). Layers begin to tell from the second: `ungraded`
-    is less."""
+    """Constant A of the error A ratio^(λ m) that m layers at a kink of ``turn`` (rad) leave in K.
+
+    The kink is a tenth as long as its crack; the largest measured value (20° to 120°: within 30 %). Only the second and
+    later layers reduce the error below that of `ungraded`.
+    """
     return 2.4e-2 * (turn / (math.pi / 2)) ** 1.6
 
 
 @dataclass(frozen=True)
 class Grading:
-    """``ratio`` of neighbouring layers; ``layers`` of them at each node, or as many as the ``target`` error needs."""
+    """``ratio`` of neighbouring layers; ``layers`` of them at each node, or as many as the ``target`` error
+    requires."""
 
     ratio: float
     layers: int
@@ -97,7 +101,7 @@ class Grading:
         return cls(settings.grading_ratio, settings.grading_layers, settings.grading_error)
 
     def needed(self, angle: float, where: str) -> int:
-        """Layers at a wedge of rock of ``angle`` (rad) for the target; ``where`` as in `ungraded`."""
+        """Layers that reach the target at a wedge of rock of ``angle`` (rad); ``where`` as in `ungraded`."""
         error, power = ungraded(angle, where)
         if error <= self.target:
             return 0
@@ -106,25 +110,25 @@ class Grading:
         return self._layers_for(math.log(error / self.target) / power)
 
     def _at_kink(self, turn: float, error: float) -> int:
-        """Layers that leave ``error`` at a kink by ``turn``."""
+        """Layers that leave the relative error ``error`` at a kink of ``turn`` (rad)."""
         fold = max(0.0, (turn - FOLD) / FOLD_SHRINKS)
         return self._layers_for(math.log(max(at_graded_kink(turn) / error, 1.0)) / exponent(math.pi + turn) + fold)
 
     def _layers_for(self, shrinking: float) -> int:
-        """Layers that make elements smaller by e to the ``shrinking``."""
+        """Layers that shrink elements by exp(``shrinking``)."""
         return min(MOST_LAYERS, math.ceil(shrinking / -math.log(self.ratio)))
 
     def at_corner(self, angle: float) -> int:
-        """At a corner of the outline. Re-entrant ones are singular and get all layers and one more, convex ones one,
-        straight ones none."""
+        """Layers at a corner of the outline: re-entrant ones, which are singular, get all layers and one more, convex
+        ones one, straight ones none."""
         if self.target is not None:
             return self.needed(angle, "outline")
         if angle > math.pi + KINK:
             return self.layers + 1
         return 1 if angle < math.pi - KINK and self.layers else 0
 
-    def beside_crack(self, angle: float) -> int:
-        """At a re-entrant corner of the outline near a crack; ``angle`` (rad) of rock."""
+    def near_crack(self, angle: float) -> int:
+        """Layers at a re-entrant corner of the outline near a crack; ``angle`` (rad) of rock."""
         if self.target is not None or not self.layers:
             return self.at_corner(angle)
         error, power = ungraded(angle, "outline")
@@ -132,7 +136,7 @@ class Grading:
         return max(self.at_corner(angle), wanted + self.layers - KINK_LAYERS)
 
     def at_closed_kink(self, turn: float) -> int:
-        """At a kink by ``turn`` of a crack that was drawn closed; no fewer than at an open one."""
+        """Layers at a kink of ``turn`` (rad) of a crack drawn closed; no fewer than at an open one."""
         if turn < CLOSED_KINK or (self.target is None and not self.layers):
             return self.at_kink(turn, False)
         error = CLOSED_ERROR * min(1.0, turn / CLOSED_TURN) / (KINK_ERROR if self.target is None else self.target)
@@ -142,7 +146,8 @@ class Grading:
         return max(layers, self.at_kink(turn, False))
 
     def at_kink(self, turn: float, forgotten: bool) -> int:
-        """At a kink of a crack by ``turn``; one that growth has left behind is ``forgotten`` unless it is sharp."""
+        """Layers at a crack's kink of ``turn`` (rad); none if it is ``forgotten``, i.e. left behind by growth, and not
+        sharp."""
         if self.target is not None:
             return self.needed(math.pi + turn, "crack")
         if turn <= KINK or (forgotten and turn <= SHARP_KINK) or not self.layers:
@@ -150,20 +155,24 @@ class Grading:
         return max(1, self._at_kink(turn, KINK_ERROR) + self.layers - KINK_LAYERS)
 
     def at_node(self, wedges: np.ndarray, where: str) -> int:
-        """At a junction ("crack") or, for the target, at a "mouth" whose faces enclose ``wedges`` (n,) of rock, rad.
-        Without a target a junction gets what a kink about its widest wedge does, and no fewer than any node."""
+        """Layers at a junction ("crack") or, for the target, at a "mouth"; ``wedges`` (n,) are the angles of rock, rad.
+
+        Without a target a junction gets as many as a kink at its widest wedge, and no fewer than any other node.
+        """
         if self.target is None:
             return max(self.layers, self.at_kink(float(max(wedges, default=0.0)) - math.pi, False))
         return max((self.needed(float(angle), where) for angle in wedges), default=0)
 
     def finest(self, point: np.ndarray, length: float, extent: float) -> float:
-        """Length, m, of the shortest element at ``point`` (2,) on a side or segment of ``length`` in a body of
-        ``extent``. Farther from the origin than its extent the body is graded as at its extent."""
+        """Length, m, of the shortest element at ``point`` (2,) on an edge or segment of ``length``.
+
+        ``extent`` is that of the body; farther from the origin than its extent, a body is graded as at its extent.
+        """
         if self.target is None:
             return _SHORTEST * extent
         reach = min(max(abs(point[0]), abs(point[1])), extent)
         return max(_FINEST * reach ** (2 / 3) * length ** (1 / 3), _SHORTEST * extent)
 
     def fractions(self, layers: int, least: float = 0.0) -> list[float]:
-        """Fractions inside (0, 1) that grade an element towards 0, none below ``least``."""
+        """Fractions inside (0, 1) that grade an element towards 0; no interval is shorter than ``least``."""
         return [f for f in (self.ratio**k for k in range(layers, 0, -1)) if f >= least]

@@ -1,4 +1,4 @@
-"""The half-plane: rock on one side of a straight line that bears no traction and needs no elements."""
+"""The half-plane: rock bounded by a straight, traction-free surface that needs no elements."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from ...conventions import turned_stress
 if TYPE_CHECKING:
     from ...model import Cracks
 
-#: A stress that a load brings to the surface is no load it bears when it is larger than this part of the load.
+#: A traction that a load causes at the surface counts as zero below this part of the load.
 _BORNE = 1e-9
-#: Where the surface has to have ends they are this many extents of what stands in the rock to either side of it; for a
-#: path that is to meet the surface, so many.
+#: Where a finite piece of the surface is needed, it extends this many extents of the geometry to either side; for a
+#: path that is to meet the surface, this many.
 _NEAR, _FAR = 2.0, 100.0
-#: What stands out of the rock by no more than this part of its extent stands on the surface.
+#: Points outside the rock by less than this part of the extent count as on the surface.
 ON_SURFACE = 1e-7
 
 
@@ -43,26 +43,27 @@ class HalfPlane:
 
     @property
     def turn(self) -> np.ndarray:
-        """(2, 2) from vectors to their components along the surface (rock on the right) and out of it."""
+        """(2, 2) maps vectors to components along the surface (rock on the right) and along the outward normal."""
         x, y = self.outward
         return np.array([[y, -x], [x, y]])
 
     def turned(self, vectors: np.ndarray) -> np.ndarray:
-        """Components (..., 2) of ``vectors`` (..., 2) along the surface and out of it."""
+        """Components (..., 2) of ``vectors`` (..., 2) along the surface and along the outward normal."""
         return vectors @ self.turn.T
 
     def frame(self, points: np.ndarray) -> np.ndarray:
-        """(..., 2) ``points`` from the surface's own point, along the surface and out of it: in the rock the second is
-        negative."""
+        """(..., 2) ``points`` relative to the surface's own point, along the surface and along the outward normal: the
+        second component is negative in the rock."""
         return self.turned(points - np.asarray(self.point))
 
     def images(self, points: np.ndarray, on_surface: float = 0.0) -> np.ndarray:
-        """(..., 2) mirror images of ``points`` (..., 2); those within ``on_surface`` (m) of it are their own."""
+        """(..., 2) mirror images of ``points`` (..., 2); points within ``on_surface`` (m) of the surface are their own
+        images."""
         height = self.frame(points)[..., 1:]
         return points - np.where(np.abs(height) <= on_surface, 0.0, 2 * height) * np.asarray(self.outward)
 
     def edge(self, points: np.ndarray, extents: float = _NEAR) -> np.ndarray:
-        """(1, 2, 2) a piece of the surface, rock on its left, that reaches so many ``extents`` beyond ``points`` (n,
+        """(1, 2, 2) a piece of the surface, rock on its left, that extends ``extents`` extents beyond ``points`` (n,
         2)."""
         if not len(points):
             points = np.array([self.point])
@@ -71,35 +72,35 @@ class HalfPlane:
         ends = np.array([middle + reach, middle - reach])[:, None] * self.turn[0] + np.asarray(self.point)
         return ends[None]
 
-    def sky(self, points: np.ndarray) -> np.ndarray:
-        """(3, 2) a loop about what is not rock, as far as that is in sight of ``points`` (n, 2)."""
+    def region_above_surface(self, points: np.ndarray) -> np.ndarray:
+        """(3, 2) a triangle that covers the region outside the rock near ``points`` (n, 2)."""
         ends = self.edge(points, _FAR)[0]
         return np.concatenate([ends, [ends.mean(axis=0) + np.hypot(*(ends[1] - ends[0])) * np.asarray(self.outward)]])
 
     def stress_of(self, in_frame: np.ndarray) -> np.ndarray:
-        """(..., 3) stress in x and y from that along the surface and out of it."""
+        """(..., 3) stress in x and y from that in the surface's frame."""
         (c, s), _ = self.turn
         return turned_stress(in_frame, c, s)
 
     def check_uniform(self, stress: np.ndarray) -> None:
-        """Raise ValueError unless a uniform ``stress`` (3,) leaves the surface without traction."""
+        """Raise ValueError unless a uniform ``stress`` (3,) leaves the surface free of traction."""
         x, y = self.outward
         pulled = np.array([stress[0] * x + stress[2] * y, stress[2] * x + stress[1] * y])
         if np.hypot(*pulled) > _BORNE * np.abs(stress).max():
             along, out = self.turned(pulled)
             raise ValueError(
-                f"remote_stress: the free surface of the half-plane bears none of the traction ({along:g} Pa along it, "
-                f"{out:g} Pa out of it) that this stress has there; only a stress parallel to the surface stands in a "
-                "half-plane"
+                "remote_stress: the surface of the half-plane is free of traction, but this stress has a traction "
+                f"({along:g} Pa along it, {out:g} Pa out of it) there; only a stress parallel to the surface is "
+                "possible in a half-plane"
             )
 
     def check_force(self, gradient: np.ndarray) -> None:
-        """Raise ValueError where a body force has a ``gradient`` (2, 2)."""
+        """Raise ValueError if a body force has a ``gradient`` (2, 2)."""
         if gradient.any():
             raise ValueError("body_force_gradient: in a half-plane a body force is uniform")
 
     def check_inside(self, loops: Sequence[np.ndarray], cracks: Cracks) -> None:
-        """Raise ValueError naming the hole among ``loops``, or the crack, that is not in the rock."""
+        """Raise ValueError naming the hole among ``loops``, or the crack, that is not inside the rock."""
         nodes = cracks.nodes
         points = np.concatenate([*loops, nodes, np.empty((0, 2))])
         if not len(points):

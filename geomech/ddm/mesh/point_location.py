@@ -1,4 +1,4 @@
-"""Which points lie in the rock: inside the outline, if there is one, and outside the holes."""
+"""Point location: which points lie in the rock, inside the outline (if any) and outside the holes."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ _jit = kept(error_model="numpy", nogil=True)
 
 
 def outlined(loops: Sequence[np.ndarray]) -> bool:
-    """Whether the first loop is an outline; if not, all are holes in the infinite plane."""
+    """Whether the first loop is an outline; otherwise all loops are holes in the infinite plane."""
     return bool(loops) and signed_area(loops[0]) > 0
 
 
@@ -28,8 +28,11 @@ def inside(loops: Sequence[np.ndarray], points: np.ndarray) -> np.ndarray:
 
 
 def onto_rock(loops: Sequence[np.ndarray], points: np.ndarray, near: float, on: float) -> tuple[np.ndarray, np.ndarray]:
-    """``points`` (n, 2), of which those that stand out of the rock by no more than ``near`` (m), but by more than
-    ``on``, are put onto its boundary, and which ones (k,) stand out by more than ``near``."""
+    """Project ``points`` (n, 2) that lie outside the rock by more than ``on`` (m) but no more than ``near`` (m) onto
+    its boundary.
+
+    Returns the points and the indices (k,) of those farther outside than ``near``.
+    """
     out = np.flatnonzero(~inside(loops, points))
     if not len(out):
         return points, out
@@ -45,7 +48,7 @@ def onto_rock(loops: Sequence[np.ndarray], points: np.ndarray, near: float, on: 
 
 @_jit
 def _cross(points, loop, odd):
-    """Turn ``odd`` (n,) over at every edge that a ray from its point to the right crosses."""
+    """Toggle ``odd`` (n,) at every edge that the ray from a point in the +x direction crosses."""
     m = len(loop)
     for k in range(m):
         ax, ay = loop[k, 0], loop[k, 1]
@@ -60,7 +63,7 @@ def _cross(points, loop, odd):
 
 @_jit
 def _nearest(points, loop, foot, distance):
-    """The nearest place of ``loop``, where it is nearer than ``distance`` (n,)."""
+    """Update ``foot`` and ``distance`` (n,) with the closest point of ``loop`` where it is nearer."""
     m = len(loop)
     for k in range(m):
         ax, ay = loop[k, 0], loop[k, 1]

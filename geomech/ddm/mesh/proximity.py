@@ -1,9 +1,9 @@
-"""How long elements are beside their distance to others, and the halving of those that are too long.
+"""Limits the length of elements relative to their distance from others, by halving those that are too long.
 
-Between two faces at a distance d tractions vary over a length d: elements must not be much longer. Thin rock therefore
-takes many of them, its length over its thickness. Only in the acute angle where two faces meet they need not shrink for
-ever: what happens within a hundredth of the faces' length from there is not seen by K (of cracks that cross at 1° 6e-5
-of it, at 3° 2e-7).
+Between two faces at a distance d tractions vary over a length d, so that elements must not be much longer: thin rock
+takes as many elements as its length over its thickness. In the acute angle where two faces meet, elements need not
+shrink without limit: the region within a hundredth of the faces' length from the vertex has no effect on K (6e-5 of K
+for cracks that cross at 1°, 2e-7 at 3°).
 """
 
 from __future__ import annotations
@@ -15,27 +15,27 @@ import numpy as np
 from ...compiled import kept, part
 from ..kernels import shape_functions
 
-#: Longest element in units of its distance to another one. Its density then still converges like 3.5^−p.
+#: Largest element length relative to its distance from another element. The density still converges like 3.5^−p.
 APART = 1.25
-#: The same for opposite sides of a body: what is left of equilibrium errors in a slender one is amplified by its
+#: The same for opposite edges of a body: in a slender body the remaining equilibrium error is amplified by the
 #: slenderness squared.
 ACROSS = 0.6
-#: The same for elements of cracks that meet at an angle of less than `ACUTE`: they stand beside each other all along,
-#: however coarsely they are graded into the node. Graded ones, as long beside that angle as a ratio of 0.3 makes them,
-#: are left (0.15 left K of a fold by 165° 10 % off, by 168° anything).
-#: At order 2 and below they may be a share `LOW` of that, from a ratio `FINE` on whatever they are.
-BESIDE, ACUTE, GRADED, LOW, FINE = 3.5, np.radians(60), 1.05 * (1 / 0.3 - 1), 0.5, 0.299
+#: The same for elements of cracks that meet at an angle below `ACUTE`: they run close to each other however they are
+#: graded towards the node. Graded elements with the lengths that a ratio of 0.3 gives are kept (a ratio of 0.15 left K
+#: of a fold of 165° off by 10 %, of 168° useless). At order 2 and below the limit is a share `LOW` of it; from a ratio
+#: of `FINE` on, there is none.
+AT_ACUTE, ACUTE, GRADED, LOW, FINE = 3.5, np.radians(60), 1.05 * (1 / 0.3 - 1), 0.5, 0.299
 #: Elements of faces that meet are not halved below this part of the shorter face.
 AT_NODE = 0.01
-#: The same at a surface, where one of them is a side, or its own image behind a free surface: the thin rock between may
-#: be as good as loose, and what its end lacks of equilibrium bends it. (By dislocations, short cracks at 3.5° to a
-#: side: K 1 % off; 64 % where only a ten-thousandth of the longer face was.)
+#: The same at a surface, where one of them is an edge, or its own image behind a free surface: the thin rock between
+#: them may be almost detached, and equilibrium errors at its end bend it. (Measured with dislocations on short cracks
+#: at 3.5° to an edge: K off by 1 %; by 64 % with a ten-thousandth of the longer face.)
 AT_BOUNDARY = 0.0001
-#: Elements are not halved below this part of the largest extent of the geometry.
+#: Shortest element that halving may make, relative to the extent of the geometry.
 FLOOR = 1e-10
-#: What is longer than so many times its distance to another element, at the floor, is refused.
-HOPELESS = 8.0
-#: Most unknowns of a mesh that halving has made more than four times as large.
+#: An element at that limit is refused if its length exceeds this many times its distance from another.
+REFUSED_ABOVE = 8.0
+#: Largest number of unknowns of a mesh that halving has made more than four times as large.
 MOST_UNKNOWNS = 20000
 
 _jit = kept(fastmath=False, error_model="numpy", nogil=True)
@@ -44,7 +44,7 @@ _part = part(fastmath=False, error_model="numpy", nogil=True)
 
 @_part
 def _distance_squared(px, py, ax, ay, bx, by):
-    """From a point to a segment."""
+    """Squared distance of a point from a segment."""
     dx, dy = bx - ax, by - ay
     s = ((px - ax) * dx + (py - ay) * dy) / (dx * dx + dy * dy)
     s = min(1.0, max(0.0, s))
@@ -53,8 +53,12 @@ def _distance_squared(px, py, ax, ay, bx, by):
 
 
 class Candidates(NamedTuple):
-    """Elements that may be halved: ``start``, ``end`` (n, 2), the ``tip`` of each (0: none, 1 at its start, 2 at its end, 3
-    at both), and the number of its ``source``, the edge or crack segment that it lies on."""
+    """Elements that may be halved.
+
+    start, end   (n, 2)
+    tip          (n,)  0: none, 1: at the start, 2: at the end, 3: at both
+    source       (n,)  number of the edge or crack segment on which the element lies
+    """
 
     start: np.ndarray
     end: np.ndarray
@@ -63,30 +67,34 @@ class Candidates(NamedTuple):
 
 
 class Sources(NamedTuple):
-    """Edges, ``n_edges`` of them, and crack segments: their ``span`` (n_sources,) m; what ``meeting`` (n_sources, n_sources)
-    says, 0 for two that do not meet, 1 for those that do, −sin of the angle between cracks where that is acute; those from
-    ``images`` on are behind a free surface. Where they meet, ``chained`` times the distance is allowed, at an acute angle
-    `BESIDE` times it, and ``beside`` times `GRADED`."""
+    """Edges (the first ``n_edges``) and crack segments.
+
+    images    number from which on sources are images behind a free surface
+    span      (n_sources,)  length, m
+    meeting   (n_sources, n_sources)  0: they do not meet; 1: they meet; −sin of the angle between cracks where acute
+    chained   largest length relative to the distance where they meet; at an acute angle `AT_ACUTE`, and ``acute_share`` times
+              `GRADED`
+    """
 
     n_edges: int
     images: int
     span: np.ndarray
     meeting: np.ndarray
     chained: float
-    beside: float
+    acute_share: float
 
 
 def crowding(elements: Candidates, sources: Sources) -> np.ndarray:
-    """(n,) the largest length / (allowed length) of each of the ``elements`` over all others.
+    """(n,) the largest ratio of the length of each of the ``elements`` to its allowed length, over all others.
 
-    Allowed is `APART` times the distance, `ACROSS` times it between two edges, and what ``sources`` says where the two lie
-    on one source or on two that meet, whose grading already ties sizes to distances; there elements below the part
-    `AT_NODE` (`AT_BOUNDARY` at a surface: where one is an edge, or one alone is an image) of the shorter span are left
-    alone. Elements that share an end are not compared, but for the tip at the other end of the neighbour.
+    Allowed is `APART` times the distance, `ACROSS` times it between two edges, and a larger value from ``sources``
+    where the two lie on one source or on two that meet, whose grading already ties sizes to distances; there elements
+    below the part `AT_NODE` (`AT_BOUNDARY` at a surface: where one is an edge, or only one is an image) of the shorter
+    span are left alone. Elements that share an end are compared only with the tip at the far end of the neighbour.
     """
     start, end = elements.start, elements.end
     length = np.hypot(end[:, 0] - start[:, 0], end[:, 1] - start[:, 1])
-    # Farther apart than this along x, two elements cannot matter to one another.
+    # Elements farther apart along x than this need not be compared.
     reach = (1.0 + 1.0 / min(APART, ACROSS)) * length.max() if len(start) else 0.0
     sweep = np.argsort(0.5 * (start[:, 0] + end[:, 0]), kind="stable")
     return _crowding(elements, length, sources, sweep, 1.000001 * reach)
@@ -94,7 +102,8 @@ def crowding(elements: Candidates, sources: Sources) -> np.ndarray:
 
 @_jit
 def _crowding(elements, length, sources, sweep, reach):
-    """See `crowding`; ``sweep`` is the order of the elements along x, ``reach`` m how far apart there they may matter."""
+    """See `crowding`; ``sweep`` orders the elements along x, ``reach`` (m) is the largest distance along x that
+    matters."""
     start, end = elements.start, elements.end
     n, least_apart = len(start), min(APART, ACROSS)
     out = np.zeros(n)
@@ -106,7 +115,7 @@ def _crowding(elements, length, sources, sweep, reach):
             qx, qy = 0.5 * (start[j, 0] + end[j, 0]), 0.5 * (start[j, 1] + end[j, 1])
             if mx - qx > reach:
                 break
-            # Squared: most pairs are far apart, and a root for each would be most of the work.
+            # Squared distances: most pairs are far apart, and their square roots would dominate the time.
             near = 0.5 * (length[i] + length[j]) + max(length[i], length[j]) / least_apart
             if (mx - qx) ** 2 + (my - qy) ** 2 > near * near:
                 continue
@@ -117,7 +126,7 @@ def _crowding(elements, length, sources, sweep, reach):
 
 @_part
 def _share_an_end(elements, length, i, j, out):
-    """Whether two elements do; each is then compared with the tip at the other's far end."""
+    """Whether two elements share an end; then each is compared with the tip at the far end of the other."""
     start, end, tip = elements.start, elements.end, elements.tip
     shared = False
     for p in range(2):
@@ -127,7 +136,7 @@ def _share_an_end(elements, length, i, j, out):
                 u, v = (end[i], start[j]) if q == 0 else (end[i], end[j])
             if u[0] == v[0] and u[1] == v[1]:
                 shared = True
-                # The square root at the neighbour's far tip is the singularity to keep clear of.
+                # The square-root singularity at the neighbour's far tip is what an element must be short for.
                 if (tip[j] == 1 and q == 1) or (tip[j] == 2 and q == 0):
                     out[i] = max(out[i], length[i] / (APART * length[j]))
                 if (tip[i] == 1 and p == 1) or (tip[i] == 2 and p == 0):
@@ -143,7 +152,7 @@ def _compare(elements, length, sources, i, j, out):
     meet = sources.meeting[one, other]
     allowed = APART
     if meet != 0:
-        allowed = sources.chained if meet > 0 else min(sources.chained, BESIDE)
+        allowed = sources.chained if meet > 0 else min(sources.chained, AT_ACUTE)
     elif one < n_edges and other < n_edges:
         allowed = ACROSS
     ax, ay, bx, by = start[i, 0], start[i, 1], end[i, 0], end[i, 1]
@@ -156,29 +165,29 @@ def _compare(elements, length, sources, i, j, out):
     if meet != 0:
         at_side = one < n_edges or other < n_edges or (one < sources.images) != (other < sources.images)
         least = (AT_BOUNDARY if at_side else AT_NODE) * min(sources.span[one], sources.span[other])
-    graded = sources.beside * GRADED / -meet if meet < 0 else np.inf
+    graded = sources.acute_share * GRADED / -meet if meet < 0 else np.inf
     for k in (i, j):
         out[k] = max(out[k], length[k] / (d * (allowed if length[k] > least else graded)))
 
 
 def keep_apart(start, end, kind, source, pieces, touching, n_edges, ratio, extent, unknowns, images=None):
-    """Elements (``start``, ``end`` (n, 2), ``kind``, ``source`` (n,)) with those halved that stand too close to
-    another.
+    """Halve elements (``start``, ``end`` (n, 2), ``kind``, ``source`` (n,)) that are too long for their distance to
+    others.
 
     ``pieces`` (n_sources, 2, 2) are the edges, then the crack segments, ``touching`` (n_sources, n_sources) which of
-    them meet; ``ratio`` that of graded elements, ``unknowns`` those of an element; sources from ``images`` on are
-    behind a free surface. Raises ValueError, saying where, when rock is too thin for that: it would take too many
-    elements, or shorter ones than coordinates can tell apart.
+    them meet; ``ratio`` is the grading ratio, ``unknowns`` the number per element; sources from ``images`` on are
+    behind a free surface. Raises ValueError with the place where rock is too thin: it would take too many elements, or
+    shorter ones than coordinates can resolve.
     """
-    # A graded element is 1/ratio times its distance to the next but one.
+    # A graded element is 1/ratio times its distance from the next but one.
     chained = max(2.5, 1.05 / ratio)
-    if ratio >= FINE:  # acute angles then ask for nothing besides
-        beside, meeting = np.inf, touching.astype(float)
+    if ratio >= FINE:  # acute angles then add no limit of their own
+        acute_share, meeting = np.inf, touching.astype(float)
     else:
-        beside, meeting = LOW if unknowns <= 6 else 1.0, _meeting(pieces, touching, n_edges, np.cos(ACUTE))
+        acute_share, meeting = LOW if unknowns <= 6 else 1.0, _meeting(pieces, touching, n_edges, np.cos(ACUTE))
     span = np.hypot(*(pieces[:, 1] - pieces[:, 0]).T)
     images = len(pieces) if images is None else images
-    sources = Sources(n_edges, images, span, meeting, chained, float(beside))
+    sources = Sources(n_edges, images, span, meeting, chained, float(acute_share))
     most = max(4 * len(start), MOST_UNKNOWNS // unknowns)
     while True:
         tip = np.where(kind == shape_functions.ORDINARY, 0, kind)
@@ -189,17 +198,17 @@ def keep_apart(start, end, kind, source, pieces, touching, n_edges, ratio, exten
         if not cut.any():
             break
         if len(start) + cut.sum() > most:
-            raise ValueError(f"{_thin(start, end, length, crowded)}: it would take more than {most} elements")
+            raise ValueError(f"{_thin(start, end, length, crowded)}: the mesh would need more than {most} elements")
         start, end, kind, source = _halved(start, end, kind, source, cut)
-    if len(crowded) and crowded.max() > HOPELESS:
-        raise ValueError(f"{_thin(start, end, length, crowded)}: less than coordinates can tell apart")
+    if len(crowded) and crowded.max() > REFUSED_ABOVE:
+        raise ValueError(f"{_thin(start, end, length, crowded)}: less than coordinates can resolve")
     return start, end, kind, source
 
 
 @_jit
 def _meeting(pieces, touching, n_edges, acute):
-    """What `crowding` has to know of sources that meet; ``acute`` is the cosine of the angle below which two cracks
-    do at an acute one."""
+    """Relations between sources as `crowding` needs them; ``acute`` is the cosine of the angle below which two cracks
+    meet acutely."""
     n = len(pieces)
     out = np.zeros((n, n))
     for i in range(n):
@@ -223,7 +232,7 @@ def _meeting(pieces, touching, n_edges, acute):
 
 
 def _thin(start, end, length, crowded) -> str:
-    """Where rock is too thin, and how thin."""
+    """Message: where rock is too thin, and how thin."""
     at = int(np.argmax(crowded))
     x, y = 0.5 * (start[at] + end[at])
     gap = length[at] / crowded[at]

@@ -1,8 +1,8 @@
-"""Cracks that leave the boundary at one mouth and close a ring: they would cut out a piece whose corner is that mouth.
+"""Separates the mouths of cracks that leave the boundary at one point and enclose a piece of rock.
 
-The rock around such a piece would hang together by a point, which no body does. So one of the two cracks at the mouth
-is moved a sliver along the boundary, away from the piece: then the piece has an edge there, and the rock around it two
-ends.
+The surrounding rock would be connected only through that point, which no elastic body can be. One of the two cracks at
+the mouth is therefore moved a small distance along the boundary, away from the piece: the piece then has an edge there,
+and the surrounding rock two ends.
 """
 
 from __future__ import annotations
@@ -12,14 +12,14 @@ from collections.abc import Callable
 
 from ..growth.crack_network import Network, Obstacle, Point, Row
 
-#: A mouth lies on an edge that is nearer to it than this part of the edge's length.
+#: A mouth lies on an edge if its distance is below this part of the edge's length.
 _ON_EDGE = 1e-9
-#: Nearer than a distance is what is nearer by more than a thousandth of it: rounding does not decide.
+#: Distances are compared with a relative margin of a thousandth, so that round-off does not decide.
 _LESS = 1 - 1e-3
 
 
 def chain_between(network: Network, tip: int, ends: tuple[int, ...]) -> list[int]:
-    """The nodes from ``tip`` along its cracks to the first of ``ends``; [] where they do not lead there."""
+    """The nodes from ``tip`` along its cracks to the first of ``ends``; [] where the cracks do not lead there."""
     before = {tip: tip}
     front = [tip]
     while front:
@@ -45,9 +45,13 @@ def part_mouths(
     distance: float,
     free: Callable[[int, Point, Obstacle, Row], bool],
 ) -> None:
-    """Give the two cracks of a mouth, which a ``chain`` of nodes closed at ``joined`` goes through, one each: that on
-    the outside of the ring goes on from ``distance`` m along the boundary. ``free(node, at, edge, row)``: whether
-    ``row`` may run from ``node`` to ``at`` on the ``edge``. Where there is no room nothing is done."""
+    """Give each of the two cracks at a mouth, through which a ``chain`` of nodes closed at ``joined`` passes, its own
+    mouth.
+
+    The crack on the outside of the ring continues from a point ``distance`` (m) along the boundary. ``free(node, at,
+    edge, row)`` says whether ``row`` may run from ``node`` to ``at`` on ``edge``. Where there is no room nothing
+    changes.
+    """
     ring = [*chain, joined] if chain[-1] != joined else chain
     for before, mouth, after in zip(ring, ring[1:], ring[2:]):
         if network.surface[mouth]:
@@ -63,7 +67,7 @@ def _part(network: Network, block: int, mouth: int, neighbours: tuple[int, int],
         for end in (edge.b, edge.a)
         if math.dist(end, point) > 2 * distance
     ]
-    # Rock is on the left of an edge: counter-clockwise from where the boundary goes on to where it comes from.
+    # Rock is on the left of an edge: counter-clockwise from the edge that leaves to the edge that arrives.
     onward = [way for way in ways if way[1] == way[0].b]
     back = [way for way in ways if way[1] == way[0].a]
     if not onward or not back:
@@ -105,9 +109,9 @@ def own_mouth_at(
     return None
 
 
-def beside(mouth: Point, edge: Obstacle, start: Point, distance: float) -> Point:
-    """The point of the boundary's ``edge`` that is ``distance`` from the ``mouth`` on it, towards ``start``; onward
-    where that is right across."""
+def point_along_edge(mouth: Point, edge: Obstacle, start: Point, distance: float) -> Point:
+    """The point of ``edge`` at ``distance`` from the ``mouth`` on it: on the side towards ``start``, or in the edge's
+    direction where ``start`` lies opposite the mouth or there is no room on its side."""
     length = math.dist(edge.a, edge.b)
     x, y = ((edge.b[0] - edge.a[0]) / length, (edge.b[1] - edge.a[1]) / length)
     place, wanted = ((p[0] - edge.a[0]) * x + (p[1] - edge.a[1]) * y for p in (mouth, start))

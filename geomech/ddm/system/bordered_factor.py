@@ -33,7 +33,7 @@ SMALLEST = 200
 #: with that of new factors to 1e-10.
 LOSS = 5e6
 #: Meaning of a singular matrix.
-SINGULAR = "cracks cut a part of the body off"
+SINGULAR = "cracks separate a part from the body"
 
 
 class Bordered:

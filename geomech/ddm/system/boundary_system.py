@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..counters import Work
-from ..iterative.boundary_gmres import HeldJumps, HeldMatrix, IteratedBoundary
+from ..iterative.boundary_gmres import IteratedBoundary, PrescribedJumps, SupportedBoundaryMatrix
 from ..iterative.fast_multipole import Compressed
 from ..loads.hole_supports import Anchors
 from ..loads.supports import Holds
@@ -78,7 +78,7 @@ class BoundarySystem:
             self.matrix = jumps = Compressed(g, g, nu, tol)
             if holds is not None:
                 self._hold_motions(mesh)
-                self.matrix, self.known = HeldMatrix(jumps, holds, nu, tol), HeldJumps(jumps, holds)
+                self.matrix, self.known = SupportedBoundaryMatrix(jumps, holds, nu, tol), PrescribedJumps(jumps, holds)
 
             def between(elements):
                 return self.influence_on(g.take(elements), elements)

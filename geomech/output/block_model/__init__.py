@@ -1,1 +1,1 @@
-"""The block system before anything runs, as files."""
+"""Files of the block system before a run."""

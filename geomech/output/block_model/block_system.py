@@ -1,4 +1,4 @@
-"""The block system of a scene as files, before anything runs: VTU, MSH, and its statistics as JSON."""
+"""Files of a scene's block system before a run: VTU, MSH, and its statistics as JSON."""
 
 from __future__ import annotations
 
@@ -19,14 +19,16 @@ from ..vtk.triangulate import Triangles
 from ..vtk.vtu import LINE, TRIANGLE, Grid, GridFiles, world_origin
 from .world_map import write_world_map
 
-#: Parts of the rock, by area, that the block-size curve is given at.
+#: Percentages of the rock, by area, at which the block-size curve is given.
 _PASSING = (0.05, 0.1, 0.25, 0.5, 0.75, 0.9, 1.0)
 
 
 def write_block_system(scene: Any, folder: Path | str) -> dict[str, Any]:
-    """Write ``block_system.vtu``, ``joint_lines.vtu``, ``block_system.msh`` and ``block_system.json`` of a loaded scene
-    into ``folder``, and where it has traces of the field or an origin ``block_system.geojson`` in world coordinates;
-    what the JSON holds."""
+    """Write the block system of a loaded scene into ``folder``; returns the content of the JSON file.
+
+    The files are ``block_system.vtu``, ``joint_lines.vtu``, ``block_system.msh`` and ``block_system.json``; if the
+    scene has mapped traces or an origin, also ``block_system.geojson`` in world coordinates.
+    """
     folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
     problem = scene.problem()
@@ -82,8 +84,10 @@ def write_block_system(scene: Any, folder: Path | str) -> dict[str, Any]:
 def _write_msh(
     path: Path, blocks: Blocks, cracks: Cracks, cells: np.ndarray, owner: np.ndarray, zones: list[str], zone: np.ndarray
 ) -> None:
-    """Gmsh's format 2.2: a surface a block, zones, edge names and cracks as physical groups. Read as a model it gives
-    the same blocks."""
+    """Gmsh's format 2.2: one surface per block; zones, edge names and cracks as physical groups.
+
+    Read as a model, it gives the same blocks.
+    """
     curves = [name for name in blocks.edge_names if name] + [f"crack:{name}" for name in cracks.names]
     number = {name: k for k, name in enumerate(curves)}
     lines = []
@@ -168,7 +172,7 @@ def _statistics(
 
 
 def _lines(statistics: dict[str, Any], jointed: Any) -> list[str]:
-    """The statistics for people."""
+    """The statistics as lines of text."""
     size = statistics["blocks"]
     rows = [
         (
@@ -180,19 +184,19 @@ def _lines(statistics: dict[str, Any], jointed: Any) -> list[str]:
         nodes, topology = statistics["nodes"], statistics["topology"]
         text = f"  nodes     I {nodes['I']}, Y {nodes['Y']}, X {nodes['X']}"
         if topology["connections_per_branch"] is not None:
-            text += f"; {topology['connections_per_branch']:.2f} connections a branch"
+            text += f"; {topology['connections_per_branch']:.2f} connections per branch"
         if topology["connections_per_line"] is not None:
-            text += f", {topology['connections_per_line']:.3g} a line"
+            text += f", {topology['connections_per_line']:.3g} per line"
         rows.append(text)
         rows += [f"  {row}" for row in table(statistics["sets"])]
     x, y = statistics["world_origin_m"]
     if x or y:
-        rows.insert(0, f"  origin    ({x:.10g}, {y:.10g}) m: add it to every coordinate that is written")
+        rows.insert(0, f"  origin    ({x:.10g}, {y:.10g}) m: add it to every written coordinate")
     if statistics["rock_bridges"]["number"]:
         bridges = statistics["rock_bridges"]
         rows.append(
             f"  bridges   {bridges['number']}, mean {bridges['mean_m']:.3g} m, least {bridges['shortest_m']:.3g} m"
         )
     return rows + [
-        f"  mended    {text}" for text in (jointed.repair_lines("listed in block_system.json") if jointed else ())
+        f"  repaired   {text}" for text in (jointed.repair_lines("listed in block_system.json") if jointed else ())
     ]

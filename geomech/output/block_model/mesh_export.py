@@ -1,4 +1,4 @@
-"""The block system as a mesh for other programs: every format that meshio writes, by the suffix of the file."""
+"""Export of the block system as a mesh, in every format that meshio writes, chosen by the suffix of the file."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ log = logging.getLogger(__name__)
 
 
 def check_format(path: Path) -> None:
-    """Raise ValueError for a file whose suffix meshio does not write."""
+    """Raise ValueError for a file suffix that meshio does not write."""
     import meshio
 
     known = sorted(meshio.extension_to_filetypes)
@@ -27,12 +27,12 @@ def check_format(path: Path) -> None:
 
 
 def export_blocks(problem: Problem, zones: list[str], path: Path, size: float | None = None) -> str:
-    """Write the blocks of ``problem`` and their cracks to ``path``; what was written, in a line.
+    """Write the blocks of ``problem`` and their cracks to ``path``; returns a line that says what was written.
 
-    Every block is cut into triangles of its own nodes: as few as possible, or with sides of about ``size`` m by Gmsh,
-    torn along its cracks. Sets are the ``zones`` (by block), "block:NUMBER", the names of edges and "crack:NAME"; cells
-    have ``block_id``, ``zone`` and ``material``. Raises ValueError for a suffix that meshio does not know and for what
-    its writer refuses.
+    Every block is divided into triangles of its own nodes: as few as possible, or with sides of about ``size`` m by
+    Gmsh, split along its cracks. Sets are the ``zones`` (by block), "block:NUMBER", the names of edges and
+    "crack:NAME"; cells have ``block_id``, ``zone`` and ``material``. Raises ValueError for a suffix that meshio does
+    not know and for what its writer refuses.
     """
     import meshio
 
@@ -43,7 +43,7 @@ def export_blocks(problem: Problem, zones: list[str], path: Path, size: float | 
     named = np.flatnonzero(np.array([bool(name) for name in blocks.edge_names])[blocks.edge_name])
     start = len(points)
     if size is not None:
-        # Nodes of a mesh by Gmsh are its own: edges and cracks stand on theirs.
+        # Gmsh's mesh has nodes of its own: edges and cracks use them.
         points = np.concatenate([points, blocks.vertices])
         edges = edges + start
     first_crack = len(points)
@@ -73,7 +73,7 @@ def export_blocks(problem: Problem, zones: list[str], path: Path, size: float | 
     nodes = np.column_stack([points, np.zeros(len(points))])
     try:
         meshio.Mesh(nodes, cells, cell_data=data, cell_sets=sets).write(path)
-    except (Exception, SystemExit) as error:  # meshio's writers raise whatever they stumble over
+    except (Exception, SystemExit) as error:  # meshio's writers raise many kinds of exceptions
         raise ValueError(f"{path}: meshio cannot write this format here: {error}") from error
     if path.suffix.lower() == ".inp":
         # meshio names the last types of its table, rigid faces and hybrid beams in space.
@@ -96,7 +96,7 @@ def _fine(problem: Problem, size: float) -> tuple[np.ndarray, np.ndarray, np.nda
         if angle < SLIVER:
             log.warning(
                 "block %d: triangles of %.2g degrees where cracks or its outline nearly touch, at (%.6g, %.6g) m: finite "
-                "elements want such cracks to be joined or moved apart",
+                "elements need such cracks to be joined or moved apart",
                 block, math.degrees(angle), x, y,
             )  # fmt: skip
         points.append(mesh.points)

@@ -1,4 +1,4 @@
-"""The block system back in the world: blocks and cracks as GeoJSON in world coordinates, for GIS and CAD."""
+"""Export of blocks and cracks as GeoJSON in world coordinates, for GIS and CAD."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from ..tables.summary import write_json
 def write_world_map(
     problem: Problem, zones: tuple[str, ...], path: Path | str, crs: dict[str, Any] | None = None
 ) -> None:
-    """Write the blocks of ``problem`` (polygons with "set" = "zone:NAME", block, material, fixed, area_m2) and its
-    cracks (lines with "set" = "crack:NAME") as the GeoJSON file ``path``; ``zones`` names each block's zone, ``crs`` is the
-    reference system of the files that were read.
+    """Write the blocks and cracks of ``problem`` as the GeoJSON file ``path``.
 
-    Read as traces of a scene it gives the same blocks.
+    Blocks are polygons with "set" = "zone:NAME", block, material, fixed and area_m2; cracks are lines with "set" =
+    "crack:NAME". ``zones`` names each block's zone, ``crs`` is the reference system of the files that were read. Read
+    as traces of a scene, the file gives the same blocks.
     """
     blocks, cracks, origin = problem.blocks, problem.cracks, np.array(problem.origin)
     area = blocks.areas()

@@ -1,1 +1,1 @@
-"""What a run can go on from."""
+"""Checkpoints, from which runs are resumed."""

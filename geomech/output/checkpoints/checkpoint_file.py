@@ -1,12 +1,11 @@
-"""Checkpoints: all that a run goes on from, in one file; how it is written, and read back.
+"""Checkpoint files: format, writing and reading.
 
-A checkpoint holds whatever the run's solvers and writers keep, not only blocks, cracks and loads: factors that were
-renewed in part, face states that the next solution is tried with, meshes. They decide about round-off, so that a run
-goes on bit for bit only with them, and keeping them lets a run be stored at any moment without changing a bit of what
-it does afterwards. What they are is the solvers' own business: their objects stand there by the names of their classes
-and attributes, as plain data (`geomech.plain_data`), so that a file from anyone can be read without running anything.
-It is of use to the sources that wrote it alone: its first lines, the format and a header in JSON with a sum of its own,
-say which, and are read before anything else.
+A checkpoint holds all that the solvers and writers of a run keep, not only blocks, cracks and loads: factors that were
+partly updated, the face states with which the next solution starts, meshes. They affect round-off; only with them does
+a resumed run continue bit for bit, and storing a run at any moment changes nothing in its results. Solver objects are
+stored by the names of their classes and attributes, as plain data (`geomech.plain_data`), so that reading a file from
+anyone runs no code. A checkpoint can be used only by the sources that wrote it: its first lines, the format and a JSON
+header with a checksum of its own, identify them and are read before anything else.
 """
 
 from __future__ import annotations
@@ -27,19 +26,19 @@ from typing import Any, BinaryIO
 
 from geomech import plain_data
 
-#: Counts the ways in which this file has been written; the first was a pickle behind a line of JSON.
+#: Version of the file format; the first was a pickle after a line of JSON.
 FORMAT = 3
-#: Below the run folder.
+#: Relative to the run folder.
 FOLDER = "checkpoint"
-#: So many checkpoints are kept: the last, and one more should that be damaged.
+#: Number of checkpoints kept: the last, and one more in case it is damaged.
 KEPT = 2
 
-#: The first line: what the file is, the CRC-32 and the length of the header in the second.
+#: First line: file type, CRC-32 and length of the header in the second line.
 _FIRST = "geomech checkpoint {format} {crc:08x} {length}\n"
 _FIRST_READ = re.compile(rb"geomech checkpoint (\d{1,9}) ([0-9a-f]{8}) (\d{1,12})\n")
-#: Behind the content: its CRC-32 and its length.
+#: After the content: its CRC-32 and length.
 _TRAILER = struct.Struct("<IQ")
-#: What a checkpoint may hold besides arrays, numbers, texts and Python's own containers.
+#: Classes that a checkpoint may hold in addition to arrays, numbers, texts and Python's own containers.
 _ALLOWED = plain_data.Allowed(
     parts=("geomech.model", "geomech.dda", "geomech.ddm", "geomech.coupling"),
     classes=(
@@ -50,37 +49,41 @@ _ALLOWED = plain_data.Allowed(
     ),
     methods=("geomech.model.problem:Problem.joint_index",),
 )  # fmt: skip
-#: Sources that decide what a run does and what a checkpoint holds.
+#: Sources that determine what a run does and what a checkpoint holds.
 _DECISIVE = ("conventions.py", "model", "dda", "ddm", "coupling", "output")
-#: Bytes: no header is as long.
+#: Bytes, upper limit of the header's length.
 _LONGEST_HEADER = 1 << 24
 
 
 class NotResumable(RuntimeError):
-    """A run cannot be gone on with: the message says why, and what to do instead."""
+    """A run cannot be resumed; the message gives the reason and a way out."""
 
 
 class FilesChanged(ValueError):
-    """A file of a run is not what it was at the checkpoint."""
+    """A file of a run differs from its state at the checkpoint."""
 
 
 @cache
 def identity() -> Mapping[str, Any]:
-    """What must be the same for a checkpoint to be of use, and for the run to go on bit for bit. Sources are those of
-    the time when it was asked for first: they may be edited while a run lasts."""
+    """What must be unchanged for a checkpoint to be used, and for the run to continue bit for bit.
+
+    The sources are those at the time of the first call: they may be edited during a run.
+    """
     packages = {name: importlib.metadata.version(name) for name in ("numpy", "scipy", "numba")}
     return {"format": FORMAT, "python": platform.python_version(), **packages, "sources": _sources()}
 
 
 def surroundings() -> dict[str, Any]:
-    """What rounding may depend on besides."""
+    """Further properties of the machine on which round-off may depend."""
     threads = {name: os.environ.get(name, "") for name in ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")}
     return {"machine": f"{platform.machine()}, {_processor()}", **threads}
 
 
 def write(folder: Path, header: dict[str, Any], content: Any) -> Path:
-    """``content`` as the checkpoint of cycle ``header["cycle"]`` in ``folder``, whole or not at all; older ones than
-    the one before are removed. Raises OSError."""
+    """Write ``content`` as the checkpoint of cycle ``header["cycle"]`` in ``folder``, atomically.
+
+    Checkpoints older than the previous one are removed. Raises OSError.
+    """
     folder.mkdir(parents=True, exist_ok=True)
     path = folder / f"cycle_{header['cycle']:07d}.checkpoint"
     unfinished = path.with_name(path.name + ".part")
@@ -108,27 +111,29 @@ def found(folder: Path) -> list[Path]:
 
 
 def read_header(path: Path) -> dict[str, Any]:
-    """The header of the checkpoint ``path``. Raises NotResumable where it is none, or not whole."""
+    """The header of the checkpoint ``path``. Raises NotResumable if it is not a complete checkpoint."""
     with open(path, "rb") as file:
         return _read_header(path, file)
 
 
 def read(path: Path) -> Any:
-    """The content of the checkpoint ``path``, which these sources wrote. Raises NotResumable where it is not whole."""
+    """The content of the checkpoint ``path``, written by these sources. Raises NotResumable if it is incomplete."""
     with open(path, "rb") as file:
         header = _read_header(path, file)
         if header["format"] != FORMAT:
-            raise NotResumable(f"{path} is a checkpoint of format {header['format']}, and this geomech reads {FORMAT}")
+            raise NotResumable(
+                f"{path} is a checkpoint of format {header['format']}, but this version of geomech reads format {FORMAT}"
+            )
         try:
             return plain_data.read(file, _ALLOWED)
         except plain_data.Broken as error:
             raise NotResumable(
-                f"{path} does not hold what a checkpoint holds ({error}): run the scene again"
+                f"{path} does not have the content of a checkpoint ({error}): run the scene again"
             ) from error
 
 
 def whole(folder: Path) -> Iterator[tuple[dict[str, Any], Path]]:
-    """(header, path) of the checkpoints in ``folder`` that are whole, the last one first."""
+    """(header, path) of the complete checkpoints in ``folder``, the last one first."""
     for path in found(folder):
         try:
             yield read_header(path), path
@@ -137,9 +142,11 @@ def whole(folder: Path) -> Iterator[tuple[dict[str, Any], Path]]:
 
 
 def _read_header(path: Path, file: BinaryIO) -> dict[str, Any]:
-    """The header; ``file`` then stands at the content, whose sum is right. Of another format the header says no more
-    than which."""
-    damaged = NotResumable(f"{path} is no whole checkpoint: remove it, and the one before it is taken")
+    """The header; ``file`` is then positioned at the content, whose checksum has been verified.
+
+    Of another format, the header holds only the format.
+    """
+    damaged = NotResumable(f"{path} is not a complete checkpoint: remove it, and the one before it is used")
     first = file.readline(256)
     if first.startswith(b"{"):
         return {"format": 1}
@@ -170,7 +177,7 @@ def _read_header(path: Path, file: BinaryIO) -> dict[str, Any]:
 
 
 class _Summed(io.RawIOBase):
-    """A file that knows the sum and the length of what was written to it."""
+    """A file that computes the checksum and the length of what is written to it."""
 
     def __init__(self, file: BinaryIO) -> None:
         self._file, self.crc, self.length = file, 0, 0
@@ -182,7 +189,7 @@ class _Summed(io.RawIOBase):
 
 
 def _sources() -> str:
-    """A digest of the sources that decide what a run does."""
+    """Digest of the sources that determine what a run does."""
     house = Path(__file__).parents[2]
     digest = hashlib.sha256()
     for name in _DECISIVE:
@@ -193,7 +200,7 @@ def _sources() -> str:
 
 
 def _processor() -> str:
-    """The processor's own name, where the system gives it."""
+    """The processor's name, if the system gives it."""
     try:
         with open("/proc/cpuinfo", encoding="utf-8") as file:
             return next(line.partition(":")[2].strip() for line in file if line.startswith("model name"))

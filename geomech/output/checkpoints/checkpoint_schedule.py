@@ -1,4 +1,4 @@
-"""When a run is stored, and what its checkpoints say about where it came from."""
+"""Schedule of checkpoints, and their information about the origin of a run."""
 
 from __future__ import annotations
 
@@ -18,31 +18,29 @@ from . import checkpoint_file
 
 log = logging.getLogger(__name__)
 
-#: Unless a scene says otherwise a checkpoint comes so many seconds after the one before, at the earliest …
+#: Unless the scene says otherwise, a checkpoint follows the previous one after at least this many seconds …
 INTERVAL = 30.0
-#: … and as late as keeps what checkpoints cost below this part of the run's time.
+#: … and late enough that checkpoints take less than this part of the run's time.
 SHARE = 0.02
-#: A run that has ended keeps checkpoints up to this size, MB: factors of a specimen with grown cracks take a hundred.
+#: Checkpoints of a finished run are kept up to this size, MB: factors of a specimen with grown cracks take a hundred.
 KEPT_MB = 16.0
-#: Keys of a scene that name files.
+#: Scene keys that name files.
 _NAMING_FILES = ("model", "file")
 
 
 class Checkpoints:
-    """Observer that knows when a checkpoint is `due`; whoever runs the cycles then lets it `write` one, between two
-    cycles.
+    """Observer that decides when a checkpoint is `due`; the driver of the cycles then calls `write` between two cycles.
 
-    ``every`` counts cycles between two, 0 for none at all; None leaves it to `INTERVAL` and `SHARE`. ``scene`` is the
-    resolved scene, which a resumed run must still have. ``kept_mb``: of a run that has come to its end, checkpoints larger
-    than this are removed. A checkpoint that cannot be written is reported in the log and ends
-    nothing.
+    ``every`` is the number of cycles between two, 0 for none at all; None leaves it to `INTERVAL` and `SHARE`.
+    ``scene`` is the resolved scene, which a resumed run must still have. ``kept_mb``: larger checkpoints of a finished
+    run are removed. A checkpoint that cannot be written is reported in the log, and the run continues.
     """
 
     def __init__(
         self, *, every: int | None = None, scene: Mapping[str, Any] | None = None, kept_mb: float = KEPT_MB
     ) -> None:
         if every is not None and every < 0:
-            raise ValueError(f"checkpoints come every n-th cycle, or never with 0; got {every}")
+            raise ValueError(f"checkpoint_every is a number of cycles, or 0 for no checkpoints; got {every}")
         self.every, self.scene = every, None if scene is None else dict(scene)
         self.kept_mb = kept_mb
         self.seconds = 0.0
@@ -64,7 +62,7 @@ class Checkpoints:
 
     @property
     def wanted(self) -> bool:
-        """Whether there are to be any."""
+        """Whether checkpoints are written at all."""
         return self.every != 0
 
     @property
@@ -74,8 +72,8 @@ class Checkpoints:
         return time.monotonic() - self._last >= self._interval
 
     def write(self, cycle: int, now: float, content: Any) -> bool:
-        """Store ``content`` as what the run goes on with after ``cycle``, at the time ``now`` s; whether it could
-        be."""
+        """Store ``content``, from which the run continues after ``cycle`` at the time ``now`` (s); returns whether it
+        succeeded."""
         began = time.monotonic()
         header = {
             **checkpoint_file.identity(), **checkpoint_file.surroundings(), "geomech": __version__, "cycle": cycle, "time_s": now,
@@ -85,7 +83,7 @@ class Checkpoints:
             checkpoint_file.write(self._folder, header, content)
         except (OSError, plain_data.NotPlain) as error:
             why = getattr(error, "strerror", None) or error
-            log.warning("no checkpoint of cycle %d: %s; the one before it is kept", cycle, why)
+            log.warning("checkpoint of cycle %d could not be written: %s; the previous one is kept", cycle, why)
             written = False
         else:
             written = True
@@ -107,12 +105,11 @@ class Checkpoints:
         for path in stored:
             path.unlink()
         summary["checkpoint_not_kept_mb"] = round(size, 1)
-        log.info("its state at the end, %.0f MB, is not kept: output.checkpoint_kept_mb is %g", size, self.kept_mb)
+        log.info("the final checkpoint, %.0f MB, is not kept: output.checkpoint_kept_mb is %g", size, self.kept_mb)
 
 
 def digests(scene: Mapping[str, Any]) -> dict[str, str]:
-    """file → SHA-256 of what stands in every file that the resolved ``scene`` names, and in those that its models
-    read."""
+    """{file: SHA-256} of every file that the resolved ``scene`` names, and of those that its models include."""
     names = set(_files(scene))
     for name in tuple(names):
         if Path(name).suffix.lower() in MODELS:

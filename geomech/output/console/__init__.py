@@ -1,1 +1,1 @@
-"""What a run shows while it runs."""
+"""Progress of a run on the terminal."""

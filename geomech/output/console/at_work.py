@@ -1,4 +1,4 @@
-"""A sign of life from studies that take long without a step to report: a line every few seconds, to stderr."""
+"""Heartbeat of long studies without steps to report: a line every few seconds on stderr."""
 
 from __future__ import annotations
 
@@ -8,21 +8,21 @@ import time
 from contextlib import suppress
 from typing import Self, TextIO
 
-#: Seconds of silence after which a line is written.
+#: Silence, s, after which a line is written.
 SILENCE = 5.0
 
 _last = [time.monotonic()]
 
 
 def spoken() -> None:
-    """Note that something has been shown to the user just now."""
+    """Record that something has been shown to the user just now."""
     _last[0] = time.monotonic()
 
 
 class AtWork:
-    """Context: while it lasts, ``name`` is said to be at work whenever nothing was shown for ``silence`` s.
+    """Context that reports ``name`` as running whenever nothing was shown for ``silence`` s.
 
-    ``stream`` defaults to stderr. ``quiet`` says nothing.
+    ``stream`` is stderr by default. ``quiet`` suppresses the lines.
     """
 
     def __init__(
@@ -51,15 +51,15 @@ class AtWork:
                 if self._done.wait(left):
                     return
                 continue
-            self._say(f"  {self.name}: at work for {time.monotonic() - self._began:.0f} s")
+            self._say(f"  {self.name}: running for {time.monotonic() - self._began:.0f} s")
             spoken()
 
     def _say(self, text: str) -> None:
         stream = self.stream or sys.stderr
-        with suppress(OSError, ValueError):  # nobody reads it: the study goes on
+        with suppress(OSError, ValueError):  # nobody reads it: the study continues
             tqdm = sys.modules.get("tqdm")
             if tqdm is not None and stream is sys.stderr:
-                tqdm.tqdm.write(text, file=stream)  # above a bar that may stand there
+                tqdm.tqdm.write(text, file=stream)  # above a progress bar that may be shown there
             else:
                 stream.write(text + "\n")
                 stream.flush()

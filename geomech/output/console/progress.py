@@ -1,4 +1,4 @@
-"""What a run shows while it runs: a bar on a terminal, a line every few seconds elsewhere, a few lines at the end."""
+"""Progress of a run: a bar on a terminal, a line every few seconds elsewhere, and a few lines at the end."""
 
 from __future__ import annotations
 
@@ -23,17 +23,16 @@ from ..tables.motion_state import closing, state_text
 from ..units import length_text, stress_text
 from .at_work import spoken
 
-#: So many warnings of a run are shown at its end, each this long at most.
+#: Number of warnings shown at the end of a run, and the largest length of each.
 SHOWN_WARNINGS, WIDTH = 3, 400
 
 
-#: Of a static run in which blocks slide or turn on and on.
-NO_ANSWER = "since the mechanism what blocks move by means nothing: nothing holds them (events.csv)"
+#: For a static run in which blocks keep sliding or rotating.
+NO_ANSWER = "since the mechanism the displacements of blocks have no meaning: nothing holds the blocks (events.csv)"
 
 
 class Warned(logging.Handler):
-    """Counts what geomech warns of while a run lasts, from its making to its `end`; and keeps the first of each
-    kind."""
+    """Counts geomech's warnings between its construction and `end`, and keeps the first of each kind."""
 
     def __init__(self) -> None:
         super().__init__(logging.WARNING)
@@ -42,7 +41,7 @@ class Warned(logging.Handler):
         logging.getLogger("geomech").addHandler(self)
 
     def emit(self, record: logging.LogRecord) -> None:
-        # Warnings about the scene were said before the run; how it was ended is said after it.
+        # Warnings about the scene were shown before the run; how it ended is shown after it.
         if record.name in ("geomech.pipeline", "geomech.output.run_record"):
             return
         self.count += 1
@@ -60,10 +59,10 @@ class Warned(logging.Handler):
 
 
 class Pace:
-    """How fast a run goes through its scene, by the later half of the wall time it has taken.
+    """Rate at which a run proceeds through its scene, from the later half of the elapsed wall time.
 
-    A pace means something after `LEAST` s, where the two halves of that span went at paces that differ by less than a
-    factor `UNEVEN`: rock that begins to crack stops the clock of the scene.
+    It is meaningful after `LEAST` s, if the rates in the two halves of that time differ by less than a factor `UNEVEN`:
+    while rock cracks, the scene's clock stands still.
     """
 
     LEAST, UNEVEN = 3.0, 2.5
@@ -73,7 +72,7 @@ class Pace:
         self._seen: deque[tuple[float, float]] = deque()
 
     def add(self, wall: float, time: float) -> None:
-        """The scene has come to ``time``, s, at ``wall``, s."""
+        """Record that the scene has reached ``time`` (s) at ``wall`` (s)."""
         self._began = wall if self._began is None else self._began
         self._seen.append((wall, time))
         half = 0.5 * (self._began + wall)
@@ -81,7 +80,7 @@ class Pace:
             self._seen.popleft()
 
     def time_for(self, rest: float) -> float:
-        """Wall time, s, for ``rest`` s of the scene; inf where that is not known."""
+        """Wall time, s, for another ``rest`` s of the scene; inf if unknown."""
         if self._began is None or len(self._seen) < 5 or self._seen[-1][0] - self._began < self.LEAST:
             return math.inf
         first, last = self._seen[0], self._seen[-1]
@@ -95,12 +94,12 @@ class Pace:
 
 
 class Progress:
-    """Observer for people. On a terminal it draws a tqdm bar over the scene's time, elsewhere a line now and then. The
-    time left is that of the rest of the scene at the recent `Pace`, once there is a steady one; where cracks are to end
-    the run by an event there is no estimate. ``quiet`` leaves only where a failed run stopped.
+    """Observer that reports progress.
 
-    ``stream`` defaults to stderr; ``interval`` s is the least time between two lines off a terminal, twice that
-    between two with the same percentage.
+    On a terminal it draws a tqdm bar over the scene's time, elsewhere a line from time to time. The time left follows
+    from the recent `Pace`, once it is steady; if cracks may end the run by an event there is no estimate. ``quiet``
+    reports only where a failed run stopped. ``stream`` is stderr by default; ``interval`` s is the least time between
+    two lines when not on a terminal, twice that between two with the same percentage.
     """
 
     def __init__(self, *, quiet: bool = False, stream: TextIO | None = None, interval: float = 5.0) -> None:
@@ -146,17 +145,17 @@ class Progress:
         if self.quiet:
             return
         now = time.perf_counter()
-        if cycle.state.time > 0:  # from the first load step on: it may have compiled kernels, and sets no pace
+        if cycle.state.time > 0:  # from the first load step on: that step may have compiled kernels and does not count
             self._pace.add(now, float(cycle.state.time))
         if self._bar is not None:
-            # The text is made only as often as the bar is drawn.
+            # The text is made only when the bar is drawn.
             if now - self._said >= self._bar.mininterval:
                 self._said = now
-                # What is left comes first: a narrow terminal cuts the end off.
+                # The time left comes first: a narrow terminal cuts off the end.
                 said = f"{self._left(cycle).removeprefix(', ')}, {_cycle_text(cycle)}"
                 self._bar.set_postfix_str(said.removeprefix(", "), refresh=False)
                 spoken()
-            with suppress(OSError):  # of a terminal that is gone
+            with suppress(OSError):  # the terminal is gone
                 self._bar.update(max(0.0, min(cycle.state.time, self._end) - self._bar.n))
         elif now - self._said >= self.interval:
             percent = self._share(cycle)
@@ -171,14 +170,14 @@ class Progress:
             with suppress(OSError):
                 self._bar.close()
         if error is not None:
-            # Why it stopped is the exception's own to say, to whoever catches it.
+            # The exception says why it stopped, to its handler.
             last = self._last
             where = "before the first cycle" if last is None else f"at {self._share(last)} %, {_cycle_text(last)}"
-            self._say(f"stopped {where}\n  what was written until then is in {self._folder}")
+            self._say(f"stopped {where}\n  results up to this point are in {self._folder}")
             if isinstance(error, (KeyboardInterrupt, OSError)) and checkpoint_file.found(
                 self._folder / checkpoint_file.FOLDER
             ):
-                self._say(f"  to go on: geomech resume {self._folder}")
+                self._say(f"  to continue: geomech resume {self._folder}")
         elif not self.quiet:
             self._say("\n".join([*closing_lines(summary, self._folder), *self._warnings.lines()]))
 
@@ -186,8 +185,11 @@ class Progress:
         return round(100 * min(cycle.state.time, self._end) / self._end)
 
     def _left(self, cycle: Cycle) -> str:
-        """Wall time that the rest of the scene takes; empty where there is no steady pace. A run of cracks that an event
-        ends stops long before the end of the scene, nobody knows when: it says what it waits for."""
+        """Wall time that the rest of the scene takes; empty if the rate is not steady.
+
+        A run of cracks that an event ends stops long before the end of the scene, at an unknown time: the text names
+        the event.
+        """
         if self._stops and cycle.cracks.n_cracks:
             return f", until {' or '.join(self._stops)}"
         seconds = self._pace.time_for(self._end - float(cycle.state.time))
@@ -203,20 +205,19 @@ class Progress:
         except UnicodeEncodeError:
             self._out.write(text.encode("ascii", "replace").decode() + "\n")
         except (OSError, ValueError):
-            # Nobody can read it: a full disk, a closed stream, a terminal that is gone. The run goes on.
+            # The text cannot be shown: a full disk, a closed stream, a terminal that is gone. The run continues.
             if self._out is sys.stderr:
                 sys.stderr = open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115
             self._out = None
 
 
 def closing_lines(summary: dict[str, Any], folder: Path) -> list[str]:
-    """The few lines that end a run: why it ended, at what loads (times, where nothing leads), how long it took, where
-    the files are."""
+    """The lines that end a run: the reason, the loads of events (times, if no load leads), the duration, the folder."""
     lines = [f"{summary.get('title', 'run')}: {summary.get('end', 'done')}"]
     if "not_reached" in summary:
         lines.append(f"  {summary['not_reached']}")
     for kind, first in summary.get("first", {}).items():
-        # A load of 0 is that of a scene which has no leading one: it is driven by time.
+        # Without a leading load the load is 0: the scene is driven by time.
         load = first.get("load_pa")
         text = f"  {kind:<13} " + (f"{stress_text(load):>12}" if load else f"t = {first['time_s']:.4g} s")
         text += " in tension" if load and load < 0 else ""
@@ -241,20 +242,18 @@ def closing_lines(summary: dict[str, Any], folder: Path) -> list[str]:
 
 
 def _way_on(summary: dict[str, Any], folder: Path) -> str:
-    """How a run goes on beyond the event that ended it."""
+    """How to continue a run beyond the event that ended it."""
     size = summary.get("checkpoint_not_kept_mb")
     if size is None:
-        return f"  to go on beyond it: geomech resume {folder} --set 'run.stop_at=[]'"
-    return (
-        f"  to go on beyond it: run again with --set output.checkpoint_kept_mb={math.ceil(size)}, then geomech resume"
-    )
+        return f"  to continue beyond it: geomech resume {folder} --set 'run.stop_at=[]'"
+    return f"  to continue beyond it: run again with --set output.checkpoint_kept_mb={math.ceil(size)}, then geomech resume"
 
 
 def _cycle_text(cycle: Cycle) -> str:
     if not cycle.cracks.n_cracks:
         return f"t = {cycle.state.time:.4g} s, {state_text(cycle)}"
     growing = int(np.count_nonzero(cycle.tips["grown"] > 0))
-    # A load that has not begun is that of a scene which has no leading one: it is driven by time.
+    # Before a load begins, or without a leading one, the scene is driven by time.
     pulled = " in tension" if cycle.load < 0 else ""
     drive = f"load {stress_text(cycle.load, 3)}{pulled}" if cycle.load else f"t = {cycle.state.time:.4g} s"
     text = f"{drive}, cycle {cycle.number}"

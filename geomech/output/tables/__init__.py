@@ -1,1 +1,1 @@
-"""Histories as CSV and the summary of a run."""
+"""Histories as CSV, and the summary of a run."""

@@ -1,4 +1,4 @@
-"""How far the crack solver's last results are to be trusted: what is left of their equations, and the error of K."""
+"""Reliability of the crack solver's last results: residual and condition of its equations, and the error of K."""
 
 from __future__ import annotations
 
@@ -9,22 +9,24 @@ import numpy as np
 
 from geomech.model import Cycle
 
-#: Bodies whose K are solved for on a finer mesh, those with the hardest driven tips: as much work again as they took.
+#: Number of bodies whose K are solved for on a finer mesh, those with the hardest driven tips: it doubles their cost.
 ESTIMATED = 10
-#: Residuals below this are round-off, of which the last digits follow from where arrays happen to lie in memory.
+#: Smaller residuals are round-off, whose last digits depend on the location of arrays in memory.
 ROUND_OFF = 1e-12
 _log = logging.getLogger(__name__)
 
 
 def _three_digits(number: float) -> float:
-    """More of an estimate means nothing, and a resumed run is to report the same."""
+    """Further digits of an estimate have no meaning, and a resumed run must report the same."""
     return float(f"{number:.2e}")
 
 
 def crack_trust(cycle: Cycle) -> dict[str, Any]:
-    """The worst over the cracked blocks of ``cycle``: ``residual`` of equilibrium relative to the largest traction
-    (at least `ROUND_OFF`), ``condition`` of the equations, and the estimated error of K relative to the largest K of
-    its block, with the block it is of."""
+    """Worst values over the cracked blocks of ``cycle``.
+
+    ``residual`` of equilibrium relative to the largest traction (at least `ROUND_OFF`), ``condition`` of the equations,
+    and the estimated error of K relative to the largest K of its block, with that block.
+    """
     summary: dict[str, Any] = {
         "residual": _three_digits(max(ROUND_OFF, *(float(body.residual) for body in cycle.bodies.values()))),
         "condition": _three_digits(max(float(body.condition) for body in cycle.bodies.values())),

@@ -1,4 +1,4 @@
-"""The deepest that contacts were pressed in during a run, of which blocks and where; and what has shortened its steps."""
+"""Deepest contact penetration during a run, with its blocks and location; and what shortened the steps."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from geomech.model import OPEN, Cycle, Shortened
 
 @dataclass(eq=False)
 class Deepest:
-    """The deepest penetration relative to the smaller block's size, √area, that any cycle has shown."""
+    """The deepest penetration of any cycle, relative to the smaller block's size √area."""
 
     share: float = 0.0
     summary: dict[str, Any] | None = None
@@ -36,12 +36,12 @@ class Deepest:
 
 
 def step_limits(shortened: tuple[Shortened, ...]) -> list[dict[str, Any]]:
-    """What has shortened steps, most often first: for ``summary.json``."""
+    """Reasons why steps were shortened, the most frequent first, for ``summary.json``."""
     return [{"why": s.why, "blocks": list(s.blocks), "count": s.count, "way_out": s.way_out} for s in shortened]
 
 
 def limits_line(limits: list[dict[str, Any]], steps: int) -> list[str]:
-    """A line that ends a run of which more steps were shortened than not."""
+    """A closing line for a run in which most steps were shortened."""
     if not limits or limits[0]["count"] <= 0.5 * steps:
         return []
     first = limits[0]

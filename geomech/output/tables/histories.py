@@ -1,4 +1,4 @@
-"""CSV files that grow with the run: ``history.csv`` a row a cycle, ``tips.csv`` a row a tip, ``events.csv``."""
+"""CSV files that grow during a run: ``history.csv``, one row per cycle; ``tips.csv``, one per tip; ``events.csv``."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ class Histories:
 
 
 class TableEnd(NamedTuple):
-    """Where a `Table` ends: its columns, rows and bytes."""
+    """End of a `Table`: its columns, rows and bytes."""
 
     columns: tuple[str, ...]
     rows: int
@@ -66,8 +66,11 @@ class TableEnd(NamedTuple):
 
 
 class Table:
-    """A CSV file that grows row by row. A column not seen before (a monitor's, a step's statistic that only comes
-    with contact) is added at the right, with the rows so far rewritten; that happens a few times in a run."""
+    """A CSV file that grows row by row.
+
+    A new column (of a monitor, or a step statistic that appears with the first contact) is added at the right, and the
+    existing rows are rewritten; that happens a few times in a run.
+    """
 
     def __init__(self, path: Path, columns: Iterable[str]) -> None:
         self.path, self.columns = Path(path), list(columns)
@@ -83,8 +86,8 @@ class Table:
 
     @classmethod
     def cut_back(cls, path: Path, end: TableEnd) -> Table:
-        """Go on with the file ``path`` from where it ended as ``end`` says: columns and rows that came later are
-        dropped. Raises FilesChanged when it has not got what it had then."""
+        """Continue the file ``path`` from ``end``; later columns and rows are dropped. Raises FilesChanged if it has
+        less content than at that time."""
         table = cls.__new__(cls)
         table.path, table.columns, table._known, table._rows = path, list(end.columns), set(end.columns), end.rows
         if not path.is_file():
@@ -103,7 +106,7 @@ class Table:
         return table
 
     def add(self, rows: Iterable[dict[str, Any]]) -> None:
-        """Append ``rows`` (column → value; a column left out stays empty) and flush."""
+        """Append ``rows`` (column → value; missing columns stay empty) and flush."""
         rows = list(rows)
         if not rows:
             return
@@ -129,7 +132,7 @@ class Table:
         self._file = open(self.path, "a", newline="", encoding="utf-8")  # noqa: SIM115
 
     def _narrow(self, header: list[str]) -> None:
-        """Take the columns beyond ours, and the rows beyond ours, out of the file, whose ``header`` has more."""
+        """Remove columns and rows from the file that are not ours; its ``header`` has more columns."""
         if header[: len(self.columns)] != self.columns:
             raise FilesChanged(f"{self.path} has other columns than it had: {', '.join(header)}")
         with open(self.path, newline="", encoding="utf-8") as file:

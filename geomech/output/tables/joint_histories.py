@@ -1,5 +1,4 @@
-"""CSV files of joints and supports that grow with the run: ``joints.csv``, a row a joint and cycle, and
-``reactions.csv``."""
+"""CSV files of joints and supports: ``joints.csv``, one row per joint and cycle, and ``reactions.csv``."""
 
 from __future__ import annotations
 
@@ -14,7 +13,7 @@ from .histories import Table, TableEnd
 
 
 class JointHistories:
-    """Observer that adds contacts up by joint (`geomech.model.joints.joint_sums`) and what they put on fixed and guided
+    """Observer that sums up contacts by joint (`geomech.model.joints.joint_sums`) and their forces on fixed and guided
     blocks."""
 
     def on_start(self, problem: Problem, folder: Path) -> None:

@@ -1,4 +1,4 @@
-"""Joint sets as they were asked for and as they came out: for block_system.json and for people."""
+"""Statistics of joint sets, as specified and as generated, for block_system.json and as text."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from geomech.shapes.joint_networks.fracture_statistics import line_statistics, s
 from geomech.shapes.joint_networks.interfaces import joints_between
 from geomech.shapes.parts import JOINT, extent_of
 
-#: Columns of the table: heading, key, key of what stands behind a ±.
+#: Columns of the table: heading, key, key of the value after ±.
 _COLUMNS = (
     ("P10 1/m", "p10_per_m", None),
     ("P20 1/m²", "p20_per_m2", None),
@@ -32,20 +32,20 @@ _COLUMNS = (
 
 
 def given(value: float) -> float | None:
-    """``value``, or None where there is none."""
+    """``value``, or None if it is missing."""
     return value if math.isfinite(value) else None
 
 
 class Network(NamedTuple):
-    """All ``joints`` of a scene, drawn and by statistics, those that are outlines of its zones too; its ``nodes`` by
-    kind, and what became of each name's traces."""
+    """All ``joints`` of a scene: drawn, generated, and those that are outlines of its zones; its ``nodes`` by kind, and
+    the fate of each name's traces."""
 
     joints: tuple[Joint, ...]
     nodes: dict[str, int]
     partings: tuple[Parting, ...]
 
 
-#: What `network_of` has found, as long as its scene lives: tables, files and pictures ask for it.
+#: Results of `network_of`, kept as long as their scene: tables, files and pictures use them.
 _found: WeakKeyDictionary[Any, Network] = WeakKeyDictionary()
 
 
@@ -67,7 +67,7 @@ def _network(scene: Any) -> Network:
         if jointed is None:
             return Network((), {"I": 0, "Y": 0, "X": 0}, ())
         return Network(known, dict(jointed.cutting.nodes), jointed.cutting.partings)
-    # What was parted before is cut again, out of all the rock.
+    # Rock that was separated earlier is cut again as a whole.
     joints = [replace(joint, lines=(*joint.lines, *more.pop(joint.name, ()))) for joint in known]
     joints += [Joint(name, lines) for name, lines in more.items()]
     whole = [
@@ -79,13 +79,15 @@ def _network(scene: Any) -> Network:
 
 
 def _tolerance(scene: Any) -> float:
-    """What the drawing takes to touch, m."""
+    """Distance, m, below which drawn lines touch."""
     return scene.tables.geometry.tolerance_m or TOLERANCE * extent_of([scene.drawing.blocks.vertices])
 
 
 def joint_statistics(scene: Any, problem: Any, free: np.ndarray) -> list[dict[str, Any]]:
-    """An entry for every joint set of a loaded scene: what it is like in the rock of the ``free`` blocks (a mask), and
-    below "asked" what its laws say, by the same keys."""
+    """One entry per joint set of a loaded scene: its statistics in the rock of the ``free`` blocks (a mask).
+
+    "asked" holds the parameters of its distributions, by the same keys.
+    """
     import shapely
 
     blocks, cracks, drawing, network = problem.blocks, problem.cracks, scene.drawing, network_of(scene)
@@ -94,7 +96,7 @@ def joint_statistics(scene: Any, problem: Any, free: np.ndarray) -> list[dict[st
     geometry = scene.tables.geometry
     shapes = {shape.name: shape for shape in geometry.joint_sets}
     zone = np.array(drawing.zones)
-    # What the drawing takes to touch the rim ends on it.
+    # A trace that the drawing counts as touching the rim ends there.
     tolerance = _tolerance(scene)
     rock = {(): rock_of(blocks, np.flatnonzero(free).tolist())}
     crack_set = np.array([name.rpartition(" ")[0] for name in cracks.names])
@@ -122,7 +124,7 @@ def joint_statistics(scene: Any, problem: Any, free: np.ndarray) -> list[dict[st
         if shape is not None:
             entry["asked"] = asked(shape, geometry)
             if entry["mean_angle_deg"] is not None and "mean_angle_deg" in entry["asked"]:
-                # A trace has no sense: of its two angles, the one nearer to what was asked.
+                # A trace has no direction sense: of its two angles, the one nearer to the specified one.
                 off = entry["mean_angle_deg"] - entry["asked"]["mean_angle_deg"]
                 entry["mean_angle_deg"] -= 180 * round(off / 180)
             entry["ends_on"] = list(shape.ends_on)
@@ -147,7 +149,7 @@ def _got(joint: Any, region: Any, shape: Any, tolerance: float) -> dict[str, Any
         "angle_deviation_deg": math.degrees(found.angle_deviation),
     }
     if shape is not None and shape.kind == "parallel":
-        # Traces of a parallel set lie on lines, whose spacing and persistence were asked for.
+        # Traces of a parallel set lie on lines whose spacing and persistence were specified.
         lines = line_statistics(joint, region)
         out |= {
             "lines": lines.lines,
@@ -159,8 +161,8 @@ def _got(joint: Any, region: Any, shape: Any, tolerance: float) -> dict[str, Any
 
 
 def table(entries: Sequence[dict[str, Any]]) -> list[str]:
-    """``entries`` side by side with what was asked, a row each: how many traces there are, how many of them part
-    blocks, and along what length."""
+    """``entries`` next to the specified values, one per row: number of traces, how many separate blocks, and their
+    length."""
     if not entries:
         return []
     wide = max(8, *(len(entry["name"]) for entry in entries))

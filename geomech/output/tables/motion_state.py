@@ -1,4 +1,4 @@
-"""Whether the blocks are at rest, slide or move: the words of the progress line and of the summary."""
+"""State of motion of the blocks, at rest, sliding or moving, in words for the progress line and the summary."""
 
 from __future__ import annotations
 
@@ -10,22 +10,21 @@ import numpy as np
 from geomech.model import OPEN, SLIP, Cycle, Problem
 from geomech.model.blocks.key_blocks import CLASSES, FALLS, FIXED, SLIDES, key_blocks
 
-#: Blocks are at rest, but for small vibrations, when less than this part of the forces on any of them is left to move
-#: it …
+#: Blocks are at rest, apart from small vibrations, if the unbalanced force on every block is below this part of its
+#: forces …
 AT_REST = 1e-2
-#: … and their kinetic energy is below this part of what blocks and contacts store: what slides steadily is balanced
-#: too.
+#: … and their kinetic energy is below this part of the energy stored in blocks and contacts (steady sliding is in
+#: equilibrium, too).
 STILL = 1e-2
-#: So many blocks are named.
+#: Number of blocks that are named.
 NAMED = 5
-#: A block stands that has moved by less than this part of its size √area, and would not in the time it takes to fall so
-#: far.
+#: A block counts as stable if it has moved by less than this part of its size √area, and at its velocity would not
+#: reach that in the time of a free fall over that distance.
 STANDS = 1e-3
 
 
 def condition(cycle: Cycle) -> str:
-    """One of "at rest", "sliding" (every block that moves keeps touching others), "moving"; "" before the first
-    step."""
+    """ "at rest", "sliding" (every moving block keeps touching others) or "moving"; "" before the first step."""
     statistics = cycle.statistics
     unbalanced = statistics.get("unbalanced_ratio", math.nan)
     if math.isnan(unbalanced):
@@ -57,16 +56,18 @@ def state_text(cycle: Cycle) -> str:
 
 
 def motion_summary(cycle: Cycle) -> dict[str, Any]:
-    """How the blocks are at the end: for ``summary.json``."""
+    """State of motion at the end of the run, for ``summary.json``."""
     statistics = cycle.statistics
     names = ("kinetic_energy", "unbalanced_ratio", "worst_penetration")
     return {"condition": condition(cycle), **{name: statistics[name] for name in names if name in statistics}}
 
 
 def energy_summary(cycle: Cycle) -> dict[str, float]:
-    """The energy budget of the run, J/m, ``budget_residual`` as a part of all energy turned over: for ``summary.json``.
-    Empty without one. ``unpaid_toughness``: what rock took in a run in motion as it broke and blocks, which store no
-    bending, did not give."""
+    """Energy budget of the run, J/m, for ``summary.json``; empty without one.
+
+    ``budget_residual`` is relative to all energy turned over. ``unpaid_toughness``: fracture energy in a run in motion
+    that the blocks, which store no bending energy, did not supply.
+    """
     names = (
         "kinetic_energy", "elastic_energy", "contact_energy", "gravity_work", "load_work", "crack_work",
         "friction_loss",
@@ -84,7 +85,7 @@ def energy_summary(cycle: Cycle) -> dict[str, float]:
 
 
 def key_block_summary(cycle: Cycle, problem: Problem) -> list[dict[str, Any]]:
-    """The blocks that have moved farthest, and how block theory has them: for ``summary.json``."""
+    """The blocks that have moved farthest, with their classification by block theory, for ``summary.json``."""
     rows = key_blocks(
         cycle.blocks, problem.materials, problem.joints, cycle.state, problem.loads.gravity.at(cycle.state.time)
     )
@@ -106,7 +107,7 @@ def key_block_summary(cycle: Cycle, problem: Problem) -> list[dict[str, Any]]:
             and row["displacement"] < STANDS * size
             and row["speed"] < STANDS * math.sqrt(pull * size)
         ):
-            # Neighbours wedge it, or bolts and bonds hold it: block theory knows of its own weight and friction alone.
+            # Neighbours, bolts or bonds hold it: block theory considers only its own weight and friction.
             entry["class"] = f"stands (by its own weight and friction a {entry['class']})"
         if not math.isnan(row["direction"]):
             entry["direction_deg"] = math.degrees(row["direction"])
@@ -117,7 +118,7 @@ def key_block_summary(cycle: Cycle, problem: Problem) -> list[dict[str, Any]]:
 
 
 def closing(summary: dict[str, Any]) -> list[str]:
-    """What a run of blocks ends with: their state of motion, the balance of energy, the blocks that moved farthest."""
+    """Closing lines of a run of blocks: state of motion, energy balance, the blocks that moved farthest."""
     motion, energy = summary.get("motion", {}), summary.get("energy", {})
     lines = []
     if motion.get("condition"):
@@ -129,7 +130,7 @@ def closing(summary: dict[str, Any]) -> list[str]:
         work = energy["gravity_work"] + energy["load_work"]
         struck = f" impacts {energy['impact_loss']:.3g}," if energy.get("impact_loss") else ""
         lines.append(
-            f"  work {work:.3g} J/m, of it lost in friction {energy['friction_loss']:.3g}, damping "
+            f"  work {work:.3g} J/m, of which lost in friction {energy['friction_loss']:.3g}, damping "
             f"{energy['damping_loss']:.3g},{struck} time scheme {energy['scheme_loss']:.3g}; unexplained "
             f"{energy['energy_residual']:.1g}"
         )

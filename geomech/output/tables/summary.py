@@ -1,4 +1,4 @@
-"""``summary.json``: what a run came to, in numbers a table can be made of."""
+"""``summary.json``: the results of a run in numbers, as the basis of tables."""
 
 from __future__ import annotations
 
@@ -23,16 +23,16 @@ from .deepest_penetration import Deepest, step_limits
 from .motion_state import energy_summary, key_block_summary, motion_summary
 from .skipped_work import skipped
 
-#: What a `Summary` has counted.
+#: Counters of a `Summary`.
 _COUNTED = ("_last", "_events", "_peak", "_load_steps", "_growth_passes", "_grown", "_deepest")
 
 
 class Summary:
-    """Observer that counts, and at the end completes the run's ``summary`` and writes it as ``summary.json``.
+    """Observer that counts, and at the end completes the run's ``summary`` and writes ``summary.json``.
 
-    Loads are given in Pa, positive in compression, and their magnitudes, where the problem has cracks and a toughness,
-    as |σ|√(πb)/K_Ic with b half the longest crack of the scene, which is how strengths of different rocks compare. The
-    peak is the load of the largest magnitude.
+    Loads are in Pa, positive in compression; if the problem has cracks and a toughness, their magnitudes are also given as
+    |σ|√(πb)/K_Ic, with b half the longest crack of the scene, which makes strengths of different rocks comparable. The peak
+    is the load of largest magnitude.
     """
 
     def on_start(self, problem: Problem, folder: Path) -> None:
@@ -92,7 +92,7 @@ class Summary:
         summary["events"] = counts
         if last is not None:
             summary["cycles"] = last.number + 1
-            summary["load_steps"] = self._load_steps  # the initial state, number 0, is none
+            summary["load_steps"] = self._load_steps  # without the initial state, number 0
             summary["growing_cycles"] = int(self._growth_passes)
             summary["time_s"] = float(last.state.time)
             summary["peak_load_pa"] = float(self._peak)
@@ -139,8 +139,8 @@ class Summary:
 
 
 def normalisation(problem: Problem) -> tuple[float, float] | None:
-    """(b, K_Ic) that make loads dimensionless, σ√(πb)/K_Ic: half the longest crack of the scene, along it, and the
-    toughness of its block; None without cracks or with an infinite toughness."""
+    """(b, K_Ic) for the dimensionless load σ√(πb)/K_Ic: half the length of the scene's longest crack, and the toughness
+    of its block; None without cracks or with infinite toughness."""
     cracks = problem.cracks
     if not cracks.n_segments:
         return None
@@ -152,14 +152,14 @@ def normalisation(problem: Problem) -> tuple[float, float] | None:
 
 
 def versions() -> dict[str, str]:
-    """Versions of what computed the run."""
+    """Versions of the software that computed the run."""
     found = {"python": platform.python_version(), "machine": f"{platform.machine()}, {os.cpu_count()} cores"}
     packages = ("geomech", "numpy", "scipy", "numba", "shapely", "gmsh")
     return found | dict.fromkeys(packages, "not installed") | installed(packages)
 
 
 def installed(packages: Iterable[str]) -> dict[str, str]:
-    """The versions of those ``packages`` that are there."""
+    """Versions of those ``packages`` that are installed."""
     found = {}
     for package in packages:
         with suppress(importlib.metadata.PackageNotFoundError):
@@ -168,7 +168,7 @@ def installed(packages: Iterable[str]) -> dict[str, str]:
 
 
 def write_json(path: Path, value: Any) -> None:
-    """Write ``value`` as JSON, whole or not at all; NumPy numbers become plain ones."""
+    """Write ``value`` as JSON, atomically; NumPy numbers become plain ones."""
     unfinished = path.with_name(path.name + ".part")
     unfinished.write_text(json.dumps(value, indent=2, default=_plain, ensure_ascii=False) + "\n", encoding="utf-8")
     os.replace(unfinished, path)

@@ -1,4 +1,4 @@
-"""Many points, each carried by its own block: displacement, turned directions, velocity."""
+"""Motion of points fixed to blocks: displacement, rotated directions, velocity."""
 
 from __future__ import annotations
 
@@ -10,7 +10,8 @@ from geomech.model.blocks.block_motion import Motion
 
 def displacement(motion: Motion, block: np.ndarray, points: np.ndarray) -> np.ndarray:
     """(n, 2) m: displacement of reference ``points`` (n, 2), point i moving with ``block[i]``."""
-    # F − 1 is formed before it meets coordinates, so a displacement of a millionth of the block keeps its digits.
+    # F − 1 is formed before it is multiplied by coordinates, so that displacements of a millionth of the block keep
+    # their digits.
     stretch = motion.gradient - np.eye(2)
     x, y = (points - motion.reference_centre[block]).T
     out = (motion.centre - motion.reference_centre)[block]
@@ -20,7 +21,7 @@ def displacement(motion: Motion, block: np.ndarray, points: np.ndarray) -> np.nd
 
 
 def carried(motion: Motion, block: np.ndarray, directions: np.ndarray) -> np.ndarray:
-    """(n, 2): ``directions`` drawn on the reference blocks, turned and stretched with them, made unit again."""
+    """(n, 2): unit ``directions`` drawn on the reference blocks, deformed with them and normalised."""
     turned = np.einsum("nij,nj->ni", motion.gradient[block], directions)
     return turned / np.maximum(np.hypot(turned[:, 0], turned[:, 1]), np.finfo(float).tiny)[:, None]
 
@@ -34,16 +35,16 @@ def rotation(gradient: np.ndarray) -> np.ndarray:
 
 
 def vertex_velocity(blocks: Blocks, state: State) -> np.ndarray:
-    """(n_vertices, 2) m/s: Shi's (1988) first-order displacement function applied to each block's six rates about its
-    current centroid."""
+    """(n_vertices, 2) m/s: Shi's (1988) first-order displacement function of each block's six rates about its current
+    centroid."""
     x, y = (state.vertices - centroids(blocks, state.vertices)[blocks.vertex_block]).T
     u0, v0, r0, ex, ey, gxy = state.velocity[blocks.vertex_block].T
     return np.stack([u0 - y * r0 + x * ex + 0.5 * y * gxy, v0 + x * r0 + y * ey + 0.5 * x * gxy], axis=-1)
 
 
 def centroids(blocks: Blocks, vertices: np.ndarray) -> np.ndarray:
-    """(n_blocks, 2) m: centroids of the polygons, holes taken out."""
-    # About each block's own first vertex, or the closed sums lose their digits far from the origin.
+    """(n_blocks, 2) m: centroids of the polygons without their holes."""
+    # Relative to each block's first vertex: the closed sums would lose digits far from the origin.
     origin = vertices[blocks.vertex_start[:-1]]
     own = vertices - origin[blocks.vertex_block]
     ahead = own[blocks.next_vertex]

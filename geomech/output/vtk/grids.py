@@ -1,8 +1,8 @@
-"""A cycle as grids of points, cells and fields: blocks, cracks, tips and contacts.
+"""Grids of a cycle with points, cells and fields: blocks, cracks, tips and contacts.
 
-One rule holds for all files of a run: where a point is now = points + REFERENCE × displacement. With ``configuration``
-"reference" (REFERENCE = 1 in the field data) files hold the coordinates of the reference, and warping by displacement
-moves them; with "current" (REFERENCE = 0) the coordinates are those of now, and warping would move them twice.
+One rule holds for all files of a run: current position = points + REFERENCE × displacement. With ``configuration``
+"reference" (REFERENCE = 1 in the field data) files hold reference coordinates, to be warped by displacement; with
+"current" (REFERENCE = 0) they hold current coordinates, which warping would displace twice.
 """
 
 from __future__ import annotations
@@ -22,12 +22,12 @@ from .vtu import LINE, TRIANGLE, VERTEX, Grid
 
 CONFIGURATIONS = ("reference", "current")
 
-#: Key blocks are found again when a block has turned by the inverse of this, rad.
+#: Key blocks are determined again when a block has rotated by the inverse of this, rad.
 _TURNS_SEEN = 50.0
 
 
 class KeyBlocks:
-    """The key blocks of a run, kept while the same contacts are closed: block theory asks for directions only."""
+    """Key blocks of a run, kept while the same contacts are closed: block theory depends on directions only."""
 
     def __init__(self, problem: Problem) -> None:
         self._materials, self._joints, self._gravity = problem.materials, problem.joints, problem.loads.gravity
@@ -35,7 +35,7 @@ class KeyBlocks:
         self._kind = np.empty(0, np.int64)
 
     def kind(self, cycle: Cycle) -> np.ndarray:
-        """(n_blocks,) the class of every block (`geomech.model.blocks.key_blocks`)."""
+        """(n_blocks,) class of every block (`geomech.model.blocks.key_blocks`)."""
         contacts, state = cycle.state.contacts, cycle.state
         if cycle.number == 0 and len(contacts) == 0:
             return np.full(cycle.blocks.n_blocks, UNKNOWN)
@@ -51,8 +51,8 @@ class KeyBlocks:
 def blocks_grid(
     cycle: Cycle, materials: Sequence[Material], configuration: str, triangles: Triangles, keys: KeyBlocks
 ) -> Grid:
-    """Every block as triangles on its own vertices, so that Warp By Vector opens the joints and Feature Edges draws
-    the outlines."""
+    """Every block as triangles on its own vertices, so that Warp By Vector opens the joints and Feature Edges draws the
+    outlines."""
     blocks, state = cycle.blocks, cycle.state
     cells, owner = triangles.of(blocks)
     stress = six_components(state.stress, blocks.material, materials)
@@ -79,7 +79,7 @@ def blocks_grid(
 
 
 def _rank(blocks: Blocks, state: State) -> np.ndarray:
-    """(n_blocks,) 0 for the block that has moved farthest."""
+    """(n_blocks,) 0 for the block that has moved farthest, and so on."""
     moved = blocks.mean_vertices(state.vertices) - blocks.mean_vertices(blocks.vertices)
     rank = np.empty(blocks.n_blocks, int)
     rank[np.argsort(-np.einsum("ij,ij->i", moved, moved), kind="stable")] = np.arange(blocks.n_blocks)
@@ -87,16 +87,18 @@ def _rank(blocks: Blocks, state: State) -> np.ndarray:
 
 
 class CrackLines:
-    """Elements of a crack network as lines between their sampling points, kept while the network stands; then segments
-    that nobody solved for (``unsolved``), from end to end. Elements do not share points, since opening and slip jump
-    between them."""
+    """Elements of a crack network as lines between their sampling points, kept while the network does not change.
+
+    They are followed by segments without a solution (``unsolved``), from end to end. Elements do not share points,
+    because opening and slip are discontinuous between them.
+    """
 
     def __init__(self) -> None:
         self._cracks: Cracks | None = None
         self._segment: np.ndarray | None = None
 
     def update(self, cracks: Cracks, faces: CrackFaces | None) -> None:
-        """Make the lines those of ``cracks`` as far as they are sampled in ``faces``."""
+        """Set the lines to those of ``cracks``, as far as they are sampled in ``faces``."""
         segment = np.empty(0, int) if faces is None else faces.segment
         if cracks is self._cracks and np.array_equal(segment, self._segment):
             return
@@ -123,8 +125,7 @@ class CrackLines:
 
 
 def cracks_grid(cycle: Cycle, motion: Motion, configuration: str, lines: CrackLines) -> Grid:
-    """The crack network. Segments that nobody solved for are drawn with nan, but at the start with the zeros of rock at
-    rest."""
+    """The crack network. Segments without a solution have nan; at the start, the zeros of rock at rest."""
     faces = cycle.faces
     lines.update(cycle.cracks, faces)
     rest = np.full(2 * len(lines.unsolved), 0.0 if cycle.number == 0 else np.nan)
@@ -153,7 +154,7 @@ def cracks_grid(cycle: Cycle, motion: Motion, configuration: str, lines: CrackLi
 
 
 def tips_grid(cycle: Cycle, motion: Motion, configuration: str) -> Grid:
-    """Every crack tip as a point; at the start, before anything is solved, with the zeros of rock at rest."""
+    """Every crack tip as a point; at the start, before the first solution, with the zeros of rock at rest."""
     tips = _tips_at_rest(cycle.cracks) if cycle.number == 0 and not len(cycle.tips) else cycle.tips
     moved = displacement(motion, tips["block"], tips["point"])
     c, s = np.cos(tips["angle"])[:, None], np.sin(tips["angle"])[:, None]
@@ -181,7 +182,7 @@ def tips_grid(cycle: Cycle, motion: Motion, configuration: str) -> Grid:
 def contacts_grid(cycle: Cycle, configuration: str) -> Grid:
     """Every contact as a point: its vertex in the reference, its foot on the edge in the current configuration."""
     contacts = cycle.state.contacts
-    along = normal_of(contacts["normal"])  # the edge's direction, given its outward normal
+    along = normal_of(contacts["normal"])  # the edge's direction from its outward normal
     force = contacts["normal_force"][:, None] * contacts["normal"] + contacts["shear_force"][:, None] * along
     reference = cycle.blocks.vertices[contacts["vertex"]]
     return _cloud(
@@ -234,7 +235,7 @@ def _cloud(points: np.ndarray, point_data: dict[str, np.ndarray]) -> Grid:
 
 
 def _tips_at_rest(cracks: Cracks) -> np.ndarray:
-    """TIP rows of all tips of ``cracks``, all factors zero."""
+    """TIP rows of all tips of ``cracks``, with all factors zero."""
     place = {int(node): k for k, node in enumerate(cracks.segments.ravel())}
     at = np.array([place[int(node)] for node in cracks.tips], dtype=int)
     segment, end = at // 2, at % 2

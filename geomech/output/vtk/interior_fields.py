@@ -1,4 +1,4 @@
-"""Stress and displacement inside cracked rock, on a triangle mesh whose crack faces can part."""
+"""Stress and displacement inside cracked rock, on a triangle mesh that is split along crack faces."""
 
 from __future__ import annotations
 
@@ -20,19 +20,22 @@ from .vtu import TRIANGLE, Grid
 
 #: A node on a crack face is evaluated this far inside its own side, relative to its shortest triangle edge.
 _ASIDE = 1e-5
-#: Triangles of a block of higher order, at least, and of all of them together, about.
+#: Least number of triangles of a block of higher order, and about the number of all of them together.
 _FEWEST, _OF_BENT = 60, 40_000
-#: Displacement is tied to the block's own within this part of its size (√area) about a contact.
+#: Displacement is adjusted to the block's own within this part of its size (√area) around a contact.
 _TIED = 0.25
-#: Cracks that turn by more than this are sharp there: stress is singular, rad.
+#: Sharp kinks of cracks, where stress is singular, turn by more than this, rad.
 _SHARP = math.radians(20)
 
 
 @dataclass(frozen=True, eq=False)
 class _Kept:
-    """The mesh of a block with its cracks: ``points`` (n, 2) where its nodes are looked at, ``areas`` (n,) of
-    the rock about them. Below, nodes where stress is singular: ``centres`` (k, 2) of the triangles about them and the
-    node of each, ``owner`` (k,)."""
+    """Mesh of a cracked block.
+
+    points   (n, 2) where its nodes are evaluated
+    areas    (n,) area of rock around each node
+    centres, owner   (k, 2) centres of the triangles around nodes where stress is singular, and (k,) the node of each
+    """
 
     mesh: Any
     points: np.ndarray
@@ -42,12 +45,12 @@ class _Kept:
 
 
 class InteriorMeshes:
-    """Meshes of the cracked blocks, kept while their geometry stands (whatever number a block has by then: where one is
-    split, all after it get others), and the fields of a cycle on them.
+    """Meshes of the cracked blocks, kept while their geometry does not change, and the fields of a cycle on them.
 
-    ``n_triangles`` is about how many triangles an uncracked block gets; crack tips are meshed ``tip_ratio`` times
-    finer than the rest. Blocks without cracks, but of a material that has been seen to crack, are there as well (what a
-    crack has cut off, above all), each with the one strain and stress that it has.
+    Meshes are found by geometry, because splitting a block renumbers those after it. ``n_triangles`` is about the
+    number of triangles of an uncracked block; crack tips are meshed ``tip_ratio`` times finer than the rest. Uncracked
+    blocks of a material that has cracked are included (above all parts that a crack has separated), each with its
+    uniform strain and stress.
     """
 
     def __init__(self, n_triangles: int = 2000, tip_ratio: float = 15.0) -> None:
@@ -57,18 +60,18 @@ class InteriorMeshes:
         self._triangles = Triangles()
 
     def note_cracked(self, cycle: Cycle) -> None:
-        """Take the materials that hold cracks at ``cycle`` for those that crack, before an earlier cycle is drawn."""
+        """Note the materials with cracks at ``cycle``, before an earlier cycle is drawn."""
         self._cracked_materials |= {int(cycle.blocks.material[b]) for b in cycle.inside}
 
     def grid(self, cycle: Cycle, materials: Sequence[Material], motion: Motion, configuration: str) -> Grid:
-        """The rock of ``cycle`` as one grid; empty until some block holds a crack."""
+        """The rock of ``cycle`` as one grid; empty until some block has a crack."""
         blocks = cycle.blocks
         self.note_cracked(cycle)
         whole = np.isin(blocks.material, [*self._cracked_materials]) & ~blocks.fixed
         whole[[*cycle.inside]] = False
         before, self._kept = self._kept, {}
         parts = [self._block(cycle, b, body, motion, before) for b, body in sorted(cycle.inside.items())]
-        # Blocks whose cracks nobody has solved for yet: before the first step.
+        # Blocks whose cracks have no solution yet: before the first step.
         waiting = np.intersect1d(np.flatnonzero(whole), cycle.cracks.block).tolist()
         whole[waiting] = False
         parts += [self._waiting_block(cycle, b, motion, before) for b in waiting]
@@ -106,8 +109,7 @@ class InteriorMeshes:
         turn = float(rotation(gradient))
         n = len(kept.points)
         stress, own = body.fields(np.concatenate([kept.points, kept.centres]))
-        # At a tip or a sharp corner there is no stress to give: that of the triangles about it is what the mesh
-        # resolves.
+        # At a tip or sharp corner stress is infinite: the mean of the surrounding triangles is what the mesh resolves.
         count = np.bincount(kept.owner, minlength=n)
         singular = np.flatnonzero(count)
         for k in range(3):
@@ -128,7 +130,7 @@ class InteriorMeshes:
         }
 
     def _waiting_block(self, cycle: Cycle, b: int, motion: Motion, before: dict[bytes, _Kept]) -> dict[str, np.ndarray]:
-        """A block with cracks before they are solved for: the one stress and the motion that it has as a block."""
+        """A cracked block before its first solution: uniform stress, and the block's own motion."""
         kept = self._mesh(cycle, b, before)
         owner = np.full(len(kept.points), b)
         return {
@@ -140,7 +142,7 @@ class InteriorMeshes:
         }
 
     def _whole_blocks(self, cycle: Cycle, whole: np.ndarray) -> dict[str, np.ndarray]:
-        """Blocks without cracks (``whole``, a mask) have one strain and one stress each: their corners say it all."""
+        """Blocks without cracks (``whole``, a mask) have uniform strain and stress: their corners suffice."""
         blocks, state = cycle.blocks, cycle.state
         triangles, owner = self._triangles.of(blocks)
         corners = np.flatnonzero(whole[blocks.vertex_block])
@@ -169,20 +171,20 @@ class InteriorMeshes:
         return kept
 
     def _triangles_of(self, cycle: Cycle, b: int) -> int:
-        """About how many triangles block ``b`` gets: fewer where many blocks bend, whose stress is smooth."""
+        """Approximate number of triangles of block ``b``: fewer if many blocks bend, whose stress is smooth."""
         if b not in cycle.bent:
             return self.n_triangles
         return max(_FEWEST, min(self.n_triangles, _OF_BENT // len(cycle.bent)))
 
 
 def _singular_nodes(cracks: Cracks) -> np.ndarray:
-    """Nodes of ``cracks`` where elastic stress has no bound: tips, junctions and sharp kinks."""
+    """Nodes of ``cracks`` where elastic stress is unbounded: tips, junctions and sharp kinks."""
     along = cracks.nodes[cracks.segments[:, 1]] - cracks.nodes[cracks.segments[:, 0]]
     along = along / cracks.lengths[:, None]
     out = np.zeros((len(cracks.nodes), 2))
     np.add.at(out, cracks.segments[:, 0], along)
     np.subtract.at(out, cracks.segments[:, 1], along)
-    # The two unit vectors out of a node inside a crack add up to 2 sin(turn / 2).
+    # The two unit vectors out of a node inside a crack add up to a length of 2 sin(turn / 2).
     sharp = (cracks.valence == 2) & (np.hypot(*out.T) > 2 * math.sin(_SHARP / 2))
     singular = sharp | (cracks.valence > 2)
     singular[cracks.tips] = True
@@ -190,13 +192,13 @@ def _singular_nodes(cracks: Cracks) -> np.ndarray:
 
 
 def _about_singular(mesh: Any, cracks: Cracks) -> tuple[np.ndarray, np.ndarray]:
-    """The centres (k, 2) of the triangles about singular nodes and the node of each (k,)."""
+    """Centres (k, 2) of the triangles around singular nodes, and the node of each (k,)."""
     at = cracks.nodes[_singular_nodes(cracks)]
     if not len(at):
         return np.empty((0, 2)), np.empty(0, int)
     singular = np.zeros(len(mesh.points), bool)
     reach = 1e-9 * float(np.ptp(mesh.points, axis=0).max())
-    # So few of them that a tree is not worth its import.
+    # Too few for the import of a tree to pay off.
     for node in at:
         singular |= np.abs(mesh.points - node).max(axis=1) <= reach
     triangle, corner = np.nonzero(singular[mesh.triangles])
@@ -204,7 +206,7 @@ def _about_singular(mesh: Any, cracks: Cracks) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _local_size(mesh: Any) -> np.ndarray:
-    """(n,) m: the shortest triangle edge at every point."""
+    """(n,) m: shortest triangle edge at every point."""
     size = np.full(len(mesh.points), np.inf)
     for a, b in ((0, 1), (1, 2), (2, 0)):
         i, j = mesh.triangles[:, a], mesh.triangles[:, b]
@@ -215,7 +217,7 @@ def _local_size(mesh: Any) -> np.ndarray:
 
 
 def _node_areas(mesh: Any) -> np.ndarray:
-    """(n,) m²: a third of the triangles around every point."""
+    """(n,) m²: a third of the area of the triangles around every point."""
     a, b, c = (mesh.points[mesh.triangles[:, k]] for k in range(3))
     u, v = b - a, c - a
     third = np.abs(u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]) / 6
@@ -223,7 +225,7 @@ def _node_areas(mesh: Any) -> np.ndarray:
 
 
 def _contact_points(cycle: Cycle, b: int) -> np.ndarray:
-    """(n, 2) m in the reference: where closed contacts press on block ``b``, its own vertices or feet on its edges."""
+    """(n, 2) m, reference: closed contacts of block ``b``, its own vertices or projections on its edges."""
     contacts, blocks = cycle.state.contacts, cycle.blocks
     closed = contacts[contacts["state"] != OPEN]
     own, other = closed[closed["block"] == b], closed[closed["other"] == b]
@@ -233,12 +235,13 @@ def _contact_points(cycle: Cycle, b: int) -> np.ndarray:
 
 
 def _tied(points: np.ndarray, moved: np.ndarray, at: np.ndarray, as_block: np.ndarray, reach: float) -> np.ndarray:
-    """``moved`` (n, 2) m at ``points``, as the block moves (``as_block``) at the contacts ``at`` (k, 2) m, and as it was
-    beyond ``reach`` m of them.
+    """``moved`` (n, 2) m at ``points``, adjusted to the block's motion ``as_block`` at the contacts ``at`` (k, 2).
 
-    The neighbour that presses there has met the block, which has one strain. The rock inside is also dented under the
-    load, by several times the block's shortening where the load is nearly a point: without this it would be drawn away
-    from its platens. What is added is continuous (Shepard's weights), so that cracks open and slip as before."""
+    Beyond ``reach`` (m) of the contacts nothing changes. The neighbour at a contact touches the block, which has one
+    strain. The rock inside is also indented by the load, by several times the block's shortening where the load is
+    nearly a point: without the adjustment it would be drawn away from its platens. The adjustment is continuous
+    (Shepard's weights), so that cracks open and slip as before.
+    """
     if not len(at):
         return moved
     nearest = np.array([np.argmin(((points - place) ** 2).sum(axis=1)) for place in at])
@@ -262,9 +265,10 @@ def _placed(
 ) -> np.ndarray:
     """The body's ``own`` displacement with its rigid part replaced by the block's.
 
-    A body under given tractions knows its displacement up to a rigid motion, so that part is taken out and the block's
-    put in its place; the deformation turns with the block. The rigid part is that of the affine motion which fits best
-    over the area (``weights``): fitted without the strain, it would pick up a spin from strain on a lopsided body.
+    A body under given tractions determines its displacement up to a rigid motion, so that this part is removed and the
+    block's is added; the deformation rotates with the block. The rigid part is that of the affine motion with the best
+    fit over the area (``weights``): fitted without the strain, it would pick up a rotation from the strain of an
+    asymmetric body.
     """
     share = weights / weights.sum()
     middle = share @ points
@@ -276,6 +280,6 @@ def _placed(
     c, s = math.cos(turn), math.sin(turn)
     # cos − 1 = −2 sin²(turn/2) keeps the digits of small rotations.
     less = -2 * math.sin(turn / 2) ** 2
-    # The body's middle goes where the block's affine motion takes it; about it, the block turns.
+    # The body's centre moves with the block's affine motion; around it, the block rotates.
     shift = (centre_now - centre) + (gradient - np.eye(2)) @ (middle - centre)
     return shift + arm @ np.array([[less, -s], [s, less]]).T + deforming @ np.array([[c, -s], [s, c]]).T

@@ -1,4 +1,4 @@
-"""``view.py`` in a run folder: ParaView opens every series of the run, drawn as one would by hand."""
+"""``view.py`` in a run folder: opens every series of the run in ParaView, with suitable colours."""
 
 from __future__ import annotations
 
@@ -226,7 +226,7 @@ main()
 
 
 class ViewScript:
-    """Observer that writes ``view.py`` and at the end the state ``view.pvsm``, which opens what ``series`` has written;
+    """Observer that writes ``view.py`` and, at the end, the state ``view.pvsm``, which open the written ``series``;
     ``configuration`` is that of the series."""
 
     def __init__(self, configuration: str = "reference", series: Series | None = None) -> None:

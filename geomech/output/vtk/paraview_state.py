@@ -1,7 +1,7 @@
-"""``view.pvsm`` in a run folder: a ParaView state that opens all series of the run, drawn as ``view.py`` draws them.
+"""``view.pvsm`` in a run folder: a ParaView state that opens all series of the run, drawn as by ``view.py``.
 
 The file is ParaView's own XML (a ``ServerManagerState``: proxies with their properties, and collections that name
-them), written without ParaView; what a proxy does not say takes ParaView's default.
+them), written without ParaView; properties that are left out take ParaView's defaults.
 """
 
 from __future__ import annotations
@@ -19,15 +19,15 @@ from .vtu import EMPTY, Grid
 #: ColorBrewer's YlGnBu (C. Brewer, colorbrewer2.org), as in the pictures; crimson to orange for cracks.
 ROCK = ("ffffd9", "edf8b1", "c7e9b4", "7fcdbb", "41b6c4", "1d91c0", "225ea8", "253494", "081d58")
 CRACKS = ("8f0d33", "d7263d", "ff7a1a", "ffb01f")
-#: ParaView of at least this version reads it.
+#: Oldest ParaView version that reads it.
 VERSION = "5.10.0"
-#: Arrows of the largest force or K are this part of the model long.
+#: Arrows of the largest force or K have this length, relative to the model.
 ARROW = 0.1
 _POINTS, _CELLS = "0", "1"
 
 
 class State:
-    """Proxies, numbered as they come, and what they are called in ParaView's collections."""
+    """Proxies, numbered in order, and their names in ParaView's collections."""
 
     def __init__(self) -> None:
         self._lines: list[str] = []
@@ -35,7 +35,8 @@ class State:
         self._last = 1000
 
     def add(self, group: str, kind: str, name: str = "", collection: str = "", **properties: Any) -> int:
-        """A proxy ``kind`` of ``group``; its number. A property is a value, a list of values, or `Of` another proxy."""
+        """Add a proxy ``kind`` of ``group``; returns its number. A property is a value, a list of values, or `Of`
+        another proxy."""
         self._last += 1
         # ParaView's servers: 1 data, 16 client, 20 render, 21 data and render.
         servers = {"sources": 1, "filters": 1, "extended_sources": 1, "misc": 16, "animation": 16}.get(group, 21)
@@ -66,7 +67,7 @@ class State:
 
 
 class Of:
-    """A property's value that is the proxy of this number."""
+    """Property value that refers to the proxy with this number."""
 
     def __init__(self, proxy: int) -> None:
         self.proxy = proxy
@@ -77,8 +78,11 @@ def _text(value: Any) -> str:
 
 
 def view_state(folder: Path, last: Mapping[str, Grid], reference: bool, suffix: str) -> str:
-    """The state for the run in ``folder``, whose series' last grids are ``last`` (name → grid, blocks among them), in
-    reference coordinates or not; ``suffix`` of the series' files."""
+    """State for the run in ``folder``.
+
+    ``last`` are the last grids of the series (name → grid, blocks among them), in reference coordinates or not;
+    ``suffix`` is that of the series' files.
+    """
     state = State()
     folder = Path(folder).resolve()
     kind = "PVDReader" if suffix == ".pvd" else "VTKHDFReader"
@@ -109,7 +113,7 @@ def view_state(folder: Path, last: Mapping[str, Grid], reference: bool, suffix: 
 
 
 def _rock(state: State, shown: Mapping[str, int], last: Mapping[str, Grid]) -> list[int]:
-    """Blocks, in colours of displacement, or plain next to the stress inside cracked rock."""
+    """Blocks, coloured by displacement, or plain with the stress inside cracked rock."""
     flat: dict[str, Any] = {"Visibility": 1, "Representation": "Surface", "Ambient": 1, "Diffuse": 0}
     inside = "interior" in shown and "principal_stress" in last["interior"].point_data
     if not inside:
@@ -179,8 +183,11 @@ def _arrows(state: State, shown: Mapping[str, int], last: Mapping[str, Grid], si
 def _colours(
     state: State, array: str, title: str, data: Mapping[str, np.ndarray], column: int | None, stops: Sequence[str]
 ) -> tuple[int, int]:
-    """(colours of an ``array``, its legend or 0): the span of the last cycle without the outermost 0.7 % at either
-    end, since stress at a crack tip is singular."""
+    """(colours of an ``array``, its legend or 0).
+
+    The range is that of the last cycle without the outermost 0.7 % at either end, because stress at a crack tip is
+    singular.
+    """
     low, high = _span(data.get(array), column)
     table: list[float] = []
     for value, stop in zip(np.linspace(low, high, len(stops)), stops, strict=True):
@@ -208,14 +215,14 @@ def _span(values: np.ndarray | None, column: int | None) -> tuple[float, float]:
     if not len(found):
         return 0.0, 1.0
     low, high = np.percentile(found, [0.7, 99.3])
-    # A uniform field gets a band about its value, or colours would show round-off.
+    # A uniform field gets a band around its value; otherwise colours would show round-off.
     middle, half = 0.5 * (low + high), max(0.5 * (high - low), 0.05 * max(abs(low), abs(high)))
     return (float(middle - half), float(middle + half)) if half > 0 else (0.0, 1.0)
 
 
 def _magnification(last: Mapping[str, Grid]) -> float:
-    """What makes the largest displacement 3 % of the model where it is below 0.2 %: 1, 2 or 5 times a power of ten, as
-    in ``view.py``."""
+    """Factor that makes the largest displacement 3 % of the model if it is below 0.2 %: 1, 2 or 5 times a power of ten,
+    as in ``view.py``."""
     size = float(np.ptp(last["blocks"].points, axis=0).max())
     largest = float(np.abs(last["blocks"].point_data["displacement"]).max(initial=0.0))
     if not 0.0 < largest < 0.002 * size:

@@ -1,5 +1,4 @@
-"""The ParaView series of a run, one a kind of thing, readable after every cycle: which cycles are written, and what of
-them."""
+"""ParaView series of a run, readable after every cycle: which cycles are written, with which fields."""
 
 from __future__ import annotations
 
@@ -22,35 +21,36 @@ from .vtkhdf import HdfStore
 from .vtu import Grid, nothing, world_origin
 from .vtu_store import VtuStore
 
-#: What `output.format` names.
+#: Values of `output.format`.
 FORMATS = {"vtu": VtuStore, "vtkhdf": HdfStore}
 
 #: Growth passes share the time of their load step; each is written this fraction of a step later than the one before.
 PASS_OFFSET = 1e-6
 
-#: Interior fields cost more than everything else that is written; where no crack grows they are this much rarer.
+#: Interior fields are more expensive than all other output; without crack growth they are less frequent by this factor.
 QUIET = 10
 
 
-#: What a `Series` knows of the run so far, besides what it has listed.
+#: State of a `Series` in addition to the list of what it has written.
 _REMEMBERED = (
     "_triangles", "_lines", "_meshes", "_keys", "_bolts", "_time", "_pending", "_first", "_last_interior",
     "_segments_then", "seconds", "_cycles", "_cracked", "_interior_seconds", "_series_seconds",
 )  # fmt: skip
 
-#: Grids with more bytes of fields than these take longer to pack (some 20 ms a MB) than to hand over to another thread.
+#: Grids with more bytes of fields than these take longer to pack (some 20 ms per MB) than to pass to another thread.
 LARGE = 1 << 19
 
 
 class Series:
-    """Observer that writes ``blocks``, ``outlines``, ``cracks``, ``tips``, ``contacts`` and ``interior``, and where a
-    scene has them ``bolts`` and ``water``. All begin with the first cycle and last to the end.
+    """Observer that writes ``blocks``, ``outlines``, ``cracks``, ``tips``, ``contacts`` and ``interior``, and if the
+    scene has them ``bolts`` and ``water``. All extend from the first cycle to the last.
 
-    ``every`` counts cycles between written ones; cycles in which a tip grew or something happened, the first and the
-    last are always written. ``interior_every`` counts cycles between interior fields while cracks grow; while none does
-    they come `QUIET` times as rarely, since there they mostly scale with the load. They also come with the first load,
-    with every event, before and after blocks are cut and at the end; 0 leaves them out. ``format`` is "vtu" (a file a
-    cycle, PVD lists) or "vtkhdf" (one file a series). Raises ValueError for an unknown ``configuration`` or ``format``.
+    ``every`` is the number of cycles between written ones; cycles in which a tip grew or an event happened, the first
+    and the last are always written. ``interior_every`` is the number of cycles between interior fields while cracks
+    grow; otherwise they are less frequent by a factor `QUIET`, because they mostly scale with the load. They are also
+    written with the first load, with every event, before and after blocks are cut and at the end; 0 leaves them out.
+    ``format`` is "vtu" (one file per cycle, PVD lists) or "vtkhdf" (one file per series). Raises ValueError for an
+    unknown ``configuration`` or ``format``.
     """
 
     def __init__(
@@ -64,7 +64,7 @@ class Series:
             raise ValueError("every counts from 1, interior_every from 0")
         self.every, self.interior_every, self.configuration = every, interior_every, configuration
         self.format, self.seconds = format, 0.0
-        #: The last grid of each series, for whoever draws them at the end.
+        #: The last grid of each series, for pictures at the end.
         self.last: dict[str, Grid] = {}
 
     def on_start(self, problem: Problem, folder: Path) -> None:
@@ -84,8 +84,8 @@ class Series:
         return {"listed": self._store.listed(), **{name: getattr(self, name) for name in _REMEMBERED}}
 
     def on_resume(self, problem: Problem, folder: Path, memory: dict[str, Any]) -> None:
-        """Goes on with the files that were listed then; later ones are deleted. Raises FilesChanged when one is
-        missing."""
+        """Continue with the files that were listed at the checkpoint; later ones are deleted. Raises FilesChanged if
+        one is missing."""
         listed = memory["listed"]
         vars(self).update({name: memory[name] for name in _REMEMBERED})
         missing = FORMATS[self.format].missing(Path(folder), listed)
@@ -112,7 +112,7 @@ class Series:
         self._cracked += bool(cycle.inside)
         if self._pending is not None and cycle.blocks.n_blocks != self._pending[0].blocks.n_blocks:
             self._write_last_interior()  # of the rock while it was whole
-        # Every cycle takes its time, written or not, so that the times do not depend on what is left out.
+        # Every cycle gets a time, written or not, so that times do not depend on which cycles are left out.
         at = self._time.of(cycle)
         if self._pending is None and cycle.number == 0:
             self._first = (cycle, at)
@@ -143,8 +143,11 @@ class Series:
         )
 
     def _skips(self) -> dict[str, Skip]:
-        """What was not written, beside what was; the first interior fields, for which Gmsh is loaded, are not timed,
-        and those of the rock before the first load cost nothing."""
+        """What was not written, relative to what was.
+
+        The first interior fields, for which Gmsh is loaded, are not timed, and those before the first load cost
+        nothing.
+        """
         inside, all_of = max(0, self._store.count("interior") - 1), self._store.count("blocks")
         return {
             "interior fields": Skip(self._cracked - inside, inside - 1, self._interior_seconds),
@@ -174,7 +177,7 @@ class Series:
         self._series_seconds += time.perf_counter() - began
 
     def _write_last_interior(self) -> None:
-        """The interior of the last cycle that came, unless it is written or there is none."""
+        """The interior of the last cycle, unless it is written or there is none."""
         cycle, at, _ = self._pending
         begun = bool(cycle.inside) or self._last_interior >= 0
         if self.interior_every and begun and cycle.number != self._last_interior:
@@ -182,7 +185,7 @@ class Series:
 
     def _write_interior(self, cycle: Cycle, at: float) -> None:
         if self._first is not None and self._last_interior < 0 and self._first[0] is not cycle:
-            # From the start on, so that all series of the run have one span of time.
+            # From the start on, so that all series of the run span the same time.
             self._meshes.note_cracked(cycle)
             self._background.do(self._interior, *self._first)
         self._first = None
@@ -197,8 +200,10 @@ class Series:
         self._interior_seconds += (time.perf_counter() - began) if timed else 0.0
 
     def _save(self, name: str, cycle: Cycle, at: float, grid: Grid) -> None:
-        """Small grids at once; large ones in the background, so that the run need not wait until they are packed. A series
-        that has been large stays in the background, so that its files are listed in their order."""
+        """Small grids are written at once, large ones in the background, so that the run need not wait for packing.
+
+        A series that has been large stays in the background, so that its files are listed in order.
+        """
         if name in self._large or _size(grid) > LARGE:
             self._large.add(name)
             self._background.do(self._put, name, cycle, at, grid)
@@ -210,7 +215,7 @@ class Series:
             "CYCLE": cycle.number,
             "TIME": float(cycle.state.time),
             "LOAD": float(cycle.load),
-            "REFERENCE": int(self.configuration == "reference"),  # 1: coordinates are the reference ones
+            "REFERENCE": int(self.configuration == "reference"),  # 1: coordinates are reference coordinates
             **self._world,
         }
         if name in ("cracks", "tips"):
@@ -227,12 +232,12 @@ class Series:
 
 
 def _names(names: Iterable[str]) -> bytes:
-    """Names as field data: UTF-8, one a line, in the order of their numbers."""
+    """Names as field data: UTF-8, one per line, in the order of their numbers."""
     return "\n".join(names).encode()
 
 
 def _size(grid: Grid) -> int:
-    """Bytes of its fields."""
+    """Number of bytes of its fields."""
     return sum(array.nbytes for fields in (grid.point_data, grid.cell_data) for array in fields.values())
 
 
@@ -245,7 +250,7 @@ class SeriesTime:
         self._step = 1.0
 
     def of(self, cycle: Cycle) -> float:
-        """The time to list ``cycle`` under; call once a cycle, in order."""
+        """The time to list ``cycle`` under; to be called once per cycle, in order."""
         now = float(cycle.state.time)
         advance = now - self._physical
         if 0 < advance < float("inf"):

@@ -1,7 +1,7 @@
 """Grids other than the rock itself: outlines of blocks, bolts with their forces, the water table.
 
-Outlines are the edges of the polygons, so that no triangle's side is drawn; a bolt is one line between its two ends,
-which move with their blocks.
+Outlines are the edges of the polygons, without triangle sides; a bolt is one line between its ends, which move with
+their blocks.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from .vtu import LINE, Grid
 #: States of a bolt in the files.
 NOT_INSTALLED, ACTS, YIELDS, BROKEN = 0, 1, 2, 3
 
-#: An edge that bends is drawn in so many pieces.
+#: Number of pieces in which a bent edge is drawn.
 _PIECES = 12
 
 
@@ -61,8 +61,11 @@ def outlines_grid(cycle: Cycle, configuration: str) -> Grid:
 
 
 def _bent_edges(cycle: Cycle, pairs: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """The edges ``pairs`` (n, 2) with those of blocks of higher order in `_PIECES` each: lines (k, 2), the edge of each (k,),
-    and the points that this adds behind the vertices (m, 2) with their displacements (m, 2)."""
+    """The edges ``pairs`` (n, 2), those of blocks of higher order divided into `_PIECES` pieces each.
+
+    Returns lines (k, 2), the edge of each (k,), and the points added after the vertices (m, 2) with their displacements
+    (m, 2).
+    """
     blocks, n = cycle.blocks, cycle.blocks.n_vertices
     bends = np.isin(blocks.vertex_block, [*cycle.bent])
     some = np.flatnonzero(bends)
@@ -82,7 +85,7 @@ def _bent_edges(cycle: Cycle, pairs: np.ndarray) -> tuple[np.ndarray, np.ndarray
 
 
 class BoltLines:
-    """The bolts of a run as lines. Their ends are looked for again when blocks are cut: a part has another number."""
+    """The bolts of a run as lines. Their ends are located again when blocks are cut, which renumbers the parts."""
 
     def __init__(self, bolts: Sequence[Bolt]) -> None:
         self._bolts = tuple(bolts)
@@ -90,7 +93,7 @@ class BoltLines:
         self._holder = np.empty((0, 2), int)
 
     def grid(self, cycle: Cycle, motion: Motion, configuration: str) -> Grid:
-        """The bolts at ``cycle`` with their forces; before the first step they carry nothing."""
+        """The bolts at ``cycle`` with their forces; before the first step these are zero."""
         if cycle.blocks.n_blocks != self._count:
             self._holder = np.array([self._blocks_of(bolt, cycle.blocks) for bolt in self._bolts]).reshape(-1, 2)
             self._count = cycle.blocks.n_blocks
@@ -116,15 +119,15 @@ class BoltLines:
         )
 
     def _blocks_of(self, bolt: Bolt, blocks: Blocks) -> list[int]:
-        """The blocks that hold the ends of ``bolt``; GROUND for an end in the ground."""
-        if self._count < 0:  # the blocks are those that the scene named
+        """Blocks at the ends of ``bolt``; GROUND for an end in the ground."""
+        if self._count < 0:  # the blocks are those of the scene
             return [bolt.block, bolt.other]
         other = GROUND if bolt.other == GROUND else _holding(blocks, bolt.end)
         return [_holding(blocks, bolt.start), other]
 
 
 def _holding(blocks: Blocks, point: tuple[float, float]) -> int:
-    """The block whose reference outline holds ``point`` (m), or else the one with the nearest vertex."""
+    """The block whose reference outline contains ``point`` (m), or else the one with the nearest vertex."""
     at = np.asarray(point, float)
     for b in range(blocks.n_blocks):
         own = blocks.vertices[blocks.vertex_start[b] : blocks.vertex_start[b + 1]]
@@ -143,8 +146,8 @@ class WaterLine:
         self._ground = None if self._water is None else lowest_over(ground_of(problem.blocks))
 
     def grid(self, time: float) -> Grid:
-        """The table at ``time`` s; it stands in space, so its displacement is zero."""
-        assert self._water is not None and self._ground is not None, "a scene without water has no table"
+        """The table at ``time`` s; it is fixed in space, so that its displacement is zero."""
+        assert self._water is not None and self._ground is not None, "a scene without water has no water table"
         line = self._water.line_at(time)
         found = ponds(line, self._ground)
         ends = [x for pond in found for x in (pond.start, pond.end)]

@@ -1,4 +1,4 @@
-"""Blocks cut into triangles for drawing, because VTK fills concave polygons and holes wrongly."""
+"""Triangulation of blocks for drawing, because VTK fills concave polygons and holes wrongly."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ from geomech.model import Blocks
 
 
 class Triangles:
-    """The triangles of a block system, kept while it stands; of blocks that are not convex, while their outline
-    does."""
+    """Triangles of a block system, kept while it does not change; those of non-convex blocks, while their outline does
+    not."""
 
     def __init__(self) -> None:
         self._blocks: Blocks | None = None
@@ -35,10 +35,10 @@ class Triangles:
         count[~fan] = [len(triangles) for triangles in others]
         first = np.concatenate([[0], np.cumsum(count)])
         owner = np.repeat(np.arange(blocks.n_blocks), count)
-        # A fan about the first corner …
+        # A fan around the first corner …
         k = np.arange(first[-1]) - first[owner]
         cells = start[owner, None] + np.stack([np.zeros_like(k), k + 1, k + 2], axis=1)
-        # … and what is no fan in its place.
+        # … and other triangulations in its place.
         for b, triangles in zip(np.flatnonzero(~fan).tolist(), others, strict=True):
             cells[first[b] : first[b + 1]] = triangles + start[b]
         self._blocks, self._known, self._cells = blocks, known, (cells, owner)
@@ -46,7 +46,7 @@ class Triangles:
 
 
 def _convex(blocks: Blocks) -> np.ndarray:
-    """(n_blocks,) strictly convex and without holes: a straight corner would make a fan's triangle flat."""
+    """(n_blocks,) strictly convex and without holes: a straight corner would make a triangle of the fan flat."""
     ring, of_loop = blocks.loop_start, np.repeat(np.arange(len(blocks.loop_start) - 1), np.diff(blocks.loop_start))
     after, before = np.arange(1, len(of_loop) + 1), np.arange(-1, len(of_loop) - 1)
     after[ring[1:] - 1], before[ring[:-1]] = ring[:-1], ring[1:] - 1

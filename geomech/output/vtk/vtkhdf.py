@@ -1,9 +1,9 @@
-"""A run's series as one file each, ``blocks.vtkhdf`` and so on: VTK's HDF5 format with time steps.
+"""Series of a run in one file each, ``blocks.vtkhdf`` and so on: VTK's HDF5 format with time steps.
 
 Every file is a temporal unstructured grid (VTK file formats, "VTKHDF", version 2.2). Arrays that have not changed since
-the last step, points and cells too, are not stored again: a step points to where they are. (A file of all series would
-be a composite data set, of which readers do not get the later steps: VTK 9.7 reads back the first step of what its own
-writer has written.) Needs h5py (``pip install 'geomech[hdf]'``) and ParaView 5.13 or newer.
+the last step, points and cells included, are not stored again: a step refers to their location. (One file of all series
+would be a composite data set, of which readers do not get the later steps: VTK 9.7 reads back only the first step of
+what its own writer has written.) Needs h5py (``pip install 'geomech[hdf]'``) and ParaView 5.13 or newer.
 """
 
 from __future__ import annotations
@@ -24,11 +24,11 @@ if TYPE_CHECKING:
     import h5py
     import pyvista
 
-#: A series' file in the run folder has this ending.
+#: Suffix of a series' file in the run folder.
 SUFFIX = ".vtkhdf"
-#: Steps are kept back until so many bytes, or seconds since the last time, have come together.
+#: Steps are buffered until this many bytes, or seconds since the last write.
 _BATCH, _WAIT = 1 << 23, 10.0
-#: Rows of a chunk: small enough for a few points, large enough that packing pays.
+#: Rows per chunk: small enough for a few points, large enough that compression pays off.
 _CHUNK = 1 << 12
 _VERSION = (2, 2)
 _MESH = ("Points", "Connectivity", "Offsets", "Types")
@@ -36,7 +36,7 @@ _COUNTS = ("NumberOfPoints", "NumberOfCells", "NumberOfConnectivityIds")
 
 
 def library() -> Any:
-    """h5py; ValueError that says how to get it where it is not installed."""
+    """The h5py module; raises ValueError with instructions if it is not installed."""
     try:
         import h5py
     except ModuleNotFoundError:
@@ -48,7 +48,7 @@ def library() -> Any:
 
 @dataclass
 class _Steps:
-    """The steps of one series: their times, s, and where in its datasets each begins."""
+    """Steps of one series: their times, s, and the start of each in its datasets."""
 
     times: list[float] = field(default_factory=list)
     cycles: list[int] = field(default_factory=list)
@@ -60,9 +60,10 @@ class _Steps:
 
 
 class HdfStore:
-    """Writes the grids of ``names`` into a file each in ``folder``; goes on from what is ``listed`` (empty: from the
-    start). A file that was cut off in the middle of a write may be lost, unlike .vtu files. Raises ValueError without
-    h5py."""
+    """Writes the grids of ``names`` into one file each in ``folder``, after what is ``listed`` (empty: from the start).
+
+    A file that was cut off during a write may be lost, unlike .vtu files. Raises ValueError without h5py.
+    """
 
     def __init__(self, folder: Path, names: Sequence[str], listed: Mapping[str, Any], *, resumed: bool = False) -> None:
         self._h5py = library()
@@ -78,7 +79,7 @@ class HdfStore:
         self._last: dict[str, dict[str, np.ndarray]] = {name: {} for name in names}
         self._kept: dict[str, dict[str, list[np.ndarray]]] = {name: {} for name in names}
         self._bytes, self._lock = 0, threading.Lock()
-        for name in listed:  # what was written after the checkpoint
+        for name in listed:  # written after the checkpoint
             with self._open(name, "r+") as file:
                 for key, size in self._steps[name].sizes.items():
                     file[f"VTKHDF/{key}"].resize(size, axis=0)
@@ -86,14 +87,14 @@ class HdfStore:
 
     @staticmethod
     def missing(folder: Path, listed: Mapping[str, Any]) -> list[str]:
-        """Files that are listed and not there."""
+        """Files that are listed but do not exist."""
         return [name + SUFFIX for name in listed if not (folder / (name + SUFFIX)).is_file()]
 
     def _open(self, name: str, mode: str) -> h5py.File:
         return self._h5py.File(self._folder / (name + SUFFIX), mode, locking=False)
 
     def listed(self) -> dict[str, Any]:
-        """What has been written, by series, as plain data; all of it is in the file then."""
+        """What has been written, by series, as plain data; all of it is then in the file."""
         self._flush()
         return {
             name: {
@@ -107,11 +108,12 @@ class HdfStore:
         }
 
     def count(self, name: str) -> int:
-        """How many cycles of the series ``name`` have been written; 0 where it is not written at all."""
+        """Number of written cycles of the series ``name``; 0 if it is not written."""
         return len(self._steps[name].times) if name in self._steps else 0
 
     def put(self, name: str, cycle: int, at: float, grid: Grid, numbers: Mapping[str, float | int | bytes]) -> None:
-        """Write ``grid`` as the series ``name`` at ``cycle`` and the time ``at``, s, with ``numbers`` as field data."""
+        """Write ``grid`` as the series ``name`` at ``cycle`` and the time ``at`` (s), with ``numbers`` as field
+        data."""
         with self._lock:
             steps = self._steps[name]
             self._add_mesh(name, grid)
@@ -135,7 +137,7 @@ class HdfStore:
             self._flush()
 
     def _add_mesh(self, name: str, grid: Grid) -> None:
-        """Points and cells, and the part that they make: again only where any of them has changed."""
+        """Points and cells, and the part that they form; stored again only if any of them has changed."""
         points = np.zeros((len(grid.points), 3))
         points[:, : grid.points.shape[1]] = grid.points
         mesh: dict[str, np.ndarray] = {
@@ -165,7 +167,7 @@ class HdfStore:
         last[key] = array
 
     def _append(self, name: str, key: str, array: np.ndarray) -> int:
-        """``array`` at the end of a dataset; where it begins there."""
+        """Append ``array`` to a dataset; returns its start there."""
         sizes = self._steps[name].sizes
         begin = sizes.get(key, 0)
         sizes[key] = begin + len(array)
@@ -174,7 +176,7 @@ class HdfStore:
         return begin
 
     def _flush(self) -> None:
-        """Write what was kept back, and renew the lists of steps."""
+        """Write the buffered steps, and update the lists of steps."""
         with self._lock:
             for name, kept in self._kept.items():
                 if not kept and not self._steps[name].times:
@@ -230,7 +232,7 @@ def _list_steps(group: h5py.Group, steps: _Steps) -> None:
 
 @dataclass(frozen=True)
 class HdfStep:
-    """One step of a series in its VTKHDF file: what `read_step` reads."""
+    """One step of a series in its VTKHDF file, for `read_step`."""
 
     path: Path
     step: int

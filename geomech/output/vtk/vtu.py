@@ -1,8 +1,8 @@
-"""VTK's XML files, written directly: unstructured grids (appended raw data, large ones zlib level 1), PVD collections.
+"""VTK XML files written directly: unstructured grids (appended raw data, large ones zlib level 1), PVD collections.
 
 The format is VTK's own (VTK XML file formats, "Serial vtkUnstructuredGrid" with appended data). Writing it from NumPy
-takes a tenth of the time of ``vtkXMLUnstructuredGridWriter`` on the small files that a run leaves by the thousand, and
-a run that writes files need not import VTK.
+takes a tenth of the time of ``vtkXMLUnstructuredGridWriter`` for the small files that a run writes by the thousand, and
+a run need not import VTK.
 """
 
 from __future__ import annotations
@@ -28,9 +28,9 @@ EMPTY, VERTEX, LINE, TRIANGLE = 0, 1, 3, 5
 
 _TYPE = {"f8": "Float64", "f4": "Float32", "i8": "Int64", "i4": "Int32", "u1": "UInt8"}
 _TAIL = b"\n</AppendedData>\n</VTKFile>\n"
-#: Grids of up to this many bytes are left as they are: packing them takes longer than all the rest of their writing.
+#: Grids up to this many bytes are not compressed, which would take longer than all the rest of writing.
 SMALL = 1 << 16
-# Arrays are compressed in pieces of this many bytes, so that a reader never needs more than that at a time.
+# Arrays are compressed in pieces of this many bytes, so that a reader never needs more at a time.
 _BLOCK = 1 << 20
 _size = struct.Struct("=Q").pack
 
@@ -39,9 +39,11 @@ _size = struct.Struct("=Q").pack
 class Grid:
     """Points and cells with their arrays.
 
-    Vectors, the ``points`` (m) too, are (n, 2) or (n, 3); ``connectivity`` point indices, cell after cell; ``offsets``
-    (n_cells,) one past each cell's last index; ``types`` (n_cells,) VTK cell types; ``point_data`` and ``cell_data``
-    name → array.
+    points         (n, 2) or (n, 3) m, as all vectors
+    connectivity   point indices, cell after cell
+    offsets        (n_cells,) one past each cell's last index
+    types          (n_cells,) VTK cell types
+    point_data, cell_data   name → array
     """
 
     points: np.ndarray
@@ -53,10 +55,11 @@ class Grid:
 
 
 def nothing(series: str, at: np.ndarray) -> Grid:
-    """A grid of the ``series`` that draws nothing: one cell of VTK's empty type and, at ``at`` (2,) m, one point.
+    """A grid of the ``series`` that draws nothing: one cell of VTK's empty type and one point ``at`` (2,) m.
 
-    ParaView drops the arrays of a grid without points, and with them every colour and glyph that was chosen. Vectors
-    and displacements are 0, other floats nan, whole numbers −1."""
+    ParaView drops the arrays of a grid without points, and with them all chosen colours and glyphs. Vectors and
+    displacements are 0, other floats nan, integers −1.
+    """
 
     def blank(f: Field) -> np.ndarray:
         fill = -1 if f.dtype.startswith("int") else 0.0 if f.components[:1] == ("X",) else np.nan
@@ -68,7 +71,7 @@ def nothing(series: str, at: np.ndarray) -> Grid:
 
 
 def world_origin(problem: Any) -> dict[str, float]:
-    """Field data that place a grid in the world: what is to be added to x and y, m. Empty where that is nothing."""
+    """Field data that place a grid in the world: the offset to be added to x and y, m. Empty if it is zero."""
     x, y = problem.origin
     return {"WORLD_X": float(x), "WORLD_Y": float(y)} if x or y else {}
 
@@ -77,7 +80,7 @@ class GridFiles:
     """Writes the grids of one ``series`` as .vtu files.
 
     From cycle to cycle a small grid mostly keeps its numbers of points and cells: its file is laid out once, and the
-    arrays are put in place.
+    arrays are replaced.
     """
 
     def __init__(self, series: str) -> None:
@@ -87,11 +90,12 @@ class GridFiles:
     def write(self, path: Path | str, grid: Grid, numbers: Mapping[str, float | int | bytes]) -> None:
         """Write ``grid`` as the file ``path``, with ``numbers`` (and texts, as bytes of UTF-8) as field data.
 
-        Raises ValueError when an array is not as `geomech.output.fields` declares it."""
+        Raises ValueError if an array does not have the form declared in `geomech.output.fields`.
+        """
         n_points, n_cells = len(grid.points), len(grid.types)
         data = declared(self.series, "point", n_points, grid.point_data)
         data |= declared(self.series, "cell", n_cells, grid.cell_data)
-        # Numbers not as text: VTK's parser stops at "nan", which is the load of a scene that has no leading one.
+        # Numbers not as text: VTK's parser stops at "nan", which is the load of a scene without a leading one.
         data |= {name: field_array(value) for name, value in numbers.items()}
         data["Points"], data["connectivity"] = grid.points, grid.connectivity
         data["offsets"], data["types"] = grid.offsets, grid.types
@@ -117,7 +121,7 @@ class _Column(NamedTuple):
 
 
 class _Layout:
-    """The file of a grid of so many points, cells and corners, with field data ``numbers`` (name, dtype,
+    """File layout of a grid with so many points, cells and corners, and field data ``numbers`` (name, dtype,
     length)."""
 
     def __init__(self, series: str, n_points: int, n_cells: int, n_corners: int, numbers: tuple) -> None:
@@ -136,9 +140,10 @@ class _Layout:
             _Column("Cells", "types", "u1", (n_cells,)),
         ]
         # The last array comes first: meshio gives arrays new offsets one by one as it reads, in the order of the data,
-        # and would take one of those for the offset of a later array, did it not meet that one first.
+        # and would take one of those for the offset of a later array if it did not meet that one first.
         self._columns = columns[::-1]
         self._compress = sum(c.nbytes for c in columns) > SMALL
+        self._kept: dict[str, tuple[bytes, bytes]] = {}
         if not self._compress:
             self._lay_out()
 
@@ -155,21 +160,31 @@ class _Layout:
             at += size
 
     def filled(self, data: Mapping[str, Any]) -> bytes | bytearray:
-        """The file with the arrays of ``data``, good until it is filled again; vectors may lack their zero third
+        """The file with the arrays of ``data``, valid until it is filled again; vectors may lack their zero third
         component."""
         if self._compress:
             arrays = [np.zeros(c.shape, c.dtype) for c in self._columns]
             for column, array in zip(self._columns, arrays, strict=True):
                 _fill(array, data[column.name])
-            packed = [_compressed(array) for array in arrays]
+            packed = [
+                self._packed(column.name, array.tobytes()) for column, array in zip(self._columns, arrays, strict=True)
+            ]
             return b"".join([self._head([len(p) for p in packed]), *packed, _TAIL])
         for name, place in self._places:
             _fill(place, data[name])
         return self._file
 
+    def _packed(self, name: str, raw: bytes) -> bytes:
+        """The array ``name`` compressed. Much of a grid stays from cycle to cycle (points, cells, numbers of blocks): to
+        compare takes a hundredth of the time of compressing again."""
+        kept = self._kept.get(name)
+        if kept is None or kept[0] != raw:
+            kept = self._kept[name] = (raw, _compressed(raw))
+        return kept[1]
+
     def _head(self, sizes: list[int]) -> bytes:
-        """The file up to its data; ``sizes``: the bytes that each array takes in the file, in the order of the data,
-        which is the tags' backwards."""
+        """The file up to its data; ``sizes``: bytes of each array in the file, in the order of the data, which is the
+        reverse of the tags'."""
         tags: dict[str, list[str]] = {name: [] for name in ("FieldData", "PointData", "CellData", "Points", "Cells")}
         at = 0
         for column, size in zip(self._columns, sizes, strict=True):
@@ -197,7 +212,7 @@ class _Layout:
 
 
 def field_array(value: float | int | bytes) -> np.ndarray:
-    """One value of field data as an array: a whole number, a float, or the bytes of a text."""
+    """One value of field data as an array: an integer, a float, or the bytes of a text."""
     if isinstance(value, bytes):
         return np.frombuffer(value, np.uint8)
     return np.array([value], np.int64 if isinstance(value, (int, np.integer)) else np.float64)
@@ -210,11 +225,11 @@ def _fill(place: np.ndarray, value: Any) -> None:
 
 
 def _put(path: Path | str, content: bytes | bytearray) -> None:
-    """A file of ``content``; a file that is there already is written over where it stands.
+    """Write ``content`` as a file; an existing file is overwritten in place.
 
-    Few system calls, a fraction of what a buffered file object takes. To empty a file first costs several times as much
-    as to write over it, and to delete and create thousands again tens of times (ext4 will not take an inode again that was
-    freed minutes ago, and steps over all of these for every new one).
+    Few system calls, a fraction of what a buffered file object needs. Truncating a file first costs several times as
+    much as overwriting it, and deleting and creating thousands of files tens of times (ext4 does not reuse an inode
+    that was freed minutes ago, and skips all of these for every new one).
     """
     handle = os.open(path, os.O_WRONLY | os.O_CREAT, 0o666)
     try:
@@ -224,15 +239,14 @@ def _put(path: Path | str, content: bytes | bytearray) -> None:
         if os.fstat(handle).st_size > written:
             os.ftruncate(handle, written)
     except OSError as error:
-        error.filename = str(path)  # a full disk does not say which file it had no room for
+        error.filename = str(path)  # the error of a full disk does not name the file
         raise
     finally:
         os.close(handle)
 
 
-def _compressed(data: np.ndarray) -> bytes:
+def _compressed(raw: bytes) -> bytes:
     """One compressed array: (number of blocks, block size, size of a partial last block, compressed sizes), data."""
-    raw = data.tobytes()
     pieces = [zlib.compress(raw[k : k + _BLOCK], 1) for k in range(0, len(raw), _BLOCK)]
     size = min(len(raw), _BLOCK)
     # "Partial" is zero when the last block is full; a single block is always full.
@@ -244,11 +258,10 @@ def _compressed(data: np.ndarray) -> bytes:
 class Collection:
     """A PVD file: a time series of .vtu files.
 
-    Times are written with ``repr`` so that they read back as the same numbers. An entry and the end of the file are
-    written over the end that was there, at once: after every cycle, also the last before a crash, whoever reads the
-    file finds a complete series. There is no file before there is an entry: ParaView opens no empty one.
-
-    ``entries`` (time, file) are listed already: the file is written again with them, in place of what it was.
+    Times are written with ``repr`` so that they read back as the same numbers. An entry and the end of the file
+    overwrite the old end in one write: after every cycle, also the last before a crash, a reader finds a complete
+    series. The file is created with its first entry: ParaView does not open an empty one. ``entries`` (time, file)
+    exist already: the file is rewritten with them.
     """
 
     def __init__(self, path: Path, entries: Iterable[tuple[float, str]] = ()) -> None:
@@ -261,7 +274,7 @@ class Collection:
             self.path.unlink(missing_ok=True)
 
     def _begin(self) -> int:
-        """Write the whole file and open it; its handle."""
+        """Write the whole file and open it; returns its handle."""
         unfinished = self.path.with_name(self.path.name + ".part")
         content = "".join([_PVD_HEAD, *(_entry(*each) for each in self.entries), _PVD_END]).encode()
         _put(unfinished, content)
@@ -271,7 +284,7 @@ class Collection:
         return self._handle
 
     def add(self, at: float, file: str) -> None:
-        """List ``file`` (relative to the PVD's folder) at time ``at``, which must be later than all before it."""
+        """Add ``file`` (relative to the PVD's folder) at time ``at``, which must be later than all before it."""
         last = self.entries[-1][0] if self.entries else -math.inf
         if not at > last:
             raise ValueError(f"{self.path.name}: time {at!r} does not follow {last!r}")
@@ -280,7 +293,7 @@ class Collection:
         content = entry + _PVD_END.encode()
         written = os.pwrite(handle, content, self._end)
         if written < len(content):
-            # The disk is full. What stood here before is left room for.
+            # The disk is full. Space for the previous content exists.
             os.pwrite(handle, _PVD_END.encode(), self._end)
             os.ftruncate(handle, self._end + len(_PVD_END))
             raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(self.path))
@@ -288,7 +301,7 @@ class Collection:
         self.entries.append((float(at), file))
 
     def close(self) -> None:
-        """Give the file back; nothing can be added any more."""
+        """Close the file; nothing can be added any more."""
         if self._handle is not None:
             os.close(self._handle)
             self._handle = None

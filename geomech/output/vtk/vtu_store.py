@@ -1,4 +1,4 @@
-"""A run's series as one .vtu file a cycle and series under ``vtk/``, listed by one PVD a series."""
+"""Series of a run as one .vtu file per cycle and series under ``vtk/``, with one PVD list per series."""
 
 from __future__ import annotations
 
@@ -8,15 +8,15 @@ from pathlib import Path
 from ..fields import SERIES
 from .vtu import Collection, Grid, GridFiles
 
-#: Entries of a series: (time in the PVD, file below the run folder).
+#: Entries of a series: (time in the PVD, file relative to the run folder).
 Listed = dict[str, list[tuple[float, str]]]
 
 
 class VtuStore:
-    """Writes the grids of ``names`` below ``folder``; goes on from what is ``listed`` (empty: from the start).
+    """Writes the grids of ``names`` below ``folder``, after what is ``listed`` (empty: from the start).
 
-    The files of an earlier run are written over and what is left of them is deleted at the end; with ``resumed`` later
-    ones than those listed are deleted at once.
+    Files of an earlier run are overwritten, and the remaining ones deleted at the end; with ``resumed``, files later
+    than those listed are deleted at once.
     """
 
     def __init__(self, folder: Path, names: Sequence[str], listed: Listed, *, resumed: bool = False) -> None:
@@ -36,11 +36,11 @@ class VtuStore:
 
     @staticmethod
     def missing(folder: Path, listed: Listed) -> list[str]:
-        """Files that are listed and not there."""
+        """Files that are listed but do not exist."""
         return [file for entries in listed.values() for _, file in entries if not (folder / file).is_file()]
 
     def _unlisted(self) -> set[str]:
-        """The files of series in ``vtk`` that no collection lists."""
+        """Files of series in ``vtk`` that no collection lists."""
         listed = {file for entries in self.listed().values() for _, file in entries}
         there = {path.name for name in SERIES for path in self._vtk.glob(f"{name}_[0-9]*.vtu")}
         return {name for name in there if f"vtk/{name}" not in listed}
@@ -50,11 +50,11 @@ class VtuStore:
         return {name: list(collection.entries) for name, collection in self._collections.items()}
 
     def count(self, name: str) -> int:
-        """How many cycles of the series ``name`` have been written; 0 where it is not written at all."""
+        """Number of written cycles of the series ``name``; 0 if it is not written."""
         return len(self._collections[name].entries) if name in self._collections else 0
 
     def put(self, name: str, cycle: int, at: float, grid: Grid, numbers: Mapping[str, float | int]) -> None:
-        """Write ``grid`` as the series ``name`` at ``cycle``, listed at the time ``at``, s, with ``numbers`` as field
+        """Write ``grid`` as the series ``name`` at ``cycle``, listed at the time ``at`` (s), with ``numbers`` as field
         data."""
         file = f"{name}_{cycle:06d}.vtu"
         self._files[name].write(f"{self._vtk}/{file}", grid, numbers)
@@ -62,7 +62,7 @@ class VtuStore:
         self._collections[name].add(at, f"vtk/{file}")
 
     def close(self) -> None:
-        """Give the files back; a longer run before this one must not leave its last files among ours."""
+        """Close the files; the last files of a longer earlier run must not remain among ours."""
         for collection in self._collections.values():
             collection.close()
         for name in self._old:

@@ -1,17 +1,19 @@
-"""Quantities of many things side by side, as bars on a logarithmic axis."""
+"""Horizontal bars of several quantities side by side, on a logarithmic axis."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
 
-#: Colours of series, the first the one that matters.
+#: Colours of series, the first for the one of interest.
 _COLOURS = ("#c8553d", "#8aa4a0", "#d9a441")
 
 
 def draw_bars(series: Mapping[str, Mapping[str, float]], path: Path, label: str, title: str = "") -> Path:
-    """A row for every name in any of the ``series`` (legend → name → value above zero), a bar a series in it, with its
-    value; ``label`` is that of the axis. Values of zero are drawn at the axis's lower end."""
+    """One row per name in the ``series`` (legend → name → positive value), with one bar and its value per series.
+
+    ``label`` is that of the axis. Zero values are drawn at the axis's lower end.
+    """
     from matplotlib.figure import Figure
 
     names = list(dict.fromkeys(name for values in series.values() for name in values))

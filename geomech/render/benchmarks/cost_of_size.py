@@ -1,5 +1,5 @@
-"""The pictures of `geomech bench dda` and `geomech bench geometry`: time against the number of blocks, or against what
-is left of the equations."""
+"""Pictures of `geomech bench dda` and `geomech bench geometry`: time against the number of blocks, or against the
+residual."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ from pathlib import Path
 from typing import Any, Protocol
 
 _STYLES = (("#1f6f8b", "o"), ("#588157", "s"), ("#c8553d", "^"), ("#8e6c8a", "D"), ("#c9a227", "v"))
-#: Panels side by side at most.
+#: Panels side by side, at most.
 _ABREAST = 3
 
 
 class Measured(Protocol):
-    """What a scene of so many blocks costs."""
+    """Cost of a scene with so many blocks."""
 
     scene: str
     blocks: int
@@ -23,7 +23,7 @@ class Measured(Protocol):
 
 
 class Cut(Protocol):
-    """What cutting rock into so many blocks costs."""
+    """Cost of cutting rock into so many blocks."""
 
     network: str
     blocks: int
@@ -31,7 +31,8 @@ class Cut(Protocol):
 
 
 def draw(costs: Sequence[Measured], other: Mapping[int, float], path: Path) -> Path:
-    """``costs`` as a curve a scene, dashed for the search of a step; ``other`` is Shi's code, blocks → s."""
+    """``costs`` as one curve per scene, dashed for the contact search of a step; ``other`` is Shi's code, {blocks:
+    s}."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(7.2, 5.2), dpi=130, layout="constrained")
@@ -47,12 +48,14 @@ def draw(costs: Sequence[Measured], other: Mapping[int, float], path: Path) -> P
     first = min(costs, key=lambda c: c.blocks)
     n = [first.blocks, max(c.blocks for c in costs)]
     axes.loglog(n, [1e3 * first.iteration * k / n[0] for k in n], color="#999999", lw=0.8, ls="--", label="linear")
-    return _saved(figure, axes, "ms an open–close iteration", path)
+    return _saved(figure, axes, "ms per open–close iteration", path)
 
 
 def draw_solvers(solutions: Sequence[Mapping[str, Any]], path: Path) -> Path:
-    """Time against residual of ways to solve a step's equations, a panel a scene and size: ``solutions`` are rows of
-    scene, blocks, method, seconds, residual."""
+    """Time against residual of several solvers of a step's equations, one panel per scene and size.
+
+    ``solutions`` are rows of scene, blocks, method, seconds, residual.
+    """
     from matplotlib.figure import Figure
 
     scenes = list(dict.fromkeys((row["scene"], row["blocks"]) for row in solutions))
@@ -75,23 +78,23 @@ def draw_solvers(solutions: Sequence[Mapping[str, Any]], path: Path) -> Path:
         panel.set_axisbelow(True)
         for side in ("top", "right"):
             panel.spines[side].set_visible(False)
-    # One axis for all.
+    # The same axis for all panels.
     panels[0].invert_xaxis()
     for panel in panels[len(scenes) :]:
         panel.set_axis_off()
     for panel in grid[:, 0]:
-        panel.set_ylabel("solution, set-up included, ms")
+        panel.set_ylabel("solution with set-up, ms")
     figure.legend(
         *panels[0].get_legend_handles_labels(), loc="outside upper center", ncols=4, frameon=False, fontsize=9
     )
-    figure.supxlabel("residual over the right side, better to the right", fontsize=10)
+    figure.supxlabel("relative residual, better to the right", fontsize=10)
     path.parent.mkdir(parents=True, exist_ok=True)
     figure.savefig(path)
     return path
 
 
 def draw_cutting(costs: Sequence[Cut], path: Path) -> Path:
-    """Seconds of cutting, a curve a network."""
+    """Time of cutting, s, one curve per network."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(7.2, 5.2), dpi=130, layout="constrained")
@@ -107,7 +110,7 @@ def draw_cutting(costs: Sequence[Cut], path: Path) -> Path:
     low, high = min(costs, key=lambda c: c.blocks), max(costs, key=lambda c: c.blocks)
     n = [low.blocks, high.blocks]
     axes.loglog(n, [high.cutting * k / n[1] for k in n], color="#999999", lw=0.8, ls="--", label="linear")
-    return _saved(figure, axes, "s of cutting", path)
+    return _saved(figure, axes, "cutting time, s", path)
 
 
 def _saved(figure: Any, axes: Any, what: str, path: Path) -> Path:

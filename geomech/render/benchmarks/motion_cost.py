@@ -1,4 +1,4 @@
-"""The picture of `geomech bench motion`: time of a simulated second against the error of what moves, a line a size."""
+"""Picture of `geomech bench motion`: time per simulated second against the error, one line per size."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ from pathlib import Path
 from typing import Protocol
 
 _STYLES = (("#1f6f8b", "o"), ("#588157", "s"), ("#c8553d", "^"), ("#8e6c8a", "D"), ("#c9a227", "v"))
-#: Errors below this are drawn at it.
+#: Smaller errors are drawn at this value.
 LEAST = 1e-4
 
 
 class Cost(Protocol):
-    """What a second of motion costs with one time step, and how far it is off."""
+    """Cost and error of a simulated second with one time step."""
 
     dt: float
     off_slab: float
@@ -23,7 +23,7 @@ class Cost(Protocol):
 
 
 class Sized(Protocol):
-    """Those costs for so many blocks."""
+    """The costs for one number of blocks."""
 
     blocks: int
     costs: Sequence[Cost]
@@ -33,8 +33,11 @@ class Sized(Protocol):
 
 
 def draw(slopes: Sequence[Sized], path: Path) -> Path:
-    """Left: time against error, off the shortest steps and (dashed) off the rigid slab. Right: an iteration's time over
-    that of a wall's of as many blocks, and iterations a step, against the time step."""
+    """Draw cost against error, and cost per iteration.
+
+    Left: time against error, relative to the shortest steps and (dashed) to the rigid slab. Right: time of an iteration
+    relative to that of a wall with as many blocks, and iterations per step, against the time step.
+    """
     from matplotlib.figure import Figure
     from matplotlib.ticker import FixedLocator
 
@@ -45,7 +48,7 @@ def draw(slopes: Sequence[Sized], path: Path) -> Path:
         if not sized.costs:
             continue
         seconds = [cost.second for cost in sized.costs]
-        # What is nan is not drawn.
+        # nan values are not drawn.
         errors = [max(error, LEAST) for error in sized.errors()]
         off_slab = [max(abs(cost.off_slab), LEAST) for cost in sized.costs]
         of_error.plot(errors, seconds, color=colour, marker=marker, lw=1.6, label=f"{sized.blocks} blocks")
@@ -59,17 +62,17 @@ def draw(slopes: Sequence[Sized], path: Path) -> Path:
         steps = [1e3 * cost.dt for cost in sized.costs]
         of_step.plot(steps, [c.iteration / sized.wall for c in sized.costs], color=colour, marker=marker, lw=1.6)
         counts.plot(steps, [c.iterations for c in sized.costs], color=colour, marker=marker, ms=3, lw=1.0, ls=":")
-    of_error.set(xscale="log", yscale="log", ylabel="s a simulated second")
+    of_error.set(xscale="log", yscale="log", ylabel="s per simulated second")
     of_error.set_xlim(max(2.0, of_error.get_xlim()[1]), LEAST)
-    of_error.set_xlabel("work of gravity on what moves, off that in the shortest steps (dashed: the rigid slab's)")
+    of_error.set_xlabel("error of gravity's work on moving blocks, relative to the shortest steps (dashed: rigid slab)")
     of_error.set_title("better to the right and below", fontsize=10, loc="left")
     if any(sized.costs for sized in slopes):
         of_error.legend(frameon=False, fontsize=9)
     of_step.set_xscale("log", base=2)
     of_step.xaxis.set_major_locator(FixedLocator(sorted({1e3 * c.dt for sized in slopes for c in sized.costs})))
     of_step.xaxis.set_major_formatter(lambda value, _: f"{value:g}")
-    of_step.set(xlabel="time step, ms", ylabel="an iteration's time over the wall's")
-    counts.set_ylabel("open–close iterations a step (dotted)")
+    of_step.set(xlabel="time step, ms", ylabel="time of an iteration over the wall's")
+    counts.set_ylabel("open–close iterations per step (dotted)")
     for axes in (of_step, counts):
         axes.set_ylim(0, 1.1 * axes.get_ylim()[1])
     for axes in (of_error, of_step, counts):

@@ -1,4 +1,4 @@
-"""The picture of `geomech bench sliding`: the work of gravity on what moves against the time step, a line a slope."""
+"""Picture of `geomech bench sliding`: work of gravity on moving blocks against the time step, one line per slope."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from .slope_outcomes import COLOURS
 
 
 class Sliding(Protocol):
-    """What a slope with a known slide came to, by time step."""
+    """Results of a slope with a known slide, by time step."""
 
     seed: int
     verdict: str
@@ -22,15 +22,17 @@ class Sliding(Protocol):
 
 
 def draw(slopes: Sequence[Sliding], bound: float, path: Path) -> Path:
-    """``slopes`` with works relative to that in the shortest steps, and to the rigid slab's where there is one; the
-    band is ``bound`` wide to each side."""
+    """``slopes`` with works relative to that in the shortest steps, and to the rigid slab's if there is one.
+
+    The band is ``bound`` wide to each side.
+    """
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(10.5, 4.8), dpi=120, layout="constrained")
     of_steps, of_slab = figure.subplots(1, 2)
     for axes, title, scale in (
-        (of_steps, "over that in the shortest steps", lambda slope: slope.work[-1]),
-        (of_slab, "over that on the rigid slab above the lowest daylighting bed", lambda slope: slope.slab_work),
+        (of_steps, "relative to the shortest steps", lambda slope: slope.work[-1]),
+        (of_slab, "relative to the rigid slab above the lowest daylighting bed", lambda slope: slope.slab_work),
     ):
         for slope in slopes:
             unit = scale(slope)
@@ -54,7 +56,7 @@ def draw(slopes: Sequence[Sliding], bound: float, path: Path) -> Path:
         axes.set_xlabel("time step, ms")
         axes.set_title(title, fontsize=10, loc="left")
         axes.spines[["top", "right"]].set_visible(False)
-    of_steps.set_ylabel("work of gravity on what moves")
+    of_steps.set_ylabel("work of gravity on moving blocks")
     path.parent.mkdir(parents=True, exist_ok=True)
     figure.savefig(path)
     return path

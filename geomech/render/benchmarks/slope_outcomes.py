@@ -1,5 +1,5 @@
-"""The pictures of `geomech bench slopes`, of invariants and of invariance: a square a slope, coloured by what became of
-it; and how near to its bound each quantity came."""
+"""Pictures of `geomech bench slopes`, of invariants and of invariance: one square per slope, coloured by its outcome,
+and each quantity relative to its bound."""
 
 from __future__ import annotations
 
@@ -12,19 +12,19 @@ from typing import Protocol
 COLOURS = {"right": "#9cc5a1", "reported": "#f2d388", "refused": "#c9ccd1", "long": "#a9c4dd", "wrong": "#d1495b"}
 MEANING = {
     "right": "right to the end",
-    "reported": "beyond a bound, and a warning says so",
+    "reported": "beyond a bound, with a warning",
     "refused": "refused with a reason",
-    "long": "right until its time was up",
-    "wrong": "wrong in silence",
+    "long": "right until its time limit",
+    "wrong": "wrong without a warning",
 }
-#: Squares in a row.
+#: Squares per row.
 ACROSS = 25
-#: What is smaller is not drawn.
+#: Smaller values are not drawn.
 LEAST = 1e-16
 
 
 class Outcome(Protocol):
-    """What a random slope came to."""
+    """Outcome of a random slope."""
 
     seed: int
     verdict: str
@@ -42,15 +42,17 @@ def draw(
     title: str = "",
     meaning: Mapping[str, str] = MEANING,
 ) -> Path:
-    """``slopes`` in the order in which they are drawn; ``bounds``: name of a quantity → its bound; ``meaning`` of the
-    verdicts, for the legend."""
+    """Draw the outcomes of ``slopes`` in their order.
+
+    ``bounds``: {quantity: bound}; ``meaning`` of the verdicts, for the legend.
+    """
     from matplotlib.figure import Figure
 
     down = math.ceil(len(slopes) / ACROSS)
     heights = [0.3 * down + 0.9, 0.28 * len(bounds) + 1.0]
     figure = Figure(figsize=(11.5, sum(heights) + 0.4), dpi=120, layout="constrained")
     top, bottom = figure.subfigures(2, 1, height_ratios=heights)
-    _squares(top, slopes, verdicts, down, title or f"What became of {len(slopes)} random slopes (their seeds)", meaning)
+    _squares(top, slopes, verdicts, down, title or f"Outcome of {len(slopes)} random slopes (by seed)", meaning)
     quantities, times = bottom.subplots(1, 2, width_ratios=[3, 1.3])
     _quantities(quantities, slopes, bounds)
     _times(times, slopes, verdicts)
@@ -90,7 +92,7 @@ def _quantities(axes, slopes: Sequence[Outcome], bounds: Mapping[str, float]) ->
     for k, (name, bound) in enumerate(bounds.items()):
         for verdict, colour in COLOURS.items():
             values = [s.worst[name] for s in slopes if s.verdict == verdict and s.worst.get(name, 0.0) > LEAST]
-            # Spread a little by their order, so that those which lie upon one another are seen.
+            # Spread a little by their order, so that coinciding points are visible.
             ys = [k + 0.3 * (((7 * j) % 11) / 5 - 1) for j in range(len(values))]
             axes.plot(
                 values, ys, "o", ms=3, color=colour, mec="#55555555", mew=0.3, zorder=3 if verdict == "wrong" else 2
@@ -109,6 +111,6 @@ def _times(axes, slopes: Sequence[Outcome], verdicts: Sequence[str]) -> None:
     spent = {verdict: [max(s.seconds, 0.1) for s in slopes if s.verdict == verdict] for verdict in verdicts}
     edges = np.geomspace(0.1, 1.2 * max(max(of, default=1.0) for of in spent.values()), 16)
     axes.hist(list(spent.values()), edges, stacked=True, color=[COLOURS[verdict] for verdict in spent])
-    axes.set(xscale="log", xlabel="processor time of a slope, s", ylabel="slopes")
+    axes.set(xscale="log", xlabel="processor time per slope, s", ylabel="slopes")
     axes.xaxis.set_major_formatter(lambda value, _: f"{value:g}")
     axes.spines[["top", "right"]].set_visible(False)

@@ -1,5 +1,7 @@
-"""The pictures of `geomech bench stability`: a row of panels a map, a square a scene; the first panel is coloured by what
-became of it, each of the others by a quantity."""
+"""Pictures of `geomech bench stability`: one row of panels per map, one square per scene.
+
+The first panel is coloured by the outcome, each of the others by a quantity.
+"""
 
 from __future__ import annotations
 
@@ -9,7 +11,7 @@ from pathlib import Path
 from typing import Protocol
 
 COLOURS = {"right": "#9cc5a1", "reported": "#f2d388", "refused": "#c9ccd1", "wrong": "#d1495b"}
-#: The colour of a square whose quantity is zero.
+#: Colour of a square whose quantity is zero.
 _ZERO = "#f4f4f4"
 
 
@@ -22,7 +24,7 @@ class Judged(Protocol):
 
 
 class Grid(Protocol):
-    """A map: what is measured, and its rows and columns."""
+    """A map: the measured quantity, and its rows and columns."""
 
     title: str
     measure: str
@@ -34,9 +36,11 @@ class Grid(Protocol):
 
 
 def draw(grids: Sequence[Grid], cells: Sequence[Judged], path: Path, quantities: Mapping[str, str]) -> Path:
-    """``cells`` in the order of their grids, row by row, each with its error, and in a panel each those of its
-    ``quantities`` (attribute → what it is called) that a grid has: the logarithm is the colour, from the least to the
-    largest in the picture."""
+    """Draw ``cells``, in the order of their grids, row by row, each with its error.
+
+    A further panel for each of the ``quantities`` (attribute → name) that a grid has is coloured by its logarithm, from
+    the least to the largest value in the picture.
+    """
     from matplotlib.patches import Patch
 
     figure, panels, foot = _panels([len(grid.rows) for grid in grids], 1 + len(quantities))
@@ -58,8 +62,8 @@ def draw(grids: Sequence[Grid], cells: Sequence[Judged], path: Path, quantities:
             panel.set_title(name, fontsize=10, loc="left")
     figure.legend(
         [Patch(facecolor=colour) for colour in COLOURS.values()],
-        ["right: error below the bound", "reported: beyond it, a warning says so", "refused with a reason (–)",
-         "wrong in silence"],
+        ["right: error below the bound", "reported: beyond it, with a warning", "refused with a reason (–)",
+         "wrong without a warning"],
         loc="lower center", ncols=4 if quantities else 2, frameon=False, fontsize=10, bbox_to_anchor=(0.5, foot),
     )  # fmt: skip
     path.parent.mkdir(parents=True, exist_ok=True)
@@ -68,7 +72,7 @@ def draw(grids: Sequence[Grid], cells: Sequence[Judged], path: Path, quantities:
 
 
 class _Shades:
-    """Colours of positive numbers by their logarithm; those of zero and less are pale."""
+    """Colours of positive numbers by their logarithm; others are pale."""
 
     def __init__(self, values: Sequence[float]) -> None:
         from matplotlib import colormaps
@@ -76,7 +80,7 @@ class _Shades:
         positive = [math.log(v) for v in values if v > 0]
         self._least = min(positive, default=0.0)
         self._range = max(max(positive, default=0.0) - self._least, 1e-12)
-        # The darker half would hide the figures.
+        # The darker half would hide the numbers.
         self._map = colormaps["YlGnBu"]
 
     def __call__(self, value: float):
@@ -86,11 +90,14 @@ class _Shades:
 
 
 def _panels(rows: Sequence[int], across: int):
-    """A figure; its panels, a row of ``across`` for each grid of so many ``rows``; and the height of its foot, for what
-    the colours mean, as a part of the figure's. Without further panels the grids stand three abreast."""
+    """A figure, its panels, and the height of its legend area relative to the figure's.
+
+    There are ``across`` panels for each grid, with ``rows`` rows; without further panels, three grids stand side by
+    side.
+    """
     from matplotlib.figure import Figure
 
-    # Margins in inches, the same for all: a layout that measures every text takes longer than all else.
+    # Margins in inches, the same for all: a layout that measures every text takes longer than everything else.
     over, under, square, foot = 0.35, 0.55, 0.21, 0.4
     if across == 1:
         abreast = 3

@@ -1,4 +1,4 @@
-"""Run time against error, a panel a problem: the pictures of `geomech bench ddm`, `schemes`, `coupling`, `boundary` and
+"""Run time against error, one panel per problem: pictures of `geomech bench ddm`, `schemes`, `coupling`, `boundary` and
 `steps`."""
 
 from __future__ import annotations
@@ -35,10 +35,12 @@ def draw(
     ),
     goal: float | None = 1e-4,
 ) -> Path:
-    """``points`` as one curve a method (at most seven, in the legend's order; several of one colour where points have
-    a ``curve``, which labels their ends), logarithmic axes shared by all ``panels`` (rows, columns). The first method's
-    ends are labelled by ``size_of`` otherwise; ``labels`` are those of the axes,
-    ``goal`` an error to mark."""
+    """Draw ``points`` as one curve per method (at most seven, in the legend's order).
+
+    There may be several curves of one colour, whose ends are labelled by the ``curve`` of their points; otherwise the
+    ends of the first method are labelled by ``size_of``. All ``panels`` (rows, columns) share logarithmic axes with
+    these ``labels``; ``goal`` is an error to mark.
+    """
     from matplotlib.figure import Figure
     from matplotlib.ticker import LogLocator
 
@@ -91,5 +93,5 @@ def draw(
 
 
 def _ends(curve: Sequence[Measured], size_of: Callable[[Measured], str]):
-    """Points at both ends with what labels them and where, in points."""
+    """Points at both ends, with their labels and offsets in points."""
     return [(curve[0], size_of(curve[0]), (0, -14)), (curve[-1], size_of(curve[-1]), (6, 7))]

@@ -14,18 +14,18 @@ from .drive import COLOURS, SAME, drive, drive_label, first_events, to_the_end
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-#: So many curves have a colour and a name of their own: of more, those of the tips that go farthest, or are driven
-#: most; the others are grey.
+#: Number of curves with a colour and name of their own, those of the tips with the largest growth or K; others are
+#: grey.
 NAMED = 6
-#: So many tips are named where they share a curve.
+#: Number of tips named where they share a curve.
 SHARING = 2
-#: Where there are many tips, K of a crack that runs away, or hangs by a thread, is beyond this percentile.
+#: With many tips, K of a runaway crack, or of a last ligament, is above this percentile.
 MOST_TIPS = 98.0
 _GREY = "#c4c6ca"
 
 
 class TipCurve(NamedTuple):
-    """``members`` (crack, end) share ``load`` (drive), ``k_i`` and ``k_ii`` MPa√m; they grow by ``grown`` m."""
+    """``members`` (crack, end) share ``load`` (drive), ``k_i`` and ``k_ii`` (MPa√m); they grow by ``grown`` (m)."""
 
     members: list[tuple[int, int]]
     load: np.ndarray
@@ -35,8 +35,11 @@ class TipCurve(NamedTuple):
 
 
 def stress_intensity(axes: Axes, run: Run) -> None:
-    """K_I (full) and K_II (dashed) at every tip against load, or time where nothing leads: growth relieves a tip, the
-    load drives it up again. Tips with the same curves share one; the toughness is a line across."""
+    """K_I (full) and K_II (dashed) at every tip against load, or time without a leading load.
+
+    Growth relieves a tip, the load drives it up again. Tips with equal curves share one; the toughness is a horizontal
+    line.
+    """
     curves = tip_curves(run)
     n_tips = sum(len(curve.members) for curve in curves)
     named = _foremost(curves)
@@ -57,26 +60,26 @@ def stress_intensity(axes: Axes, run: Run) -> None:
     toughness = run.summary.get("normalisation", {}).get("k_ic_pa_sqrt_m")
     if toughness:
         axes.axhline(toughness / 1e6, color="#222222", lw=0.9, ls=":", label=r"$K_{Ic}$")
-    # Beside many curves there is no corner that one of them does not reach.
+    # With many curves none of the corners is free.
     beside = {"loc": "upper left", "bbox_to_anchor": (1.0, 1.0)} if others else {}
     axes.legend(frameon=False, fontsize=8, **beside)
     low, high = _calm_span(run)
     title = run.title
     if high > low:
-        # A crack that runs away leaves all others flat at the bottom, so it leaves the page instead.
+        # A runaway crack would make all others flat, so it is cut off at the top instead.
         room = 2.0 * max((toughness or 0.0) / 1e6, high, -low)
         bottom, top = axes.get_ylim()
         axes.set_ylim(max(bottom, low - room), min(top, high + room))
         highest = max((float(np.nanmax(np.abs([c.k_i, c.k_ii]), initial=0.0)) for c in curves), default=0.0)
         if highest > max(high + room, room - low):
             axes.text(
-                0.01, 0.99, f"beyond the page: up to {highest:.3g}", transform=axes.transAxes, fontsize=7, va="top"
+                0.01, 0.99, f"above the range: up to {highest:.3g}", transform=axes.transAxes, fontsize=7, va="top"
             )
     axes.set(xlabel=drive_label(run), ylabel="stress intensity factor, MPa√m", title=title)
 
 
 def _foremost(curves: list[TipCurve]) -> list[int]:
-    """Which curves are named, in order: all where they are few, else those that grow farthest, then the largest."""
+    """The named curves, in order: all if they are few, else those with the largest growth, then K."""
     if len(curves) <= NAMED:
         return list(range(len(curves)))
     sizes = [float(np.nanpercentile(np.abs(np.concatenate([c.k_i, c.k_ii])), 90)) for c in curves]
@@ -85,8 +88,7 @@ def _foremost(curves: list[TipCurve]) -> list[int]:
 
 
 def _calm_span(run: Run) -> tuple[float, float]:
-    """The least and the largest K_I or K_II, MPa√m, where the load has just gone up and nothing has grown at it: of
-    many tips what `MOST_TIPS` of them have."""
+    """Least and largest K_I or K_II, MPa√m, right after load increments; of many tips, the percentile `MOST_TIPS`."""
     calm = run.history["cycle"][run.history["growth_pass"] == 0]
     tips = run.tips[np.isin(run.tips["cycle"], calm)]
     every = np.concatenate([tips["K_I"], tips["K_II"]]) / 1e6
@@ -99,11 +101,11 @@ def _calm_span(run: Run) -> tuple[float, float]:
 
 
 def tip_curves(run: Run) -> list[TipCurve]:
-    """A curve for every tip; one for all tips whose curves lie on one another."""
+    """One curve for every tip; tips with coinciding curves share one."""
     tips = run.tips
     every = np.abs([tips["K_I"], tips["K_II"]])
     every = every[np.isfinite(every)]
-    # Of many tips, one that runs away is no measure for the others.
+    # Of many tips, a runaway one is not the scale for the others.
     many = len(np.unique(tips["crack"])) > NAMED
     near = SAME * float(np.percentile(every, 90.0 if many else 100.0)) if len(every) else 0.0
     groups: list[tuple[list[tuple[int, int]], np.ndarray]] = []
@@ -137,14 +139,15 @@ def _tip_names(run: Run, members: list[tuple[int, int]], n_tips: int) -> str:
 
 
 def crack_length(axes: Axes, run: Run) -> None:
-    """The length of all cracks against load, or time where nothing leads: what grows at one load is a vertical line.
-    Where rock comes apart its cracks are faces of blocks from then on: they go on being counted, and what is still
-    cracks is dashed."""
+    """Length of all cracks against load, or time without a leading load; growth at one load is a vertical line.
+
+    Where rock breaks apart its cracks become block faces: they are still counted, and the remaining cracks are dashed.
+    """
     history, every = to_the_end(run), length_ever(run)
     unit, size = length_unit(float(every.max()))
     at, still = drive(run, history), history["crack_length"]
     parted = bool((every - still > 1e-6 * every.max()).any())
-    everything = "with those that are block faces now" if parted else None
+    everything = "including those that are now block faces" if parted else None
     axes.plot(at, every / size, color=COLOURS[0], lw=1.8, label=everything)
     if parted:
         axes.plot(at, still / size, color=COLOURS[0], lw=1.2, ls="--", label="cracks still")
@@ -155,8 +158,11 @@ def crack_length(axes: Axes, run: Run) -> None:
 
 
 def length_ever(run: Run) -> np.ndarray:
-    """(rows to the end,) m of crack that there is, or was before blocks parted along it. Between two cycles cracks get
-    longer by what their tips grew, and shorter only by what becomes faces of blocks."""
+    """(rows to the end,) m: length of all cracks, including those that have become block faces.
+
+    Between two cycles the length grows by the growth of the tips, and is reduced only by cracks that become block
+    faces.
+    """
     history = to_the_end(run)
     length = history["crack_length"]
     grown = np.zeros(len(history))

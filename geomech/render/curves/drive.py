@@ -1,4 +1,4 @@
-"""What the curves of a run are drawn against: its leading load, or time where nothing leads; with its events."""
+"""Abscissa of a run's curves: its leading load, or time without one; with events."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from ..pictures.look import final_cycle
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-#: One a curve.
+#: One per curve.
 COLOURS = ("#1f6f8b", "#c8553d", "#588157", "#8d6a9f", "#b08900", "#3d405b")
-#: Full and broken lines, one for each colour: in a grey print colours look alike.
+#: Full and broken lines, one for each colour, because colours look alike in a grey print.
 DASHES = (
     "-",
     (0, (5, 1.8)),
@@ -25,50 +25,52 @@ DASHES = (
     (0, (9, 2.5)),
     (0, (3, 1.2, 1.2, 1.2, 1.2, 1.2)),
 )
-#: Curves nearer than this part of the largest value are one on paper.
+#: Curves that differ by less than this part of the largest value coincide on paper.
 SAME = 0.01
 
 
 def line_of(k: int) -> dict[str, Any]:
-    """Colour and dashes of the curve number ``k`` among several, for Matplotlib."""
+    """Colour and dashes of curve number ``k``, for Matplotlib."""
     return {"color": COLOURS[k % len(COLOURS)], "ls": DASHES[k % len(DASHES)]}
 
 
 def sense(run: Run) -> float:
-    """1 where the leading load presses, −1 where it pulls: its largest value is drawn to the right."""
+    """1 if the leading load is compressive, −1 if tensile: its largest value is drawn at the right."""
     load = run.history["load"]
     return -1.0 if np.nanmax(np.abs(load)) > np.nanmax(load) else 1.0
 
 
 def load_unit(run: Run) -> tuple[str, float]:
-    """(name, Pa) of the unit for the run's leading load."""
+    """(name, Pa) of the unit of the run's leading load."""
     return stress_unit(largest_of(run.history["load"]))
 
 
 def drive(run: Run, rows: np.ndarray) -> np.ndarray:
-    """What ``rows`` are drawn against: the leading load, in its unit, or the time, s, of a run without one."""
+    """Abscissa of ``rows``: the leading load in its unit, or the time (s) of a run without one."""
     return sense(run) * rows["load"] / load_unit(run)[1] if run.led else rows["time"]
 
 
 def drive_label(run: Run) -> str:
-    """What the axis of the leading load, or of time, is called."""
+    """Label of that axis."""
     return load_label(run) if run.led else "time, s"
 
 
 def load_label(run: Run) -> str:
-    """What the axis of the leading load is called, with its unit."""
+    """Label of the axis of the leading load, with its unit."""
     unit = load_unit(run)[0]
     return f"load in tension, {unit}" if sense(run) < 0 else f"load, {unit}"
 
 
 def to_the_end(run: Run) -> np.ndarray:
-    """The history up to what the run came to: not past the cut that ends it, where cracks turn into block faces."""
+    """The history up to the end that is drawn: without the final cut, in which cracks become block faces."""
     return run.history[run.history["cycle"] <= final_cycle(run)]
 
 
 def first_events(axes: Axes, run: Run, strain: np.ndarray | None) -> None:
-    """Mark the first event of every kind: as a point on the load–strain curve, or as a line at its load (at its time
-    where nothing leads). Those that would be drawn over one another share one mark."""
+    """Mark the first event of every kind: a point on the load–strain curve, or a line at its load (or time).
+
+    Coinciding events share one mark.
+    """
     history = to_the_end(run)
     if not len(run.events):
         return

@@ -1,4 +1,4 @@
-"""Crack paths drawn over one another: a panel a specimen, a colour a run."""
+"""Crack paths superposed: one panel per specimen, one colour per run."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ if TYPE_CHECKING:
 
     from geomech.model import Cracks
 
-#: Rock shown around the cracks, in parts of what they span.
+#: Margin around the cracks, relative to their extent.
 _MARGIN = 0.25
-#: The same around outlines.
+#: Margin around outlines.
 _TIGHT = 0.06
-#: Axes of a panel, inches.
+#: Size of a panel's axes, inches.
 _WIDEST, _TALLEST = 2.0, 4.6
 
 
@@ -29,8 +29,11 @@ def crack_paths(
     columns: int = 4,
     outlines: Mapping[str, np.ndarray] | None = None,
 ) -> Path:
-    """``panels``: title → (what it is called → cracks at the end of a run). Cracks that were drawn are black, what grew
-    has its run's colour; all panels have one scale. ``outlines``: title → (n, 2) m of the rock. Lengths in mm."""
+    """Draw crack paths.
+
+    ``panels``: {title: {name: cracks at the end of a run}}. Initial cracks are black, growth has the colour of its run;
+    all panels have one scale. ``outlines``: {title: (n, 2) m of the rock}. Lengths in mm.
+    """
     panels = {
         title: {name: cracks for name, cracks in runs.items() if cracks.n_segments} for title, runs in panels.items()
     }
@@ -51,7 +54,7 @@ def crack_paths(
         1 + (_TIGHT if outlines else _MARGIN)
     )
     width = max(width, 0.45 * height)
-    # Inches of a panel's axes, of numbers beside and below it, of the legend.
+    # Inches of a panel's axes, of tick labels at the left and below, of the legend.
     wide = min(_WIDEST, _TALLEST * width / height)
     size = ((wide + 0.45) * columns + 0.3, (wide * height / width + 0.6) * rows + 0.5)
     figure, save = figure_of(size, path)
@@ -88,7 +91,7 @@ def crack_paths(
 
 
 def _draw_runs(panel: Axes, runs: Mapping[str, Cracks], names: list[str]) -> None:
-    """The cracks of all ``runs`` in one ``panel``, in the colours of their ``names``."""
+    """Cracks of all ``runs`` in one ``panel``, in the colours of their ``names``."""
     for name, cracks in runs.items():
         k = names.index(name)
         line, wider = ("-", "--", ":")[k // len(COLOURS) % 3], 0.45 * (len(runs) - list(runs).index(name) - 1)
@@ -96,7 +99,7 @@ def _draw_runs(panel: Axes, runs: Mapping[str, Cracks], names: list[str]) -> Non
             lines = 1e3 * cracks.nodes[cracks.segments[(cracks.birth_cycle == 0) == old]]
             if not len(lines):
                 continue
-            # One broken line for all segments.
+            # One interrupted line for all segments.
             x, y = np.concatenate([lines, np.full((len(lines), 1, 2), np.nan)], axis=1).reshape(-1, 2).T
             colour = "#15161a" if old else COLOURS[k % len(COLOURS)]
             label = name if not old and len(names) > 1 else None

@@ -1,5 +1,5 @@
-"""Curves of a run: load against strain, stress intensity factors and crack length against load; where there is no load
-or nothing cracks, energies and the monitors' ways against time."""
+"""Curves of a run: load against strain, stress intensity factors and crack length against load; without load or cracks,
+energies and displacements of monitors against time."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-#: Parts of the energy budget in the order they are drawn, and what they are called.
+#: Parts of the energy budget in drawing order, and their names.
 _ENERGIES = {
     "elastic_energy": "elastic",
     "contact_energy": "contacts",
@@ -30,7 +30,7 @@ _ENERGIES = {
     "fracture_energy": "new crack",
     "crack_friction": "crack faces",
     "crack_bond_loss": "cement of cracks",
-    "runaway_loss": "cracks run away",
+    "runaway_loss": "unstable crack growth",
     "parting_energy": "blocks parted",
     "friction_loss": "friction",
     "damping_loss": "damping",
@@ -42,8 +42,10 @@ _ENERGIES = {
 
 
 def plots(run: Run, folder: Path, *, suffix: str = ".png", more: bool = False) -> list[Path]:
-    """Draw the curves that ``run`` has data for as files in ``folder``; their paths. ``suffix`` ".svg" draws lines that
-    stay sharp; ``more`` draws energies, monitors, joints and bolts as well."""
+    """Draw the curves for which ``run`` has data into ``folder``; returns their paths.
+
+    ``suffix`` ".svg" gives vector graphics; ``more`` also draws energies, monitors, joints and bolts.
+    """
     history, tips = run.history, run.tips
     several = len(history) > 1
     wanted = {
@@ -61,19 +63,18 @@ def plots(run: Run, folder: Path, *, suffix: str = ".png", more: bool = False) -
 
 
 def energies(axes: Axes, run: Run) -> None:
-    """What the work of loads and gravity went into, against time: curves below a hundredth of the largest are left
-    out."""
+    """Use of the work of loads and gravity against time; curves below a hundredth of the largest are left out."""
     history = to_the_end(run)
     for k, (name, energy) in enumerate(_energy_curves(run).items()):
         axes.plot(history["time"], energy, **line_of(k), lw=1.5, label=name)
-    # Beside the curves: there is no corner that one of them does not reach.
+    # Legend outside: none of the corners is free.
     axes.legend(frameon=False, fontsize=8, loc="upper left", bbox_to_anchor=(1.0, 1.0))
     axes.set(xlabel="time, s", ylabel="energy, J/m", title=run.title)
 
 
 def _energy_curves(run: Run) -> dict[str, np.ndarray]:
     history = to_the_end(run)
-    # At rest forces do more on cracks than blocks of one strain know.
+    # At rest, forces do more work on cracks than blocks with uniform strain account for.
     done = ("load_work", "gravity_work", "uneven_work")
     work = [history[name] for name in done if name in history.dtype.names]
     curves = {"work done": np.nansum(work, axis=0)} if work else {}
@@ -87,7 +88,7 @@ def _energy_curves(run: Run) -> dict[str, np.ndarray]:
 
 
 def monitors(axes: Axes, run: Run) -> None:
-    """How far each monitored point has moved, against time."""
+    """Displacement of each monitored point against time."""
     history, ways = to_the_end(run), _monitor_curves(run)
     unit, size = length_unit(max(largest_of(way) for way in ways.values()))
     for k, (name, way) in enumerate(ways.items()):
@@ -105,8 +106,8 @@ def _monitor_curves(run: Run) -> dict[str, np.ndarray]:
 
 
 def stress_strain(axes: Axes, run: Run) -> None:
-    """The leading load against axial strain, both positive in compression (in tension, where that is what leads), with
-    the run's events."""
+    """Leading load against axial strain, both positive in compression (in tension if the load is tensile), with
+    events."""
     history, sign = to_the_end(run), sense(run)
     axes.plot(sign * 1e3 * history["strain"], drive(run, history), color=COLOURS[0], lw=1.8)
     first_events(axes, run, sign * 1e3 * history["strain"])
@@ -115,7 +116,7 @@ def stress_strain(axes: Axes, run: Run) -> None:
 
 
 def compared(runs: Mapping[str, Run], path: Path) -> Path | None:
-    """Draw load against axial strain of ``runs``, by name, into one file; None where none of them has both."""
+    """Draw load against axial strain of ``runs``, by name, in one figure; None if none has both."""
     known = {
         name: run for name, run in runs.items() if (np.isfinite(run.history["load"] + run.history["strain"])).sum() > 1
     }
@@ -144,8 +145,8 @@ def _save(curve, run: Run, path: Path) -> Path:
 
 
 def figure_of(size: tuple[float, float], path: Path) -> tuple[Figure, Callable[[], Path]]:
-    """An empty figure of ``size`` (inches), and what writes it to ``path`` when it is drawn."""
-    # The object interface: pyplot would keep figures and may want a display.
+    """An empty figure of ``size`` (inches), and the function that writes it to ``path``."""
+    # The object interface: pyplot would keep figures and may need a display.
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 

@@ -1,4 +1,4 @@
-"""Curves of joints and bolts: how far joints have slipped, what bolts carry, against time."""
+"""Curves of joints and bolts against time: slip and forces."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 def joint_curves(run: Run) -> dict[str, np.ndarray]:
-    """joint → (n, 2) of time, s, and mean slip, m: those that slipped farthest, as many as there are colours."""
+    """joint → (n, 2) of time, s, and mean slip, m: those with the largest slip, as many as there are colours."""
     table = read_table(run.folder / "joints.csv", JOINTS)
     if not len(table):
         return {}
@@ -32,7 +32,7 @@ def joint_curves(run: Run) -> dict[str, np.ndarray]:
 
 
 def bolt_curves(run: Run) -> dict[str, np.ndarray]:
-    """bolt → (n, 2) of time, s, and force, N/m: those that carry most, as many as there are colours."""
+    """bolt → (n, 2) of time, s, and force, N/m: those with the largest force, as many as there are colours."""
     rows, names = [], []
     for time, file in run.series("bolts"):
         grid = read_grid(file)

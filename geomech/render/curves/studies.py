@@ -1,4 +1,4 @@
-"""Curves of a study: what several runs came to, against what differs between them, beside published values."""
+"""Curves of a study: results of several runs against the varied quantity, with published values."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from .plots import figure_of
 
 #: A published range: its lower and upper end.
 Range = tuple[float, float]
-#: Curves of no more points than this have a mark at each.
+#: Curves with no more points than this have a mark at each.
 MARKED = 12
 
 
@@ -22,7 +22,7 @@ def against(
     ranges: Mapping[str, Range] | None = None,
     log: bool = False,
 ) -> Path:
-    """``curves``: name → (x, y); ``ranges`` are bands across; ``log`` scales both axes so."""
+    """``curves``: {name: (x, y)}; ``ranges`` are horizontal bands; ``log`` selects logarithmic axes."""
     from matplotlib.ticker import LogLocator, NullLocator
 
     figure, save = figure_of((5.6, 3.6 + 0.2 * ((len(curves) + len(ranges or {})) // 2)), path)

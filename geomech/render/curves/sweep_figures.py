@@ -1,5 +1,4 @@
-"""Figures of a sweep: distribution, convergence, sensitivities, responses, the map of what moves. They take plain
-arrays."""
+"""Figures of a sweep from plain arrays: distribution, convergence, sensitivities, responses, moving region."""
 
 from __future__ import annotations
 
@@ -17,7 +16,7 @@ if TYPE_CHECKING:
     from geomech.model import Blocks
 
 INK, SOFT, ACCENT, FAILS, BAND = "#2f3136", "#8aa4a0", "#1f6f8b", "#c8553d", "#cfe0e6"
-#: Bars of a histogram, at least and at most.
+#: Least and largest number of bars of a histogram.
 _LEAST_BARS, _MOST_BARS = 8, 40
 
 
@@ -41,8 +40,11 @@ def _saved(figure: Figure, path: Path) -> Path:
 def draw_distribution(
     values: np.ndarray, shares: np.ndarray, half_width: float, label: str, path: Path, limit: float | None = None
 ) -> Path:
-    """Histogram of sorted ``values`` (n,), and how many lie below each (``shares``) with a band of ``half_width`` about
-    it; what fails lies below ``limit``."""
+    """Histogram of sorted ``values`` (n,), and their cumulative distribution (``shares``) with a band of
+    ``half_width``.
+
+    Failure is below ``limit``.
+    """
     figure = _figure(8.6, 3.5)
     left, right = figure.subplots(1, 2)
     span = float(np.ptp(values)) or 1.0
@@ -51,7 +53,7 @@ def draw_distribution(
     bars = int(np.clip(span / width, _LEAST_BARS, _MOST_BARS)) if width > 0 else _LEAST_BARS
     edges = np.histogram_bin_edges(values, bars)
     if limit is not None and edges[0] < limit < edges[-1]:
-        # No bar holds both what fails and what stands.
+        # No bar contains both failed and stable runs.
         edges = edges + (limit - edges[np.argmin(np.abs(edges - limit))])
         step = edges[1] - edges[0]
         edges = np.concatenate([[edges[0] - step], edges, [edges[-1] + step]])
@@ -72,7 +74,7 @@ def draw_distribution(
 
 
 def draw_convergence(table: np.ndarray, path: Path) -> Path:
-    """The probability of failure after each run with its interval: ``table`` (n, 4) of runs, value, low, high."""
+    """Probability of failure after each run with its interval; ``table`` (n, 4): runs, value, low, high."""
     figure = _figure(8.6, 3.0)
     axes = figure.subplots()
     axes.fill_between(table[:, 0], 100 * table[:, 2], 100 * table[:, 3], color=BAND, lw=0, label="95 % (Wilson)")
@@ -86,8 +88,8 @@ def draw_convergence(table: np.ndarray, path: Path) -> Path:
 
 
 def draw_tornado(swings: Sequence[Any], middle: float, label: str, path: Path) -> Path:
-    """A bar for each of ``swings`` (name, low, high and their errors), from its mean at low to that at high values of
-    the variable, about ``middle``."""
+    """One bar for each of ``swings`` (name, low, high and their errors), from its mean at low to that at high values of
+    the variable, around ``middle``."""
     figure = _figure(8.6, 0.9 + 0.42 * len(swings))
     axes = figure.subplots()
     for k, each in enumerate(swings):
@@ -125,7 +127,7 @@ def draw_sensitivities(found: Sequence[Any], path: Path) -> Path:
     axes.set_ylim(len(found) - 0.5, -0.5)
     axes.set_xlim(left=min(0.0, axes.get_xlim()[0]))
     axes.axvline(0, color=INK, lw=0.8)
-    axes.set_xlabel("part of the variance that the variable makes")
+    axes.set_xlabel("part of the variance due to the variable")
     if totals:
         axes.legend(frameon=False, fontsize=8, loc="lower right")
     _plain(axes)
@@ -141,7 +143,7 @@ def draw_responses(
     path: Path,
     limit: float | None,
 ) -> Path:
-    """``values`` (n,) over each of the variables ``columns`` (n,), failed runs in another colour, with the means of
+    """``values`` (n,) against each of the variables ``columns`` (n,), failed runs in another colour, with means of
     tenths of the runs."""
     across = min(3, len(columns))
     down = math.ceil(len(columns) / across)
@@ -175,8 +177,10 @@ def draw_responses(
 def draw_map(
     shares: np.ndarray, box: Sequence[float], outlines: Sequence[np.ndarray], fixed: Sequence[bool], path: Path
 ) -> Path:
-    """How often each place moves: ``shares`` (ny, nx) over the ``box`` (x0, y0, x1, y1), with the ``outlines`` of
-    blocks of one drawing; ``fixed`` ones are grey."""
+    """How often each place moves: ``shares`` (ny, nx) over the ``box`` (x0, y0, x1, y1).
+
+    ``outlines`` are the blocks of one drawing; ``fixed`` ones are grey.
+    """
     from matplotlib.collections import PolyCollection
 
     ratio = (box[3] - box[1]) / (box[2] - box[0])
@@ -210,7 +214,7 @@ def draw_map(
 
 
 def draw_moved(blocks: Blocks, vertices: np.ndarray, title: str, path: Path) -> Path:
-    """Blocks where they have come to (``vertices``), coloured by how far, m."""
+    """Blocks at their final ``vertices``, coloured by displacement, m."""
     from matplotlib.collections import PolyCollection
 
     moved = blocks.mean_vertices(vertices) - blocks.mean_vertices(blocks.vertices)

@@ -1,1 +1,1 @@
-"""Pictures and movies of any field that a run has written: displacement, slip, forces, K, stress and what else there is."""
+"""Pictures and movies of any field that a run has written: displacement, slip, forces, K, stress and others."""

@@ -17,17 +17,20 @@ from .frame import Frames, drawn
 from .painter import FieldPainter, view
 from .quantity import limits, quantity
 
-#: A run is shown by its motion where blocks move by more than this part of the model.
+#: Blocks count as moving if they move by more than this part of the model.
 MOVES = 0.03
 
 
 @dataclass(frozen=True)
 class Wish:
-    """What a picture of a field is to be like; None: as suits the run.
+    """Specification of a field picture; None: chosen for the run.
 
-    ``cycle`` or ``time`` (s): what the run came to (`final_cycle`); ``span``: (lowest, highest) in the field's SI unit; ``scale``: factor on
-    displacements; ``size``: pixels, (width, height or None); ``suffix``: format of the picture; ``movies``: formats of
-    the movies.
+    cycle, time   the cycle, or the time (s), to draw; by default the run's final state (`final_cycle`)
+    span          (lowest, highest) in the field's SI unit
+    scale         factor on displacements
+    size          pixels, (width, height or None)
+    suffix        format of the picture
+    movies        formats of the movies
     """
 
     field: str = "displacement"
@@ -45,10 +48,12 @@ class Wish:
 def suited(
     run: Run, component: str | None = None, *, width: int | None = None, span: tuple[float, float] | None = None
 ) -> FieldPainter:
-    """A painter of what suits the run (`usual_field`) or of a stress ``component``; what is not given here, the scene's
-    ``[render]`` table says, and where that is silent too, vertical stress and 800 pixels; ``span`` of the colours in
-    the field's unit (None: of the run). Raises KeyError for an unknown
-    stress component or crack colour."""
+    """Painter of the usual field of the run (`usual_field`), or of a stress ``component``.
+
+    Settings that are not given come from the scene's ``[render]`` table, and else are vertical stress and 800 pixels;
+    ``span`` of the colours is in the field's unit (None: from the run). Raises KeyError for an unknown stress component
+    or crack colour.
+    """
     asked = run.scene.get("render", {})
     field = component or usual_field(run) or asked.get("component", "yy")
     if component is not None and component not in COMPONENTS:
@@ -60,14 +65,14 @@ def suited(
 
 
 def draw_end(painter: FieldPainter, path: Path) -> Path:
-    """The picture ``path`` of the cycle that shows what the run came to (`final_cycle`)."""
+    """Draw the cycle of the run's final state (`final_cycle`) to ``path``."""
     painter.draw(painter.frames.cycle_time(final_cycle(painter.run)))
     return painter.save(path)
 
 
 def usual_field(run: Run) -> str | None:
-    """The field that shows what a run is: displacement where its blocks move or nothing is solved inside; None where
-    stress inside cracked rock is the subject."""
+    """The field that characterises a run: displacement if its blocks move or nothing is solved inside; None for stress
+    inside cracked rock."""
     if not run.series("interior"):
         return "displacement"
     frames = Frames(run)
@@ -77,12 +82,14 @@ def usual_field(run: Run) -> str | None:
 
 
 def draw_field(runs: Sequence[Run], wish: Wish, out: Path | None = None) -> list[Path]:
-    """Draw ``wish.field`` of ``runs``, in colours that mean the same in all of them, into ``out`` (default: ``pictures``
-    in each run folder); the paths. Raises UnknownField, NoEncoder, KeyError for a cycle or time before the first, and
-    ValueError for a run without blocks."""
+    """Draw ``wish.field`` of ``runs`` with common colours into ``out`` (default: ``pictures`` in each run folder).
+
+    Returns the paths. Raises UnknownField, NoEncoder, KeyError for a cycle or time before the first, and ValueError for
+    a run without blocks.
+    """
     for run in runs:
         if not run.series("blocks"):
-            raise ValueError(f"{run.folder}: the run has written no blocks yet: let it go on, then draw it")
+            raise ValueError(f"{run.folder}: the run has written no blocks yet: continue it, then draw it")
     wanted = {run: quantity(run, wish.field, compression_positive=wish.compression_positive) for run in runs}
     if wish.span is None and len(runs) > 1:
         spans = [limits([run], wanted[run]) for run in runs]
@@ -113,5 +120,5 @@ def _time(painter: FieldPainter, wish: Wish) -> float:
     if wish.time is None:
         return painter.frames.cycle_time(final_cycle(painter.run))
     if not first <= wish.time <= last * (1 + 1e-9):
-        raise KeyError(f"{painter.run.folder} was written from t = {first:g} s to {last:g} s, not at {wish.time:g} s")
+        raise KeyError(f"{painter.run.folder} has output from t =  {first:g} s to {last:g} s, not at {wish.time:g} s")
     return wish.time

@@ -1,4 +1,4 @@
-"""A movie of a field, even in time: every frame stands for as much of the run's time as any other."""
+"""Movie of a field, uniform in time: every frame stands for the same part of the run's time."""
 
 from __future__ import annotations
 
@@ -8,19 +8,19 @@ import numpy as np
 
 from .painter import FieldPainter
 
-#: The last frame of a GIF stays for this long, ms.
+#: Duration of the last frame of a GIF, ms.
 LAST = 2500
 
 
 class NoEncoder(RuntimeError):
-    """MP4 needs an encoder that is not installed; the message says which."""
+    """MP4 needs an encoder that is not installed; the message names it."""
 
 
 def even_movie(
     painter: FieldPainter, paths: list[Path], *, frames: int = 48, frames_per_second: float = 10.0
 ) -> list[Path]:
-    """Draw the whole run with ``painter`` into every one of ``paths``, .gif or .mp4. Raises NoEncoder for an MP4 where
-    imageio-ffmpeg is not installed."""
+    """Draw the whole run with ``painter`` into every one of ``paths``, .gif or .mp4. Raises NoEncoder for an MP4
+    without imageio-ffmpeg."""
     first, last = painter.frames.span()
     if not last > first:
         return []
@@ -38,10 +38,10 @@ def even_movie(
 
 
 def write_gif(path: Path, images: list[np.ndarray], durations: list[int]) -> None:
-    """``images`` (height, width, 3) of 8 bits as the GIF ``path``, each shown for its duration, ms."""
+    """Write ``images`` (height, width, 3) of 8 bits as the GIF ``path``, each shown for its duration, ms."""
     from PIL import Image
 
-    # One palette for all frames, or they would flicker: that of the first, the middle and the last together.
+    # One palette for all frames, otherwise they would flicker: from the first, the middle and the last.
     shown = [images[0], images[len(images) // 2], images[-1]]
     found = Image.fromarray(np.concatenate(shown)).quantize(256, dither=Image.Dither.NONE).getpalette()
     colours = np.array(found).reshape(-1, 3)
@@ -59,7 +59,7 @@ def _mp4(path: Path, images: list[np.ndarray], frames_per_second: float) -> None
         import imageio_ffmpeg  # noqa: F401
     except ModuleNotFoundError:
         raise NoEncoder("an MP4 needs imageio-ffmpeg, which is not installed: pip install 'geomech[movie]'") from None
-    tall, wide = (size - size % 2 for size in images[0].shape[:2])  # H.264 wants even sizes
+    tall, wide = (size - size % 2 for size in images[0].shape[:2])  # H.264 requires even sizes
     with imageio.get_writer(path, fps=frames_per_second, codec="libx264", quality=8, macro_block_size=2) as writer:
         for image in images:
             writer.append_data(image[:tall, :wide])

@@ -1,5 +1,4 @@
-"""The grids of a run at any time, between two written cycles too, where blocks are as far as their mean speed takes
-them."""
+"""Grids of a run at any time, interpolated between written cycles with the mean velocity of the blocks."""
 
 from __future__ import annotations
 
@@ -15,7 +14,7 @@ if TYPE_CHECKING:
 
 
 class Frames:
-    """Reads the grids of ``run`` and interpolates in time between two that have the same points and cells."""
+    """Reads the grids of ``run`` and interpolates in time between two with the same points and cells."""
 
     def __init__(self, run: Run) -> None:
         self.run = run
@@ -23,7 +22,7 @@ class Frames:
         self._read = lru_cache(maxsize=24)(run.grid)
 
     def grid(self, name: str, time: float) -> pv.UnstructuredGrid | None:
-        """The series ``name`` at ``time`` s of its PVD; the first one before its start; None where it was not
+        """The series ``name`` at ``time`` (s) of its PVD; the first one before its start; None if it was not
         written."""
         if name not in self._times:
             series = self.run.series(name)
@@ -46,13 +45,13 @@ class Frames:
         return grid
 
     def span(self) -> tuple[float, float]:
-        """The first and the last time of the blocks, s."""
+        """First and last time of the blocks, s."""
         times = [at for at, _ in self.run.series("blocks")]
         return times[0], times[-1]
 
     def cycle_time(self, cycle: int) -> float:
-        """The time, s, at which ``cycle`` stands in the list of blocks, or the last one written before it. Raises
-        KeyError for one before the first."""
+        """Time, s, of ``cycle`` in the list of blocks, or of the last one written before it. Raises KeyError for a
+        cycle before the first."""
         found = [at for (at, _), number in zip(self.run.series("blocks"), self.run.grids("blocks")) if number <= cycle]
         if not found:
             raise KeyError(f"{self.run.folder}: nothing was written up to cycle {cycle}")
@@ -60,7 +59,7 @@ class Frames:
 
 
 def reference(grid: pv.DataSet) -> np.ndarray:
-    """(n, 2) m, points where they were at the start."""
+    """(n, 2) m, initial points."""
     points = np.asarray(grid.points)[:, :2]
     return points if int(grid.field_data["REFERENCE"][0]) else points - np.asarray(grid["displacement"])[:, :2]
 

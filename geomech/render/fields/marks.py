@@ -1,5 +1,4 @@
-"""What stands beside the field on a picture: supports, loads, bolts with their forces, water, monitors, the ground as
-it was."""
+"""Marks on a picture: supports, loads, bolts with their forces, water, monitors, initial ground surface."""
 
 from __future__ import annotations
 
@@ -13,12 +12,12 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 INK, FIXED, LOAD, WATER, BOLT, BEFORE = "#1b1d21", "#8d9199", "#5b2a86", "#2f6fb5", "#1b1d21", "#7a7f87"
-#: At most so many bolts, or tips, are labelled, those with the largest values: more would cover the model.
+#: Largest number of labelled bolts or tips, those with the largest values: more would cover the model.
 LABELLED = 8
 
 
 class Marks:
-    """Draws the marks of a run on axes; each method returns the handles of its legend."""
+    """Draws the marks of a run on axes; each method returns its legend handles."""
 
     def __init__(self, frames: Frames, scale: float, size: float) -> None:
         self.frames, self.scale, self.size = frames, scale, size
@@ -27,7 +26,7 @@ class Marks:
         self._before = _outer(frames.grid("blocks", start))
 
     def draw(self, axes: Axes, time: float) -> list[Any]:
-        """All marks at ``time``; the handles of the legend."""
+        """All marks at ``time``; returns the legend handles."""
         now = self.frames.grid("outlines", time)
         keys: list[Any] = []
         if now is not None:
@@ -46,7 +45,7 @@ class Marks:
         return [Line2D([], [], color=FIXED, lw=2.2, label="fixed")]
 
     def _ground(self, axes: Axes, now: Any) -> list[Any]:
-        """The outline before, where the rock has moved by more than a line is wide."""
+        """The initial outline, if the rock has moved by more than the width of a line."""
         from matplotlib.collections import LineCollection
         from matplotlib.lines import Line2D
 
@@ -59,7 +58,7 @@ class Marks:
         return [Line2D([], [], color=BEFORE, lw=0.9, ls=(0, (4, 3)), label="outline at the start")]
 
     def _loads(self, axes: Axes, now: Any) -> list[Any]:
-        """Arrows on edges that carry a traction or a point force of the scene."""
+        """Arrows on edges with a traction, and at point forces of the scene."""
         from matplotlib.lines import Line2D
 
         loads = self.scene.get("loads", {})
@@ -104,7 +103,7 @@ class Marks:
             middle = lines[k].mean(axis=0)
             near = [other for other in labelled if np.hypot(*(middle - other)) < 0.1 * self.size]
             if near or len(labelled) == LABELLED:
-                continue  # labels would cover one another
+                continue  # labels would overlap
             labelled.append(middle)
             axes.annotate(f"{force[k] / 1e3:.3g}".replace("-", "\N{MINUS SIGN}"), middle, xytext=(3, 3), textcoords="offset points",
                           fontsize=6.5, color=BOLT, zorder=9, bbox=PAPER)  # fmt: skip
@@ -128,7 +127,7 @@ class Marks:
         if not points or blocks is None:
             return []
         at = np.array(points, float)
-        # A monitor moves with the vertex next to it: at the width of a line there is no difference to see.
+        # A monitor moves with the nearest vertex: the difference is below the width of a line.
         near = np.argmin(((reference(blocks)[None] - at[:, None]) ** 2).sum(axis=2), axis=1)
         at = at + self.scale * np.asarray(blocks["displacement"])[near, :2]
         style = {"marker": "o", "ms": 4.5, "mfc": "white", "mec": INK, "mew": 1.1, "lw": 0}
@@ -136,12 +135,12 @@ class Marks:
         return [Line2D([], [], label="monitors", **style)]
 
 
-#: What stands behind a label.
+#: Background of a label.
 PAPER = {"boxstyle": "round,pad=0.15", "fc": "white", "ec": "none", "alpha": 0.8}
 
 
 def _outer(blocks: Any) -> list[np.ndarray]:
-    """Outlines (n, 2) m of the rock at the start, as one body: seams between blocks closed."""
+    """Outlines (n, 2) m of the initial rock as one body, without the seams between blocks."""
     import shapely
 
     corners = reference(blocks)[blocks.cells.reshape(-1, 4)[:, 1:]]

@@ -1,4 +1,4 @@
-"""One picture of any field of a run, drawn with Matplotlib: rock, field, cracks, marks, scale bar, legend beside."""
+"""One picture of any field of a run, drawn with Matplotlib: rock, field, cracks, marks, scale bar, legend."""
 
 from __future__ import annotations
 
@@ -23,20 +23,23 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 ROCK, STANDS, INK, SOFT = "#efe9dd", "#dcdcd8", "#33363b", "#5a5f66"
-#: The page, inches: its width, and what surrounds the model on it.
+#: Page, inches: its width, and the margins around the model.
 PAGE, LEFT, RIGHT, TOP, BOTTOM, ROW = 4.8, 0.52, 1.15, 0.52, 0.5, 0.15
-#: The model is at least and at most so tall, inches.
+#: Least and largest height of the model, inches.
 SHORTEST, TALLEST = 1.3, 5.5
-#: The largest force is drawn this long, and principal stresses so, in parts of the model.
+#: Length of the largest force, and of principal stresses, relative to the model.
 _ARROW, _CROSS = 0.09, 0.03
-#: So many crosses of principal stress across the model.
+#: Number of crosses of principal stress across the model.
 _CROSSES = 26
 
 
 @dataclass(frozen=True)
 class View:
-    """What stays the same from frame to frame: the span of the field in its own unit, (x0, x1, y0, y1) m as drawn, the
-    factor on displacements, the picture's width and, where it is given, height in pixels."""
+    """Constant settings of all frames.
+
+    The range of the field in its own unit, (x0, x1, y0, y1) m as drawn, the factor on displacements, the picture's
+    width and, if given, height in pixels.
+    """
 
     limits: tuple[float, float]
     bounds: tuple[float, float, float, float]
@@ -53,8 +56,10 @@ def view(
     span: tuple[float, float] | None = None,
     size: tuple[int, int | None] = (800, None),
 ) -> View:
-    """The view that suits ``what`` over the whole of ``run``; ``scale``, ``span`` and ``size`` are as asked for, or
-    found: a scale at which displacements are seen and blocks do not lie inside others."""
+    """The view for ``what`` over the whole ``run``; ``scale``, ``span`` and ``size`` are as given, or chosen.
+
+    The chosen scale makes displacements visible without overlap of blocks.
+    """
     scale = suitable_scale(run) if scale is None else scale
     frames = Frames(run)
     start, end = frames.span()
@@ -67,8 +72,8 @@ def view(
 
 
 def suitable_scale(run: Run) -> float:
-    """A factor at which the displacements at the end are seen, and blocks do not lie inside others; 1 where the run was
-    written as it has moved."""
+    """Factor that makes the final displacements visible without overlap of blocks; 1 if the run was written in its
+    current configuration."""
     frames = Frames(run)
     end = frames.cycle_time(final_cycle(run))
     blocks, interior = frames.grid("blocks", end), frames.grid("interior", end)
@@ -79,8 +84,10 @@ def suitable_scale(run: Run) -> float:
 
 
 class FieldPainter:
-    """Draws ``what`` of a run at any time, in the ``view`` that its pictures share. Where it is a stress, cracks are
-    coloured too, by ``cracks``: "birth" or "opening"."""
+    """Draws ``what`` of a run at any time, in the ``view`` that its pictures share.
+
+    For a stress, cracks are also coloured, by ``cracks``: "birth" or "opening".
+    """
 
     def __init__(self, run: Run, what: Quantity, fixed: View, cracks: str = "birth") -> None:
         self.run, self.what, self.view = run, what, fixed
@@ -96,7 +103,7 @@ class FieldPainter:
     # -- frames --------------------------------------------------------------------------------------------------
 
     def draw(self, time: float) -> None:
-        """Draw the run at ``time`` s of its series, between two written cycles too."""
+        """Draw the run at ``time`` (s) of its series, interpolated between written cycles."""
         self.figure, axes, bar, strip = self._page()
         self.cycle = self._last_cycle(time)
         blocks, interior = self.frames.grid("blocks", time), self.frames.grid("interior", time)
@@ -114,7 +121,7 @@ class FieldPainter:
         return np.asarray(self.figure.canvas.buffer_rgba())[..., :3].copy()
 
     def save(self, path: Path) -> Path:
-        """Write what was drawn last; the ending says the format: .png, .pdf or .svg."""
+        """Write the last drawing; the suffix gives the format: .png, .pdf or .svg."""
         self.figure.savefig(path, dpi=self.figure.dpi, facecolor="white")
         return path
 
@@ -154,7 +161,7 @@ class FieldPainter:
         return figure, axes, bar, legend
 
     def _bars(self, axes: Axes, shown: Any) -> None:
-        """The legend of the field and, below it, that of the cracks where they have several colours."""
+        """Legend of the field and, below it, of the cracks if they have several colours."""
         from matplotlib.cm import ScalarMappable
 
         left, low, wide, tall = axes.get_position().bounds
@@ -178,7 +185,7 @@ class FieldPainter:
 
     @staticmethod
     def _fine(bar: Any, name: str, inches: float) -> None:
-        """Lines and letters of a legend ``inches`` tall, beside which long names turn into two lines."""
+        """Ticks and labels of a legend ``inches`` tall, with long names on two lines."""
         bar.ax.tick_params(labelsize=7, colors=SOFT, length=2.5, width=0.6)
         bar.outline.set_linewidth(0.4)
         bar.set_label(_folded(name, int(inches / _LETTER)), fontsize=7.5, color=INK)
@@ -192,7 +199,7 @@ class FieldPainter:
         figure.text(0.1 / PAGE, 1 - 0.38 / height, self._told(time), fontsize=7.5, color=SOFT, va="center")
         x0, x1 = axes.get_xlim()
         length = _round_length(0.22 * (x1 - x0))
-        # The scale bar stands under the axis, where nothing is drawn.
+        # The scale bar is below the axis, where nothing else is drawn.
         at = axes.get_xaxis_transform()
         y = -0.36 / (axes.get_position().height * height)
         axes.plot([x1 - length, x1], [y, y], color=INK, lw=2.0, transform=at, clip_on=False, solid_capstyle="butt")
@@ -220,7 +227,7 @@ class FieldPainter:
         return "    ".join(said)
 
     def _last_cycle(self, time: float) -> int:
-        """The last cycle whose blocks were written up to ``time`` s."""
+        """The last cycle whose blocks were written up to ``time`` (s)."""
         times = [at for at, _ in self.run.series("blocks")]
         k = max(0, int(np.searchsorted(times, time * (1 + 1e-12), side="right")) - 1)
         return list(self.run.grids("blocks"))[k]
@@ -255,7 +262,7 @@ class FieldPainter:
             if name in ("blocks", "interior"):
                 use = _there(blocks, interior) if name == "blocks" else np.ones(grid.n_cells, bool)
                 if name == "blocks" and self.what.stress and interior is not None:
-                    continue  # platens have a stress each that takes attention off the specimen's
+                    continue  # the uniform stress of platens would distract from the specimen's
                 if name == "blocks":
                     free = use & (np.asarray(grid["fixed"]) == 0)
                     use = free if free.any() or interior is not None else use
@@ -278,7 +285,7 @@ class FieldPainter:
         points, triangles = drawn(grid, self.view.scale), grid.cells.reshape(-1, 4)[:, 1:][use]
         if at_points:
             if two_signed(*self.view.limits) and values[triangles].min() < 0 < values[triangles].max():
-                # In a grey print red and blue look alike: the line between them tells.
+                # In a grey print red and blue look alike: the line between them shows the sign.
                 axes.tricontour(*points.T, triangles, values, levels=[0.0], colors=SOFT, linewidths=0.5, zorder=2.5)
             return axes.tripcolor(*points.T, triangles, values, shading="gouraud", zorder=2, rasterized=True,
                                   **self._style())  # fmt: skip
@@ -287,7 +294,7 @@ class FieldPainter:
         return axes.add_collection(area)
 
     def _crosses(self, axes: Axes, grid: pv.UnstructuredGrid, use: np.ndarray) -> None:
-        """Short lines along the principal stresses in the plane, as long as they are large; tension in red."""
+        """Short lines along the in-plane principal stresses, with proportional length; tension in red."""
         from matplotlib.collections import LineCollection
 
         triangles = grid.cells.reshape(-1, 4)[:, 1:]
@@ -313,7 +320,7 @@ class FieldPainter:
             axes.add_collection(LineCollection(lines, colors=colours, linewidths=0.8, zorder=4))
 
     def _arrows(self, axes: Axes, grid: pv.UnstructuredGrid, values: np.ndarray) -> Any:
-        """Forces at contacts as lines through them, their width and colour by their size."""
+        """Forces at contacts as lines, their width and colour by magnitude."""
         from matplotlib.collections import LineCollection
 
         force = np.asarray(grid["force"], float)[:, :2]
@@ -343,7 +350,7 @@ class FieldPainter:
         return axes.add_collection(drawn_lines)
 
     def _points(self, axes: Axes, grid: pv.UnstructuredGrid, values: np.ndarray, name: str) -> Any:
-        """Contacts and tips as dots; what is zero is left out, so that the rest is seen."""
+        """Contacts and tips as dots; zero values are left out, so that the others are visible."""
         keep = np.isfinite(values) & (
             np.abs(values) > (1e-3 * self.view.limits[1] / self.unit_size if name == "contacts" else -1)
         )
@@ -355,7 +362,7 @@ class FieldPainter:
                             edgecolors=INK if name == "tips" else "none", linewidths=0.6, **self._style())  # fmt: skip
 
     def _label(self, axes: Axes, at: np.ndarray, values: np.ndarray, order: np.ndarray) -> None:
-        """The values at points ``at``, in ``order``, as far as their numbers do not cover one another."""
+        """Values at the points ``at``, in ``order``, as far as their labels do not overlap."""
         labelled: list[np.ndarray] = []
         for k in order:
             if len(labelled) < LABELLED and all(np.hypot(*(at[k] - other)) > 0.06 * self.size for other in labelled):
@@ -366,7 +373,7 @@ class FieldPainter:
     def _lines(
         self, axes: Axes, blocks: pv.UnstructuredGrid, interior: pv.UnstructuredGrid | None, time: float
     ) -> None:
-        """Outlines of the blocks, thinner where there are many, and cracks."""
+        """Outlines of the blocks, thinner if there are many, and cracks."""
         from matplotlib.collections import LineCollection
 
         many = int(np.asarray(blocks["block_id"]).max()) + 1
@@ -382,18 +389,18 @@ class FieldPainter:
 
 
 _LINE = 3
-#: A letter of a legend is so wide, inches.
+#: Width of a letter in a legend, inches.
 _LETTER = 0.055
 
 
 def _there(blocks: pv.UnstructuredGrid, interior: pv.UnstructuredGrid | None) -> np.ndarray:
-    """(n_cells,) True for triangles of blocks that are there, and not drawn from inside."""
+    """(n_cells,) True for triangles of existing blocks that are not drawn by the interior."""
     there = np.asarray(blocks["removed"]) == 0
     return there if interior is None else there & ~np.isin(blocks["block_id"], np.unique(interior["block_id"]))
 
 
 def _edges(grid: pv.UnstructuredGrid, use: np.ndarray | None) -> np.ndarray:
-    """(n, 2) point indices of the edges of one triangle only."""
+    """(n, 2) point indices of the edges that belong to one triangle only."""
     triangles = grid.cells.reshape(-1, 4)[:, 1:]
     triangles = triangles if use is None else triangles[use]
     edges = np.sort(triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)

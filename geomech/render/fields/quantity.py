@@ -1,4 +1,4 @@
-"""What a picture shows: a field by its name, its unit, and its values on the grids of a run."""
+"""A field to draw: its name, its unit, and its values on the grids of a run."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ from ..pictures.field import COMPONENTS
 if TYPE_CHECKING:
     import pyvista as pv
 
-#: Stress components by name → (array, column, label), von Mises stress as it was written.
+#: Stress components by name → (array, column, label); von Mises stress as written.
 STRESSES = {**COMPONENTS, "von_mises": ("von_mises", None, "von Mises stress")}
-#: Fields with a name of their own → (series that hold it, array, column, label). Vectors show their magnitude.
+#: Fields with a name of their own → (series, array, column, label). Vectors are drawn by magnitude.
 NAMED = {
     "displacement": (("interior", "blocks"), "displacement", None, "displacement"),
     "velocity": (("blocks",), "velocity", None, "velocity"),
@@ -28,15 +28,15 @@ NAMED = {
     "K": (("tips",), "K_eq", None, "K_eq"),
     "principal": (("interior", "blocks"), "principal_stress", 2, "σ₃ and directions"),
 }
-#: An end of a span that is nearer to zero than this part of the other end is zero.
+#: An end of a range that is closer to zero than this part of the other end is set to zero.
 NEARLY = 0.03
-#: Where a few values are far above all others, colours leave out this much of them at either end, per cent.
+#: Share of values, %, cut off at either end of the colours for fields with a few extreme values.
 CLIPPED = 0.7
 _PREFIXES = ((1e9, "G"), (1e6, "M"), (1e3, "k"), (1.0, ""), (1e-3, "m"), (1e-6, "µ"), (1e-9, "n"))
 
 
 class UnknownField(KeyError):
-    """A field that the run has not written; the message names those that it has."""
+    """A field that the run has not written; the message names the existing ones."""
 
     def __str__(self) -> str:
         return str(self.args[0])
@@ -44,8 +44,12 @@ class UnknownField(KeyError):
 
 @dataclass(frozen=True)
 class Quantity:
-    """A field that can be drawn. ``series`` that hold the ``array``; ``column`` of it, None for its magnitude;
-    ``turned`` −1 where compression is shown positive."""
+    """A field that can be drawn.
+
+    series   those that hold the ``array``
+    column   of it, None for the magnitude
+    turned   −1 if compression is shown positive
+    """
 
     name: str
     series: tuple[str, ...]
@@ -57,23 +61,23 @@ class Quantity:
 
     @property
     def stress(self) -> bool:
-        """Whether it is a stress, which has a sign convention and singular points."""
+        """Whether it is a stress, with a sign convention and singular points."""
         return self.unit == "Pa" and "traction" not in self.array
 
     @property
     def clipped(self) -> bool:
-        """Whether a few values may be far above all others: stress at crack tips, slip and gaps at single corners."""
+        """Whether a few values may be extreme: stress at crack tips, slip and gaps at single corners."""
         return self.stress or (self.series[:1] == ("contacts",) and self.name != "force")
 
     @property
     def title(self) -> str:
-        """What the legend says besides the unit."""
+        """Legend text without the unit."""
         if not self.stress or self.array == "von_mises":
             return self.label
         return self.label + (", compression positive" if self.turned < 0 else ", tension positive")
 
     def values(self, name: str, grid: pv.UnstructuredGrid) -> tuple[np.ndarray, bool]:
-        """(values, whether one a point and not one a cell) on a ``grid`` of the series ``name``."""
+        """(values, whether per point rather than per cell) on a ``grid`` of the series ``name``."""
         if self.array == "opening" and name == "contacts":
             return np.maximum(np.asarray(grid.point_data["gap"], float), 0.0), True
         if self.array == "von_mises" and self.array not in grid.point_data:
@@ -89,8 +93,8 @@ class Quantity:
 
 
 def quantity(run: Run, name: str, *, compression_positive: bool = False) -> Quantity:
-    """The field ``name`` of ``run``: one of `NAMED` or `STRESSES`, or any array that was written, as "velocity",
-    "velocity.X" or "contacts.gap". Raises UnknownField that says which there are."""
+    """The field ``name`` of ``run``: one of `NAMED` or `STRESSES`, or any written array such as "velocity",
+    "velocity.X" or "contacts.gap". Raises UnknownField with the existing ones."""
     written = [series for series in SERIES if run.series(series)]
     turned = -1 if compression_positive else 1
     if name in STRESSES:
@@ -118,7 +122,9 @@ def quantity(run: Run, name: str, *, compression_positive: bool = False) -> Quan
                 if len(parts) > 1 and column is None:
                     raise UnknownField(f"{field.name} has the components {', '.join(field.components) or 'none'}")
                 if len(field.components) > 3 and column is None:
-                    raise UnknownField(f"{field.name} is a tensor: say which, as {field.name}.{field.components[0]}")
+                    raise UnknownField(
+                        f"{field.name} is a tensor: name a component, as {field.name}.{field.components[0]}"
+                    )
                 label = ".".join(parts).replace("_", " ")
                 return Quantity(name, (each,), field.name, column, label, field.unit, turned)
     raise _unknown(run, name, written)
@@ -131,9 +137,11 @@ def _unknown(run: Run, name: str, written: list[str]) -> UnknownField:
 
 
 def limits(runs: Iterable[Run], what: Quantity, cycles: int = 6) -> tuple[float, float]:
-    """The span of ``what`` over all ``runs``, in its own unit, from up to so many of their cycles. Stresses, and what
-    contacts have but forces, go without the outermost 0.7 % at either end: of the rock's area in those cycles, or of
-    the number of contacts. A span that begins or ends near zero does so at zero."""
+    """Range of ``what`` over all ``runs``, in its own unit, from up to ``cycles`` of their cycles.
+
+    Of stresses, and of contact fields other than forces, the outermost 0.7 % at either end is cut off: of the rock's
+    area in those cycles, or of the number of contacts. An end near zero is set to zero.
+    """
     found = [_sampled(run, what, cycles) for run in runs]
     values, weights = (np.concatenate(part) if part else np.empty(0) for part in zip(*found))
     if not len(values):
@@ -157,9 +165,9 @@ def limits(runs: Iterable[Run], what: Quantity, cycles: int = 6) -> tuple[float,
 
 
 def _sampled(run: Run, what: Quantity, cycles: int) -> tuple[np.ndarray, np.ndarray]:
-    """(values, weights) of ``what`` in up to so many cycles of each series: of the rock's triangles their areas, of all
+    """(values, weights) of ``what`` in up to ``cycles`` cycles of each series; weights are triangle areas for rock,
     else 1."""
-    if what.name == "K":  # the table has every cycle, and the largest may be in any
+    if what.name == "K":  # the table has every cycle, and any of them may have the largest value
         found = run.tips["K_eq"][np.isfinite(run.tips["K_eq"])]
         return found, np.ones(len(found))
     values, weights = [np.empty(0)], [np.empty(0)]
@@ -189,7 +197,7 @@ def _areas(corners: np.ndarray) -> np.ndarray:
 
 
 def readable(unit: str, largest: float) -> tuple[str, float]:
-    """(unit with a prefix, its size) in which the ``largest`` value is a number between 1 and 1000."""
+    """(unit with prefix, its size) in which the ``largest`` value is between 1 and 1000."""
     if unit in ("-", "deg", "m²") or not np.isfinite(largest) or largest == 0:
         return ("" if unit == "-" else unit), 1.0
     known = [pair for pair in _PREFIXES if not (unit.startswith("m") and pair[0] > 1)]

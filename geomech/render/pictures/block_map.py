@@ -1,4 +1,4 @@
-"""The picture of `geomech build`: blocks with their joint sets, cracks, rock bridges and what holds and loads them."""
+"""Picture of `geomech build`: blocks with joint sets, cracks, rock bridges, supports and loads."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ from geomech.shapes.parts import JOINT
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-#: Joint sets in order: apart from one another for all kinds of eyes (after Okabe & Ito 2008), and from the rock.
+#: Colours of joint sets in order: distinguishable with colour blindness (after Okabe & Ito 2008), and from the rock.
 SETS = ("#0072b2", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#8c564b", "#7f7f7f", "#b5bd00")
-#: Materials in order; fixed rock is grey whatever it is made of.
+#: Colours of materials in order; fixed rock is grey in any case.
 ROCKS = ("#efe6d5", "#dfe7e3", "#e8dce6", "#f3dfc9", "#dbe3ef")
 FIXED, INK, CRACK, BRIDGE, LOAD, WATER = "#b9bcc2", "#33363b", "#d7263d", "#ff7a1a", "#5b2a86", "#2f80d0"
 
@@ -34,12 +34,12 @@ def draw_block_map(scene: Any, statistics: dict[str, Any], path: Path | str) -> 
     low, high = blocks.vertices.min(axis=0), blocks.vertices.max(axis=0)
     wide, tall = high - low
     size = float(max(wide, tall))
-    # The drawing keeps its shape inside 10 × 8 inches; the words stand to its right.
+    # The drawing keeps its proportions inside 10 × 8 inches; the text is at its right.
     across = min(10.0, 7.2 * wide / tall)
     across, up = max(across, 3.2), max(min(across * tall / wide, 7.2), 2.6)
     figure = Figure(figsize=(across + 4.1, up + 1.3), dpi=130)
     axes = figure.add_axes((0.55 / (across + 4.1), 0.5 / (up + 1.3), across / (across + 4.1), up / (up + 1.3)))
-    # Thinner lines where there are many blocks.
+    # Thinner lines if there are many blocks.
     thin = float(np.clip(2.2 / max(1.0, (blocks.n_blocks / 60) ** 0.35), 0.25, 2.2))
     keys: list[Any] = []
     edges = np.stack([blocks.vertices, blocks.vertices[blocks.next_vertex]], axis=1)
@@ -69,7 +69,7 @@ def draw_block_map(scene: Any, statistics: dict[str, Any], path: Path | str) -> 
 
 
 def _draw_rock(axes: Axes, problem: Problem) -> list[Any]:
-    """Blocks in the colours of their rock; what these are called."""
+    """Blocks in the colours of their rock; returns legend entries."""
     from matplotlib.collections import PathCollection
     from matplotlib.patches import Patch
 
@@ -92,7 +92,7 @@ def _draw_rock(axes: Axes, problem: Problem) -> list[Any]:
 
 
 def _draw_joints(axes: Axes, scene: Any, blocks: Blocks, statistics: dict[str, Any], thin: float) -> list[Any]:
-    """Outlines and joints, in lines as ``thin`` as this; what the sets of joints are called."""
+    """Outlines and joints with this line width; returns legend entries of the joint sets."""
     from matplotlib.collections import LineCollection
     from matplotlib.lines import Line2D
 
@@ -116,7 +116,7 @@ def _draw_joints(axes: Axes, scene: Any, blocks: Blocks, statistics: dict[str, A
 
 
 def _draw_cracks(axes: Axes, problem: Problem, thin: float, size: float) -> list[Any]:
-    """Cracks, and the rock bridges that one of them may cross; what these are called."""
+    """Cracks, and the rock bridges that one of them may cross; returns legend entries."""
     from matplotlib.collections import LineCollection
     from matplotlib.lines import Line2D
 
@@ -128,7 +128,7 @@ def _draw_cracks(axes: Axes, problem: Problem, thin: float, size: float) -> list
     )
     keys.append(Line2D([], [], color=CRACK, lw=2.6, label=f"cracks ({cracks.n_cracks})"))
     bridges = rock_bridges(blocks, cracks)
-    # A bridge as long as the drawing is just rock: those that a crack may cross are shown.
+    # A bridge as long as the drawing is just rock: only those that a crack may cross are shown.
     short = bridges[np.hypot(*(bridges[:, 1] - bridges[:, 0]).T) < 0.25 * size] if len(bridges) else bridges
     if len(short):
         axes.add_collection(
@@ -139,14 +139,14 @@ def _draw_cracks(axes: Axes, problem: Problem, thin: float, size: float) -> list
 
 
 def joint_colours(scene: Any) -> dict[str, str]:
-    """What colour each kind of joint of a loaded scene has, by its edge name."""
+    """Colour of each kind of joint of a loaded scene, by its edge name."""
     joints = [name for name in scene.drawing.blocks.edge_names if name.startswith(JOINT)]
     joints += [name for name in scene.drawing.joints if name not in joints]
     return {name: SETS[k % len(SETS)] for k, name in enumerate(joints)}
 
 
 def _conditions(axes: Any, scene: Any, problem: Problem, edges: np.ndarray, size: float) -> list[Any]:
-    """Loads and supports on the drawing; what they are called."""
+    """Loads and supports; returns legend entries."""
     from matplotlib.lines import Line2D
 
     blocks, loads, end, keys = problem.blocks, problem.loads, problem.run.end_time, []
@@ -165,7 +165,7 @@ def _conditions(axes: Any, scene: Any, problem: Problem, edges: np.ndarray, size
     for viscous in loads.viscous_boundaries:
         for edge in edges[blocks.edges_named(viscous.edge_name)]:
             axes.plot(*edge.T, color="#17a398", lw=3.5, alpha=0.6, zorder=5)
-        keys.append(Line2D([], [], color="#17a398", lw=3.5, alpha=0.6, label=f"lets waves out: {viscous.edge_name}"))
+        keys.append(Line2D([], [], color="#17a398", lw=3.5, alpha=0.6, label=f"viscous boundary: {viscous.edge_name}"))
     named = [
         n
         for n in blocks.edge_names
@@ -175,7 +175,7 @@ def _conditions(axes: Any, scene: Any, problem: Problem, edges: np.ndarray, size
         for edge in edges[blocks.edges_named(name)]:
             axes.plot(*edge.T, color=mark, lw=7, alpha=0.55, solid_capstyle="butt", zorder=0.5)
         keys.append(Line2D([], [], color=mark, lw=7, alpha=0.55, label=f'edges "{name}"'))
-    # A grouted bar works at the joints alone, and is as long as it is.
+    # A grouted bar acts at the joints only, over its whole length.
     bolts = scene.tables.loads.bolts
     for bolt in bolts:
         axes.plot(*np.array([bolt.start, bolt.end]).T, color="#1b1d21", lw=1.6, zorder=6)
@@ -194,7 +194,7 @@ def _conditions(axes: Any, scene: Any, problem: Problem, edges: np.ndarray, size
 
 
 def _water(axes: Any, scene: Any, problem: Problem) -> list[Any]:
-    """The water table at the start, at the end where it has risen or fallen by then, and the deepest ponded water."""
+    """The water table at the start, at the end if it has changed, and the deepest ponded water."""
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch
 
@@ -221,7 +221,7 @@ def _water(axes: Any, scene: Any, problem: Problem) -> list[Any]:
 
 
 def _arrows(axes: Any, edges: np.ndarray, value: np.ndarray, length: float) -> None:
-    """Arrows along ``value`` that end on the edges where they push, and begin there where they pull."""
+    """Arrows along ``value`` that end on edges under compression, and start there under tension."""
     if not np.hypot(*value) > 0 or not len(edges):
         return
     step = length * value / np.hypot(*value)
@@ -256,5 +256,5 @@ def _said(statistics: dict[str, Any]) -> str:
     text = statistics["summary"]
     if statistics["sets"]:
         size = statistics["blocks"]["size_m_by_part_passing"]["0.5"]
-        text += f"; half of the rock in blocks up to {size:.2g} m"
+        text += f"; half of the rock is in blocks up to {size:.2g} m"
     return text

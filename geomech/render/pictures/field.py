@@ -1,4 +1,4 @@
-"""What a run has written about the inside of its rock, for any cycle, and where that puts the faces of its cracks."""
+"""Interior fields of a run at any cycle, and displacements of its crack faces from them."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from geomech.output.reading import Run, read_grid
 if TYPE_CHECKING:
     import pyvista as pv
 
-#: Name on the command line → (array, column, how it is written).
+#: Name on the command line → (array, column, label).
 COMPONENTS = {
     "xx": ("stress", 0, "σxx"),
     "yy": ("stress", 1, "σyy"),
@@ -23,13 +23,13 @@ COMPONENTS = {
     "von_mises": ("", -1, "von Mises"),
 }
 
-# Points of cracks that are compared with all edges at a time.
+# Number of crack points compared with all edges at a time.
 _BATCH = 512
 
 
 def interior_grid(run: Run, cycle: int) -> pv.UnstructuredGrid | None:
-    """The interior at ``cycle``: as it was written, or, between two that were written of the same cracks, interpolated
-    in time, or else the last one before. None without one."""
+    """The interior at ``cycle``: as written, or interpolated in time between two with the same cracks, or else the last
+    one before. None if there is none."""
     files = run.grids("interior")
     before = [number for number in files if number <= cycle]
     if not before:
@@ -47,7 +47,7 @@ def interior_grid(run: Run, cycle: int) -> pv.UnstructuredGrid | None:
 
 
 def agreeing(run: Run, cycles: Sequence[int]) -> list[int]:
-    """Those of ``cycles`` whose interior is that of their own cracks; all where no interior was written."""
+    """Those of ``cycles`` whose interior belongs to their own cracks; all if no interior was written."""
     files = run.grids("interior")
     if not files:
         return list(cycles)
@@ -55,7 +55,7 @@ def agreeing(run: Run, cycles: Sequence[int]) -> list[int]:
 
 
 def _around(run: Run, files: dict[int, object], cycle: int) -> tuple[int, int] | None:
-    """The written interiors before and after ``cycle`` when no crack grew from the one to the other."""
+    """The written interiors before and after ``cycle`` if no crack grew between them."""
     before, after = [n for n in files if n <= cycle], [n for n in files if n >= cycle]
     if not before or not after:
         return None
@@ -65,8 +65,10 @@ def _around(run: Run, files: dict[int, object], cycle: int) -> tuple[int, int] |
 
 
 def face_displacements(interior: pv.UnstructuredGrid, cracks: pv.UnstructuredGrid) -> tuple[np.ndarray, np.ndarray]:
-    """(n, 3) displacement of the upper and of the lower face at the points of the lines ``cracks``, from the mesh that
-    is torn along them; nan where it is not. Both grids in the reference configuration."""
+    """(n, 3) displacement of the upper and of the lower face at the points of the lines ``cracks``.
+
+    It is taken from the mesh split along them; nan elsewhere. Both grids are in the reference configuration.
+    """
     points, moved = np.asarray(interior.points)[:, :2], np.asarray(interior["displacement"])
     edges = _free_edges(interior.cells.reshape(-1, 4)[:, 1:])
     start, along = points[edges[:, 0]], points[edges[:, 1]] - points[edges[:, 0]]
@@ -86,7 +88,7 @@ def face_displacements(interior: pv.UnstructuredGrid, cracks: pv.UnstructuredGri
         off = np.abs(arm[..., 0] * unit[:, 1] - arm[..., 1] * unit[:, 0])
         same = tangent[rows] @ unit.T
         on = (off < near) & (position > -near) & (position < length + near) & (np.abs(same) > 1 - 1e-9)
-        # Rock is on the left of a free edge: on the upper face if the edge runs as the crack does.
+        # Rock is on the left of a free edge: on the upper face if the edge runs like the crack.
         for found, side in ((upper, on & (same > 0)), (lower, on & (same < 0))):
             edge = side.argmax(axis=1)
             hit = np.flatnonzero(side.any(axis=1))
@@ -97,7 +99,7 @@ def face_displacements(interior: pv.UnstructuredGrid, cracks: pv.UnstructuredGri
 
 
 def _free_edges(triangles: np.ndarray) -> np.ndarray:
-    """(k, 2) the edges of one triangle only, with the triangle on their left."""
+    """(k, 2) edges that belong to one triangle only, with the triangle on their left."""
     edges = triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
     _, first, count = np.unique(np.sort(edges, axis=1), axis=0, return_index=True, return_counts=True)
     return edges[first[count == 1]]

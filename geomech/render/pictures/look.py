@@ -1,4 +1,4 @@
-"""How a run is to be drawn, the same for all its pictures: colours, the cycle that shows its end, magnification."""
+"""Common appearance of a run's pictures: colours, final cycle, magnification."""
 
 from __future__ import annotations
 
@@ -16,19 +16,21 @@ if TYPE_CHECKING:
     import pyvista as pv
     from matplotlib.colors import Colormap
 
-#: What the colour of cracks means → the legend's title.
+#: Meaning of the colour of cracks → legend title.
 CRACK_COLOURS = {"birth": "grown in cycle", "opening": "opening, µm"}
 
-#: The largest displacement relative to the block system, drawn as this fraction of its size.
+#: Size at which the largest displacement is drawn, relative to the block system.
 DEFORMATION = 0.03
-#: Blocks may be drawn inside others by this fraction of the size: two pixels of a picture 800 wide.
+#: Blocks may overlap by this fraction of the size in a drawing: two pixels of a picture 800 wide.
 OVERLAP = 0.0025
 
 
 def rock_colours(low: float, high: float) -> Colormap:
-    """The colours of rock for values from ``low`` to ``high``; those of the page that plays as well. Where both signs
-    matter red is positive, blue negative, white zero, equally deep for equal size. Where one is everywhere the map runs
-    from light to dark, dark for the largest size, so that a grey print can be read too."""
+    """Colours of rock for values from ``low`` to ``high``, also for the player.
+
+    If both signs matter, red is positive, blue negative, white zero, equally deep for equal magnitude. Otherwise the
+    map runs from light to dark, dark for the largest magnitude, so that a grey print is readable too.
+    """
     import matplotlib
     from matplotlib.colors import ListedColormap
 
@@ -41,20 +43,23 @@ def rock_colours(low: float, high: float) -> Colormap:
 
 
 def two_signed(low: float, high: float) -> bool:
-    """Whether both signs matter between ``low`` and ``high``: the smaller side is more than a tenth of the larger."""
+    """Whether both signs matter: the smaller side is more than a tenth of the larger."""
     return low < 0 < high and min(-low, high) > 0.1 * max(-low, high)
 
 
 def crack_colours() -> Colormap:
-    """From crimson to orange: apart from every colour that rock is filled with."""
+    """From crimson to orange: distinct from all colours of rock."""
     from matplotlib.colors import LinearSegmentedColormap
 
     return LinearSegmentedColormap.from_list("crack", ["#8f0d33", "#d7263d", "#ff7a1a", "#ffb01f"])
 
 
 def final_cycle(run: Run) -> int:
-    """The cycle that shows what a run came to: its last one; but where a run ends as its rock is cut, the last one with
-    the cracks that cut it, since the pieces have one stress each and nobody waited for them to move."""
+    """The cycle that shows the final state of a run: the last one, except where a run ends as its rock is cut.
+
+    Then it is the last one with the cracks that cut it: the pieces have uniform stress, and their motion was not
+    computed.
+    """
     last = int(run.history["cycle"][-1])
     written = list(run.grids("blocks"))
     cracked = run.history[run.history["crack_length"] > 0]
@@ -65,8 +70,11 @@ def final_cycle(run: Run) -> int:
 
 
 def crack_limits(run: Run, cycle: int, colour: str) -> tuple[float, float]:
-    """The span of the colours of cracks up to ``cycle``: cycles, or µm of opening; (0, 0) where none has grown or the
-    run has written no cracks. Raises KeyError for an unknown ``colour``."""
+    """Range of crack colours up to ``cycle``: cycles, or µm of opening; (0, 0) if none has grown or no cracks were
+    written.
+
+    Raises KeyError for an unknown ``colour``.
+    """
     if colour not in CRACK_COLOURS:
         raise KeyError(f"no crack colour {colour!r}; there are {', '.join(CRACK_COLOURS)}")
     if not run.series("cracks"):
@@ -82,20 +90,19 @@ def crack_limits(run: Run, cycle: int, colour: str) -> tuple[float, float]:
 
 
 def magnification(shown: Sequence[pv.UnstructuredGrid], size: float) -> float:
-    """A round factor by which displacements are seen, and blocks are not drawn inside others by
-    more than the width of a line."""
-    # A common translation shows nothing; what counts is how far points move against each other, and cracked blocks give
-    # way further than the strain that they have as blocks.
+    """A round factor that makes displacements visible, with overlaps of blocks below the width of a line."""
+    # A common translation shows nothing; relative motion counts, and cracked blocks deform more than their uniform
+    # strain.
     spread = max(np.ptp(grid["displacement"], axis=0).max() for grid in shown)
     if spread <= 1e-12 * size:
         return 1.0
     scale = DEFORMATION * size / spread
-    # Motion that is large enough to be seen is drawn true.
+    # Motion that is large enough to be visible is drawn true to scale.
     if scale <= 1:
         return 1.0
     scale = max(1.0, float(f"{scale:.1g}"))
     if overlap(shown, 1.0, OVERLAP * size):
-        return scale  # no fault of the factor
+        return scale  # not due to the factor
     while scale > 1.0 and overlap(shown, scale, OVERLAP * size):
         scale = max(1.0, float(f"{0.5 * scale:.1g}"))
     return scale

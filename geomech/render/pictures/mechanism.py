@@ -1,4 +1,4 @@
-"""The picture of `geomech safety`: how blocks move at failure, which joints are mobilised, anchors and toes."""
+"""Picture of `geomech safety`: motion of blocks at failure, mobilised joints, anchors and toes."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ from geomech.model import GROUND, Problem
 
 from .block_map import FIXED, INK, LOAD
 
-#: What moves, by how it does; what stands.
+#: Colours of moving blocks by kind of motion, and of stable ones.
 KINDS = {"slides": "#e69f00", "topples": "#cc79a7", "slides and topples": "#d55e00"}
 STANDS, SLIDING, TOE = "#efe6d5", "#d7263d", "#0072b2"
-#: The longest arrow, in parts of the drawing's size.
+#: Length of the longest arrow, relative to the drawing's size.
 _ARROW = 0.12
 
 
@@ -31,8 +31,11 @@ def draw_mechanism(
     problem: Problem, title: str, moving: Sequence[Moving], sliding: np.ndarray,
     toes: Sequence[tuple[float, float]], anchors: Mapping[str, float], path: Path | str,
 ) -> Path:  # fmt: skip
-    """Blocks of ``problem`` with those ``moving`` in colour, arrows as long as they go, faces ``sliding`` (n, 2, 2) m
-    in red, corners that are ``toes`` (points, m), and bolts with the force that ``anchors`` tell (N/m by name)."""
+    """Draw ``problem`` with the blocks ``moving`` in colour and arrows proportional to their displacement.
+
+    Faces ``sliding`` (n, 2, 2) m are red; ``toes`` (points, m) and bolts with the forces ``anchors`` (N/m by name) are
+    marked.
+    """
     from matplotlib.collections import LineCollection, PolyCollection
     from matplotlib.figure import Figure
     from matplotlib.lines import Line2D
@@ -55,14 +58,14 @@ def draw_mechanism(
             keys.append(Patch(facecolor=colour, edgecolor=INK, lw=0.5, label=kind))
     if len(sliding):
         axes.add_collection(LineCollection(sliding, colors=SLIDING, linewidths=2.4, capstyle="round"))
-        keys.append(Line2D([], [], color=SLIDING, lw=2.4, label="joint strength mobilised in full"))
+        keys.append(Line2D([], [], color=SLIDING, lw=2.4, label="joint strength fully mobilised"))
     for bolt in problem.loads.bolts:
         ends = np.array([bolt.start, bolt.end])
         axes.plot(*ends.T, color=LOAD, lw=1.8, marker="s" if bolt.other != GROUND else "|", ms=4)
         if bolt.name in anchors:
             axes.annotate(f"{anchors[bolt.name] / 1e3:.4g} kN/m", ends.mean(axis=0), fontsize=8, color=LOAD)
     if problem.loads.bolts:
-        keys.append(Line2D([], [], color=LOAD, lw=1.8, label="anchors, with what they carry"))
+        keys.append(Line2D([], [], color=LOAD, lw=1.8, label="anchors and their forces"))
     if len(toes):
         axes.plot(*np.array(toes).T, ls="", marker="o", ms=8, mfc="none", mec=TOE, mew=1.8)
         keys.append(Line2D([], [], ls="", marker="o", mfc="none", mec=TOE, mew=1.8, label="toes"))
@@ -71,7 +74,7 @@ def draw_mechanism(
         if name in kinds:
             middle, way = outlines[b].mean(axis=0), _ARROW * size * np.array(kinds[name].displacement)
             axes.annotate("", middle + way, middle, arrowprops={"arrowstyle": "-|>", "color": INK, "lw": 1.3})
-    # What moves fills the picture; the base may reach far.
+    # The moving region fills the picture; the base may extend far.
     seen = np.concatenate([outlines[b] for b in np.flatnonzero(~blocks.fixed)])
     near, far = seen.min(axis=0) - 0.35 * size, seen.max(axis=0) + 0.35 * size
     near, far = np.maximum(near, low - 0.02 * size), np.minimum(far, high + 0.1 * size)

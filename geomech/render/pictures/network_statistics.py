@@ -1,4 +1,4 @@
-"""The picture of what a joint network is like: block sizes, directions, trace lengths, and how it is connected."""
+"""Picture of a joint network's statistics: block sizes, directions, trace lengths, and connectivity."""
 
 from __future__ import annotations
 
@@ -17,9 +17,11 @@ _SOFT = "#4a4e55"
 
 
 def draw_network_statistics(scene: Any, statistics: dict[str, Any], path: Path | str) -> Path:
-    """Draw the joint ``statistics`` of `geomech.output.block_model.block_system` for a loaded scene, as a PNG: the block-size
-    curve, a rose of directions by length, trace lengths beside the laws asked for, and Sanderson & Nixon's triangle of
-    nodes."""
+    """Draw the joint ``statistics`` of `geomech.output.block_model.block_system` for a loaded scene, as a PNG.
+
+    Block-size curve, rose diagram of directions weighted by length, trace lengths with the specified distributions, and
+    Sanderson & Nixon's triangle of nodes.
+    """
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(11.4, 9.0), dpi=130)
@@ -51,7 +53,7 @@ def _dressed(axes: Any, title: str, x: str, y: str) -> None:
 def _block_sizes(axes: Any, statistics: dict[str, Any]) -> None:
     blocks = statistics["blocks"]
     curve = np.array(blocks["percent_passing_by_size_m"])
-    _dressed(axes, "Block sizes", "block size √area, m", "% of the rock in blocks not larger")
+    _dressed(axes, "Block sizes", "block size √area, m", "% of the rock in blocks up to this size")
     axes.step(np.append(curve[0, 0], curve[:, 0]), np.append(0, curve[:, 1]), where="post", color=INK, lw=1.8)
     if curve[-1, 0] > 30 * curve[0, 0]:
         from matplotlib.ticker import LogLocator, NullFormatter, ScalarFormatter
@@ -73,7 +75,7 @@ def _block_sizes(axes: Any, statistics: dict[str, Any]) -> None:
 
 
 def _rose(axes: Any, lines: dict[str, list[np.ndarray]], colour: dict[str, str]) -> None:
-    """Length of trace by direction, in sectors of 5°, both ways: traces have no sense."""
+    """Trace length by direction, in sectors of 5°, both ways: traces have no direction sense."""
     from matplotlib.ticker import MaxNLocator
 
     width = math.radians(5)
@@ -87,7 +89,7 @@ def _rose(axes: Any, lines: dict[str, list[np.ndarray]], colour: dict[str, str])
             axes.bar(at + turn, length, width=0.94 * width, bottom=below, color=colour[name], lw=0,
                      label=name.removeprefix(JOINT) if turn == 0 else None)  # fmt: skip
         below += length
-    axes.set_title("Directions, by length of trace", fontsize=10, color=INK, weight="bold", pad=14)
+    axes.set_title("Directions, weighted by trace length", fontsize=10, color=INK, weight="bold", pad=14)
     axes.tick_params(labelsize=8, colors=INK)
     axes.set_rlabel_position(45)
     axes.yaxis.set_major_locator(MaxNLocator(4))
@@ -98,7 +100,7 @@ def _rose(axes: Any, lines: dict[str, list[np.ndarray]], colour: dict[str, str])
 
 
 def _lengths(axes: Any, statistics: dict[str, Any], lines: dict[str, list[np.ndarray]], colour: dict[str, str]) -> None:
-    _dressed(axes, "Trace lengths, as drawn in the section", "length, m", "% of the traces not longer")
+    _dressed(axes, "Trace lengths, as drawn in the section", "length, m", "% of the traces up to this length")
     for entry in statistics["sets"]:
         name = JOINT + entry["name"]
         length = np.sort([float(np.hypot(*np.diff(line, axis=0).T).sum()) for line in lines[name]])
@@ -109,15 +111,15 @@ def _lengths(axes: Any, statistics: dict[str, Any], lines: dict[str, list[np.nda
                   label=entry["name"])  # fmt: skip
         wanted = entry.get("asked", {}).get("mean_length_m")
         if wanted is not None:
-            axes.axvline(wanted, color=colour[name], lw=1.0, ls=(0, (4, 3)), label=f"mean asked, {wanted:.3g} m")
+            axes.axvline(wanted, color=colour[name], lw=1.0, ls=(0, (4, 3)), label=f"specified mean, {wanted:.3g} m")
     axes.set_ylim(0, 102)
     axes.set_xlim(left=0)
     axes.legend(frameon=False, fontsize=8, labelcolor=INK, loc="best")
 
 
 def _triangle(axes: Any, statistics: dict[str, Any]) -> None:
-    """Shares of the three kinds of nodes (Manzocchi 2002), with lines of equal connections a branch (Sanderson & Nixon
-    2015)."""
+    """Shares of the three kinds of nodes (Manzocchi 2002), with lines of equal connections per branch (Sanderson &
+    Nixon 2015)."""
     nodes, topology = statistics["nodes"], statistics["topology"]
     corner = {"I": np.array([0.5, math.sqrt(0.75)]), "Y": np.array([0.0, 0.0]), "X": np.array([1.0, 0.0])}
 
@@ -140,10 +142,10 @@ def _triangle(axes: Any, statistics: dict[str, Any]) -> None:
         )
     text = f"I {nodes['I']} ends in rock, Y {nodes['Y']} abutments, X {nodes['X']} crossings"
     if topology["connections_per_branch"] is not None:
-        text += f"\n{topology['connections_per_branch']:.2f} connections a branch (grey lines)"
+        text += f"\n{topology['connections_per_branch']:.2f} connections per branch (grey lines)"
     if topology["connections_per_line"] is not None:
-        text += f", {topology['connections_per_line']:.3g} a line"
-    axes.set_title("How it is connected", fontsize=10, color=INK, loc="left", weight="bold", y=1.03)
+        text += f", {topology['connections_per_line']:.3g} per line"
+    axes.set_title("Connectivity", fontsize=10, color=INK, loc="left", weight="bold", y=1.03)
     axes.text(0.5, -0.13, text, fontsize=8.5, color=_SOFT, ha="center", va="top")
     axes.set(xlim=(-0.15, 1.15), ylim=(-0.1, 0.95), aspect="equal")
     axes.axis("off")

@@ -1,7 +1,7 @@
-"""Whether blocks that are drawn with magnified displacements cover one another.
+"""Whether blocks drawn with magnified displacements overlap.
 
-Small displacements that keep blocks apart keep them apart when they are magnified; what slides far or turns is drawn
-inside its neighbours, where it never is.
+Small displacements that keep blocks apart do so when magnified; blocks that slide far or rotate would be drawn inside
+their neighbours, where they never are.
 """
 
 from __future__ import annotations
@@ -16,8 +16,10 @@ if TYPE_CHECKING:
 
 
 def overlap(grids: Sequence[pv.UnstructuredGrid], scale: float, depth: float) -> bool:
-    """Whether two blocks share a piece that is more than ``depth`` m across, displacements times ``scale``. Blocks are
-    as the last of ``grids`` has them that knows them: what is solved inside bends."""
+    """Whether two blocks overlap in a region more than ``depth`` (m) across, with displacements times ``scale``.
+
+    Each block is taken from the last of ``grids`` that contains it: the interior bends.
+    """
     import shapely
 
     drawn: dict[int, object] = {}
@@ -31,7 +33,7 @@ def overlap(grids: Sequence[pv.UnstructuredGrid], scale: float, depth: float) ->
 
 
 def _polygons(grid: pv.UnstructuredGrid, scale: float) -> dict[int, object]:
-    """block → what it covers as it is drawn: the union of its triangles."""
+    """block → the area that it covers in the drawing: the union of its triangles."""
     import shapely
 
     corners = grid.cells.reshape(-1, 4)[:, 1:]

@@ -1,4 +1,4 @@
-"""A few pictures that tell a run: its first load, the first event of each kind, its end."""
+"""Pictures of a run's stages: its first load, the first event of each kind, its end."""
 
 from __future__ import annotations
 
@@ -10,13 +10,12 @@ from geomech.output.reading import Run
 from .field import agreeing
 from .look import final_cycle
 
-#: So many stages stand side by side.
+#: Largest number of stages side by side.
 MOST = 4
 
 
 def stages(run: Run, folder: Path, *, width: int = 560) -> list[tuple[Path, str, int]]:
-    """(PNG file in ``folder``, what it shows, cycle) of every stage, in the same colours throughout; [] of a run that
-    wrote no blocks."""
+    """(PNG file in ``folder``, description, cycle) of every stage, in common colours; [] for a run without blocks."""
     from ..fields.draw import suited
 
     shown = moments(run)
@@ -32,7 +31,7 @@ def stages(run: Run, folder: Path, *, width: int = 560) -> list[tuple[Path, str,
 
 
 def moments(run: Run) -> dict[int, str]:
-    """cycle → what it shows, in order."""
+    """cycle → description, in order."""
     if not len(run.history):
         return {}
     last = final_cycle(run)

@@ -1,4 +1,4 @@
-"""Cracks that a block was cut along: faces of blocks since, no cracks any more, but drawn as what they were."""
+"""Cracks along which blocks were cut: block faces since then, but drawn as former cracks."""
 
 from __future__ import annotations
 
@@ -12,22 +12,26 @@ from geomech.output.reading import Run
 if TYPE_CHECKING:
     import pyvista as pv
 
-#: What is nearer than this part of the drawing's extent to a line lies on it.
+#: A point lies on a line if it is nearer than this part of the drawing's extent.
 _ON = 1e-9
-#: Points that are compared with all lines at a time.
+#: Number of points compared with all lines at a time.
 _BATCH = 512
 
 
 def reference(grid: pv.DataSet) -> np.ndarray:
-    """(n, 2) points of a grid as it was written, m, in the reference configuration."""
+    """(n, 2) m: points of a grid in the reference configuration."""
     points = np.asarray(grid.points)[:, :2]
     return points if int(grid.field_data["REFERENCE"][0]) else points - np.asarray(grid["displacement"])[:, :2]
 
 
 @dataclass(frozen=True, eq=False)
 class Walls:
-    """``ends`` (n, 2, 2) of faces that cracks have left, m, in the reference configuration; ``birth`` (n,) the cycle in
-    which the crack grew there, 0 where it was drawn; ``cut`` (n,) the cycle that ended with the cut."""
+    """Block faces that were cracks, in the reference configuration.
+
+    ends    (n, 2, 2) m
+    birth   (n,) cycle in which the crack grew there, 0 for initial cracks
+    cut     (n,) cycle that ended with the cut
+    """
 
     ends: np.ndarray
     birth: np.ndarray
@@ -49,7 +53,7 @@ class Walls:
             new = new[_holder(new, before) < 0]
             cracks = run.grid("cracks", number)
             lines = reference(cracks)[cracks.cells.reshape(-1, 3)[:, 1:]]
-            # A segment holds several lines: the middle of a face tells which of them it is on.
+            # A segment contains several lines: the midpoint of a face decides which of them it is on.
             middle = new.mean(axis=1, keepdims=True).repeat(2, axis=1)
             holder = _holder(middle, lines)
             old = np.append(np.asarray(cracks["birth_cycle"]).astype(int), number)
@@ -59,7 +63,7 @@ class Walls:
         return cls(np.concatenate(ends), np.concatenate(birth), np.concatenate(cut))
 
     def births(self, lines: np.ndarray, cycle: int) -> np.ndarray:
-        """(m,) the cycle in which the face grew that holds each of ``lines`` (m, 2, 2) at ``cycle``; −1: none does."""
+        """(m,) cycle in which the face containing each of ``lines`` (m, 2, 2) grew, as of ``cycle``; −1 for none."""
         here = self.cut < cycle
         return np.append(self.birth[here], -1)[_holder(lines, self.ends[here])]
 
@@ -76,7 +80,7 @@ def _outline(blocks: pv.UnstructuredGrid) -> np.ndarray:
 
 
 def _holder(lines: np.ndarray, among: np.ndarray) -> np.ndarray:
-    """(m,) the first row of ``among`` (n, 2, 2) on which both ends of each of ``lines`` (m, 2, 2) lie; −1: none."""
+    """(m,) first row of ``among`` (n, 2, 2) on which both ends of each of ``lines`` (m, 2, 2) lie; −1 for none."""
     found = np.full(len(lines), -1)
     if not len(lines) or not len(among):
         return found

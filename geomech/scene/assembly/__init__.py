@@ -1,1 +1,1 @@
-"""From a scene's tables to loads, joint laws, jointing and supports of the problem."""
+"""Conversion of a scene's tables to loads, joint laws, jointing and supports of the problem."""

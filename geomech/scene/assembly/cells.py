@@ -1,4 +1,4 @@
-"""Zones that are divided into cells, glued to each other: [zones.NAME] mesh_size_m."""
+"""Zones divided into cells that are bonded to each other: [zones.NAME] mesh_size_m."""
 
 from __future__ import annotations
 
@@ -12,17 +12,17 @@ from ..errors import Fault
 from ..locator import Path
 from ..tables import SceneTables
 
-#: What names of faces between cells begin with.
+#: Prefix of the names of faces between cells.
 CELLS = "cells:"
 
 
 def cells_of(zone: str) -> str:
-    """The name of the faces between the cells of a ``zone``."""
+    """Name of the faces between the cells of ``zone``."""
     return CELLS + zone
 
 
 def with_cells(tables: SceneTables, drawing: Drawing, place: Callable[[Path], str], faults: list[Fault]) -> Drawing:
-    """``drawing`` with the blocks of zones that have a mesh size divided into cells; what is wrong goes to ``faults``."""
+    """``drawing`` with blocks of zones that have a mesh size divided into cells; errors are added to ``faults``."""
     meshed = {name: zone for name, zone in (tables.zones or {}).items() if zone.mesh_size_m is not None}
     if drawing.blocks is None or not meshed or (drawing.cracks is not None and drawing.cracks.n_segments):
         return drawing

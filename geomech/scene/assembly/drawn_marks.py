@@ -1,5 +1,4 @@
-"""Bolts, water tables and measuring points of the drawing, put into the tables of the scene that give their
-properties."""
+"""Bolts, water tables and monitor points of the drawing, entered into the scene's tables with their properties."""
 
 from __future__ import annotations
 
@@ -18,9 +17,10 @@ from ..tables.loads import BoltTable, ForceTable
 from ..tables.output import MonitorTable
 from ..validation import nearest
 
-#: A bolt is straight to this part of its length; a drawn one that is less straight is reported.
+#: A bolt must be straight to this part of its length; others are reported.
 _STRAIGHT = 1e-3
-#: Pieces of one bolt, and of a water table, meet to this part of the drawing's largest side.
+#: Pieces of one bolt, and of a water table, are joined if their distance is below this part of the drawing's largest
+#: side.
 _MEETING = 1e-6
 
 Place = Callable[[Path], str]
@@ -29,8 +29,11 @@ Place = Callable[[Path], str]
 def with_marks(
     tables: SceneTables, drawing: Drawing, place: Place, faults: list[Fault], warnings: list[Fault]
 ) -> tuple[SceneTables, Place]:
-    """``tables`` with every bolt, the water table and every monitor of the drawing in them, and ``place`` for what is
-    there now. Tables that mean nothing drawn are faults; what is drawn and no table means is warned of."""
+    """``tables`` with every bolt, the water table and every monitor of the drawing, and ``place`` for the added
+    entries.
+
+    Tables that refer to nothing drawn are faults; drawn marks without a table cause warnings.
+    """
     marks = {mark.name: mark for mark in drawing.marks}
     work = _Matching(marks, drawing, place, faults, warnings)
     came_from: dict[Path, Path] = {}
@@ -45,7 +48,7 @@ def with_marks(
     work.warn_of_idle(tables)
 
     def placed(path: Path) -> str:
-        # Longest first: an end of a drawn bolt stands where the name of its line does.
+        # Longest first: an end of a drawn bolt has the place of its line.
         for n in range(len(path), 0, -1):
             if path[:n] in came_from:
                 origin = came_from[path[:n]]
@@ -56,7 +59,7 @@ def with_marks(
 
 
 class _Matching:
-    """Marks by name, and which of them a table has claimed."""
+    """Marks by name, and the tables that have claimed them."""
 
     def __init__(
         self, marks: dict[str, Mark], drawing: Drawing, place: Place, faults: list[Fault], warnings: list[Fault]
@@ -90,14 +93,16 @@ class _Matching:
                 names = [name for name in self._of("bolt") if fnmatch.fnmatchcase(name, pattern)]
                 if not names:
                     self._missing(
-                        path, f"no drawn line is called {pattern!r}", "bolt", pattern,
-                        'the drawing has no bolts: lines called "bolt:NAME"',
+                        path, f"no drawn line has the name {pattern!r}", "bolt", pattern,
+                        'the drawing has no bolts, i.e. lines called "bolt:NAME"',
                     )  # fmt: skip
                 for name in names:
                     first = self.claimed.setdefault(name, k)
                     if first != k:
                         self.faults.append(
-                            Fault(self.place(path), f"bolts {name!r} have two tables", "leave them to one of the two")
+                            Fault(
+                                self.place(path), f"bolts {name!r} have two tables", "name them in only one of the two"
+                            )
                         )
                         continue
                     ends = self._straight(self.marks[name])
@@ -111,7 +116,7 @@ class _Matching:
         return tuple(found)
 
     def _straight(self, mark: Mark) -> list[tuple[tuple[float, float], tuple[float, float]]]:
-        """The ends of each bolt: pieces that go on in one direction are one bolt."""
+        """The ends of each bolt: pieces in one direction are one bolt."""
         ends = []
         for line in _joined(mark.lines, self.near, straight_on=True):
             along = line[-1] - line[0]
@@ -119,7 +124,9 @@ class _Matching:
             off = np.abs((line[:, 0] - line[0, 0]) * along[1] - (line[:, 1] - line[0, 1]) * along[0])
             if length <= self.near or off.max() > _STRAIGHT * length**2:
                 self._warn(
-                    mark.name, f"{mark.name!r} is not straight", "a bolt goes straight from its first end to its last"
+                    mark.name,
+                    f"{mark.name!r} is not straight",
+                    "a bolt is a straight line from its first end to its last",
                 )
             if length > self.near:
                 ends.append((_pair(line[0]), _pair(line[-1])))
@@ -202,14 +209,14 @@ class _Matching:
         return tuple(found)
 
     def warn_of_idle(self, tables: SceneTables) -> None:
-        """Warn of what is drawn and does nothing."""
+        """Warn of drawn marks without effect."""
         for name in self.marks:
             kind = name.partition(":")[0]
             if name in self.claimed:
                 continue
             if kind == "bolt" and tables.loads is not None:
                 self._warn(
-                    name, f"no bolt is made of {name!r}", f'give it properties: [[loads.bolts]] lines = ["{name}"]'
+                    name, f"no bolt uses the line {name!r}", f'give it properties: [[loads.bolts]] lines = ["{name}"]'
                 )
             elif kind == "water" and tables.loads is not None:
                 other = tables.loads.water is not None
@@ -222,7 +229,7 @@ class _Matching:
                 self._warn(name, f"no force acts on the point {name!r}", f'[[loads.forces]] point = "{name}"')
             elif kind not in ("bolt", "water", "load"):
                 self._warn(
-                    name, f"the point {name!r} says nothing",
+                    name, f"the point {name!r} has no effect",
                     'measuring points are called "monitor:NAME", points of forces "load:NAME"',
                 )  # fmt: skip
 
@@ -233,7 +240,7 @@ def _pair(point: np.ndarray) -> tuple[float, float]:
 
 
 def _joined(lines: Sequence[np.ndarray], near: float, straight_on: bool) -> list[np.ndarray]:
-    """Lines that meet end to end as one; ``straight_on``: only where they go on in one direction."""
+    """Lines joined where their ends meet; ``straight_on``: only where they continue in one direction."""
     waiting, joined = [np.asarray(line) for line in lines], []
     while waiting:
         line = waiting.pop(0)
@@ -248,7 +255,7 @@ def _joined(lines: Sequence[np.ndarray], near: float, straight_on: bool) -> list
             ]
             if fitting:
                 a, b = fitting[0]
-                # Keeps the direction of the piece that was drawn first.
+                # The direction is that of the piece that was drawn first.
                 line = np.concatenate([a, b[1:]]) if a is line else np.concatenate([a, b[1:]])[::-1]
                 del waiting[k]
                 k = 0

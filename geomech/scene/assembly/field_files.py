@@ -1,4 +1,4 @@
-"""Files with traces of the field, [[geometry.traces]], as parts of the drawing."""
+"""Files with mapped traces, [[geometry.traces]], as parts of the drawing."""
 
 from __future__ import annotations
 
@@ -36,9 +36,12 @@ def read_traces(
     faults: list[Fault],
     warnings: list[Fault],
 ) -> tuple[bool, dict[str, Any] | None]:
-    """Give what all files hold to ``add`` (a `FieldDrawing`, a function from (part, index) to its path in the scene and
-    its place in the file, and the names of zones that its joints cut); False after saying why one cannot be read. Also
-    the coordinate reference system of the first file that says one, as GeoJSON does."""
+    """Pass the content of all files to ``add``; returns False if one cannot be read, which is reported.
+
+    ``add`` takes a `FieldDrawing`, a function from (part, index) to its path in the scene and its place in the file,
+    and the names of zones that its joints cut. Also returns the coordinate reference system of the first file that has
+    one, as in GeoJSON.
+    """
     every: list[Named] = []
     by_file: dict[int, list[Named]] = {}
     path_of: dict[str, Path] = {}
@@ -63,7 +66,7 @@ def read_traces(
                     Fault(
                         place(source),
                         f"{entry.file} has another coordinate reference system than {first}",
-                        "export both in one: coordinates are taken as they are",
+                        "export both in the same one: coordinates are not converted",
                     )
                 )
         named = _named_lines(file, k, entry, place, faults, warnings)
@@ -77,7 +80,7 @@ def read_traces(
     if not sound:
         return False, crs
     try:
-        # Joints by file, for each may cut zones of its own; outlines of all files together, for they may close one
+        # Joints by file, because each may cut its own zones; outlines of all files together, because they may close one
         # another.
         joints = {k: drawing_of_lines(own) for k, own in by_file.items()}
         drawn = drawing_of_lines([item for item in every if item.role != "joint"])
@@ -99,7 +102,7 @@ def read_traces(
 
 
 def _simplified(named: list[Named], tolerance: float, meets: float | None) -> tuple[list[Named], str]:
-    """``named`` with joints and cracks simplified, and what to report of it."""
+    """``named`` with joints and cracks simplified, and a report."""
     at = [
         k
         for k, item in enumerate(named)
@@ -111,9 +114,7 @@ def _simplified(named: list[Named], tolerance: float, meets: float | None) -> tu
     found, out = simplified(lines, tolerance, meets), list(named)
     for k, points in zip(at, found.lines):
         out[k] = named[k]._replace(line=replace(named[k].line, points=points, away=None))
-    report = (
-        f"{found.before} sides of its joints and cracks are {found.after}, off by up to {found.off:.3g} m (simplify_m)"
-    )
+    report = f"{found.before} sides of its joints and cracks are reduced to {found.after}, with deviations up to {found.off:.3g} m (simplify_m)"
     return out, report
 
 
@@ -125,8 +126,10 @@ def _named_lines(
     faults: list[Fault],
     warnings: list[Fault],
 ) -> list[Named]:
-    """The lines of a ``file``, the entry number ``k`` of the scene, with what they are; what is wrong with its layers goes
-    to ``faults``, and what it leaves out to ``warnings``."""
+    """Lines of ``file``, entry number ``k`` of the scene, with their kinds.
+
+    Errors in its layers are added to ``faults``, lines that are left out to ``warnings``.
+    """
     named, idle, left = named_lines(file, entry.layers, entry.name, entry.kind)
     present = list(dict.fromkeys(line.layer for line in file.lines))
     for pattern, said in entry.layers.items():
@@ -134,15 +137,15 @@ def _named_lines(
             faults.append(
                 Fault(
                     place(("geometry", "traces", k, "layers", pattern)),
-                    f"{said!r} wants a name after it",
-                    f'write "{said}:{"x" if said == "guided" else "NAME"}", or "" to leave it to the name of the layer',
+                    f"{said!r} needs a name after it",
+                    f'write "{said}:{"x" if said == "guided" else "NAME"}", or "" to use the name of the layer',
                 )
             )
     for pattern in idle:
         faults.append(
             Fault(
                 place(("geometry", "traces", k, "layers", pattern)),
-                f"{FilePath(entry.file).name} has no layer {pattern!r}, or one before it means them all",
+                f"{FilePath(entry.file).name} has no layer {pattern!r}, or an earlier entry matches them all",
                 nearest(pattern, present),
             )
         )
@@ -159,7 +162,7 @@ def _named_lines(
 
 
 def _read(path: FilePath, unit: str | None, chord_tolerance: float | None, set_property: str) -> FieldFile:
-    """The file; one of a CAD program in a process of its own."""
+    """The file; one of a CAD program is read in a process of its own."""
     arguments: dict[str, Any] = {"unit": unit, "chord_tolerance": chord_tolerance, "set_property": set_property}
     if path.suffix.lower() == ".dxf" and os.path.isfile(path):
         from ...shapes.gmsh_models.isolated_reader import field_file_apart

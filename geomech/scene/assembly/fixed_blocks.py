@@ -1,4 +1,4 @@
-"""Which blocks stand still or slide along an axis: by zone, or by the names of edges that they have after the cut."""
+"""Fixed and guided blocks: by zone, or by the names of edges that they have after cutting."""
 
 from __future__ import annotations
 
@@ -10,23 +10,23 @@ from ..checks.check import Check
 from ..drawing import Drawing
 from ..tables import SceneTables
 
-#: Edges called "fixed" or "fixed:NAME" fix the blocks that have them, "guided:x" or "guided:x:NAME" let them move along
-#: x.
+#: Edges called "fixed" or "fixed:NAME" fix their blocks; with "guided:x" or "guided:x:NAME" these can move along x
+#: only.
 FIXED, GUIDED = "fixed", "guided"
-#: What a block keeps that is guided along an axis: it moves along it, turns, and strains across nothing.
+#: Constrained unknowns of a block guided along an axis: translation across it, rotation and shear strain.
 _CONSTRAINED = {"x": [1, 2, 5], "y": [0, 2, 5]}
 
 
 def holds(name: str) -> bool:
-    """Whether edges of this ``name`` hold the blocks they are on."""
+    """Whether edges with this ``name`` fix or guide their blocks."""
     parts = name.split(":")
     return parts[0] == FIXED or (parts[0] == GUIDED and len(parts) > 1 and parts[1] in _CONSTRAINED)
 
 
 def fixed_blocks(tables: SceneTables, drawing: Drawing) -> np.ndarray:
-    """(n_blocks,) whether each block stands still."""
+    """(n_blocks,) whether each block is fixed."""
     zones = tables.zones or {}
-    # Rock without an end does not move either; its cracks do.
+    # Unbounded rock does not move either; its cracks do.
     fixed = np.array(
         [zone in zones and (zones[zone].fixed or zones[zone].body != "block") for zone in drawing.zones], dtype=bool
     )
@@ -39,7 +39,7 @@ def fixed_blocks(tables: SceneTables, drawing: Drawing) -> np.ndarray:
 
 
 def first_velocities(tables: SceneTables, drawing: Drawing) -> np.ndarray | None:
-    """(n_blocks, 2) m/s as the run begins; None where all are at rest."""
+    """(n_blocks, 2) m/s at the start of the run; None if all are at rest."""
     zones = tables.zones or {}
     given = [zones[zone].velocity_m_s if zone in zones else None for zone in drawing.zones]
     found = np.array([(0.0, 0.0) if velocity is None else velocity for velocity in given], dtype=float).reshape(-1, 2)
@@ -48,7 +48,7 @@ def first_velocities(tables: SceneTables, drawing: Drawing) -> np.ndarray | None
 
 
 def constrained_unknowns(tables: SceneTables, drawing: Drawing) -> np.ndarray | None:
-    """(n_blocks, 6) which unknowns of guided blocks stay zero; None where no block is guided."""
+    """(n_blocks, 6) which unknowns of guided blocks are constrained to zero; None if no block is guided."""
     constrained = np.zeros((len(drawing.zones), 6), bool)
     zones = tables.zones or {}
     for block, zone in enumerate(drawing.zones):
@@ -64,8 +64,8 @@ def constrained_unknowns(tables: SceneTables, drawing: Drawing) -> np.ndarray | 
 
 
 def block_orders(tables: SceneTables, drawing: Drawing) -> np.ndarray | None:
-    """(n_blocks,) the order of each block's displacement, 1 where it stands still, `AUTO_ORDER` where it is to be found;
-    None where all are of first order."""
+    """(n_blocks,) order of each block's displacement, 1 if it is fixed, `AUTO_ORDER` if it is chosen during the run;
+    None if all are of first order."""
     zones = tables.zones or {}
     given = [zones[zone].order if zone in zones else 1 for zone in drawing.zones]
     order = np.array([AUTO_ORDER if p == "auto" else p for p in given], dtype=int)
@@ -74,18 +74,18 @@ def block_orders(tables: SceneTables, drawing: Drawing) -> np.ndarray | None:
 
 
 def check_holding(c: Check) -> None:
-    """Edges that would guide must say along what."""
+    """Names of guided edges must include an axis."""
     for name in c.blocks.edge_names:
         if name.partition(":")[0] == GUIDED and not holds(name):
             c.refuse(
                 ("geometry",),
-                f"edges are called {name!r}, and along what their blocks are guided is not said",
+                f"edges are called {name!r}, without the axis along which their blocks are guided",
                 'call them "guided:x" or "guided:y"',
             )
 
 
 def check_borne(c: Check) -> None:
-    """Weight wants something that bears it: without it all blocks fall together, and nothing else happens."""
+    """Weight needs a support: without one all blocks fall together, and nothing else happens."""
     t, blocks = c.tables, c.blocks
     if t.loads is None or t.zones is None or not any(t.loads.gravity_m_s2):
         return
@@ -101,7 +101,7 @@ def check_borne(c: Check) -> None:
     falls = f" and {others} more blocks" if others > 1 else " and the other block" if others else ""
     c.refuse(
         ("loads", "gravity_m_s2"),
-        f"nothing bears the weight of {blocks.names[lowest]!r}{falls}: no block is fixed or guided, and no load, "
+        f"nothing supports the weight of {blocks.names[lowest]!r}{falls}: no block is fixed or guided, and no load, "
         "motion, bolt or water holds them",
-        "say `fixed = true` in the [zones.NAME] of what they stand on, or draw it and call its edges `fixed`",
+        "set `fixed = true` in the [zones.NAME] of their base, or draw a base and call its edges `fixed`",
     )

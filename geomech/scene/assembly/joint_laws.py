@@ -1,4 +1,4 @@
-"""Joint laws from their tables, and what is wrong with those that make none."""
+"""Joint laws from their tables, and the errors of tables that do not make a law."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ from ...model import JointLaw, Roughness
 from ..checks.check import Check
 from ..tables.rock import JointTable
 
-#: Keys of a rough joint that mean nothing without its roughness.
+#: Keys of a rough joint that need its roughness.
 _OF_ROUGHNESS = ("joint_length_m", "sample_length_m", "stiffness_from_peak_slip")
-#: What a law that was refused says of itself, the key that it is about, and the way out.
+#: Text of a refused law → the key concerned, and the way out.
 _FAULTS = (
     ("residual friction angle (", "residual_friction_angle_deg", "make it at most friction_angle_deg"),
     ("residual cohesion (", "residual_cohesion_pa", "make it at most cohesion_pa"),
@@ -20,18 +20,22 @@ _FAULTS = (
     ("tensile_strength does not go", "tensile_strength_pa", "leave it out, or leave out jrc and jcs_pa"),
     ("residual_friction_angle does not", "residual_friction_angle_deg", "friction_angle_deg is the residual one"),
     ("residual_cohesion does not go", "residual_cohesion_pa", "leave it out, or leave out jrc and jcs_pa"),
-    ("softening_slip does not go", "softening_slip_m", "leave it out: roughness wears off by itself"),
-    ("dilation_angle does not go", "dilation_angle_deg", "leave it out: roughness dilates by itself"),
-    ("dilation_slip does not go", "dilation_slip_m", "leave it out: roughness dilates by itself"),
+    ("softening_slip does not go", "softening_slip_m", "leave it out: the roughness degrades anyway"),
+    ("dilation_angle does not go", "dilation_angle_deg", "leave it out: the roughness causes dilation anyway"),
+    ("dilation_slip does not go", "dilation_slip_m", "leave it out: the roughness causes dilation anyway"),
     ("restitution does not go", "restitution", "leave it out, or leave out normal_stiffness_pa_per_m"),
     ("shear_stiffness is given", "shear_stiffness_pa_per_m", "leave it out, or stiffness_from_peak_slip"),
-    ("below 70°", "friction_angle_deg", "with jrc it is the angle that is left when the roughness is worn off"),
-    ("length of a rough joint must not be below", "joint_length_m", "leave it out: the sample's values then hold"),
+    ("below 70°", "friction_angle_deg", "with jrc it is the residual angle, without roughness"),
+    (
+        "length of a rough joint must not be below",
+        "joint_length_m",
+        "leave it out: the values of the sample are used then",
+    ),
 )
 
 
 def joint_law(name: str, joint: JointTable) -> JointLaw:
-    """The law of table ``joint``. Raises ValueError for values that do not go together."""
+    """The law of table ``joint``. Raises ValueError for inconsistent values."""
     rough = None
     if joint.jrc is not None:
         rough = Roughness(
@@ -61,14 +65,14 @@ def joint_law(name: str, joint: JointTable) -> JointLaw:
 
 
 def check_joints(c: Check) -> None:
-    """Values of a joint that do not go together, and laws that crack faces cannot follow."""
+    """Inconsistent values of joints, and laws that crack faces cannot have."""
     laws: dict[str, JointLaw] = {}
     for name, joint in (c.tables.joints or {}).items():
         missing = {"jrc": "jcs_pa", "jcs_pa": "jrc"}
         for given, other in missing.items():
             if getattr(joint, given) is not None and getattr(joint, other) is None:
                 c.refuse(("joints", name, given), f"joint {name!r} has {given} but no {other}", f"add {other}")
-        # A scene written out with all its defaults is right as well.
+        # A scene written out with all its defaults is valid as well.
         usual = JointTable()
         idle = [key for key in _OF_ROUGHNESS if joint.jrc is None and getattr(joint, key) != getattr(usual, key)]
         for key in idle:
@@ -84,7 +88,7 @@ def check_joints(c: Check) -> None:
         if crack.joint in laws and not laws[crack.joint].straight:
             c.refuse(
                 ("cracks", name, "joint"),
-                f"crack faces cannot follow joint {crack.joint!r}: they know neither residual friction, softening, "
+                f"crack faces cannot follow joint {crack.joint!r}: they support neither residual friction, softening, "
                 "dilation, roughness nor hyperbolic closure",
-                "name a joint with friction_angle_deg, cohesion_pa, tensile_strength_pa and stiffnesses alone",
+                "name a joint with friction_angle_deg, cohesion_pa, tensile_strength_pa and stiffnesses only",
             )

@@ -1,4 +1,4 @@
-"""The joints of a scene: drawn ones and sets by statistics, and the rock cut along them."""
+"""Joints of a scene, drawn ones and statistical sets, and the rock cut along them."""
 
 from __future__ import annotations
 
@@ -28,25 +28,25 @@ from ...shapes.joint_networks.joint_sets import (
 from ...shapes.parts import JOINT, Flaw, ShapeError, extent_of, grid_decimals
 from ..tables.geometry import Geometry, JointSetShape
 
-#: This many places of each kind of defect are listed.
+#: Number of listed places of each kind of defect.
 _LISTED = 4
-#: More pieces of joints between one crossing and the next are not cut: 100 000 blocks have 250 000, and take seconds;
-#: ten times as many take a minute and 10 GB, and no solver here moves them. Nor are joints of which so many pairs lie
-#: beside each other.
+#: Joints with more pieces between crossings are not cut: 100 000 blocks have 250 000 and take seconds; ten times as
+#: many take a minute and 10 GB, and are beyond the solvers. The same limit holds for pairs of joints that lie side by
+#: side.
 MOST_PIECES, MOST_PAIRS = 2_000_000, 20_000_000
 
 
 @dataclass(frozen=True, eq=False)
 class Jointed:
-    """Zones cut along ``joints``. ``cutting`` has the blocks; ``cracks`` are its dead ends and the drawn cracks, noded
-    together."""
+    """Zones cut along ``joints``. ``cutting`` has the blocks; ``cracks`` are its dead ends and the drawn cracks, with
+    common nodes."""
 
     joints: tuple[Joint, ...]
     cutting: Cutting
     cracks: Cracks
 
     def repair_lines(self, others: str) -> list[str]:
-        """What was found and mended, a line a kind, with the first places and what meets there now; ``others`` says
+        """Defects found and repaired, one line per kind, with the first places and their junctions; ``others`` says
         where the rest are listed."""
         kinds: dict[str, list[Mend]] = {}
         for mend in self.cutting.mends:
@@ -71,10 +71,9 @@ def jointed(
     drawn: Sequence[Joint] = (),
     chords: Chords | None = None,
 ) -> Jointed:
-    """The rock of ``zones``, drawn soundly as ``blocks``, cut along the scene's joints and those ``drawn`` elsewhere;
-    those that end on a curve end on its ``chords``.
+    """Rock of ``zones``, drawn as ``blocks``, cut along the scene's joints and those ``drawn`` elsewhere.
 
-    Raises ShapeError where joints or cracks are wrong.
+    Joints that end on a curve end on its ``chords``. Raises ShapeError for faulty joints or cracks.
     """
     named = [Zone(zone.name, tuple(blocks.loops(k)), _names(blocks, k)) for k, zone in enumerate(zones)]
     joints = make_joints(geometry, named, drawn, chords)
@@ -85,7 +84,7 @@ def jointed(
         dead_ends=geometry.dead_ends,
         shortest_crack=geometry.shortest_crack_m,
         smallest_area=geometry.smallest_block_m2,
-        # Drawn joints come first, sets by their order: a small block never breaks a drawn fault.
+        # Drawn joints come first, then sets in order: a small block never removes part of a drawn fault.
         lasting=len(joints) - len(geometry.joint_sets),
     )
     return Jointed(tuple(joints), cutting, _cracks(geometry, named, cutting, traces))
@@ -94,8 +93,10 @@ def jointed(
 def make_joints(
     geometry: Geometry, zones: Sequence[Zone], drawn: Sequence[Joint] = (), chords: Chords | None = None
 ) -> list[Joint]:
-    """Joints drawn in the scene and elsewhere, one a name, and the scene's sets over the rock of ``zones``; drawn ones
-    end on the ``chords`` of a curve that they end on."""
+    """Joints drawn in the scene and elsewhere, one per name, and the scene's sets over the rock of ``zones``.
+
+    Drawn joints that end on a curve end on its ``chords``.
+    """
     outlines = [zone.loops[0] for zone in zones]
     lines: dict[str, list[np.ndarray]] = {}
     for joint in geometry.joints:
@@ -110,13 +111,13 @@ def make_joints(
     box = np.array([low, [high[0], low[1]], high, [low[0], high[1]]])
     flaws = _too_fine(geometry, box)
     for k, shape in enumerate(geometry.joint_sets if not flaws else ()):
-        # A set of its own stream: adding one does not change the others.
+        # Each set has its own random stream: adding one does not change the others.
         rng = np.random.default_rng([geometry.seed, k])
         unknown = [name for name in shape.ends_on if JOINT + name not in {joint.name for joint in joints}]
         if unknown:
             known = ", ".join(repr(joint.name.removeprefix(JOINT)) for joint in joints) or "none"
             flaws.append(
-                Flaw("joint_sets", k, f"there are no joints {unknown[0]!r} before this set", f"there are {known}")
+                Flaw("joint_sets", k, f"no joints {unknown[0]!r} are defined before this set", f"there are {known}")
             )
             continue
         try:
@@ -139,7 +140,7 @@ def make_joints(
 
 
 def within(joint: Joint, zones: Sequence[Zone]) -> Joint:
-    """What of ``joint`` lies in ``zones``."""
+    """The part of ``joint`` inside ``zones``."""
     import shapely
 
     rock = shapely.union_all([shapely.Polygon(zone.loops[0], zone.loops[1:]) for zone in zones])
@@ -150,29 +151,29 @@ def within(joint: Joint, zones: Sequence[Zone]) -> Joint:
 
 
 def _too_fine(geometry: Geometry, box: np.ndarray) -> list[Flaw]:
-    """A flaw where the sets, as they are asked for, would have too many pieces, or joints so near to each other that
-    too many have to be compared; it names the finest of them."""
+    """A flaw if the specified sets would have too many pieces, or too many joints side by side; it names the finest
+    set."""
     finest, pieces, pairs, lengths = (0.0, 0, 0.0), 0.0, 0.0, 0.0
     for k, shape in enumerate(geometry.joint_sets):
         try:
             wanted = asked(shape, geometry)
         except ValueError:
-            continue  # reported when it is drawn
+            continue  # reported when it is generated
         region = box if shape.region is None else np.array(shape.region, dtype=float).reshape(-1, 2)
         x, y = (region - region[0]).T
         area = 0.5 * abs(float(x @ np.roll(y, -1) - y @ np.roll(x, -1)))
         if not area:
             continue
         length = wanted["p21_per_m"] * area
-        # What has no length goes right through.
+        # Without a length, traces extend right through.
         each = min(wanted.get("mean_length_m", math.inf), math.sqrt(area))
         number = length / each
-        # Boxes around slanting joints overlap, however near to parallel they are.
+        # Boxes around inclined joints overlap, however nearly parallel they are.
         beside = min(
             number, number / area * 2 * each**2 * abs(math.sin(2 * math.radians(wanted.get("mean_angle_deg", 45.0))))
         )
         pairs += number * beside
-        # Two sets that share a region cross about as often as lines of all directions (Miles 1964).
+        # Two sets in one region cross about as often as lines with random directions (Miles 1964).
         pieces += number + 4 / math.pi * length * lengths / area
         lengths += length
         finest = max(finest, (wanted["p21_per_m"], k, number))
@@ -182,9 +183,9 @@ def _too_fine(geometry: Geometry, box: np.ndarray) -> list[Flaw]:
     return [
         Flaw(
             "joint_sets", k,
-            f"this set would have about {number:.1g} joints, {density:.3g} m on every m², and all sets {pieces:.1g} "
-            "pieces between crossings: more than can be cut",
-            "are its spacing and lengths in metres? Make it coarser, or its `region` smaller",
+            f"this set would have about {number:.1g} joints, {density:.3g} m per m², and all sets {pieces:.1g} pieces "
+            "between crossings: more than can be cut",
+            "are its spacing and lengths in metres? Increase the spacing, or reduce its `region`",
         )
     ]  # fmt: skip
 
@@ -205,7 +206,7 @@ def _set(shape: JointSetShape, geometry: Geometry, box: np.ndarray, rng: np.rand
 
 
 def asked(shape: JointSetShape, geometry: Geometry) -> dict[str, float]:
-    """What a set of the scene is expected to be like, as `geomech.shapes.joint_networks.expected_statistics` says it."""
+    """Expected statistics of a set of the scene, as from `geomech.shapes.joint_networks.expected_statistics`."""
     from ...shapes.joint_networks import expected_statistics as expected
 
     turn, spacing, length, gap = _laws(shape, geometry)
@@ -223,7 +224,8 @@ def asked(shape: JointSetShape, geometry: Geometry) -> dict[str, float]:
 def _laws(
     shape: JointSetShape, geometry: Geometry
 ) -> tuple[Law | FisherAngle | None, Law | None, Law | None, Law | None]:
-    """The laws of angle in the section (rad), spacing, length and gap; None for what the set does not have."""
+    """Distributions of angle in the section (rad), spacing, length and gap; None for those that the set does not
+    have."""
     angle, section = shape.angle_deg, math.radians(geometry.section_azimuth_deg)
     if shape.dip_deg is not None:
         angle = math.degrees(apparent_dip(math.radians(shape.dip_deg), math.radians(shape.dip_direction_deg), section))
@@ -258,7 +260,7 @@ def _names(blocks: Blocks, block: int) -> tuple[tuple[str, ...], ...]:
 
 
 def _cracks(geometry: Geometry, zones: list[Zone], cutting: Cutting, traces: list[Trace]) -> Cracks:
-    """Dead ends, and the drawn ``traces`` in the blocks that hold them now."""
+    """Dead ends, and the drawn ``traces``, in the blocks that contain them now."""
     if not traces:
         return cutting.cracks
     import shapely
@@ -285,8 +287,10 @@ def _cracks(geometry: Geometry, zones: list[Zone], cutting: Cutting, traces: lis
 
 
 def _parted(trace: Trace, polygons: np.ndarray, tolerance: float) -> list[Trace]:
-    """A drawn crack where joints cross it: a crack in every block, "NAME 1", "NAME 2", …; else as it is. Pieces shorter
-    than ``tolerance`` m are left out."""
+    """A drawn crack where joints cross it: one crack per block, "NAME 1", "NAME 2", …; otherwise unchanged.
+
+    Pieces shorter than ``tolerance`` (m) are left out.
+    """
     import shapely
 
     whole = shapely.multilinestrings(shapely.linestrings(trace.lines)) if len(trace.lines) > 1 else None
@@ -295,7 +299,7 @@ def _parted(trace: Trace, polygons: np.ndarray, tolerance: float) -> list[Trace]
     inside = shapely.intersection(polygons[near], whole)
     inside = inside[shapely.length(inside) > tolerance]
     if len(inside) < 2 or shapely.length(whole) - shapely.length(inside).sum() > tolerance:
-        # In one block; or partly outside the rock, which is for the network of cracks to say.
+        # In one block; or partly outside the rock, which the check of cracks reports.
         return [trace]
     runs = shapely.get_parts(shapely.line_merge(inside))
     runs = runs[shapely.length(runs) > tolerance]

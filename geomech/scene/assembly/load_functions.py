@@ -1,5 +1,4 @@
-"""Loads of a scene as functions of time, and what acts besides forces: given motion, water, bolts, excavations,
-stress."""
+"""Loads of a scene as functions of time, and other actions: prescribed motion, water, bolts, excavations, stress."""
 
 from __future__ import annotations
 
@@ -33,7 +32,7 @@ from ..tables.loads import BaseTable, BoltTable, ForceTable, Timed, TractionTabl
 
 
 def history_of(table: Timed) -> History:
-    """The history that ``table`` gives, two columns. Raises OSError or ValueError for a file that is no record."""
+    """The history of ``table``, two columns. Raises OSError or ValueError for a file that is not a record."""
     value, rate, values, _ = table._parts()
     if value is not None and table.frequency_hz is not None:
         end = math.inf if table.until_s is None else table.until_s
@@ -61,13 +60,13 @@ def force_history(table: ForceTable) -> History:
 
 
 def profile_of(table: TractionTable) -> LinearProfile | None:
-    """How a traction changes along its edge; None where it does not."""
+    """Variation of a traction along its edge; None if it is uniform."""
     p = table.profile
     return None if p is None else LinearProfile(p.start, p.end, p.factors)
 
 
 def actions_of(tables: SceneTables, check: Check) -> dict[str, Any]:
-    """The parts of `Loads` that are no forces, by their names there."""
+    """The parts of `Loads` other than forces, by name."""
     loads, zones = tables.loads, check.drawing.zones
     in_zone: dict[str, list[int]] = {}
     for b, name in enumerate(zones):
@@ -76,7 +75,7 @@ def actions_of(tables: SceneTables, check: Check) -> dict[str, Any]:
     points = []
     for k, motion in enumerate(loads.point_motions):
         place = ("loads", "point_motions", k, "at")
-        block = carrier(check, place, "the point that is moved", motion.at, motion.zone)
+        block = carrier(check, place, "the point with prescribed motion", motion.at, motion.zone)
         history, direction = _along_axes(history_of(motion), motion.axes)
         points.append(PointMotion(block, motion.at, history, direction, stiffness=motion.stiffness_n_per_m))
     excavations = tuple(
@@ -99,7 +98,7 @@ def actions_of(tables: SceneTables, check: Check) -> dict[str, Any]:
 
 
 def _along_axes(history: History, axes: str) -> tuple[History, tuple[float, float] | None]:
-    """The columns of ``history`` that are given, and their direction where it is one."""
+    """The given columns of ``history``, and their direction if it is one column."""
     if axes == "xy":
         return history, None
     column = slice(0, 1) if axes == "x" else slice(1, 2)
@@ -147,8 +146,8 @@ def _water(tables: SceneTables, blocks: Blocks) -> WaterTable | None:
 
 
 def deepest_pond(tables: SceneTables, blocks: Blocks) -> tuple[Pond, float] | None:
-    """Where the water table of a scene stands highest above the ground during the run, and when, s; None where it never
-    does."""
+    """The largest height of a scene's water table above the ground during the run, and its time, s; None if it never is
+    above."""
     water = _water(tables, blocks)
     if water is None or water.ground is not None:
         return None
@@ -159,7 +158,7 @@ def deepest_pond(tables: SceneTables, blocks: Blocks) -> tuple[Pond, float] | No
 
 
 def said_of_pond(pond: Pond, time: float, origin: tuple[float, float]) -> str:
-    """A pond in words, with the time at which it stands."""
+    """Description of a pond at ``time``."""
     return (
         f"ponded up to {pond.depth:.3g} m deep from x = {pond.start + origin[0]:.6g} to {pond.end + origin[0]:.6g} m "
         f"({time:g} s)"
@@ -167,7 +166,7 @@ def said_of_pond(pond: Pond, time: float, origin: tuple[float, float]) -> str:
 
 
 def bolts_of(check: Check, number: int, table: BoltTable) -> tuple[Bolt, ...]:
-    """The bolts of one table; none after saying why an end is in no block. Raises ValueError for what `Bolt`
+    """The bolts of one table; none, with an error, if an end is in no block. Raises ValueError for what `Bolt`
     refuses."""
     compression = {} if table.compression is None else {"compression": table.compression}
     properties = {
@@ -189,7 +188,7 @@ def bolts_of(check: Check, number: int, table: BoltTable) -> tuple[Bolt, ...]:
         except CrossesNoJoint as error:
             if not table.lines:
                 raise
-            # Of a drawn row of bars some miss the joints, which may come by statistics.
+            # In a drawn row of bars some may miss the joints, which may be random.
             check.warn(("loads", "bolts", number), str(error), "it does nothing; a longer one might")
             return ()
     place = ("loads", "bolts", number)

@@ -1,5 +1,4 @@
-"""Checks of what acts besides forces: records that can be read, zones and edges that are there, ends of bolts in
-rock."""
+"""Checks of actions other than forces: readable records, existing zones and edges, bolt ends in rock."""
 
 from __future__ import annotations
 
@@ -13,7 +12,7 @@ from .cross_checks import carrier
 
 
 def check_actions(c: Check) -> None:
-    """Motion, water, bolts and excavations of the section of loads, where it is sound."""
+    """Motion, water, bolts and excavations, if the section of loads is valid."""
     if c.tables.loads is None:
         return
     _records(c)
@@ -27,7 +26,7 @@ def check_actions(c: Check) -> None:
 
 
 def records_are_sound(c: Check) -> bool:
-    """Whether every file of a load could be read."""
+    """Whether every file of a load can be read."""
     return not any(_trouble(load) for _, load in c.tables.loads.timed)
 
 
@@ -49,7 +48,7 @@ def _records(c: Check) -> None:
         if trouble:
             c.refuse(
                 ("loads", *place, "file"), trouble,
-                "a record has a time and its values, x and y (or one and a `direction`), in every line",
+                "every line of a record has a time and its values, x and y (or one value and a `direction`)",
             )  # fmt: skip
 
 
@@ -76,14 +75,14 @@ def _zones(c: Check) -> None:
             if not inside.any():
                 c.refuse(
                     ("loads", "excavations", k, "polygon"), "no block's centroid lies in the polygon",
-                    "blocks are taken out as a whole: draw it around their centroids",
+                    "whole blocks are excavated: draw it around their centroids",
                 )  # fmt: skip
         if c.tables.run is not None and excavation.time_s >= c.tables.run.end_time_s:
             c.warn(
                 ("loads", "excavations", k, "time_s"),
-                f"the excavation at {excavation.time_s:g} s comes when the run has ended ({c.tables.run.end_time_s:g} "
+                f"the excavation at {excavation.time_s:g} s is after the end of the run ({c.tables.run.end_time_s:g} "
                 "s)",
-                "let the run go on beyond it (run.end_time_s)",
+                "extend the run beyond it (run.end_time_s)",
             )
 
 
@@ -91,11 +90,11 @@ def _points(c: Check) -> None:
     fixed = fixed_blocks(c.tables, c.drawn)
     for k, motion in enumerate(c.tables.loads.point_motions):
         place = ("loads", "point_motions", k, "at")
-        block = carrier(c, place, "the point that is moved", motion.at, motion.zone)
+        block = carrier(c, place, "the point with prescribed motion", motion.at, motion.zone)
         if block >= 0 and fixed[block]:
             c.refuse(
                 place, f"the point lies in the fixed zone {c.drawn.zones[block]!r}",
-                "move the zone itself by [[loads.motions]], or let it move",
+                "prescribe the motion of the zone by [[loads.motions]], or let it move freely",
             )  # fmt: skip
 
 
@@ -111,7 +110,7 @@ def _bolts(c: Check) -> None:
             ends = [b for b in (bolt.block, bolt.other) if b >= 0]
             if all(fixed[b] for b in ends):
                 c.refuse(
-                    ("loads", "bolts", k), f"bolt {bolt.name!r} holds nothing: both its ends are fixed",
+                    ("loads", "bolts", k), f"bolt {bolt.name!r} has no effect: both its ends are in fixed blocks",
                     "put one end into a block that may move",
                 )  # fmt: skip
 
@@ -130,11 +129,11 @@ def _base(c: Check) -> None:
         return
     if c.tables.dda is not None and c.tables.dda.dynamic_factor == 0 and base.frame == "ground":
         c.warn(
-            ("loads", "base"), "the base shakes, but the run is static: inertia takes no part",
+            ("loads", "base"), "the base shakes, but the run is static, without inertia",
             "set dda.dynamic_factor = 1",
         )  # fmt: skip
     if not fixed_blocks(c.tables, c.drawn).any():
         c.refuse(
-            ("loads", "base"), "nothing is fixed, so there is no base to shake",
-            "fix the zone that the others stand on ([zones.NAME] fixed = true)",
+            ("loads", "base"), "no block is fixed, so there is no base to shake",
+            "fix the zone on which the others rest ([zones.NAME] fixed = true)",
         )  # fmt: skip

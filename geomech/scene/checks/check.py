@@ -1,4 +1,4 @@
-"""What the checks of a scene see, and where they say what is wrong."""
+"""Input and output of the checks of a scene."""
 
 from __future__ import annotations
 
@@ -17,7 +17,8 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class Check:
-    """Input of the checks: tables (a faulty section is None), the data of the file, the drawing; and their results."""
+    """Input of the checks (tables, of which faulty sections are None; the data of the file; the drawing), and their
+    results."""
 
     tables: SceneTables
     data: dict[str, Any]
@@ -28,7 +29,7 @@ class Check:
 
     @property
     def drawn(self) -> Drawing:
-        """The drawing, for checks that come after those of the drawing itself."""
+        """The drawing, for checks that follow those of the drawing itself."""
         if self.drawing is None:
             raise ValueError("the scene has no drawing")
         return self.drawing

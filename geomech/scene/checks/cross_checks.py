@@ -1,4 +1,5 @@
-"""Checks across the sections of a scene: names that must exist, points that must be in rock, times and lengths."""
+"""Checks across the sections of a scene: names must exist, points must be in rock; times and lengths must be
+consistent."""
 
 from __future__ import annotations
 
@@ -18,12 +19,12 @@ from .check import Check
 from .edges import check_edges
 from .higher_order import check_orders
 
-#: No tip advances by less, in units of the rock's largest side: coordinates of a drawing keep twelve digits.
+#: Least advance of a tip relative to the rock's largest side: coordinates of a drawing have twelve digits.
 SHORTEST_ADVANCE = 1e-9
 
 
 def check(c: Check) -> None:
-    """Run every check that the sections at hand allow."""
+    """Run all checks for which the sections are available."""
     _times(c)
     _growth_lengths(c)
     _names_once(c)
@@ -50,7 +51,7 @@ def check(c: Check) -> None:
 
 def _times(c: Check) -> None:
     if c.tables.run is not None and c.tables.dda is not None and c.tables.dda.time_step_s > c.tables.run.end_time_s:
-        # A time step that is not in the file cannot be pointed at.
+        # A time step that is missing in the file cannot be located.
         given = "time_step_s" in c.data.get("dda", {})
         c.refuse(
             ("dda", "time_step_s") if given else ("run", "end_time_s"),
@@ -61,7 +62,7 @@ def _times(c: Check) -> None:
 
 
 def _statics(c: Check) -> None:
-    """What only static or only dynamic runs can do."""
+    """Settings for static or dynamic runs only."""
     dda, loads = c.tables.dda, c.tables.loads
     if dda is None:
         return
@@ -69,42 +70,42 @@ def _statics(c: Check) -> None:
         c.refuse(
             ("dda", "equilibrium"),
             "equilibrium at every load is for static runs, and dda.dynamic_factor is not 0",
-            'say equilibrium = "start" to begin at rest, or dynamic_factor = 0',
+            'set equilibrium = "start" to begin at rest, or dynamic_factor = 0',
         )
     if loads is not None and loads.viscous_boundaries and dda.dynamic_factor == 0:
         c.warn(
             ("loads", "viscous_boundaries"),
-            "viscous boundaries do nothing in a static run",
+            "viscous boundaries have no effect in a static run",
             "set dda.dynamic_factor = 1, or leave them out",
         )
     for name, joint in (c.tables.joints or {}).items() if dda.dynamic_factor == 0 else ():
         if joint.restitution is not None:
             c.warn(
                 ("joints", name, "restitution"),
-                "nothing strikes anything in statics, which carry no velocity: restitution does nothing",
+                "statics have no velocities and therefore no impacts: restitution has no effect",
                 "set dda.dynamic_factor = 1, or leave it out",
             )
 
 
 def _stepping(c: Check) -> None:
-    """What steps from event to event can do, and what only they can."""
+    """Settings for steps from event to event only."""
     run, dda = c.tables.run, c.tables.dda
     if run is None or dda is None:
         return
     if "mechanism" in run.stop_at and dda.dynamic_factor > 0:
         c.refuse(
             ("run", "stop_at"),
-            '"mechanism" is reported in static runs only, and dda.dynamic_factor is not 0: in dynamics blocks just move',
+            '"mechanism" is reported in static runs only, and dda.dynamic_factor is not 0: in dynamics blocks simply move',
             "leave it out, or set dda.dynamic_factor = 0",
         )
     if run.stepping == "events":
         for key, hinders, way_out in (
             ("dynamic_factor", dda.dynamic_factor > 0, "set dda.dynamic_factor = 0"),
-            ("equilibrium", dda.equilibrium == "loads", 'say dda.equilibrium = "start", or ""'),
+            ("equilibrium", dda.equilibrium == "loads", 'set dda.equilibrium = "start", or ""'),
             (
                 "automatic_time_step",
                 dda.automatic_time_step,
-                "leave dda.automatic_time_step out: steps grow by themselves",
+                "leave out dda.automatic_time_step: steps adapt anyway",
             ),
         ):
             if hinders:
@@ -120,11 +121,11 @@ def _stepping(c: Check) -> None:
         ("longest_step_s", run.longest_step_s is not None),
     ):
         if belongs:
-            c.refuse(("run", key), f'run.{key} belongs to stepping "events"', 'set run.stepping = "events"')
+            c.refuse(("run", key), f'run.{key} requires stepping "events"', 'set run.stepping = "events"')
 
 
 def _warned(c: Check) -> None:
-    """Events that end a run must be reported."""
+    """Events that end a run must be reported ones."""
     run = c.tables.run
     if run is None or (run.events is None and run.stepping == "events") or set(run.events or ()) - {"tips"}:
         return
@@ -132,7 +133,7 @@ def _warned(c: Check) -> None:
         if run.events is None:
             what, way_out = (
                 "fixed steps report these where run.events names them",
-                'say run.events = ["contacts", "faces"]',
+                'set run.events = ["contacts", "faces"]',
             )
         else:
             what, way_out = "run.events names neither", 'add "contacts" or "faces" to run.events'
@@ -144,7 +145,7 @@ def _growth_lengths(c: Check) -> None:
     if growth is not None and growth.trial_kink_m and growth.criterion != "f":
         c.refuse(
             ("growth", "trial_kink_m"),
-            f'trial kinks are judged by the criterion "f", not by "{growth.criterion}"',
+            f'trial kinks are used by the criterion "f" only, not by "{growth.criterion}"',
             'leave it out, or set growth.criterion = "f"',
         )
     if growth is not None and c.drawing is not None and c.drawing.blocks is not None:
@@ -172,7 +173,9 @@ def _names_once(c: Check) -> None:
     for k, monitor in enumerate(c.tables.monitors or ()):
         if monitor.name in seen:
             c.refuse(
-                ("monitors", k, "name"), f"there are two monitors called {monitor.name!r}", "give each its own name"
+                ("monitors", k, "name"),
+                f"there are two monitors called {monitor.name!r}",
+                "give each a name of its own",
             )
         seen.add(monitor.name)
 
@@ -198,7 +201,7 @@ def _zones(c: Check) -> None:
         return
     for name in given:
         if name not in known:
-            # A zone that has its table already is not the one that is meant.
+            # A zone that has a table already is not the one meant.
             free = [zone for zone in known if zone not in given]
             c.refuse(
                 ("zones", name),
@@ -217,7 +220,7 @@ def _zones(c: Check) -> None:
         for name in (name for name, zone in given.items() if zone.velocity_m_s is not None):
             c.refuse(
                 ("zones", name, "velocity_m_s"),
-                "a static run carries no velocity from one step to the next",
+                "a static run has no velocities",
                 "leave it out, or set dda.dynamic_factor = 1",
             )
     used = {zone.material for zone in given.values()}
@@ -238,7 +241,7 @@ def _cracks(c: Check) -> None:
 
 
 def _crack_joints(c: Check) -> None:
-    """The laws of crack faces must be there, and faces that are cemented must touch."""
+    """The laws of crack faces must exist, and cemented faces must touch."""
     for name, crack in (c.tables.cracks or {}).items():
         if crack.joint is None or c.tables.joints is None:
             continue
@@ -253,7 +256,7 @@ def _crack_joints(c: Check) -> None:
             c.refuse(
                 ("cracks", name, "joint"),
                 f"faces with an aperture cannot have the tensile strength of joint {crack.joint!r}",
-                'say aperture = "closed", or name a joint without tensile strength',
+                'set aperture = "closed", or name a joint without tensile strength',
             )
 
 
@@ -262,7 +265,7 @@ def _are(known: list[str]) -> str:
 
 
 def _whole(c: Check) -> None:
-    """What drawn cracks enclose is a block of its own, and must be drawn as one."""
+    """A piece enclosed by drawn cracks is a block of its own, and must be drawn as one."""
     for crack, block in cutting_cracks(c.blocks, c.cracks):
         c.refuse(
             c.drawn.path_of_crack(c.cracks.names[crack]),
@@ -273,7 +276,7 @@ def _whole(c: Check) -> None:
 
 
 def blocks_at(blocks: Blocks, point: tuple[float, float]) -> list[int]:
-    """The blocks that hold ``point``, those whose outline it touches included (to 1e-6 of the drawing's size)."""
+    """The blocks that contain ``point``, including those whose outline it touches (to 1e-6 of the drawing's size)."""
     import shapely
 
     slack = 1e-6 * np.ptp(blocks.vertices, axis=0).max()
@@ -282,7 +285,7 @@ def blocks_at(blocks: Blocks, point: tuple[float, float]) -> list[int]:
 
 
 def carrier(c: Check, path: Path, what: str, point, zone: str | None, among: list[int] | None = None) -> int:
-    """The block that carries ``point``; −1 after saying why there is none."""
+    """The block that contains ``point``; −1, with an error, if there is none."""
     known = list(dict.fromkeys(c.drawn.zones))
     if zone is not None and zone not in known:
         c.refuse(path[:-1] + ("zone",), f"the geometry has no zone {zone!r}", nearest(zone, known))
@@ -294,7 +297,7 @@ def carrier(c: Check, path: Path, what: str, point, zone: str | None, among: lis
     if zone is not None:
         inside, at = at, [b for b in at if c.drawn.zones[b] == zone]
         if inside and not at:
-            c.refuse(path, f"{what} {here} is not in zone {zone!r}", "move it, or name its own zone")
+            c.refuse(path, f"{what} {here} is not in zone {zone!r}", "move it, or name the zone that contains it")
             return -1
     if among is not None and len(at) > 1:
         at = [b for b in at if b in among] or at
@@ -309,7 +312,7 @@ def carrier(c: Check, path: Path, what: str, point, zone: str | None, among: lis
         )
         return -1
     if len(at) > 1 and len({rock_of(c.blocks.names[b]) for b in at}) == 1:
-        # Cells of one rock: it moves there as either does.
+        # Cells of one rock: either moves like the point.
         at = at[:1]
     if len(at) > 1:
         names = [c.blocks.names[b] for b in at]
@@ -320,7 +323,7 @@ def carrier(c: Check, path: Path, what: str, point, zone: str | None, among: lis
 
 
 def gauge_carriers(c: Check) -> tuple[int, int] | None:
-    """The blocks that carry the gauge's ends; where an end lies between two blocks, the one that holds the other."""
+    """The blocks at the gauge's ends; an end between two blocks belongs to the one with the other end."""
     gauge = c.tables.gauge
     if gauge is None:
         return None
@@ -345,7 +348,7 @@ def _points(c: Check) -> None:
 
 
 def material_of(tables: SceneTables, zone: str) -> str:
-    """The name of the material that ``zone`` is made of."""
+    """Name of the material of ``zone``."""
     entry = tables.zones.get(zone)
     return entry.material if entry is not None and entry.material is not None else next(iter(tables.materials))
 
@@ -358,20 +361,20 @@ def _strength(c: Check) -> None:
     if t.growth.enabled and t.growth.initiation and not strong:
         c.refuse(
             ("growth", "initiation"),
-            "cracks are to be born, but no material has a strength that could be reached",
+            "cracks are to initiate, but no material has a strength",
             "add tensile_strength_pa or cohesion_pa to a material",
         )
     for name, m in t.materials.items() if t.growth.enabled and t.growth.initiation else ():
         if m in strong and m.k_ic_pa_sqrt_m is None:
             c.refuse(
                 ("materials", name, "k_ic_pa_sqrt_m"),
-                f"material {name!r} has no fracture toughness, and cracks that are born in it may grow",
+                f"material {name!r} has no fracture toughness, and cracks that initiate in it may grow",
                 f"add k_ic_pa_sqrt_m to [materials.{name}], Pa √m (1e6 to 2.5e6 for most rocks)",
             )
 
 
 def _rigid(c: Check) -> None:
-    """Cracks open in rock that strains."""
+    """Cracks need rock that strains."""
     t = c.tables
     if t.materials is None or t.zones is None:
         return
@@ -380,8 +383,8 @@ def _rigid(c: Check) -> None:
         if name in t.materials and t.materials[name].rigid:
             c.refuse(
                 ("materials", name, "rigid"),
-                f"zone {c.drawn.zones[block]!r} holds a crack, but its material {name!r} is rigid",
-                "take rigid = true away, or give the zone a material of its own",
+                f"zone {c.drawn.zones[block]!r} contains a crack, but its material {name!r} is rigid",
+                "remove rigid = true, or give the zone another material",
             )
 
 
@@ -395,7 +398,7 @@ def _toughness(c: Check) -> None:
         return
     needy: dict[str, str] = {}
     fixed = fixed_blocks(t, c.drawn)
-    # Of a crack that several segments make, one warning.
+    # One warning per crack of several segments.
     for k, b in dict.fromkeys(zip(cracks.crack.tolist(), cracks.block.tolist())):
         zone = c.drawn.zones[b]
         name = material_of(t, zone)
@@ -405,11 +408,11 @@ def _toughness(c: Check) -> None:
             by_key = zone in t.zones and t.zones[zone].fixed
             c.warn(
                 ("zones", zone, "fixed") if by_key else ("geometry",),
-                f"crack {cracks.names[k]!r} lies in the fixed {_block_or_zone(t, zone)}, which is not strained",
+                f"crack {cracks.names[k]!r} lies in the fixed {_block_or_zone(t, zone)}, which does not strain",
                 "let it move, or leave the crack out"
-                + ("" if by_key else ': edges called "fixed" hold the block')
+                + ("" if by_key else ': edges called "fixed" fix the block')
                 + (
-                    '; joints that end in rock are none with geometry.dead_ends = "trim"'
+                    '; joints that end in rock are trimmed with geometry.dead_ends = "trim"'
                     if t.geometry.joint_sets
                     else ""
                 ),

@@ -1,4 +1,4 @@
-"""Names of edges: which of them loads and joints mean, and which nobody means."""
+"""Checks of edge names: those that loads and joints refer to, and those that nothing refers to."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from .check import Check
 
 
 def check_edges(c: Check) -> None:
-    """Loads and joints must name edges that there are; names in neither are reported."""
+    """Loads and joints must name existing edges; names in neither are reported."""
     _tractions(c)
     _joints(c)
     _unused(c)
@@ -49,35 +49,40 @@ def _tractions(c: Check) -> None:
         elif fixed_blocks(c.tables, c.drawn)[blocks.vertex_block[blocks.edges_named(boundary.edge)]].all():
             c.refuse(
                 ("loads", "viscous_boundaries", k, "edge"),
-                f"the edges {boundary.edge!r} belong to fixed blocks: nothing there moves that could be braked",
-                "let the zone move: it stands on the boundary itself",
+                f"the edges {boundary.edge!r} belong to fixed blocks, where a viscous boundary has no effect",
+                "let the zone move: it rests on the boundary itself",
             )
     leading = c.tables.loads.leading_edge
-    # Where a traction's own edge is wrong, it may be the one that leads.
+    # If a traction's own edge is wrong, it may be the leading one.
     if leading == WEIGHT and leading not in known:
         if not any(c.tables.loads.gravity_m_s2):
             c.refuse(
-                ("loads", "leading_edge"), "there is no gravity that could lead", "set gravity_m_s2 and gravity_ramp_s"
+                ("loads", "leading_edge"),
+                "there is no gravity to be the leading load",
+                "set gravity_m_s2 and gravity_ramp_s",
             )
     elif leading is not None and leading not in taken | _moved_edges(c) and taken <= set(known):
         c.refuse(
             ("loads", "leading_edge"),
-            f"no traction acts on the leading edge {leading!r}, and no zone that has it is moved",
+            f"no traction acts on the leading edge {leading!r}, and no zone with it has a prescribed motion",
             'it must be the edge of one of [[loads.tractions]], or of a zone in [[loads.motions]], or "gravity": '
             + nearest(leading, sorted(taken | _moved_edges(c) | {WEIGHT})),
         )
 
 
 def _moved_edges(c: Check) -> set[str]:
-    """Names of the edges of zones that are moved."""
+    """Edge names of zones with prescribed motion."""
     moved, blocks = {motion.zone for motion in c.tables.loads.motions}, c.blocks
     owner = {name: {c.drawn.zones[b] for b in blocks.vertex_block[blocks.edges_named(name)]} for name in _edge_names(c)}
     return {name for name, zones in owner.items() if zones & moved}
 
 
 def _edge_hint(c: Check, name: str, known: list[str], taken: set[str]) -> str:
-    """What edge may be meant by ``name``. Never one that another traction acts on: two opposite loads on one edge
-    cancel. Nor one of another kind: a traction on "contact:bottom" would act between blocks."""
+    """Suggestion of the edge meant by ``name``.
+
+    Never one on which another traction acts, because two opposite loads on one edge cancel, and never one of another
+    kind: a traction on "contact:bottom" would act between blocks.
+    """
     brought = c.drawn.choices_with_edge(name)
     kind, colon, _ = name.rpartition(":")
     alike = [edge for edge in known if edge not in taken and edge.startswith(kind + colon)]
@@ -96,7 +101,7 @@ def _edge_hint(c: Check, name: str, known: list[str], taken: set[str]) -> str:
 
 
 def _unused(c: Check) -> None:
-    """Names that the model gives and the scene never says: a load that is missing, or a crack without its prefix."""
+    """Names in the model that the scene never uses: a missing load, or a crack without its prefix."""
     t = c.tables
     from_files = c.drawn.model is not None or (t.geometry is not None and t.geometry.traces)
     if not from_files or t.loads is None or t.joints is None:
@@ -105,7 +110,7 @@ def _unused(c: Check) -> None:
     used.update(() if t.loads.water is None else t.loads.water.dry_edges)
     for joint in t.joints.values():
         used.update(joint_names(joint.edges, _edge_names(c)), *joint.between)
-    # Joints without a law of their own follow the default one, as is usual.
+    # Joints without a law of their own follow the default one, as usual.
     idle = [
         name for name in _edge_names(c) if name not in used and not name.startswith((JOINT, CELLS)) and not holds(name)
     ]
@@ -113,17 +118,17 @@ def _unused(c: Check) -> None:
         c.warn(
             ("geometry", "model" if c.drawn.model is not None else "traces"),
             f"no load and no joint names the edges {', '.join(map(repr, idle))}",
-            f'they carry nothing, and follow the default joint where they touch; a crack is called "{CRACK}NAME"',
+            f'they are unloaded, and follow the default joint where they touch; a crack is called "{CRACK}NAME"',
         )
 
 
 def joint_names(patterns: tuple[str, ...], known: list[str]) -> list[str]:
-    """The names of ``known`` that ``patterns`` mean, in order."""
+    """Those of the ``known`` names that match the ``patterns``, in order."""
     return [name for name in known if any(fnmatch.fnmatchcase(name, pattern) for pattern in patterns)]
 
 
 def contact_names(drawing: Drawing) -> list[str]:
-    """Names that faces in contact may have: edges as drawn, and the faces that a crack leaves when it cuts through."""
+    """Names of faces in contact: drawn edges, and the faces of cracks that cut through a block."""
     assert drawing.blocks is not None and drawing.cracks is not None
     names = [name for name in drawing.blocks.edge_names if name] + list(drawing.joints)
     faces = [f"crack:{name}" for name in (*drawing.cracks_drawn, *drawing.cracks.names)]
@@ -141,14 +146,16 @@ def _joints(c: Check) -> None:
         if first != law:
             what = f"edges {pair[1]!r}" if not pair[0] else f"edges {pair[0]!r} and {pair[1]!r}"
             c.refuse(
-                path, f"joints {first!r} and {law!r} both claim contacts of {what}", "leave them to one of the two"
+                path, f"joints {first!r} and {law!r} both claim contacts of {what}", "name them in only one of the two"
             )
 
     for name, joint in c.tables.joints.items():
         if name == "default":
             if joint.edges or joint.between:
                 c.refuse(
-                    ("joints", name), "the default joint names edges", "it rules all contacts that no other joint names"
+                    ("joints", name),
+                    "the default joint names edges",
+                    "it applies to all contacts that no other joint names",
                 )
             continue
         of_a_crack = any(crack.joint == name for crack in (c.tables.cracks or {}).values())

@@ -1,11 +1,11 @@
-"""What blocks of higher order ([zones.NAME] order) cannot be part of yet, refused by name."""
+"""Features that blocks of higher order ([zones.NAME] order) do not support yet, refused by name."""
 
 from __future__ import annotations
 
 from ..validation import nearest
 from .check import Check
 
-#: Of [loads]: what moves, holds or strains blocks in ways that deflection does not know.
+#: Keys of [loads] that move, constrain or strain blocks in ways not implemented for deflection.
 _LOADS = {
     "bolts": "bolts", "motions": "prescribed motion", "point_motions": "prescribed motion of points",
     "viscous_boundaries": "viscous boundaries", "excavations": "excavations",
@@ -14,12 +14,12 @@ _LOADS = {
 
 
 def quoted(order: int | str) -> str:
-    """As a scene says it."""
+    """As written in a scene."""
     return f'"{order}"' if isinstance(order, str) else str(order)
 
 
 def check_orders(c: Check) -> None:
-    """Refuse what blocks of order 2 and more do not support."""
+    """Refuse features that blocks of order 2 and more do not support."""
     t = c.tables
     zones = {name: zone for name, zone in (t.zones or {}).items() if zone.order != 1}
     for name, zone in zones.items():
@@ -29,7 +29,7 @@ def check_orders(c: Check) -> None:
             c.refuse(path, f"order = {quoted(zone.order)}: {why}", way_out)
 
         if zone.fixed or zone.guided is not None or zone.body != "block":
-            refuse("rock that is fixed, guided or without an end does not bend", "leave `order` out")
+            refuse("rock that is fixed, guided or unbounded does not bend", "leave `order` out")
         material = (t.materials or {}).get(zone.material or next(iter(t.materials or {}), ""))
         if material is not None and material.rigid:
             refuse("a rigid material does not bend", "leave `order` out, or `rigid`")
@@ -44,11 +44,11 @@ def check_orders(c: Check) -> None:
                     "leave out one",
                 )
         if t.loads is not None and t.loads.base is not None and t.loads.base.frame == "ground":
-            refuse('a base that shakes in the frame "ground" is not supported yet', 'say frame = "base"')
+            refuse('a base that shakes in the frame "ground" is not supported yet', 'set frame = "base"')
 
 
 def _check_cell_joint(c: Check, zone: str, joint: str | None) -> None:
-    """The joint by which the cells of a ``zone`` part must exist and hold something."""
+    """The joint along which the cells of ``zone`` separate must exist and have a strength."""
     if joint is None:
         return
     path, joints = ("zones", zone, "cell_joint"), c.tables.joints or {}
@@ -56,7 +56,7 @@ def _check_cell_joint(c: Check, zone: str, joint: str | None) -> None:
         c.refuse(path, f"there is no [joints.{joint}]", nearest(joint, list(joints)))
     elif not joints[joint].tensile_strength_pa > 0:
         c.refuse(
-            path, f"[joints.{joint}] has no tensile strength", "say its tensile_strength_pa, or leave `cell_joint` out"
+            path, f"[joints.{joint}] has no tensile strength", "give its tensile_strength_pa, or leave `cell_joint` out"
         )
 
 
@@ -66,7 +66,7 @@ def _check_cracks(c: Check, refuse) -> None:
         refuse("blocks of higher order cannot be cut by cracks yet", "leave `order` out, or the cracks")
     if t.growth is not None and t.growth.initiation:
         refuse(
-            "cracks cannot begin in blocks of higher order yet", "say growth.initiation = false, or leave `order` out"
+            "cracks cannot begin in blocks of higher order yet", "set growth.initiation = false, or leave `order` out"
         )
 
 
@@ -76,8 +76,8 @@ def _check_joints(c: Check, refuse) -> None:
         softens = joint.residual_friction_angle_deg is not None or joint.residual_cohesion_pa or joint.softening_slip_m
         if curved or softens:
             refuse(
-                f"faces of higher order take straight Coulomb laws yet, and [joints.{name}] softens, dilates or closes "
-                "along a curve",
+                f"faces of higher order support linear Coulomb laws only, and [joints.{name}] softens, dilates or "
+                "closes nonlinearly",
                 "leave these keys out",
             )
         if joint.restitution is not None:
@@ -88,12 +88,12 @@ def _check_solver(c: Check, refuse) -> None:
     dda = c.tables.dda
     if dda is None:
         return
-    beta, gamma = dda.newmark or (0.5, 1.0)  # unset: one of the two that are allowed
+    beta, gamma = dda.newmark or (0.5, 1.0)  # unset: one of the two allowed schemes
     if dda.dynamic_factor > 0 and (dda.spectral_radius is not None or abs(gamma - 2 * beta) > 1e-12):
-        refuse("it moves by Newmark's scheme with gamma = 2 beta only", "say newmark = [0.5, 1.0] or [0.25, 0.5]")
+        refuse("it supports Newmark's scheme with gamma = 2 beta only", "set newmark = [0.5, 1.0] or [0.25, 0.5]")
     if dda.contact != "penalty" or dda.springs != "stiff":
         refuse(
-            'its faces take stiff penalty springs or the stiffness of their joint, dda.contact = "penalty" and '
+            'its faces need stiff penalty springs or the stiffness of their joint, dda.contact = "penalty" and '
             'dda.springs = "stiff"',
             "leave these keys out",
         )

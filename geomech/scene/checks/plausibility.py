@@ -1,4 +1,5 @@
-"""What a scene may say and hardly means: lengths in millimetres, moduli in GPa, crack ends that just miss a surface."""
+"""Plausibility checks: values that are possible but probably mistakes, such as wrong units or crack ends that just miss
+a surface."""
 
 from __future__ import annotations
 
@@ -16,32 +17,34 @@ from ..tables.loads import TractionTable
 from .check import Check
 from .cross_checks import material_of
 
-#: A crack end that misses an outline by less than this share of its crack's length was probably meant to reach it.
+#: A crack end that misses an outline by less than this part of its crack's length was probably meant to reach it.
 NEAR_MISS = 0.01
-#: Largest sides of cracked specimens and outcrops that are likely, m.
+#: Largest plausible sides of cracked specimens and of outcrops, m.
 SIZES = 1e-3, 100.0
-#: Rocks are stiffer and tougher by orders of magnitude: Pa, and Pa √m. Below, the number is in GPa or MPa.
+#: Least plausible modulus (Pa) and toughness (Pa √m): rocks are stiffer and tougher by orders of magnitude; smaller
+#: numbers are in GPa or MPa.
 LEAST_MODULUS, LEAST_TOUGHNESS = 1e6, 1e3
-#: The lightest pumice weighs more, kg/m³. Below (but for 0, which is meant), the number is in g/cm³ or t/m³.
+#: Least plausible density, below that of the lightest pumice, kg/m³; smaller numbers (except 0) are in g/cm³ or t/m³.
 LEAST_DENSITY = 100.0
-#: A cracked block that lies on a fixed one with a side so many times as long as the block is deep behind it. Contacts
-#: press linearly there; on a rigid base true pressure keeps under its load. K is 2 % off for 1, 1.4 times too large for
-#: 1½, twice for 2, 5 times for 3 (`tests/scene/test_plausibility.py`).
+#: Ratio of side length to block depth above which a cracked block on a fixed one is reported. Contact pressure is
+#: linear there; on a rigid base the true pressure concentrates below the load. K is off by 2 % at a ratio of 1, and too
+#: large by a factor of 1.4 at 1½, 2 at 2, 5 at 3 (`tests/scene/test_plausibility.py`).
 SHALLOW = 1.5
-#: What lies on one another: nearer than this part of the side, over no less than that part of it.
+#: A side lies on another one if their distance is below this part of its length, over at least that part of it.
 LIES_ON, MOST_OF_IT = 1e-6, 0.5
-#: A block that moves is a sliver next to one this many times as large by area: in motion, pairs of such blocks shorten steps
-#: (`dda.step_control.relative_motion`) to less than a third of what those of the large one take.
+#: A moving block is a sliver next to one this many times as large by area: in motion, pairs of such blocks shorten
+#: steps (`dda.step_control.relative_motion`) to less than a third of those of the large one.
 SLIVER = 1e-2
-#: A slope is where the ground at one end of the section stands above that at the other by this part of its height, and
-#: its back is free where that much of what rises is.
+#: A section is a slope if the ground at one end is higher than at the other by this part of its height; its back is
+#: free if that much of the higher side is.
 SLOPES = 0.25
-#: Rock breaks at strains of 0.1 to 1 %, and elements and blocks here are linear elastic.
+#: Largest plausible elastic strain: rock fails at strains of 0.1 to 1 %, and elements and blocks here are linear
+#: elastic.
 LARGEST_STRAIN = 0.05
 
 
 def check_plausible(c: Check) -> None:
-    """Warn of what is likely to be a slip of units or of drawing; for scenes without faults."""
+    """Warn of probable mistakes in units or drawing, for scenes without faults."""
     _materials(c)
     _size(c)
     _near_misses(c)
@@ -70,7 +73,7 @@ def _materials(c: Check) -> None:
                 f"the fracture toughness of {name!r} is {m.k_ic_pa_sqrt_m:g} Pa √m, far below that of any rock",
                 "the unit is Pa √m: 1.2 MPa √m is 1.2e6",
             )
-    # One light material among others of true weight is meant so: walls that only guide.
+    # One light material among others of normal weight is intended: walls that only guide.
     name, heaviest = max(c.tables.materials.items(), key=lambda item: item[1].density_kg_m3)
     if 0 < heaviest.density_kg_m3 < LEAST_DENSITY:
         c.warn(
@@ -105,7 +108,7 @@ def _slivers(c: Check) -> None:
 
 
 def _rounding(c: Check) -> None:
-    """A rounding length that was asked for and that the edges at corners are too short for."""
+    """A specified rounding length for which the edges at corners are too short."""
     if "corner_rounding" not in c.tables.dda.model_fields_set:
         return
     blocks, share = c.blocks, c.tables.dda.corner_rounding
@@ -117,15 +120,15 @@ def _rounding(c: Check) -> None:
     x, y = blocks.vertices[worst]
     c.warn(
         ("dda", "corner_rounding"),
-        f"{len(short)} of {len(rounding)} corners have edges too short for {share:g} times √area and are rounded less: that "
-        f"of {blocks.names[int(blocks.vertex_block[worst])]!r} at x = {x:.4g}, y = {y:.4g} m over {longest[worst]:.2g} m "
-        f"instead of {rounding[worst]:.2g} m",
+        f"{len(short)} of {len(rounding)} corners have edges too short for a rounding length of {share:g} √area and "
+        f"are rounded less: that of {blocks.names[int(blocks.vertex_block[worst])]!r} at x = {x:.4g}, y = {y:.4g} m "
+        f"over {longest[worst]:.2g} m instead of {rounding[worst]:.2g} m",
         f"a corner is rounded over at most {LARGEST_SHARE:g} of its shorter edge",
     )
 
 
 def _free_back(c: Check) -> None:
-    """A slope whose back is no rock: blocks leave it there as well as at the face."""
+    """A slope without rock behind it: blocks can leave it at the back as well as at the face."""
     blocks, t = c.blocks, c.tables
     fixed = fixed_blocks(t, c.drawn)
     if not any(t.loads.gravity_m_s2) or blocks.n_blocks < 3 or not fixed.any() or fixed.all():
@@ -150,14 +153,14 @@ def _free_back(c: Check) -> None:
     x += c.drawn.origin[0]
     c.warn(
         ("geometry",),
-        f"nothing holds the back of the slope: {counted(count, 'block')} that may move {'is' if count == 1 else 'are'} free "
+        f"nothing supports the back of the slope:  {counted(count, 'block')} that may move {'is' if count == 1 else 'are'} free "
         f"at x = {x:.6g} m over {height:.3g} m, and leave the rock there",
         'draw fixed rock behind it ([zones.NAME] fixed = true), or call those edges "guided:y" or "fixed"',
     )
 
 
 def _gravity(c: Check) -> None:
-    """Weight that points to the sky."""
+    """Gravity that points upwards."""
     loads, place = c.tables.loads, ("loads", "gravity_m_s2")
     if not any(loads.gravity_m_s2):
         return
@@ -166,7 +169,7 @@ def _gravity(c: Check) -> None:
 
 
 def _increment(c: Check) -> None:
-    """An advance that crosses a block at a stroke has no path."""
+    """Growth increments that exceed a block's size give no path."""
     increment, blocks = c.tables.growth.increment_m, c.blocks
     if increment is None:
         return
@@ -177,7 +180,7 @@ def _increment(c: Check) -> None:
             c.warn(
                 ("growth", "increment_m"),
                 f"an advance of {increment:g} m is more than all of {blocks.names[b]!r}, which is {largest:.3g} m: a "
-                "tip crosses it at a stroke",
+                "tip crosses it in one step",
                 "is it in metres? Unset, it is a tenth of the shortest crack",
             )
             return
@@ -188,14 +191,14 @@ def _weightless(c: Check) -> None:
     if loads.in_situ is not None and loads.gravity_ramp_s > 0:
         c.warn(
             ("loads", "gravity_ramp_s"),
-            "blocks take their in-situ stress at time 0, when gravity is still 0: nothing bears it, and weight comes "
-            "on afterwards",
+            "blocks take their in-situ stress at time 0, when gravity is still 0: nothing balances it, and weight is "
+            "applied afterwards",
             "leave `gravity_ramp_s` out",
         )
 
 
 def _sudden_weight(c: Check) -> None:
-    """Rock bridges that bear all the weight, and in dynamics up to twice that, in the first steps."""
+    """Rock bridges that carry all the weight, in dynamics up to twice that, in the first steps."""
     t = c.tables
     loads, bridges = t.loads, len(c.cracks.names) - len(t.geometry.cracks)
     tough = all(m.k_ic_pa_sqrt_m is None for m in t.materials.values()) or not t.growth.enabled
@@ -205,9 +208,9 @@ def _sudden_weight(c: Check) -> None:
     if any(loads.gravity_m_s2) and t.dda.dynamic_factor > 0:
         c.warn(
             ("geometry", "dead_ends") if "dead_ends" in c.data["geometry"] else ("loads", "gravity_m_s2"),
-            f"all weight comes on at once, and {bridges} cracks before rock bridges bear up to twice of it: blocks may "
-            "split in the first steps that would stand",
-            'let it come by and by (loads.gravity_ramp_s), begin at rest (dda.equilibrium = "start"), or under the '
+            f"all weight is applied at once, and rock bridges in front of {bridges} cracks carry up to twice as much: "
+            "blocks may split in the first steps that would be stable",
+            'apply it gradually (loads.gravity_ramp_s), begin at rest (dda.equilibrium = "start"), or under the '
             "stress of the "
             "ground (loads.in_situ)",
         )
@@ -218,7 +221,7 @@ def _shallow(c: Check) -> None:
     fixed = fixed_blocks(c.tables, c.drawn)
     base = np.flatnonzero(fixed[blocks.vertex_block])
     cracked = [b for b in np.unique(c.cracks.block).tolist() if not fixed[b]]
-    # In dynamics blocks come down on corners and edges: how they would rest is not what loads their cracks.
+    # In dynamics blocks land on corners and edges: static contact pressure is not what loads their cracks.
     if not (len(base) and cracked) or c.tables.dda.dynamic_factor > 0 or c.tables.run.boundary_stress == "bases":
         return
     starts, ends = blocks.vertices[base], blocks.vertices[blocks.next_vertex[base]]
@@ -230,7 +233,7 @@ def _shallow(c: Check) -> None:
         a, b = blocks.vertices[side[0]], blocks.vertices[side[-1]]
         length = float(np.hypot(*(b - a)))
         if weight.any() and weight @ outward_normal_of(b - a) < 0.5 * length * np.hypot(*weight):
-            continue  # a wall beside it, not the ground that bears it
+            continue  # a wall at its side, not its base
         corners = blocks.vertices[blocks.vertex_start[block] : blocks.vertex_start[block + 1]] - a
         depth = np.abs((b - a)[0] * corners[:, 1] - (b - a)[1] * corners[:, 0]).max() / length
         slenderness = length / float(depth)
@@ -241,16 +244,16 @@ def _shallow(c: Check) -> None:
         others = f", and {len(found) - 1} more sides of cracked blocks" if len(found) > 1 else ""
         c.warn(
             ("geometry",),
-            f"{blocks.names[block]!r} holds cracks and lies on a fixed block with a side of {length:.3g} m, "
-            f"{slenderness:.2g} times as long as the block is deep{others}: it presses on it linearly, and bends where "
-            "it would not on a true base; K of its cracks may be twice what it should be",
-            'say run.boundary_stress = "bases", or draw it deeper '
+            f"{blocks.names[block]!r} contains cracks and lies on a fixed block with a side of {length:.3g} m, "
+            f"{slenderness:.2g} times as long as the block is deep{others}: its base pressure is linear, which bends "
+            "it more than a true base would; K of its cracks may be too large by a factor of two",
+            'set run.boundary_stress = "bases", or draw it deeper '
             f"(less than {SHALLOW:g} times as wide as deep), or cut it by joints into pieces that are",
         )
 
 
 def _overlap(a: np.ndarray, b: np.ndarray, starts: np.ndarray, ends: np.ndarray) -> float:
-    """m of the side from ``a`` to ``b`` along which edges from ``starts`` to ``ends`` (n, 2) lie on it."""
+    """Length (m) of the side from ``a`` to ``b`` on which edges from ``starts`` to ``ends`` (n, 2) lie."""
     along = b - a
     length = float(np.hypot(*along))
     off = [np.abs(along[0] * (p[:, 1] - a[1]) - along[1] * (p[:, 0] - a[0])) / length for p in (starts, ends)]
@@ -305,12 +308,12 @@ def _strain(c: Check) -> None:
         c.warn(
             ("loads", "tractions", at),
             f"its {worst / 1e6:.4g} MPa would strain {softest!r} (E = {modulus / 1e9:.4g} GPa) by "
-            f"{100 * worst / modulus:.3g} %, if the run comes so far",
+            f"{100 * worst / modulus:.3g} %, if the run gets that far",
             "is the modulus, the load or the end of the run wrong?",
         )
 
 
 def _largest(t: SceneTables, traction: TractionTable) -> float:
-    """The largest magnitude of a traction in the run, Pa: its history is linear between its times and the end."""
+    """Largest magnitude of a traction during the run, Pa: its history is linear between its times and the end."""
     history, end = traction_history(traction), t.run.end_time_s
     return max(float(np.hypot(*history.at(time))) for time in (*history.times[history.times < end], end))

@@ -1,4 +1,4 @@
-"""Whether loaded blocks are supported: blocks that move have mass, and loads on blocks that nothing fixes balance."""
+"""Checks of supports: moving blocks must have mass, and loads on unsupported blocks must balance."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from .cross_checks import blocks_at, material_of
 
 
 def check_loads(c: Check) -> None:
-    """Loads on blocks that nothing fixes must balance; blocks that may move must have a mass."""
+    """Loads on blocks without supports must balance; blocks that can move must have mass."""
     if c.drawing is None or c.drawing.blocks is None:
         return
     t, blocks = c.tables, c.blocks
@@ -38,7 +38,7 @@ def check_loads(c: Check) -> None:
             c.refuse(
                 ("materials", name, "density_kg_m3"),
                 f"zone {zone!r} may move but its material {name!r} has no density",
-                "give the density; blocks without mass have no equation of motion",
+                "give the density: blocks without mass have no equation of motion",
             )
     if acts or fixed.any() or t.loads is None or t.run is None or t.dda is None or t.dda.dynamic_factor > 0:
         return
@@ -47,9 +47,9 @@ def check_loads(c: Check) -> None:
             ("loads", "gravity_m_s2"),
             "gravity acts and nothing is fixed: all blocks would fall",
             (
-                "rest it on a zone of its own below ([zones.NAME] fixed = true)"
+                "place it on a fixed zone of its own ([zones.NAME] fixed = true)"
                 if blocks.n_blocks == 1
-                else "fix the zone that carries the others ([zones.NAME] fixed = true)"
+                else "fix the zone that supports the others ([zones.NAME] fixed = true)"
             )
             + ", or set dda.dynamic_factor = 1 if they are to fall",
         )
@@ -61,14 +61,14 @@ def check_loads(c: Check) -> None:
     if np.hypot(*force) > 1e-9 * size or abs(moment) > 1e-9 * size * reach:
         c.refuse(
             ("loads",),
-            f"the loads do not balance and nothing is fixed: at {t.run.end_time_s:g} s they leave a force of "
+            f"the loads do not balance and nothing is fixed: at {t.run.end_time_s:g} s the resultants are a force of "
             f"({force[0]:.4g}, {force[1]:.4g}) N/m and a moment of {moment:.4g} N",
             _balance_hint(t, blocks),
         )
 
 
 def _loads_are_lost(c: Check, fixed: np.ndarray) -> bool:
-    """Refuse a scene whose loads all act on fixed blocks (then True); say which tractions do, or cancel one another."""
+    """Refuse a scene in which all loads act on fixed blocks (then True); report tractions that do, or that cancel."""
     t, blocks = c.tables, c.blocks
     if any(traction.edge not in blocks.edge_names for traction in t.loads.tractions):
         return False
@@ -80,8 +80,8 @@ def _loads_are_lost(c: Check, fixed: np.ndarray) -> bool:
         c.refuse(
             ("zones", zone, "fixed"),
             "every load acts on fixed blocks "
-            f"({', '.join(sorted({c.drawn.zones[b] for at in loaded for b in at}))}): nothing would be strained",
-            "fix what the specimen stands on, never the specimen; a single block is kept in place by loads that balance",
+            f"({', '.join(sorted({c.drawn.zones[b] for at in loaded for b in at}))}): nothing would deform",
+            "fix the base of the specimen, not the specimen itself; a single block stays in place under balanced loads",
         )
         return True
     totals: dict[str, list] = {}
@@ -92,21 +92,23 @@ def _loads_are_lost(c: Check, fixed: np.ndarray) -> bool:
             if len(values) > 1 and np.abs(values.sum(axis=0)).max() <= 1e-9 * np.abs(values).max():
                 c.warn(
                     ("loads", "tractions", k, "edge"),
-                    f"the tractions on {traction.edge!r} cancel one another at {t.run.end_time_s:g} s",
+                    f"the tractions on {traction.edge!r} cancel each other at {t.run.end_time_s:g} s",
                     "the opposite load stands on the opposite edge",
                 )
         if fixed[at].all():
             c.warn(
                 ("loads", "tractions", k, "edge"),
-                f"the edges {traction.edge!r} belong to fixed blocks: their traction does nothing",
+                f"the edges {traction.edge!r} belong to fixed blocks: their traction has no effect",
                 "leave it out, or let the zone move",
             )
     return False
 
 
 def _balance_hint(t: SceneTables, blocks: Blocks) -> str:
-    """How loads can be made to balance: what each edge carries, since an edge as long as its opposite takes its
-    traction, and one of another length takes that traction scaled."""
+    """How to balance the loads: the resultant on each edge.
+
+    An edge as long as the opposite one needs its traction, one of another length that traction scaled.
+    """
     edges = []
     for traction in t.loads.tractions:
         edge = blocks.edges_named(traction.edge)
@@ -115,12 +117,12 @@ def _balance_hint(t: SceneTables, blocks: Blocks) -> str:
         edges.append(f"{traction.edge!r} ({length:.4g} m) carries ({x:.4g}, {y:.4g}) N/m")
     hint = "balance the tractions, each times the length of its edges" + (f": {', '.join(edges)}" if edges else "")
     if blocks.n_blocks == 1:
-        return hint + "; or stand the block on a zone of its own that is fixed"
-    return f"fix the zone that carries the others ([zones.NAME] fixed = true), or {hint}"
+        return hint + "; or place the block on a fixed zone of its own"
+    return f"fix the zone that supports the others ([zones.NAME] fixed = true), or {hint}"
 
 
 def _resultant(t: SceneTables, blocks: Blocks) -> tuple[np.ndarray, float, float]:
-    """Force, moment about the centre, and the sum of magnitudes of all loads at the end of the run."""
+    """Force, moment about the centre, and sum of the magnitudes of all loads at the end of the run."""
     centre = 0.5 * (blocks.vertices.min(axis=0) + blocks.vertices.max(axis=0))
     loads = []
     for traction in t.loads.tractions:

@@ -1,4 +1,4 @@
-"""The tables of a scene file. Every key is declared, bounded and described here, once."""
+"""The tables of a scene file: every key is declared, bounded and described here, once."""
 
 from __future__ import annotations
 
@@ -20,15 +20,13 @@ __all__ = ["SceneTables"]
 class SceneTables(Table):
     """A whole scene."""
 
-    title: str = Field("", description="one line about the scene")
-    geometry: Geometry = Field(description="what is where")
+    title: str = Field("", description="title, one line")
+    geometry: Geometry = Field(description="geometry")
     materials: Annotated[dict[str, MaterialTable], Field(min_length=1)] = Field(description="materials by name")
     zones: dict[str, ZoneTable] = Field({}, description="what each zone of the geometry is made of, by its name")
-    joints: dict[str, JointTable] = Field(
-        {}, description="laws of contacts by name; `default` rules where none is named"
-    )
-    cracks: dict[str, CrackTable] = Field({}, description="cracks by name; `default` rules where none is named")
-    loads: LoadsTable = Field(LoadsTable(), description="what acts on the blocks")
+    joints: dict[str, JointTable] = Field({}, description="joint laws by name; `default` applies where none is named")
+    cracks: dict[str, CrackTable] = Field({}, description="cracks by name; `default` applies where none is named")
+    loads: LoadsTable = Field(LoadsTable(), description="loads on the blocks")
     dda: DdaTable = Field(DdaTable(), description="motion of the blocks")
     ddm: DdmTable = Field(DdmTable(), description="elements of cracked blocks")
     growth: GrowthTable = Field(GrowthTable(), description="growth of cracks")

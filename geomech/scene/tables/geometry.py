@@ -1,4 +1,4 @@
-"""Where rock, cracks and joints are: [geometry]."""
+"""Location of rock, cracks and joints: [geometry]."""
 
 from __future__ import annotations
 
@@ -56,8 +56,8 @@ class EdgeShape(Table):
 class JointShape(Table):
     """[[geometry.joints]]: a joint drawn as a line."""
 
-    name: str = Field(description='name of the joints; the block edges they make are called "joint:NAME"')
-    points: Points = Field(description="a polyline along which rock parts, [[x, y], …], m")
+    name: str = Field(description='name of the joints; the resulting block edges are called "joint:NAME"')
+    points: Points = Field(description="a polyline along which rock is cut, [[x, y], …], m")
     zones: Names = Field((), description="names of the zones that it cuts (unset: all)")
 
 
@@ -65,9 +65,9 @@ DistributionLaw = Literal["constant", "normal", "uniform", "lognormal", "exponen
 
 
 class JointSetShape(Table):
-    """[[geometry.joint_sets]]: joints by statistics."""
+    """[[geometry.joint_sets]]: statistical joint sets."""
 
-    name: str = Field(description='name of the set; the block edges it makes are called "joint:NAME"')
+    name: str = Field(description='name of the set; the resulting block edges are called "joint:NAME"')
     kind: Literal["parallel", "poisson", "discs", "lines", "voronoi"] = Field(
         "parallel",
         description='"parallel" (spacing, length, gap), "poisson" (traces anywhere: p20), "discs" in space cut by the '
@@ -83,13 +83,13 @@ class JointSetShape(Table):
     )
     dip_direction_deg: Finite | None = Field(None, description="azimuth of the dip, clockwise from north, degrees")
     fisher: NotNegative = Field(
-        0.0, description="Fisher's constant of the poles in space about dip and dip direction (0: all alike)"
+        0.0, description="Fisher's constant of the poles in space about dip and dip direction (0: no scatter)"
     )
     spacing_m: Positive | None = Field(None, description='distance between the lines of a "parallel" set, m')
     spacing_deviation_m: NotNegative = Field(0.0, description="its standard deviation, m")
     spacing_law: DistributionLaw = Field("normal", description="its law")
     length_m: Positive | None = Field(
-        None, description='length of traces, diameter of "discs", m (unset: right through)'
+        None, description='length of traces, diameter of "discs", m (unset: right through the rock)'
     )
     length_deviation_m: NotNegative = Field(0.0, description="its standard deviation, m")
     length_law: DistributionLaw = Field("normal", description="its law")
@@ -100,10 +100,10 @@ class JointSetShape(Table):
     p21_per_m: Positive | None = Field(None, description='length of "lines" per area, m/m²')
     p32_per_m: Positive | None = Field(None, description='area of "discs" per volume, m²/m³')
     cell_area_m2: Positive | None = Field(None, description='mean area of "voronoi" cells, m²')
-    region: Points | None = Field(None, description="polygon that holds the set, [[x, y], …], m (unset: all rock)")
+    region: Points | None = Field(None, description="polygon that contains the set, [[x, y], …], m (unset: all rock)")
     zones: Names = Field((), description="names of the zones that the set cuts (unset: all)")
-    ends_on: Names = Field((), description="names of joints or sets before it that its traces end on")
-    ends_share: Annotated[float, Field(ge=0, le=1)] = Field(1.0, description="part of the traces that do so")
+    ends_on: Names = Field((), description="names of earlier joints or sets at which its traces end")
+    ends_share: Annotated[float, Field(ge=0, le=1)] = Field(1.0, description="fraction of the traces that do so")
 
     @model_validator(mode="after")
     def _complete(self):
@@ -138,37 +138,37 @@ Unit = Literal["m", "km", "cm", "mm", "ft", "in"]
 
 
 class TraceFile(Table):
-    """[[geometry.traces]]: a file of traces mapped in the field."""
+    """[[geometry.traces]]: a file of mapped traces."""
 
-    file: str = Field(description="traces mapped in the field, .dxf, .csv or .geojson, relative to the scene file")
+    file: str = Field(description="mapped traces, .dxf, .csv or .geojson, relative to the scene file")
     name: str | None = Field(
         None, description="name of the joints, or cracks, of all its layers (unset: layers' own names)"
     )
     kind: Literal["joint", "crack"] = Field(
-        "joint", description='what its traces are; layers called "zone-NAME", "bolt-NAME", "water", … say it themselves'
+        "joint", description='kind of its traces; layers called "zone-NAME", "bolt-NAME", "water", … have that kind'
     )
     layers: dict[str, str] = Field(
         {},
-        description='what its layers (or sets; wildcards) are: { "J1*" = "joint:bedding", "Rock" = "zone:rock" }, also '
-        '"crack:", "hole", "edge:", "load:", "fixed", "bolt:", "water", "monitor:"; "" leaves it to the '
-        "layer's name; layers that it "
-        "does not mean are left out (unset: all are read)",
+        description="kinds of its layers (or sets; with wildcards):  "
+        '{ "J1*" = "joint:bedding", "Rock" = "zone:rock" }, also "crack:", "hole", "edge:", "load:", '
+        '"fixed", "bolt:", "water", "monitor:"; "" uses the layer\'s name; layers that match no entry are '
+        "left out (unset: all are read)",
     )
     unit: Unit | None = Field(
-        None, description="unit it is drawn in (unset: geometry.unit, else what a DXF says, else m)"
+        None, description="unit of its coordinates (unset: geometry.unit, else the unit in a DXF, else m)"
     )
     zones: Names = Field((), description="names of the zones that its joints cut (unset: all)")
     simplify_m: Positive | None = Field(
         None,
-        description="vertices of its joints and cracks within this distance, m, of the line through the others are removed and reported; "
-        "ends stay connected. Every side of a cracked block, and of a crack, needs at least one element "
-        "(unset: lines as they were digitised)",
+        description="vertices of its joints and cracks within this distance, m, of the line through the others are "
+        "removed and reported; ends stay connected. Every side of a cracked block, and of a crack, needs "
+        "at least one element (unset: lines as digitised)",
     )
     set_property: str = Field("set", description="property of GeoJSON features that names their set")
 
 
 class Geometry(Table):
-    """[geometry]: what is drawn, and how it is cut into blocks."""
+    """[geometry]: the drawing, and how it is cut into blocks."""
 
     model: str | None = Field(
         None,
@@ -177,16 +177,18 @@ class Geometry(Table):
     )
     parameters: dict[str, Finite | str] = Field({}, description="values for the model's parameters, by name")
     zones: Annotated[tuple[ZoneShape, ...], Strict(False)] = Field(
-        (), description="zones drawn here instead of a model"
+        (), description="zones drawn in the scene instead of a model"
     )
-    cracks: Annotated[tuple[CrackShape, ...], Strict(False)] = Field((), description="cracks drawn here")
-    edges: Annotated[tuple[EdgeShape, ...], Strict(False)] = Field((), description="names for block edges drawn here")
+    cracks: Annotated[tuple[CrackShape, ...], Strict(False)] = Field((), description="cracks drawn in the scene")
+    edges: Annotated[tuple[EdgeShape, ...], Strict(False)] = Field(
+        (), description="names for block edges drawn in the scene"
+    )
     joints: Annotated[tuple[JointShape, ...], Strict(False)] = Field((), description="joints that cut rock into blocks")
-    traces: Annotated[tuple[TraceFile, ...], Strict(False)] = Field((), description="files with traces of the field")
+    traces: Annotated[tuple[TraceFile, ...], Strict(False)] = Field((), description="files with mapped traces")
     unit: Unit | None = Field(
         None,
-        description="unit that the model and the traces are drawn in (unset: what DXF and STEP files say, else m; Gmsh "
-        "says mm in every STEP file that it writes)",
+        description="unit of the coordinates of the model and the traces (unset: that in DXF and STEP files, else m; "
+        "Gmsh writes mm in every STEP file)",
     )
     origin: Pair | None = Field(
         None,
@@ -194,7 +196,7 @@ class Geometry(Table):
         "world's (unset: [0, 0], or near the rock where traces lie far away)",
     )
     joint_sets: Annotated[tuple[JointSetShape, ...], Strict(False)] = Field(
-        (), description="joints by statistics, in order: later sets may end on those before"
+        (), description="statistical joint sets, in order: later sets may end on earlier ones"
     )
     seed: Annotated[int, Field(ge=0)] = Field(0, description="seed of the joint sets: the same seed, the same joints")
     section_azimuth_deg: Finite = Field(
@@ -202,22 +204,23 @@ class Geometry(Table):
     )
     dead_ends: Literal["cracks", "trim"] = Field(
         "cracks",
-        description='joints that stop in rock: "cracks" before a rock bridge, or "trim" them off (a trace of which '
-        "nothing is left is reported)",
+        description='joints that end in rock: they become "cracks" in front of a rock bridge, or "trim" removes '
+        "their ends (traces that vanish are reported)",
     )
     shortest_crack_m: NotNegative = Field(0.0, description="dead ends shorter than this are trimmed, m")
     smallest_block_m2: NotNegative = Field(
         0.0,
-        description="smaller blocks join a neighbour across the joint set that comes last, never across a drawn joint, "
-        "m²",
+        description="smaller blocks are merged with a neighbour across the latest joint set, never across a drawn "
+        "joint, m²",
     )
     tolerance_m: Positive | None = Field(
-        None, description="nearer than this, crack ends touch outlines and cracks, m (unset: 1e-6 of the largest side)"
+        None,
+        description="distance below which crack ends touch outlines and cracks, m (unset: 1e-6 of the largest side)",
     )
     chord_tolerance_m: Positive | None = Field(
         None,
-        description="curves of a model or DXF become chords this near to them, and ends of joints and cracks as near to "
-        "a curve join it, m (unset: 1e-4 of the largest side)",
+        description="largest distance of the chords that replace curves of a model or DXF, and of ends of joints and "
+        "cracks that are joined to a curve, m (unset: 1e-4 of the largest side)",
     )
 
     @model_validator(mode="after")

@@ -1,4 +1,4 @@
-"""What acts on the blocks: [loads]."""
+"""Loads on the blocks: [loads]."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from .entries import Finite, Names, NotNegative, Pair, Points, Positive, Table
 
 
 def _refuse_uneven(times: tuple | None, values: tuple | None, name: str) -> None:
-    """A table in time has a value, the key ``name``, for every one of its ascending times."""
+    """A table in time needs a value, the key ``name``, for each of its ascending times."""
     if values is None or times is None or len(values) != len(times) or not values:
         raise ValueError(f"`times_s` and `{name}` need the same number of entries, at least one")
     if any(b <= a for a, b in itertools.pairwise(times)):
@@ -19,9 +19,9 @@ def _refuse_uneven(times: tuple | None, values: tuple | None, name: str) -> None
 
 
 class Timed(Table):
-    """A vector in time: exactly one of value, rate, times with values, or a file; a value may swing."""
+    """A vector in time: exactly one of value, rate, times with values, or a file; a value may be a sinusoid."""
 
-    start_s: NotNegative = Field(0.0, description="the rate, or the sinusoid, counts from this time, s")
+    start_s: NotNegative = Field(0.0, description="start of the rate or the sinusoid, s")
     frequency_hz: Positive | None = Field(
         None, description="the constant is the amplitude of a sinusoid of this frequency, Hz (unset: it is constant)"
     )
@@ -32,7 +32,9 @@ class Timed(Table):
         description="record in a text file, relative to the scene: time and values in a line, with a header "
         '"time [s], x [kPa], y [kPa]" or in SI units',
     )
-    direction: Pair | None = Field(None, description="[x, y] that a record with one column of values is multiplied by")
+    direction: Pair | None = Field(
+        None, description="direction [x, y] by which a record with one column of values is multiplied"
+    )
     times_s: Annotated[tuple[Finite, ...], Strict(False)] | None = Field(
         None, description="times of a piecewise linear history, s, ascending"
     )
@@ -64,11 +66,11 @@ class Timed(Table):
 
 
 class ProfileTable(Table):
-    """How a traction changes along its edge."""
+    """Variation of a traction along its edge."""
 
-    start: Pair = Field(description="one point of the line along which the traction varies, [x, y], m")
-    end: Pair = Field(description="the other, [x, y], m")
-    factors: Pair = Field(description="what the traction is multiplied by at the two points, linear between and beyond")
+    start: Pair = Field(description="start of the line along which the traction varies, [x, y], m")
+    end: Pair = Field(description="its end, [x, y], m")
+    factors: Pair = Field(description="factors on the traction at the two points, linear between and beyond them")
 
     @model_validator(mode="after")
     def _two_points(self):
@@ -81,7 +83,7 @@ class TractionTable(Timed):
     """[[loads.tractions]]: a traction on a named edge."""
 
     edge: str = Field(description="name of the edges it acts on")
-    follower: bool = Field(False, description="true: it turns with its block (unset: it keeps its direction)")
+    follower: bool = Field(False, description="true: it rotates with its block (unset: it keeps its direction)")
     profile: ProfileTable | None = Field(None, description="linear distribution along the edges (unset: uniform)")
     value_pa: Pair | None = Field(None, description="constant traction [x, y], Pa")
     rate_pa_per_s: Pair | None = Field(None, description="traction that grows from zero, [x, y], Pa/s")
@@ -97,7 +99,7 @@ class ForceTable(Timed):
     at: Pair | None = Field(None, description="material point it acts on, [x, y], m")
     point: str | None = Field(None, description='name of the drawn point it acts on, as "load:crane", in place of `at`')
     zone: str | None = Field(None, description="zone of that point, where two zones touch")
-    follower: bool = Field(False, description="true: it turns with its block (unset: it keeps its direction)")
+    follower: bool = Field(False, description="true: it rotates with its block (unset: it keeps its direction)")
     value_n_per_m: Pair | None = Field(None, description="constant force [x, y] per metre of thickness, N/m")
     rate_n_per_m_s: Pair | None = Field(None, description="force that grows from zero, [x, y], N/m per s")
     values_n_per_m: Points | None = Field(None, description="forces [[x, y], …] at `times_s`, N/m")
@@ -114,9 +116,9 @@ class ForceTable(Timed):
 
 
 class ViscousBoundaryTable(Table):
-    """[[loads.viscous_boundaries]]: an edge that lets waves out."""
+    """[[loads.viscous_boundaries]]: an absorbing edge."""
 
-    edge: str = Field(description="name of the edges that let waves out (dynamic runs)")
+    edge: str = Field(description="name of the edges that absorb waves (dynamic runs)")
     times_s: Annotated[tuple[Finite, ...], Strict(False)] | None = Field(
         None, description="times of `incoming_m_per_s`, s, ascending"
     )
@@ -134,11 +136,11 @@ class ViscousBoundaryTable(Table):
 
 
 class MotionTable(Timed):
-    """[[loads.motions]]: a block whose motion is given."""
+    """[[loads.motions]]: a block with prescribed motion."""
 
-    zone: str = Field(description="zone whose blocks are moved, fixed ones too")
-    axes: Literal["x", "y", "xy"] = Field("xy", description="components that are given; the others stay free")
-    turns: bool = Field(False, description="true: the blocks may turn (unset: they keep their direction)")
+    zone: str = Field(description="zone whose blocks have this motion, fixed ones included")
+    axes: Literal["x", "y", "xy"] = Field("xy", description="prescribed components; the others stay free")
+    turns: bool = Field(False, description="true: the blocks may rotate (unset: they do not)")
     displacement_m: Pair | None = Field(None, description="constant displacement [x, y], m (an amplitude)")
     velocity_m_per_s: Pair | None = Field(None, description="velocity [x, y], m/s, from `start_s` on")
     displacements_m: Points | None = Field(None, description="displacements [[x, y], …] at `times_s`, m")
@@ -149,13 +151,14 @@ class MotionTable(Timed):
 
 
 class PointMotionTable(Timed):
-    """[[loads.point_motions]]: a point whose motion is given."""
+    """[[loads.point_motions]]: a point with prescribed motion."""
 
-    at: Pair = Field(description="material point that is moved, [x, y], m")
+    at: Pair = Field(description="material point with this motion, [x, y], m")
     zone: str | None = Field(None, description="zone of that point, where two zones touch")
-    axes: Literal["x", "y", "xy"] = Field("xy", description="components that are given; the others stay free")
+    axes: Literal["x", "y", "xy"] = Field("xy", description="prescribed components; the others stay free")
     stiffness_n_per_m: Positive | None = Field(
-        None, description="stiffness of the spring that moves it, N/m per metre of thickness (unset: exactly)"
+        None,
+        description="stiffness of the spring that moves it, N/m per metre of thickness (unset: the motion is imposed exactly)",
     )
     displacement_m: Pair | None = Field(None, description="constant displacement [x, y], m (an amplitude)")
     velocity_m_per_s: Pair | None = Field(None, description="velocity [x, y], m/s, from `start_s` on")
@@ -171,11 +174,11 @@ class BaseTable(Timed):
 
     frame: Literal["ground", "base"] = Field(
         "ground",
-        description='"ground": the fixed blocks move as the record says; "base": they stay in place, and blocks are subject to minus the '
-        "acceleration",
+        description='"ground": the fixed blocks follow the record; "base": they stay in place, and blocks are '
+        "subject to minus the acceleration",
     )
     baseline: Literal["", "constant", "linear"] = Field(
-        "", description="baseline that is taken off a record or table so that the base comes to rest"
+        "", description="baseline subtracted from a record or table so that the base comes to rest"
     )
     acceleration_m_s2: Pair | None = Field(None, description="constant acceleration [x, y], m/s² (an amplitude)")
     jerk_m_s3: Pair | None = Field(None, description="acceleration that grows from zero, [x, y], m/s³")
@@ -202,17 +205,17 @@ class WaterTableTable(Table):
         None, description='name of the drawn line that is the water table, as "water:high" (unset: "water")'
     )
     unit_weight_n_per_m3: Positive = Field(9810.0, description="unit weight of water, N/m³")
-    dry_edges: Names = Field((), description="names of edges that no water reaches")
+    dry_edges: Names = Field((), description="names of edges that stay dry")
     level_times_s: Annotated[tuple[Finite, ...], Strict(False)] | None = Field(
         None, description="times of `levels_m`, s, ascending"
     )
     levels_m: Annotated[tuple[Finite, ...], Strict(False)] | None = Field(
-        None, description="by how much the whole table is raised at `level_times_s`, m"
+        None, description="rise of the whole table at `level_times_s`, m"
     )
     follows_ground: bool = Field(
         False,
-        description="the table is never above the ground: in front of a slope it follows it (unset: water stands there "
-        "as a lake that presses on the rock)",
+        description="true: the table is never above the ground, which it follows in front of a slope (unset: water "
+        "stands there as a lake that presses on the rock)",
     )
 
     @model_validator(mode="after")
@@ -235,22 +238,20 @@ class WaterTableTable(Table):
 class BoltTable(Table):
     """[[loads.bolts]]: a bolt between two points."""
 
-    name: str = Field("bolt", description="name of the bolt in history.csv (of drawn ones: their own)")
-    start: Pair | None = Field(None, description="its one end, a material point of a block, [x, y], m")
-    end: Pair | None = Field(None, description="its other end, [x, y], m")
+    name: str = Field("bolt", description="name of the bolt in history.csv (unset for drawn ones: their own)")
+    start: Pair | None = Field(None, description="one end, a material point of a block, [x, y], m")
+    end: Pair | None = Field(None, description="the other end, [x, y], m")
     lines: Names = Field(
         (),
-        description='names of drawn lines that are such bolts, with wildcards, as ["bolt:roof", "bolt:wall*"], '
+        description='names of drawn lines for these bolts, with wildcards, such as ["bolt:roof", "bolt:wall*"], '
         "in place of `start` and `end`",
     )
-    zone: str | None = Field(None, description="zone of its one end, where two zones touch")
-    end_zone: str | None = Field(None, description="zone of its other end, where two zones touch")
-    end_in_ground: bool = Field(
-        False, description="true: its other end is fixed to the ground at rest, whatever is there"
-    )
+    zone: str | None = Field(None, description="zone of the start, where two zones touch")
+    end_zone: str | None = Field(None, description="zone of the end, where two zones touch")
+    end_in_ground: bool = Field(False, description="true: its end is fixed to the ground, whatever block is there")
     stiffness_n_per_m: Positive | None = Field(None, description="EA/L, N/m per metre of thickness")
     axial_stiffness_n: Positive | None = Field(
-        None, description="EA of a fully grouted bar, N per metre of thickness; it works at every joint it crosses"
+        None, description="EA of a fully grouted bar, N per metre of thickness; it acts at every joint that it crosses"
     )
     active_length_m: Positive | None = Field(
         None, description="length about a joint over which a grouted bar strains, m"
@@ -258,17 +259,15 @@ class BoltTable(Table):
     pretension_n_per_m: NotNegative = Field(0.0, description="force at installation, N/m")
     yield_force_n_per_m: Positive | None = Field(
         None,
-        description="force at which it yields, N/m (unset: it does not, and `geomech safety` counts what it takes while "
-        "blocks stay where they are)",
+        description="force at which it yields, N/m (unset: never, and `geomech safety` takes its force before the "
+        "blocks move)",
     )
     breaking_strain: Positive | None = Field(None, description="strain at which it breaks (unset: it does not)")
     shear_stiffness_n_per_m: NotNegative = Field(0.0, description="stiffness across its axis (dowel), N/m")
-    shear_strength_n_per_m: Positive | None = Field(
-        None, description="force across its axis that it bears at most, N/m"
-    )
+    shear_strength_n_per_m: Positive | None = Field(None, description="largest force across its axis, N/m")
     start_s: NotNegative = Field(0.0, description="time of its installation, s")
     compression: bool | None = Field(
-        None, description="true: it takes compression too (unset: a grouted bar does, another goes slack)"
+        None, description="true: it also acts in compression (unset: grouted bars do, others go slack)"
     )
 
     @model_validator(mode="after")
@@ -290,12 +289,14 @@ class BoltTable(Table):
 
 
 class ExcavationTable(Table):
-    """[[loads.excavations]]: blocks that are taken out."""
+    """[[loads.excavations]]: blocks to be excavated."""
 
-    time_s: NotNegative = Field(description="when the blocks are taken out, s")
-    zones: Names = Field((), description="zones whose blocks are taken out")
-    polygon: Points | None = Field(None, description="blocks whose centroid lies in it are taken out, [[x, y], …], m")
-    drained: bool = Field(True, description="true: no water presses any more on what lay against them")
+    time_s: NotNegative = Field(description="time of the excavation, s")
+    zones: Names = Field((), description="zones whose blocks are excavated")
+    polygon: Points | None = Field(
+        None, description="polygon: blocks with their centroid inside are excavated, [[x, y], …], m"
+    )
+    drained: bool = Field(True, description="true: water no longer acts on faces that touched them")
 
     @model_validator(mode="after")
     def _something(self):
@@ -307,7 +308,7 @@ class ExcavationTable(Table):
 
 
 class InSituTable(Table):
-    """[loads.in_situ]: the stress in the rock before anything happens."""
+    """[loads.in_situ]: the stress in the rock before the run."""
 
     surface_m: Finite | None = Field(None, description="level of the surface, m: stress grows with the depth below it")
     unit_weight_n_per_m3: NotNegative | None = Field(None, description="unit weight of the rock above, ρg, N/m³")
@@ -335,9 +336,9 @@ class InSituTable(Table):
 
 
 class Rising(Table):
-    """What acts in rock without an end: exactly one of value, rate, or times with values."""
+    """A load on unbounded rock: exactly one of value, rate, or times with values."""
 
-    start_s: NotNegative = Field(0.0, description="the rate counts from this time, s")
+    start_s: NotNegative = Field(0.0, description="start of the rate, s")
     times_s: Annotated[tuple[Finite, ...], Strict(False)] | None = Field(
         None, description="times of `values_pa`, s, ascending"
     )
@@ -359,7 +360,7 @@ Stress = Annotated[tuple[Finite, Finite, Finite], Strict(False)]
 
 
 class RemoteTable(Rising):
-    """[[loads.remote]]: a stress far away in rock without an end."""
+    """[[loads.remote]]: remote stress in unbounded rock."""
 
     value_pa: Stress | None = Field(None, description="constant stress [xx, yy, xy], Pa, tension positive")
     rate_pa_per_s: Stress | None = Field(None, description="stress that grows from zero, [xx, yy, xy], Pa/s")
@@ -372,15 +373,15 @@ class FluidTable(Rising):
     """[[loads.fluids]]: fluid pressure in cracks and holes."""
 
     fills: Annotated[tuple[Literal["cracks", "holes"], ...], Strict(False), Field(min_length=1)] = Field(
-        ("cracks",), description='"cracks", those that grow with them, "holes", or both'
+        ("cracks",), description='"cracks", including their growth, "holes", or both'
     )
     cracks: Names = Field(
-        (), description='names of the cracks that it is pumped into, "*" matches anything (unset: it fills all cracks)'
+        (), description='names of the cracks into which it is pumped, "*" matches anything (unset: it fills all cracks)'
     )
     connected: bool | None = Field(
         None,
         description="true: it also fills cracks connected with those `cracks`, or with holes that it fills, "
-        "now or later (unset: where `cracks` are named)",
+        "now or later (unset: true if `cracks` are named)",
     )
     value_pa: Finite | None = Field(None, description="constant pressure, Pa")
     rate_pa_per_s: Finite | None = Field(None, description="pressure that grows from zero, Pa/s")
@@ -398,16 +399,15 @@ class FluidTable(Rising):
 
 
 class LoadsTable(Table):
-    """[loads]: everything that acts on the rock."""
+    """[loads]: all loads on the rock."""
 
     gravity_m_s2: Pair = Field((0.0, 0.0), description="acceleration of gravity [x, y], m/s²")
-    gravity_ramp_s: NotNegative = Field(0.0, description="gravity grows linearly to its value over this time, s")
+    gravity_ramp_s: NotNegative = Field(0.0, description="time over which gravity grows linearly to its value, s")
     leading_edge: str | None = Field(
         None,
-        description="edges whose traction is the load of a run, positive in compression; of a zone that is moved, what "
-        "it takes "
-        'to move it over their length; "gravity": the weight ρgh of a column as high as what moves (unset: the first '
-        "traction's)",
+        description="edges whose traction is the leading load of a run, positive in compression; for a zone with "
+        'prescribed motion, its reaction over their length; "gravity": the weight ρgh of a column as '
+        "high as the moving blocks (unset: the first traction's)",
     )
     tractions: Annotated[tuple[TractionTable, ...], Strict(False)] = Field((), description="tractions on named edges")
     forces: Annotated[tuple[ForceTable, ...], Strict(False)] = Field((), description="forces on points")
@@ -415,31 +415,31 @@ class LoadsTable(Table):
         (), description="named edges that absorb waves, or let one in"
     )
     water: WaterTableTable | None = Field(None, description="water in all joints below a water table")
-    base: BaseTable | None = Field(None, description="shaking of the base that the blocks stand on")
-    motions: Annotated[tuple[MotionTable, ...], Strict(False)] = Field((), description="blocks whose motion is given")
+    base: BaseTable | None = Field(None, description="shaking of the base")
+    motions: Annotated[tuple[MotionTable, ...], Strict(False)] = Field((), description="blocks with prescribed motion")
     point_motions: Annotated[tuple[PointMotionTable, ...], Strict(False)] = Field(
-        (), description="points whose motion is given"
+        (), description="points with prescribed motion"
     )
     bolts: Annotated[tuple[BoltTable, ...], Strict(False)] = Field((), description="bolts and anchors")
     excavations: Annotated[tuple[ExcavationTable, ...], Strict(False)] = Field(
-        (), description="blocks that are taken out while the run goes on"
+        (), description="blocks excavated during the run"
     )
     in_situ: InSituTable | None = Field(
-        None, description="stress of the rock before the run; displacements count from its equilibrium"
+        None, description="stress of the rock before the run; displacements are relative to its equilibrium"
     )
 
     remote: Annotated[tuple[RemoteTable, ...], Strict(False)] = Field(
         (),
-        description='stresses far away in rock without an end (zones.NAME.body = "plane" or "half-plane"); they add up',
+        description='remote stresses in unbounded rock (zones.NAME.body = "plane" or "half-plane"); they add up',
     )
     fluids: Annotated[tuple[FluidTable, ...], Strict(False)] = Field(
         (),
-        description="pressures of fluids in the cracks and holes of such rock; they add up and, where there are any, lead",
+        description="fluid pressures in the cracks and holes of such rock; they add up and are the leading load if there are any",
     )
 
     @property
     def timed(self) -> list[tuple[tuple, Timed]]:
-        """Every load that is a function of time, with its place in the section."""
+        """Every load that is a function of time, with its path in the section."""
         lists = ("tractions", "forces", "motions", "point_motions")
         found = [((name, k), load) for name in lists for k, load in enumerate(getattr(self, name))]
         return found + ([(("base",), self.base)] if self.base is not None else [])

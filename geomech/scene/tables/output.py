@@ -1,4 +1,4 @@
-"""What a run records and draws: [gauge], [[monitors]], [output], [render]."""
+"""Records and drawings of a run: [gauge], [[monitors]], [output], [render]."""
 
 from __future__ import annotations
 
@@ -29,36 +29,37 @@ class MonitorTable(Table):
 
 
 class OutputTable(Table):
-    """[output]: what a run writes."""
+    """[output]: files of a run."""
 
     every: Annotated[int, Field(ge=1)] = Field(
         1, description="write every n-th cycle; cycles with growth or an event, the first and the last always"
     )
     joints: bool | None = Field(
         None,
-        description="write opening, slip and forces of every joint (joints.csv) and what fixed and guided blocks carry "
-        "(reactions.csv) (unset: in scenes without cracks)",
+        description="write opening, slip and forces of every joint (joints.csv) and the reactions of fixed and "
+        "guided blocks (reactions.csv) (unset: in scenes without cracks)",
     )
     interior: bool = Field(True, description="write stress inside cracked rock (interior.pvd)")
     interior_every: Annotated[int, Field(ge=1)] = Field(
         5,
-        description="write the interior every n-th cycle while cracks grow, every 10 n-th while none does; at the "
-        "first load, with events, before and after a block is cut and at the end always",
+        description="write the interior every n-th cycle while cracks grow, every 10 n-th otherwise; always at the "
+        "first load, with events, before and after a block is cut and at the end",
     )
     checkpoint_every: Annotated[int, Field(ge=0)] | None = Field(
         None,
-        description="store the run for `geomech resume` every n cycles, 0 never (unset: every half minute, less often "
-        "where that takes more than a fiftieth of the time); at the end and after Ctrl-C too, if not 0",
+        description="write a checkpoint for `geomech resume` every n cycles, 0 never (unset: every half minute, less "
+        "often if that takes more than a fiftieth of the time); if not 0, also at the end and after "
+        "Ctrl-C",
     )
     checkpoint_kept_mb: NotNegative = Field(
         16.0,
-        description="a run that has ended keeps its checkpoint, to go on beyond the end, up to this size, MB; one that was "
-        "stopped or failed keeps it whatever its size",
+        description="largest checkpoint that a finished run keeps, to be continued beyond its end, MB; a stopped or "
+        "failed run keeps its checkpoint at any size",
     )
     format: Literal["vtu", "vtkhdf"] = Field(
         "vtu",
-        description='series as "vtu" (a file a cycle, listed by .pvd) or as "vtkhdf" (one file, run.vtkhdf; needs h5py and '
-        "ParaView 5.13 or newer)",
+        description='series as "vtu" (one file per cycle, listed by .pvd) or as "vtkhdf" (one file per series, '
+        "blocks.vtkhdf and so on; needs h5py and ParaView 5.13 or newer)",
     )
     configuration: Literal["reference", "current"] = Field(
         "reference",
@@ -67,17 +68,17 @@ class OutputTable(Table):
 
 
 class RenderTable(Table):
-    """[render]: what pictures show."""
+    """[render]: appearance of pictures."""
 
     component: Literal["xx", "yy", "zz", "xy", "principal_max", "principal_min", "von_mises"] = Field(
-        "yy", description="stress component that pictures show"
+        "yy", description="stress component in pictures"
     )
     width_px: Annotated[int, Field(ge=64)] = Field(800, description="width of pictures, pixels")
     deformation_scale: NotNegative | None = Field(
         None,
-        description="displacements are drawn this much larger (unset: so that they are seen, and blocks not "
-        "inside others)",
+        description="factor on displacements in pictures (unset: chosen to make them visible without overlapping "
+        "blocks)",
     )
-    crack_colour: Literal["birth", "opening"] = Field("birth", description="what the colour of cracks means")
-    gif: bool = Field(True, description="also make a moving picture of the growth")
-    frames_per_second: Positive = Field(10.0, description="pace of the moving picture")
+    crack_colour: Literal["birth", "opening"] = Field("birth", description="meaning of the colour of cracks")
+    gif: bool = Field(True, description="also make a movie of the growth")
+    frames_per_second: Positive = Field(10.0, description="frame rate of the movie")

@@ -1,4 +1,4 @@
-"""What rock, joints and crack faces are made of: [materials], [zones], [joints], [cracks]."""
+"""Properties of rock, joints and crack faces: [materials], [zones], [joints], [cracks]."""
 
 from __future__ import annotations
 
@@ -22,10 +22,10 @@ class MaterialTable(Table):
         None, description='toughness against growth in shear, Pa √m, for growth.criterion = "f" (unset: no such growth)'
     )
     tensile_strength_pa: Positive | None = Field(
-        None, description="tensile strength of intact rock, Pa, for growth.initiation (unset: it does not tear)"
+        None, description="tensile strength of intact rock, Pa, for growth.initiation (unset: no initiation in tension)"
     )
     cohesion_pa: Positive | None = Field(
-        None, description="cohesion of intact rock, Pa, for growth.initiation (unset: it does not shear)"
+        None, description="cohesion of intact rock, Pa, for growth.initiation (unset: no initiation in shear)"
     )
     internal_friction_angle_deg: Annotated[float, Field(ge=0, lt=90)] = Field(
         0.0, description="angle of internal friction of intact rock, used with its cohesion, degrees"
@@ -33,46 +33,49 @@ class MaterialTable(Table):
     plane: Literal["strain", "stress"] = Field("strain", description='"strain" or "stress" in the plane')
     rigid: bool = Field(
         False,
-        description="true: its blocks move without straining; the modulus sets the springs of their contacts only",
+        description="true: its blocks are rigid; the modulus only determines the springs of their contacts",
     )
 
 
 class ZoneTable(Table):
-    """[zones.NAME]: what a zone is made of, and how it is constrained."""
+    """[zones.NAME]: material and constraints of a zone."""
 
     material: str | None = Field(None, description="a name of [materials] (unset: the only one there is)")
     fixed: bool = Field(False, description="true: its blocks do not move")
     guided: Literal["x", "y"] | None = Field(
         None,
-        description='"x" or "y": its blocks move along that axis only and neither turn nor shear, as a press\'s platen',
+        description=(
+            '"x" or "y": its blocks move along that axis only, without rotation or shear, like the platen of a press'
+        ),
     )
     velocity_m_s: Pair | None = Field(
         None, description="velocity of its blocks at the start of a dynamic run, [x, y], m/s (unset: at rest)"
     )
     order: Annotated[int, Field(ge=1, le=8)] | Literal["auto"] = Field(
         1,
-        description="order of the polynomial that is the displacement of each of its blocks, 1 to 8: 1 is uniform strain, "
-        'from 2 on blocks bend, and their faces bear stress that varies along them; "auto": each block begins with 1 and is '
-        "raised where that matters (`dda.order_target`)",
+        description="order of the polynomial that is the displacement of each of its blocks, 1 to 8: 1 is uniform "
+        'strain, from 2 on blocks bend, and the stress varies along their faces; "auto": each block '
+        "begins with 1 and is raised where that matters (`dda.order_target`)",
     )
     mesh_size_m: Positive | None = Field(
         None,
-        description="its blocks are divided by Gmsh into cells of about this size, m, smaller at short edges of their outline; "
-        "displacement and stress pass from cell to cell as in one rock. It takes an `order` of 2 or more (unset: a block is one "
-        "cell)",
+        description="its blocks are divided by Gmsh into cells of about this size, m, smaller at short edges of "
+        "their outline; displacement and stress are continuous between cells. Needs an `order` of 2 or "
+        "more (unset: a block is one cell)",
     )
     cells: Literal["triangles", "quads"] = Field(
-        "triangles", description='what blocks are divided into with `mesh_size_m`: "triangles" or "quads"'
+        "triangles", description='shape of the cells of `mesh_size_m`:  "triangles" or "quads"'
     )
     cell_joint: str | None = Field(
         None,
-        description="a name of [joints]: faces between cells part where they bear its tensile or shear strength, and touch by its "
-        "friction from then on (unset: cells hold together)",
+        description="a name of [joints]: faces between cells separate where the stress reaches its tensile or shear "
+        "strength, and have its friction from then on (unset: cells stay connected)",
     )
     body: Literal["block", "plane", "half-plane"] = Field(
         "block",
-        description='"plane" or "half-plane": rock without an end, of which the zone is the piece that is seen; its holes are '
-        "holes, its outline nothing but the edges called `surface` (cracks alone, loaded by loads.remote and loads.fluids)",
+        description='"plane" or "half-plane": unbounded rock, of which the zone is the displayed part; its holes are '
+        "holes, its outline has no meaning except for the edges called `surface` (cracks only, loaded by "
+        "loads.remote and loads.fluids)",
     )
     surface: str | None = Field(None, description='name of the edges on the straight free surface of a "half-plane"')
 
@@ -81,22 +84,22 @@ class ZoneTable(Table):
         if self.body == "half-plane" and self.surface is None:
             raise ValueError('a "half-plane" needs `surface`, the name of the edges on its free surface')
         if self.mesh_size_m is not None and (self.fixed or self.guided is not None or self.body != "block"):
-            raise ValueError("rock that is `fixed`, `guided` or without an end is not divided: leave `mesh_size_m` out")
+            raise ValueError("rock that is `fixed`, `guided` or unbounded is not divided: leave out `mesh_size_m`")
         if self.cell_joint is not None and self.mesh_size_m is None:
-            raise ValueError("`cell_joint` belongs to cells: say `mesh_size_m`, or leave it out")
+            raise ValueError("`cell_joint` needs cells: give `mesh_size_m`, or leave it out")
         if self.mesh_size_m is not None and self.order in (1, "auto"):
             raise ValueError(
-                "cells take an order of 2 to 8, for uniformly strained ones bend as stiffly as one block: say order = 3"
+                "cells need an order of 2 to 8, because uniformly strained ones are too stiff in bending: set order = 3"
             )
         if self.body != "half-plane" and self.surface is not None:
             raise ValueError('`surface` belongs to body = "half-plane"')
         if self.velocity_m_s is not None and (self.fixed or self.body != "block"):
-            raise ValueError("rock that is `fixed`, or without an end, has no `velocity_m_s`")
+            raise ValueError("rock that is `fixed` or unbounded has no `velocity_m_s`")
         across = 1 if self.guided == "x" else 0
         if self.guided is not None and self.velocity_m_s is not None and self.velocity_m_s[across] != 0:
-            raise ValueError(f"a zone guided along {self.guided} cannot begin with a velocity across it")
+            raise ValueError(f"a zone guided along {self.guided} cannot have an initial velocity across it")
         if self.body != "block" and (self.fixed or self.guided is not None):
-            raise ValueError(f'rock without an end (body = "{self.body}") is neither `fixed` nor `guided`')
+            raise ValueError(f'unbounded rock (body =  "{self.body}") is neither `fixed` nor `guided`')
         return self
 
 
@@ -108,37 +111,33 @@ class JointTable(Table):
     )
     cohesion_pa: NotNegative = Field(
         0.0,
-        description="cohesion, Pa, until the joint slips or parts: its faces hold c l + N tan φ (`geomech safety` keeps it "
+        description="cohesion, Pa, until the joint slips or opens: the shear strength of its faces is c l + N tan φ (`geomech safety` keeps it "
         "on faces that slip before others do, unless a residual strength is given)",
     )
     tensile_strength_pa: NotNegative = Field(
         0.0,
-        description="tensile strength, Pa, until the joint slips or parts: a face parts where its edge, N/l + 6 M/l^2, "
-        "reaches it",
+        description="tensile strength, Pa, until the joint slips or opens: a face breaks when its edge stress, N/l + "
+        "6 M/l^2, reaches it",
     )
     residual_friction_angle_deg: Annotated[float, Field(ge=0, lt=90)] | None = Field(
         None, description="friction angle after slip, degrees (unset: as before)"
     )
-    residual_cohesion_pa: NotNegative = Field(0.0, description="cohesion after slip, Pa, of faces that have not parted")
+    residual_cohesion_pa: NotNegative = Field(0.0, description="cohesion after slip, Pa, of faces that have not opened")
     softening_slip_m: NotNegative = Field(
         0.0, description="slip over which friction and cohesion fall to their residual values, m (0: at once)"
     )
-    dilation_angle_deg: Annotated[float, Field(ge=0, lt=90)] = Field(
-        0.0, description="angle at which sliding faces rise on each other, degrees"
-    )
-    dilation_slip_m: Positive | None = Field(
-        None, description="slip from the start after which they rise no more, m (unset: they go on)"
-    )
+    dilation_angle_deg: Annotated[float, Field(ge=0, lt=90)] = Field(0.0, description="dilation angle, degrees")
+    dilation_slip_m: Positive | None = Field(None, description="slip after which dilation ends, m (unset: never)")
     jrc: Annotated[float, Field(gt=0, le=20)] | None = Field(
-        None, description="joint roughness coefficient of Barton and Bandis (unset: straight Coulomb friction)"
+        None, description="joint roughness coefficient of Barton and Bandis (unset: linear Coulomb friction)"
     )
     jcs_pa: Positive | None = Field(None, description="compressive strength of the joint's wall, Pa, with jrc")
     joint_length_m: Positive | None = Field(
         None, description="length to which jrc and jcs_pa are corrected, m: of the joint's blocks (unset: the sample's)"
     )
-    sample_length_m: Positive = Field(0.1, description="length of the sample that jrc and jcs_pa are of, m")
+    sample_length_m: Positive = Field(0.1, description="length of the sample of jrc and jcs_pa, m")
     stiffness_from_peak_slip: bool = Field(
-        False, description="true: shear stiffness of a rough joint from its strength and the slip of its peak"
+        False, description="true: shear stiffness of a rough joint from its strength and its peak slip"
     )
     normal_stiffness_pa_per_m: Positive | None = Field(
         None,
@@ -149,31 +148,32 @@ class JointTable(Table):
     )
     max_closure_m: Positive | None = Field(
         None,
-        description="closure that a joint tends to, m: it stiffens hyperbolically from normal_stiffness_pa_per_m on",
+        description="maximum closure, m: the joint stiffens hyperbolically from normal_stiffness_pa_per_m on",
     )
     restitution: Annotated[float, Field(ge=0, le=1)] | None = Field(
         None,
-        description="coefficient of restitution of blocks that strike each other, 0 (they stay together) to 1 (elastic), "
-        "at any time step; for rockfall (unset: what springs and time scheme leave, 0.5 to 0.75 of the energy)",
+        description="coefficient of restitution of impacts, 0 (plastic) to 1 (elastic), independent of the time "
+        "step; for rockfall (unset: determined by springs and time scheme, which leave 0.5 to 0.75 of "
+        "the energy)",
     )
     edges: Names = Field(
         (),
-        description='contacts where either edge has one of these names; "*" matches anything, "crack:NAME" is a '
-        "face that a crack's growth has made",
+        description='contacts where either edge has one of these names; "*" matches anything, "crack:NAME" is a face '
+        "made by the growth of a crack",
     )
     between: Annotated[tuple[Annotated[tuple[str, str], Strict(False)], ...], Strict(False)] = Field(
-        (), description="contacts between these pairs of edge names, [[a, b], …]; goes before `edges`"
+        (), description="contacts between these pairs of edge names, [[a, b], …]; takes precedence over `edges`"
     )
 
 
 class CrackTable(Table):
-    """[cracks.NAME]: a crack's faces."""
+    """[cracks.NAME]: faces of a crack."""
 
     aperture: float | str = Field(
         "closed", description='"closed", "slot" (its faces never meet) or the initial aperture in m'
     )
     joint: str | None = Field(
-        None, description="a name of [joints] whose law its faces follow, its wings with friction only (unset: smooth)"
+        None, description="a name of [joints] for the law of its faces; new growth has friction only (unset: smooth)"
     )
 
     @field_validator("aperture", mode="before")

@@ -1,4 +1,4 @@
-"""How blocks are moved, cracks resolved and grown, and for how long: [dda], [ddm], [growth], [run]."""
+"""Settings of the block and crack solvers, of growth and of the run: [dda], [ddm], [growth], [run]."""
 
 from __future__ import annotations
 
@@ -19,27 +19,27 @@ class DdaTable(Table):
         description="steps grow and shrink below `time_step_s` by displacement and open–close iterations",
     )
     dynamic_factor: Annotated[float, Field(ge=0, le=1)] = Field(
-        0.0, description="share of the velocity carried from step to step: 0 static, 1 dynamic"
+        0.0, description="fraction of the velocity carried from step to step: 0 static, 1 dynamic"
     )
     damping: NotNegative = Field(
         0.4,
-        description="damping of dynamic steps, as a fraction of the critical one of a block's lowest vibration (below 0.3 a "
-        "block that should stick may creep; waves that cross many blocks want less)",
+        description="damping of dynamic steps, as a fraction of the critical one of a block's lowest vibration "
+        "(below 0.3 a block that should stick may creep; waves that cross many blocks need less)",
     )
     newmark: Pair | None = Field(
         None,
         description="β and γ of the time scheme: [0.5, 1] is Shi's, [0.25, 0.5] the trapezoidal rule without dissipation "
-        "(unset: that where the ground moves or edges absorb waves, which Shi's eats, and Shi's elsewhere); "
+        "(unset: the latter if the ground moves or edges absorb waves, which Shi's damps, otherwise Shi's); "
         "2β ≥ γ ≥ 0.5 and β ≤ γ − 0.25; γ > 0.5 damps and is of first order, `spectral_radius` damps and is of second",
     )
     spectral_radius: Annotated[float, Field(ge=0, le=1)] | None = Field(
         None,
-        description="in place of `newmark`: a second-order scheme that damps to this part a step what the step does not "
-        "resolve; 1 not at all, 0 at once",
+        description="instead of `newmark`: spectral radius at high frequencies of a second-order scheme with "
+        "dissipation, 1 (no damping) to 0 (damped in one step)",
     )
     equilibrium: Literal["", "start", "loads"] = Field(
         "",
-        description='when static equilibrium is searched for, whatever the time step: "" never, "start" before the run begins, '
+        description='when static equilibrium is computed, independent of the time step:  "" never, "start" before the run begins, '
         '"loads" at every load of a static run too; a run ends if there is none, or only one after blocks have moved by '
         "more than a two-thousandth of their size in addition to elastic displacements",
     )
@@ -56,8 +56,9 @@ class DdaTable(Table):
     )
     max_displacement_ratio: Annotated[float, Field(gt=0, le=1)] = Field(
         0.01,
-        description="largest displacement in a step, in units of half the diagonal of the domain: how finely motion is "
-        "followed (blocks near each other move by no more than a tenth of their size against each other, whatever it is)",
+        description="largest displacement in a step, in units of half the diagonal of the domain: the resolution of "
+        "motion (the relative motion of neighbouring blocks is limited to a tenth of their size in any "
+        "case)",
     )
     normal_penalty_pa: Positive | None = Field(
         None,
@@ -68,34 +69,37 @@ class DdaTable(Table):
     )
     springs: Literal["stiff", "resolved"] = Field(
         "stiff",
-        description='"resolved": contact springs that are unset are in motion no stiffer than the time step resolves '
+        description='"resolved": in motion, unset contact springs are no stiffer than the time step resolves '
         "(100 m/dt², at least E'/2; bonds stay stiff): slopes that move at 5 ms take half the time, and blocks sink by "
         "fractions of a millimetre where they come to rest",
     )
     contact: Literal["penalty", "augmented"] = Field(
         "penalty",
-        description='"penalty": springs hold the faces of blocks; "augmented": forces are added until they neither '
-        "penetrate nor give, however soft the springs",
+        description='"penalty": springs at the faces of blocks; "augmented": augmented Lagrangian, without '
+        "penetration or elastic slip, however soft the springs",
     )
     penetration_tolerance: Annotated[float, Field(gt=0, lt=1)] = Field(
         1e-8,
-        description='what "augmented" contacts may still gape or give, in units of the smallest block\'s size, √area',
+        description=(
+            'tolerance of "augmented" contacts (penetration, elastic slip), in units of the smallest block\'s '
+            "size, √area"
+        ),
     )
     order_target: Annotated[float, Field(gt=0, le=1)] = Field(
         0.01,
         description='blocks of zones with order = "auto" are raised while the next orders would take up more than this part '
-        "of the energy of all such blocks: what they store and move with, and friction takes",
+        "of the energy of all such blocks: elastic and kinetic energy, and friction loss",
     )
     corner_rounding: Annotated[float, Field(ge=0, le=LARGEST_CORNER)] = Field(
         0.01,
-        description="length over which two corners that meet are rounded, in units of the smaller block's size, √area "
-        "(at most a quarter of the shortest edge there): corners that overlap by less slide over each other, by more "
-        "they hold",
+        description="length over which two corners that meet are rounded, in units of the smaller block's size, "
+        "√area (at most a quarter of the shortest edge there): corners that overlap by less slide over "
+        "each other, by more they lock",
     )
     max_open_close_iterations: Annotated[int, Field(ge=1)] = Field(
         60, description="open–close iterations before the time step is cut"
     )
-    max_step_cuts: Annotated[int, Field(ge=0)] = Field(12, description="how often a step is cut before the run fails")
+    max_step_cuts: Annotated[int, Field(ge=0)] = Field(12, description="number of cuts of a step before the run fails")
 
     @field_validator("newmark")
     @classmethod
@@ -121,29 +125,29 @@ class DdmTable(Table):
 
     target_error: Annotated[float, Field(gt=0, lt=1)] | None = Field(
         None,
-        description="relative error of K asked for; order, elements and grading then follow from it, every solution is "
-        "compared with that of a finer mesh, and a run ends where no mesh meets it",
+        description="target for the relative error of K; order, elements and grading follow from it, every solution "
+        "is compared with that of a finer mesh, and a run ends if no mesh meets it",
     )
     order: Annotated[int, Field(ge=0, le=12)] = Field(4, description="polynomial order of the elements")
-    nodes: Literal["chebyshev", "gauss", "equal"] = Field("chebyshev", description="collocation points of an element")
-    elements_per_crack: Annotated[int, Field(ge=1)] = Field(4, description="elements of a straight crack")
-    elements_per_side: Annotated[int, Field(ge=1)] = Field(6, description="elements of a block's side")
+    nodes: Literal["chebyshev", "gauss", "equal"] = Field("chebyshev", description="collocation points per element")
+    elements_per_crack: Annotated[int, Field(ge=1)] = Field(4, description="elements per straight crack")
+    elements_per_side: Annotated[int, Field(ge=1)] = Field(6, description="elements per side of a block")
     grading_ratio: Annotated[float, Field(gt=0, lt=1)] = Field(
         0.3, description="ratio of neighbouring elements at kinks, junctions and mouths"
     )
     grading_layers: Annotated[int, Field(ge=0)] = Field(
         2,
-        description="layers of that grading; kinks get more, by their angle: with 2 they leave 5e-4 in K, with every one more half",
+        description="layers of that grading; kinks get more, depending on their angle: 2 leave an error of 5e-4 in K, each further layer halves it",
     )
     solver: Literal["auto", "dense", "compressed"] = Field(
-        "auto", description="how the equations of cracks and sides are solved: factored, or iterated when they are many"
+        "auto", description="solver of the equations of cracks and sides: factored, or iterative for large numbers"
     )
 
 
 class GrowthTable(Table):
     """[growth]: how cracks grow."""
 
-    enabled: bool = Field(True, description="false: cracks open and slide, none grows")
+    enabled: bool = Field(True, description="false: cracks open and slide without growing")
     criterion: Literal["mts", "g", "s", "f"] = Field(
         "mts",
         description='growth criterion: "mts" maximum tangential stress, "g" maximum energy release rate, "s" minimum '
@@ -154,91 +158,94 @@ class GrowthTable(Table):
     )
     min_increment_m: Positive | None = Field(None, description="shortest advance, m (unset: a tenth of the longest)")
     join_distance: NotNegative = Field(
-        0.5, description="nearer than this to a crack or a surface a tip joins it, in units of the increment"
+        0.5, description="distance below which a tip joins a crack or a surface, in units of the increment"
     )
     join_length_m: Positive | None = Field(
         None,
-        description="the same in metres, such as a grain of the rock: loads at which cracks join and cut through then do not "
-        "depend on the increment (unset: join_distance)",
+        description="the same in metres, such as the grain size: loads at which cracks coalesce and cut through then "
+        "do not depend on the increment (unset: join_distance)",
     )
     approach_steps: NotNegative = Field(
         0.0,
-        description="where a tip comes nearer to another crack than so many increments, all tips of its block take shorter ones, so many "
-        "to what is left; 16 lets loads at which cracks join depend hardly on the increment (0: they do not)",
+        description="within this many increments of another crack, all tips of a block use shorter increments, this "
+        "many for the remaining distance; with 16, coalescence loads hardly depend on the increment (0: "
+        "off)",
     )
     max_passes: Annotated[int, Field(ge=1)] = Field(
         200,
-        description="growth passes of a load step; at rest the load then waits for tips that still run, from where the step "
-        "has led, for up to 200 in all",
+        description="growth passes per load step; in statics the load then waits for tips that still run, for up to "
+        "200 passes in all",
     )
-    correct: bool = Field(
-        True, description="predict each step, then bend it towards where it would go on: paths of second order"
-    )
+    correct: bool = Field(True, description="predictor-corrector growth steps: paths of second order")
     initiation: Literal["", "surface", "everywhere"] = Field(
         "",
-        description='where cracks are born when intact rock reaches its strength: "" nowhere, "surface" on outlines, '
+        description='where cracks initiate when intact rock reaches its strength:  "" nowhere, "surface" on outlines, '
         'holes and crack faces, "everywhere" inside blocks too',
     )
     initiation_distance_m: NotNegative = Field(
         0.0, description="stress is averaged over this distance into the rock, m (0: at the point)"
     )
     initiation_spacing_m: NotNegative = Field(
-        0.0, description="least distance between cracks at birth, m (0: five increments)"
+        0.0, description="least distance between initiating cracks, m (0: five increments)"
     )
     trial_kink_m: NotNegative = Field(
         0.0,
-        description='length of the kinks that criterion "f" tries in all directions, faces in contact and with friction, m '
-        "(0: kinks of no length, on which nothing presses; an increment or less sees shear cracks under compression)",
+        description='length of the trial kinks of criterion "f" in all directions, with contact and friction of '
+        "their faces, m (0: infinitesimal kinks without contact; an increment or less captures shear "
+        "cracks under compression)",
     )
     speed_limit: Annotated[float, Field(gt=0, le=1)] = Field(
         0.4,
-        description="in dynamic runs no tip runs faster than this part of the rock's Rayleigh speed, c_R = (0.87 + 1.12 ν)/(1 + ν)"
+        description="in dynamic runs, limit of the tip velocity relative to the rock's Rayleigh wave speed, c_R = (0.87 + 1.12 ν)/(1 + ν)"
         " √(μ/ρ) (Viktorov 1967)",
     )
 
 
 class RunTable(Table):
-    """[run]: how long a run is, and what stops it."""
+    """[run]: duration of a run, and its stop events."""
 
-    end_time_s: Positive = Field(description="the run ends at this time, s")
+    end_time_s: Positive = Field(description="end time of the run, s")
     stop_at: Annotated[tuple[Literal[STOPS], ...], Strict(False)] = Field(
         ("coalescence", "split"),
-        description="the run ends at the first event of these kinds; a mechanism is when blocks of a static run slide or turn "
-        'without bound, and ends stepping "events" whatever is said here. Of the contacts of two blocks, or the faces of a '
-        "crack, the first that opens is an opening, the last one a parting; the first that slips a slip, the last one a sliding; what meets a closure, what sticks again a stick, "
-        'a lost bond a debonding: these need stepping "events", or run.events',
+        description="the run ends at the first event of these kinds; a mechanism occurs when blocks of a static run "
+        'slide or rotate without limit, and always ends stepping "events". Of the contacts of two '
+        "blocks, or the faces of a crack, the first to open is an opening, the last a parting; the first "
+        "to slip is a slip, the last a sliding; a contact that closes is a closure, one that sticks "
+        'again a stick, a lost bond a debonding: these need stepping "events", or run.events',
     )
     stepping: Literal["fixed", "events"] = Field(
         "fixed",
-        description='static load steps: "fixed", of `dda.time_step_s`; "events", that end at the very load at which a tip '
-        "reaches its toughness, and else are as long as blocks may move in one",
+        description='static load steps: "fixed", of `dda.time_step_s`; "events": they end exactly at the load at '
+        "which a tip reaches its toughness, and are otherwise as long as the allowed motion of blocks "
+        "permits",
     )
     events: Annotated[tuple[Literal["tips", "contacts", "faces"], ...], Strict(False)] | None = Field(
         None,
         description='where steps of stepping "events" end, also listed in events.csv: tips that reach their toughness (always), crack '
         "faces and contacts of blocks that open, close, slip, stick or lose their bond; loads are exact, with more than a hundred "
-        "contacts to 1e-3, and changes in rapid succession are taken together (unset: tips and faces, and contacts of up to 30 blocks). "
+        "contacts to 1e-3, and changes in rapid succession are combined (unset: tips and faces, and contacts of up to 30 blocks). "
         "Fixed and dynamic steps list contacts and faces, too, at the end of their step (unset: they do not)",
     )
     longest_step_s: Positive | None = Field(
         None,
-        description='longest step of stepping "events", s (unset: none but by how far blocks move in it); loads at events do '
-        "not depend on it, the work of friction on crack faces is right to a step",
+        description='longest step of stepping "events", s (unset: limited by the motion of blocks only); loads at '
+        "events do not depend on it, the friction work on crack faces is accurate to a step",
     )
     control: Literal["load", "toughness"] = Field(
         "load",
-        description='"load": loads and imposed motion follow their histories; "toughness": every increment of growth is made '
-        "at the load at which the most driven tip has K_eq = K_Ic, also where that is less than before (time is what the "
-        "loads are functions of, and goes back with them)",
+        description='"load": loads and imposed motion follow their histories; "toughness": every increment of growth '
+        "is made at the load at which the most driven tip has K_eq = K_Ic, also if that is lower than "
+        "before (time, as the argument of the loads, decreases with them)",
     )
     boundary_stress: Literal["contacts", "bases", "springs", "kelvin-springs"] = Field(
         "contacts",
-        description='how contact forces load cracked blocks: "contacts", linear over each face; "bases", the same, but on fixed, '
-        'guided and rigid blocks as on a straight, rigid base that cannot pull; "springs", as point forces '
-        'where they are; "kelvin-springs", as those of the infinite plane (for comparison: most of a force is then lost)',
+        description='how contact forces load cracked blocks: "contacts", linear over each face; "bases", the same, '
+        'but on fixed, guided and rigid blocks as on a straight rigid base without tension; "springs", '
+        'as point forces at the springs; "kelvin-springs", as Kelvin\'s point forces of the infinite '
+        "plane (for comparison: most of a force is then lost)",
     )
     skip: bool = Field(
         True,
-        description="what has not changed since the last pass is not worked out again (false: it is, for comparison; the results "
-        "are the same)",
+        description="reuse everything that has not changed since the last pass (false: recompute it, for comparison; "
+        "the results are the same)",
     )

@@ -1,1 +1,1 @@
-"""Rock cut into blocks by joint traces: noding, faces of the planar graph, dead ends."""
+"""Cutting of rock into blocks by joint traces: noding, faces of the planar graph, dead ends."""

@@ -1,4 +1,4 @@
-"""Crack traces into a noded network: each in its block, mouths on the outline, crossings shared."""
+"""Noded network from crack traces: each in its block, mouths on the outline, shared nodes at crossings."""
 
 from __future__ import annotations
 
@@ -23,9 +23,9 @@ def crack_network(
 ) -> Cracks:
     """The network of cracks ``lines[crack][branch]`` (n, 2) inside ``polygons`` (Shapely; ``loops`` their vertices).
 
-    Each crack goes to the block that holds it; an end within ``tolerance`` of the outline is moved onto it and
-    becomes a mouth; ends within ``tolerance`` of a crack join it; crossings become shared nodes. What cannot be
-    placed is added to ``flaws`` under "cracks".
+    Each crack is assigned to the block that contains it; an end within ``tolerance`` of the outline is moved onto it
+    and becomes a mouth; ends within ``tolerance`` of a crack join it; crossings become shared nodes. Cracks that cannot
+    be placed are added to ``flaws`` under "cracks".
     """
     import shapely
 
@@ -49,11 +49,9 @@ def crack_network(
 
 
 def cutting_cracks(blocks: Blocks, cracks: Cracks) -> list[tuple[int, int]]:
-    """(crack, block) for every crack that closes a ring with those before it and the outline, so that it cuts a piece
-    off its block.
+    """(crack, block) for every crack that closes a ring with earlier ones and the outline, and thus cuts off a piece.
 
-    Every loop of a block counts as one point; a segment that joins two points which are connected already closes a
-    ring.
+    Every loop of a block counts as one point; a segment that joins two points that are already connected closes a ring.
     """
     parent: dict[tuple, tuple] = {}
 
@@ -97,10 +95,10 @@ def _cleaned(k: int, name: str, line: np.ndarray, tolerance: float, flaws: list[
 
 
 def _block_of(k, name, line, zone_names, tree, tolerance, flaws) -> int:
-    """The block that holds the whole of ``line``, or −1 after saying why there is none."""
+    """The block that contains all of ``line``; −1, with a message, if there is none."""
     import shapely
 
-    # Piece by piece: the intersection with a whole line would count a stretch that it runs twice only once.
+    # Segment by segment: the intersection with a whole line would count a part traversed twice only once.
     pieces = shapely.linestrings(np.stack([line[:-1], line[1:]], axis=1))
     length = float(shapely.length(pieces).sum())
     near = np.unique(tree.query(pieces, predicate="intersects")[1])
@@ -118,7 +116,7 @@ def _block_of(k, name, line, zone_names, tree, tolerance, flaws) -> int:
                     "cracks",
                     k,
                     f"crack {name!r} runs along the outline of zone {zone_names[block]!r}",
-                    "blocks part along their outlines anyway: move the crack inside, or leave it out",
+                    "blocks are separate along their outlines anyway: move the crack inside, or leave it out",
                 )
             )
             return -1
@@ -151,7 +149,8 @@ def _block_of(k, name, line, zone_names, tree, tolerance, flaws) -> int:
 
 
 def _mouths(k, name, line, zone, loops, branches, tolerance, flaws):
-    """``line`` with ends near the outline moved onto it, the two flags that say so, and whether the rest is clear."""
+    """``line`` with ends near the outline moved onto it, the two flags that mark these, and whether the rest is
+    clear."""
     line = line.copy()
     mouth = np.zeros(2, bool)
     starts = np.concatenate(loops)
@@ -184,7 +183,7 @@ def _mouths(k, name, line, zone, loops, branches, tolerance, flaws):
 
 
 def _nearest_on(point: np.ndarray, starts: np.ndarray, ends: np.ndarray, tolerance: float) -> tuple[np.ndarray, float]:
-    """The nearest point of segments (n, 2), (n, 2), a vertex where one is within ``tolerance``, and its distance."""
+    """The nearest point of segments (n, 2), (n, 2), a vertex if one is within ``tolerance``, and its distance."""
     corner = np.hypot(*(starts - point).T)
     if corner.min() <= tolerance:
         return starts[np.argmin(corner)], float(corner.min())
@@ -200,7 +199,7 @@ def _nearest_on(point: np.ndarray, starts: np.ndarray, ends: np.ndarray, toleran
 
 
 class _Network:
-    """Nodes merged within the tolerance, and the segments between them while crossings are found."""
+    """Nodes merged within the tolerance, and the segments between them, while crossings are determined."""
 
     def __init__(self, names: Sequence[str], tolerance: float, decimals: int, flaws: list[Flaw]) -> None:
         self.names, self.tolerance, self.decimals, self.flaws = tuple(names), tolerance, decimals, flaws
@@ -210,7 +209,7 @@ class _Network:
         self.segments: list[tuple[int, int, int, int]] = []  # start, end, crack, block
 
     def node(self, point: np.ndarray, block: int, surface: bool = False) -> int:
-        """The node at ``point`` in ``block``: one that is there already, or a new one."""
+        """The node at ``point`` in ``block``, an existing one or a new one."""
         size = 4 * self.tolerance
         i, j = (int(c) for c in np.floor(point / size))
         for di in (0, -1, 1):
@@ -282,7 +281,8 @@ class _Network:
         return sorted(zip(i[keep].tolist(), j[keep].tolist()))
 
     def _join_ends(self, pairs, cuts) -> None:
-        """Nodes that lie on another segment: they divide it. A free end is moved onto it, so that it stays straight."""
+        """Nodes that lie on another segment divide it. A free end is moved onto the segment, so that it stays
+        straight."""
         ends = np.bincount(np.array(self.segments)[:, :2].ravel(), minlength=len(self.points))
         for pair in pairs:
             for i, j in (pair, pair[::-1]):
@@ -322,7 +322,7 @@ class _Network:
                     cut.add(n)
 
     def _refuse_overlap(self, i: int, j: int, crack: int, other: int) -> None:
-        """Nearly parallel segments: refuse them when they lie on one another over more than the tolerance."""
+        """Refuse nearly parallel segments that coincide over more than the tolerance."""
         a, b = (self.points[n] for n in self.segments[i][:2])
         c, d = (self.points[n] for n in self.segments[j][:2])
         along = b - a
@@ -337,11 +337,9 @@ class _Network:
     def _coincident(self, crack: int, other: int) -> None:
         first, second = sorted((crack, other))
         if first == second:
-            message = f"crack {self.names[first]!r} lies on itself over part of its length"
+            message = f"crack {self.names[first]!r} coincides with itself over part of its length"
         else:
-            message = (
-                f"cracks {self.names[first]!r} and {self.names[second]!r} lie on one another over part of their length"
-            )
+            message = f"cracks {self.names[first]!r} and {self.names[second]!r} coincide over part of their length"
         flaw = Flaw("cracks", second, message, "keep one of them, or move them apart")
         if flaw not in self.flaws:
             self.flaws.append(flaw)

@@ -1,8 +1,8 @@
-"""Rock cut into blocks by joint traces: cleaned, noded, faces taken, dead ends kept as cracks.
+"""Cutting of rock into blocks by joint traces: cleaned, noded, faces determined, dead ends kept as cracks.
 
-Everything nearer than the tolerance meets: ends stop on what they nearly reach, near corners become one, a trace that
-nearly passes through a corner passes through it. Outlines stand still; joints give way. What was mended is reported with
-its place. Cuts are exact otherwise: the blocks tile their zones.
+Points closer than the tolerance are joined: ends stop on what they nearly reach, near corners become one, a trace that
+nearly passes through a corner passes through it. Outlines stay in place; joints are moved. Repairs are reported with
+their places. Cuts are exact otherwise: the blocks tile their zones.
 """
 
 from __future__ import annotations
@@ -21,18 +21,18 @@ from .noding import FREE, Drawn, Graph, Mend, noded
 from .partings import Parting, partings, trace_lengths, trimmed_away
 from .planar_arrangement import Arrangement, arrange, following_in, gathered
 
-#: Two edges at a node go straight on when they turn by less than 5° (its cosine): so much a hand-drawn trace may bend.
+#: Two edges at a node continue straight if they turn by less than 5° (its cosine), allowing for hand-drawn traces.
 _STRAIGHT_ON = 0.9962
 
 
 @dataclass(frozen=True, eq=False)
 class Cutting:
-    """What cutting gives.
+    """Result of cutting.
 
-    zone      (n_blocks,)  the zone each block was cut from
+    zone      (n_blocks,)  zone of each block
     mends                  what was moved, joined or left out
     nodes                  {"I": n, "Y": n, "X": n}: ends in rock, junctions of three (T or Y), crossings of four joints
-    partings               of the joints of every name, in their order
+    partings               for the joints of every name, in their order
     """
 
     blocks: Blocks
@@ -55,13 +55,13 @@ def cut(
 ) -> Cutting:
     """Cut ``zones`` along ``joints``.
 
-    Joint ends that stop in rock become cracks ("cracks") or are taken away ("trim"), those shorter than
-    ``shortest_crack`` m always. Blocks smaller than ``smallest_area`` m² join a neighbour, of those with at least half
-    as long a common side as any the one across the least important joint; ``joints`` are listed by importance, and no
-    small block breaks one of the first ``lasting`` ones. Only what is thinner than the tolerance joins across any of
-    them. ``tolerance`` m, default `TOLERANCE` of the largest side. Block edges carry their zone's edge names and the
-    joints' names. Raises ShapeError where a joint or zone has no length, area or number, or ``tolerance`` leaves
-    nothing in place.
+    Joint ends in rock become cracks ("cracks") or are removed ("trim"); those shorter than ``shortest_crack`` (m) are
+    always removed. Blocks smaller than ``smallest_area`` (m²) are merged with a neighbour: of those with at least half
+    the longest common side, the one across the least important joint; ``joints`` are listed by importance, and the
+    first ``lasting`` ones are never removed for a small block. Only pieces thinner than the tolerance are merged across
+    any of them. ``tolerance`` in m, default `TOLERANCE` of the largest side. Block edges have their zone's edge names
+    and the joints' names. Raises ShapeError if a joint or zone has no length or area or is not finite, or if no
+    position satisfies ``tolerance``.
     """
     _refuse_bad(zones, joints)
     every = [np.asarray(loop, dtype=float) for zone in zones for loop in zone.loops]
@@ -70,7 +70,7 @@ def cut(
     decimals = grid_decimals(every)
     tolerance = TOLERANCE * extent_of(every) if tolerance is None else float(tolerance)
     drawn = Drawn.of(zones, joints, origin, decimals)
-    # Crossings keep two digits more than what is drawn: corners of blocks stay on the lines of their neighbours.
+    # Crossings have two digits more than the drawing: corners of blocks stay on the lines of their neighbours.
     decimals += 2
     mends: list[Mend] = []
     grid = 10.0**-decimals
@@ -84,7 +84,7 @@ def cut(
         keep, stay = _kept(
             arrangement, graph, drawn, zone, tolerance, dead_ends, shortest_crack, smallest_area, lasting, mends
         )
-        # Faces stay what they are, but for those between which an edge goes.
+        # Faces do not change, except those between which an edge is removed.
         bounds = (arrangement.left != arrangement.right) & ~_outside(arrangement, zone)
         if keep[bounds].all():
             break
@@ -111,7 +111,7 @@ def cut(
 
 
 def _origin(loops: Sequence[np.ndarray]) -> np.ndarray:
-    """(2,) where to count from: the drawing's own origin, or a round point in the rock when that is far away."""
+    """(2,) local origin: the drawing's own, or a round point in the rock if that is far away."""
     low, high = (
         np.min([loop.min(axis=0) for loop in loops], axis=0),
         np.max([loop.max(axis=0) for loop in loops], axis=0),
@@ -150,8 +150,11 @@ def _refuse_bad(zones: Sequence[Zone], joints: Sequence[Joint]) -> None:
 
 
 def _zones_of(arrangement: Arrangement, joint: np.ndarray, zones: Sequence[Zone], origin: np.ndarray) -> np.ndarray:
-    """(n_faces,) the zone each face lies in, −1 for none. Faces on either side of a ``joint`` edge (a mask) are in one
-    zone: the largest face of each such cluster is looked at."""
+    """(n_faces,) zone of each face, −1 for none.
+
+    Faces on either side of a ``joint`` edge (a mask) are in one zone: the largest face of each such cluster is
+    examined.
+    """
     import shapely
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
@@ -175,7 +178,7 @@ def _zones_of(arrangement: Arrangement, joint: np.ndarray, zones: Sequence[Zone]
 
 
 def _outside(arrangement: Arrangement, zone: np.ndarray) -> np.ndarray:
-    """(n_edges,) True for edges with no rock on either side."""
+    """(n_edges,) True for edges without rock on either side."""
     side = np.append(zone, -1)  # face −1 is outside
     return (side[arrangement.left] < 0) & (side[arrangement.right] < 0)
 
@@ -183,8 +186,11 @@ def _outside(arrangement: Arrangement, zone: np.ndarray) -> np.ndarray:
 def _kept(
     arrangement: Arrangement, graph: Graph, drawn: Drawn, zone, tolerance, dead_ends, shortest, smallest, lasting, mends
 ) -> tuple[np.ndarray, list[Mend]]:
-    """(n_edges,) False for edges to be left out: outside the rock, dead ends too short or unwanted, a joint of blocks
-    too small; and the small blocks that stay."""
+    """(n_edges,) False for edges to be left out; and the small blocks that are kept.
+
+    Left out are edges outside the rock, dead ends that are too short or unwanted, and a joint of blocks that are too
+    small.
+    """
     joint = graph.source >= drawn.n_outlines
     keep = ~(joint & _outside(arrangement, zone))
     dead = arrangement.dead & keep & joint
@@ -202,14 +208,15 @@ def _kept(
 
 
 def _join_small(arrangement: Arrangement, graph: Graph, zone, keep, rank, small, lasting, mends) -> list[Mend]:
-    """Take the edges between each of the ``small`` faces and one neighbour out of ``keep``; those that stay."""
+    """Remove the edges between each of the ``small`` faces and one neighbour from ``keep``; returns the faces that
+    stay."""
     import shapely
 
     side = np.append(zone, -1)
     left, right = arrangement.left, arrangement.right
     span = np.hypot(*(graph.nodes[graph.edges[:, 1]] - graph.nodes[graph.edges[:, 0]]).T)
     inner = keep & (rank >= 0) & (side[left] == side[right]) & (left != right)
-    # The edges of each small face, in order.
+    # Edges of each small face, in order.
     number = np.full(arrangement.n_faces + 1, -1)
     number[small] = np.arange(len(small))
     edge = np.flatnonzero(inner & ((number[left] >= 0) | (number[right] >= 0)))
@@ -227,14 +234,14 @@ def _join_small(arrangement: Arrangement, graph: Graph, zone, keep, rank, small,
         own = own[inner[own]]
         other = left[own] + right[own] - small[k]
         neighbours, which = np.unique(other, return_inverse=True)
-        # A neighbour is as far away as the most important joint between.
+        # The rank of a neighbour is that of the most important joint in between.
         between = np.full(len(neighbours), rank.max() + 1)
         np.minimum.at(between, which, rank[own])
         length = np.bincount(which, weights=span[own], minlength=len(neighbours))
         at = shapely.point_on_surface(shapes[k])
         may = between >= lasting[k]
         if not may.any():
-            # A block joined to it in this round asks again in the next.
+            # A block that a neighbour has joined in this round is examined again in the next.
             stay += [Mend("small block kept", at.x, at.y, float(area[k]))]
             continue
         # Joined across a short side, a thin block would be a needle on its neighbour.
@@ -246,7 +253,7 @@ def _join_small(arrangement: Arrangement, graph: Graph, zone, keep, rank, small,
 
 
 def _short_dead_ends(arrangement: Arrangement, dead: np.ndarray, shortest: float, mends: list[Mend]) -> np.ndarray:
-    """Indices of the ``dead`` edges that hang together over less than ``shortest``."""
+    """Indices of ``dead`` edges that are connected over less than ``shortest``."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
 
@@ -254,7 +261,7 @@ def _short_dead_ends(arrangement: Arrangement, dead: np.ndarray, shortest: float
     edges, nodes = arrangement.edges[index], arrangement.nodes
     ring = np.zeros(len(nodes), bool)
     ring[arrangement.edges[~arrangement.dead].ravel()] = True
-    # Dead ends on either side of a block edge do not hang together: a node on a ring counts once for each of its edges.
+    # Dead ends on either side of a block edge are not connected: a node on a ring counts once for each of its edges.
     rows, side = np.nonzero(~ring[edges])
     columns = edges[rows, side]
     incidence = coo_array((np.ones(len(rows)), (rows, columns)), shape=(len(index), len(nodes))).tocsr()
@@ -269,14 +276,14 @@ def _short_dead_ends(arrangement: Arrangement, dead: np.ndarray, shortest: float
 
 
 def _cracks(arrangement: Arrangement, graph: Graph, drawn: Drawn, inside: np.ndarray) -> Cracks:
-    """Dead ends as cracks: one a run of edges of one joint between ends, junctions and mouths."""
+    """Dead ends as cracks: one per run of edges of one joint between ends, junctions and mouths."""
     block_of = np.full(arrangement.n_faces + 1, -1)
     block_of[inside] = np.arange(len(inside))
     dead = np.flatnonzero(arrangement.dead & (block_of[arrangement.left] >= 0))
     ring = np.zeros(len(graph.nodes), bool)
     ring[graph.edges[~arrangement.dead].ravel()] = True
     chains: list[tuple[int, list[int], int]] = []
-    # Plain lists: walked edge by edge, arrays would take most of the time.
+    # Plain lists: traversed edge by edge, arrays would take most of the time.
     through, owner = (~ring).tolist(), block_of[arrangement.left].tolist()
     dead = dead[np.argsort(graph.source[dead], kind="stable")]
     for own in np.split(dead, np.flatnonzero(np.diff(graph.source[dead])) + 1) if len(dead) else ():
@@ -287,7 +294,7 @@ def _cracks(arrangement: Arrangement, graph: Graph, drawn: Drawn, inside: np.nda
             for node in pair:
                 at.setdefault(node, []).append(e)
         left = set(ends)
-        # Ends first, so that every chain is walked from one end to the other.
+        # Ends first, so that every chain is traversed from one end to the other.
         for node in sorted(at, key=lambda k: (len(at[k]) == 2 and through[k], k)):
             for first in at[node]:
                 if first not in left:
@@ -341,14 +348,14 @@ def _blocks(
     a, b = points - points[before], points[following] - points
     off = np.abs(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0])
     short = np.minimum(np.hypot(*a.T), np.hypot(*b.T))
-    # A neighbour's corner on a straight side is no corner of this block. The turn, over the longer edge, is within the
-    # grid: beside a short edge it may be more, and the corner stays.
+    # A neighbour's corner on a straight side is not a corner of this block. The turn, over the longer edge, is within
+    # the grid; next to a short edge it may be larger, and the corner stays.
     flat = (off <= 8 * grid * short) & (np.einsum("ij,ij->i", a, b) > 0) & (label == label[before])
     kept = np.flatnonzero(~flat)
     owner = np.repeat(np.arange(len(loops)), count)[kept]
     count = np.bincount(owner, minlength=len(loops))
     start = np.concatenate([[0], np.cumsum(count)])
-    # From the lowest, then leftmost vertex on, whatever the order of the joints.
+    # From the lowest, then leftmost vertex on, independent of the order of the joints.
     lowest = np.lexsort((points[kept, 0], points[kept, 1], owner))[start[:-1]]
     place = np.arange(len(kept)) - start[owner] + (lowest - start[:-1])[owner]
     kept = kept[start[owner] + place % count[owner]]
@@ -367,14 +374,17 @@ def _blocks(
 
 
 def _junctions(graph: Graph, drawn: Drawn) -> np.ndarray:
-    """(n_nodes,) what the joints do at each node off the outlines: "I" end, "V" bend or meeting of two ends, "T" one
-    abuts another, "Y" three part ways, "X" cross; "E" for nodes on outlines."""
+    """(n_nodes,) junction of joints at each node off the outlines.
+
+    "I" end, "V" bend or meeting of two ends, "T" one abuts another, "Y" three meet, "X" crossing; "E" for nodes on
+    outlines.
+    """
     joint = graph.source >= drawn.n_outlines
     edges = graph.edges[joint]
     n = len(graph.nodes)
     degree = np.bincount(edges.ravel(), minlength=n)
     kind = np.array(["", "I", "V", "Y", "X"])[np.minimum(degree, 4)]
-    # Of three edges, two in one line: the third abuts on these.
+    # If two of three edges form a line, the third abuts on it.
     node = np.concatenate([edges[:, 0], edges[:, 1]])
     away = graph.nodes[np.concatenate([edges[:, 1], edges[:, 0]])] - graph.nodes[node]
     away /= np.hypot(*away.T)[:, None]
@@ -388,7 +398,7 @@ def _junctions(graph: Graph, drawn: Drawn) -> np.ndarray:
 
 
 def _with_junctions(mends: list[Mend], nodes: np.ndarray, kind: np.ndarray, tolerance: float) -> list[Mend]:
-    """``mends`` with the junction that is now at the place where things met."""
+    """``mends`` with the junction at each place after the repair."""
     met = [k for k, mend in enumerate(mends) if mend.kind in ("near miss", "near corners")]
     if met:
         from scipy.spatial import cKDTree

@@ -1,5 +1,4 @@
-"""Outlines and joint traces made a planar graph: crossings become nodes, whatever is nearer than the tolerance
-meets."""
+"""Planar graph of outlines and joint traces: crossings become nodes, and parts closer than the tolerance are joined."""
 
 from __future__ import annotations
 
@@ -11,28 +10,28 @@ import numpy as np
 
 from ..parts import Flaw, Joint, ShapeError, Zone
 
-#: Moving one near-miss may make another; more rounds than this mean that the tolerance is as large as the blocks.
+#: Moving one near miss may create another; more rounds than this mean that the tolerance is as large as the blocks.
 _ROUNDS = 20
-#: What moves by less than this part of the tolerance moves by round-off, which is nobody's mistake.
+#: Movements below this part of the tolerance are round-off and not reported.
 _REPORTED = 1e-4
 FREE, CORNER = -1, -2
-#: Cells along a side of the coarse grid by which the surroundings of changes are found.
+#: Number of cells along a side of the coarse grid used to find the surroundings of changes.
 _CELLS = 256
 
 
 class Mend(NamedTuple):
-    """Something found and mended, by its ``kind``; where, m; ``size`` m (m² of blocks); the ``junction`` that is there
+    """A repaired defect: its ``kind``, its location (m), its ``size`` (m; m² for blocks), and the ``junction`` there
     now.
 
-    "near corners"      ends, bends or crossings nearer than the tolerance: made one, at an outline's corner where one
-                        is
-    "near miss"         an end or a crossing nearer than that to a trace: an end is moved onto it, the trace is led
-                        through a crossing
+    "near corners"      ends, bends or crossings closer than the tolerance: made one, at a corner of an outline if there
+                        is one
+    "near miss"         an end or a crossing closer than the tolerance to a trace: an end is moved onto it, the trace is
+                        led through a crossing
     "duplicate"         traces on one another: the first of them stays
-    "dead end"          a trace that goes on beyond its last crossing by less than the shortest crack: taken away
-    "trimmed away"      a trace of which nothing is left where dead ends are trimmed
-    "sliver"            a block too small: joined to a neighbour across its least important long joint
-    "small block kept"  one that only a drawn joint, or an outline, parts from its neighbours: it stays
+    "dead end"          a trace that extends beyond its last crossing by less than the shortest crack: removed
+    "trimmed away"      a trace of which nothing is left when dead ends are trimmed
+    "sliver"            a block that is too small: merged with a neighbour across its least important long joint
+    "small block kept"  one that only a drawn joint, or an outline, separates from its neighbours: kept
     """
 
     kind: str
@@ -44,13 +43,13 @@ class Mend(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Drawn:
-    """All segments as drawn: outlines first. ``source`` counts polylines; joints from ``n_outlines`` on."""
+    """All segments as drawn: outlines first. ``source`` numbers polylines; those from ``n_outlines`` on are joints."""
 
     start: np.ndarray
     end: np.ndarray
     source: np.ndarray
     names: np.ndarray  # (n_sources,) of edges on each source
-    rank: np.ndarray  # (n_sources,) the place of its joint among all, −1 of outlines
+    rank: np.ndarray  # (n_sources,) number of its joint, −1 for outlines
     n_outlines: int
 
     @classmethod
@@ -65,7 +64,7 @@ class Drawn:
                 starts.append(loop)
                 ends.append(np.roll(loop, -1, axis=0))
                 own = zone.edge_names[k][: len(loop)] if zone.edge_names is not None else [""] * len(loop)
-                # Every edge of an outline is a source of its own: its name differs.
+                # Every edge of an outline is a source of its own, because names differ.
                 sources.append(len(names) + np.arange(len(loop)))
                 names += own
         n_outlines = len(names)
@@ -92,14 +91,14 @@ class Drawn:
 
 
 def _clipped(start: np.ndarray, end: np.ndarray, corners: np.ndarray, decimals: int) -> tuple[np.ndarray, np.ndarray]:
-    """Segments cut to a box a little larger than the rock: what lies outside need not be crossed."""
+    """Segments clipped to a box slightly larger than the rock: crossings outside are not needed."""
     low, high = corners.min(axis=0), corners.max(axis=0)
     room = 0.01 * float((high - low).max())
     low, high = low - room, high + room
     along = end - start
     with np.errstate(divide="ignore", invalid="ignore"):
         first, second = (low - start) / along, (high - start) / along
-    # Along an axis the other coordinate is inside for good or never.
+    # Parallel to an axis, the other coordinate is always or never inside.
     level = along == 0
     outside = (level & ((start < low) | (start > high))).any(axis=1)
     enter = np.where(level, -np.inf, np.minimum(first, second)).max(axis=1).clip(0, 1)
@@ -112,9 +111,11 @@ def _clipped(start: np.ndarray, end: np.ndarray, corners: np.ndarray, decimals: 
 
 @dataclass(frozen=True, eq=False)
 class Graph:
-    """Noded: edges meet at nodes only. ``source`` (n_edges,) as in `Drawn`, the first where several lie on one another;
-    ``home`` (n_nodes,) the outline edge (a source) that each node lies on, `FREE` off outlines, `CORNER` where two
-    meet."""
+    """Noded graph: edges meet at nodes only.
+
+    source   (n_edges,) as in `Drawn`, the first if several coincide
+    home     (n_nodes,) outline edge (a source) on which each node lies, `FREE` off outlines, `CORNER` where two meet
+    """
 
     nodes: np.ndarray
     edges: np.ndarray
@@ -128,9 +129,9 @@ class Graph:
 
 
 def noded(drawn: Drawn, tolerance: float, decimals: int, mends: list[Mend]) -> Graph:
-    """The graph of ``drawn`` in which whatever is within ``tolerance`` m meets; what was moved goes to ``mends``."""
+    """The graph of ``drawn`` with everything within ``tolerance`` (m) joined; repairs are added to ``mends``."""
     start, end, source = drawn.start, drawn.end, drawn.source
-    # What has not changed since the round before need not be looked at again.
+    # Parts unchanged since the previous round are not examined again.
     fresh = np.ones(len(start), bool)
     for _ in range(_ROUNDS):
         graph, fresh = _crossed(start, end, source, fresh, drawn.n_outlines, decimals, mends)
@@ -143,7 +144,7 @@ def noded(drawn: Drawn, tolerance: float, decimals: int, mends: list[Mend]) -> G
             Flaw(
                 "joints",
                 0,
-                f"things within {tolerance:g} m of one another do not come to rest",
+                f"joining everything within {tolerance:g} m does not converge",
                 "take a smaller tolerance",
             )
         ]
@@ -151,7 +152,7 @@ def noded(drawn: Drawn, tolerance: float, decimals: int, mends: list[Mend]) -> G
 
 
 def _crossed(start, end, source, fresh, n_outlines, decimals, mends) -> tuple[Graph, np.ndarray]:
-    """All crossings made nodes, and which edges are of ``fresh`` segments. What merely touches meets in `_met`."""
+    """All crossings made nodes, and which edges belong to ``fresh`` segments. Touching parts are joined in `_met`."""
     one, other, t, u = _crossings(start, end, source < n_outlines, fresh, 10.0 ** (3 - decimals))
     at = np.round(start[one] + t[:, None] * (end[one] - start[one]), decimals) + 0.0
     n = len(start)
@@ -165,13 +166,13 @@ def _crossed(start, end, source, fresh, n_outlines, decimals, mends) -> tuple[Gr
     edges = np.sort(np.stack([node[:-1], node[1:]], axis=1)[same], axis=1)
     segment = segment[:-1][same]
     of, new = source[segment], fresh[segment]
-    # The first source stands for an edge that several share: outlines before joints, joints as they are listed.
+    # The first source represents an edge shared by several: outlines before joints, joints as listed.
     key = edges[:, 0] * len(nodes) + edges[:, 1]
     rank = np.lexsort((of, key))
     key, edges, of, new = key[rank], edges[rank], of[rank], new[rank]
     first = np.ones(len(edges), bool)
     first[1:] = key[1:] != key[:-1]
-    # Two joints on one another, or one on an outline; zones share outlines by right.
+    # Two coinciding joints, or a joint on an outline; zones may share outlines.
     again = np.unique(edges[~first & (of >= n_outlines)], axis=0)
     for p, q in nodes[again]:
         x, y = (0.5 * (p + q)).tolist()
@@ -187,7 +188,7 @@ def _crossed(start, end, source, fresh, n_outlines, decimals, mends) -> tuple[Gr
 
 
 def _distinct(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The distinct rows of ``points`` (n, 2), by x, then y, and which of them each row is."""
+    """The distinct rows of ``points`` (n, 2), sorted by x, then y, and the number of each row among them."""
     order = np.lexsort((points[:, 1], points[:, 0]))
     ranked = points[order]
     new = np.ones(len(points), bool)
@@ -198,8 +199,10 @@ def _distinct(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _crossings(start: np.ndarray, end: np.ndarray, outline: np.ndarray, fresh: np.ndarray, roundoff: float):
-    """Pairs of segments, one of them ``fresh`` at least, that cross inside both, and where along each (0 to 1): (one,
-    other, t, u). Outlines that lie on one another but for ``roundoff`` m do not cross."""
+    """Pairs of segments, at least one of them ``fresh``, that cross inside both, and the position along each (0 to 1).
+
+    Returns (one, other, t, u). Outlines that coincide to within ``roundoff`` (m) do not cross.
+    """
     one, other = _near_pairs(start, end, fresh)
     p, r = start[one], end[one] - start[one]
     q, s = start[other], end[other] - start[other]
@@ -213,7 +216,7 @@ def _crossings(start: np.ndarray, end: np.ndarray, outline: np.ndarray, fresh: n
         away = np.maximum(np.abs(gap[:, 0] * r[:, 1] - gap[:, 1] * r[:, 0]),
                           np.abs((gap + s)[:, 0] * r[:, 1] - (gap + s)[:, 1] * r[:, 0]))  # fmt: skip
         cross &= ~(outline[one] & outline[other] & (away <= roundoff * np.hypot(*r.T)))
-    # Straight lines from one point meet nowhere else, whatever round-off says.
+    # Straight lines from one point meet nowhere else, despite round-off.
     for a in (start, end):
         for b in (start, end):
             cross &= (a[one] != b[other]).any(axis=1)
@@ -221,14 +224,14 @@ def _crossings(start: np.ndarray, end: np.ndarray, outline: np.ndarray, fresh: n
 
 
 def _near_pairs(start: np.ndarray, end: np.ndarray, fresh: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Pairs of segments, one of them ``fresh``, whose boxes meet, piece by piece: the box of a long slanting joint
-    would hold half the rock."""
+    """Pairs of segments, one of them ``fresh``, whose boxes intersect, piece by piece: the box of a long inclined joint
+    would contain half the rock."""
     import shapely
 
     along = end - start
     length = np.hypot(*along.T)
     area = max(float(np.prod(np.ptp(np.concatenate([start, end]), axis=0))), 1e-300)
-    # Pieces as long as joints are apart on average meet a handful of others each.
+    # Pieces as long as the mean spacing of joints intersect a few others each.
     count = np.maximum(1, np.ceil(length * length.sum() / (2 * area)).astype(int))
     count = np.minimum(count, 1000)
     owner = np.repeat(np.arange(len(start)), count)
@@ -256,7 +259,7 @@ def _vicinity(low: np.ndarray, high: np.ndarray, fresh: np.ndarray, margin: floa
     cell = max(float((high - corner).max()) / _CELLS, 1e-300)
     first, last = ((low - margin - corner) / cell).astype(int), ((high + margin - corner) / cell).astype(int)
     first, last = first.clip(0, _CELLS), last.clip(0, _CELLS)
-    # Every box adds one to its cells: at its corners now, everywhere after summing along both axes.
+    # Every box adds one to its cells: at its corners first, everywhere after summing along both axes.
     marks = np.zeros((_CELLS + 2, _CELLS + 2), int)
     (a, b), (c, d) = first[fresh].T, last[fresh].T + 1
     for rows, columns, sign in ((a, b, 1), (c, d, 1), (a, d, -1), (c, b, -1)):
@@ -269,8 +272,10 @@ def _vicinity(low: np.ndarray, high: np.ndarray, fresh: np.ndarray, margin: floa
 
 
 def _met(graph: Graph, fresh: np.ndarray, n_outlines: int, tolerance: float, roundoff: float, mends: list[Mend]):
-    """The segments (start, end, source, fresh) after everything within ``tolerance`` of something else was made to meet
-    it; None when nothing was. Edges that are not ``fresh`` have been looked at before."""
+    """Segments (start, end, source, fresh) after joining everything within ``tolerance``; None if nothing was joined.
+
+    Edges that are not ``fresh`` have been examined before.
+    """
     import shapely
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
@@ -280,7 +285,7 @@ def _met(graph: Graph, fresh: np.ndarray, n_outlines: int, tolerance: float, rou
     n = len(nodes)
     settled = np.zeros(n, bool)
     pairs = cKDTree(nodes).query_pairs(tolerance, output_type="ndarray").reshape(-1, 2)
-    # Corners stand still, what lies on an outline moves along it only.
+    # Corners do not move; points on an outline move along it only.
     one, other = home[pairs[:, 0]], home[pairs[:, 1]]
     pairs = pairs[
         (one == FREE)
@@ -311,8 +316,8 @@ def _met(graph: Graph, fresh: np.ndarray, n_outlines: int, tolerance: float, rou
     fresh = fresh | settled[edges].any(axis=1)
     node, edge = _near_edges(nodes, edges, np.flatnonzero(~settled), fresh, tolerance)
     near = ~(nodes[edges[edge]] == nodes[node][:, None]).all(axis=2).any(axis=1)
-    # A node on an outline divides it wherever round-off has put it; other outlines are led through it only where it
-    # lies on them, as a brick's corner does on the course below.
+    # A node on an outline divides it wherever round-off has put it; other outlines are led through it only if it lies
+    # on them, as a brick's corner does on the course below.
     foreign = np.flatnonzero((source[edge] < n_outlines) & firm[node] & (home[node] != source[edge]))
     lines = shapely.linestrings(nodes[edges[edge[foreign]]])
     near[foreign] &= shapely.distance(shapely.points(nodes[node[foreign]]), lines) <= roundoff
@@ -323,14 +328,14 @@ def _met(graph: Graph, fresh: np.ndarray, n_outlines: int, tolerance: float, rou
         along = b - a
         foot = a + float((nodes[k] - a) @ along / (along @ along)) * along
         away = float(np.hypot(*(foot - nodes[k])))
-        # Beside an end it is a matter of corners, which have met where they may.
+        # Near an end, corners are concerned, which have been joined where possible.
         beside = min(float((foot - a) @ along), float((b - foot) @ along)) <= tolerance * float(np.hypot(*along))
         if settled[k] or beside:
             continue
         if not firm[k] and (source[e] < n_outlines or degree[k] == 1):
             nodes[k] = foot
             settled[k] = True
-        # The edge is led through the node; one that has been moved onto it lies on it but for round-off.
+        # The edge is led through the node; a node that has been moved onto it lies on it to round-off.
         through.setdefault(e, []).append(k)
         if away > _REPORTED * tolerance:
             x, y = nodes[k].tolist()
@@ -343,8 +348,10 @@ def _met(graph: Graph, fresh: np.ndarray, n_outlines: int, tolerance: float, rou
 def _led_through(
     nodes: np.ndarray, edges: np.ndarray, source: np.ndarray, settled: np.ndarray, through: dict[int, list[int]]
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """The segments (start, end, source, fresh) of ``edges``, some of which are led ``through`` nodes (edge → nodes); those
-    with a ``settled`` node are fresh."""
+    """Segments (start, end, source, fresh) of ``edges``, some led ``through`` nodes (edge → nodes).
+
+    Those with a ``settled`` node are fresh.
+    """
     starts, ends, sources = [], [], []
     whole = np.ones(len(edges), bool)
     whole[list(through)] = False
@@ -366,8 +373,10 @@ def _led_through(
 def _near_edges(
     nodes: np.ndarray, edges: np.ndarray, wanted: np.ndarray, fresh: np.ndarray, tolerance: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """``wanted`` nodes and edges within ``tolerance`` that do not end there: (node, edge); one of them belongs to what
-    is ``fresh``, a mask of edges, at least."""
+    """``wanted`` nodes and edges within ``tolerance`` that do not end there: (node, edge).
+
+    At least one of them belongs to ``fresh``, a mask of edges.
+    """
     import shapely
 
     ends = nodes[edges]

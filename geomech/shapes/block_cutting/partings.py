@@ -1,4 +1,4 @@
-"""What became of each trace that cuts rock: how much of it parts blocks, and which were trimmed away whole."""
+"""Fate of each trace that cuts rock: the length along which it separates blocks, and traces trimmed away completely."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from .noding import Drawn, Graph, Mend
 
 
 class Parting(NamedTuple):
-    """What became of the joints of one ``name``: how many ``traces`` reach into the rock, how many of these are
-    ``cutting``, all along or in part, and the ``length`` along which they part blocks, m."""
+    """Fate of the joints of one ``name``: the number of ``traces`` that reach into the rock, the number of those that
+    are ``cutting`` (completely or in part), and the ``length`` along which they separate blocks, m."""
 
     name: str
     traces: int
@@ -21,23 +21,23 @@ class Parting(NamedTuple):
 
 
 def trace_lengths(graph: Graph, drawn: Drawn, among: np.ndarray) -> np.ndarray:
-    """(n_sources,) m of each outline edge and each trace in the edges ``among`` all (a mask)."""
+    """(n_sources,) m: length of each outline edge and each trace in the edges ``among`` (a mask)."""
     span = np.hypot(*(graph.nodes[graph.edges[:, 1]] - graph.nodes[graph.edges[:, 0]]).T)
     return np.bincount(graph.source[among], weights=span[among], minlength=len(drawn.names))
 
 
 def trimmed_away(drawn: Drawn, reach: np.ndarray, left: np.ndarray) -> list[Mend]:
-    """The traces of which ``reach`` m lay in the rock and nothing is ``left``."""
+    """Traces of which ``reach`` (m) lay in the rock and nothing is ``left``."""
     gone = np.flatnonzero((reach > 0) & (left == 0))
     gone = gone[gone >= drawn.n_outlines]
-    # Pieces stand in the order of their traces; a trace is reported at its middle one.
+    # Pieces are in the order of their traces; a trace is reported at its middle one.
     middle = (np.searchsorted(drawn.source, gone) + np.searchsorted(drawn.source, gone, "right")) // 2
     at = 0.5 * (drawn.start[middle] + drawn.end[middle])
     return [Mend("trimmed away", x, y, size) for (x, y), size in zip(at.tolist(), reach[gone].tolist(), strict=True)]
 
 
 def partings(drawn: Drawn, names: Sequence[str], reach: np.ndarray, cutting: np.ndarray) -> tuple[Parting, ...]:
-    """Of the joints ``names``, of whose traces ``reach`` m lie in the rock and ``cutting`` m part blocks."""
+    """For the joints ``names``, of whose traces ``reach`` (m) lie in the rock and ``cutting`` (m) separate blocks."""
     rank = drawn.rank
     return tuple(
         Parting(name, int(((reach > 0) & (rank == place)).sum()), int(((cutting > 0) & (rank == place)).sum()),

@@ -1,4 +1,4 @@
-"""The faces of a planar graph: half-edges, cycles, dead ends; arrays all the way, for hundreds of thousands of
+"""Faces of a planar graph: half-edges, cycles, dead ends; with arrays throughout, for hundreds of thousands of
 edges."""
 
 from __future__ import annotations
@@ -14,12 +14,12 @@ class Arrangement:
 
     nodes      (n_nodes, 2)   m
     edges      (n_edges, 2)   node indices; edges meet at nodes only
-    left, right (n_edges,)    the face on either side of each edge, −1 outside all; the same on both sides of a dead end
-    loop_node  (n,)           the nodes of all loops, loop after loop, face after face: of each face the outline
+    left, right (n_edges,)    face on either side of each edge, −1 outside all; equal on both sides of a dead end
+    loop_node  (n,)           nodes of all loops, loop after loop, face after face: of each face the outline
                               (counter-clockwise), then its holes (clockwise)
     loop_edge  (n,)           the edge that leaves each of them along the loop
-    loop_start (n_loops + 1,) where each loop begins
-    face_loop  (n_faces + 1,) the first loop of each face
+    loop_start (n_loops + 1,) start of each loop
+    face_loop  (n_faces + 1,) first loop of each face
     """
 
     nodes: np.ndarray
@@ -37,11 +37,11 @@ class Arrangement:
 
     @property
     def dead(self) -> np.ndarray:
-        """(n_edges,) True for edges with one face on both sides: dead ends, lone traces, bridges between loops."""
+        """(n_edges,) True for edges with the same face on both sides: dead ends, lone traces, bridges between loops."""
         return self.left == self.right
 
     def areas_and_rims(self) -> tuple[np.ndarray, np.ndarray]:
-        """(n_faces,) m²; (n_faces,) m, the length of all loops of each face."""
+        """(n_faces,) m² area; (n_faces,) m length of all loops of each face."""
         if not self.n_faces:
             return np.empty(0), np.empty(0)
         first = self.loop_start[self.face_loop[:-1]]
@@ -50,7 +50,7 @@ class Arrangement:
         return np.add.reduceat(_areas(self.nodes, self.loop_node, self.loop_start), self.face_loop[:-1]), rim
 
     def polygons(self, faces: np.ndarray | None = None) -> np.ndarray:
-        """(n_faces,) Shapely polygons; of ``faces`` alone where given."""
+        """(n_faces,) Shapely polygons; only of ``faces`` if given."""
         if faces is None:
             return _polygons(self.nodes, self.loop_node, self.loop_start, self.face_loop)
         loop_start, loops = gathered(self.face_loop, faces)
@@ -58,8 +58,10 @@ class Arrangement:
         return _polygons(self.nodes, self.loop_node[flat], start, loop_start)
 
     def only(self, keep: np.ndarray) -> Arrangement:
-        """Without the edges that are not to ``keep`` (a mask) and nodes that no edge is left at. Those edges must be
-        dead ends, or bound faces that are not looked at any more: the other faces stay what they are."""
+        """Without the edges outside ``keep`` (a mask), and without isolated nodes.
+
+        The removed edges must be dead ends, or bound faces that are no longer used: the other faces do not change.
+        """
         used, flat = np.unique(self.edges[keep].ravel(), return_inverse=True)
         node, edge = np.full(len(self.nodes), -1), np.cumsum(keep) - 1
         node[used] = np.arange(len(used))
@@ -75,7 +77,7 @@ class Arrangement:
 
 
 def dead_ends(edges: np.ndarray, n_nodes: int) -> np.ndarray:
-    """(n_edges,) True for edges that an end of degree one leads to, taken away again and again."""
+    """(n_edges,) True for edges at nodes of degree one, removed repeatedly."""
     dead = np.zeros(len(edges), bool)
     degree = np.bincount(edges.ravel(), minlength=n_nodes)
     while True:
@@ -87,8 +89,7 @@ def dead_ends(edges: np.ndarray, n_nodes: int) -> np.ndarray:
 
 
 def arrange(nodes: np.ndarray, edges: np.ndarray) -> Arrangement:
-    """Faces of the graph with ``edges`` (n, 2) between ``nodes`` (n, 2), which must cross nowhere else and lie on one
-    another nowhere."""
+    """Faces of the graph with ``edges`` (n, 2) between ``nodes`` (n, 2); edges must neither cross nor coincide."""
     ring = ~dead_ends(edges, len(nodes))
     origin, following, first = _traced(nodes, edges[ring])
     # An edge with the same cycle on both sides is a bridge between rings.
@@ -104,7 +105,7 @@ def arrange(nodes: np.ndarray, edges: np.ndarray) -> Arrangement:
     face_of_cycle = np.full(len(area), -1)
     face_of_cycle[outer] = np.arange(len(outer))
     if len(inner):
-        # A rim larger than every face is the outer one of a cluster that lies in no face.
+        # An outer rim not inside any face bounds a cluster.
         small = inner[-area[inner] < area[outer].max()]
         if len(small):
             face_of_cycle[small] = _faces_around(nodes, node, start, area, outer, small)
@@ -120,14 +121,14 @@ def arrange(nodes: np.ndarray, edges: np.ndarray) -> Arrangement:
 
 
 def _loops(nodes, node, edge, start, face_of_cycle, outer, inner):
-    """The cycles of each face put together: (loop_node, loop_edge, loop_start, face_loop) of an `Arrangement`."""
+    """The cycles of each face combined: (loop_node, loop_edge, loop_start, face_loop) of an `Arrangement`."""
     holes = inner[face_of_cycle[inner] >= 0]
     crooked = _pinched(node, start)
     crooked = crooked[face_of_cycle[crooked] >= 0]
     order = np.concatenate([outer, holes])
     order = order[np.argsort(face_of_cycle[order], kind="stable")]
     if len(crooked):
-        # Faces with a loop that touches itself, of which there are few, are put together one by one.
+        # The few faces with a loop that touches itself are assembled one by one.
         special = np.unique(face_of_cycle[crooked])
         mine = np.isin(face_of_cycle[order], special)
         loops: dict[int, list[np.ndarray]] = {int(face): [] for face in special}
@@ -157,7 +158,7 @@ def _pairs(node: np.ndarray, edge: np.ndarray, start: np.ndarray, cycle: int) ->
 
 
 def _faces_at(faces: np.ndarray, points: np.ndarray) -> np.ndarray:
-    """(n,) the one of ``faces`` that holds each of ``points`` (n, 2), −1 for none."""
+    """(n,) the one of ``faces`` that contains each of ``points`` (n, 2), −1 for none."""
     import shapely
 
     out = np.full(len(points), -1)
@@ -167,15 +168,17 @@ def _faces_at(faces: np.ndarray, points: np.ndarray) -> np.ndarray:
 
 
 def gathered(start: np.ndarray, chosen: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Of runs that begin at ``start`` (n + 1,), the ``chosen`` ones (m,): where they begin in a row of their own (m +
-    1,), and the place that each of its members had."""
+    """For runs that begin at ``start`` (n + 1,): the ``chosen`` (m,) ones one after the other.
+
+    Returns their starts (m + 1,) and the former position of each member.
+    """
     count = np.diff(start)[chosen]
     begin = np.concatenate([[0], np.cumsum(count)])
     return begin, np.arange(begin[-1]) + np.repeat(start[chosen] - begin[:-1], count)
 
 
 def following_in(start: np.ndarray) -> np.ndarray:
-    """The place after each place of the closed runs that begin at ``start`` (n + 1,)."""
+    """Position after each position of the closed runs that begin at ``start`` (n + 1,)."""
     following = np.arange(1, start[-1] + 1)
     following[start[1:] - 1] = start[:-1]
     return following
@@ -192,7 +195,7 @@ def _polygons(nodes: np.ndarray, node: np.ndarray, start: np.ndarray, face_loop:
 
 
 def _areas(nodes: np.ndarray, node: np.ndarray, start: np.ndarray) -> np.ndarray:
-    """Signed area of every closed run of nodes, m², about its own first one."""
+    """Signed area of every closed run of nodes, m², relative to its first node."""
     if len(start) < 2:
         return np.empty(0)
     points = nodes[node]
@@ -202,8 +205,8 @@ def _areas(nodes: np.ndarray, node: np.ndarray, start: np.ndarray) -> np.ndarray
 
 
 def _half_edges(nodes: np.ndarray, edges: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """(origin of each half-edge, the half-edge that follows it round the face on its left); halves 2k and 2k + 1 are
-    edge k forwards and backwards."""
+    """(origin of each half-edge, the next half-edge around the face on its left); halves 2k and 2k + 1 are edge k
+    forwards and backwards."""
     origin = edges.ravel()
     target = edges[:, ::-1].ravel()
     along = nodes[target] - nodes[origin]
@@ -212,7 +215,7 @@ def _half_edges(nodes: np.ndarray, edges: np.ndarray) -> tuple[np.ndarray, np.nd
     place = np.empty(len(order), int)
     place[order] = np.arange(len(order))
     start = np.searchsorted(origin[order], np.arange(len(nodes) + 1))
-    # Turning clockwise from the way back: the neighbour before the twin in the fan round the target.
+    # Clockwise from the reverse direction: the neighbour before the twin in the fan around the target.
     twin = np.arange(len(origin)) ^ 1
     before = place[twin] - 1
     before = np.where(before < start[target], start[target + 1] - 1, before)
@@ -220,18 +223,18 @@ def _half_edges(nodes: np.ndarray, edges: np.ndarray) -> tuple[np.ndarray, np.nd
 
 
 def _first_of_cycle(following: np.ndarray) -> np.ndarray:
-    """(n,) the smallest member of the cycle that each half-edge belongs to, by leaps twice as long every time."""
+    """(n,) smallest member of the cycle of each half-edge, by pointer doubling."""
     least, leap = np.arange(len(following)), following
     while True:
         lower = np.minimum(least, least[leap])
-        # A leap that shows nothing smaller to anybody has been all the way round.
+        # A step that shows no smaller member has been all the way round.
         if (lower == least).all():
             return least
         least, leap = lower, leap[leap]
 
 
 def _traced(nodes: np.ndarray, edges: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Of each half-edge: its origin, the one that follows it, the smallest one of its cycle."""
+    """For each half-edge: its origin, the next one, and the smallest one of its cycle."""
     if not len(edges):
         return np.empty(0, int), np.empty(0, int), np.empty(0, int)
     origin, following = _half_edges(nodes, edges)
@@ -239,10 +242,12 @@ def _traced(nodes: np.ndarray, edges: np.ndarray) -> tuple[np.ndarray, np.ndarra
 
 
 def _cycles(following: np.ndarray, first: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """All cycles of half-edges in the order of their ``first`` ones, at which they begin: the half-edges, cycle after
-    cycle; where each cycle begins; the cycle of each half-edge."""
+    """All cycles of half-edges, ordered by their ``first`` ones, at which they begin.
+
+    Returns the half-edges, cycle after cycle; the start of each cycle; the cycle of each half-edge.
+    """
     n = len(following)
-    # How many half-edges come after each one until its cycle closes, again by leaps (Wyllie 1979).
+    # Number of half-edges after each one until its cycle closes, again by pointer doubling (Wyllie 1979).
     last = following == first
     leap, after = np.where(last, np.arange(n), following), (~last).astype(int)
     while True:
@@ -266,8 +271,8 @@ def _pinched(node: np.ndarray, start: np.ndarray) -> np.ndarray:
 
 
 def _unpinch(nodes: np.ndarray, loops: list[np.ndarray], cycle: np.ndarray) -> None:
-    """Take the one of ``loops`` that is ``cycle`` (n, 2), nodes and edges, which passes through a node twice, apart
-    there: a hole may touch its outline or another hole at a corner, but is a loop of its own."""
+    """Split the one of ``loops`` that is ``cycle`` (n, 2), nodes and edges, at the node through which it passes twice:
+    a hole may touch its outline or another hole at a corner, but is a loop of its own."""
     loops.pop(next(k for k, loop in enumerate(loops) if np.array_equal(loop, cycle)))
     chain: list[list[int]] = []
     parts: list[list[list[int]]] = []
@@ -284,14 +289,14 @@ def _unpinch(nodes: np.ndarray, loops: list[np.ndarray], cycle: np.ndarray) -> N
     pieces = [np.array(part) for part in parts]
     start = np.concatenate([[0], np.cumsum([len(piece) for piece in pieces])])
     area = _areas(nodes, np.concatenate(pieces)[:, 0], start)
-    # The outline first: of all loops of a face it alone turns counter-clockwise.
+    # The outline first: it alone of all loops of a face turns counter-clockwise.
     for k in np.argsort(-area):
         loops.insert(0 if area[k] > 0 else len(loops), pieces[k])
 
 
 def _faces_around(nodes, node, start, area, outer, inner) -> np.ndarray:
-    """(n_inner,) which of the ``outer`` cycles is the smallest that holds each of the ``inner`` ones (the outer rims of
-    clusters of faces), −1 for none."""
+    """(n_inner,) the smallest ``outer`` cycle that contains each of the ``inner`` ones (outer rims of clusters of
+    faces), −1 for none."""
     import shapely
 
     def rings(cycles: np.ndarray) -> np.ndarray:
@@ -299,7 +304,8 @@ def _faces_around(nodes, node, start, area, outer, inner) -> np.ndarray:
         return _polygons(nodes, node[flat], begin, np.arange(len(cycles) + 1))
 
     out = np.full(len(inner), -1)
-    # The rim and the faces within it touch: another face holds the rim when it covers the rim's hull but not its faces.
+    # The rim and the faces within it touch: another face contains the rim if it covers the rim's hull but not its
+    # faces.
     rims, areas = rings(inner), area[outer]
     hit, face = shapely.STRtree(rings(outer)).query(rims, predicate="within")
     rim_area = shapely.area(rims)

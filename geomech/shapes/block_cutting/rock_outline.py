@@ -1,4 +1,4 @@
-"""The rock that blocks fill together: its outline without the seams between them, and the ground on top of it."""
+"""The rock formed by all blocks together: its outline without the seams between them, and its ground surface."""
 
 from __future__ import annotations
 
@@ -8,13 +8,13 @@ import numpy as np
 
 from ...model import Blocks
 
-#: Neighbours' edges lie on one another but for round-off, which leaves slits in a plain union: gaps narrower than this
-#: part of the rock's largest side are seams.
+#: Edges of neighbours coincide to round-off, which leaves slits in a plain union: gaps narrower than this part of the
+#: rock's largest side are closed.
 SEAM = 1e-8
 
 
 def rock_of(blocks: Blocks, chosen: Iterable[int] | None = None):
-    """The area, a shapely (multi)polygon, that ``blocks`` (the ``chosen`` ones, default all) fill together."""
+    """Area, a shapely (multi)polygon, of ``blocks`` (the ``chosen`` ones, default all) together."""
     import shapely
 
     numbers = range(blocks.n_blocks) if chosen is None else chosen
@@ -23,13 +23,13 @@ def rock_of(blocks: Blocks, chosen: Iterable[int] | None = None):
         return shapely.Polygon()
     low, high = blocks.vertices.min(axis=0), blocks.vertices.max(axis=0)
     seam = SEAM * float((high - low).max())
-    # Out and back by the same distance, with sharp corners: what is left in place is exact but for round-off.
+    # Buffered outwards and inwards by the same distance, with sharp corners: the result is exact to round-off.
     return shapely.union_all(shapely.buffer(polygons, seam, join_style="mitre")).buffer(-seam, join_style="mitre")
 
 
 def ground_of(blocks: Blocks) -> np.ndarray:
-    """(n, 2) m: the outline of the largest piece of rock from its upper left corner over its top to the upper right
-    one, overhangs and vertical faces included."""
+    """(n, 2) m: outline of the largest piece of rock from its upper left corner over its top to the upper right one,
+    overhangs and vertical faces included."""
     import shapely
 
     rock = max(shapely.get_parts(rock_of(blocks)), key=lambda part: part.area)

@@ -1,8 +1,8 @@
-"""Files of CAD programs read in a process of their own: what takes the reader down, or never ends, is a bad file.
+"""Reading of CAD files in a separate process, so that a damaged file cannot crash or block the program.
 
-OpenCASCADE and mesh readers trust what they read: a line that is missing can end the process, a flipped byte keep it
-busy for ever; a script for Gmsh may loop without end. A child process reads the file within `SECONDS` of processor
-time and `BYTES` of memory, and hands back what it found as plain data.
+OpenCASCADE and mesh readers trust their input: a missing line can end the process, a flipped byte keep it busy for
+ever; a Gmsh script may loop endlessly. A child process reads the file within `SECONDS` of processor time and `BYTES` of
+memory, and returns the result as plain data.
 """
 
 from __future__ import annotations
@@ -24,11 +24,11 @@ from .model_drawing import GmshDrawing, GmshModelError
 from .script_commands import SCRIPTS
 from .session import GmshUnavailable
 
-#: Processor time that reading one file may take, s: a hundred times that of a section with thousands of curves.
+#: Limit of processor time for one file, s: a hundred times that of a section with thousands of curves.
 SECONDS = 60
-#: By the clock, in units of `SECONDS`, should the child wait instead.
+#: Limit of wall time, in units of `SECONDS`, in case the child waits.
 PATIENCE = 10
-#: Memory that it may take, bytes.
+#: Limit of its memory, bytes.
 BYTES = 4 << 30
 
 ALLOWED = plain_data.Allowed(
@@ -40,7 +40,7 @@ ALLOWED = plain_data.Allowed(
     )
 )  # fmt: skip
 ERRORS = {"model": GmshModelError, "field": FieldFileError, "gmsh": GmshUnavailable}
-#: What the child runs; the job comes by its standard input.
+#: Program of the child; the job arrives on its standard input.
 _CHILD = (
     "import json, sys; job = json.load(sys.stdin); sys.path[:] = job['path']; "
     "from geomech.shapes.gmsh_models.reader_process import serve; serve(job)"
@@ -60,7 +60,7 @@ def field_file_apart(path: Path, arguments: Mapping[str, Any]) -> FieldFile:
 def _read(kind: str, path: Path, arguments: Mapping[str, Any], error: type[Exception]) -> Any:
     job = {"path": sys.path, "kind": kind, "file": str(path), "arguments": dict(arguments),
            "limits": [SECONDS, BYTES]}  # fmt: skip
-    # A thread each for libraries that would take memory for as many as there are processors.
+    # One thread each for libraries that would reserve memory for as many threads as processors.
     alone = {f"{name}_NUM_THREADS": "1" for name in ("OMP", "OPENBLAS", "MKL")}
     try:
         done = subprocess.run(
@@ -75,7 +75,7 @@ def _read(kind: str, path: Path, arguments: Mapping[str, Any], error: type[Excep
         try:
             said, what = plain_data.read(io.BytesIO(out), ALLOWED)
         except plain_data.Broken:
-            said, what = "failed", "its reader said nothing that makes sense"
+            said, what = "failed", "its reader returned no valid answer"
         if said == "read":
             return what
         if said in ERRORS:
@@ -83,10 +83,10 @@ def _read(kind: str, path: Path, arguments: Mapping[str, Any], error: type[Excep
         raise error(f"{path} cannot be read: {what}", "the file is damaged: export it again")
     way_out = "the file is damaged: export it again"
     if path.suffix in SCRIPTS:
-        way_out = "look for a loop or macro without an end, in Gmsh"
+        way_out = "look for an endless loop or macro, in Gmsh"
     if code in (-signal.SIGXCPU, -signal.SIGKILL):
         raise error(f"{path} cannot be read within {SECONDS} s of processor time", way_out)
     if b"MemoryError" in done.stderr or b"bad_alloc" in done.stderr:
-        raise error(f"{path} cannot be read within {BYTES >> 30} GiB of memory", "export it again, with less in it")
+        raise error(f"{path} cannot be read within {BYTES >> 30} GiB of memory", "export it again with less content")
     name = signal.Signals(-code).name if code < 0 else f"exit code {code}"
-    raise error(f"{path} cannot be read: it ends its reader ({name})", way_out)
+    raise error(f"{path} cannot be read: its reader crashed ({name})", way_out)

@@ -1,4 +1,5 @@
-"""Meshes of Gmsh (.msh) read as drawings: outlines are where triangles end, joints and cracks are lines of edges."""
+"""Gmsh meshes (.msh) read as drawings: outlines are the boundaries of the triangles, joints and cracks are lines of
+edges."""
 
 from __future__ import annotations
 
@@ -11,15 +12,16 @@ import numpy as np
 from ..parts import JOINT, Joint, Mark, Trace, Zone, is_mark
 from .model_drawing import CRACK, GmshDrawing, GmshModelError
 
-#: A node on a straight run is no corner: nodes leave the run by less than this part of its shorter neighbour edge.
+#: A node on a straight run is not a corner if its distance from the run is below this part of its shorter adjacent
+#: edge.
 _STRAIGHT = 1e-9
 
 
 def drawing_of_mesh(gmsh, path: Path) -> GmshDrawing:
     """The `GmshDrawing` of the mesh in Gmsh's current model; the mesh itself is not kept.
 
-    Every entity of a physical surface is a zone, or several where it falls apart. Raises GmshModelError for meshes
-    without physical surfaces or with outlines that touch themselves.
+    Every entity of a physical surface is a zone, or several if it consists of separate pieces. Raises GmshModelError
+    for meshes without physical surfaces or with outlines that touch themselves.
     """
     mesh = _Mesh.of(gmsh, path)
     warnings = _out_of_plane(mesh)
@@ -57,8 +59,12 @@ def drawing_of_mesh(gmsh, path: Path) -> GmshDrawing:
 
 
 class _Mesh(NamedTuple):
-    """The mesh in Gmsh's current model, from the file ``path``: ``nodes`` (n, 3) m, the ``tags`` (n,) that the file gives
-    them, and the number that each tag stands ``at``."""
+    """The mesh in Gmsh's current model, from the file ``path``.
+
+    nodes   (n, 3) m
+    tags    (n,) numbers in the file
+    at      index of each tag
+    """
 
     gmsh: Any
     path: Path
@@ -74,20 +80,20 @@ class _Mesh(NamedTuple):
 
 
 def _out_of_plane(mesh: _Mesh) -> list[tuple[str, str]]:
-    """A warning where nodes are off the plane z = 0."""
+    """A warning if nodes are off the plane z = 0."""
     nodes, tags = mesh.nodes, mesh.tags
     size = float(np.ptp(nodes, axis=0).max()) if len(nodes) else 0.0
     if not len(nodes) or not np.abs(nodes[:, 2]).max() > 1e-9 * size:
         return []
     worst = int(np.argmax(np.abs(nodes[:, 2])))
     message = f"{mesh.path.name}: node {tags[worst]} has z = {nodes[worst, 2]:g} m"
-    return [(message, "the rock is plane and z is left away: draw in x and y, with z = 0")]
+    return [(message, "the model is plane and z is ignored: draw in x and y, with z = 0")]
 
 
 def _named_lines(
     mesh: _Mesh, warnings: list[tuple[str, str]]
 ) -> tuple[dict[str, list[tuple[int, int]]], dict[str, list[int]]]:
-    """The edges of the physical curves of each name, and the entities that they are on."""
+    """Edges of the physical curves of each name, and the entities on which they lie."""
     lines: dict[str, list[tuple[int, int]]] = {}
     where: dict[str, list[int]] = {}
     model = mesh.gmsh.model
@@ -104,7 +110,7 @@ def _named_lines(
 
 
 def _edge_names(mesh: _Mesh, lines: dict[str, list[tuple[int, int]]]) -> dict[tuple[int, int], str]:
-    """The name of each edge on a physical curve that is no mark."""
+    """Name of each edge on a physical curve that is not a mark."""
     edge_name: dict[tuple[int, int], str] = {}
     for name, pairs in lines.items():
         for pair in pairs if not is_mark(name) else ():
@@ -121,7 +127,8 @@ def _edge_names(mesh: _Mesh, lines: dict[str, list[tuple[int, int]]]) -> dict[tu
 def _zones(
     mesh: _Mesh, edge_name: dict[tuple[int, int], str], places: dict[tuple[str, int], str]
 ) -> tuple[list[Zone], set[tuple[int, int]]]:
-    """The zones of all physical surfaces, and the edges around them; where each zone is in the file goes to ``places``."""
+    """Zones of all physical surfaces, and the edges around them; the place of each zone in the file is added to
+    ``places``."""
     zones: list[Zone] = []
     rim: set[tuple[int, int]] = set()
     model, nodes = mesh.gmsh.model, mesh.nodes
@@ -143,7 +150,7 @@ def _zones(
 
 
 def _marked_nodes(mesh: _Mesh, places: dict[tuple[str, int], str]) -> list[Mark]:
-    """The marks of all named physical points."""
+    """Marks of all named physical points."""
     marks: list[Mark] = []
     model = mesh.gmsh.model
     for dim, group in model.getPhysicalGroups(0):
@@ -156,7 +163,7 @@ def _marked_nodes(mesh: _Mesh, places: dict[tuple[str, int], str]) -> list[Mark]
 
 
 def _corners(gmsh, dim: int, entity: int, at: dict[int, int]) -> np.ndarray:
-    """(n, 2 | 3 | 4) corner nodes of the elements of an entity, -1 for a triangle's fourth."""
+    """(n, 2 | 3 | 4) corner nodes of the elements of an entity, -1 for the fourth of a triangle."""
     rows = []
     kinds, _, connectivity = gmsh.model.mesh.getElements(dim, entity)
     for kind, flat in zip(kinds, connectivity):
@@ -168,7 +175,7 @@ def _corners(gmsh, dim: int, entity: int, at: dict[int, int]) -> np.ndarray:
 
 
 def _rim(elements: np.ndarray, nodes: np.ndarray) -> list[tuple[int, int]]:
-    """Edges that one element alone has, directed with the rock to their left."""
+    """Edges that belong to one element only, directed with the rock on their left."""
     count: dict[tuple[int, int], int] = {}
     directed = []
     for element in elements.tolist():
@@ -225,7 +232,7 @@ def _area(loop: np.ndarray) -> float:
 
 
 def _corners_of(run: list[int], nodes: np.ndarray, edge_name: dict[tuple[int, int], str], closed: bool) -> list[int]:
-    """``run`` without the nodes that stand on a straight piece of one name."""
+    """``run`` without the nodes on straight pieces with one name."""
     xy = nodes[run, :2]
     before, after = xy - np.roll(xy, 1, axis=0), np.roll(xy, -1, axis=0) - xy
     off = np.abs(before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0])

@@ -12,15 +12,15 @@ from .model_drawing import GmshModelError
 
 
 class Curves:
-    """Curves of the current model as polylines, each with the tags of the points it joins."""
+    """Curves of the current model as polylines, each with the tags of its end points."""
 
     def __init__(self, gmsh, chord: float) -> None:
         self.gmsh, self.chord = gmsh, chord
         self.known: dict = {}
-        self.bent: dict[int, float] = {}  # how far each curve that is not straight may leave its chords, m
+        self.bent: dict[int, float] = {}  # largest distance of each curve that is not straight from its chords, m
 
     def chords(self) -> Chords:
-        """The chords of all curves so far that are not straight."""
+        """Chords of all curves so far that are not straight."""
         return Chords.of([self.known[tag][0] for tag in self.bent], list(self.bent.values()))
 
     def polyline(self, tag: int) -> tuple[np.ndarray, int, int]:
@@ -40,8 +40,8 @@ class Curves:
         (low,), (high,) = model.getParametrizationBounds(1, tag)
         if model.getType(1, tag) == "Line":
             return model.getValue(1, tag, [low, high]).reshape(-1, 3)[:, :2]
-        # Halve the pieces until the curve's mid-points leave the chords by less than the tolerance; a closed curve
-        # needs a few pieces before its chords mean anything.
+        # Halve the pieces until the curve's midpoints are closer to the chords than the tolerance; a closed curve needs
+        # a few pieces before its chords are meaningful.
         for pieces in (4, 8, 16, 32, 64, 128, 256, 512, 1024):
             t = np.linspace(low, high, 2 * pieces + 1)
             fine = model.getValue(1, tag, t.tolist()).reshape(-1, 3)[:, :2]
@@ -54,7 +54,7 @@ class Curves:
         return points
 
     def chained(self, tags: list[int]) -> list[np.ndarray]:
-        """Curves that follow one another joined into polylines; a new one starts where they branch."""
+        """Consecutive curves joined into polylines; a new one starts at branches."""
         pieces = [self.polyline(tag) for tag in tags]
         lines = []
         while pieces:
@@ -79,7 +79,7 @@ class Curves:
         return lines
 
     def zone(self, name: str, path: Path, surface: int, signed: list[int], edge_name: dict[int, str]) -> Zone:
-        """The loops that the ``signed`` boundary curves of a ``surface`` form, the widest one first."""
+        """Loops formed by the ``signed`` boundary curves of ``surface``, the widest one first."""
         waiting = list(signed)
         loops = []
         while waiting:
@@ -89,7 +89,7 @@ class Curves:
             while last != first:
                 following = next((t for t in waiting if self.polyline(t)[1] == last), None)
                 if following is None:
-                    # A curve listed against the loop's sense.
+                    # A curve listed against the loop's direction.
                     following = next((t for t in waiting if self.polyline(t)[2] == last), None)
                     if following is None:
                         raise GmshModelError(

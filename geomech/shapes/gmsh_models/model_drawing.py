@@ -1,4 +1,4 @@
-"""What a Gmsh model or mesh holds once it is read, and what is wrong with one that cannot be."""
+"""Content of a Gmsh model or mesh, and errors of one that cannot be read."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ from dataclasses import dataclass, field, replace
 from ..curves import Chords
 from ..parts import Joint, Mark, Trace, Zone
 
-#: Physical curves whose name starts so are cracks; every other name belongs to edges of blocks.
+#: Prefix of physical curves that are cracks; all other names belong to edges of blocks.
 CRACK = "crack:"
 
 
 class GmshModelError(ValueError):
-    """A model that cannot be read. ``parameter`` is the name of the parameter at fault, or None."""
+    """A model that cannot be read. ``parameter`` is the name of the faulty parameter, or None."""
 
     def __init__(self, message: str, way_out: str, parameter: str | None = None) -> None:
         super().__init__(f"{message}: {way_out}")
@@ -33,10 +33,15 @@ class Parameter:
 
 @dataclass(frozen=True, eq=False)
 class GmshDrawing:
-    """What a model holds: ``zones`` (with named edges), ``traces`` of cracks, its ``parameters`` by short name as used,
-    ``warnings`` as (message, way out): whatever is drawn and left out; ``joints``; and where they stand in the model:
-    ``places`` says, for ("zones" | "cracks" | "joints" | "marks", index), which entities they are; ``marks`` are bolts,
-    water tables and measuring points; ``chords`` stand for its curves."""
+    """Content of a model.
+
+    zones        with named edges; ``traces`` of cracks; ``joints``
+    parameters   by short name, as used
+    warnings     (message, way out) for everything that is drawn and left out
+    places       entities of ("zones" | "cracks" | "joints" | "marks", index)
+    marks        bolts, water tables and monitor points
+    chords       approximations of its curves
+    """
 
     zones: tuple[Zone, ...]
     traces: tuple[Trace, ...]
@@ -49,7 +54,7 @@ class GmshDrawing:
 
 
 def scaled(found: GmshDrawing, factor: float) -> GmshDrawing:
-    """The drawing with all its lengths times ``factor``."""
+    """The drawing with all lengths multiplied by ``factor``."""
 
     def lines(item):
         return replace(item, lines=tuple(factor * line for line in item.lines))

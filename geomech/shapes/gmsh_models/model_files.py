@@ -25,7 +25,7 @@ from .session import gmsh_session
 from .step_units import STEP, metres_in_step
 from .unnamed_parts import lost_curves, out_of_plane
 
-#: Curved edges become chords that leave the curve by at most this, in units of the model's largest side.
+#: Curved edges become chords within this distance of the curve, relative to the model's largest side.
 CHORD = 1e-4
 
 
@@ -36,30 +36,30 @@ def read_gmsh_model(
     unit: str | None = None,
     folder: Path | None = None,
 ) -> GmshDrawing:
-    """Read a model with ``parameters`` set: .geo, .geo_unrolled, .msh (any version, its mesh is not kept), .brep, .step,
-    and meshes of other programs (`mesh_exchange.SUFFIXES`).
+    """Read a model with ``parameters`` set: .geo, .geo_unrolled, .msh (any version, its mesh is not kept), .brep,
+    .step, and meshes of other programs (`mesh_exchange.SUFFIXES`).
 
     A parameter is known by the last part of its name in the side panel ("Parameters/Cracks/phi_deg" is ``phi_deg``) or
-    by the whole; where the model offers named choices the name may be given. Physical surfaces are zones, one block a
-    surface; physical curves called "crack:NAME" are cracks; those called "joint:NAME" that bound no surface are joints;
-    "bolt:NAME", "water" and "water:NAME" are lines that cut nothing, and physical points called "monitor:NAME" or
-    "probe:NAME" measuring points; all other physical curves name the block edges on them. A .brep or .step without
-    physical surfaces gives a zone a surface, and what its shapes are called there names surfaces and curves. Curved
-    edges become chords within ``chord_tolerance`` m (default 1e-4 of the model's largest side), and ends of joints and
-    cracks that are as near to a curve are on its chords. ``unit`` (a key of
-    `geomech.shapes.traces.field_lines.METRES`) is what the model is drawn in, default m; for a .step, what the file says.
+    by its full name; if the model offers named choices the name may be given. Physical surfaces are zones, one block
+    per surface; physical curves called "crack:NAME" are cracks; those called "joint:NAME" that bound no surface are
+    joints; "bolt:NAME", "water" and "water:NAME" are lines that cut nothing, and physical points called "monitor:NAME"
+    or "probe:NAME" monitor points; all other physical curves name the block edges on them. A .brep or .step without
+    physical surfaces gives one zone per surface, and the names of its shapes are those of surfaces and curves. Curved
+    edges become chords within ``chord_tolerance`` (m, default 1e-4 of the model's largest side), and ends of joints and
+    cracks that are as near to a curve are moved onto its chords. ``unit`` (a key of
+    `geomech.shapes.traces.field_lines.METRES`) is the model's unit of length, default m; for a .step, that in the file.
 
-    A model may draw; one that would run programs or write files is refused before Gmsh sees it, unless
+    A model may only draw; one that would run programs or write files is refused before Gmsh sees it, unless
     GEOMECH_TRUST_MODELS is set (`script_commands`). It may read files below ``folder`` (default: its own).
 
-    Meshes and shapes, and scripts that read files, loop or make a mesh, are read in another process
-    (`isolated_reader`): damaged ones can end it, and a loop need not end.
+    Meshes and shapes, and scripts that read files, loop or make a mesh, are read in a separate process
+    (`isolated_reader`): damaged ones can crash it, and a loop need not end.
 
-    Raises GmshModelError for a missing or faulty file, unknown parameters and values out of range, models without
-    named surfaces, and GmshUnavailable where Gmsh cannot be loaded.
+    Raises GmshModelError for a missing or faulty file, unknown parameters and values out of range, models without named
+    surfaces, and GmshUnavailable if Gmsh cannot be loaded.
     """
     path = Path(path)
-    if not os.path.isfile(path):  # False, too, for a name that is too long to be one
+    if not os.path.isfile(path):  # False also for a name that is too long
         near = [p.name for p in path.parent.glob("*" + path.suffix)] if path.parent.is_dir() else []
         close = difflib.get_close_matches(path.name, near, 1)
         raise GmshModelError(
@@ -78,10 +78,10 @@ def read_gmsh_model(
 def read_here(
     path: Path, parameters: Mapping[str, float | str], chord_tolerance: float | None, unit: str | None
 ) -> GmshDrawing:
-    """`read_gmsh_model` without a look at the file before, in this process: a damaged one may end it."""
+    """`read_gmsh_model` without a check of the file, in this process: a damaged file may crash it."""
     metres = METRES[unit or "m"]
     if path.suffix.lower() in STEP:
-        # Every length of a STEP file arrives in millimetres, whatever its unit.
+        # All lengths of a STEP file arrive in millimetres, whatever its unit.
         metres = 1e-3 if unit is None else 1e-3 * metres / metres_in_step(path)
     try:
         with gmsh_session() as gmsh, TemporaryDirectory() as folder:
@@ -97,7 +97,7 @@ def read_here(
 
 
 def _no_text(path: Path, error: UnicodeDecodeError) -> GmshModelError:
-    """A name in the file is no UTF-8: where, as far as the file's own lines show."""
+    """A name in the file is not UTF-8: its place, as far as the file's lines show it."""
     at = ""
     for number, line in enumerate(path.read_bytes().split(b"\n"), 1):
         try:
@@ -107,21 +107,21 @@ def _no_text(path: Path, error: UnicodeDecodeError) -> GmshModelError:
             if b'"' in line or b"'" in line:
                 break
     byte = error.object[error.start]
-    return GmshModelError(f"{path}{at}: a name with the byte 0x{byte:02x} is no UTF-8 text", "save the file as UTF-8")
+    return GmshModelError(f"{path}{at}: a name with the byte 0x{byte:02x} is not UTF-8 text", "save the file as UTF-8")
 
 
 def _drawing(gmsh, path: Path, parameters: dict[str, Parameter], chord: float | None) -> GmshDrawing:
     box = gmsh.model.getBoundingBox(-1, -1) if gmsh.model.getEntities(2) else (0.0,) * 6
     if not np.isfinite(box).all():
         raise GmshModelError(
-            f"{path.name}: its surfaces reach beyond all numbers", "draw it in metres, near the origin"
+            f"{path.name}: its surfaces have coordinates that are not finite", "draw it in metres, near the origin"
         )
     chord = CHORD * max(box[3] - box[0], box[4] - box[1]) if chord is None else chord
     curves = Curves(gmsh, chord)
     warnings: list[tuple[str, str]] = []
     if path.suffix in (".geo", ".geo_unrolled") and not path.read_bytes().endswith((b"\n", b"\r")):
         warnings.append(
-            (f"{path.name}: its last line does not end, and Gmsh does not read it", "end it with a new line")
+            (f"{path.name}: its last line has no line end, so that Gmsh does not read it", "end it with a new line")
         )
 
     groups = _named_groups(gmsh, path, warnings)
@@ -188,7 +188,7 @@ def _drawing(gmsh, path: Path, parameters: dict[str, Parameter], chord: float | 
 
 
 def _name_edges(path: Path, name: str, tags: list[int], edge_name: dict[int, str]) -> None:
-    """Call the curves ``tags`` by this ``name``; each has one."""
+    """Assign ``name`` to the curves ``tags``; each curve has one name."""
     for tag in tags:
         if edge_name.setdefault(tag, name) != name:
             raise GmshModelError(
@@ -198,7 +198,7 @@ def _name_edges(path: Path, name: str, tags: list[int], edge_name: dict[int, str
 
 
 def _bound_nothing(path: Path, edge_name: dict[int, str], used: set[int], warnings: list[tuple[str, str]]) -> set[int]:
-    """Named curves of which none is ``used`` by a surface, each name with a warning."""
+    """A warning for each name of curves none of which is ``used`` by a surface."""
     reported: set[int] = set()
     for name in dict.fromkeys(edge_name.values()):
         tags = {tag for tag, its in edge_name.items() if its == name}
@@ -211,9 +211,11 @@ def _bound_nothing(path: Path, edge_name: dict[int, str], used: set[int], warnin
 
 
 def _named_groups(gmsh, path: Path, warnings: list[tuple[str, str]]) -> dict[int, list[tuple[str, int, list[int]]]]:
-    """(name, physical tag, entities) of all physical points (0), curves (1) and surfaces (2). A file of shapes has no
-    physical groups: there every surface counts, and shapes are called what the file calls them. Points without a name
-    only held a size of elements, or a place."""
+    """(name, physical tag, entities) of all physical points (0), curves (1) and surfaces (2).
+
+    A file of shapes has no physical groups: there every surface counts, and shapes have their names in the file. Points
+    without a name only define an element size or a position.
+    """
     groups: dict[int, list[tuple[str, int, list[int]]]] = {0: [], 1: [], 2: []}
     for dim in (0, 1, 2):
         for _, group in gmsh.model.getPhysicalGroups(dim):

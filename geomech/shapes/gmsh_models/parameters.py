@@ -1,4 +1,4 @@
-"""The parameters of a Gmsh model: read from its side panel, checked against their ranges and choices, set."""
+"""Parameters of a Gmsh model: read from its side panel, checked against their ranges and choices, set."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ from .session import open_model
 
 
 def open_with_parameters(gmsh, path: Path, wanted: Mapping[str, float | str]) -> dict[str, Parameter]:
-    """Open the model with ``wanted`` set; all its parameters as used, by short name.
+    """Open the model with ``wanted`` set; returns all its parameters as used, by short name.
 
-    What is known is set and the model read again, until the rest is known too: a parameter may appear with another's
-    value.
+    Known parameters are set and the model is read again, until the others are known too: a parameter may appear with
+    another's value.
     """
     known = _opened(gmsh, path)
     waiting = dict(wanted)
@@ -42,8 +42,7 @@ def open_with_parameters(gmsh, path: Path, wanted: Mapping[str, float | str]) ->
 
 
 def _opened(gmsh, path: Path) -> dict[str, Parameter]:
-    """(Re)read the model; what it lets its user choose, by short name (by the whole one where another has the short
-    one)."""
+    """(Re)read the model; its parameters by short name (by the full one if another has the short one)."""
     open_model(gmsh, path)
     found = {}
     for name in gmsh.onelab.getNames():

@@ -1,4 +1,4 @@
-"""The child process of `isolated_reader`: one file read within limits of time and memory, the drawing handed back."""
+"""Child process of `isolated_reader`: reads one file within limits of time and memory, and returns the drawing."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ from .session import GmshUnavailable, load_gmsh
 
 
 def serve(job: Mapping[str, Any]) -> None:
-    """In the child: read the file of ``job`` within its limits and write what came of it to the standard output."""
+    """In the child: read the file of ``job`` within its limits and write the result to the standard output."""
     import resource
 
-    # What libraries print must not get into the answer.
+    # Output of libraries must not get into the answer.
     out = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)
     if job["kind"] == "model":
-        with suppress(GmshUnavailable):  # told when it is used; loaded here, where memory is no limit
+        with suppress(GmshUnavailable):  # reported on use; imported here, before the memory limit
             load_gmsh()
     seconds, memory = job["limits"]
     for limit, value in ((resource.RLIMIT_CPU, seconds), (resource.RLIMIT_AS, memory), (resource.RLIMIT_CORE, 0)):

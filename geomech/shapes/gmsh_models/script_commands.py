@@ -1,10 +1,10 @@
-"""What of a Gmsh model is looked at before Gmsh sees it: a script for Gmsh can run programs and write files.
+"""Security check of a Gmsh model before Gmsh reads it: a Gmsh script can run programs and write files.
 
-A .geo file is a program. Beside geometry it may run shell commands (SystemCall), write files (Save, Print, Printf > …),
-end the process (Exit), read and write memory (formats of Printf) and read other files. Here these are found by name
-and line and refused, unless the models are the user's own (`TRUST`). Words are read as Gmsh's scanner reads them (`Gmsh.l`: comments, strings in either quotes).
-Loops and macros make Gmsh jump back to the beginning of a line, where it knows nothing of a comment or string that
-began above: in files with loops or macros such lines are read as code as well.
+A .geo file is a program. Besides geometry it may run shell commands (SystemCall), write files (Save, Print, Printf >
+…), end the process (Exit), read and write memory (formats of Printf) and read other files. Here these are found by name
+and line and refused, unless the models are the user's own (`TRUST`). Words are read as by Gmsh's scanner (`Gmsh.l`:
+comments, strings in either quotes). Loops and macros make Gmsh jump back to the beginning of a line, where it knows
+nothing of a comment or string that began above: in files with loops or macros such lines are also read as code.
 """
 
 from __future__ import annotations
@@ -19,15 +19,15 @@ from typing import NamedTuple
 from ..mesh_exchange import SUFFIXES as OTHER_MESHES
 from .model_drawing import GmshModelError
 
-#: Set to anything but "" or "0", this environment variable lets models do what Gmsh lets them do.
+#: Set to anything but "" or "0", this environment variable allows models to do everything that Gmsh allows.
 TRUST = "GEOMECH_TRUST_MODELS"
 
-#: How files that Gmsh reads by their name's ending are recognised; all others it takes for scripts.
+#: Suffixes by which Gmsh recognises file types; it takes all others for scripts.
 SCRIPTS, MESHES, SHAPES = (".geo", ".geo_unrolled"), (".msh",), (".brep", ".step", ".stp", ".STEP", ".STP")
-#: What a mesh begins with; Gmsh takes a .msh that begins otherwise for a script.
+#: Beginning of a mesh; Gmsh takes a .msh that begins otherwise for a script.
 _MESH_BEGINS = (b"$PTS", b"$NO", b"$PARA", b"$ELM", b"$MeshFormat", b"$Comments")
 
-#: Words that do more than draw, and what they do.
+#: Words that do more than draw, and their effect.
 _DOES = {
     **dict.fromkeys(("System", "SystemCall", "NonBlockingSystemCall"), "runs a shell command"),
     **dict.fromkeys(("OnelabRun", "ExternalProcess"), "runs a program"),
@@ -41,19 +41,19 @@ _DOES = {
     **dict.fromkeys(("StringToName", "S2N"), "makes commands of text"),
     "Solver": "sets up a program to run",
 }
-#: Words whose first argument C's printf takes as it stands: "%s" there reads memory, "%n" writes to it.
+#: Words whose first argument is a format for C's printf: "%s" there reads memory, "%n" writes to it.
 _FORMATS = ("Printf", "Sprintf", "Error", "Warning")
-#: What such a text may hold: "%%", and conversions of a number that take little room.
+#: Admissible content of such a format: "%%", and conversions of a number with limited width.
 _NUMBERS = re.compile(rb"(?:[^%]|%%|%[-+ #0]*[0-9]{0,2}(?:\.[0-9]{0,2})?l?[eEfFgG])*", re.DOTALL)
-#: Words by which a short script may take any time and memory.
+#: Words with which a short script may take unlimited time and memory.
 _HEAVY = frozenset(
     b"For Macro Function Call Mesh RefineMesh RelocateMesh OptimizeMesh ClassifySurfaces CreateGeometry Homology "
     b"Cohomology Field LinSpace LogSpace Include Merge MergeWithBoundingBox ShapeFromFile ListFromFile".split()
 )
-#: Words that read the file that is named behind them.
+#: Words that read the file named after them.
 _READS = ("Include", "Merge", "MergeWithBoundingBox", "ShapeFromFile", "ListFromFile")
 
-#: Longer strings, and longer lines of files with loops, are cut by Gmsh's scanner, and what follows is read as code.
+#: Gmsh's scanner cuts longer strings, and longer lines of files with loops, and reads the rest as code.
 _LONGEST_STRING, _LONGEST_LINE = 1000, 8000
 
 _TOKEN = re.compile(
@@ -71,22 +71,22 @@ class _Token(NamedTuple):
 
 
 def trusted() -> bool:
-    """Whether this user has said that models are their own."""
+    """Whether the user has declared the models to be trusted."""
     return os.environ.get(TRUST, "") not in ("", "0")
 
 
 def refuse_commands(path: Path, folder: Path | None = None) -> list[Path]:
-    """Refuse a model that would do more than draw: raise GmshModelError with file, line and command.
+    """Refuse a model that would do more than draw: raises GmshModelError with file, line and command.
 
-    Files below the model's folder, or below ``folder``, may be read by it; they are looked at as well. Returns all
-    files that Gmsh will read, the model first.
+    It may read files below its own folder, or below ``folder``; they are checked as well. Returns all files that Gmsh
+    will read, the model first.
     """
     homes = [path.parent.resolve(), *([folder.resolve()] if folder else [])]
     seen: list[Path] = []
     waiting = [path]
     while waiting:
         file = waiting.pop(0)
-        # Gmsh reads options beside a file, MODEL.opt, as a script.
+        # Gmsh also reads a file of options, MODEL.opt, as a script.
         for found in (file, *([beside] if (beside := file.with_name(file.name + ".opt")).is_file() else [])):
             if found.resolve() in seen:
                 continue
@@ -96,19 +96,18 @@ def refuse_commands(path: Path, folder: Path | None = None) -> list[Path]:
 
 
 def is_light(path: Path) -> bool:
-    """Whether the script ``path`` does no more than its length allows: it has no loop, macro or range, makes no mesh
-    and reads no other file, so that it cannot keep its reader busy or fill the memory."""
+    """Whether the cost of the script ``path`` is limited by its length: no loop, macro or range, no mesh, no other
+    file."""
     code = [token.text for token in _tokens(path.read_bytes()) if token.kind not in ("line", "block", "text")]
     heavy = any(word in _HEAVY and (word, after) != (b"Mesh", b".") for word, after in pairwise([*code, b""]))
-    # A colon stands behind a question mark, or alone in braces ("all surfaces"), or in a range.
+    # A colon follows a question mark, or is alone in braces ("all surfaces"), or is part of a range.
     alone = sum(three == (b"{", b":", b"}") for three in zip(code, code[1:], code[2:], strict=False))
     return not heavy and code.count(b":") - alone <= code.count(b"?")
 
 
 def files_read(path: Path) -> list[Path]:
-    """The model ``path`` and all files that Gmsh reads with it, as far as their names are written out: what it
-    includes and
-    merges, lists of numbers, options beside it, and what these read. Nothing is refused."""
+    """The model ``path`` and all files that Gmsh reads with it, as far as their names are literal: included and merged
+    files, lists of numbers, options, and the files that these read. Nothing is refused."""
     seen: dict[Path, Path] = {}
     waiting = [path]
     while waiting:
@@ -129,12 +128,12 @@ def files_read(path: Path) -> list[Path]:
 
 
 def _files_of(path: Path, homes: Sequence[Path], is_script: bool) -> list[Path]:
-    """The files that ``path`` reads, after a look at what else it does."""
+    """The files that ``path`` reads, after a check of its other commands."""
     if not is_script and path.suffix.lower() in OTHER_MESHES:
         return _other_mesh(path)
     if not is_script and path.suffix not in (*SCRIPTS, *MESHES, *SHAPES):
         raise GmshModelError(
-            f"{path}: Gmsh would take a file called *{path.suffix} for a script, or for what is no drawing",
+            f"{path}: Gmsh would take a file called *{path.suffix} for a script, or not for a drawing",
             f"models are {', '.join((*SCRIPTS, *MESHES, '.step', '.stp', '.brep', *OTHER_MESHES))} (in lower case)",
         )
     if not is_script and path.suffix in SHAPES:
@@ -143,7 +142,7 @@ def _files_of(path: Path, homes: Sequence[Path], is_script: bool) -> list[Path]:
     if not is_script and path.suffix in MESHES:
         if not data.startswith(_MESH_BEGINS):
             raise GmshModelError(
-                f"{path}: this is no mesh of Gmsh: it does not begin with $MeshFormat",
+                f"{path}: this is not a Gmsh mesh: it does not begin with $MeshFormat",
                 "save it as .msh again, or call it .geo if it is a script",
             )
         return []
@@ -151,12 +150,12 @@ def _files_of(path: Path, homes: Sequence[Path], is_script: bool) -> list[Path]:
 
 
 def _other_mesh(path: Path) -> list[Path]:
-    """Meshes that meshio reads name no other files, but those of Abaqus may include some."""
+    """Meshes read by meshio name no other files, except that those of Abaqus may include some."""
     if path.suffix.lower() == ".inp":
         for number, line in enumerate(path.read_bytes().split(b"\n"), 1):
             if line.strip().upper().startswith(b"*INCLUDE"):
                 raise GmshModelError(
-                    f"{path}:{number}: *INCLUDE reads another file", "put what it includes in its place"
+                    f"{path}:{number}: *INCLUDE reads another file", "replace it by the content of that file"
                 )
     return []
 
@@ -198,7 +197,7 @@ def _tokens(data: bytes) -> Iterator[_Token]:
 
 
 def _judged(path: Path, tokens: Sequence[_Token], homes: Sequence[Path], comment: bool = False) -> list[Path]:
-    """The files that ``tokens`` read. Raises GmshModelError for what they do besides."""
+    """The files that ``tokens`` read. Raises GmshModelError for other actions."""
     code = [token for token in tokens if token.kind not in ("line", "block")]
     found = []
     for k, token in enumerate(code):
@@ -222,7 +221,7 @@ def _judged(path: Path, tokens: Sequence[_Token], homes: Sequence[Path], comment
 
 
 def _look_at_format(path: Path, token: _Token, rest: Sequence[_Token], comment: bool) -> None:
-    """The first argument of a word of `_FORMATS`: one text, written out, that formats nothing but numbers."""
+    """First argument of a word of `_FORMATS`: one literal text that formats nothing but numbers."""
     word = token.text.decode()
     if len(rest) < 2 or rest[0].kind != "text" or rest[1].text not in (b")", b","):
         if not comment:
@@ -234,7 +233,7 @@ def _look_at_format(path: Path, token: _Token, rest: Sequence[_Token], comment: 
 
 
 def _is_sent_to_a_file(rest: Sequence[_Token]) -> bool:
-    """Whether ">" stands behind the parenthesis that ``rest`` begins with."""
+    """Whether ">" follows the parenthesis with which ``rest`` begins."""
     depth = 0
     for k, token in enumerate(rest):
         depth += {b"(": 1, b")": -1}.get(token.text, 0) if token.kind == "mark" else 0
@@ -244,7 +243,7 @@ def _is_sent_to_a_file(rest: Sequence[_Token]) -> bool:
 
 
 def _read(path: Path, token: _Token, rest: Sequence[_Token], homes: Sequence[Path], comment: bool) -> list[Path]:
-    """The file that a word which reads one reads: it must be named, and be below one of ``homes``."""
+    """The file that such a word reads: its name must be literal, and it must be below one of ``homes``."""
     word = token.text.decode()
     rest = rest[1:] if rest and rest[0].text in (b"(", b"[") else rest
     if len(rest) < 2 or rest[0].kind != "text" or rest[1].text not in (b";", b")", b"]"):
@@ -252,11 +251,11 @@ def _read(path: Path, token: _Token, rest: Sequence[_Token], homes: Sequence[Pat
             return []
         _refuse(path, token.line, word, "reads a file whose name is not written out", comment)
     name = rest[0].text[1:-1].decode("utf-8", "surrogateescape")
-    # Gmsh does not know a drive or "~"; a path that is not absolute counts from the file that names it.
+    # Gmsh knows neither drives nor "~"; a relative path is relative to the file that names it.
     file = path.parent / name
     if not any(file.resolve().is_relative_to(home) for home in homes):
         _refuse(path, token.line, f'{word} "{name}"', f"reads a file outside {homes[-1]}", comment)
-    # What is not there Gmsh itself complains of; a list of numbers is no script.
+    # Gmsh itself reports missing files; a list of numbers is not a script.
     return [file] if file.is_file() and word not in ("ListFromFile",) else []
 
 
@@ -264,5 +263,5 @@ def _refuse(path: Path, line: int, what: str, does: str, comment: bool) -> None:
     where = " (in a comment or text of several lines, into which its loops or macros may jump)" if comment else ""
     raise GmshModelError(
         f"{path}:{line}: {what} {does}{where}; a model may draw, and read files below the scene's folder",
-        f"remove it; or, if you trust this file and all that it reads, say --trust-models (or {TRUST}=1)",
+        f"remove it; or, if you trust this file and all that it reads, use --trust-models (or {TRUST}=1)",
     )

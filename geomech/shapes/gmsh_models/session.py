@@ -1,4 +1,4 @@
-"""A Gmsh session: loaded late, one at a time, always closed; and files opened in it as if each were the first."""
+"""Gmsh session: loaded on demand, one at a time, always closed; files are opened independently of earlier ones."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from pathlib import Path
 
 from .model_drawing import GmshModelError
 
-# Gmsh keeps one global state in a process.
+# Gmsh has one global state per process.
 _LOCK = threading.RLock()
 #: Words in the rest of a faulty line.
 _LONGEST_REST = 1000
@@ -21,7 +21,7 @@ class GmshUnavailable(RuntimeError):
 
 
 def load_gmsh():
-    """The gmsh module. Raises GmshUnavailable with the way out where it or a shared library it needs is missing."""
+    """The gmsh module. Raises GmshUnavailable with the way out if it or a shared library is missing."""
     try:
         import gmsh
     except ImportError as error:
@@ -36,13 +36,13 @@ def load_gmsh():
 
 @contextmanager
 def gmsh_session(name: str = "geomech") -> Iterator:
-    """An empty Gmsh model of its own, silent; leaves a session that the caller already has as it was."""
+    """An empty Gmsh model, silent; a session that the caller has already opened is left as it was."""
     gmsh = load_gmsh()
     with _LOCK:
         mine = not gmsh.isInitialized()
         before = None
         if mine:
-            # Signal handlers work in the main thread only, and a user's ~/.gmshrc must not change a result.
+            # Signal handlers work in the main thread only, and a user's ~/.gmshrc must not affect results.
             gmsh.initialize(interruptible=False, readConfigFiles=False)
         else:
             before = gmsh.model.getCurrent()
@@ -62,13 +62,13 @@ def gmsh_session(name: str = "geomech") -> Iterator:
 
 def open_model(gmsh, path: Path) -> None:
     """(Re)read the file into the current model."""
-    # Anew, and not gmsh.clear(): that would wipe other models of a session the caller has open.
+    # A new model rather than gmsh.clear(), which would delete other models of the caller's session.
     gmsh.model.remove()
     gmsh.model.add("geomech")
-    gmsh.parser.clear()  # DefineConstant keeps what a variable of that name already holds
+    gmsh.parser.clear()  # DefineConstant keeps the existing value of a variable with that name
     gmsh.logger.start()
     unit = gmsh.option.getString("Geometry.OCCTargetUnit")
-    # OpenCASCADE's own choice, but it keeps what a caller may have chosen before, and would keep another after.
+    # OpenCASCADE's default, set explicitly because a caller may have chosen another; restored afterwards.
     gmsh.option.setString("Geometry.OCCTargetUnit", "MM")
     try:
         gmsh.merge(str(path))
@@ -87,8 +87,8 @@ def open_model(gmsh, path: Path) -> None:
 
 
 def _forget_rest(gmsh) -> None:
-    """Gmsh's parser keeps what follows a fault in its line, and reads that before the next file: give it empty ones,
-    which take a word each, until nothing is left."""
+    """Gmsh's parser keeps the rest of a faulty line, and reads it before the next file: feed it empty files, which
+    consume one word each, until nothing is left."""
     with tempfile.TemporaryDirectory() as folder:
         empty = Path(folder) / "empty.geo"
         empty.write_text("\n")

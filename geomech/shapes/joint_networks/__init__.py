@@ -1,1 +1,1 @@
-"""Joint sets by statistics, and the statistics of joint networks."""
+"""Statistical joint sets, and the statistics of joint networks."""

@@ -1,10 +1,9 @@
-"""What a joint set is expected to be like from the laws it is drawn by; the mean of many networks, of which one shows
-some.
+"""Expected statistics of a joint set from its distributions, i.e. the mean over many networks.
 
-A dictionary of each: ``p10_per_m`` across the set, ``p20_per_m2``, ``p21_per_m``, ``mean_length_m``,
+Each is a dictionary: ``p10_per_m`` across the set, ``p20_per_m2``, ``p21_per_m``, ``mean_length_m``,
 ``length_deviation_m``, ``spacing_m``, ``spacing_deviation_m``, ``persistence``, ``mean_angle_deg``,
-``angle_deviation_deg``; what a set does not have is left out. Terminations on other sets, which shorten traces, are not
-counted in.
+``angle_deviation_deg``; values that do not apply to a set are left out. Terminations on other sets, which shorten
+traces, are not included.
 """
 
 from __future__ import annotations
@@ -17,7 +16,7 @@ from .joint_sets import FisherAngle, Law, fisher_rule, mean_pole, poles_about
 
 
 def of_parallel(angle: Law | FisherAngle, spacing: Law, length: Law | None, gap: Law | None) -> dict[str, float]:
-    """Lines ``spacing`` apart, of which length / (length + gap) is joint."""
+    """Lines ``spacing`` apart, of which the part length / (length + gap) is joint."""
     share = 1.0 if length is None or gap is None or gap.mean == 0 else length.mean / (length.mean + gap.mean)
     out = {
         "p10_per_m": share / spacing.mean,
@@ -37,7 +36,7 @@ def of_parallel(angle: Law | FisherAngle, spacing: Law, length: Law | None, gap:
 
 
 def of_poisson_traces(angle: Law | FisherAngle, length: Law, per_area: float) -> dict[str, float]:
-    """What traces that lie anywhere, ``per_area`` of them a m², come to on average, by the names of the statistics."""
+    """Mean statistics of randomly located traces, ``per_area`` of them per m²."""
     p21 = per_area * length.mean
     return {
         "p20_per_m2": per_area,
@@ -50,14 +49,14 @@ def of_poisson_traces(angle: Law | FisherAngle, length: Law, per_area: float) ->
 
 
 def of_poisson_lines(angle: Law | FisherAngle | None, per_area_length: float) -> dict[str, float]:
-    """Without ``angle`` all directions are alike: a scan-line meets 2/π of the length (Miles 1964)."""
+    """Without ``angle`` all directions are equally likely: a scan-line meets 2/π of the length (Miles 1964)."""
     if angle is None:
         return {"p21_per_m": per_area_length, **_scanned(2 / math.pi * per_area_length)}
     return {"p21_per_m": per_area_length, **_scanned(per_area_length * angle.mean_cosine), **_angles(angle)}
 
 
 def of_voronoi(cell_area: float) -> dict[str, float]:
-    """Cells of points that fall anywhere: 2/√A of edge for each area, all directions alike (Miles 1970)."""
+    """Cells of random points: 2/√A of edge per area, all directions equally likely (Miles 1970)."""
     p21 = 2 / math.sqrt(cell_area)
     return {"p21_per_m": p21, "p10_per_m": 2 / math.pi * p21, "spacing_m": 0.5 * math.pi / p21}
 
@@ -65,8 +64,8 @@ def of_voronoi(cell_area: float) -> dict[str, float]:
 def of_discs(
     *, dip: float, dip_direction: float, fisher: float, diameter: Law, per_volume_area: float, section: float
 ) -> dict[str, float]:
-    """Discs cut by the section: P21 = P32 E[sin θ] with θ between pole and the section's normal, traces of mean
-    π/4 E[D²]/E[D] and mean square 2/3 E[D³]/E[D] (Warburton 1980)."""
+    """Discs cut by the section: P21 = P32 E[sin θ] with θ between pole and the section's normal, traces of mean π/4
+    E[D²]/E[D] and mean square 2/3 E[D³]/E[D] (Warburton 1980)."""
     mean = mean_pole(dip, dip_direction, section)
     pole = poles_about(mean, fisher, *fisher_rule())
     flat = np.hypot(pole[:, 0], pole[:, 1])
@@ -77,7 +76,7 @@ def of_discs(
     double = np.exp(2j * angle)
     middle = 0.5 * float(np.angle((flat * double).sum()))
     off = 0.5 * np.angle(double * np.exp(-2j * middle))
-    # Steep discs are cut more often than flat ones: each counts by the area it shows to the section.
+    # Steep discs are cut more often than flat ones: each is weighted by its area projected on the section.
     spread = math.sqrt(float(np.average((off - np.average(off, weights=flat)) ** 2, weights=flat)))
     return {
         "p20_per_m2": p21 / length,
@@ -95,5 +94,5 @@ def _angles(angle: Law | FisherAngle) -> dict[str, float]:
 
 
 def _scanned(p10: float) -> dict[str, float]:
-    """Traces that fall anywhere are met by a scan-line at distances of an exponential law (Priest & Hudson 1976)."""
+    """A scan-line meets random traces at exponentially distributed distances (Priest & Hudson 1976)."""
     return {"p10_per_m": p10, "spacing_m": 1 / p10, "spacing_deviation_m": 1 / p10}

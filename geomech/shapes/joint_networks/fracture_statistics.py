@@ -1,4 +1,4 @@
-"""What a joint network is like: intensities, trace lengths, spacings, persistence, angles, nodes, block sizes
+"""Statistics of joint networks: intensities, trace lengths, spacings, persistence, angles, nodes, block sizes
 (Dershowitz & Herda 1992)."""
 
 from __future__ import annotations
@@ -10,9 +10,9 @@ import numpy as np
 
 from ..parts import Joint
 
-#: Traces are on one line when they are this near to it, relative to the region.
+#: Traces are on one line if their distance from it is below this, relative to the region.
 _ON_ONE_LINE = 1e-7
-#: Spacings of lines are taken where at least this part of the longest chord of the region lies between them.
+#: Spacings of lines are measured where at least this part of the longest chord of the region lies between them.
 _LONG_ENOUGH = 0.5
 
 
@@ -20,16 +20,16 @@ _LONG_ENOUGH = 0.5
 class SetStatistics:
     """One joint set in a region; nan where there is nothing to measure.
 
-    traces             how many reach into the region
+    traces             number of traces that reach into the region
     p10                1/m: traces met by scan-lines across the set
-    p20                1/m²: half the trace ends inside for each area (Mauldon 1998), which no window biases; of endless
-                       traces, their middles
-    p21                m/m²: length of trace for each area
-    mean_length        m: p21 / p20, the mean of whole traces of which the window cuts some off (Mauldon 1998)
-    window_length      m: the mean of what the region shows of each trace that reaches into it
-    seen_length, seen_length_deviation   m: of the traces that lie inside with both ends
+    p20                1/m²: half the number of trace ends inside, per area (Mauldon 1998), unbiased by the window; for
+                       endless traces, their midpoints
+    p21                m/m²: trace length per area
+    mean_length        m: p21 / p20, the mean of whole traces, some of which the window cuts (Mauldon 1998)
+    window_length      m: mean of the part inside the region of each trace that reaches into it
+    seen_length, seen_length_deviation   m: of the traces with both ends inside
     mean_spacing, spacing_deviation      m: between neighbours along the scan-lines
-    mean_angle, angle_deviation          rad: of the traces, the mean weighed by their length
+    mean_angle, angle_deviation          rad: of the traces, weighted by length
     """
 
     name: str
@@ -49,8 +49,8 @@ class SetStatistics:
 
 @dataclass(frozen=True)
 class LineStatistics:
-    """The lines that the traces of a parallel set lie on: their number, ``mean_spacing`` and ``spacing_deviation`` m
-    between neighbours, and what part of them is joint, ``persistence``."""
+    """Lines of the traces of a parallel set: their number, ``mean_spacing`` and ``spacing_deviation`` (m) between
+    neighbours, and the fraction of them that is joint, ``persistence``."""
 
     lines: int
     mean_spacing: float
@@ -59,8 +59,11 @@ class LineStatistics:
 
 
 def set_statistics(joint: Joint, region, scan_lines: int = 200, tolerance: float = 0.0) -> SetStatistics:
-    """Statistics of ``joint`` inside ``region``, (n, 2) or a shapely polygon; ``p10`` and spacings on equidistant
-    ``scan_lines`` at right angles to its mean direction. Ends within ``tolerance`` m of the region's rim are on it."""
+    """Statistics of ``joint`` inside ``region``, (n, 2) or a shapely polygon.
+
+    ``p10`` and spacings are measured on equidistant ``scan_lines`` at right angles to its mean direction. Ends within
+    ``tolerance`` (m) of the region's rim count as on it.
+    """
     import shapely
 
     area = shapely.Polygon(region) if isinstance(region, np.ndarray) else region
@@ -75,7 +78,7 @@ def set_statistics(joint: Joint, region, scan_lines: int = 200, tolerance: float
     inside, length = inside[kept], length[kept]
     mean, off = mean_direction(ends, length)
     at = shapely.points(ends)
-    # An end on the rim is where the region stops, not the trace.
+    # An end on the rim is where the region ends, not the trace.
     reach = max(tolerance, _ON_ONE_LINE * float(np.hypot(*np.subtract(area.bounds[2:], area.bounds[:2]))))
     rim = area.boundary
     shapely.prepare(rim)
@@ -104,10 +107,10 @@ def set_statistics(joint: Joint, region, scan_lines: int = 200, tolerance: float
 
 
 def line_statistics(joint: Joint, region) -> LineStatistics:
-    """Of the lines that the straight traces of a parallel set lie on inside ``region``, (n, 2) or a shapely polygon.
+    """Statistics of the lines of the straight traces of a parallel set inside ``region``, (n, 2) or a shapely polygon.
 
-    Lines without any trace in the region are not seen. Spacings are taken where the region shows at least half as much
-    of a line between them as it does elsewhere.
+    Lines without any trace in the region are missed. Spacings are measured where the region contains at least half as
+    much of a line between them as elsewhere.
     """
     import shapely
 
@@ -124,7 +127,7 @@ def line_statistics(joint: Joint, region) -> LineStatistics:
     along, across = np.array([np.cos(mean), np.sin(mean)]), np.array([-np.sin(mean), np.cos(mean)])
     arm = ends.mean(axis=1) - middle
     at = arm @ across - (arm @ along) * np.tan(off)
-    # Where a line passes, and how it is turned: short pieces cut off at a corner of the region know the latter badly.
+    # Position and direction of a line: short pieces cut off at a corner of the region give the latter poorly.
     order = np.argsort(at)
     new = np.diff(at[order], prepend=-np.inf) > _ON_ONE_LINE * size
     number = np.empty(len(at), int)
@@ -136,7 +139,7 @@ def line_statistics(joint: Joint, region) -> LineStatistics:
     chords = shapely.intersection(shapely.linestrings(np.stack([start - step, start + step], axis=1)), area)
     place = np.sort(at[longest])
     between = np.diff(place)
-    # Where a line would show little of itself some are missed, and their neighbours seem too far apart.
+    # Where only short parts of lines are in the region some are missed, and spacings appear too large.
     halfway = middle + (place[:-1] + 0.5 * between)[:, None] * across
     shown = shapely.length(
         shapely.intersection(
@@ -150,8 +153,10 @@ def line_statistics(joint: Joint, region) -> LineStatistics:
 
 
 def mean_direction(ends: np.ndarray, weights: np.ndarray) -> tuple[float, np.ndarray]:
-    """The mean angle of traces with ``ends`` (n, 2, 2), rad, and how far each is off it: traces have no sense, so their
-    angles are averaged doubled (Mardia 1972)."""
+    """Mean angle of traces with ``ends`` (n, 2, 2), rad, and the deviation of each.
+
+    Traces have no direction sense, so that doubled angles are averaged (Mardia 1972).
+    """
     along = ends[:, 1] - ends[:, 0]
     double = 2 * np.arctan2(along[:, 1], along[:, 0])
     mean = 0.5 * float(np.angle(np.sum(weights * np.exp(1j * double))))
@@ -176,8 +181,8 @@ def _deviation(values: np.ndarray) -> float:
 
 
 def _scanned(lines: np.ndarray, area, angle: float, n: int) -> tuple[int, float, np.ndarray]:
-    """How often scan-lines across ``angle`` meet ``lines``, their length in ``area`` m, and the distances m between
-    neighbours on them."""
+    """Number of intersections of scan-lines across ``angle`` with ``lines``, length (m) of the scan-lines in ``area``,
+    and distances (m) between neighbours on them."""
     import shapely
 
     low_x, low_y, high_x, high_y = area.bounds
@@ -197,10 +202,12 @@ def _scanned(lines: np.ndarray, area, angle: float, n: int) -> tuple[int, float,
 
 @dataclass(frozen=True)
 class Topology:
-    """What the nodes of a network say (Sanderson & Nixon 2015, Journal of Structural Geology 72, 55): ends in rock
-    ``i_nodes``, abutments ``y_nodes``, crossings ``x_nodes``; its ``branches`` (N_I + 3 N_Y + 4 N_X) / 2 and ``lines``
-    (N_I + N_Y) / 2; ``per_branch`` (3 N_Y + 4 N_X) / N_B, 0 to 2, and ``per_line`` 2 (N_Y + N_X) / N_L, how many
-    connections each has."""
+    """Topology of a network (Sanderson & Nixon 2015, Journal of Structural Geology 72, 55).
+
+    Nodes: ends in rock ``i_nodes``, abutments ``y_nodes``, crossings ``x_nodes``; ``branches`` (N_I + 3 N_Y + 4 N_X) /
+    2 and ``lines`` (N_I + N_Y) / 2; connections ``per_branch`` (3 N_Y + 4 N_X) / N_B, 0 to 2, and ``per_line`` 2 (N_Y +
+    N_X) / N_L.
+    """
 
     i_nodes: int
     y_nodes: int
@@ -228,16 +235,16 @@ class Topology:
 
 
 def block_sizes(areas: np.ndarray, passing: Sequence[float] = (0.1, 0.25, 0.5, 0.75, 0.9)) -> dict[float, float]:
-    """Block size, √area in m, that the part ``passing`` of all rock, by area, is not larger than: the in-situ block
-    size distribution (Hudson & Priest 1979)."""
+    """Block size √area (m) that the part ``passing`` of the rock, by area, does not exceed: the in-situ block size
+    distribution (Hudson & Priest 1979)."""
     order = np.sort(np.asarray(areas, dtype=float))
     share = np.cumsum(order) / order.sum()
     return {p: float(np.sqrt(order[min(int(np.searchsorted(share, p)), len(order) - 1)])) for p in passing}
 
 
 def passing_curve(areas: np.ndarray, most: int = 200) -> np.ndarray:
-    """(n, 2) block size, √area in m, and the per cent of all rock by area in blocks that are not larger: the block-size
-    curve, at ``most`` blocks evenly taken."""
+    """(n, 2) block size √area (m), and the percentage of the rock by area in blocks up to that size: the block-size
+    curve, at ``most`` evenly selected blocks."""
     order = np.sort(np.asarray(areas, dtype=float))
     percent = 100 * np.cumsum(order) / order.sum()
     at = np.unique(np.linspace(0, len(order) - 1, min(most, len(order))).round().astype(int))

@@ -1,4 +1,4 @@
-"""Joints that are drawn as outlines, between zones or blocks that were parted before they came here: their traces."""
+"""Traces of joints drawn as outlines, between zones or blocks that are separate from the start."""
 
 from __future__ import annotations
 
@@ -9,15 +9,18 @@ import numpy as np
 from ...model import Blocks
 from ..parts import JOINT, Joint
 
-#: At a node a trace goes on into the edge that turns by less than 5° (its cosine).
+#: At a node a trace continues along the edge that turns by less than 5° (its cosine).
 _STRAIGHT_ON = 0.9962
-#: Cutting moves a trace by a few tolerances at most, where near misses follow one another.
+#: Largest displacement of a trace by cutting, in tolerances, where near misses follow one another.
 _MOVED = 10.0
 
 
 def joints_between(blocks: Blocks, known: Sequence[Joint], rock, tolerance: float) -> list[Joint]:
-    """Joints with the traces of all edges called "joint:NAME" inside ``rock`` (a shapely area) that are not on the lines
-    of the ``known`` joint of that name; what is within ``tolerance`` m of the rock's rim is not inside."""
+    """Joints with the traces of all edges called "joint:NAME" inside ``rock`` (a shapely area) that are not on the
+    lines of the ``known`` joint of that name.
+
+    Edges within ``tolerance`` (m) of the rock's rim are not inside.
+    """
     import shapely
 
     rim = shapely.boundary(rock)
@@ -43,10 +46,10 @@ def joints_between(blocks: Blocks, known: Sequence[Joint], rock, tolerance: floa
 
 
 def _traces(pieces: np.ndarray) -> list[np.ndarray]:
-    """Straight ``pieces`` (n, 2, 2) that meet at their ends as polylines, each as long as it goes straight on."""
+    """Straight ``pieces`` (n, 2, 2) that meet at their ends as polylines, each as long as it continues straight."""
     nodes, end = np.unique(pieces.reshape(-1, 2), axis=0, return_inverse=True)
     end = end.reshape(-1, 2)
-    # Half-piece 2 k + s leaves piece k at its end s; pairs of them that go on into one another.
+    # Half-piece 2 k + s leaves piece k at its end s; pairs of them continue into one another.
     away = nodes[end[:, ::-1].ravel()] - nodes[end.ravel()]
     away /= np.hypot(*away.T)[:, None]
     partner = np.full(len(away), -1)
@@ -61,7 +64,7 @@ def _traces(pieces: np.ndarray) -> list[np.ndarray]:
             cosine[[i, j]] = cosine[:, [i, j]] = -1.0
     left = np.ones(len(pieces), bool)
     traces = []
-    # Ends first; what is left then goes round.
+    # Ends first; the rest are closed.
     for half in [*np.flatnonzero(partner < 0).tolist(), *range(len(partner))]:
         if not left[half // 2]:
             continue

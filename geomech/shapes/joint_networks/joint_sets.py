@@ -1,4 +1,4 @@
-"""Joint sets by statistics: parallel sets with spacing, trace length and gap; Poisson traces, discs cut by the section,
+"""Statistical joint sets: parallel sets with spacing, trace length and gap; Poisson traces, discs cut by the section,
 Poisson lines, Voronoi edges; terminations of one set on another. Reproducible from a seed.
 
 Angles are those of the traces in the section, counter-clockwise from x, in radians.
@@ -16,14 +16,14 @@ from ..parts import Joint
 
 LAWS = ("constant", "normal", "uniform", "lognormal", "exponential")
 
-#: No normal or uniform length is longer than its mean by more than this many standard deviations.
+#: Normal and uniform lengths exceed their mean by at most this many standard deviations.
 _FARTHEST = 6.0
 
 
 @dataclass(frozen=True)
 class Law:
-    """How a length or an angle is distributed: its ``mean`` and standard ``deviation`` (of the quantity itself, also
-    for "lognormal"; "exponential" has its mean for one)."""
+    """Distribution of a length or an angle: its ``mean`` and standard ``deviation`` (of the quantity itself, also for
+    "lognormal"; that of "exponential" is its mean)."""
 
     mean: float
     deviation: float = 0.0
@@ -39,7 +39,7 @@ class Law:
 
     @property
     def spread(self) -> float:
-        """The standard deviation that the law has."""
+        """Standard deviation of the distribution."""
         return {"constant": 0.0, "exponential": float(self.mean)}.get(self.law, self.deviation)
 
     @property
@@ -54,7 +54,7 @@ class Law:
 
     @property
     def mean_cosine(self) -> float:
-        """E[cos(X − mean)] of an angle by a normal or uniform law, rad."""
+        """E[cos(X − mean)] of a normally or uniformly distributed angle, rad."""
         if self.law == "uniform":
             half = math.sqrt(3) * self.deviation
             return math.sin(half) / half if half else 1.0
@@ -75,7 +75,7 @@ class Law:
         return rng.lognormal(math.log(self.mean) - 0.5 * square, math.sqrt(square), n)
 
     def lengths(self, rng: np.random.Generator, n: int) -> np.ndarray:
-        """(n,) values that are lengths: those below a hundredth of the mean are drawn again."""
+        """(n,) lengths: values below a hundredth of the mean are drawn again."""
         values = self.sample(rng, n)
         for _ in range(1000):
             bad = values < 0.01 * self.mean
@@ -87,8 +87,8 @@ class Law:
         )
 
     def met(self, rng: np.random.Generator) -> float:
-        """The length that lies at a place taken anywhere on a line of such lengths end to end: long ones lie there the
-        more often, in proportion to themselves (Cox 1962, Renewal theory, 5.4)."""
+        """Length that covers a random point on a line of such lengths end to end: its probability is proportional to
+        the length itself (Cox 1962, Renewal theory, 5.4)."""
         if self.spread == 0:
             return float(self.mean)
         if self.law == "exponential":
@@ -107,7 +107,7 @@ def apparent_dip(dip: float, dip_direction: float, section: float) -> float:
     ``section``.
 
     ``dip`` and azimuths in rad, azimuths clockwise from north: tan α = −tan δ cos(dip direction − section), which falls
-    to the right where the plane dips to the right (Priest 1993, Discontinuity analysis, section 2.4).
+    to the right if the plane dips to the right (Priest 1993, Discontinuity analysis, section 2.4).
     """
     if abs(dip - math.pi / 2) < 1e-12:
         return math.pi / 2
@@ -116,12 +116,14 @@ def apparent_dip(dip: float, dip_direction: float, section: float) -> float:
 
 @dataclass(frozen=True)
 class FisherAngle:
-    """Angles of the traces of planes whose poles are spread in space by Fisher's law of constant ``concentration``
-    about those of the mean ``dip`` and ``dip_direction``; in a section with its x axis to azimuth ``section``. In rad;
-    stands in place of a `Law` of the angle.
+    """Angles of the traces of planes with Fisher-distributed poles, in a section with its x axis at azimuth
+    ``section``.
 
-    The section cuts a plane as often as the sine of the angle between its pole and the section's normal (Terzaghi
-    1965): planes off the section are seldom seen in it."""
+    The distribution has the constant ``concentration`` around the pole of the mean ``dip`` and ``dip_direction``; rad.
+    It replaces a `Law` of the angle. The section cuts a plane with a frequency proportional to the sine of the angle
+    between its pole and the section's normal (Terzaghi 1965): planes nearly parallel to the section are rarely seen in
+    it.
+    """
 
     dip: float
     dip_direction: float
@@ -138,7 +140,7 @@ class FisherAngle:
         while len(found) < n:
             off, chance = self._off(rng.random(wanted), rng.uniform(0, 2 * math.pi, wanted))
             found = np.append(found, off[rng.random(wanted) < chance])
-            # As many again as the part that was cut lets expect.
+            # As many again as the truncated part requires.
             wanted = min(1_000_000, math.ceil(1.2 * (n - len(found)) / max(chance.mean(), 1e-3)) + 16)
         return self.mean + found[:n]
 
@@ -155,7 +157,7 @@ class FisherAngle:
         return float(np.average(np.cos(off), weights=chance))
 
     def _off(self, share: np.ndarray, turn: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Angles off the mean, and how often such a plane is cut."""
+        """Deviations of angles from the mean, and the frequency with which such planes are cut."""
         mean = mean_pole(self.dip, self.dip_direction, self.section)
         pole = poles_about(mean, self.concentration, share, turn)
         angle = np.arctan2(pole[:, 1], pole[:, 0]) + 0.5 * math.pi - self.mean
@@ -163,8 +165,8 @@ class FisherAngle:
 
 
 def fisher_rule() -> tuple[np.ndarray, np.ndarray]:
-    """``share`` and ``turn`` of `poles_about` for means over Fisher's law: equal parts of the probability, each with as
-    many turns about the mean."""
+    """``share`` and ``turn`` of `poles_about` for means over Fisher's distribution: equal parts of the probability,
+    each with as many rotations about the mean."""
     share, turn = (np.arange(400) + 0.5) / 400, (np.arange(64) + 0.5) / 64 * 2 * math.pi
     share, turn = np.meshgrid(share, turn)
     return share.ravel(), turn.ravel()
@@ -179,9 +181,12 @@ def parallel_set(
     gap: Law | None,
     rng: np.random.Generator,
 ) -> Joint:
-    """Traces along parallel lines over ``region`` (n, 2): lines ``spacing`` apart, on each of them traces and gaps by
-    turns from a random start; without ``length`` a trace goes right through. Each line has its own angle about the
-    region's middle line of the set. The persistence is length / (length + gap)."""
+    """Traces along parallel lines over ``region`` (n, 2).
+
+    Lines are ``spacing`` apart, with alternating traces and gaps from a random start; without ``length`` a trace
+    extends right through. Each line has its own angle about its intersection with the centre line of the region. The
+    persistence is length / (length + gap).
+    """
     middle, radius = _circle(region)
     across = _unit(angle.mean + 0.5 * math.pi)
     offsets = _renewal(spacing, 2 * radius, rng) - radius
@@ -195,7 +200,7 @@ def parallel_set(
 
 
 def _renewal(spacing: Law, extent: float, rng: np.random.Generator) -> np.ndarray:
-    """Points ``spacing`` apart from 0 to ``extent``, as they lie on an endless line on which 0 is anywhere."""
+    """Points ``spacing`` apart from 0 to ``extent``, as on an endless line with a random origin."""
     mean = spacing.mean
     steps = spacing.lengths(rng, int(2 * extent / mean) + 16)
     points = np.cumsum(steps) - _before(spacing, float(steps[0]), rng.random(), rng)
@@ -205,10 +210,11 @@ def _renewal(spacing: Law, extent: float, rng: np.random.Generator) -> np.ndarra
 
 
 def _before(spacing: Law, step: float, share: float, rng: np.random.Generator) -> float:
-    """How much of the first ``step`` lies before 0, a place taken anywhere on an endless line.
+    """Part of the first ``step`` before 0, a random point on an endless line.
 
-    The ``share`` of it is right where all steps are alike, and else for most: it is kept as often as the two laws have
-    it in common (their maximal coupling), so that a seed keeps its network where it may; a stream of its own decides.
+    The ``share`` of it is right if all steps are equal, and otherwise for most: it is kept with the probability common
+    to both distributions (their maximal coupling), so that a seed keeps its network where possible; a separate stream
+    decides.
     """
     if spacing.spread == 0:
         return step * share
@@ -216,7 +222,7 @@ def _before(spacing: Law, step: float, share: float, rng: np.random.Generator) -
     lengths = spacing.lengths(np.random.default_rng(0), 20_000)
 
     def ratio(rest: float) -> float:
-        """Density of what is left after 0 on an endless line, P(X > rest) / E[X], over that of a share of any step,
+        """Density of the remainder after 0 on an endless line, P(X > rest) / E[X], over that of a share of any step,
         E[1/X; X > rest]."""
         longer = lengths[lengths > rest]
         return len(longer) / lengths.mean() / float((1 / longer).sum()) if len(longer) else math.inf
@@ -237,7 +243,8 @@ def _intervals(
     period = length.mean + gap.mean
     n = int(2 * extent / period) + 8
     out: list[tuple[float, float]] = []
-    # A place taken anywhere on an endless line is in a trace as often as the persistence says, and anywhere in it.
+    # The probability that a random point on an endless line is in a trace is the persistence; its position in the trace
+    # is uniform.
     at = period * rng.random()
     if at < length.mean:
         first = (1 - at / length.mean) * length.met(rng)
@@ -257,7 +264,7 @@ def _intervals(
 def poisson_traces(
     name: str, region: np.ndarray, angle: Law | FisherAngle, length: Law, per_area: float, rng: np.random.Generator
 ) -> Joint:
-    """Traces whose centres fall anywhere, ``per_area`` (P20, 1/m²) of them, each with its own angle and length."""
+    """Traces with random centres, ``per_area`` (P20, 1/m²) of them, each with its own angle and length."""
     middle, radius = _circle(region)
     reach = radius + 0.5 * (
         length.mean + 4 * length.deviation + (6 * length.mean if length.law == "exponential" else 0.0)
@@ -279,9 +286,12 @@ def discs(
     section: float,
     rng: np.random.Generator,
 ) -> Joint:
-    """Discs about anywhere in space, cut by the vertical section with its x axis to azimuth ``section`` (Baecher,
-    Lanney & Einstein 1977): ``per_volume_area`` (P32, m²/m³) of joint, poles spread about the mean by Fisher's law with
-    constant ``fisher`` (0: all alike). Angles in rad, azimuths clockwise from north."""
+    """Randomly located discs in space, cut by the vertical section with its x axis at azimuth ``section`` (Baecher,
+    Lanney & Einstein 1977).
+
+    ``per_volume_area`` (P32, m²/m³) of joint; poles have Fisher's distribution about the mean with constant ``fisher``
+    (0: no scatter). Angles in rad, azimuths clockwise from north.
+    """
     middle, radius = _circle(region)
     largest = diameter.mean + 5 * diameter.deviation + (8 * diameter.mean if diameter.law == "exponential" else 0.0)
     reach = radius + 0.5 * largest
@@ -294,7 +304,7 @@ def discs(
         pole = poles_about(pole, fisher, rng.random(n), rng.uniform(0, 2 * math.pi, n))
     else:
         pole = np.tile(pole, (n, 1))
-    # The section is z = 0: a disc is cut along the line through its plane, as far as its rim reaches.
+    # The section is z = 0: a disc is cut along the line in its plane, as far as its rim extends.
     flat = np.hypot(pole[:, 0], pole[:, 1])
     cut = (flat > 1e-12) & (np.abs(centre[:, 2]) < radii * flat)
     radii, centre, pole, flat = radii[cut], centre[cut], pole[cut], flat[cut]
@@ -309,9 +319,12 @@ def discs(
 def poisson_lines(
     name: str, region: np.ndarray, angle: Law | FisherAngle | None, per_area_length: float, rng: np.random.Generator
 ) -> Joint:
-    """Endless lines, ``per_area_length`` (P21, m/m²) of them, of ``angle`` or, without it, of all directions alike
-    (Miles 1964): those that meet a circle of radius R are Poisson with mean 2 R P21, their distances from its middle
-    uniform."""
+    """Endless lines, ``per_area_length`` (P21, m/m²) of them, with ``angle`` or, without it, random directions (Miles
+    1964).
+
+    The number of lines that meet a circle of radius R is Poisson with mean 2 R P21, their distances from its centre
+    uniform.
+    """
     middle, radius = _circle(region)
     n = rng.poisson(2 * radius * per_area_length)
     turn = rng.uniform(0, math.pi, n) if angle is None else angle.sample(rng, n)
@@ -321,7 +334,7 @@ def poisson_lines(
 
 
 def voronoi(name: str, region: np.ndarray, cell_area: float, rng: np.random.Generator) -> Joint:
-    """Edges of the Voronoi cells of points that fall anywhere, one on every ``cell_area`` m²."""
+    """Edges of the Voronoi cells of random points, one per ``cell_area`` m²."""
     from scipy.spatial import Voronoi
 
     middle, radius = _circle(region)
@@ -329,14 +342,14 @@ def voronoi(name: str, region: np.ndarray, cell_area: float, rng: np.random.Gene
     n = rng.poisson((2 * reach) ** 2 / cell_area)
     cells = Voronoi(rng.uniform(-reach, reach, (n, 2)))
     ridges = np.array(cells.ridge_vertices)
-    # Ridges without end belong to points at the rim of all, far from the region.
+    # Infinite ridges belong to points at the outer rim, far from the region.
     ridges = ridges[(ridges >= 0).all(axis=1)]
     return Joint(name, tuple(_touching(middle + cells.vertices[ridges], region)))
 
 
 def terminated(joint: Joint, on: Sequence[Joint], share: float, rng: np.random.Generator) -> Joint:
-    """``joint`` with the part ``share`` of its traces ended where they first meet a trace of ``on``, to either side of
-    their middle."""
+    """``joint`` with the fraction ``share`` of its traces terminated where they first meet a trace of ``on``, on either
+    side of their midpoint."""
     import shapely
 
     walls = shapely.linestrings([piece for other in on for line in other.lines for piece in _pairs(line)])
@@ -360,7 +373,7 @@ def _between(line: np.ndarray, walls: np.ndarray) -> np.ndarray:
 
 
 def _circle(region: np.ndarray) -> tuple[np.ndarray, float]:
-    """Middle and radius of a circle around ``region``."""
+    """Centre and radius of a circle around ``region``."""
     middle = 0.5 * (region.min(axis=0) + region.max(axis=0))
     return middle, float(np.hypot(*(region - middle).T).max())
 
@@ -379,7 +392,7 @@ def _pairs(line: np.ndarray) -> list[np.ndarray]:
 
 
 def _touching(lines: Sequence[np.ndarray] | np.ndarray, region: np.ndarray) -> list[np.ndarray]:
-    """The parts of straight ``lines``, (n, 2, 2), inside ``region``."""
+    """Parts of straight ``lines``, (n, 2, 2), inside ``region``."""
     import shapely
 
     if not len(lines):
@@ -399,14 +412,17 @@ def _touching(lines: Sequence[np.ndarray] | np.ndarray, region: np.ndarray) -> l
 
 
 def mean_pole(dip: float, dip_direction: float, section: float) -> np.ndarray:
-    """Unit normal, upwards, in the section's axes: x along it, y up, z horizontally across."""
+    """Upward unit normal in the section's axes: x along it, y up, z horizontally across."""
     to = dip_direction - section
     return np.array([math.sin(dip) * math.cos(to), math.cos(dip), math.sin(dip) * math.sin(to)])
 
 
 def poles_about(mean: np.ndarray, concentration: float, share: np.ndarray, turn: np.ndarray) -> np.ndarray:
-    """(n, 3) unit vectors about ``mean`` by Fisher's law (1953): farther from it than the part ``share`` of all, with
-    ``turn`` about it, rad; by inversion (Priest 1993, 3.6). All alike for ``concentration`` 0."""
+    """(n, 3) unit vectors around ``mean`` with Fisher's distribution (1953), by inversion (Priest 1993, 3.6).
+
+    ``share`` is the part of all vectors that is closer to the mean, ``turn`` (rad) the rotation about it. All equal for
+    ``concentration`` 0.
+    """
     if concentration == 0:
         return np.tile(mean, (len(share), 1))
     cosine = 1 + np.log1p(-share * -math.expm1(-2 * concentration)) / concentration

@@ -1,4 +1,4 @@
-"""Rock bridges: the whole rock between the end of a joint and what lies ahead of it."""
+"""Rock bridges: intact rock between the end of a joint and the next discontinuity ahead."""
 
 from __future__ import annotations
 
@@ -6,13 +6,13 @@ import numpy as np
 
 from ...model import Blocks, Cracks
 
-#: An end that stands less than this off the direction of another (cosine of 15°) is ahead of it: the gap in a joint.
+#: Another end is ahead if its direction deviates by less than this (cosine of 15°): the gap in a joint.
 _AHEAD = 0.9659
 
 
 def rock_bridges(blocks: Blocks, cracks: Cracks) -> np.ndarray:
-    """(n, 2, 2) m: from each end of a crack in the rock to the nearest thing ahead, in its block: an outline or another
-    crack on its line, or another end within 15° of it. Two ends that face each other share one bridge."""
+    """(n, 2, 2) m: from each crack end in the rock to the nearest point ahead in its block: an outline or another crack
+    on its line, or another end within 15° of it. Two ends that face each other share one bridge."""
     import shapely
 
     tips = cracks.tips
@@ -30,7 +30,7 @@ def rock_bridges(blocks: Blocks, cracks: Cracks) -> np.ndarray:
     lines = shapely.linestrings(cracks.nodes[cracks.segments])
     walls = {b: shapely.union_all([shape.boundary, *lines[cracks.block == b]]) for b, shape in shapes.items()}
     far = 2.0 * np.array([np.hypot(*np.ptp(blocks.loops(int(b))[0], axis=0)) for b in owner])
-    # The ray leaves its own crack behind.
+    # The ray starts from its own crack.
     rays = shapely.linestrings(np.stack([at + 1e-9 * far[:, None] * along, at + far[:, None] * along], axis=1))
     ends = shapely.points(at)
     hits = shapely.intersection(rays, np.array([walls[int(b)] for b in owner]))

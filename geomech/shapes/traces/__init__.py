@@ -1,1 +1,1 @@
-"""Traces mapped in the field: DXF, CSV and GeoJSON."""
+"""Mapped traces from DXF, CSV and GeoJSON."""

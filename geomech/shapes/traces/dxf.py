@@ -13,31 +13,31 @@ import numpy as np
 
 from .field_lines import METRES, FieldFile, FieldFileError, FieldLine
 
-#: Chords leave curves by at most this, in units of the drawing's largest side, where no tolerance is given.
+#: Largest distance of chords from curves, relative to the drawing's largest side, if no tolerance is given.
 CHORD = 1e-4
-#: What $INSUNITS says (DXF reference, "Drawing units"), m; 0 is "unitless".
+#: Values of $INSUNITS (DXF reference, "Drawing units"), m; 0 is "unitless".
 _INSUNITS = {
     1: 0.0254, 2: 0.3048, 3: 1609.344, 4: 1e-3, 5: 1e-2, 6: 1.0, 7: 1e3, 8: 2.54e-8, 9: 2.54e-5, 10: 0.9144, 13: 1e-6,
     14: 0.1, 15: 10.0, 16: 100.0, 21: 1200 / 3937,
 }  # fmt: skip
-#: A closed curve is at least a square, an arc of a third of a turn two chords.
+#: A closed curve has at least four chords, an arc of a third of a turn two.
 _LEAST_TURN = math.pi / 2
-#: Points of an entity, whether it closes, and where the piece after each point stands for a curve (one for all).
+#: Points of an entity, whether it is closed, and which pieces after a point approximate a curve (one value for all).
 _Sampled = tuple[Any, bool, "bool | list[bool]"]
-#: What ezdxf raises where an entity is not what its kind says (DXFError is a plain Exception).
+#: Exceptions of ezdxf for an invalid entity (DXFError is a plain Exception).
 _DAMAGED = (AttributeError, LookupError, TypeError, ValueError, ArithmeticError, StopIteration, RecursionError)
 _AGAIN = "delete or redraw it, or export the drawing again"
-#: References to references, deeper than this, go in a circle.
+#: References nested deeper than this are circular.
 _DEEPEST = 32
 
 
 def read_dxf(path: Path, unit: str | None = None, chord_tolerance: float | None = None) -> FieldFile:
     """The lines of the model space of a DXF file, in m: LINE, LWPOLYLINE and POLYLINE with bulges, ARC, CIRCLE,
-    ELLIPSE, SPLINE, POINT and what INSERT puts there of them.
+    ELLIPSE, SPLINE, POINT and those inserted by INSERT.
 
-    ``unit`` (a key of `METRES`) overrides the file's $INSUNITS; ``chord_tolerance`` m, default `CHORD` of the largest
-    side. Layers that are off or frozen and other kinds of entities are left out and reported. What a block draws on layer 0
-    is on the layer of its INSERT. Raises FieldFileError for a file that cannot be read, or where ezdxf is not
+    ``unit`` (a key of `METRES`) overrides the file's $INSUNITS; ``chord_tolerance`` in m, default `CHORD` of the
+    largest side. Layers that are off or frozen and other kinds of entities are left out and reported. Parts of a block
+    on layer 0 are on the layer of its INSERT. Raises FieldFileError for a file that cannot be read, or if ezdxf is not
     installed.
     """
     try:
@@ -52,7 +52,7 @@ def read_dxf(path: Path, unit: str | None = None, chord_tolerance: float | None 
         try:
             document = ezdxf.readfile(path)
         except (ezdxf.DXFStructureError, *_DAMAGED) as error:
-            # Some programs write what the format does not allow; what can be saved of it is read.
+            # Some programs write files that violate the format; what can be recovered is read.
             with _Recoveries() as recoveries:
                 document, _ = recover.readfile(path)
             warnings.append(recoveries.recovery_warnings(path, error))
@@ -79,7 +79,7 @@ def read_dxf(path: Path, unit: str | None = None, chord_tolerance: float | None 
         heights.append(float(np.abs(points[:, 2]).max()))
         if len(points) > 1:
             apart = (np.diff(points[:, :2], axis=0) != 0).any(axis=1)
-            # Of points on one another the first stays, and the piece after the last.
+            # Of coinciding points the first stays, and the piece after the last.
             points, bent = points[np.append(True, apart)], bent[np.append(apart, True)]
         if closed and len(points) > 1 and np.hypot(*(points[0] - points[-1])[:2]) <= 1e-12 * size:
             points, bent = points[:-1], bent[:-1]
@@ -98,7 +98,7 @@ def read_dxf(path: Path, unit: str | None = None, chord_tolerance: float | None 
                     f"{path.name}: {sum(h > 1e-9 * size for h in heights)} entities have z ≠ 0 (up to "
                     f"{max(heights) * factor:g} m)"
                 ),
-                "the rock is plane and z is left away: draw the section in x and y",
+                "the model is plane and z is ignored: draw the section in x and y",
             )
         )
     return FieldFile(tuple(lines), tuple(warnings + reader.recovery_warnings()))
@@ -111,17 +111,13 @@ def _factor(document: Any, path: Path, unit: str | None, warnings: list[tuple[st
     code = int(document.header.get("$INSUNITS", 0))
     if code in _INSUNITS:
         return _INSUNITS[code]
-    said = (
-        "names no unit ($INSUNITS is 0)"
-        if code == 0
-        else f"is in a unit that no rock is measured in ($INSUNITS {code})"
-    )
-    warnings.append((f"{path.name} {said}: taken for metres", 'say its unit: unit = "m", "mm", …'))
+    said = "names no unit ($INSUNITS is 0)" if code == 0 else f"is in an unsuitable unit ($INSUNITS {code})"
+    warnings.append((f"{path.name} {said}: taken for metres", 'give its unit: unit = "m", "mm", …'))
     return 1.0
 
 
 class _Recoveries(logging.Handler):
-    """While this context lasts, what ezdxf logs of what it has made of a file that is no right DXF."""
+    """Context that collects ezdxf's log of its repairs of an invalid file."""
 
     def __enter__(self) -> Self:
         self.found: list[str] = []
@@ -140,36 +136,37 @@ class _Recoveries(logging.Handler):
     def recovery_warnings(self, path: Path, error: Exception) -> tuple[str, str]:
         made = f"; {len(self.found)} guesses were made, the first: {self.found[0]}" if self.found else ""
         return (
-            f"{path.name} is no right DXF ({error or type(error).__name__}): what could be saved of it is read{made}",
-            "hold the picture of `geomech build` against the drawing, or save it as DXF again",
+            f"{path.name} is not a valid DXF file ({error or type(error).__name__}): the recoverable part is read{made}",
+            "compare the picture of `geomech build` with the drawing, or save it as DXF again",
         )
 
 
 class _Reader:
-    """Entities of a document's model space that are seen, and what was left out."""
+    """Visible entities of a document's model space, and those left out."""
 
     def __init__(self, document: Any, path: Path) -> None:
         self.document, self.path = document, path
-        self.at = "its entities"  # what is being read
+        self.at = "its entities"  # the entity being read
         self.hidden: Counter[str] = Counter()
         self.left: Counter[str] = Counter()
 
     def entities(self) -> Iterator[tuple[str, Any]]:
-        """(layer, entity) of all curves and points, INSERTs exploded."""
+        """(layer, entity) of all curves and points, with INSERTs exploded."""
         yield from self._of(self.document.modelspace(), "0", 0)
 
     def _of(self, entities: Any, host: str, depth: int) -> Iterator[tuple[str, Any]]:
         for entity in entities:
             self.at = _named(entity)
             layer = entity.dxf.get("layer", "0")
-            # Layer 0 inside a block stands for the layer that the block is put on.
+            # Layer 0 inside a block stands for the layer of the INSERT.
             layer = host if layer == "0" and depth else layer
             if self._is_hidden(layer) or entity.dxf.get("invisible", 0):
                 self.hidden[layer] += 1
             elif entity.dxftype() == "INSERT":
                 if depth >= _DEEPEST:
                     raise FieldFileError(
-                        f"{self.path.name}: block {entity.dxf.name!r} holds itself", "remove the circle of references"
+                        f"{self.path.name}: block {entity.dxf.name!r} contains itself",
+                        "remove the circle of references",
                     )
                 parts = [entity] if not entity.mcount > 1 else entity.multi_insert()
                 for part in parts:
@@ -190,8 +187,8 @@ class _Reader:
         self.left[f"{entity.dxftype()} in a block ({reason})"] += 1
 
     def points(self, entity: Any, chord: float) -> tuple[np.ndarray, bool, np.ndarray]:
-        """(n, 3) points of an entity, in the file's unit; whether it closes; (n,) True where the piece after a point
-        stands for a curve."""
+        """(n, 3) points of an entity in the file's unit; whether it is closed; (n,) True if the piece after a point
+        approximates a curve."""
         try:
             points, closed, bent = _POINTS[entity.dxftype()](entity, chord)
         except _DAMAGED as error:
@@ -199,7 +196,7 @@ class _Reader:
         points = np.array([tuple(point)[:3] for point in points], dtype=float).reshape(-1, 3)
         if not np.isfinite(points).all():
             raise FieldFileError(
-                f"{self.path.name}: {entity.dxftype()} #{entity.dxf.handle} has a coordinate that is no finite number",
+                f"{self.path.name}: {entity.dxftype()} #{entity.dxf.handle} has a coordinate that is not a finite number",
                 "delete or redraw it",
             )
         return points, closed, np.broadcast_to(np.asarray(bent, dtype=bool), len(points))
@@ -225,7 +222,7 @@ def _named(entity: Any) -> str:
 
 
 def _error_text(error: Exception) -> str:
-    return f"what belongs to it is missing or spoilt ({error})"
+    return f"data of it are missing or damaged ({error})"
 
 
 def _is_line(polyline: Any) -> bool:
@@ -258,7 +255,7 @@ def _turned(
 
 
 def _pieces(radius: float, turn: float, chord: float) -> int:
-    """Chords over an arc: one over the angle a leaves it by r (1 - cos a/2)."""
+    """Number of chords of an arc: a chord over the angle a deviates by r (1 - cos a/2)."""
     each = 2 * math.acos(1 - chord / radius) if chord < radius else math.pi
     return max(1, math.ceil(abs(turn) / min(each, _LEAST_TURN) - 1e-9))
 
@@ -274,7 +271,7 @@ def _polyline(entity: Any, chord: float) -> _Sampled:
     closed = entity.is_closed
     if entity.is_3d_polyline:
         return list(entity.points()), closed, False
-    # Control points of a fitted curve are no part of it.
+    # Control points of a fitted curve are not part of it.
     vertices = [v for v in entity.vertices if not v.dxf.flags & 16]
     rows = [(v.dxf.location.x, v.dxf.location.y, v.dxf.bulge) for v in vertices]
     height = vertices[0].dxf.location.z if vertices else 0.0
@@ -285,8 +282,10 @@ def _polyline(entity: Any, chord: float) -> _Sampled:
 def _bulged(
     rows: list[tuple[float, float, float]], closed: bool, chord: float
 ) -> tuple[list[tuple[float, float]], list[bool]]:
-    """Vertices with the points of arcs between them, and where an arc follows; a bulge is the tangent of a quarter of
-    its arc's angle, positive to the left of the way from end to end as the arc turns."""
+    """Vertices with the points of arcs between them, and which pieces are arcs.
+
+    A bulge is the tangent of a quarter of the arc's angle, positive for arcs that turn counter-clockwise.
+    """
     points: list[tuple[float, float]] = []
     bent: list[bool] = []
     for k, (x, y, bulge) in enumerate(rows):
@@ -300,7 +299,7 @@ def _bulged(
         if length == 0.0:
             continue
         radius, turn = 0.25 * length * (1 / bulge + bulge), 4 * math.atan(bulge)
-        # The centre lies to the left of the chord for an arc of less than half a turn counter-clockwise.
+        # The centre is left of the chord for an arc of less than half a turn counter-clockwise.
         off = radius - 0.5 * length * bulge
         cx, cy = x + 0.5 * dx - off * dy / length, y + 0.5 * dy + off * dx / length
         first = math.atan2(y - cy, x - cx)

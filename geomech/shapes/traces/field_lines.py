@@ -1,4 +1,4 @@
-"""Lines mapped in the field, whatever file they come from: what their names say they are, and the drawing they make."""
+"""Mapped lines from any file: their kinds according to their names, and the drawing that they make."""
 
 from __future__ import annotations
 
@@ -14,21 +14,21 @@ import numpy as np
 from ..curves import Chords, ended_on
 from ..parts import EdgeLine, Joint, Mark, Trace, Zone, extent_of
 
-#: Metres in each unit that a file may be drawn in.
+#: Metres per unit, for every unit that a file may have.
 METRES = {"m": 1.0, "km": 1e3, "cm": 1e-2, "mm": 1e-3, "ft": 0.3048, "in": 0.0254}
-#: Ends of outline pieces nearer than this part of the drawing's largest side are one corner.
+#: Ends of outline pieces closer than this part of the drawing's largest side are one corner.
 CLOSING = 1e-6
 
-# CAD programs do not take a colon in the name of a layer: "bolt-roof" and "bolt_roof" are "bolt:roof".
+# CAD programs do not allow a colon in the name of a layer: "bolt-roof" and "bolt_roof" are "bolt:roof".
 _ROLE = re.compile(
     r"(?P<role>joint|crack|zone|hole|edge|load|fixed|guided|bolt|water|monitor|probe)(?:[:_\- ]+(?P<own>.+))?",
     re.IGNORECASE,
 )
-#: Words that want a name after them where they stand for a layer.
+#: Words that need a name after them as the name of a layer.
 UNFINISHED = ("joint", "crack", "edge", "load", "guided")
-#: Roles that say all without a name after them. A set may be called "joint" or "crack" itself.
+#: Roles that are complete without a name. A set may itself be called "joint" or "crack".
 _ALONE = ("zone", "hole", "fixed", "water", "bolt", "monitor", "probe")
-#: A plain layer of outlines.
+#: Name of a plain layer of outlines.
 _OUTLINE = re.compile(r"zones|outlines?|boundary|domain", re.IGNORECASE)
 
 
@@ -42,10 +42,15 @@ class FieldFileError(ValueError):
 
 @dataclass(frozen=True, eq=False)
 class FieldLine:
-    """One line of a file: ``points`` (n, 2), one alone for a point; ``layer`` the layer or set it is in, ``label`` a
-    name of its own (of a monitor) or ""; ``place`` says where it stands in the file. ``shape`` is "line", "closed" (its
-    first point not repeated), "area" (a closed line that is meant as an area) or "hole" (of the area before it). Of a
-    curve, ``away`` says how far it may leave the piece after each point, (n,) m."""
+    """One line of a file.
+
+    points   (n, 2), a single one for a point
+    layer    layer or set that contains it; ``label``: a name of its own (of a monitor) or ""
+    place    its place in the file
+    shape    "line", "closed" (without repetition of its first point), "area" (a closed line meant as an area) or "hole"
+             (of the preceding area)
+    away     of a curve, its largest distance from the piece after each point, (n,) m
+    """
 
     layer: str
     points: np.ndarray
@@ -55,7 +60,7 @@ class FieldLine:
     away: np.ndarray | None = None
 
     def chords(self) -> Chords:
-        """The pieces that stand for curves."""
+        """The pieces that approximate curves."""
         if self.away is None:
             return Chords.none()
         points = self.points if self.shape == "line" else np.concatenate([self.points, self.points[:1]])
@@ -64,8 +69,8 @@ class FieldLine:
 
 @dataclass(frozen=True, eq=False)
 class FieldFile:
-    """``lines`` of a file in m, and what in it was left out, as (message, way out); ``crs`` is the member of a GeoJSON
-    that says its coordinate reference system, None where none is said."""
+    """``lines`` of a file in m, and the parts that were left out, as (message, way out); ``crs`` is the member of a
+    GeoJSON file with its coordinate reference system, or None."""
 
     lines: tuple[FieldLine, ...]
     warnings: tuple[tuple[str, str], ...] = ()
@@ -73,8 +78,8 @@ class FieldFile:
 
 
 class Named(NamedTuple):
-    """A line and what it is: ``role`` "joint", "crack", "zone", "hole", "edge" or "mark", with the full name, as
-    "joint:bedding" or "bolt:roof" (of an edge: its own)."""
+    """A line and its ``role``: "joint", "crack", "zone", "hole", "edge" or "mark", with the full name, such as
+    "joint:bedding" or "bolt:roof" (for an edge its own)."""
 
     role: str
     name: str
@@ -83,8 +88,8 @@ class Named(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class FieldDrawing:
-    """What lines make. ``places`` says, for ("zones" | "cracks" | "joints" | "edges" | "marks", index), where in its
-    file each stands; ``chords`` stand for the curves of outlines, joints and cracks."""
+    """The drawing made of lines. ``places`` gives the place in its file for ("zones" | "cracks" | "joints" | "edges" |
+    "marks", index); ``chords`` approximate the curves of outlines, joints and cracks."""
 
     zones: tuple[Zone, ...] = ()
     traces: tuple[Trace, ...] = ()
@@ -97,9 +102,10 @@ class FieldDrawing:
 
 
 def role_of(name: str) -> tuple[str, str] | None:
-    """The role that the name of a layer says, and the full name; None for the plain name of a set.
+    """Role according to the name of a layer, and the full name; None for the plain name of a set.
 
-    "joint:J1" is ("joint", "joint:J1"), "BOLT-roof" ("mark", "bolt:roof"), "outline" ("zone", "zone:rock")."""
+    "joint:J1" is ("joint", "joint:J1"), "BOLT-roof" ("mark", "bolt:roof"), "outline" ("zone", "zone:rock").
+    """
     name = name.strip()
     if _OUTLINE.fullmatch(name):
         return "zone", "zone:rock"
@@ -122,12 +128,12 @@ def role_of(name: str) -> tuple[str, str] | None:
 def named_lines(
     file: FieldFile, layers: Mapping[str, str] | None = None, name: str | None = None, kind: str = "joint"
 ) -> tuple[list[Named], list[str], dict[str, int]]:
-    """What each line of ``file`` is.
+    """The role of each line of ``file``.
 
-    ``layers`` maps layers (with wildcards) to names, as {"J1*": "joint:bedding", "*": ""}; "" leaves it to the layer's
-    own, and lines in layers that no pattern means are left out. A plain name is a set of ``kind`` "joint" or "crack";
-    ``name`` stands for the plain names of all layers. Areas with plain names are zones. Also returned: the patterns
-    that mean no layer, and the number of lines left out by layer.
+    ``layers`` maps layers (with wildcards) to names, such as {"J1*": "joint:bedding", "*": ""}; "" keeps the layer's
+    own name, and lines in layers that match no pattern are left out. A plain name is a set of ``kind`` "joint" or
+    "crack"; ``name`` replaces the plain names of all layers. Areas with plain names are zones. Also returned: the
+    patterns that match no layer, and the number of lines left out by layer.
     """
     found: list[Named] = []
     idle = set(layers or ())
@@ -152,11 +158,11 @@ def named_lines(
 
 
 def drawing_of_lines(lines: Sequence[Named]) -> FieldDrawing:
-    """Zones, cracks, joints, named edges and marks that ``lines`` make.
+    """Zones, cracks, joints, named edges and marks made of ``lines``.
 
-    Closed lines of zones, and open ones where they close one another, are outlines; one inside another is cut out of
-    it, and so are holes. Ends of joints and cracks on a curve are on its chords. Every line of a set of cracks is a crack, "NAME 1", "NAME 2", … where there are several.
-    Raises FieldFileError for outlines that do not close.
+    Closed lines of zones, and open ones that close each other, are outlines; one inside another is cut out of it, and
+    so are holes. Ends of joints and cracks on a curve are moved onto its chords. Every line of a set of cracks is a
+    crack, "NAME 1", "NAME 2", … if there are several. Raises FieldFileError for outlines that do not close.
     """
     warnings: list[tuple[str, str]] = []
     places: dict[tuple[str, int], str] = {}
@@ -191,7 +197,7 @@ def drawing_of_lines(lines: Sequence[Named]) -> FieldDrawing:
         else:
             full = f"{name}:{line.label}" if line.label and name == "monitor" else name
             if is_point != name.startswith(("monitor", "load:")):
-                warnings.append((f"{line.place}: {full!r} is no point, and is left out", "a monitor is a point"))
+                warnings.append((f"{line.place}: {full!r} is not a point, and is left out", "a monitor is a point"))
                 continue
             places.setdefault(("marks", list(marks).index(full) if full in marks else len(marks)), line.place)
             marks.setdefault(full, []).append(points)
@@ -220,7 +226,7 @@ def drawing_of_lines(lines: Sequence[Named]) -> FieldDrawing:
 
 
 def _zones(outlines: Sequence[Named], places: dict[tuple[str, int], str]) -> list[Zone]:
-    """Outlines as zones, what is drawn inside one cut out of it."""
+    """Outlines as zones; outlines inside them are cut out."""
     if not outlines:
         return []
     import shapely
@@ -249,7 +255,7 @@ def _zones(outlines: Sequence[Named], places: dict[tuple[str, int], str]) -> lis
         if not name:
             continue
         if not shape.is_valid:
-            # `assemble` says of an outline that crosses itself where it does.
+            # `assemble` reports where an outline crosses itself.
             places["zones", len(zones)] = place
             zones.append(Zone(name, (shapely.get_coordinates(shape)[:-1],)))
             continue
@@ -263,7 +269,7 @@ def _zones(outlines: Sequence[Named], places: dict[tuple[str, int], str]) -> lis
 
 
 def _closed(pieces: Sequence[FieldLine], name: str, tolerance: float) -> list:
-    """The polygons that open ``pieces`` enclose; ends within ``tolerance`` m are one corner."""
+    """Polygons enclosed by open ``pieces``; ends within ``tolerance`` (m) are one corner."""
     import shapely
     from scipy.spatial import cKDTree
 
@@ -281,6 +287,6 @@ def _closed(pieces: Sequence[FieldLine], name: str, tolerance: float) -> list:
         x, y = (shapely.get_coordinates(loose[0]) if loose else ends)[-1]
         raise FieldFileError(
             f"{pieces[0].place}: the outline of zone {name!r} does not close: a line ends at ({x:.10g}, {y:.10g})",
-            "end the lines of an outline on one another, or put what is no outline into a layer of its own",
+            "join the ends of the lines of an outline, or put lines that are not outlines into another layer",
         )
     return list(shapely.get_parts(polygons))

@@ -1,7 +1,7 @@
-"""Traces of a map without the vertices that only their digitising gave them.
+"""Simplification of traces: removes vertices that are due to digitising only.
 
-A polyline keeps those of its vertices from which the line through the others would be farther away than a tolerance
-(Douglas & Peucker 1973), and its ends. An end that lay on another trace is put where that trace now is: it moves by no more
+A polyline keeps its ends and those vertices from which the line through the others would be farther away than a
+tolerance (Douglas & Peucker 1973). An end that lay on another trace is moved onto that trace's new position, by no more
 than the tolerance.
 """
 
@@ -15,8 +15,8 @@ import shapely
 
 
 class Simplified(NamedTuple):
-    """The ``lines`` (n, 2), how many sides they have ``before`` and ``after``, and how far the farthest vertex that was
-    left out, or end that was moved, is ``off``, m."""
+    """The ``lines`` (n, 2), their numbers of sides ``before`` and ``after``, and the largest distance ``off`` (m) of a
+    removed vertex or a moved end."""
 
     lines: list[np.ndarray]
     before: int
@@ -25,8 +25,8 @@ class Simplified(NamedTuple):
 
 
 def simplified(lines: Sequence[np.ndarray], tolerance: float, meets: float) -> Simplified:
-    """The open ``lines`` (n, 2), of which none leaves its own by more than ``tolerance`` m; ends within ``meets`` m of
-    another line meet it."""
+    """The open ``lines`` (n, 2), simplified within ``tolerance`` (m); ends within ``meets`` (m) of another line stay on
+    it."""
     drawn = [shapely.LineString(line) for line in lines]
     now = list(shapely.simplify(drawn, tolerance)) if drawn else []
     out = [shapely.get_coordinates(line) for line in now]

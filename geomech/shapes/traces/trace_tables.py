@@ -1,4 +1,4 @@
-"""Traces of the field from text: CSV tables and GeoJSON. DXF is in `dxf`."""
+"""Mapped traces from text files: CSV tables and GeoJSON. DXF is in `dxf`."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ import numpy as np
 
 from .field_lines import METRES, FieldFile, FieldFileError, FieldLine
 
-#: What the columns of a table may be called besides their own names.
+#: Alternative names of the columns of a table.
 _COLUMNS = {"layer": "set", "joint_set": "set", "trace": "id", "trace_id": "id", "fid": "id"}
 _COMMENT = re.compile(r"(^|\s)#.*")
 _ENDS, _VERTICES = ("x1", "y1", "x2", "y2"), ("x", "y")
-#: Coordinate systems of GeoJSON that count in degrees.
+#: Coordinate systems of GeoJSON in degrees.
 _DEGREES = ("CRS84", "EPSG::4326", "EPSG:4326")
 
 
@@ -26,13 +26,12 @@ def read_field_file(
 ) -> FieldFile:
     """The lines of a .csv (.txt, .tsv), .geojson (.json) or .dxf file, in m.
 
-    ``unit`` is what the file is drawn in, a key of `METRES` (default: what a DXF file says, else metres);
-    ``chord_tolerance`` m is how far chords may leave the curves of a DXF file; ``set_property`` the property of GeoJSON
-    features that names their set. Raises FieldFileError with file and line (or feature, entity) for what cannot be
-    read.
+    ``unit`` is the file's unit, a key of `METRES` (default: that in a DXF file, else metres); ``chord_tolerance`` (m)
+    is the largest distance of chords from curves of a DXF file; ``set_property`` is the property of GeoJSON features
+    that names their set. Raises FieldFileError with file and line (or feature, entity) for content that cannot be read.
     """
     path = Path(path)
-    if not os.path.isfile(path):  # False, too, for a name that is too long to be one
+    if not os.path.isfile(path):  # False also for a name that is too long
         raise FieldFileError(f"there is no file {path}", "paths are relative to the scene file")
     kind = path.suffix.lower()
     if kind == ".dxf":
@@ -46,7 +45,7 @@ def read_field_file(
     elif kind == ".dwg":
         raise FieldFileError(f"{path.name}: DWG files cannot be read", "save the drawing as DXF")
     else:
-        raise FieldFileError(f"{path.name} is none of .dxf, .csv, .geojson", "save the traces as one of these")
+        raise FieldFileError(f"{path.name} is not a .dxf, .csv or .geojson file", "save the traces as one of these")
     factor = METRES[unit or "m"]
     if factor == 1.0:
         return found
@@ -62,13 +61,16 @@ def _text(path: Path) -> str:
 
 
 def _read_csv(path: Path) -> FieldFile:
-    """A table whose first row names its columns: x1, y1, x2, y2 (a trace a row), or id, x, y (a vertex a row, in
-    order); with them a column "set". Columns of other names are left alone. Between columns stands a tab, ";" or ",";
-    with the first two numbers may have decimal commas. "#" at the beginning or after a blank begins a comment."""
+    """A table whose first row names its columns: x1, y1, x2, y2 (one trace per row), or id, x, y (one vertex per row,
+    in order); optionally with a column "set".
+
+    Other columns are ignored. Columns are separated by a tab, ";" or ","; with the first two, numbers may have decimal
+    commas. "#" at the beginning or after a blank starts a comment.
+    """
     rows = [(k, _COMMENT.sub("", row).strip(" \r")) for k, row in enumerate(_text(path).splitlines(), 1)]
     rows = [(k, row) for k, row in rows if row.strip()]
     if not rows:
-        raise FieldFileError(f"{path.name} holds no rows", "name the columns first: set,x1,y1,x2,y2 or id,x,y")
+        raise FieldFileError(f"{path.name} has no rows", "name the columns first: set,x1,y1,x2,y2 or id,x,y")
     first, header = rows[0]
     mark = next((m for m in ("\t", ";", ",") if m in header), ",")
     names = [name.strip().strip('"').lower() for name in header.split(mark)]
@@ -80,11 +82,11 @@ def _read_csv(path: Path) -> FieldFile:
     else:
         raise FieldFileError(
             f"{path.name}:{first}: the columns are {', '.join(names)}",
-            "the first row names them: x1, y1, x2, y2, or id, x, y, and with them set",
+            "the first row names them: x1, y1, x2, y2, or id, x, y, and optionally set",
         )
     twice = next((name for name in (*wanted, "set", "id") if names.count(name) > 1), None)
     if twice:
-        raise FieldFileError(f"{path.name}:{first}: there are two columns {twice!r}", "leave one of them")
+        raise FieldFileError(f"{path.name}:{first}: there are two columns {twice!r}", "remove one of them")
     column = [names.index(name) for name in wanted]
     set_at, id_at = (names.index(name) if name in names else None for name in ("set", "id"))
     values = np.empty((len(rows) - 1, len(column)))
@@ -115,13 +117,13 @@ def _number(text: str, mark: str, what: str) -> float:
     try:
         return float(text.replace(",", ".") if mark != "," and text.count(",") == 1 else text)
     except ValueError:
-        raise FieldFileError(f"{what} is {text!r}, no number", "write metres, with a decimal point") from None
+        raise FieldFileError(f"{what} is {text!r}, not a number", "write metres, with a decimal point") from None
 
 
 def _ended(
     path: Path, numbers: Sequence[int], sets: Sequence[str], ids: Sequence[str], values: np.ndarray
 ) -> list[FieldLine]:
-    """A trace a row; one whose ends are the same is a point."""
+    """One trace per row; one with equal ends is a point."""
     same = (values[:, :2] == values[:, 2:]).all(axis=1).tolist()
     return [
         FieldLine(layer, points[:1] if one else points, f"{path.name}:{number}", label=label)
@@ -132,7 +134,7 @@ def _ended(
 def _strung(
     path: Path, numbers: Sequence[int], sets: Sequence[str], ids: Sequence[str], values: np.ndarray
 ) -> list[FieldLine]:
-    """A trace an id, its vertices in the order of the rows; it closes where the last is the first."""
+    """One trace per id, its vertices in the order of the rows; it is closed if the last vertex is the first."""
     members: dict[str, list[int]] = {}
     for row, name in enumerate(ids):
         members.setdefault(name, []).append(row)
@@ -153,7 +155,7 @@ def _strung(
 
 
 def _read_geojson(path: Path, set_property: str) -> FieldFile:
-    """Features with lines, polygons and points (RFC 7946); coordinates are metres."""
+    """Features with lines, polygons and points (RFC 7946); coordinates are in metres."""
     try:
         data = json.loads(_text(path))
     except json.JSONDecodeError as error:
@@ -163,7 +165,9 @@ def _read_geojson(path: Path, set_property: str) -> FieldFile:
     kind = data.get("type") if isinstance(data, dict) else None
     features = {"FeatureCollection": lambda: data.get("features"), "Feature": lambda: [data]}.get(str(kind))
     if features is None:
-        raise FieldFileError(f"{path.name} is no GeoJSON of features", 'its "type" must be "FeatureCollection"')
+        raise FieldFileError(
+            f"{path.name} is not a GeoJSON feature collection", 'its "type" must be "FeatureCollection"'
+        )
     about_crs = data["crs"].get("properties") if isinstance(data.get("crs"), dict) else None
     crs = str(about_crs.get("name", "")) if isinstance(about_crs, dict) else ""
     if any(name in crs for name in _DEGREES):
@@ -173,11 +177,11 @@ def _read_geojson(path: Path, set_property: str) -> FieldFile:
     lines: list[FieldLine] = []
     left: dict[str, int] = {}
     if not isinstance(features() or [], list):
-        raise FieldFileError(f'{path.name}: its "features" are no array', "export it again")
+        raise FieldFileError(f'{path.name}: its "features" are not an array', "export it again")
     for k, feature in enumerate(features() or []):
         place = f"{path.name}: feature {k + 1}"
         if not isinstance(feature, dict) or not isinstance(feature.get("properties") or {}, dict):
-            raise FieldFileError(f"{place} is no feature of GeoJSON", "export it again")
+            raise FieldFileError(f"{place} is not a GeoJSON feature", "export it again")
         about = feature.get("properties") or {}
         layer = str(about.get(set_property) or about.get("layer") or about.get("Layer") or path.stem)
         label = str(about.get("name") or "")
@@ -214,5 +218,5 @@ def _of_geometry(
 def _points(given: Any) -> np.ndarray:
     points = np.array([pair[:2] for pair in given], dtype=float)
     if points.ndim != 2 or points.shape[1] != 2 or not np.isfinite(points).all():
-        raise ValueError("pairs of numbers are wanted")
+        raise ValueError("pairs of numbers are required")
     return points

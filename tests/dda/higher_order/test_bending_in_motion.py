@@ -126,5 +126,5 @@ def test_what_is_not_supported_is_refused_by_name():
 def test_loads_that_deflection_does_not_know_are_refused_by_name():
     system = system_of([rectangle(-1, -1, 3, 0), rectangle(0, 0, 2, 1)], [1, 0], [1, 3])
     loads = replace(WEIGHT, excavations=(Excavation(1.0, blocks=(1,)),))
-    with pytest.raises(ValueError, match="excavations are not supported beside blocks of an order above 1"):
+    with pytest.raises(ValueError, match="excavations are not supported with blocks of an order above 1"):
         system.step(State.at_rest(system.blocks), loads)

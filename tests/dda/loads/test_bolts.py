@@ -237,7 +237,7 @@ def test_faulty_bolts_are_refused_by_name():
             Bolt(**{**good, **wrong})
     blocks = Blocks.from_polygons([rectangle(0, 0, 1, 1), rectangle(2, 0, 3, 1)], fixed=[True, True])
     system = dda.BlockSystem(blocks, [ROCK])
-    for wrong, match in (({}, "bolt 'A' holds nothing"), ({"block": 9}, "bolt 'A' names block 9, but there are 2")):
+    for wrong, match in (({}, "bolt 'A' has no effect"), ({"block": 9}, "bolt 'A' names block 9, but there are 2")):
         with pytest.raises(ValueError, match=match):
             system.step(State.at_rest(blocks), Loads(bolts=(Bolt(**{**good, **wrong}),)), 1.0)
 

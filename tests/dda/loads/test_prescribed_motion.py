@@ -158,7 +158,7 @@ def test_what_cannot_be_imposed_is_refused_by_name():
     refused("'base' is fixed", block_motions=(BlockMotion(0, still, ("u0", "ex")),))
     refused("point of 'base'.*fixed", point_motions=(PointMotion(0, (0.0, 0.0), still),))
     twice = (PointMotion(2, (1.0, 3.0), still), PointMotion(2, (1.0, 3.0), still))
-    refused("'platen': the motions imposed on it contradict or repeat", point_motions=twice)
+    refused("'platen': the motions prescribed for it contradict or repeat", point_motions=twice)
     with pytest.raises(ValueError, match=r"2 unknowns of block 1.*1 columns"):
         BlockMotion(1, History.constant([0.0]), ("u0", "v0"))
     with pytest.raises(ValueError, match="some of u0, v0"):

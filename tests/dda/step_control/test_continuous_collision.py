@@ -137,7 +137,7 @@ def test_energy_of_overlaps_is_told_of_and_ends_the_run(caplog):
             budget = budget.after(empty._replace(kinetic=100.0, before=100.0, overlap=2.0), 0.1 * k)
             watch.check(budget, worst, ("a", "b"), 0.1 * k)
     assert len(caplog.records) == 1
-    assert "'a' and 'b' lay 0.01 m in each other near x = 2, y = 3 m" in caplog.text
+    assert "'a' and 'b' overlapped by 0.01 m near x = 2, y = 3 m" in caplog.text
     budget = budget.after(empty._replace(kinetic=100.0, before=100.0, overlap=3.0), 0.5)
     with pytest.raises(dda.NotConverged, match=r"0.11 of all energy turned over .* 'a' and 'b'"):
         watch.check(budget, worst, ("a", "b"), 0.5)

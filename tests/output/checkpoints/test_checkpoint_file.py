@@ -87,7 +87,7 @@ def test_an_old_checkpoint_is_named_and_not_unpickled(tmp_path):
     marker, path = tmp_path / "ran", tmp_path / "cycle_0000007.checkpoint"
     path.write_bytes(json.dumps(HEAD | {"format": 1}).encode() + b"\n" + pickle.dumps(_Runs(marker)))
     assert checkpoint_file.read_header(path) == {"format": 1}
-    with pytest.raises(NotResumable, match="of format 1, and this geomech reads 3"):
+    with pytest.raises(NotResumable, match="of format 1, but this version of geomech reads format 3"):
         checkpoint_file.read(path)
     assert not marker.exists()
 
@@ -126,7 +126,7 @@ def _crafted(tmp_path, classes, nodes):
     ],
 )
 def test_a_crafted_checkpoint_is_refused(tmp_path, classes, nodes):
-    with pytest.raises(NotResumable, match="does not hold what a checkpoint holds"):
+    with pytest.raises(NotResumable, match="does not have the content of a checkpoint"):
         checkpoint_file.read(_crafted(tmp_path, classes, nodes))
 
 
@@ -136,7 +136,7 @@ def test_what_is_no_data_is_not_stored_and_ends_nothing(tmp_path, caplog):
     with open(os.devnull, encoding="utf-8") as file:
         for value in (print, lambda: None, file, np.array([object()]), [_Runs(tmp_path)]):
             assert not observer.write(1, 0.1, value)
-    assert caplog.text.count("no checkpoint of cycle 1") == 5
+    assert caplog.text.count("checkpoint of cycle 1 could not be written") == 5
 
 
 def test_any_flipped_bit_is_seen(tmp_path):
@@ -165,7 +165,7 @@ def test_the_last_two_are_kept_and_a_damaged_one_is_passed_over(tmp_path):
     spoiled[-20] ^= 1
     for bad in (b"", content[:5], content[:-1], content + b"x", bytes(spoiled)):
         last.write_bytes(bad)
-        with pytest.raises(NotResumable, match="no whole checkpoint"):
+        with pytest.raises(NotResumable, match="not a complete checkpoint"):
             checkpoint_file.read(last)
         header, path = next(checkpoint_file.whole(tmp_path))
         assert header["cycle"] == 2 and checkpoint_file.read(path) == [0, 1]
@@ -181,7 +181,7 @@ def test_what_cannot_be_written_leaves_what_there_is(tmp_path, monkeypatch, capl
 
     monkeypatch.setattr(os, "fsync", full)
     assert not observer.write(2, 0.2, "second")
-    assert "no checkpoint of cycle 2: No space left" in caplog.text
+    assert "checkpoint of cycle 2 could not be written: No space left" in caplog.text
     (path,) = (tmp_path / checkpoint_file.FOLDER).iterdir()
     assert checkpoint_file.read(path) == "first"
 
@@ -200,7 +200,7 @@ def test_checkpoints_come_every_so_many_cycles_or_by_the_clock(tmp_path):
     assert not never.wanted and not never.due and clock.wanted and not clock.due
     clock._last -= 31.0
     assert clock.due
-    with pytest.raises(ValueError, match="never with 0"):
+    with pytest.raises(ValueError, match="or 0 for no checkpoints"):
         Checkpoints(every=-1)
 
 

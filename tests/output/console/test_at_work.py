@@ -18,7 +18,7 @@ def test_a_silent_study_is_said_to_be_at_work():
     with AtWork("toppling_slope", stream=out, silence=0.05):
         time.sleep(0.3)
     lines = out.getvalue().splitlines()
-    assert len(lines) >= 2 and all(line == "  toppling_slope: at work for 0 s" for line in lines)
+    assert len(lines) >= 2 and all(line == "  toppling_slope: running for 0 s" for line in lines)
 
 
 def test_nothing_is_said_beside_what_is_shown_nor_when_quiet():

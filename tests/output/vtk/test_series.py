@@ -66,11 +66,11 @@ def test_stress_columns_stand_in_vtks_order(run_folder):
     mesh = pv.read(last_file(run_folder, "blocks"))
     load = 3 * made.RATE
     rock = mesh["block_id"] == 1
-    # Plane strain: σzz = ν(σxx + σyy).
+    # Plane strain: σzz = ν(σxx + σyy). Rounding of single precision is 6e-8.
     expected = {"XX": 0.0, "YY": -load, "ZZ": -0.21 * load, "XY": 0.0, "YZ": 0.0, "XZ": 0.0}
     for k, name in enumerate(VTK_STRESS):
-        assert np.allclose(mesh["stress"][rock][:, k], expected[name], rtol=1e-12, atol=0)
-    assert np.allclose(mesh["principal_stress"][rock], [0.0, -0.21 * load, -load], rtol=1e-12, atol=1e-9)
+        assert np.allclose(mesh["stress"][rock][:, k], expected[name], rtol=1e-7, atol=0)
+    assert np.allclose(mesh["principal_stress"][rock], [0.0, -0.21 * load, -load], rtol=1e-7, atol=1e-9)
 
 
 def test_block_triangles_cover_notch_and_hole_exactly(run_folder):
@@ -97,7 +97,7 @@ def test_displacement_and_velocity_are_those_of_the_vertices(tmp_path):
     mine = cycle.blocks.vertex_block == 1
     arm = cycle.state.vertices[mine] - centroid
     expected = 2.0 * np.stack([-arm[:, 1], arm[:, 0]], axis=1)
-    assert np.allclose(mesh["velocity"][mine, :2], expected, rtol=0, atol=1e-14)
+    assert np.allclose(mesh["velocity"][mine, :2], expected, rtol=1e-7, atol=1e-14)  # single precision
 
 
 def test_cracks_ride_on_their_block(tmp_path):
@@ -150,7 +150,8 @@ def test_contact_force_points_as_the_conventions_say(run_folder):
     """Edge of the lower block, outward normal up, so its direction (rock on the left) runs to −x."""
     mesh = pv.read(last_file(run_folder, "contacts"))
     load = 3 * made.RATE
-    assert np.allclose(mesh["force"], [[-0.01 * load, 0.03 * load, 0], [0.01 * load, 0.03 * load, 0]], rtol=1e-12)
+    # Rounding of single precision is 6e-8.
+    assert np.allclose(mesh["force"], [[-0.01 * load, 0.03 * load, 0], [0.01 * load, 0.03 * load, 0]], rtol=1e-7)
 
 
 def test_interior_is_the_bodys_field_on_the_blocks_motion(tmp_path):
@@ -431,6 +432,20 @@ def test_arrays_of_any_length_survive(tmp_path):
         for name, data in names.items():
             assert np.array_equal(mesh[name], data)
             assert np.array_equal(np.asarray(other.point_data[name]).reshape(data.shape), data)
+
+
+def test_large_grids_of_which_a_part_changes_are_read_back_as_they_are(tmp_path):
+    """What stays is compressed once: whatever changes, and changes back, must be seen in each file."""
+    n, files, rng = 5000, GridFiles("tips"), np.random.default_rng(1)
+    kinds = {f.name: (f.dtype, f.shape) for f in SERIES["tips"]}
+    names = {name: np.ones((n, *shape), dtype) for name, (dtype, shape) in kinds.items()}
+    first = rng.random((n, 2))
+    for changed, points in (("K_I", first), ("tip_id", first), ("K_I", first + 1.0), ("grown", first)):
+        names[changed] = rng.random(n) if kinds[changed][0] == "float64" else rng.integers(0, 99, n)
+        files.write(tmp_path / "tips.vtu", Grid(points, np.arange(n), np.arange(n) + 1, np.ones(n), names), {})
+        mesh = pv.read(tmp_path / "tips.vtu")
+        assert np.array_equal(mesh.points[:, :2], points)
+        assert all(np.array_equal(mesh[name], data) for name, data in names.items())
 
 
 def test_undeclared_and_missing_arrays_are_refused(tmp_path):

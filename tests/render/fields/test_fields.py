@@ -122,13 +122,13 @@ def test_what_suits_a_run(run, tmp_path):
 def test_wishes_that_cannot_be_met_are_told(run, tmp_path, capsys):
     with pytest.raises(UnknownField, match=r"no field 'heat'; there are displacement, .*contacts\.gap"):
         quantity(run, "heat")
-    with pytest.raises(UnknownField, match=r"is a tensor: say which, as stress\.XX"):
+    with pytest.raises(UnknownField, match=r"is a tensor: name a component, as stress\.XX"):
         quantity(run, "blocks.stress")
     with pytest.raises(UnknownField, match="has the components X, Y, Z"):
         quantity(run, "velocity.Q")
     folder = str(run.folder)
     for wishes, told in (
-        (["--time", "99"], "was written from t = 0 s"),
+        (["--time", "99"], "has output from t = 0 s"),
         (["--field", "heat"], "no field 'heat'"),
         (["--range", "2", "1"], "--range runs from a lower"),
         (["--scale", "-1"], "--scale is a factor of 0 or more"),

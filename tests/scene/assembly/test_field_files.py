@@ -196,7 +196,7 @@ def test_nested_places_and_levels_are_moved(tmp_path):
     [
         ("", 'layers = { "zone*" = "" , "K9" = "" }', "has no layer 'K9'", "there is"),
         ("", 'layers = { "J1" = "" }', "no rock: none of the layers is a zone", '"zone:rock"'),
-        ("", 'layers = { "zone*" = "", "J1" = "crack" }', "'crack' wants a name after it", "crack:NAME"),
+        ("", 'layers = { "zone*" = "", "J1" = "crack" }', "'crack' needs a name after it", "crack:NAME"),
         ('unit = "parsec"', "", "is not one of", "unit"),
         ("", 'kind = "fault"', "is not one of", ""),
     ],
@@ -216,7 +216,7 @@ def test_a_faulty_line_of_a_file_is_told_with_both_places(tmp_path):
         load_scene(path)
     (fault,) = caught.value.errors
     assert fault.place.endswith("scene.toml:4: geometry.traces[0].file")
-    assert "map.csv:" in fault.message and "'here', no number" in fault.message
+    assert "map.csv:" in fault.message and "'here', not a number" in fault.message
     # What the drawing says of a zone names the line that draws it.
     table.write_text(
         table.read_text().replace("77,J1,0,here", "78,zone-rock,1,1\n78,zone-rock,99,1\n78,zone-rock,99,9")

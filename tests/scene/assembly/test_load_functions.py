@@ -172,7 +172,7 @@ def test_all_of_it_arrives_and_runs(scene_file, tmp_path):
         ),
         (
             "[[loads.bolts]]\nstart = [-1.5, -0.5]\nend = [5, 5]\nend_in_ground = true\nstiffness_n_per_m = 1e8",
-            "holds nothing",
+            "has no effect",
         ),
         (
             "[[loads.bolts]]\nstart = [0.5, 0.5]\nend = [0.5, 0.6]\naxial_stiffness_n = 1e8\nactive_length_m = 0.1",

@@ -41,9 +41,9 @@ def test_what_is_not_supported_is_refused_at_its_key(tmp_path, more, message):
     ("old", "new", "message"),
     [
         ("order = 4", "order = 9", "9"),
-        ("order = 4", "order = 1\nmesh_size_m = 0.5", "cells take an order of 2 to 8"),
+        ("order = 4", "order = 1\nmesh_size_m = 0.5", "cells need an order of 2 to 8"),
         ("order = 4", "order = 2\nmesh_size_m = 0.0", "mesh_size_m"),
-        ("order = 4", 'order = 2\ncell_joint = "grain"', "belongs to cells"),
+        ("order = 4", 'order = 2\ncell_joint = "grain"', "needs cells"),
         ("order = 4", 'order = 2\nmesh_size_m = 0.4\ncell_joint = "grain"', r"no \[joints.grain\]"),
         (
             "order = 4",

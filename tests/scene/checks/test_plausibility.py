@@ -89,7 +89,7 @@ def test_a_rounding_that_edges_are_too_short_for_is_told(scene_file):
     assert not told() and not told("dda.corner_rounding=0.01")
     (warning,) = told("dda.corner_rounding=0.25")
     assert "dda.corner_rounding" in warning.place
-    assert "corners have edges too short for 0.25 times √area" in warning.message
+    assert "corners have edges too short for a rounding length of 0.25 √area" in warning.message
     assert "12 of 16" in warning.message and "over 0.25 m instead of 0.61 m" in warning.message
 
 
@@ -116,7 +116,7 @@ gap_m = 0.3
 def test_sudden_weight_on_rock_bridges_is_told(scene_file, overrides, told):
     asked = ("loads.gravity_m_s2=[0, -9.81]", "dda.dynamic_factor=1", "geometry.cracks=[]", *overrides)
     found = warnings_of(scene_file, ("[materials.rock]", BRIDGES + "[materials.rock]"), overrides=asked)
-    assert sum("all weight comes on at once" in str(w) for w in found) == told
+    assert sum("all weight is applied at once" in str(w) for w in found) == told
 
 
 @pytest.mark.parametrize(("factor", "told"), [(2e-4, 1), (1e-3, 0), (10.0, 0), (1000.0, 1)])
@@ -212,7 +212,7 @@ def test_pipelines_have_nothing_to_be_warned_of(name):
     for variant in (None, *first.variants):
         warnings = load_scene(PIPELINES / name, variant=variant).warnings
         # Joints by statistics nearly meet here and there; that they are made to is told, not warned of.
-        assert [w for w in warnings if not w.message.startswith("mended while cutting")] == []
+        assert [w for w in warnings if not w.message.startswith("repaired while cutting")] == []
 
 
 def test_overview_says_what_there_is(scene_file):
@@ -313,7 +313,7 @@ def test_weight_that_nothing_bears_is_told(scene_file, overrides, told):
 
 
 def test_blocks_that_nothing_bears_are_refused_by_name(scene_file):
-    with pytest.raises(SceneError, match="nothing bears the weight of 'ground 1' and 3 more blocks"):
+    with pytest.raises(SceneError, match="nothing supports the weight of 'ground 1' and 3 more blocks"):
         load_scene(scene_file(STANDING.format(x=0.5)), ["zones.ground.fixed=false"])
 
 
@@ -328,4 +328,4 @@ def test_a_drawn_joint_that_is_nowhere_in_the_rock_is_told(scene_file, x, told):
 def test_an_advance_longer_than_the_rock_is_told(scene_file, increment, told):
     """The plate is 1 × 2 m."""
     found = warnings_of(scene_file, overrides=[f"growth.increment_m={increment}"])
-    assert ["crosses it at a stroke" in w.message for w in found] == [True] * told
+    assert ["crosses it in one step" in w.message for w in found] == [True] * told

@@ -124,7 +124,7 @@ def test_files_that_gmsh_would_take_for_scripts_are_refused(tmp_path, name, text
     monkeypatch.chdir(tmp_path)
     path = tmp_path / name
     path.write_text(text)
-    with pytest.raises(GmshModelError, match=r"no mesh of Gmsh|take a file called"):
+    with pytest.raises(GmshModelError, match=r"not a Gmsh mesh|take a file called"):
         read_gmsh_model(path)
     assert list(tmp_path.iterdir()) == [path]
 
@@ -186,7 +186,7 @@ def test_what_may_take_any_time_is_read_in_another_process(tmp_path, text):
     [
         ("For k In {1:1e12}\n x = k;\nEndFor", "within 1 s of processor time"),
         ("Macro A\n Call A;\nReturn\nCall A;", "within 1 s of processor time"),
-        ("x[] = {0:1e10};", r"within 1 s of processor time|GiB of memory|ends its reader"),
+        ("x[] = {0:1e10};", r"within 1 s of processor time|GiB of memory|its reader crashed"),
     ],
 )
 def test_scripts_without_an_end_are_refused(tmp_path, text, why, monkeypatch):
@@ -202,7 +202,7 @@ def test_surfaces_beyond_all_numbers_are_refused(tmp_path):
         "Line(1) = {1, 2}; Line(2) = {2, 3}; Line(3) = {3, 1}; Curve Loop(1) = {1, 2, 3}; Plane Surface(1) = {1};\n"
         'Physical Surface("rock") = {1};\n'
     )
-    with pytest.raises(GmshModelError, match="beyond all numbers"):
+    with pytest.raises(GmshModelError, match="that are not finite"):
         read_gmsh_model(path)
 
 
