@@ -151,8 +151,8 @@ def test_bad_scene_ends_with_2_and_all_its_errors(scene, capsys):
     [
         (["check", "nowhere.toml"], "nowhere.toml"),
         (["run", "nowhere.toml"], "nowhere.toml"),
-        (["render", "nowhere"], "holds no run"),
-        (["report", "nowhere"], "holds no run"),
+        (["render", "nowhere"], "there is no folder nowhere"),
+        (["report", "nowhere"], "there is no folder nowhere"),
     ],
 )
 def test_missing_input_ends_with_2(arguments, message, capsys):

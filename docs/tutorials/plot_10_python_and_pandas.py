@@ -1,6 +1,6 @@
 """
-Runs from Python, results in pandas
-===================================
+Runs from Python, results in pandas and xarray
+===============================================
 
 We drive a set of runs of one scene from Python and read their tables into data frames.
 """
@@ -17,6 +17,7 @@ from pathlib import Path
 import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
+import xarray as xr
 
 import geomech
 from geomech.scene import load_scene
@@ -88,6 +89,19 @@ for friction, frame in frames.items():
     axes.plot(frame["time"], np.hypot(frame["block_ux"], frame["block_uy"]), label=f"{friction}°")
 axes.set(xlabel="s", ylabel="down the plane, m")
 axes.legend(frameon=False, title="friction")
+
+# %%
+# The set as one array
+# --------------------
+# With `xarray <https://xarray.dev>`_ (``pip install xarray``) the tables of all runs become one data set, whose axes are
+# called by what varies: friction and time.
+
+moved = xr.concat(
+    [frame.set_index("time")[["block_ux", "block_uy", "kinetic_energy"]].to_xarray() for frame in frames.values()],
+    dim=pd.Index(list(frames), name="friction"),
+)
+print(moved)
+print(moved.kinetic_energy.sel(time=[0.1, 0.3, 0.5], method="nearest").to_pandas().round(1).to_string())
 
 # %%
 # More than tables

@@ -8,7 +8,7 @@ first. In statics, where a load does not shrink with the step, what a shorter st
 from __future__ import annotations
 
 import logging
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import NoReturn, Protocol
 
 import numpy as np
@@ -265,21 +265,39 @@ class StepCutting:
     def _with_corners_of(self, attempt: Attempt, state: np.ndarray) -> ContactSet | None:
         """The contacts with which the step begins again because corners have met elsewhere than expected in the
         ``attempt``, which left its contacts in ``state`` (n,); None where all met as expected."""
-        finder, search = self.system.finder, self.search
+        system, search = self.system, self.search
         found, moved = attempt.found, attempt.new_vertices - attempt.vertices
         if found.lumped is not None:
             found = found.lumped
-        pressed = bool(((found.corner >= 0) & (state != OPEN)).any())
-        strayed = np.abs(moved if search.motion is None else moved - search.motion).max()
-        if not pressed and not strayed > 0.5 * search.margin:
+        pressed = (found.corner >= 0) & (state != OPEN)
+        off = np.abs(moved if search.motion is None else moved - search.motion).max(axis=1)
+        strayed = np.zeros(system.blocks.n_blocks, bool)
+        strayed[system.owner[off > 0.5 * search.margin]] = True
+        if not pressed.any() and not strayed.any():
             return None
         search.motion, search.glue_holds = moved, found.relies_on_glue
+        # Only these pairs may meet in another way; all pairs are searched again if any of them does.
+        near = search.near
+        some = strayed[near.pairs].any(axis=1)
+        at = near.of_contacts(found.block[pressed], found.other[pressed], len(strayed))
+        some[at[at >= 0]] = True
+        doubtful = replace(search, near=Windows(near.pairs[some], near.reach[some])).find()
+        if not self._meets_otherwise(attempt, found, doubtful, state):
+            return None
         again = search.find()
-        if pressed and self._redirected(found, again, state):
-            return again
-        known = np.isin(again.vertex * len(moved) + again.edge, found.vertex * len(moved) + found.edge)
-        missed = ~known & (finder.gaps(attempt.new_vertices, attempt.vertices, again) - again.lift < -again.precision)
-        return again if missed.any() else None
+        return again if self._meets_otherwise(attempt, found, again, state) else None
+
+    def _meets_otherwise(self, attempt: Attempt, found: ContactSet, again: ContactSet, state: np.ndarray) -> bool:
+        """Whether corners that ``found`` has pressing in ``state`` (n,), or does not have, meet otherwise in ``again``, the
+        contacts of all pairs of blocks or of some, which the motion of the ``attempt`` has told."""
+        if again.lumped is not None:
+            again = again.lumped
+        if self._redirected(found, again, state):
+            return True
+        finder, n = self.system.finder, len(attempt.vertices)
+        known = np.isin(again.vertex * n + again.edge, found.vertex * n + found.edge)
+        gap = finder.gaps(attempt.new_vertices, attempt.vertices, again) - again.lift
+        return bool((~known & (gap < -again.precision)).any())
 
     def _redirected(self, found: ContactSet, again: ContactSet, state: np.ndarray) -> bool:
         """Whether any pair of rounded corners that presses in ``state`` (n,) of ``found`` meets in another direction in

@@ -13,7 +13,7 @@ import numpy as np
 
 from ..conventions import rotate_stress
 from ..model import OPEN, SLIP, STICK, Loads, State
-from .contact_detection.contact_records import copied
+from .contact_detection.contact_records import copied, largest_of_blocks
 from .energy_balance import (
     ContactStep,
     StepEnergy,
@@ -173,8 +173,7 @@ class Attempt:
         apart, along = contact_speeds(found, found.geometry, self.carried, centroid).T
         mass = np.where(system.fixed, np.inf, system.mass)
         largest = np.where(system.fixed, np.inf, 0.0)
-        for blocks in (found.block, found.other):
-            np.maximum.at(largest, blocks, found.normal)
+        largest_of_blocks(found.normal, found.block, found.other, largest)
         least = np.minimum(mass[found.block], mass[found.other]), np.minimum(largest[found.block], largest[found.other])
         fast, slides = (least[0] * np.abs(speed) / self.dt > least[1] for speed in (apart, along))
         after, loose = found.gap_before + self.dt * apart, found.bonded == 0

@@ -39,8 +39,11 @@ class ContactSolver:
 
     Operator splitting (`dda.open_close.operator_splitting`), of steps in motion
     splitting              whether it proposes states before the central path does
+    splitting_violation    at once where the forces of wrong contacts are more than this part of all normal forces (after
+                           an impact on a slope of 1 000 blocks Newton's method leads nowhere from there: 0.01 to 0.1 take
+                           as many factorisations)
     splitting_wrong        where fewer than this part of the contacts is wrong, patches are tried before
-    splitting_iterations   substitutions at most: from the states of 100 Newton's method mostly ends in five iterations on
+    splitting_iterations   substitutions at most: from the states of 60 Newton's method mostly ends in four iterations on
                            a slope of 1 000 blocks that an impact shakes
     splitting_settled      … or until no more than this part of the states changes within ten of them
 
@@ -79,8 +82,9 @@ class ContactSolver:
     patch_share: float = 0.4
     patch_blocks: int = 2000
     splitting: bool = True
+    splitting_violation: float = 0.03
     splitting_wrong: float = 0.02
-    splitting_iterations: int = 100
+    splitting_iterations: int = 60
     splitting_settled: float = 0.001
     central_path: bool = True
     path_iterations: int = 60

@@ -30,6 +30,8 @@ class Run:
     def __init__(self, folder: Path | str) -> None:
         self.folder = Path(folder)
         self._files: dict[str, dict[int, Path | HdfStep]] = {}
+        if not self.folder.is_dir():
+            raise FileNotFoundError(f"there is no folder {self.folder}")
         if not (self.folder / "history.csv").is_file():
             raise FileNotFoundError(f"{self.folder} holds no run: history.csv is missing")
 

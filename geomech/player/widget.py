@@ -16,7 +16,7 @@ class RunPlayer:
 
     Raises NothingToPlay where none of them has written anything that could be drawn."""
 
-    def __init__(self, runs: Sequence[Run], height: int = 760, megabytes: float = 4.0) -> None:
+    def __init__(self, runs: Sequence[Run], height: int = 860, megabytes: float = 4.0) -> None:
         self.height = int(height)
         records = records_of(runs, int(1e6 * megabytes))
         if not records:

@@ -38,8 +38,10 @@ def open_run(folder: str | Path) -> RunResults:
     (8, 3)
     """
     folder = Path(folder)
+    if not folder.is_dir():
+        raise FileNotFoundError(f"there is no folder {folder}")
     if not (folder / "history.csv").is_file():
-        below = sorted(str(path.parent) for path in folder.glob("*/history.csv")) if folder.is_dir() else []
+        below = sorted(str(path.parent) for path in folder.glob("*/history.csv"))
         raise FileNotFoundError(
             f"{folder} holds no run"
             + (f"; there are runs in {', '.join(below)}" if below else ": history.csv is missing")
@@ -133,7 +135,7 @@ class RunResults:
 
         return draw(self._run, out, **options)
 
-    def view(self, *others: RunResults, height: int = 760, megabytes: float = 4.0) -> RunPlayer:
+    def view(self, *others: RunResults, height: int = 860, megabytes: float = 4.0) -> RunPlayer:
         """The run as a notebook plays it, cycle by cycle, ``others`` beside it with one range of colours; as far as it has
         come. Raises ValueError where nothing was written that could be drawn.
 

@@ -173,7 +173,8 @@ def draw(found: Mapping[str, Any], file: Path) -> None:
         rows = [row for row in each.rows if row.get("_places")]
         shares = np.mean([moved_cells(row["_places"], each.plan.cells) for row in rows], axis=0)
         x0, y0, x1, y1 = each.plan.box
-        right.fill([0, 60, 60, 42, 30, 0], [0, 0, 20, 20, 40, 40], color="#efe6d5")
+        # Matplotlib draws images below areas: the rock has to be lower still.
+        right.fill([0, 60, 60, 42, 30, 0], [0, 0, 20, 20, 40, 40], color="#efe6d5", zorder=-1)
         image = right.imshow(
             np.ma.masked_where(shares <= 0, 100 * shares),
             extent=(x0, x1, y0, y1),

@@ -8,7 +8,8 @@ import numpy as np
 
 from geomech.reference.slopes import toppling_slope as published
 
-COLOURS = {"slides": "#d9a441", "topples": "#c8553d", "stands": "#8aa4a0"}
+# Three steps of lightness, so that they differ in grey too.
+COLOURS = {"slides": "#f2d16b", "topples": "#a63c28", "stands": "#8aa4a0"}
 INK, BASE = "#2f3136", "#e6e3dc"
 
 #: Of tan φ: elastic columns, E = 100 GPa, take 0.0011 more than rigid ones; bisection to 2e-4, and what creeps past
@@ -108,7 +109,15 @@ def draw(
         slope.fill(*outline.T, fill=False, edgecolor="#9a9a94", lw=0.8, ls=(0, (3, 2)), zorder=1)
     for n, outline in enumerate(fallen[1:]):
         slope.fill(*outline.T, facecolor=COLOURS[modes[n]], edgecolor=INK, lw=0.8, zorder=2)
-        slope.text(*outline.mean(axis=0), str(n + 1), ha="center", va="center", fontsize=7.5, color="white", zorder=3)
+        slope.text(
+            *outline.mean(axis=0),
+            str(n + 1),
+            ha="center",
+            va="center",
+            fontsize=7.5,
+            zorder=3,
+            color="white" if modes[n] == "topples" else INK,
+        )
     slope.set_aspect("equal")
     corners = np.concatenate([*rest[1:], *fallen[1:]])
     (left, low), (right, high) = corners.min(axis=0), corners.max(axis=0)

@@ -14,12 +14,13 @@ ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT))
 from docs.generate import gallery  # noqa: E402
 
-#: Pictures that were made before the gallery kept digests, and take from ten minutes to hours to make.
+#: Pictures that were made before the gallery kept digests, and take from ten minutes to hours to make; and one of times
+#: (`bench_geometry`) whose axis has had new words since, which wants a machine that does nothing else.
 NOT_REMADE: set[str] = {
     "bench_dda.png",
     "bench_ddm.png",
+    "bench_geometry.png",
     "bench_solvers.png",
-    "random_slope.png",
     "stability.png",
     "stability_cracks.png",
 }

@@ -19,8 +19,9 @@ QUICK = {"plot_07_hydraulic_fracture.py"}
     [pytest.param(path, marks=() if path.name in QUICK else pytest.mark.slow, id=path.stem) for path in TUTORIALS],
 )
 def test_a_tutorial_runs(script):
-    if "pandas" in script.read_text(encoding="utf-8") and importlib.util.find_spec("pandas") is None:
-        pytest.skip("pandas is not installed")
+    for library in ("pandas", "xarray"):
+        if f"import {library}" in script.read_text(encoding="utf-8") and importlib.util.find_spec(library) is None:
+            pytest.skip(f"{library} is not installed")
     around = os.environ | {"MPLBACKEND": "Agg", "PYTHONPATH": str(ROOT)}
     done = subprocess.run(
         [sys.executable, script], cwd=ROOT, env=around, capture_output=True, text=True, timeout=900, check=False

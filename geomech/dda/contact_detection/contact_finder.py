@@ -463,9 +463,10 @@ class ContactFinder:
     def _pressed(self, old: np.ndarray) -> np.ndarray:
         """(n_blocks,) m: deepest penetration of each block's faces in the last step."""
         deepest = np.zeros(len(self._area))
-        closed = old["state"] != OPEN
-        for blocks in (old["block"][closed], old["other"][closed]):
-            np.maximum.at(deepest, blocks, -old["gap"][closed])
+        deep = np.where(old["state"] != OPEN, -old["gap"], 0.0)
+        contact_records.largest_of_blocks(
+            deep, np.ascontiguousarray(old["block"]), np.ascontiguousarray(old["other"]), deepest
+        )
         return deepest + self.deflection
 
     def _tilt(self, vertices, edge, corner, geometry) -> np.ndarray:

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...compiled import kept
+from ...compiled import UNCOUNTED, kept
 from ...model import CONTACT, OPEN
 
 _jit = kept(fastmath=False, error_model="numpy", nogil=True)
@@ -45,6 +45,16 @@ def names(rows, n_vertices):
         if row.state != OPEN:
             gap = min(gap, row.gap)
     return Names(vertex, edge, keys, normal, lift, gap)
+
+
+@kept(fastmath=False, error_model="numpy", nogil=True, **UNCOUNTED)
+def largest_of_blocks(value, block, other, least):
+    """Raise ``least`` (n_blocks,) to the largest ``value`` (n,) of the contacts between ``block`` and ``other`` (n,) of
+    each block, in place."""
+    for c in range(len(value)):
+        for b in (block[c], other[c]):
+            if value[c] > least[b]:
+                least[b] = value[c]
 
 
 @_jit

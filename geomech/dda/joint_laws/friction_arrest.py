@@ -22,14 +22,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ...compiled import UNCOUNTED, kept
 from ...model import OPEN, SLIP, STICK
+from ..contact_detection.contact_records import largest_of_blocks
 from ..equation_records import BlockEquations, ContactMotion, ContactStiffness, SpringsInStates
 from ..linear_solver import assembly
 from ..open_close.contact_set import ContactSet
 from ..open_close.settled_states import Settled
 
-#: Impulses beyond what friction can exert are brought back to it this many times.
-_ROUNDS = 4
+#: Impulses beyond what friction can exert are brought back to it this many times, or until no more than this part of the
+#: contacts that stop have such.
+_ROUNDS, _LEFT = 4, 0.1
 #: A spring k turns the speed of a mass m about in every step of Shi's, instead of swinging, from k dt² = 16 m on: there
 #: its two roots are real, and one of them tends to −1.
 _TURNS_ABOUT = 16.0
@@ -40,10 +43,10 @@ _PASSED_ON = 20.0
 #: it in so long a time; with it all that is slower, else nothing. (One brick that slides on a wall of 10 000 shakes
 #: hundreds of contacts at their strength, by 1e-11 m each, of 1e-12 J in all, in every step, which all blocks' equations
 #: were solved for three times more.)
-_WORTH = 3e-5
+_WORTH = 1e-3
 #: … and takes vibrations out that swing the forces of contacts by more than this part of the largest: less hardly brings
 #: one to its strength.
-_SWING = 1e-3
+_SWING = 1e-2
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,22 +119,34 @@ def _worth_it(
     if not len(rows):
         return False
     largest = np.zeros(len(mass))
-    for blocks in (found.block, found.other):
-        np.maximum.at(largest, blocks, force)
+    largest_of_blocks(force, found.block, found.other, largest)
     return bool((deceleration * mass[light[rows]] > worth * largest[light[rows]]).any())
 
 
 def contact_speeds(found: ContactSet, geometry: np.ndarray, velocity: np.ndarray, centroid: np.ndarray) -> np.ndarray:
     """(n, 2) m/s of the vertex relative to the edge, across the edge and along it; ``geometry`` (n, 7) of the contacts,
     ``velocity`` (n_blocks, 6), ``centroid`` (n_blocks, 2) m."""
-    normal, point = geometry[:, 1:3], geometry[:, 5:7]
-    speed = np.zeros((len(found), 2))
-    for owner, sign in ((found.block, 1.0), (found.other, -1.0)):
-        v, (x, y) = velocity[owner], (point - centroid[owner]).T
-        speed[:, 0] += sign * (v[:, 0] + (0.5 * v[:, 5] - v[:, 2]) * y + v[:, 3] * x)
-        speed[:, 1] += sign * (v[:, 1] + (0.5 * v[:, 5] + v[:, 2]) * x + v[:, 4] * y)
-    across = normal[:, 0] * speed[:, 0] + normal[:, 1] * speed[:, 1]
-    return np.stack([across, normal[:, 0] * speed[:, 1] - normal[:, 1] * speed[:, 0]], axis=1)
+    speed = np.empty((len(found), 2))
+    _speeds(
+        found.block, found.other, np.ascontiguousarray(geometry), np.ascontiguousarray(velocity),
+        np.ascontiguousarray(centroid), speed,
+    )  # fmt: skip
+    return speed
+
+
+@kept(fastmath=False, error_model="numpy", nogil=True, **UNCOUNTED)
+def _speeds(block, other, geometry, velocity, centroid, speed):
+    """Fill ``speed`` (n, 2) as `contact_speeds`."""
+    for c in range(len(block)):
+        across = along = 0.0
+        for side in range(2):
+            b, sign = (block[c], 1.0) if side == 0 else (other[c], -1.0)
+            x, y = geometry[c, 5] - centroid[b, 0], geometry[c, 6] - centroid[b, 1]
+            turn, half = velocity[b, 2], 0.5 * velocity[b, 5]
+            across += sign * (velocity[b, 0] + (half - turn) * y + velocity[b, 3] * x)
+            along += sign * (velocity[b, 1] + (half + turn) * x + velocity[b, 4] * y)
+        nx, ny = geometry[c, 1], geometry[c, 2]
+        speed[c, 0], speed[c, 1] = nx * across + ny * along, nx * along - ny * across
 
 
 def stop(
@@ -194,7 +209,7 @@ def stop(
         # What friction at its bound has stopped and more, sticks.
         speed = u1 + sense * moved * 2.0 / dt
         within = given & (np.where(bound < strength, speed, -speed) > 0.0)
-        if not (beyond.any() or within.any()):
+        if np.count_nonzero(beyond | within) <= _LEFT * len(rows):
             break
         bound[beyond] = np.clip(total, least, strength)[beyond]
         bound[within] = np.nan

@@ -20,6 +20,7 @@ import numpy as np
 
 from ...model import OPEN, STICK, ContactSolver
 from ..contact_detection.contact_finder import ContactSet
+from ..contact_detection.contact_records import largest_of_blocks
 from .block_patches import settled_in_patch
 from .equations import Answer, Equations, States, Unsettled
 from .interior_point.central_path import CentralPath
@@ -145,7 +146,7 @@ class _Search:
                 continue
             if not self.equations.first_order:
                 self._pivot(answer, wrong, called, returned)
-            elif returned or self.tries > self._most_tries(number):
+            elif returned or self._overshoots(answer) or self.tries > self._most_tries(number):
                 if not self._by_splitting():
                     self._by_path(answer)
             else:
@@ -188,6 +189,12 @@ class _Search:
         self.falls = number < self.fewest
         if self.falls:
             self.fewest, self.best = number, (self.states, answer, wrong)
+
+    def _overshoots(self, answer: Answer) -> bool:
+        """Whether the forces of wrong contacts are so large that operator splitting, while it is still to be tried, leads on
+        sooner than Newton's method."""
+        forces = float(np.abs(answer.forces[:, 0]).sum())
+        return self.may_split and float(answer.violation.sum()) > self.solver.splitting_violation * forces
 
     def _most_tries(self, number: int) -> int:
         """How many iterations may go by without a reduction: none of a large system, whose factors are dear, nor where
@@ -325,8 +332,7 @@ def _negligible(answer: Answer, found: ContactSet, number: int, solver: ContactS
     if number > solver.sliver_contacts:
         return False
     largest = np.zeros(int(max(found.block.max(), found.other.max())) + 1)
-    for blocks in (found.block, found.other):
-        np.maximum.at(largest, blocks, np.abs(answer.forces[:, 0]))
+    largest_of_blocks(np.abs(answer.forces[:, 0]), found.block, found.other, largest)
     wrong = np.flatnonzero(answer.violation > 0)
     bears = np.maximum(largest[found.block[wrong]], largest[found.other[wrong]])
     return bool((answer.violation[wrong] <= solver.sliver_force * bears).all())
@@ -337,7 +343,6 @@ def _half_as_wrong_as_the_worst(
 ) -> np.ndarray:
     """(n,) True for contacts at least half as violated as any other contact of either of their free blocks."""
     worst = np.zeros(len(order))
-    np.maximum.at(worst, block, violation)
-    np.maximum.at(worst, other, violation)
+    largest_of_blocks(violation, block, other, worst)
     worst[order < 0] = 0.0
     return violation >= 0.5 * np.maximum(worst[block], worst[other])

@@ -13,11 +13,11 @@ Where z = G d, the forces F(z) balance the blocks. Unlike Newton's method on sta
 contacts change at once, and hard springs do not slow it down: how fast it converges depends on the blocks, whose answer
 lies between their inertia 2m/dt² and their stiffness E'. A motion that a contact prevents
 converges the faster the larger ρ is, one that it leaves free the faster the smaller. So ρ is the geometric mean of the two
-at first and where a contact slides along its edge; where the turns have closed a contact it comes to lie half way
-(in logarithms) between this mean and the stiffness, where they have opened it half way to the inertia. (With the mean
-alone twice the turns leave more states wrong; at the bounds themselves states go on changing.) What is left wrong in the end
-are contacts that bear next to nothing, and Newton's method finds all states from there. A turn takes a tenth of an
-iteration of it.
+where a contact slides along its edge; where a contact is closed it lies half way (in logarithms) between this mean and
+the stiffness, where it is open half way to the inertia: at first by the states that the step begins with, then by those that
+the turns have found, if many have changed. (With the mean alone twice the turns leave more states wrong; at the bounds
+themselves states go on changing.) What is left wrong in the end are contacts that bear next to nothing, and Newton's
+method finds all states from there. A turn takes a tenth of an iteration of it.
 """
 
 from __future__ import annotations
@@ -39,8 +39,8 @@ _SLIPPED = 2
 _RELAXATION = 1.7
 #: Turns between two looks at how many states have changed.
 _LOOK = 10
-#: Turns after which ρ follows the states.
-_FOLLOWS = (20, 40, 80)
+#: Turns after which ρ follows the states, where more than this part of them has changed since.
+_FOLLOWS, _MANY = (20, 40, 80), 0.05
 #: What a turn and a factorisation take, in iterations of Newton's method.
 _TURN, _FACTORS = 0.1, 1.0
 
@@ -114,24 +114,29 @@ class _Springs:
         loose, firm = of_softer(inertia), of_softer(np.maximum(inertia, matrix[:, 3, 3]))
         self._mean = np.sqrt(loose * firm)
         self._if_open, self._if_closed = np.sqrt(self._mean * loose), np.sqrt(self._mean * firm)
-        self._become(np.stack([self._mean, self._mean]))
+        self._become(found.state if found.tried is None else found.tried[0])
 
-    def _become(self, rho: np.ndarray) -> None:
+    def _become(self, state: np.ndarray) -> None:
+        """Take ρ by the ``state`` (n,) of the contacts."""
+        self._state = state.copy()
+        across = np.where(state == OPEN, self._if_open, self._if_closed)
+        self.rho = rho = np.stack([across, np.where(state == SLIP, self._mean, across)])
         equations, none = self._equations, np.zeros(rho.shape[1])
         pattern, data = equations.pattern, equations.room()
-        self.rho = rho
         stiffness = ContactStiffness(rho[0], rho[1], none, none)
         assembly.assemble(pattern, data, equations.matrix, self._contacts, stiffness, sides=equations.sides)
         pattern.add_links(data)
         self.correction = pattern.solver.corrections(data)
 
-    def follow(self, state: np.ndarray, at_hand: np.ndarray) -> None:
-        """Take ρ by the ``state`` (n,) of the contacts; ζ of what is ``at_hand`` (n, 6) changes with it, the forces ρ (z − ζ)
-        of the contacts do not."""
+    def follow(self, state: np.ndarray, at_hand: np.ndarray) -> bool:
+        """Take ρ by the ``state`` (n,) of the contacts, if many have another than before; ζ of what is ``at_hand`` (n, 6)
+        changes with it, the forces ρ (z − ζ) of the contacts do not."""
+        if np.count_nonzero(state != self._state) <= _MANY * len(state):
+            return False
         forces = self.rho.T * (at_hand[:, 2:4] - at_hand[:, :2])
-        across = np.where(state == OPEN, self._if_open, self._if_closed)
-        self._become(np.stack([across, np.where(state == SLIP, self._mean, across)]))
+        self._become(state)
         at_hand[:, :2] = at_hand[:, 2:4] - forces / self.rho.T
+        return True
 
 
 def split(equations: Equations, bonded: np.ndarray, solver: ContactSolver) -> Proposal:
@@ -166,7 +171,6 @@ def split(equations: Equations, bonded: np.ndarray, solver: ContactSolver) -> Pr
         rest = (equations.right - pattern.without_contacts(equations.matrix, unknowns)).ravel()
         balance(0, pattern.n, *equations.sides, vectors, at_hand, 4, 5, rest, rest)
         unknowns += between.correction(rest)
-        if taken in _FOLLOWS:
-            between.follow(states[0], at_hand)
+        if taken in _FOLLOWS and between.follow(states[0], at_hand):
             spent += _FACTORS
     return Proposal(States(*states, bonded), spent)

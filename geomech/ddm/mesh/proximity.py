@@ -31,6 +31,8 @@ AT_NODE = 0.01
 #: them may be almost detached, and equilibrium errors at its end bend it. (Measured with dislocations on short cracks
 #: at 3.5° to an edge: K off by 1 %; by 64 % with a ten-thousandth of the longer face.)
 AT_BOUNDARY = 0.0001
+#: What `Sources.meeting` says of two pieces of one digitised line: they are not compared.
+IN_LINE = 2.0
 #: Shortest element that halving may make, relative to the extent of the geometry.
 FLOOR = 1e-10
 #: An element at that limit is refused if its length exceeds this many times its distance from another.
@@ -71,7 +73,7 @@ class Sources(NamedTuple):
 
     images    number from which on sources are images behind a free surface
     span      (n_sources,)  length, m
-    meeting   (n_sources, n_sources)  0: they do not meet; 1: they meet; −sin of the angle between cracks where acute
+    meeting   (n_sources, n_sources)  0: they do not meet; 1: they meet; `IN_LINE`; −sin of the angle between cracks where acute
     chained   largest length relative to the distance where they meet; at an acute angle `AT_ACUTE`, and ``acute_share`` times
               `GRADED`
     """
@@ -150,6 +152,8 @@ def _compare(elements, length, sources, i, j, out):
     start, end, n_edges = elements.start, elements.end, sources.n_edges
     one, other = elements.source[i], elements.source[j]
     meet = sources.meeting[one, other]
+    if meet == IN_LINE:
+        return
     allowed = APART
     if meet != 0:
         allowed = sources.chained if meet > 0 else min(sources.chained, AT_ACUTE)
@@ -170,12 +174,12 @@ def _compare(elements, length, sources, i, j, out):
         out[k] = max(out[k], length[k] / (d * (allowed if length[k] > least else graded)))
 
 
-def keep_apart(start, end, kind, source, pieces, touching, n_edges, ratio, extent, unknowns, images=None):
+def keep_apart(start, end, kind, source, pieces, touching, n_edges, ratio, extent, unknowns, images=None, line=None):
     """Halve elements (``start``, ``end`` (n, 2), ``kind``, ``source`` (n,)) that are too long for their distance to
     others.
 
     ``pieces`` (n_sources, 2, 2) are the edges, then the crack segments, ``touching`` (n_sources, n_sources) which of
-    them meet; ``ratio`` is the grading ratio, ``unknowns`` the number per element; sources from ``images`` on are
+    them meet, ``line`` the same of those in line (`crack_nodes.in_line`; None: none); ``ratio`` is the grading ratio, ``unknowns`` the number per element; sources from ``images`` on are
     behind a free surface. Raises ValueError with the place where rock is too thin: it would take too many elements, or
     shorter ones than coordinates can resolve.
     """
@@ -185,6 +189,8 @@ def keep_apart(start, end, kind, source, pieces, touching, n_edges, ratio, exten
         acute_share, meeting = np.inf, touching.astype(float)
     else:
         acute_share, meeting = LOW if unknowns <= 6 else 1.0, _meeting(pieces, touching, n_edges, np.cos(ACUTE))
+    if line is not None:
+        meeting[line & ~np.eye(len(pieces), dtype=bool)] = IN_LINE
     span = np.hypot(*(pieces[:, 1] - pieces[:, 0]).T)
     images = len(pieces) if images is None else images
     sources = Sources(n_edges, images, span, meeting, chained, float(acute_share))

@@ -120,5 +120,5 @@ def _time(painter: FieldPainter, wish: Wish) -> float:
     if wish.time is None:
         return painter.frames.cycle_time(final_cycle(painter.run))
     if not first <= wish.time <= last * (1 + 1e-9):
-        raise KeyError(f"{painter.run.folder} has output from t =  {first:g} s to {last:g} s, not at {wish.time:g} s")
+        raise KeyError(f"{painter.run.folder} has output from t = {first:g} s to {last:g} s, not at {wish.time:g} s")
     return wish.time

@@ -12,8 +12,8 @@ from geomech.model import GROUND, Problem
 
 from .block_map import FIXED, INK, LOAD
 
-#: Colours of moving blocks by kind of motion, and of stable ones.
-KINDS = {"slides": "#e69f00", "topples": "#cc79a7", "slides and topples": "#d55e00"}
+#: Colours of moving blocks by kind of motion, from light to dark so that they differ in grey prints too, and of stable ones.
+KINDS = {"slides": "#f0b429", "topples": "#c06a98", "slides and topples": "#a84300"}
 STANDS, SLIDING, TOE = "#efe6d5", "#d7263d", "#0072b2"
 #: Length of the longest arrow, relative to the drawing's size.
 _ARROW = 0.12

@@ -137,7 +137,7 @@ def test_wishes_that_cannot_be_met_are_told(run, tmp_path, capsys):
         assert main(["render", folder, *wishes]) != 0
         assert told in capsys.readouterr().err
     assert main(["render", str(tmp_path / "none"), "--field", "K"]) != 0
-    assert "holds no run" in capsys.readouterr().err
+    assert "there is no folder" in capsys.readouterr().err
 
 
 def test_bolts_and_joints_have_curves(run, tmp_path):
