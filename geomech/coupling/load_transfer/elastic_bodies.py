@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ... import dda
 from ...ddm.counters import Work
 from ...ddm.crack_contact.face_laws import Released
 from ...model import TIP, Blocks, Cracks, Motion, Problem, State

@@ -95,9 +95,10 @@ class BlockGraph:
                 span.append((t0, t1))
         ends = np.array([[node[n] for n in pair] for pair in cracks.segments[segments].tolist()], dtype=int)
         # Loops that touch are one: a crack from one to the other divides the rock.
-        loop = np.array(loop)
-        for k in np.flatnonzero(np.array(own_node) != np.arange(len(own_node))):
-            loop[loop == loop[k]] = loop[own_node[k]]
+        loops = np.array(loop)
+        for at, first_there in enumerate(own_node):
+            if at != first_there:
+                loops[loops == loops[at]] = loops[first_there]
         return cls(
             block,
             np.array(points),
@@ -107,7 +108,7 @@ class BlockGraph:
             np.array(span),
             segments,
             ends.reshape(-1, 2),
-            loop,
+            loops,
         )
 
     def closes(self) -> bool:
