@@ -19,6 +19,7 @@ from .kinematics.strain_limits import ElasticRange
 from .loads.force_records import EDGE_FORCE, POINT_FORCE
 from .loads.load_vectors import AppliedForces
 from .results import CrackResponse, NotConverged, StepResult, contact_resultants
+from .statics.counted_resistance import warn_of_toes
 from .statics.in_situ_stress import InSituState, NoInSituEquilibrium, in_situ_state
 from .statics.mobilised_strength import MobilisedJoint, mobilised_joints
 from .statics.partial_factors import PartialFactors, design_problem
@@ -62,6 +63,7 @@ __all__ = [
     "mass_matrix",
     "mobilised_joints",
     "run",
+    "warn_of_toes",
 ]
 
 __getattr__ = renamed_exports(__name__, {"ToldContacts": "InheritedContacts"}, globals())

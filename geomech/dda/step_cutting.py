@@ -22,6 +22,7 @@ from .kinematics.simplex_integration import block_moments
 from .open_close.contact_set import ContactSet
 from .open_close.equations import Unsettled
 from .results import NotConverged, StepResult
+from .step_control.pseudo_inertia import balanced_attempt
 from .step_control.relative_motion import Windows
 from .step_control.step_limits import CROSSING, UNSETTLED, Crossed, StepLimits, Used
 from .time_step import Attempt, StepStart
@@ -83,9 +84,12 @@ def windows_of(system: LimitedSystem, start: StepStart, dt: float) -> Windows:
 
 class StepCutting:
     """Attempts at a step of ``system`` from ``start`` by ``dt`` at most; ``like``: the result of the same step with other
-    cracks, whose contact states are the first guess."""
+    cracks, whose contact states are the first guess; ``pseudo_inertia`` as in `BlockSystem.step`."""
 
-    def __init__(self, system: LimitedSystem, start: StepStart, dt: float, like: StepResult | None) -> None:
+    def __init__(
+        self, system: LimitedSystem, start: StepStart, dt: float, like: StepResult | None, pseudo_inertia: bool = True
+    ) -> None:
+        self.balances = system.scheme.static and system.deflected is None and not pseudo_inertia
         self.system, self.start = system, start
         self.dt = self.asked = system.limits.predicted(start.vertices, start.carried, start.moments, dt, start.gravity)
         self.search = self._search()
@@ -112,9 +116,9 @@ class StepCutting:
     def _attempt(self) -> tuple[Attempt, StepResult] | None:
         """One attempt and its result; None where the step begins again."""
         system, found = self.system, self.found
-        kind = Attempt if system.deflected is None else BendingAttempt
+        begun = balanced_attempt if self.balances else Attempt if system.deflected is None else BendingAttempt
         try:
-            attempt = kind(system, self.start, self.dt, found, self.cuts)
+            attempt = begun(system, self.start, self.dt, found, self.cuts)
             result = attempt.result()
         except Unsettled as failure:
             self.failed = self.reason = f"{failure}{system.finder.where(found, failure.contact)}"

@@ -11,6 +11,7 @@ from .energy_balance import EnergyBudget
 from .excavation import until_next_event
 from .kinematics.strain_limits import ElasticRange
 from .results import NotConverged, StepResult
+from .statics.counted_resistance import warn_of_toes
 from .statics.pseudo_time_equilibrium import equilibrium
 from .step_control.adaptive_time_step import StepLength
 from .step_control.overlap_energy import Overlap, OverlapWatch
@@ -109,4 +110,6 @@ def _at_rest(system: BlockSystem, state: State, loads: Loads, load_time: float) 
         raise NotConverged(f"t = {load_time:g} s: {found.reason}")
     if not found.converged:
         log.warning("t = %g s: %s; going on from there", load_time, found.reason)
+    elif state.time == load_time:
+        warn_of_toes(system, state, found.state, loads, load_time)
     return found.state

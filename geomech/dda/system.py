@@ -233,10 +233,12 @@ class BlockSystem:
         crack: CrackResponse | None = None,
         load_time: float | None = None,
         like: StepResult | None = None,
+        pseudo_inertia: bool = False,
     ) -> StepResult:
         """Move ``state`` by ``dt`` (default: the settings' time step) under ``loads`` taken at the time that the scheme
         weighs them to (the end of the step in Shi's), or at ``load_time`` however short the step becomes. ``like``: the
-        result of the same step with another ``crack``, from whose contact states iterations begin.
+        result of the same step with another ``crack``, from whose contact states iterations begin. In statics, blocks that
+        are held bear their loads without inertia, unless ``pseudo_inertia`` is True, which moves all blocks more gently.
 
         A step whose contact states do not settle, or that moves a vertex too far, is halved or shortened and begun
         again from ``state``, which is never changed; ``result.dt`` says what was done, and the log why contacts wanted a
@@ -245,14 +247,14 @@ class BlockSystem:
         """
         choice, strength = self.order_choice, self.glue_strength
         if choice is None and strength is None:
-            return self._step(state, loads, dt, crack, load_time, like)[1]
+            return self._step(state, loads, dt, crack, load_time, like, pseudo_inertia)[1]
         refuse_unsupported_loads(loads)
         if choice is not None:
             self._take_orders(choice, choice.first if state.order is None else np.asarray(state.order))
         if strength is not None:
             self._part(np.zeros(len(strength.tension), bool) if state.parted is None else np.asarray(state.parted))
         while True:
-            attempt, result = self._step(state, loads, dt, crack, load_time, like)
+            attempt, result = self._step(state, loads, dt, crack, load_time, like, pseudo_inertia)
             order = None if choice is None else choice.raised(self.order, self.deflected, attempt)
             if order is not None:
                 if state.deflection is not None:
@@ -272,7 +274,7 @@ class BlockSystem:
 
     def _step(
         self, state: State, loads: Loads, dt: float | None, crack: CrackResponse | None, load_time: float | None,
-        like: StepResult | None,
+        like: StepResult | None, pseudo_inertia: bool,
     ) -> tuple[Attempt, StepResult]:  # fmt: skip
         """As `step`, with blocks of the orders that they have."""
         dt = self.settings.time_step if dt is None else float(dt)
@@ -298,7 +300,7 @@ class BlockSystem:
             self._excavations.refuse(loads)
             self._refuse_unsupported(loads, state.time + dt if load_time is None else load_time)
         start = StepStart(state, vertices, carried, moments, loads.gravity.at(state.time + dt), loads, crack, load_time)
-        return StepCutting(self, start, dt, like).until_it_holds()
+        return StepCutting(self, start, dt, like, pseudo_inertia).until_it_holds()
 
     def contacts_near(self, state: State) -> ContactSet:
         """The contacts that a step from ``state`` would begin with, as CONTACT rows describe them."""

@@ -41,9 +41,10 @@ from .kinematics.newmark import (
 )
 from .kinematics.rigid_blocks import mean_stress
 from .kinematics.roundoff import undecided_gaps, warn_of_roundoff
-from .kinematics.simplex_integration import block_moments
+from .kinematics.simplex_integration import block_moments, mass_matrix
 from .linear_solver import assembly
 from .loads.load_vectors import AppliedForces, Inertia, generalised
+from .loads.prescribed_motion import MovedBlocks
 from .loads.step_actions import StepActions, effective_gravity
 from .loads.viscous_boundary import ViscousEdges
 from .open_close.augmented_lagrangian import settle_augmented
@@ -109,6 +110,7 @@ class StepStart:
     gravity   (2,)             m/s² at the end of the step as it was asked for
     loads, crack               that act, None for none
     load_time                  at which loads are taken, s; None: as the time scheme weights them
+    rest      (n_blocks, 6)    displacement in a static step that inertia does not count (`pseudo_inertia`); None for none
     """
 
     state: State
@@ -119,6 +121,7 @@ class StepStart:
     loads: Loads = field(default_factory=Loads)
     crack: CrackResponse | None = None
     load_time: float | None = None
+    rest: np.ndarray | None = None
 
 
 class Attempt:
@@ -128,7 +131,7 @@ class Attempt:
 
     def __init__(self, system: SteppedSystem, start: StepStart, dt: float, found: ContactSet, cuts: int) -> None:
         self.system, self.state, self.vertices = system, start.state, start.vertices
-        self.carried, self.moments = start.carried, start.moments
+        self.carried, self.moments, self.rest = start.carried, start.moments, start.rest
         self.dt, self.found, self.cuts, scheme = dt, found, cuts, system.scheme
         state, moments, crack = start.state, start.moments, start.crack
         self.time = state.time + dt
@@ -147,6 +150,8 @@ class Attempt:
             # What blocks store goes with them, in the first step without them and not after it.
             self.stress[system.taken_out] = 0.0
         self.iterations = 0
+        #: J/m of the mean velocity of a static step, which it does not keep.
+        self.dropped = 0.0
         if not scheme.static and found.tried is None and len(found):
             self.found = found.expecting(*self._expected_states())
         self._edges_along: tuple[np.ndarray | None, np.ndarray] = None, np.zeros((0, 2))
@@ -208,9 +213,8 @@ class Attempt:
         self.points, self.edges = system.load_map.rows(loads, acting, midpoint.vertices, state.rotation + self.turn)
         self.load = midpoint.loads_back(generalised(self.points, self.edges, midpoint.centroid))
         end = self.time if load_time is None else load_time
-        self.actions = StepActions.of(
-            system.blocks, system.fixed, loads, state, system.load_map, midpoint, system.free, system.taken_out, end
-        )
+        moved = MovedBlocks(system.blocks, system.fixed, system.taken_out)
+        self.actions = StepActions.of(moved, loads, state, system.load_map, midpoint, system.free, end)
 
     def _assemble(self) -> None:
         """The equations of blocks without their contacts."""
@@ -227,6 +231,33 @@ class Attempt:
             tuple(BlockStart(self.begun, self.stress, system.stiffness, system.compliance)), tuple(self.cracks),
             tuple(BlockLoads(self.gravity, self.load)), tuple(scheme.terms(dt, self.heavier)),
         )  # fmt: skip
+        if self.rest is not None:
+            self.right += self._inertia_of(self.rest)
+
+    def _inertia_of(self, increment: np.ndarray) -> np.ndarray:
+        """(n_free, 6) forces of inertia 2M d/dt² against the ``increment`` (n_blocks, 6) of a static step, in the rows of
+        its equations."""
+        moving = self.system.moving
+        mass = mass_matrix(self.moments[moving], self.density[moving])
+        force = 2.0 / self.dt**2 * np.einsum("nab,nb->na", mass, increment[moving])
+        force[:, 2:] /= np.sqrt(self.moments[moving, :1])
+        out = np.empty_like(force)
+        out[self.order[moving]] = force
+        return out
+
+    def inertia_and_size(self) -> tuple[np.ndarray, np.ndarray]:
+        """(n_blocks,) N each: the largest force (moment over √area) that inertia takes of each block in a static step, and
+        the sum of all forces on it; 0 on fixed blocks."""
+        found, settled, order, moving = self.found, self.settled, self.order, self.system.moving
+        counted = self.increment if self.rest is None else self.increment - self.rest
+        inertia, size = np.zeros(len(order)), np.zeros(len(order))
+        rows = order[moving]
+        inertia[moving] = np.abs(self._inertia_of(counted)[rows]).max(axis=1)
+        push = np.hypot(settled.normal_force, settled.shear_force)
+        for blocks in (found.block, found.other):
+            np.add.at(size, blocks, push)
+        size[moving] += np.abs(self.right[rows]).max(axis=1)
+        return inertia, size
 
     @property
     def _mass(self) -> BlockMass:
@@ -478,7 +509,8 @@ class Attempt:
             self.load = self.load + self.midpoint.loads_back(
                 generalised(self.points[:0], absorbed, self.midpoint.centroid)
             )
-        acceleration = 2.0 * (increment - carried * dt) / (dt * dt)
+        begun = carried * dt if self.rest is None else self.rest
+        acceleration = 2.0 * (increment - begun) / (dt * dt)
         before = self._remembered(acceleration)
         velocity, self.kept = scheme.corrected(velocity, before, acceleration, increment[:, 2], dt)
         if self.heavier != 1.0:
@@ -701,7 +733,7 @@ class Attempt:
             "open_close_iterations": self.iterations,
             "dt": self.dt,
             "step_cuts": self.cuts,
-            "kinetic_energy": energy.kinetic,
+            "kinetic_energy": energy.kinetic + self.dropped,
             "elastic_energy": energy.elastic,
             "contact_energy": energy.contact,
             "worst_penetration": _deepest(settled.state != OPEN, self.found.gap_before, settled.gap),
@@ -751,6 +783,12 @@ class Attempt:
             system.finder.closure,
         )  # fmt: skip
         energy = StepEnergy(*energies.tolist())
+        if scheme.static:
+            # No velocity is carried over: what inertia takes is lost within the step.
+            self.dropped = energy.kinetic
+            energy = energy._replace(
+                kinetic=0.0, before=energy.before - energy.carried, carried=0.0, scheme=energy.scheme + energy.kinetic
+            )
         if impact is not None:
             end = block_moments(self.new_vertices, system.next, system.vertex_start)
             kinetic = kinetic_energy(self.velocity, end, system) - kinetic_energy(velocity, end, system)

@@ -17,6 +17,7 @@ log = logging.getLogger(__name__)
 
 def relax(now: CrackedBlocks, load_time: float) -> tuple[Event, ...]:
     """Bring the blocks to equilibrium under the loads of ``load_time``; a collapse event if there is none."""
+    begun = now.state
     with now.timed("dda"):
         found = dda.equilibrium(
             now.system, now.state, now.problem.loads, load_time=load_time, crack=now.response,
@@ -27,6 +28,8 @@ def relax(now: CrackedBlocks, load_time: float) -> tuple[Event, ...]:
     if not found.collapsed:
         if not found.converged:
             log.warning("t = %g s: %s; going on from there", load_time, found.reason)
+        elif load_time == begun.time:
+            dda.warn_of_toes(now.system, begun, found.state, now.problem.loads, load_time, now.response)
         return ()
     return _fallen(now, found, "", load_time)
 

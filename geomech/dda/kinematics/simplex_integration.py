@@ -58,16 +58,14 @@ def fastest_vertex(rates, vertices, vertex_start, moments):
     return np.sqrt(largest)
 
 
-def mass_matrix(moments: np.ndarray, density: float) -> np.ndarray:
-    """Mass matrix (6, 6) ∫ρ TᵀT dA of one block, unknowns (u0, v0, r0, εx, εy, γxy); ``moments``: a row of
-    `block_moments`, ``density`` kg/m³."""
-    area, _, _, xx, yy, xy = moments
-    mass = np.zeros((6, 6))
-    mass[0, 0] = mass[1, 1] = area
-    mass[2, 2] = xx + yy
-    mass[3, 3], mass[4, 4], mass[5, 5] = xx, yy, (xx + yy) / 4
-    mass[2, 3] = mass[3, 2] = -xy
-    mass[2, 4] = mass[4, 2] = xy
-    mass[2, 5] = mass[5, 2] = (xx - yy) / 2
-    mass[3, 5] = mass[5, 3] = mass[4, 5] = mass[5, 4] = xy / 2
-    return density * mass
+def mass_matrix(moments: np.ndarray, density: float | np.ndarray) -> np.ndarray:
+    """Mass matrix (..., 6, 6) ∫ρ TᵀT dA of blocks, unknowns (u0, v0, r0, εx, εy, γxy); ``moments`` (..., 6) as from
+    `block_moments`, ``density`` (...) kg/m³."""
+    area, _, _, xx, yy, xy = np.moveaxis(np.asarray(moments, float), -1, 0)
+    mass = np.zeros((*np.shape(area), 6, 6))
+    for row, column, value in (
+        (0, 0, area), (1, 1, area), (2, 2, xx + yy), (3, 3, xx), (4, 4, yy), (5, 5, (xx + yy) / 4),
+        (2, 3, -xy), (2, 4, xy), (2, 5, (xx - yy) / 2), (3, 5, xy / 2), (4, 5, xy / 2),
+    ):  # fmt: skip
+        mass[..., row, column] = mass[..., column, row] = value
+    return np.asarray(density)[..., None, None] * mass

@@ -18,12 +18,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ...model import OPEN, STICK, ContactSolver
+from ...model import OPEN, SLIP, STICK, ContactSolver
 from ..contact_detection.contact_finder import ContactSet
 from ..contact_detection.contact_records import largest_of_blocks
 from .block_patches import settled_in_patch
 from .equations import Answer, Equations, States, Unsettled
-from .interior_point.central_path import CentralPath
+from .interior_point.central_path import SLIPPED, CentralPath
 from .operator_splitting import can_split, split
 from .settled_states import Settled
 
@@ -286,10 +286,30 @@ class _Search:
 
     def _bonds_on_path(self) -> np.ndarray:
         """(n,) the bonds that the central path counts with: those of open contacts are gone, but not where cohesion belongs
-        to the whole face (`whole_faces`): it stays with a face of which one end is open."""
-        states, whole = self.states, self.found.whole
+        to the whole face (`whole_faces`): it stays with a face of which one end is open. Such a face that holds no pull
+        is free to open and to slide under its cohesion."""
+        states, found = self.states, self.found
         bonded = states.without_open_bonds().bonded
-        return bonded if whole is None else np.where(whole.face >= 0, states.bonded, bonded)
+        if found.whole is None:
+            return bonded
+        bonded = np.where(found.whole.face >= 0, states.bonded, bonded)
+        return np.where(self._without_pull(bonded), SLIPPED, bonded)
+
+    def _without_pull(self, bonded: np.ndarray) -> np.ndarray:
+        """(n,) which of the ``bonded`` contacts (n,) of whole faces hold no pull and keep their cohesion when they slide."""
+        springs = self.equations.springs
+        return (self.found.whole.face >= 0) & (bonded > 0) & (springs.tension <= 0.0) & (springs.keeps > 0)
+
+    def _bonds_after_path(self, state: np.ndarray, bonded: np.ndarray) -> np.ndarray:
+        """(n,) the bonds with which iterations go on from the ``state`` (n,) that the path proposes with ``bonded`` (n,):
+        faces that stick all along have not slipped."""
+        whole = self.found.whole
+        if whole is None:
+            return bonded
+        known = whole.face >= 0
+        slides = np.zeros(int(whole.face.max()) + 1, bool)
+        slides[whole.face[known & (state == SLIP)]] = True
+        return np.where(known & ~slides[whole.face] & (bonded == SLIPPED), self.states.bonded, bonded)
 
     def _proposed(self, path: CentralPath) -> States | None:
         """States that the ``path`` proposes once nearly all contacts are decided, none of those offered already; None
@@ -308,7 +328,8 @@ class _Search:
             few = max(2, min(solver.path_undecided, solver.path_undecided_share * n))
             decided = path.arrived or undecided <= few
             if decided and path.missed < solver.path_balance and path.epsilon < 1.0:
-                states = States(*path.states(), path.bonded)
+                state, direction = path.states()
+                states = States(state, direction, self._bonds_after_path(state, path.bonded))
                 if states.key not in self.offered:
                     self.offered.add(states.key)
                     return states

@@ -3,6 +3,7 @@ at one end, the way in which blocks are wedged; and the warnings that name it.""
 
 from __future__ import annotations
 
+import logging
 import math
 from dataclasses import dataclass, replace
 
@@ -13,11 +14,15 @@ from ..joint_laws.whole_faces import WholeFaces
 from ..kinematics.simplex_integration import block_moments
 from ..loads.bolts import labels
 from ..open_close.contact_set import ContactSet
+from ..results import CrackResponse
 from ..system import BlockSystem
 from .displacement_limit import MOVED
+from .pseudo_time_equilibrium import equilibrium
 from .safety_answer import Anchor, FactorOfSafety
-from .sharp_toes import FREE, Toe
+from .sharp_toes import FREE, ROUNDED, Toe
 from .stability_trial import Trial
+
+log = logging.getLogger(__name__)
 
 #: So many blocks with toes are named.
 _LISTED = 8
@@ -65,6 +70,31 @@ def bearing_toes(system: BlockSystem, state: State, loads: Loads, load_time: flo
     return tuple(toe for toe in toes_in_the_way(system, state) if toe.force > _BEARS * weight[toe.block])
 
 
+def warn_of_toes(
+    system: BlockSystem, begun: State, found: State, loads: Loads, load_time: float, crack: CrackResponse | None = None
+) -> None:
+    """Log which toes hold blocks that have come to rest in ``found`` from ``begun`` and would not with rounded ones: a
+    search for equilibrium outside `factor_of_safety` takes corners as sharp as they are drawn."""
+    finder = system.finder
+    before = finder.toes
+    try:
+        toes = bearing_toes(system, found, loads, load_time)
+        if not toes:
+            return
+        finder.toes = ROUNDED
+        other = equilibrium(system, begun, loads, load_time=load_time, crack=crack, follow=False)
+    finally:
+        finder.toes = before
+    if other.collapsed:
+        one = len({toe.block for toe in toes}) == 1
+        log.warning(
+            "t = %g s: %s and hold%s %.4g kN/m with %s sharp tip%s; rounded, blocks do not stand: `geomech safety` tells "
+            "the factor",
+            load_time, _where(system.blocks, toes), "s" if one else "", sum(toe.force for toe in toes) / 1e3,
+            "its" if one else "their", "" if one else "s",
+        )  # fmt: skip
+
+
 def with_toes(
     blocks: Blocks, found: FactorOfSafety, toes: tuple[Toe, ...], other: FactorOfSafety | None, hold: bool
 ) -> FactorOfSafety:
@@ -81,18 +111,7 @@ def _of_toes(blocks: Blocks, toes: tuple[Toe, ...], other: FactorOfSafety | None
     def factor(of: FactorOfSafety) -> str:
         return f"{of.factor:.4f}" if math.isfinite(of.upper) else f"above {of.lower:g}"
 
-    def name(block: int) -> str:
-        return repr(blocks.names[block] if blocks.names else f"block {block}")
-
-    first, one = toes[0], len({toe.block for toe in toes}) == 1
-    where = (
-        f"the toe of {name(first.block)} touches {name(first.other)} at x = {_metres(first.at[0])}, "
-        f"y = {_metres(first.at[1])} m"
-    )
-    if not one:
-        rest = list(dict.fromkeys(name(toe.block) for toe in toes if toe.block != first.block))
-        more = f" and {len(rest) - _LISTED} others" if len(rest) > _LISTED else ""
-        where += f" (so do those of {', '.join(rest[:_LISTED])}{more})"
+    where, one = _where(blocks, toes), len({toe.block for toe in toes}) == 1
     if hold:
         without = "the blocks do not stand" if other is None else f"the factor is {factor(other)}"
         force = sum(toe.force for toe in toes) / 1e3
@@ -106,6 +125,24 @@ def _of_toes(blocks: Blocks, toes: tuple[Toe, ...], other: FactorOfSafety | None
         "would hold"
     )
     return (f"{where}; {rounded}: factor {factor(other)}, which is not to be relied on",)
+
+
+def _where(blocks: Blocks, toes: tuple[Toe, ...]) -> str:
+    """Which toes touch what, and where."""
+
+    def name(block: int) -> str:
+        return repr(blocks.names[block] if blocks.names else f"block {block}")
+
+    first = toes[0]
+    where = (
+        f"the toe of {name(first.block)} touches {name(first.other)} at x = {_metres(first.at[0])}, "
+        f"y = {_metres(first.at[1])} m"
+    )
+    rest = list(dict.fromkeys(name(toe.block) for toe in toes if toe.block != first.block))
+    if not rest:
+        return where
+    more = f" and {len(rest) - _LISTED} others" if len(rest) > _LISTED else ""
+    return f"{where} (so do those of {', '.join(rest[:_LISTED])}{more})"
 
 
 def _metres(value: float) -> str:
@@ -172,8 +209,6 @@ def hairline_faces(system: BlockSystem, state: State) -> tuple[PartedFace, ...]:
     """Faces of joints with cohesion that in ``state`` are open at all of their ends, by less than what blocks are known
     to, and so hold nothing, bonded still or not; the one that is open farthest first."""
     near = system.contacts_near(state)
-    if not system.finder.whole_faces:
-        return ()
     cohesion = np.array([joint.cohesion for joint in system.joints])[near.law]
     whole = WholeFaces.of(near.block, near.other, near.geometry, near.law, cohesion)
     if whole is None:
@@ -196,18 +231,21 @@ def _faces(near: ContactSet, whole: WholeFaces, contacts: list[np.ndarray]) -> t
     return tuple(sorted(out, key=lambda each: -each.gap))
 
 
-def with_hairlines(
+def with_rigid_blocks(
     blocks: Blocks, found: FactorOfSafety, loose: tuple[PartedFace, ...], rigid: FactorOfSafety
 ) -> FactorOfSafety:
-    """The answer ``found`` with the faces that are ``loose`` in it by a hair, and the answer of ``rigid`` blocks."""
-    worst = loose[0]
-    a, b = (blocks.names[k] if blocks.names else f"block {k}" for k in (worst.block, worst.other))
-    one = len(loose) == 1
-    line = (
-        f"{'a face' if one else f'{len(loose)} faces'} with cohesion between {a!r} and {b!r}"
-        f"{'' if one else ' and others'} hold{'s' if one else ''} nothing, open by {1e3 * worst.gap:.2g} mm because "
-        f"blocks strain evenly; rigid blocks have the factor {rigid.factor:.4f}"
-    )
+    """The answer ``found`` with the answer of ``rigid`` blocks, and the faces that are ``loose`` in it by a hair."""
+    if loose:
+        worst, one = loose[0], len(loose) == 1
+        a, b = (blocks.names[k] if blocks.names else f"block {k}" for k in (worst.block, worst.other))
+        what = (
+            f"{'a face' if one else f'{len(loose)} faces'} with cohesion between {a!r} and {b!r}"
+            f"{'' if one else ' and others'} hold{'s' if one else ''} nothing, open by {1e3 * worst.gap:.2g} mm because "
+            "blocks strain evenly"
+        )
+    else:
+        what = "blocks strain evenly and so bear on few points of faces with cohesion, which others would hold too"
+    line = f"{what}; rigid blocks have the factor {rigid.factor:.4f}"
     return replace(found, factor_if_rigid=rigid.factor, warnings=(*found.warnings, line))
 
 

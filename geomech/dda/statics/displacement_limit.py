@@ -168,7 +168,7 @@ def without_failure(system: BlockSystem, begin: State, loads: Loads, load_time: 
     # Bonds would draw together what stands off.
     unbreakable.finder.toes = SHARP
     try:
-        result = unbreakable.step(begin, loads, _LONG, load_time=load_time)
+        result = unbreakable.step(begin, loads, _LONG, load_time=load_time, pseudo_inertia=True)
     except (NotConverged, ValueError) as failure:
         log.debug("what elasticity explains is not known: %s", failure)
         return None

@@ -142,7 +142,9 @@ class _Relaxation:
         dt, longest = _pseudo_times(self.system)
         for _ in range(max_steps):
             try:
-                self.result = result = self.system.step(self.state, self.loads, dt, self.crack, self.time)
+                self.result = result = self.system.step(
+                    self.state, self.loads, dt, self.crack, self.time, pseudo_inertia=True
+                )
             except NotConverged as failure:
                 return self._ended(False, bool(self.gone), str(failure))
             row, moved = self._take(result)

@@ -93,7 +93,7 @@ def stability_trial(
     stable, reason, more, most = False, f"still moving after {under.max_steps} steps", 0, math.inf
     for _ in range(under.max_steps):
         try:
-            result = system.step(state, under.loads, dt, load_time=under.time)
+            result = system.step(state, under.loads, dt, load_time=under.time, pseudo_inertia=True)
         except NotConverged as failure:
             reason = f"no consistent contacts: {failure}"
             break

@@ -36,9 +36,9 @@ from .counted_resistance import (
     toes_in_the_way,
     with_admissible_forces,
     with_anchors,
-    with_hairlines,
     with_no_mechanism,
     with_parted_faces,
+    with_rigid_blocks,
     with_toes,
 )
 from .displacement_limit import DisplacementLimit, without_failure
@@ -181,7 +181,7 @@ class _Search:
     def answer(self, counted: Counted, watch: Callable[[Trial], None] | None) -> FactorOfSafety:
         """The factor with bolt forces, the factors without toes, and those with parted faces counted otherwise."""
         try:
-            found = self.run(counted, watch=watch)
+            found, counted = self._found(counted, watch)
         except NotConverged:
             if counted.toes != ROUNDED or not toes_in_the_way(self.system(1.0, counted), self.rest):
                 raise
@@ -191,9 +191,34 @@ class _Search:
         found = with_anchors(self.blocks, self.under.loads, found)
         if counted.toes != FREE:
             found = self._with_toes(found, counted)
-        if counted.whole_faces:
-            found = self._with_parted_faces(found, counted)
-        return self._with_admissible_forces(found, counted)
+        if not math.isfinite(found.upper):
+            return with_no_mechanism(found)
+        largest = self._admissible_beyond(found, counted)
+        if self._cohesive:
+            found = self._with_parted_faces(found, counted, largest is not None)
+        return with_admissible_forces(found, largest)
+
+    def _found(self, counted: Counted, watch: Callable[[Trial], None] | None) -> tuple[FactorOfSafety, Counted]:
+        """The factor, and what has been ``counted`` in it: of the cohesion of whole faces, or of what touches of them,
+        the larger. What balances without the cohesion of open ends balances with it, but a face that bears shear by
+        cohesion alone, pressed by nothing, may have no consistent states: open it holds nothing, and closed it opens."""
+        aim, whole = self.aim(counted), counted.whole_faces and self._cohesive
+        touching = replace(counted, whole_faces=False)
+        try:
+            found = self.run(counted, watch=watch, aim=aim)
+        except NotConverged:
+            if not whole:
+                raise
+            return self.run(touching, aim=aim), touching
+        if not whole or aim <= found.upper * (1.0 + _BEYOND):
+            return found, counted
+        just_above = found.upper * (1.0 + 2.0 * self.tolerance)
+        other = self._otherwise(touching, just_above, just_above)
+        return (found, counted) if other is None else (other, touching)
+
+    @property
+    def _cohesive(self) -> bool:
+        return any(law.cohesion > 0.0 for law in self.joints)
 
     def aim(self, counted: Counted) -> float:
         """The largest factor with admissible contact forces as drawn, bolts at any force up to yield; 0 if unknown."""
@@ -210,20 +235,22 @@ class _Search:
             log.info("the largest factor with admissible contact forces is not known: %s", failure)
             return 0.0
 
-    def _with_admissible_forces(self, found: FactorOfSafety, counted: Counted) -> FactorOfSafety:
+    def _admissible_beyond(self, found: FactorOfSafety, counted: Counted) -> float | None:
+        """The largest factor with admissible contact forces; None if that is hardly more than what was ``found``, or is
+        not known."""
         if not math.isfinite(found.upper):
-            return with_no_mechanism(found)
+            return None
         forces = AdmissibleForces.of(
             self.system(found.lower, counted), found.state, self.rest, self.joints, self.chosen
         )
-        beyond = found.upper * (1.0 + _BEYOND)
+        beyond = found.factor * (1.0 + _BEYOND)
         try:
             if forces is None or not forces.balance(beyond):
-                return found
-            return with_admissible_forces(found, forces.largest_factor(beyond / _NEARBY))
+                return None
+            return forces.largest_factor(beyond / _NEARBY)
         except Unsolved as failure:
             log.info("whether contact forces are admissible beyond the factor is not known: %s", failure)
-            return found
+            return None
 
     def _with_toes(self, found: FactorOfSafety, counted: Counted) -> FactorOfSafety:
         bearing = self._bearing(found, counted)
@@ -241,14 +268,16 @@ class _Search:
     def _bearing(self, found: FactorOfSafety, counted: Counted):
         return bearing_toes(self.system(found.lower, counted), found.state, self.under.loads, self.under.time)
 
-    def _with_parted_faces(self, found: FactorOfSafety, counted: Counted) -> FactorOfSafety:
+    def _with_parted_faces(self, found: FactorOfSafety, counted: Counted, beyond: bool) -> FactorOfSafety:
+        """The answer ``found`` with that of rigid blocks, where faces have parted by a hair or forces are admissible
+        ``beyond`` the factor, and with that without the cohesion of open ends."""
         system = self.system(found.lower, counted)
         loose = hairline_faces(system, found.state)
-        if loose and math.isfinite(found.upper):
+        if loose or beyond:
             rigid = replace(self, materials=[replace(material, rigid=True) for material in self.materials])
             above = found.upper * (1.0 + 2.0 * self.tolerance)
-            other = rigid._otherwise(counted, found.lower, above)
-            found = found if other is None else with_hairlines(self.blocks, found, loose, other)
+            other = rigid._otherwise(replace(counted, whole_faces=True), found.lower, above)
+            found = found if other is None else with_rigid_blocks(self.blocks, found, loose, other)
         parted = parted_faces(system, found.state)
         if not parted:
             return found
@@ -268,26 +297,28 @@ class _Search:
 
     def run(
         self, counted: Counted, first: float = 1.0, above: float = math.inf, stands: bool = False,
-        watch: Callable[[Trial], None] | None = None,
+        watch: Callable[[Trial], None] | None = None, aim: float | None = None,
     ) -> FactorOfSafety:  # fmt: skip
-        """Enclose the factor, starting with a trial at ``first``. Raises `_NoOther` if blocks are stable there and it
-        was only asked whether any ``stands``, or if they are unstable at a factor ``above``; `NotConverged` if they are
-        stable at none."""
+        """Enclose the factor, starting with a trial at ``first``, or near the ``aim`` (None: as by `aim`). Raises
+        `_NoOther` if blocks are stable at ``first`` and it was only asked whether any ``stands``, or if they are unstable
+        at a factor ``above``; `NotConverged` if they are stable at none."""
         near = stands or math.isfinite(above)
-        aim = 0.0 if near else self.aim(counted)
+        aim = 0.0 if near else self.aim(counted) if aim is None else aim
         bracket = _Bracket(self, counted, watch, aim)
         known = near or 0.0 < aim < _FARTHEST
         trial = bracket.begin(first if near or not known else _BELOW * aim)
         if trial.stable and stands:
             raise _NoOther
         while not trial.stable:
+            if first >= above:
+                raise _NoOther
             if trial.factor <= 1.0 / _FARTHEST:
                 raise NotConverged(
                     f"the blocks do not stand even with joints {_FARTHEST:g} times as strong: {trial.reason}; "
                     "what moves is not held by joint strength, or the contacts find no states"
                 )
             trial = bracket.begin((_NEARBY if known else 0.5) * trial.factor)
-        if math.isfinite(above) and not bracket.tried(above).stable:
+        if first < above < math.inf and not bracket.tried(above).stable:
             raise _NoOther
         return bracket.closed(self.tolerance)
 

@@ -85,10 +85,9 @@ def bench(**changes) -> Problem:
 
 
 def test_a_pass_or_two_where_the_response_is_linear():
-    """From the second load on passes find no more than how the block's shape has changed. (Each took three or four.)"""
+    """Passes find no more than how the block's shape has changed. (Each took three or four.)"""
     passes = [c.statistics["compliance_passes"] for c in cycles(bench()) if c.number]
-    assert len(passes) == 6 and passes[0] > 2
-    assert max(passes[1:]) <= 2
+    assert len(passes) == 6 and max(passes) <= 2
 
 
 def test_what_is_foretold_is_no_other_answer():

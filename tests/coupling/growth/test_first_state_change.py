@@ -98,7 +98,8 @@ def test_a_block_that_is_lifted_parts_at_its_weight():
     lifted = PointLoad(1, (x + 0.5, y), History.ramp([0.0, 1000.0]))
     events = told(replace(problem, loads=replace(problem.loads, point_loads=(lifted,))))[0]
     assert [kind for kind, _, _ in events] == ["parting", "opening"]
-    assert events[-1][1] == pytest.approx(ROCK.density * G / 1000.0, rel=1e-6)
+    # Times of changes are known to 1e-6, and the block is looked at just beyond.
+    assert events[-1][1] == pytest.approx(ROCK.density * G / 1000.0, rel=2e-6)
 
 
 def cracked_plate(**run):
