@@ -18,6 +18,7 @@ from __future__ import annotations
 
 import contextlib
 import functools
+import gc
 import hashlib
 import logging
 import sys
@@ -29,7 +30,7 @@ from types import CodeType
 import numpy as np
 from llvmlite import binding as llvm
 from numba import __version__ as numba_version
-from numba import config, njit, types
+from numba import config, jit, njit, types
 
 from .kernel_folder import SOURCE, kernel_place, prune
 
@@ -43,23 +44,25 @@ try:
     from numba.core.options import DefaultOptions
     from numba.core.targetconfig import ConfigStack, TargetConfig
     from numba.core.types.functions import BaseFunction
+    from numba.core.typing.templates import _OverloadFunctionTemplate
 except ImportError:  # reported below
     IndexDataCacheFile = UserProvidedCacheLocator = JITCodeLibrary = Compiler = object
-    ConfigStack = TargetConfig = BaseFunction = DefaultOptions = object
+    ConfigStack = TargetConfig = BaseFunction = DefaultOptions = _OverloadFunctionTemplate = object
     Dispatcher = type(njit(lambda: None))
 
 #: What of Numba's inner parts is relied on; they may move in any version.
 _INNER = (
     (JITCodeLibrary, ("_finalize_final_module", "_finalize_dynamic_globals", "_get_module_for_linking",
-                      "_raise_if_finalized")),
+                      "_optimize_functions", "_raise_if_finalized")),
     (IndexDataCacheFile, ("_load_index", "_load_data", "_save_data", "_dump", "_data_path",
                           "_open_for_write", "load", "save")),
     (Compiler, ("compile_extra",)),
     (UserProvidedCacheLocator, ("from_function", "ensure_cache_path", "get_cache_path")),
     (Dispatcher, ("_insert", "_compile_for_args", "get_call_template")),
     (BaseFunction, ("get_call_type",)),
-    (ConfigStack, ("top_or_none",)),
-    (TargetConfig, ("values", "options", "__hash__")),
+    (_OverloadFunctionTemplate, ("_get_impl", "_get_jit_decorator")),
+    (ConfigStack, ("top_or_none", "enter")),
+    (TargetConfig, ("copy", "values", "options", "__hash__")),
     (config, ("CACHE_LOCATOR_CLASSES", "CACHE_DIR")),
 )  # fmt: skip
 
@@ -151,10 +154,14 @@ def _quick_inference() -> Iterator[None]:
     """Numba's inference of types, with `_remembered_call_type` and `_same_settings`, and its own again afterwards."""
     replaced = (
         (BaseFunction, "get_call_type", _remembered_call_type),
+        (_OverloadFunctionTemplate, "_get_impl", _implementation_for_kernels),
+        (_OverloadFunctionTemplate, "_get_jit_decorator", _as_a_part),
         (TargetConfig, "__eq__", _same_settings),
         (TargetConfig, "__hash__", _hash_of_settings),
     )
-    before = [(owner, name, getattr(owner, name)) for owner, name, _ in replaced]
+    before, collects = [(owner, name, getattr(owner, name)) for owner, name, _ in replaced], gc.isenabled()
+    # What a compiler makes is in use until it is done: looking for what is not takes a twentieth of its time.
+    gc.disable()
     try:
         for owner, name, ours in replaced:
             setattr(owner, name, ours)
@@ -162,6 +169,8 @@ def _quick_inference() -> Iterator[None]:
     finally:
         for owner, name, theirs in before:
             setattr(owner, name, theirs)
+        if collects:
+            gc.enable()
 
 
 _call_type = getattr(BaseFunction, "get_call_type", None)
@@ -173,7 +182,7 @@ def _remembered_call_type(self: BaseFunction, context, args: tuple, kws: dict):
     declared, in each of several rounds of inference."""
     if type(self) is not types.Function or kws or not all(isinstance(each, _PLAIN) for each in args):
         return _call_type(self, context, args, kws)
-    settings = ConfigStack.top_or_none()
+    settings = _settings_for_kernels()
     known = _signatures.setdefault((self, context, tuple(args)), [])
     for of, signature in known:
         if of is settings or of == settings:
@@ -181,6 +190,28 @@ def _remembered_call_type(self: BaseFunction, context, args: tuple, kws: dict):
     signature = _call_type(self, context, args, kws)
     known.append((settings, signature))
     return signature
+
+
+def _settings_for_kernels() -> TargetConfig:
+    """The present settings without those that make no difference to what a kernel or a part calls; of other packages'
+    functions none are the same."""
+    settings = ConfigStack.top_or_none().copy()
+    settings.no_cpython_wrapper = settings.no_cfunc_wrapper = settings.release_gil = True
+    return settings
+
+
+_implementation = getattr(_OverloadFunctionTemplate, "_get_impl", None)
+
+
+def _implementation_for_kernels(self: _OverloadFunctionTemplate, args: tuple, kws: dict):
+    """What a function of Numba's own is made of for these types of arguments: found once for all kernels."""
+    with ConfigStack().enter(_settings_for_kernels()):
+        return _implementation(self, args, kws)
+
+
+def _as_a_part(self: _OverloadFunctionTemplate) -> Callable:
+    """Functions of Numba's own are compiled with the kernels that call them, as a `part`, and by themselves not at all."""
+    return functools.partial(jit, no_cpython_wrapper=True, no_cfunc_wrapper=True, pipeline_class=_PartCompiler)
 
 
 def _same_settings(self: TargetConfig, other: object) -> bool:
@@ -202,6 +233,9 @@ def _hash_of_settings(self: TargetConfig) -> int:
 
 class _Kernel(JITCodeLibrary):
     """Machine code that calls its own copies of what it was linked with."""
+
+    def _optimize_functions(self, module: llvm.ModuleRef) -> None:
+        _optimize_defined(self, module)
 
     def _finalize_final_module(self) -> None:
         # What other kernels are linked with stays as it was: they must find one copy, not one by each way to it.
@@ -227,6 +261,9 @@ class _Part(JITCodeLibrary):
         """What the code takes from Python; passed on to the kernel that is linked with it."""
         self.environment = name, environment
 
+    def _optimize_functions(self, module: llvm.ModuleRef) -> None:
+        _optimize_defined(self, module)
+
     def finalize(self) -> None:
         self._raise_if_finalized()
         for library in dict.fromkeys(self._linking_libraries):
@@ -235,6 +272,15 @@ class _Part(JITCodeLibrary):
         self._finalize_dynamic_globals()
         self._shared_module = _for_linking(self._final_module)
         self._finalized = True
+
+
+def _optimize_defined(library: JITCodeLibrary, module: llvm.ModuleRef) -> None:
+    """As `CPUCodeLibrary._optimize_functions`, without making passes for functions that are only declared."""
+    module.data_layout = library._codegen._data_layout
+    for function in module.functions:
+        if not function.is_declaration:
+            passes, builder = library._codegen._function_pass_manager()
+            passes.run(function, builder)
 
 
 def _for_linking(module: llvm.ModuleRef) -> llvm.ModuleRef:

@@ -233,7 +233,7 @@ def factor_of_safety(
     *,
     without_cracks: bool = False,
     along: Sequence[str] | None = None,
-    divide: Mapping[str, float] | None = None,
+    divide: Mapping[str, float] | dda.PartialFactors | None = None,
     **wishes: Any,
 ) -> dda.FactorOfSafety:
     """`geomech.dda.FactorOfSafety` of the blocks of ``scene``, by strength reduction under the loads of ``load_time`` s
@@ -263,7 +263,7 @@ def safety_report(
     *,
     without_cracks: bool = False,
     along: Sequence[str] | None = None,
-    divide: Mapping[str, float] | None = None,
+    divide: Mapping[str, float] | dda.PartialFactors | None = None,
     **wishes: Any,
 ) -> SafetyReport:
     """`geomech.report.safety_page.SafetyReport` of the same: its ``text()``, ``as_dict()`` and ``draw(path)``; the factor

@@ -203,3 +203,33 @@ def test_a_part_is_compiled_once_for_all_constants(tmp_path):
     environment["PYTHONPATH"] = os.pathsep.join([str(tmp_path), str(Path(geomech.__file__).resolve().parents[1])])
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, env=environment)
     assert done.stdout.split() == ["9.0", "1", "True"]
+
+
+def test_functions_of_numba_are_compiled_with_the_kernels_that_call_them(tmp_path):
+    """One machine code for a kernel, its part and the arrays that both make; errors of those reach Python, from the
+    kernel, from the kernel found compiled and from another package's function, which is Numba's own affair."""
+    (tmp_path / "rooms.py").write_text(
+        "import numpy as np\n"
+        "from geomech.compiled import kept, part\n"
+        "@part(fastmath=False, nogil=True)\ndef room(n):\n    return np.zeros(n)\n"
+        "@kept(fastmath=False, nogil=True)\ndef filled(n):\n    return len(room(n)) + len(np.zeros(n)) + max(n, 1)\n"
+    )
+    code = (
+        "import gc\nfrom numba import njit\nfrom numba.core import codegen\nimport numpy as np\nimport rooms\n"
+        "compiled, optimise = [], codegen.CPUCodeLibrary._optimize_final_module\n"
+        "def counted(library):\n    compiled.append(library.name)\n    optimise(library)\n"
+        "codegen.CPUCodeLibrary._optimize_final_module = counted\n"
+        "@njit\ndef own(n):\n    return len(np.zeros(n)) + max(n, 1)\n"
+        "print(rooms.filled(3), compiled.count('filled'), sum('impl' in each for each in compiled), own(3), gc.isenabled())\n"
+        "for function in rooms.filled, own:\n"
+        "    try:\n        function(-1)\n    except ValueError as error:\n        print(error)\n"
+    )
+    environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path / "kernels")}
+    environment["PYTHONPATH"] = os.pathsep.join([str(tmp_path), str(Path(geomech.__file__).resolve().parents[1])])
+    first, later = (
+        subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, env=environment)
+        .stdout.splitlines()
+        for _ in range(2)
+    )  # fmt: skip
+    assert first == ["9 1 0 6 True", "negative dimensions not allowed", "negative dimensions not allowed"]
+    assert later == ["9 0 0 6 True", *first[1:]]

@@ -62,8 +62,8 @@ from geomech.render import sketch
 from geomech.scene import SceneError, load_scene
 
 here = Path.cwd()  # the project's folder, or one below it
-project = next(folder for folder in (here, *here.parents) if (folder / "docs").is_dir())
-MODEL, SCENE = ((project / "docs" / "tutorials" / f"my_slope.{kind}").read_text() for kind in ("geo", "toml"))
+files = next(path for folder in (here, *here.parents) if (path := folder / "docs/tutorials/my_slope.toml").is_file())
+MODEL, SCENE = files.with_suffix(".geo").read_text(), files.read_text()
 work = Path(tempfile.mkdtemp(prefix="geomech-tutorial-"))
 (work / "my_slope.geo").write_text(MODEL)
 (work / "my_slope.toml").write_text(SCENE)

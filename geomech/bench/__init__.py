@@ -36,6 +36,6 @@ TOPICS = {
 }
 
 
-def topic(name: str) -> Callable[[bool], Measured]:
+def topic(name: str) -> Callable[..., Measured]:
     """The measuring function of a topic, imported on demand."""
     return import_module(TOPICS[name]).measure

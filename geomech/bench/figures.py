@@ -229,7 +229,7 @@ def changes(before: dict, topics: dict[str, Measured], unit: float) -> list[Chan
 
 def compared(found: Sequence[Change], before: dict, path: Path) -> str:
     """The table of figures that became worse or better."""
-    lines = [f"compared with {path}:  {len(found)} figures"]
+    lines = [f"compared with {path}: {len(found)} figures"]
     for title, rows in (
         ("less accurate", [c for c in found if c.worse and c.kind == ERROR]),
         (

@@ -69,7 +69,9 @@ def record(
 
 
 class _LazyCycle(Cycle):
-    """A cycle whose crack faces are put together, and bodies that were left out solved, when they are asked for."""
+    """A cycle whose crack faces are joined, and bodies that were left out solved, on demand."""
+
+    _rest: _LeftOut
 
     @cached_property
     def faces(self) -> CrackFaces | None:

@@ -44,6 +44,7 @@ from .kinematics.roundoff import undecided_gaps, warn_of_roundoff
 from .kinematics.simplex_integration import block_moments, mass_matrix
 from .linear_solver import assembly
 from .loads.load_vectors import AppliedForces, Inertia, generalised
+from .loads.prescribed_motion import MovedBlocks
 from .loads.step_actions import StepActions, effective_gravity
 from .loads.viscous_boundary import ViscousEdges
 from .open_close.augmented_lagrangian import settle_augmented
@@ -212,9 +213,8 @@ class Attempt:
         self.points, self.edges = system.load_map.rows(loads, acting, midpoint.vertices, state.rotation + self.turn)
         self.load = midpoint.loads_back(generalised(self.points, self.edges, midpoint.centroid))
         end = self.time if load_time is None else load_time
-        self.actions = StepActions.of(
-            system.blocks, system.fixed, loads, state, system.load_map, midpoint, system.free, system.taken_out, end
-        )
+        moved = MovedBlocks(system.blocks, system.fixed, system.taken_out)
+        self.actions = StepActions.of(moved, loads, state, system.load_map, midpoint, system.free, end)
 
     def _assemble(self) -> None:
         """The equations of blocks without their contacts."""

@@ -10,7 +10,7 @@ import base64
 import hashlib
 import html
 import json
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from functools import cache
 from importlib import resources
 from pathlib import Path
@@ -76,7 +76,7 @@ def policy(connect: str = "'none'") -> str:
     )
 
 
-def player(records: Sequence[dict[str, Any]] | None = None, live: str | None = None) -> str:
+def player(records: Sequence[Mapping[str, Any]] | None = None, live: str | None = None) -> str:
     """The player of ``records`` (`Recording.whole`), or of what the address ``live`` answers, for the body of a page."""
     attribute = f' data-live="{html.escape(live, quote=True)}" class="gm-alone"' if live else ""
     data = "" if records is None else f'<script type="application/json" id="geomech-runs">{_json(records)}</script>\n'

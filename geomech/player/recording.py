@@ -306,7 +306,8 @@ def _tips(run: Run) -> dict[str, Any] | None:
 def _joints(run: Run) -> dict[str, Any] | None:
     """``joints.csv`` where the run has written it: a row a joint and cycle."""
     rows = read_table(run.folder / "joints.csv", ("cycle", "time"))
-    if not len(rows) or "joint" not in rows.dtype.names:
+    columns = rows.dtype.names or ()
+    if not len(rows) or "joint" not in columns:
         return None
     numbers = np.unique(rows["cycle"])
     most = max(2, int(MOST_TIP_ROWS * len(numbers) / len(rows)))
@@ -316,7 +317,7 @@ def _joints(run: Run) -> dict[str, Any] | None:
     made.whole("joint", index)
     for name in ("cycle", "time", "mean_opening", "max_opening", "mean_slip", "max_slip", "normal_force",
                  "shear_force", "mobilised"):  # fmt: skip
-        if name in rows.dtype.names:
+        if name in columns:
             made.single(name, rows[name])
     return made.record() | {"names": [str(name) for name in names]}
 
@@ -338,7 +339,7 @@ def _number(value: float) -> float | None:
 
 def _crack_names(run: Run) -> list[str]:
     """The cracks' names by number, from ``tips.csv``, where the run has not ended."""
-    if not len(run.tips) or "crack_name" not in run.tips.dtype.names:
+    if not len(run.tips) or "crack_name" not in (run.tips.dtype.names or ()):
         return []
     names: dict[int, str] = {int(k): str(name) for k, name in zip(run.tips["crack"], run.tips["crack_name"])}
     return [names.get(k, "") for k in range(max(names) + 1)]

@@ -44,7 +44,7 @@ def sketch(
     shown = np.ones(blocks.n_blocks, bool) if removed is None else ~removed
     outlines = [
         Path.make_compound_path(*(Path(now[loop], closed=False) for loop in _loops(blocks, b)))
-        for b in np.flatnonzero(shown)
+        for b in np.flatnonzero(shown).tolist()
     ]
     drawn = PathCollection(outlines, edgecolors=INK, linewidths=0.7)
     if values is None:

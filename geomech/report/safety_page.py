@@ -211,7 +211,7 @@ class SafetyReport:
         found = self.found
         strain, strained = self.strain()
         moving = {m.name: m for m in self.moving()}
-        out = found.as_dict(self.problem.blocks)
+        out: dict[str, Any] = found.as_dict(self.problem.blocks)
         for name, entry in out["moving"].items():
             entry["kind"], entry["towards_deg"] = moving[name].kind, moving[name].towards
         return out | {

@@ -183,7 +183,7 @@ def draw(
             Fault(
                 place(("geometry", "traces")),
                 f"no rock: none of the layers is a zone; they are sets of joints ({layers})",
-                'state which layer holds the outline:  layers = { "NAME" = "zone:rock", "*" = "" }, or add '
+                'state which layer holds the outline: layers = { "NAME" = "zone:rock", "*" = "" }, or add '
                 "[[geometry.zones]]",
             )
         )

@@ -18,7 +18,6 @@ from ..scene.keys import field_of, keys_of, kind_of, table_at
 from ..scene.loading import SCENE_FILE
 from ..scene.locator import dotted, locate, path_of
 from ..scene.overrides import OverrideError, assign
-from ..scene.tables import SceneTables
 from ..scene.validation import nearest, validate, validate_sweep
 from .expressions import ExpressionError, evaluate, margin_of, names_in, parsed
 from .sampling import Design, correlation_matrix, run_table
@@ -209,8 +208,9 @@ def _merged(base: Any, table: Path | None, given: dict[str, Any], source: str, a
 
     def place(path: tuple[str | int, ...]) -> str:
         for n in (3, 2):
-            if path[1:n] in places:
-                return places[path[1:n]](path)
+            key = tuple(str(part) for part in path[1:n])
+            if key in places:
+                return places[key](path)
         return dotted(path)
 
     return merged, place, faults
@@ -565,7 +565,3 @@ def _toml(value: Any) -> str:
     if isinstance(value, float):
         return repr(value)
     return str(value)
-
-
-#: What a scene's tables are called.
-SECTIONS = tuple(SceneTables.model_fields)

@@ -29,6 +29,7 @@ from geomech.shapes.joint_networks.fracture_statistics import (
 from geomech.shapes.joint_networks.joint_sets import (
     FisherAngle,
     Law,
+    Poles,
     discs,
     mean_pole,
     parallel_set,
@@ -87,21 +88,21 @@ def whole_traces(joint: Joint, margin: float) -> np.ndarray:
 
 
 def test_traces_of_discs_are_as_long_as_warburton_says():
-    common = {"dip": math.radians(70), "dip_direction": 0.5, "fisher": 20.0, "per_volume_area": 0.5, "section": 0.0}
-    one = discs("joint:a", REGION, diameter=Law(4.0), rng=np.random.default_rng(1), **common)
+    poles = Poles(dip=math.radians(70), dip_direction=0.5, fisher=20.0, section=0.0)
+    one = discs("joint:a", REGION, poles, Law(4.0), 0.5, np.random.default_rng(1))
     length = whole_traces(one, 2.0)
     assert len(length) > 2000
     assert kstest(length, lambda x: trace_length_of_discs(x, 4.0)).pvalue > SIGNIFICANT
     # Diameters that differ are cut in proportion to themselves.
     diameter = Law(4.0, 1.5, "lognormal")
-    many = discs("joint:a", REGION, diameter=diameter, rng=np.random.default_rng(2), **common)
+    many = discs("joint:a", REGION, poles, diameter, 0.5, np.random.default_rng(2))
     mean, square = trace_length_moments(diameter.moments)
     length = whole_traces(many, 10.0)
     error = 4 * length.std() / math.sqrt(len(length))
     assert length.mean() == pytest.approx(mean, abs=error)
     assert (length**2).mean() == pytest.approx(square, rel=0.12)  # four standard errors of its wide tail
     # The window cuts some off; Mauldon's estimate of the mean does not feel it.
-    found, wanted = set_statistics(many, REGION), expected.of_discs(diameter=diameter, **common)
+    found, wanted = set_statistics(many, REGION), expected.of_discs(poles, diameter, 0.5)
     assert found.mean_length == pytest.approx(mean, abs=error)
     for key, value in (("p21_per_m", found.p21), ("p20_per_m2", found.p20), ("p10_per_m", found.p10)):
         assert value == pytest.approx(wanted[key], rel=4 * 1.2 / math.sqrt(found.traces))
@@ -112,15 +113,11 @@ def test_traces_of_discs_are_as_long_as_warburton_says():
 
 def test_intensity_on_the_section_is_that_in_space_times_the_sine():
     """P21 = P32 E[sin θ] (Dershowitz & Herda 1992): poles of all directions alike give π/4."""
-    wanted = expected.of_discs(
-        dip=0.3, dip_direction=0.2, fisher=1e-6, diameter=Law(3.0), per_volume_area=1.0, section=0.0
-    )
+    wanted = expected.of_discs(Poles(dip=0.3, dip_direction=0.2, fisher=1e-6, section=0.0), Law(3.0), 1.0)
     assert wanted["p21_per_m"] == pytest.approx(math.pi / 4, rel=1e-4)
-    alike = {"dip": math.pi / 2, "diameter": Law(3.0), "per_volume_area": 2.0, "fisher": 0.0, "section": 0.0}
     for turn in (0.0, 0.7, 1.2):
-        assert expected.of_discs(dip_direction=turn, **alike)["p21_per_m"] == pytest.approx(
-            2 * math.cos(turn), rel=1e-12
-        )
+        upright = Poles(math.pi / 2, turn, 0.0, 0.0)
+        assert expected.of_discs(upright, Law(3.0), 2.0)["p21_per_m"] == pytest.approx(2 * math.cos(turn), rel=1e-12)
 
 
 def test_scan_lines_over_poisson_lines_have_exponential_spacings():
@@ -281,10 +278,7 @@ def test_planes_beside_the_section_are_seldom_cut():
     dip, direction, section, kappa = math.radians(90), math.radians(70), 0.0, 8.0
     rng = np.random.default_rng(5)
     law = FisherAngle(dip, direction, section, kappa)
-    cut_discs = discs(
-        "joint:a", REGION, dip=dip, dip_direction=direction, fisher=kappa, diameter=Law(4.0), per_volume_area=1.5,
-        section=section, rng=rng,
-    )  # fmt: skip
+    cut_discs = discs("joint:a", REGION, Poles(dip, direction, kappa, section), Law(4.0), 1.5, rng)
     ends = np.array([line[[0, -1]] for line in cut_discs.lines])
     off = np.arctan2(*(ends[:, 1] - ends[:, 0]).T[::-1]) - law.mean
     off = 0.5 * np.angle(np.exp(2j * off))

@@ -105,7 +105,7 @@ def test_decay_and_period_of_a_block_on_a_joint_have_their_orders(name, decay_or
     errors."""
     newmark = SCHEMES[name]
     found = []
-    for n in (20, 40, 80):
+    for n in (20, 40):
         system, omega, settled = bouncer(newmark)
         dt = 2 * np.pi / omega / n
         state = State.at_rest(system.blocks)
@@ -129,11 +129,11 @@ def test_decay_and_period_of_a_block_on_a_joint_have_their_orders(name, decay_or
     errors = np.array(found)
     orders = np.log2(np.maximum(errors[:-1], 1e-300) / np.maximum(errors[1:], 1e-300)).T
     print(f"{name}: damping {errors[:, 0]}, period error {errors[:, 1]}, orders {orders.round(2).tolist()}")
-    assert orders[1] == pytest.approx([2, 2], abs=0.1)
+    assert orders[1] == pytest.approx([2], abs=0.1)
     if decay_order is None:
         assert np.abs(errors[:, 0]).max() < 1e-13
     else:
-        assert orders[0] == pytest.approx([decay_order] * 2, abs=0.1)
+        assert orders[0] == pytest.approx([decay_order], abs=0.1)
 
 
 def test_shi_takes_a_quarter_of_omega_dt_and_the_trapezoidal_rule_nothing():
@@ -177,8 +177,14 @@ def test_a_bounce_loses_what_the_scheme_loses(verified, name):
         assert orders == pytest.approx([2, 2], abs=0.15) and losses[-1] < 1e-3
 
 
-@pytest.mark.parametrize("name", ["Shi", "trapezoidal", "between"])
-@pytest.mark.parametrize("dt", [1e-3, 1e-4])
+@pytest.mark.parametrize(
+    ("name", "dt"),
+    [
+        *((name, 1e-3) for name in ("Shi", "trapezoidal", "between")),
+        ("trapezoidal", 1e-4),
+        *(pytest.param(name, 1e-4, marks=pytest.mark.slow) for name in ("Shi", "between")),
+    ],
+)
 def test_a_dropped_block_never_gains_energy_however_often_it_bounces(name, dt):
     # γ = 2β: contact met or left within a step loses energy, closed contact (2θ−1) of ½ k Δg², never gains.
     system, _, _ = bouncer(SCHEMES[name], normal_stiffness=1e9)
@@ -201,7 +207,7 @@ def test_a_dropped_block_never_gains_energy_however_often_it_bounces(name, dt):
 
 
 @pytest.mark.parametrize(("newmark", "radius"), [((0.3025, 0.6), None), ((0.5, 1.0), 0.8), ((0.5, 1.0), 0.5)])
-@pytest.mark.parametrize("dt", [1e-3, 2e-4])
+@pytest.mark.parametrize("dt", [1e-3, pytest.param(2e-4, marks=pytest.mark.slow)])
 def test_schemes_that_keep_an_acceleration_gain_no_energy_from_a_bounce(newmark, radius, dt):
     # The acceleration of the step before is kept; whether a bounce gains is no theorem there: measured.
     system, _, _ = bouncer(newmark, normal_stiffness=1e9, spectral_radius=radius)
@@ -254,7 +260,7 @@ def test_rayleigh_damping_has_the_fractions_asked_for():
         state = State.at_rest(system.blocks)
         state.velocity[0, 3] = 1e-8 * omega
         rates = []
-        for _ in range(3 * n):
+        for _ in range(5 * n // 2):
             state = system.step(state, Loads(), 2 * np.pi / omega / n).state
             rates.append(state.velocity[0, 3])
         peaks = [max(rates[k * n + n // 2 : (k + 1) * n + n // 2]) for k in range(2)]

@@ -41,7 +41,13 @@ def test_centre_crack(height):
         assert errors[0] < 6e-5 and errors[1] < 1e-7
 
 
-@pytest.mark.parametrize(("ratio", "height", "degrees"), [(0.5, 1, 45), (0.5, 2, 30), (0.8, 2, 45), (0.5, 1, 70)])
+@pytest.mark.parametrize(
+    ("ratio", "height", "degrees"),
+    [
+        (0.5, 1, 70),
+        *(pytest.param(*each, marks=pytest.mark.slow) for each in ((0.5, 1, 45), (0.5, 2, 30), (0.8, 2, 45))),
+    ],
+)
 def test_slanted_centre_crack(ratio, height, degrees):
     """Mixed mode in a plate: default settings to 3e-5 of σ√(πa), order 8 to 4e-8."""
     angle = math.radians(degrees)

@@ -11,7 +11,7 @@ from . import growth_paths
 
 #: The methods, in the order of the table and the legend.
 OURS, LOW, QUADRATIC = "this solver, p = 2 … 10", "constant elements, √r at the tips", "quadratic elements, equal nodes"
-ASKED = "this solver, by target error"
+ASKED = "this solver, by the error asked for"
 FITTED, CALIBRATED, FEM = (
     "constant elements, K by √r fit",
     "constant elements, K calibrated",
@@ -110,7 +110,7 @@ def goals_of(points: Sequence[Point]) -> dict:
     """Results for the goals, by name."""
     problems = list(dict.fromkeys(p.problem for p in points))
     goals: dict = {f"{name}: s to 1e-6": time_to(points, name, OURS, 1e-6) for name in problems}
-    goals |= {f"{name}: s with target 1e-6": _asked(points, name, 6) for name in problems}
+    goals |= {f"{name}: s when 1e-6 is asked for": _asked(points, name, 6) for name in problems}
     goals["time at one error over this solver's"] = ratios = []
     for name in problems:
         error = _error_of(name)

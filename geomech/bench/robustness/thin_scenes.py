@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from typing import NamedTuple
 
 import numpy as np
 
@@ -54,12 +55,21 @@ def _cog(x: float, y: float, teeth: int, inner: float, outer: float, turn: float
     return np.column_stack([x + radius * np.cos(angle), y + radius * np.sin(angle)])
 
 
+class _Steps(NamedTuple):
+    """``end`` of a scene and longest step ``dt``, s, and `DdaSettings.max_displacement_ratio`."""
+
+    end: float
+    dt: float
+    ratio: float
+
+
 def _run(
-    polygons: Sequence, fixed: Sequence[bool], wall: float, end: float, dt: float, ratio: float, *,
+    polygons: Sequence, fixed: Sequence[bool], wall: float, steps: _Steps, *,
     rigid: bool = False, loads: Loads = WEIGHT, moving: Callable[[State], None] | None = None,
     out: Callable[[np.ndarray, Blocks], float] = lambda vertices, blocks: 0.0,
 ) -> Outcome:  # fmt: skip
     """``moving`` gives the state its velocities, ``out`` returns the fraction of the blocks that have escaped."""
+    end, dt, ratio = steps
     blocks = Blocks.from_polygons(polygons, fixed=list(fixed))
     rock = Material("rock", 10e9, 0.25, density=2600.0, rigid=rigid)
     settings = DdaSettings(time_step=dt, dynamic_factor=1.0, max_displacement_ratio=ratio)
@@ -102,7 +112,7 @@ def ring(rigid: bool, ratio: float, wall: float, speed: float) -> Outcome:
 
     polygons = [_ring(0.0, 0.0, 1.0 + wall, wall), turned(rectangle(-0.1, -0.1, 0.1, 0.1), 0.3)]
     return _run(
-        polygons, [True, False], wall, 5.0 / speed, 0.05, ratio, rigid=rigid, loads=Loads(), moving=moving,
+        polygons, [True, False], wall, _Steps(5.0 / speed, 0.05, ratio), rigid=rigid, loads=Loads(), moving=moving,
         out=_outside(-1, -1, 1, 1, 1),
     )  # fmt: skip
 
@@ -115,7 +125,7 @@ def nested(ratio: float, wall: float, speed: float) -> Outcome:
 
     polygons = [_ring(0.0, 0.0, half, wall) for half in (1.5, 1.0, 0.5)]
     return _run(
-        polygons, [True, False, False], wall, 1.0 / max(speed, 1.0), 0.01, ratio, moving=moving,
+        polygons, [True, False, False], wall, _Steps(1.0 / max(speed, 1.0), 0.01, ratio), moving=moving,
         out=_outside(-1.5, -1.5, 1.5, 1.5, 1),
     )  # fmt: skip
 
@@ -135,7 +145,9 @@ def chain(ratio: float, wall: float, speed: float) -> Outcome:
         fallen = blocks.mean_vertices(blocks.vertices)[1:, 1] - blocks.mean_vertices(vertices)[1:, 1]
         return float(np.mean(fallen > [1.2, 2.4]))
 
-    return _run(polygons, [True, False, False], wall, 0.5 / max(speed, 1.0), 0.01, ratio, moving=moving, out=out)
+    return _run(
+        polygons, [True, False, False], wall, _Steps(0.5 / max(speed, 1.0), 0.01, ratio), moving=moving, out=out
+    )
 
 
 def combs(ratio: float, tooth: float, speed: float) -> Outcome:
@@ -148,7 +160,7 @@ def combs(ratio: float, tooth: float, speed: float) -> Outcome:
     def moving(state: State) -> None:
         state.velocity[1, 1] = -speed
 
-    return _run([below, above], [True, False], tooth, 1.0 / max(speed, 1.0), 0.01, ratio, moving=moving)
+    return _run([below, above], [True, False], tooth, _Steps(1.0 / max(speed, 1.0), 0.01, ratio), moving=moving)
 
 
 def cogs(ratio: float, spin: float, teeth: float) -> Outcome:
@@ -160,7 +172,9 @@ def cogs(ratio: float, spin: float, teeth: float) -> Outcome:
     def moving(state: State) -> None:
         state.velocity[1, 2] = spin
 
-    return _run(polygons, [True, False], 2 * math.pi / n * 0.1, 2.0 / max(spin, 2.0), 0.01, ratio, moving=moving)
+    return _run(
+        polygons, [True, False], 2 * math.pi / n * 0.1, _Steps(2.0 / max(spin, 2.0), 0.01, ratio), moving=moving
+    )
 
 
 def sticks(ratio: float, wall: float, speed: float) -> Outcome:
@@ -176,7 +190,9 @@ def sticks(ratio: float, wall: float, speed: float) -> Outcome:
         middle = blocks.mean_vertices(vertices)[1:]
         return float(np.mean((middle[:, 1] < 0.0) & (np.abs(middle[:, 0]) < 1.0)))
 
-    return _run(polygons, [True] + 8 * [False], wall, 1.0 / max(speed, 1.0), 0.01, ratio, moving=moving, out=out)
+    return _run(
+        polygons, [True] + 8 * [False], wall, _Steps(1.0 / max(speed, 1.0), 0.01, ratio), moving=moving, out=out
+    )
 
 
 def box_of_debris(ratio: float, wall: float, speed: float) -> Outcome:
@@ -199,7 +215,9 @@ def box_of_debris(ratio: float, wall: float, speed: float) -> Outcome:
         to = blocks.mean_vertices(vertices)[2:, None, :] - corners
         return float(np.mean((along[:, 0] * to[..., 1] - along[:, 1] * to[..., 0] < 0).any(axis=1)))
 
-    return _run(polygons, [True] + 13 * [False], wall, 0.5 / max(speed, 1.0), 0.01, ratio, moving=moving, out=out)
+    return _run(
+        polygons, [True] + 13 * [False], wall, _Steps(0.5 / max(speed, 1.0), 0.01, ratio), moving=moving, out=out
+    )
 
 
 def spike(rigid: bool, wall: float, speed: float) -> Outcome:
@@ -210,6 +228,6 @@ def spike(rigid: bool, wall: float, speed: float) -> Outcome:
 
     polygons = [np.array([[-0.5 * wall, 0.0], [0.5 * wall, 0.0], [0.0, 1.0]]), rectangle(-0.9, 0.3, -0.5, 0.7)]
     return _run(
-        polygons, [True, False], wall, 2.0 / speed, 0.05, 0.1, rigid=rigid, loads=Loads(), moving=moving,
+        polygons, [True, False], wall, _Steps(2.0 / speed, 0.05, 0.1), rigid=rigid, loads=Loads(), moving=moving,
         out=lambda vertices, blocks: float(blocks.mean_vertices(vertices)[1, 0] > 0.0),
     )  # fmt: skip

@@ -55,12 +55,6 @@ REASONS = (
         "a block that hangs by a thread, or is loaded beyond its stiffness, is no linear elastic body: it is named",
     ),
     Reason(
-        "rock that holds by a point",
-        dda.NotConverged,
-        r"cracks leave rock that holds by a single point at \(",
-        "a splinter has come loose inside a block at its very surface: the block and the place are named",
-    ),
-    Reason(
         "no common strain",
         dda.NotConverged,
         r"find no common strain in \d+ passes",

@@ -24,6 +24,10 @@ from ..load_transfer.boundary_tractions import BoundaryLoad
 _NONE: Mapping[int, BoundaryLoad] = MappingProxyType({})
 _Key = tuple[int, int]
 
+#: Fraction of the largest traction on a block below which a part of its boundary counts as not loaded: what balancing
+#: the loads leaves there is round-off.
+UNLOADED = 1e-6
+
 
 class WaveTime:
     """K_eq of each tip, by crack and end, over the travel time of waves to it."""
@@ -76,12 +80,21 @@ class WaveTime:
         found = []
         for row in range(len(tips)):
             block = int(tips["block"][row])
-            load = loads.get(block)
-            lines = load.segments if load is not None and len(load.segments) else _outline(blocks, block)
+            lines = _loaded(loads.get(block))
+            if not len(lines):
+                lines = _outline(blocks, block)
             time = distance_to_edges(tips["point"][row], lines[:, 0], lines[:, 1]) / float(speed[row])
             if time > dt:
                 found.append((row, time))
         return found
+
+
+def _loaded(load: BoundaryLoad | None) -> np.ndarray:
+    """(n, 2, 2) m, the parts of the boundary that carry ``load``, reference coordinates."""
+    if load is None or not len(load.segments):
+        return np.empty((0, 2, 2))
+    size = np.abs(load.tractions).reshape(len(load.segments), -1).max(axis=1)
+    return load.segments[size > UNLOADED * size.max()]
 
 
 def _outline(blocks: Blocks, block: int) -> np.ndarray:

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ... import dda
 from ...ddm.counters import Work
 from ...ddm.crack_contact.face_laws import Released
 from ...model import TIP, Blocks, Cracks, Motion, Problem, State
+from ...model.blocks.polygon import joined_loops
 from ..parallel_map import parallel_map
 from . import boundary_tractions
 from .boundary_tractions import BoundaryForces, BoundaryLoad
@@ -62,14 +62,13 @@ def elastic_bodies(
     def made(of: tuple) -> Body:
         b, own, material, old, work = of
         surface = None if problem.endless is None else problem.endless.surface
-        _check_pinches(blocks, b)
         return ddm.Body(
-            [] if problem.endless is not None else blocks.loops(b),
+            _loops(problem, blocks, b) if problem.endless is None else [],
             own,
             material,
             problem.ddm,
             previous=old,
-            holes=[] if problem.endless is None else _loops(problem, blocks, b),
+            holes=_loops(problem, blocks, b) if problem.endless is not None else [],
             face_laws=problem.face_laws,
             work=work,
             half_plane=None if surface is None else ddm.HalfPlane(*surface),
@@ -79,26 +78,10 @@ def elastic_bodies(
     return bodies, nodes_of
 
 
-def _check_pinches(blocks: Blocks, block: int) -> None:
-    """Raises `dda.NotConverged` where loops of ``block`` touch in a point, as where a crack frees a splinter at the
-    surface it started from: elements cannot resolve the stress in rock connected by a point."""
-    loops = blocks.loops(block)
-    if len(loops) == 1:
-        return
-    vertices = np.concatenate(loops)
-    _, first, times = np.unique(vertices, axis=0, return_index=True, return_counts=True)
-    if (times > 1).any():
-        name = blocks.names[block] if blocks.names else f"block {block}"
-        x, y = vertices[first[times.argmax()]]
-        raise dda.NotConverged(
-            f"{name}: cracks leave rock that holds by a single point at ({x:.6g}, {y:.6g}): no body whose cracks can be "
-            "solved; try another growth.increment_m"
-        )
-
-
 def _loops(problem: Problem, blocks: Blocks, block: int) -> list[np.ndarray]:
-    """Loops that bound the rock of ``block``; of unbounded rock its openings."""
-    return blocks.loops(block) if problem.endless is None else blocks.loops(block)[1:]
+    """Loops that bound the rock of ``block``; of unbounded rock its openings. The loop around a splinter that reaches
+    to the surface is part of the outline."""
+    return joined_loops(blocks.loops(block) if problem.endless is None else blocks.loops(block)[1:])
 
 
 def _rows_of(number: np.ndarray, wanted: np.ndarray) -> list[np.ndarray]:

@@ -155,8 +155,6 @@ def _divide(
         face_name[tuple(graph.ends[k].tolist())] = face_name[tuple(graph.ends[k, ::-1].tolist())] = name
 
     current = motion.current(parent, graph.points)
-    old = graph.vertex >= 0
-    current[old] = state.vertices[graph.vertex[old]]
 
     # Ordered by the lowest old vertex; parts without one (islands) last.
     def order(rings: list[np.ndarray]) -> tuple:
@@ -168,19 +166,23 @@ def _divide(
         loops, origin, edge_origin, edge_span = [], [], [], []
         for ring in rings:
             ring = _from_first(graph, ring)
-            names, edges, spans, corners = [], [], [], []
+            names, edges, spans, corners, own = [], [], [], [], []
+            came_by = boundary.get((int(ring[-1]), int(ring[0])), -1)
             for a, b in steps(ring):
                 k = boundary.get((a, b), -1)
                 if needed[a]:
                     corners.append(a)
+                    own.append(_old_vertex(blocks, graph, a, came_by, k))
                     names.append(face_name[a, b] if k < 0 else blocks.edge_names[blocks.edge_name[graph.edge[k]]])
                     edges.append(-1 if k < 0 else int(graph.edge[k]))
                     spans.append([0.0, 1.0] if k < 0 else graph.span[k].tolist())
                 else:
                     spans[-1][1] = graph.span[k, 1]  # the edge continues beyond the mouth
-            at = np.array(corners)
-            loops.append((graph.points[at], current[at], names))
-            origin.append(graph.vertex[corners])
+                came_by = k
+            at, old = np.array(corners), np.array(own)
+            now = np.where(old[:, None] >= 0, state.vertices[old], current[at])
+            loops.append((graph.points[at], now, names))
+            origin.append(old)
             edge_origin.append(np.array(edges))
             edge_span.append(np.array(spans))
         name = f"{blocks.names[parent]}/{n + 1}" if len(faces) > 1 else blocks.names[parent]
@@ -191,6 +193,18 @@ def _divide(
     middles = shapely.points(graph.points[graph.ends].mean(axis=1))
     apart = np.array([shapely.distance(polygon, middles) for polygon in polygons])
     return pieces, np.where(is_wall, WALL, np.where(kept, CRACK, MERGED)), apart.argmin(axis=0)
+
+
+def _old_vertex(blocks: Blocks, graph: BlockGraph, node: int, came_by: int, goes_by: int) -> int:
+    """The old vertex at ``node``, −1 where it was none, between two boundary pieces of the ``graph`` (−1: a crack
+    face). Loops that touch have a vertex each there: it is that of the piece's own loop."""
+    if graph.vertex[node] < 0:
+        return -1
+    if goes_by >= 0 and graph.span[goes_by, 0] == 0.0:
+        return int(graph.edge[goes_by])
+    if came_by >= 0 and graph.span[came_by, 1] == 1.0:
+        return int(blocks.next_vertex[graph.edge[came_by]])
+    return int(graph.vertex[node])
 
 
 def _from_first(graph: BlockGraph, ring: np.ndarray) -> np.ndarray:

@@ -27,7 +27,7 @@ ON_EDGE = 1e-9
 class BlockGraph:
     """Nodes of a block: its vertices first, then the crack nodes that are not vertices.
 
-    points    (n, 2)
+    points    (n, 2); where loops touch, the first of the vertices there stands for all
     node      crack node → node here
     vertex    (n,) old vertex, −1 for others
     edges     (m, 2) boundary pieces, rock on the left; ``edge`` (m,) the old edge, ``span`` (m, 2) the part of it
@@ -56,7 +56,8 @@ class BlockGraph:
         segments = np.flatnonzero(cracks.block == block)
 
         points, vertex, loop = list(map(tuple, a.tolist())), own.tolist(), loop_of.tolist()
-        known = {p: k for k, p in enumerate(points)}
+        known: dict[tuple, int] = {}
+        own_node = [known.setdefault(p, k) for k, p in enumerate(points)]
         node: dict[int, int] = {}
         mouths: list[list[tuple[float, int]]] = [[] for _ in own]
         for n in dict.fromkeys(cracks.segments[segments].ravel().tolist()):
@@ -75,7 +76,7 @@ class BlockGraph:
                 # A mouth at a vertex but for round-off is that vertex.
                 for end, at in ((0.0, edge), (1.0, int(blocks.next_vertex[own[edge]] - first))):
                     if abs(along - end) * np.hypot(*(b[edge] - a[edge])) <= 1e-12 * size:
-                        node[n] = at
+                        node[n] = own_node[at]
                         break
                 if n in node:
                     continue
@@ -87,12 +88,17 @@ class BlockGraph:
         edges, old, span = [], [], []
         following = (blocks.next_vertex[own] - first).tolist()
         for k, on_edge in enumerate(mouths):
-            stops = [(0.0, k), *sorted(on_edge), (1.0, following[k])]
+            stops = [(0.0, own_node[k]), *sorted(on_edge), (1.0, own_node[following[k]])]
             for (t0, n0), (t1, n1) in pairwise(stops):
                 edges.append((n0, n1))
                 old.append(own[k])
                 span.append((t0, t1))
         ends = np.array([[node[n] for n in pair] for pair in cracks.segments[segments].tolist()], dtype=int)
+        # Loops that touch are one: a crack from one to the other divides the rock.
+        loops = np.array(loop)
+        for at, first_there in enumerate(own_node):
+            if at != first_there:
+                loops[loops == loops[at]] = loops[first_there]
         return cls(
             block,
             np.array(points),
@@ -102,7 +108,7 @@ class BlockGraph:
             np.array(span),
             segments,
             ends.reshape(-1, 2),
-            np.array(loop),
+            loops,
         )
 
     def closes(self) -> bool:
@@ -144,7 +150,9 @@ def _faces(graph: BlockGraph, kept: np.ndarray) -> list[list[np.ndarray]]:
 
     pairs = np.concatenate([graph.edges, graph.ends[kept]])
     faces = shapely.get_parts(shapely.polygonize(shapely.linestrings(graph.points[pairs])))
-    number = {tuple(p): n for n, p in enumerate(graph.points.tolist())}
+    number: dict[tuple, int] = {}
+    for n, point in enumerate(graph.points.tolist()):
+        number.setdefault(tuple(point), n)
     # Seen from a hole's own void, its edges run the other way.
     backwards = {(b, a) for a, b in graph.edges.tolist()}
     found = []

@@ -179,41 +179,34 @@ class ContactFinder:
         old = np.ascontiguousarray(state.contacts)
         met = self._meeting(old, vertices, window, motion, margin)
         parent, geometry, law = met.parent, met.geometry, met.law
+        vertex, edge, corner = (column.copy() for column in met.table[:, :3].T)
         nodes = None
         if self._by_length.any():
-            nodes = nodes_in_faces(
-                met.table[:, 0], met.table[:, 1], self._owner, self._flat, geometry, law, self._by_length[law]
-            )
+            nodes = nodes_in_faces(vertex, edge, self._owner, self._flat, geometry, law, self._by_length[law])
         if nodes is not None:
             geometry[:, 4] = nodes.left(geometry[:, 4])
             parent = nodes.heirs(met.parent, np.ascontiguousarray(old["state"]))
-        block, other = self._owner[met.table[:, 0]], self._owner[met.table[:, 1]]
+        block, other = self._owner[vertex], self._owner[edge]
         springs = self._springs(block, other, law, geometry[:, 4], state.time >= self._softened_from)
         remembered = self._remembered(old, parent, state.time, geometry, springs, self._stiff[law])
         if len(self.parted):
-            remembered["bonded"][
-                np.isin(np.minimum(block, other) * len(self._area) + np.maximum(block, other), self.parted)
-            ] = 0
+            pair = np.minimum(block, other) * len(self._area) + np.maximum(block, other)
+            remembered["bonded"][np.isin(pair, self.parted)] = 0
         softened = 0.0
         if self._softens and len(old):
             softened = self._keep_forces(old, parent, geometry, springs, remembered, law)
         if self._table.curved.any():
             self._pass_on_wear(old, block, other, geometry, remembered)
         remembered["lift"] = self._lifts(old, parent, met, vertices, remembered)
-        vertex, edge, corner = (column.copy() for column in met.table[:, :3].T)
         keep = np.ones(len(vertex), bool)
         if nodes is not None:
             for name in ("normal", "shear") if len(old) else ():
                 borne = np.where(met.parent >= 0, old[name + "_force"][met.parent], 0.0)
                 remembered[name] = nodes.left(borne)
             keep[nodes.node] = False
-        glued = None
-        if glue_holds and remembered["bonded"].any():
-            along = vertices[self._next[edge]] - vertices[edge]
-            share = geometry[:, 4] / np.hypot(along[:, 0], along[:, 1])
-            glued = find_bonded_corners(vertex, edge, self._next, geometry[:, 0], share, remembered["bonded"] == 1)
-            if glued is not None:
-                keep &= ~glued
+        glued = self._bonded_corners(vertices, vertex, edge, geometry, remembered["bonded"]) if glue_holds else None
+        if glued is not None:
+            keep &= ~glued
         if not keep.all():
             vertex, edge, block, other, law = vertex[keep], edge[keep], block[keep], other[keep], law[keep]
             corner, geometry = corner[keep], geometry[keep]
@@ -243,6 +236,14 @@ class ContactFinder:
         if self.at_corners:
             return found if self.kept_corners is None else found.part(self.kept_corners(found))
         return found if lumped else self._with_springs_in_faces(found, vertices, broken)
+
+    def _bonded_corners(self, vertices, vertex, edge, geometry, bonded) -> np.ndarray | None:
+        """(n,) bool: corner contacts that the bonds around them join (`find_bonded_corners`); None without any."""
+        if not bonded.any():
+            return None
+        along = vertices[self._next[edge]] - vertices[edge]
+        share = geometry[:, 4] / np.hypot(along[:, 0], along[:, 1])
+        return find_bonded_corners(vertex, edge, self._next, geometry[:, 0], share, bonded == 1)
 
     def _meeting(
         self, old: np.ndarray, vertices: np.ndarray, window: float | Windows, motion: np.ndarray | None, margin: float

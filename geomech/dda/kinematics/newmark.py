@@ -249,7 +249,9 @@ def _tangent(b, stiffness, compliance, crack_given, crack_compliance, out):
 def _unit_mass(moments, mass):
     """(6, 6) the mass matrix of a block of unit density with these ``moments`` (6,), in the unknowns of a step."""
     area, xx, yy, xy = moments[0], moments[3], moments[4], moments[5]
-    mass[:] = 0.0
+    for k in range(6):
+        for m in range(6):
+            mass[k, m] = 0.0
     mass[0, 0] = mass[1, 1] = area
     mass[2, 2] = (xx + yy) / area
     mass[3, 3], mass[4, 4], mass[5, 5] = xx / area, yy / area, 0.25 * (xx + yy) / area

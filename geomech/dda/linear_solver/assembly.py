@@ -218,7 +218,8 @@ def _fill_rows(first, last, sides, data, matrix, places, contacts, stiffness):
     room, into, given, along = numbers(buffer), numbers(data), numbers(matrix), numbers(vectors)
     kns, kss, frictions, rises = numbers(normal), numbers(shear), numbers(slope), numbers(lift)
     for b in range(first, last):
-        data[begins[b] : begins[b + 1]] = 0.0
+        for k in range(begins[b], begins[b + 1]):
+            data[k] = 0.0
         step, at = stride[b], 36 * b
         d0, d1, d2 = load_six(given, at), load_six(given, at + 6), load_six(given, at + 12)
         d3, d4, d5 = load_six(given, at + 18), load_six(given, at + 24), load_six(given, at + 30)

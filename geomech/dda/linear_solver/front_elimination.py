@@ -18,8 +18,9 @@ remainders.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit, types
+from numba import types
 
+from ...compiled import UNCOUNTED, part
 from .simd import (
     BYTES,
     load,
@@ -37,9 +38,8 @@ from .simd import (
 )
 from .small_products import small_product
 
-#: Cached only with the kernel that calls them, since they depend on other files. Sums may be reordered and fused, as in
-#: BLAS products of whole fronts.
-_jit = njit(fastmath={"reassoc", "contract", "nsz"}, error_model="numpy", nogil=True)
+#: Sums may be reordered and fused, as in BLAS products of whole fronts.
+_part = part(fastmath={"reassoc", "contract", "nsz"}, error_model="numpy", nogil=True, **UNCOUNTED)
 
 #: Unknowns eliminated at a time.
 PANEL = 12
@@ -61,7 +61,7 @@ _gemm = types.ExternalFunction(
 )  # fmt: skip
 
 
-@_jit
+@_part
 def _add_product(a, at_a, row_a, b, at_b, row_b, c, at_c, row_c, rows, k, n, keep, width, units):
     """C ← A B, or C + A B to ``keep`` C: ``rows`` × k times k × n numbers, given by the begin of each matrix in the
     arrays a, b and c and the distance of its rows; ``units`` (2,) are 1 and 0."""
@@ -78,7 +78,7 @@ def _add_product(a, at_a, row_a, b, at_b, row_b, c, at_c, row_c, rows, k, n, kee
     return len(a) + len(b) + len(c)
 
 
-@_jit
+@_part
 def _invert(front, at, m, n, cell, others, swapped, width):
     """Invert n × n numbers of a ``front`` with rows of m, from ``at`` on, in place, by Gauss–Jordan elimination with
     row exchanges; False if they are singular. ``cell`` (`SIDE`² + 1,): working space; ``others`` (`SIDE`²,): ones with
@@ -124,7 +124,7 @@ def _invert(front, at, m, n, cell, others, swapped, width):
     return len(front) + len(cell) + len(others) > 0
 
 
-@_jit
+@_part
 def _clear(array):
     """Fill the flat ``array`` with zeros."""
     for k in range(len(array)):
@@ -142,7 +142,7 @@ def places(own: np.ndarray, far: np.ndarray) -> tuple[np.ndarray, np.ndarray, in
     return np.cumsum(up) - up, int(up.sum() + down.sum()) - np.cumsum(down), int(up.sum() + down.sum())
 
 
-@_jit
+@_part
 def _leave_sixes(given, at, stride, rows, n, taken, to, width):
     """Write ``rows`` at this distance, of n numbers each, as sixes; returns their end."""
     for i in range(at, at + rows * stride, 6 * stride):
@@ -159,7 +159,7 @@ def _leave_sixes(given, at, stride, rows, n, taken, to, width):
     return to
 
 
-@_jit
+@_part
 def _leave(front, p, m, factors, at, back):
     """Write the factors of a ``front`` to their places."""
     if p == 0:
@@ -178,7 +178,7 @@ def _leave(front, p, m, factors, at, back):
     return len(front) + len(factors)
 
 
-@_jit
+@_part
 def _runs(met, own, begins):
     """Runs of consecutive seats among ``met`` (n,) in a front with ``own`` blocks: their begins in ``begins``, followed
     by n; the number of runs, and the number within its own blocks."""
@@ -192,7 +192,7 @@ def _runs(met, own, begins):
     return runs, mine
 
 
-@_jit
+@_part
 def _add_runs(into, at, added, begin, met, begins, first, last, width):
     """Add to the row of a front that begins at ``into[at]`` the runs from ``first`` to before ``last`` of a child's row
     that begins at ``added[begin]``."""
@@ -207,7 +207,7 @@ def _add_runs(into, at, added, begin, met, begins, first, last, width):
             store_six(into, j + q, plus(load_six(into, j + q), load_six(added, v + q)))
 
 
-@_jit
+@_part
 def eliminate(
     first,
     last,
@@ -320,7 +320,7 @@ def eliminate(
     return len(room) + len(front) + len(panel) > 0
 
 
-@_jit
+@part(error_model="numpy", nogil=True)
 def working_space(pivots, reach, factors):
     """Working space of `eliminate`: a front without its F_BB, a panel, and index arrays."""
     most, far, size = 0, 0, 0
@@ -328,6 +328,7 @@ def working_space(pivots, reach, factors):
         p, b = 6 * (pivots[f + 1] - pivots[f]), 6 * (reach[f + 1] - reach[f])
         most, far, size = max(most, p + b), max(far, b), max(size, p * (p + 2 * b))
     front, panel = np.empty(size, factors.dtype), np.empty(PANEL * most, factors.dtype)
-    cell, others = np.empty(SIDE * SIDE + 1, factors.dtype), np.ones(SIDE * SIDE, factors.dtype)
-    others[:: SIDE + 1] = 0
+    cell, others = np.empty(SIDE * SIDE + 1, factors.dtype), np.empty(SIDE * SIDE, factors.dtype)
+    for k in range(SIDE * SIDE):
+        others[k] = k % (SIDE + 1) != 0
     return front, panel, np.empty(far // 6 + 1, np.int64), cell, others, np.empty(PANEL, np.int64)

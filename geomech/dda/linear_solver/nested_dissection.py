@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...compiled import kept, part
+from ...compiled import UNCOUNTED, kept, part
 
 #: Blocks in a leaf of the dissection: smaller leaves cost more calls, larger ones more arithmetic (measured on walls).
 LEAF = 10
@@ -140,7 +140,8 @@ def _dissected(orders, pointer, neighbour, leaf, large, least_part, across):
             for _ in range(children):
                 ended -= 1
                 parent[done[ended]] = fronts
-            blocks[begins[fronts] : begins[fronts] + m] = orders[0, first:last]
+            for q in range(m):
+                blocks[begins[fronts] + q] = orders[0, first + q]
             done[ended] = fronts
             ended += 1
             begins[fronts + 1] = begins[fronts] + m
@@ -164,7 +165,8 @@ def _dissected(orders, pointer, neighbour, leaf, large, least_part, across):
         for d in range(k):
             if m >= large or across[d]:
                 to_first, to_second, to_cut = first, one, two
-                room[:m] = orders[d, first:last]
+                for q in range(m):
+                    room[q] = orders[d, first + q]
                 for q in range(m):
                     b = room[q]
                     if side[b] == 0:
@@ -177,10 +179,12 @@ def _dissected(orders, pointer, neighbour, leaf, large, least_part, across):
                         orders[d, to_cut] = b
                         to_cut += 1
         # A separator is eliminated from one end to the other.
-        if best + k // 2 < k:
-            orders[0, two:last] = orders[best + k // 2, two:last]
-        else:
-            orders[0, two:last] = orders[best - k // 2, two:last][::-1].copy()
+        turned = best + k // 2 >= k
+        along = best - k // 2 if turned else best + k // 2
+        for q in range(last - two):
+            room[q] = orders[along, last - 1 - q if turned else two + q]
+        for q in range(last - two):
+            orders[0, two + q] = room[q]
         work[waiting, 0], work[waiting, 1], work[waiting, 2] = two, last, (halves[0] > 0) + (halves[1] > 0)
         waiting += 1
         for begin, end in ((first, one), (one, two)):
@@ -203,13 +207,36 @@ def dissect(points: np.ndarray, pointer: np.ndarray, neighbour: np.ndarray) -> t
     return _dissected(orders, pointer, neighbour, LEAF, _LARGE, _LEAST, across)
 
 
-@part(fastmath=False, error_model="numpy", nogil=True)
+@part(fastmath=False, error_model="numpy", nogil=True, **UNCOUNTED)
 def _seat(number, front, pivots, reach, boundary):
     """Where a block stands in a front: its own first, then its boundary."""
     if number < pivots[front + 1]:
         return number - pivots[front]
-    met = boundary[reach[front] : reach[front + 1]]
-    return pivots[front + 1] - pivots[front] + np.searchsorted(met, number)
+    low, high = reach[front], reach[front + 1]
+    while low < high:
+        middle = (low + high) // 2
+        if boundary[middle] < number:
+            low = middle + 1
+        else:
+            high = middle
+    return pivots[front + 1] - pivots[front] + low - reach[front]
+
+
+@part(fastmath=False, error_model="numpy", nogil=True, **UNCOUNTED)
+def _sort(numbers, first, last):
+    """Sort the ``numbers`` from ``first`` to before ``last`` in place, by insertion at ever smaller distances (Shell
+    1959): some hundred that are mostly in order. (np.sort takes two seconds to compile.)"""
+    apart = 1
+    while 3 * apart < last - first:
+        apart = 3 * apart + 1
+    while apart > 0:
+        for k in range(first + apart, last):
+            given, at = numbers[k], k
+            while at - apart >= first and numbers[at - apart] > given:
+                numbers[at] = numbers[at - apart]
+                at -= apart
+            numbers[at] = given
+        apart //= 3
 
 
 @kept(fastmath=False, error_model="numpy", nogil=True)
@@ -222,9 +249,11 @@ def _reached(blocks, rank, pivots, parent, pointer, neighbour):
         last = pivots[f + 1]
         if len(boundary) < top + len(blocks):
             more = np.empty(2 * len(boundary), np.int64)
-            more[:top] = boundary[:top]
+            for k in range(top):
+                more[k] = boundary[k]
             boundary = more
-        for b in blocks[pivots[f] : last]:
+        for q in range(pivots[f], last):
+            b = blocks[q]
             for e in range(pointer[b], pointer[b + 1]):
                 r = rank[neighbour[e]]
                 if r >= last and met[r] != f:
@@ -238,7 +267,7 @@ def _reached(blocks, rank, pivots, parent, pointer, neighbour):
                     met[r], boundary[top] = f, r
                     top += 1
             g = sibling[g]
-        boundary[reach[f] : top] = np.sort(boundary[reach[f] : top])
+        _sort(boundary, reach[f], top)
         reach[f + 1] = top
         if parent[f] >= 0:
             sibling[f], child[parent[f]] = child[parent[f]], f

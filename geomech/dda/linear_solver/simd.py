@@ -9,10 +9,12 @@ array until they are done with.
 from __future__ import annotations
 
 from llvmlite import ir
-from numba import njit, types
+from numba import types
 from numba.core import cgutils
 from numba.extending import intrinsic, models, register_model
 from numba.np.arrayobj import make_array
+
+from ...compiled import UNCOUNTED, part
 
 #: Bytes of a register. Where processors have none of 64, two of 32 are one.
 BYTES = 64
@@ -256,7 +258,7 @@ def sums(typingctx, a, b, c, d, e, f):
     return a(a, b, c, d, e, f), codegen
 
 
-@njit(error_model="numpy", nogil=True)
+@part(error_model="numpy", nogil=True, **UNCOUNTED)
 def copy(given, at, taken, to, n, width):
     """Copy n numbers ``given`` from ``at`` on to those ``taken`` from ``to`` on; ``width`` numbers are a register."""
     j = 0

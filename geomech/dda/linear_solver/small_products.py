@@ -6,15 +6,13 @@ which pays in large products only.
 
 from __future__ import annotations
 
-from numba import njit
-
+from ...compiled import UNCOUNTED, part
 from .simd import load, load_first, plus, plus_product, spread, store, store_first, zeros
 
-#: Kept with the kernel that calls them only, for they are made of what stands in other files, too.
-_jit = njit(error_model="numpy", nogil=True)
+_part = part(error_model="numpy", nogil=True, **UNCOUNTED)
 
 
-@_jit
+@_part
 def _put(c, at, sum_, n, width, keep):
     """Write the first ``n`` of ``sum_`` to ``c``, or add them to what it ``keep``s."""
     if n == width:
@@ -23,7 +21,7 @@ def _put(c, at, sum_, n, width, keep):
         store_first(c, at, plus(load_first(c, at, n), sum_) if keep else sum_, n)
 
 
-@_jit
+@_part
 def _put_six(c, at, row_c, s0, s1, s2, s3, s4, s5, n, width, keep):
     """`_put` of six rows, ``row_c`` apart."""
     _put(c, at, s0, n, width, keep)
@@ -34,7 +32,7 @@ def _put_six(c, at, row_c, s0, s1, s2, s3, s4, s5, n, width, keep):
     _put(c, at + 5 * row_c, s5, n, width, keep)
 
 
-@_jit
+@_part
 def _two_wide(c, at, row_c, a, at_a, row_a, b, at_b, row_b, k, n, width, keep):
     """Six rows of C in two registers, of the second ``n``."""
     s0 = s1 = s2 = s3 = s4 = s5 = t0 = t1 = t2 = t3 = t4 = t5 = zeros(c)
@@ -53,7 +51,7 @@ def _two_wide(c, at, row_c, a, at_a, row_a, b, at_b, row_b, k, n, width, keep):
     _put_six(c, at + width, row_c, t0, t1, t2, t3, t4, t5, n, width, keep)
 
 
-@_jit
+@_part
 def _one_wide(c, at, row_c, a, at_a, row_a, b, at_b, row_b, k, n, width, keep):
     """Six rows of C, ``n`` numbers of a register wide."""
     s0 = s1 = s2 = s3 = s4 = s5 = zeros(c)
@@ -68,7 +66,7 @@ def _one_wide(c, at, row_c, a, at_a, row_a, b, at_b, row_b, k, n, width, keep):
     _put_six(c, at, row_c, s0, s1, s2, s3, s4, s5, n, width, keep)
 
 
-@_jit
+@_part
 def small_product(c, at, row_c, a, at_a, row_a, b, at_b, row_b, rows, k, n, width, keep):
     """C ← A B, or C + A B to ``keep`` C: ``rows`` (sixes) × k times k × n numbers. Each matrix by where its numbers
     lie, its first and the distance of its rows; ``width`` numbers are a register."""

@@ -7,8 +7,8 @@ slow as a row of thirty by itself, are formed together.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from ...compiled import UNCOUNTED, part
 from .front_elimination import PANEL
 from .simd import (
     BYTES,
@@ -25,11 +25,11 @@ from .simd import (
     zeros,
 )
 
-#: Not kept by themselves: what they are made of stands in other files, too.
-_jit = njit(fastmath=False, error_model="numpy", nogil=True)
+_part = part(fastmath=False, error_model="numpy", nogil=True)
+_uncounted_part = part(fastmath=False, error_model="numpy", nogil=True, **UNCOUNTED)
 
 
-@_jit
+@_uncounted_part
 def _six(rows, at, x, begin, n, width):
     """The products of six ``rows``, from ``at`` on, with n numbers of ``x``, as the first six of a register of that
     ``width``."""
@@ -52,7 +52,7 @@ def _six(rows, at, x, begin, n, width):
     return sums(s0, s1, s2, s3, s4, s5)
 
 
-@_jit
+@_uncounted_part
 def _longest(pivots, reach, first, last):
     """The most unknowns of any front from ``first`` to before ``last``."""
     most = 0
@@ -61,7 +61,7 @@ def _longest(pivots, reach, first, last):
     return most
 
 
-@_jit
+@_part
 def forward(first, last, out, pivots, reach, seat, at, child, sibling, factors, passed):
     """Forward substitution in ``out`` (6n,), in the order of elimination, through fronts from ``first`` to before
     ``last``; ``passed`` holds the contribution of each front to its parent."""
@@ -72,7 +72,8 @@ def forward(first, last, out, pivots, reach, seat, at, child, sibling, factors, 
         p, b = 6 * (pivots[f + 1] - pivots[f]), 6 * (reach[f + 1] - reach[f])
         m = p + b
         copy(solution, 6 * pivots[f], x, 0, p, width)
-        known[p:m] = 0
+        for i in range(p, m):
+            known[i] = 0
         g = child[f]
         while g >= 0:
             for u in range(reach[g], reach[g + 1]):
@@ -96,7 +97,7 @@ def forward(first, last, out, pivots, reach, seat, at, child, sibling, factors, 
     return len(known) + len(part) + len(out) + len(passed) + len(factors)
 
 
-@_jit
+@_part
 def backward(first, last, out, pivots, reach, boundary, back, factors):
     """Backward substitution in ``out`` from front ``last`` − 1 down to ``first``."""
     width = BYTES // out.itemsize

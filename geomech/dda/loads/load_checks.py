@@ -22,7 +22,7 @@ class LoadChecks:
     def __init__(self, blocks: Blocks) -> None:
         self._blocks = blocks
         self._seen: tuple = ()
-        self._held: set[tuple[int, tuple[float, float]]] = set()
+        self._checked: set[tuple[int, tuple[float, ...]]] = set()
         self._reach = _OF_DRAWING * float(np.ptp(blocks.vertices, axis=0).max()) if blocks.n_vertices else 0.0
 
     def refuse(self, loads: Loads) -> None:
@@ -40,9 +40,9 @@ class LoadChecks:
             self._name(what, block)
         for what, block, at in self._at_points(loads):
             key = block, tuple(at)
-            if key not in self._held:
+            if key not in self._checked:
                 self._refuse_outside(what, block, np.asarray(at, dtype=float))
-                self._held.add(key)
+                self._checked.add(key)
         if loads.base is not None and loads.base.frame == "ground":
             self._refuse_unshaken(loads.base)
         for boundary in loads.viscous_boundaries:

@@ -8,6 +8,7 @@ its contacts as a shift of their gaps.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -65,6 +66,15 @@ class Pairs:
     shift: np.ndarray
 
 
+class MovedBlocks(NamedTuple):
+    """The ``blocks`` of a step, those that are ``fixed`` (n_blocks,), and ``removed`` (n_blocks,) by excavation (None:
+    none)."""
+
+    blocks: Blocks
+    fixed: np.ndarray
+    removed: np.ndarray | None
+
+
 class PrescribedMotion:
     """Motion that ``loads`` prescribe from ``start`` to ``end`` (s), on the midpoint configuration ``midpoint``.
 
@@ -77,10 +87,10 @@ class PrescribedMotion:
     """
 
     def __init__(
-        self, blocks: Blocks, fixed: np.ndarray, removed: np.ndarray | None, loads: Loads, midpoint: MidpointConfiguration, point_at,
-        before: np.ndarray,
-        start: float, end: float,
+        self, moved: MovedBlocks, loads: Loads, midpoint: MidpointConfiguration, point_at, before: np.ndarray, start: float,
+        end: float,
     ) -> None:  # fmt: skip
+        blocks, fixed, removed = moved
         n = blocks.n_blocks
         self.blocks, self.fixed, self.moments = blocks, fixed, midpoint.moments
         self._midpoint = midpoint

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ...model import BOLT, GROUND, Blocks, Loads, State
+from ...model import BOLT, GROUND, Loads, State
 from ..kinematics.midpoint_configuration import MidpointConfiguration
 from ..linear_solver.assembly import Links, Pattern
 from ..open_close.contact_set import ContactSet
@@ -16,7 +16,7 @@ from ..results import contact_resultants
 from .bolts import ROUNDS, BoltSet, check_bolts, labels
 from .force_records import POINT_FORCE
 from .load_vectors import LoadMap
-from .prescribed_motion import Pairs, PrescribedMotion
+from .prescribed_motion import MovedBlocks, Pairs, PrescribedMotion
 
 #: (pattern, matrix, right side, contacts, gaps) → settled contacts.
 Settle = Callable[[Pattern, np.ndarray, np.ndarray, ContactSet, np.ndarray], Settled]
@@ -42,10 +42,10 @@ class StepActions:
     """Prescribed motion and bolts of one attempt at a step; methods in the order in which the step calls them."""
 
     def __init__(
-        self, blocks: Blocks, fixed: np.ndarray, loads: Loads, state: State, load_map: LoadMap, midpoint: MidpointConfiguration,
-        order: np.ndarray, removed: np.ndarray | None, end: float,
+        self, moved: MovedBlocks, loads: Loads, state: State, load_map: LoadMap, midpoint: MidpointConfiguration,
+        order: np.ndarray, end: float,
     ) -> None:  # fmt: skip
-        self.blocks, self.order, self.loads, self.load_map = blocks, order, loads, load_map
+        self.blocks, self.order, self.loads, self.load_map = moved.blocks, order, loads, load_map
         self.moments = midpoint.moments
         vertices = state.vertices
 
@@ -55,15 +55,13 @@ class StepActions:
         self.imposed: PrescribedMotion | None = None
         shaken = loads.base is not None and loads.base.frame == "ground"
         if shaken or loads.block_motions or loads.point_motions:
-            self.imposed = PrescribedMotion(
-                blocks, fixed, removed, loads, midpoint, point_at, state.imposed, state.time, end
-            )
+            self.imposed = PrescribedMotion(moved, loads, midpoint, point_at, state.imposed, state.time, end)
         self.bolts: BoltSet | None = None
         self.memory = np.empty(0, BOLT)
         if loads.bolts:
-            check_bolts(loads.bolts, blocks.fixed)
+            check_bolts(loads.bolts, moved.blocks.fixed)
             self.bolts, self.memory = BoltSet.of(
-                loads.bolts, state.bolts, state.time, point_at, order, midpoint, removed
+                loads.bolts, state.bolts, state.time, point_at, order, midpoint, moved.removed
             )
         #: (n_contacts,) m: contacts' motion along their edges due to the motion of fixed blocks.
         self.along = np.zeros(0)
@@ -71,14 +69,14 @@ class StepActions:
 
     @classmethod
     def of(
-        cls, blocks: Blocks, fixed: np.ndarray, loads: Loads, state: State, load_map: LoadMap, midpoint: MidpointConfiguration,
-        order: np.ndarray, removed: np.ndarray | None, end: float,
+        cls, moved: MovedBlocks, loads: Loads, state: State, load_map: LoadMap, midpoint: MidpointConfiguration,
+        order: np.ndarray, end: float,
     ) -> StepActions | None:  # fmt: skip
         """The actions of a step; None where ``loads`` are forces only."""
         shaken = loads.base is not None and loads.base.frame == "ground"
         if not (shaken or loads.block_motions or loads.point_motions or loads.bolts):
             return None
-        return cls(blocks, fixed, loads, state, load_map, midpoint, order, removed, end)
+        return cls(moved, loads, state, load_map, midpoint, order, end)
 
     @property
     def linked(self) -> tuple[np.ndarray, np.ndarray] | None:

@@ -131,8 +131,7 @@ class _Path:
         entered: tuple[int, int] | None = None
         least = PathEnd(states, z)
         for _ in range(_CHANGES * n):
-            bare = problem.solve(states)
-            confined = problem.solve(states, self._right, self._more_cohesion)
+            bare, confined = problem.solve_confined(states, self._right, self._more_cohesion)
             at_zero = self._margins(states, bare, self._cohesion)
             at_one = self._margins(states, confined, self._cohesion + self._more_cohesion / problem.stress)
             concerned = np.isfinite(at_zero)

@@ -53,43 +53,55 @@ class FaceEquations:
     def solve(
         self, right: np.ndarray, states: FaceStates, memory: FaceMemory, cohesion: np.ndarray | float = 0.0
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Jumps and λ (n,) under ``right`` (n,), with more ``cohesion`` (n_nodes,) than the laws', Pa."""
+        """Jumps and λ, (n,) or (n, k), under ``right`` (n,) or (n, k), with more ``cohesion`` than the laws', Pa: one
+        for all nodes, (n_nodes,) or (n_nodes, k)."""
+        if right.ndim == 1:
+            more = np.broadcast_to(cohesion, len(self.laws.along))
+            w, reaction = self.solve(right[:, None], states, memory, more[:, None])
+            return w[:, 0], reaction[:, 0]
         laws, s = self.laws, self.system.matrix
-        self.solved += 1
+        self.solved += right.shape[1]
         prescribed, slides, spring = self._rows(states)
         a, t = laws.across, laws.along
         w, extra = np.zeros_like(right), np.zeros_like(right)
-        w[a[states.closed]] = -laws.aperture[states.closed]
-        w[t] = np.where(prescribed[t], memory.rest, 0.0)
-        w[~prescribed] = 0.0
-        bound = laws.cohesive_strength(memory.broken) + cohesion
-        bound = np.where(states.way != 0, bound, 0.0)  # it may be infinite where nothing slips
+        given = np.zeros(len(right))
+        given[a[states.closed]] = -laws.aperture[states.closed]
+        given[t] = np.where(prescribed[t], memory.rest, 0.0)
+        given[~prescribed] = 0.0
+        slipping = states.way != 0
+        bound = laws.cohesive_strength(memory.broken)[:, None] + cohesion
+        # It may be infinite where nothing slips.
+        shear = states.way[:, None] * np.where(slipping[:, None], bound, 0.0)
         free, factor = self._factor(states)
         if isinstance(factor, HeldFactor):
-            extra[t] = states.way * bound
-            w, reaction = factor.respond(self._opened(right, factor), extra, w)
-            reaction[t] = np.where(states.way != 0, -(extra[t] + slides * reaction[a]), reaction[t])
+            extra[t] = shear
+            reaction = np.empty_like(right)
+            for k in range(right.shape[1]):
+                w[:, k], reaction[:, k] = factor.respond(self._opened(right[:, k], factor), extra[:, k], given)
+            reaction[t] = np.where(slipping[:, None], -(shear + slides[:, None] * reaction[a]), reaction[t])
             return w, reaction
-        extra[t] = states.way * bound + slides * right[a]
-        extra[a] += spring[a] * laws.aperture
-        extra[t] -= spring[t] * memory.rest
-        pull = self._pull_of(w)
-        known = right + extra - pull
-        known[t] -= slides * pull[a]
-        w[free] = factor.solve(known[free])
-        self._work.back_substitutions += 1
+        w[:] = given[:, None]
+        extra[t] = shear + slides[:, None] * right[a]
+        extra[a] += (spring[a] * laws.aperture)[:, None]
+        extra[t] -= (spring[t] * memory.rest)[:, None]
+        pull = self._pull_of(given)
+        known = right + extra - pull[:, None]
+        known[t] -= (slides * pull[a])[:, None]
+        w[free] = factor.solve(np.asfortranarray(known[free]))
+        self._work.back_substitutions += right.shape[1]
         reaction = np.zeros_like(right)
-        missing = right - s @ w
+        # Products of compressed matrices take one column at a time.
+        compressed = isinstance(self.system, IterativeCrackSystem)
+        missing = right - (np.stack([s @ of for of in w.T], axis=1) if compressed else s @ w)
         closed = states.closed
         reaction[a[closed]] = missing[a[closed]]
         filled = spring[a] > 0
-        reaction[a[filled]] = -(spring[a] * (w[a] + laws.aperture))[filled]
+        reaction[a[filled]] = -(spring[a][:, None] * (w[a] + laws.aperture[:, None]))[filled]
         stuck = prescribed[t]
         reaction[t[stuck]] = missing[t[stuck]]
         springy = spring[t] > 0
-        reaction[t[springy]] = -(spring[t] * (w[t] - memory.rest))[springy]
-        slipping = states.way != 0
-        reaction[t[slipping]] = -(states.way * bound + slides * reaction[a])[slipping]
+        reaction[t[springy]] = -(spring[t][:, None] * (w[t] - memory.rest[:, None]))[springy]
+        reaction[t[slipping]] = -(shear + slides[:, None] * reaction[a])[slipping]
         return w, reaction
 
     def _pull_of(self, w: np.ndarray) -> np.ndarray:
@@ -110,7 +122,7 @@ class FaceEquations:
     def _opened(self, right: np.ndarray, factor: HeldFactor) -> np.ndarray:
         """S⁻¹ ``right``, computed once for each of the last two loads."""
         for known, opened in self._last:
-            if known is right:
+            if np.array_equal(known, right):
                 return opened
         self._work.back_substitutions += 1
         opened = factor.open.solve(right)
@@ -204,13 +216,22 @@ class FaceProblem:
         left = 1e-8 * float(np.abs(self.memory.rest).max(initial=0.0)) / self.length
         return max(float(np.abs(self.right).max()), left, NO_STRESS)
 
-    def solve(
-        self, states: FaceStates, right: np.ndarray | None = None, cohesion: np.ndarray | float = 0.0
-    ) -> FaceValues:
-        """Solution with the nodes in these ``states``; ``right`` and more ``cohesion`` than the laws' in place of the
-        problem's own."""
+    def solve(self, states: FaceStates) -> FaceValues:
+        """Solution with the nodes in these ``states``."""
+        return self._values(states, *self.equations.solve(self.right, states, self.memory))
+
+    def solve_confined(
+        self, states: FaceStates, right: np.ndarray, cohesion: np.ndarray
+    ) -> tuple[FaceValues, FaceValues]:
+        """The same, and with ``right`` and more ``cohesion`` (n_nodes,) than the laws' in place of the problem's
+        own."""
+        both = np.stack([self.right, right], axis=1), np.stack([np.zeros_like(cohesion), cohesion], axis=1)
+        w, reaction = self.equations.solve(both[0], states, self.memory, both[1])
+        bare, confined = (self._values(states, w[:, k], reaction[:, k]) for k in (0, 1))
+        return bare, confined
+
+    def _values(self, states: FaceStates, w: np.ndarray, reaction: np.ndarray) -> FaceValues:
         laws = self.laws
-        w, reaction = self.equations.solve(self.right if right is None else right, states, self.memory, cohesion)
         opening = self.stress * self.length
         return FaceValues(
             w, reaction,

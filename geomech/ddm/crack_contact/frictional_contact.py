@@ -140,7 +140,7 @@ def settle_rough(
         if not drive.max() > 1 + TOLERANCE:
             break
         # The most stressed nodes break first, and the others are judged after that.
-        broken = broken | cemented & (drive > max(1.0, 0.9 * drive.max()))
+        broken = broken | cemented & (drive > max(1.0, 0.5 * drive.max()))
         problem = FaceProblem(equations, right, replace(memory, broken=broken))
         was = found.states
         states = admissible(problem, FaceStates(was.closed & ~broken, was.way, was.pulled))

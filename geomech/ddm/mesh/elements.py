@@ -27,7 +27,7 @@ from ..system.influence_matrix import ElementSet
 from .crack_nodes import cut, ends_at, in_line, share_ends, straight_on
 from .grading import CURVED, KINK, NEAR_CORNER, Grading, sagittas
 from .half_plane import ON_SURFACE, HalfPlane
-from .proximity import keep_apart
+from .proximity import Pieces, keep_apart
 
 #: Neighbouring segments are graded where the ratio of their element lengths exceeds this.
 JUMP = 10.0 * (1 + 1e-9)
@@ -90,7 +90,7 @@ def mesh(
     sides_of_rock = edges if half_plane is None else np.concatenate([edges, half_plane.edge(points)])
     mouths = [
         (cracks.nodes[k], _layers_at(cracks, k, sides_of_rock, grading))
-        for k in (np.flatnonzero(cracks.surface & (cracks.valence > 0)) if len(edges) else ())
+        for k in (np.flatnonzero(cracks.surface & (cracks.valence > 0)).tolist() if len(edges) else ())
     ]
     corners = _corner_layers(loops, cracks, settings, grading)
     key: tuple = float(extent), tuple((*point, deep) for point, deep in mouths), tuple(corners)
@@ -111,9 +111,10 @@ def mesh(
         )
         line = None if line is None else np.kron(np.eye(2, dtype=bool), line)
     start, end, kind, source = keep_apart(
-        start, end, kind, source, pieces, touching, len(edges), settings.grading_ratio, extent,
+        start, end, kind, source, Pieces(pieces, touching, line, len(edges), n_pieces), settings.grading_ratio,
+        extent,
         # Images have no unknowns.
-        (2 if half_plane is None else 1) * (settings.order + 1), n_pieces, line,
+        (2 if half_plane is None else 1) * (settings.order + 1),
     )  # fmt: skip
     if half_plane is not None:
         own = source < n_pieces
@@ -367,7 +368,7 @@ def _cracks(cracks: Cracks, settings: DdmSettings, grading: Grading, extent: flo
         a, b = cracks.nodes[cracks.segments[s]].tolist()
         long = float(length[s])
         part = m / long
-        fine = list(range(1, m))
+        fine: list[float] = list(range(1, m))
         if at_start:
             fine = grading.fractions(at_start, grading.finest(a, long, extent) * part) + fine
         if at_end:

@@ -61,8 +61,8 @@ def check_outline(loops: list[np.ndarray], holes: Sequence[np.ndarray] = ()) -> 
     for k, hole in enumerate(out[first_hole:], 1):
         if bounded and not inside(out[:1], hole).all():
             raise ValueError(f"hole {k}: not inside the outline")
-        for m, other in enumerate(out[first_hole:], 1):
-            if m != k and not inside([other], hole[:1]).all():
+        for m, around in enumerate(out[first_hole:], 1):
+            if m != k and not inside([around], hole[:1]).all():
                 raise ValueError(f"hole {k}: inside hole {m}")
     return out
 

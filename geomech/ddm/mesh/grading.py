@@ -130,7 +130,7 @@ class Grading:
     def needed(self, angle: float, where: str) -> int:
         """Layers that reach the target at a wedge of rock of ``angle`` (rad); ``where`` as in `ungraded`."""
         error, power = ungraded(angle, where)
-        if error <= self.target:
+        if self.target is None or error <= self.target:
             return 0
         if where == "crack" and angle > math.pi:
             return self._at_kink(angle - math.pi, self.target)

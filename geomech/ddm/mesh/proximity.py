@@ -174,26 +174,41 @@ def _compare(elements, length, sources, i, j, out):
         out[k] = max(out[k], length[k] / (d * (allowed if length[k] > least else graded)))
 
 
-def keep_apart(start, end, kind, source, pieces, touching, n_edges, ratio, extent, unknowns, images=None, line=None):
+class Pieces(NamedTuple):
+    """The edges and crack segments on which elements lie.
+
+    ends       (n_sources, 2, 2) m, the first ``n_edges`` edges, then crack segments
+    touching   (n_sources, n_sources) bool, which of them meet
+    line       the same, which of them are in line (`crack_nodes.in_line`); None: none
+    images     number from which on they are images behind a free surface
+    """
+
+    ends: np.ndarray
+    touching: np.ndarray
+    line: np.ndarray | None
+    n_edges: int
+    images: int
+
+
+def keep_apart(start, end, kind, source, pieces: Pieces, ratio: float, extent: float, unknowns: int):
     """Halve elements (``start``, ``end`` (n, 2), ``kind``, ``source`` (n,)) that are too long for their distance to
     others.
 
-    ``pieces`` (n_sources, 2, 2) are the edges, then the crack segments, ``touching`` (n_sources, n_sources) which of
-    them meet, ``line`` the same of those in line (`crack_nodes.in_line`; None: none); ``ratio`` is the grading ratio, ``unknowns`` the number per element; sources from ``images`` on are
-    behind a free surface. Raises ValueError with the place where rock is too thin: it would take too many elements, or
-    shorter ones than coordinates can resolve.
+    ``ratio`` is the grading ratio, ``extent`` (m) that of the geometry, ``unknowns`` the number per element. Raises
+    ValueError with the place where rock is too thin: it would take too many elements, or shorter ones than coordinates
+    can resolve.
     """
     # A graded element is 1/ratio times its distance from the next but one.
     chained = max(2.5, 1.05 / ratio)
     if ratio >= FINE:  # acute angles then add no limit of their own
-        acute_share, meeting = np.inf, touching.astype(float)
+        acute_share, meeting = np.inf, pieces.touching.astype(float)
     else:
-        acute_share, meeting = LOW if unknowns <= 6 else 1.0, _meeting(pieces, touching, n_edges, np.cos(ACUTE))
-    if line is not None:
-        meeting[line & ~np.eye(len(pieces), dtype=bool)] = IN_LINE
-    span = np.hypot(*(pieces[:, 1] - pieces[:, 0]).T)
-    images = len(pieces) if images is None else images
-    sources = Sources(n_edges, images, span, meeting, chained, float(acute_share))
+        acute_share = LOW if unknowns <= 6 else 1.0
+        meeting = _meeting(pieces.ends, pieces.touching, pieces.n_edges, np.cos(ACUTE))
+    if pieces.line is not None:
+        meeting[pieces.line & ~np.eye(len(pieces.ends), dtype=bool)] = IN_LINE
+    span = np.hypot(*(pieces.ends[:, 1] - pieces.ends[:, 0]).T)
+    sources = Sources(pieces.n_edges, pieces.images, span, meeting, chained, float(acute_share))
     most = max(4 * len(start), MOST_UNKNOWNS // unknowns)
     while True:
         tip = np.where(kind == shape_functions.ORDINARY, 0, kind)

@@ -3,6 +3,8 @@ inside."""
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 
 
@@ -39,6 +41,37 @@ def area_moments(loops: list[np.ndarray]) -> tuple[float, np.ndarray, np.ndarray
     area, first, second = polygon_moments(loops, origin)
     centroid = first / area
     return float(area), origin + centroid, second - area * np.outer(centroid, centroid)
+
+
+def joined_loops(loops: list[np.ndarray]) -> list[np.ndarray]:
+    """``loops`` (each (n, 2)) that bound one polygon, those that touch in a vertex made one loop, which passes that
+    point twice: there the polygon has two corners, and no material between them.
+
+    At such a point a loop goes on along the first edge clockwise from the one it came by, with the polygon on its left.
+    """
+    if len(loops) < 2:
+        return loops
+    corners = [[tuple(point) for point in loop.tolist()] for loop in loops]
+    edges = [edge for loop in corners for edge in pairwise([*loop, loop[0]])]
+    onward: dict[tuple, list[tuple]] = {}
+    for start, end in edges:
+        onward.setdefault(start, []).append(end)
+    if len(onward) == len(edges):
+        return loops
+
+    def clockwise(corner: tuple, before: tuple, after: tuple) -> float:
+        u, v = np.subtract(before, corner), np.subtract(after, corner)
+        return float(np.arctan2(v[0] * u[1] - v[1] * u[0], u @ v) % (2 * np.pi))
+
+    joined, left = [], dict.fromkeys(edges)
+    while left:
+        loop, (start, end) = [], next(iter(left))
+        while (start, end) in left:
+            del left[start, end]
+            loop.append(start)
+            start, end = end, min(onward[end], key=lambda after: clockwise(end, start, after))
+        joined.append(np.array(loop))
+    return joined
 
 
 def winding_number(loops: list[np.ndarray], point: np.ndarray) -> float:

@@ -22,7 +22,7 @@ import zlib
 from collections.abc import Iterator, Mapping
 from functools import cache
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any, BinaryIO, cast
 
 from geomech import plain_data
 
@@ -92,7 +92,7 @@ def write(folder: Path, header: dict[str, Any], content: Any) -> Path:
             head = json.dumps(header).encode()
             file.write(_FIRST.format(format=FORMAT, crc=zlib.crc32(head), length=len(head)).encode() + head + b"\n")
             summed = _Summed(file)
-            plain_data.write(summed, content, _ALLOWED)
+            plain_data.write(cast(BinaryIO, summed), content, _ALLOWED)
             file.write(_TRAILER.pack(summed.crc, summed.length))
             file.flush()
             os.fsync(file.fileno())

@@ -95,7 +95,7 @@ class CrackLines:
 
     def __init__(self) -> None:
         self._cracks: Cracks | None = None
-        self._segment: np.ndarray | None = None
+        self._segment = np.empty(0, int)
 
     def update(self, cracks: Cracks, faces: CrackFaces | None) -> None:
         """Set the lines to those of ``cracks``, as far as they are sampled in ``faces``."""

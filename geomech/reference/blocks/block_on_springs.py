@@ -9,8 +9,20 @@ weight.
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
+
+from ...model import Material
+
+
+class SpringContact(NamedTuple):
+    """Contact at a corner: ``friction_angle`` (rad), ``spring`` (Pa) normal and along, and ``damping`` as
+    `geomech.model.DdaSettings` counts it."""
+
+    friction_angle: float
+    damping: float
+    spring: float
 
 
 def creep_of_a_sudden_weight(
@@ -18,22 +30,19 @@ def creep_of_a_sudden_weight(
     dt: float,
     outputs: int,
     incline: float,
-    friction_angle: float,
-    damping: float,
-    spring: float,
-    youngs_modulus: float,
-    poissons_ratio: float,
-    density: float,
+    contact: SpringContact,
+    material: Material,
     gravity: float = 9.81,
 ) -> np.ndarray:
     """(outputs,) m that a 1 m square has gone down an ``incline`` (rad) at equal times up to ``duration`` (s), when its
     weight acts at once on a block that just touches, in plane strain.
 
-    Contact ``spring`` (Pa) normal and along, at its two lower corners; ``damping`` as `geomech.model.DdaSettings`
-    counts it: a viscous stress for the block's vibration, ω² = 12 C₁₁/(ρ h²), and a dashpot 2 ξ √(k m) across each
-    contact. Semi-implicit Euler steps ``dt`` (s), of first order.
+    The ``contact`` is at its two lower corners; damping means a viscous stress for the block's vibration, ω² = 12
+    C₁₁/(ρ h²), and a dashpot 2 ξ √(k m) across each contact. Semi-implicit Euler steps ``dt`` (s), of first order.
     """
-    bulk = youngs_modulus / ((1 + poissons_ratio) * (1 - 2 * poissons_ratio))
+    friction_angle, damping, spring = contact
+    poissons_ratio, density = material.poissons_ratio, material.density
+    bulk = material.youngs_modulus / ((1 + poissons_ratio) * (1 - 2 * poissons_ratio))
     modulus, lateral = bulk * (1 - poissons_ratio), bulk * poissons_ratio
     friction, drag = math.tan(friction_angle), 2 * damping * math.sqrt(spring * density)
     viscous = 2 * damping * math.sqrt(density / (12 * modulus))

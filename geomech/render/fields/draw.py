@@ -77,6 +77,8 @@ def usual_field(run: Run) -> str | None:
         return "displacement"
     frames = Frames(run)
     last = frames.grid("blocks", frames.span()[1])
+    if last is None:
+        return "displacement"
     extent = float(np.ptp(drawn(last, 0.0), axis=0).max())
     return "displacement" if np.abs(np.asarray(last["displacement"])).max() > MOVES * extent else None
 

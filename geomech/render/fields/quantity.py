@@ -99,7 +99,7 @@ def quantity(run: Run, name: str, *, compression_positive: bool = False) -> Quan
     turned = -1 if compression_positive else 1
     if name in STRESSES:
         array, column, label = STRESSES[name]
-        series = tuple(each for each in ("interior", "blocks") if each in written)
+        series: tuple[str, ...] = tuple(each for each in ("interior", "blocks") if each in written)
         return Quantity(name, series, array, column, label, "Pa", turned)
     if name in NAMED:
         wanted, array, column, label = NAMED[name]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -54,7 +54,7 @@ def agreeing(run: Run, cycles: Sequence[int]) -> list[int]:
     return [c for c in cycles if c == 0 or c in files or _around(run, files, c) is not None]
 
 
-def _around(run: Run, files: dict[int, object], cycle: int) -> tuple[int, int] | None:
+def _around(run: Run, files: Mapping[int, object], cycle: int) -> tuple[int, int] | None:
     """The written interiors before and after ``cycle`` if no crack grew between them."""
     before, after = [n for n in files if n <= cycle], [n for n in files if n >= cycle]
     if not before or not after:

@@ -22,9 +22,14 @@ _ARROW = 0.12
 class Moving(Protocol):
     """A block that moves at failure."""
 
-    name: str
-    kind: str
-    displacement: tuple[float, float]
+    @property
+    def name(self) -> str: ...
+
+    @property
+    def kind(self) -> str: ...
+
+    @property
+    def displacement(self) -> tuple[float, float]: ...
 
 
 def draw_mechanism(
@@ -57,7 +62,7 @@ def draw_mechanism(
         if any(each.kind == kind for each in moving):
             keys.append(Patch(facecolor=colour, edgecolor=INK, lw=0.5, label=kind))
     if len(sliding):
-        axes.add_collection(LineCollection(sliding, colors=SLIDING, linewidths=2.4, capstyle="round"))
+        axes.add_collection(LineCollection(list(sliding), colors=SLIDING, linewidths=2.4, capstyle="round"))
         keys.append(Line2D([], [], color=SLIDING, lw=2.4, label="joint strength fully mobilised"))
     for bolt in problem.loads.bolts:
         ends = np.array([bolt.start, bolt.end])

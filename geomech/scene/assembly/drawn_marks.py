@@ -93,8 +93,8 @@ class _Matching:
                 names = [name for name in self._of("bolt") if fnmatch.fnmatchcase(name, pattern)]
                 if not names:
                     self._missing(
-                        path, f"no drawn line has the name {pattern!r}", "bolt", pattern,
-                        'the drawing has no bolts, i.e. lines called "bolt:NAME"',
+                        path, f"no drawn line is called {pattern!r}", "bolt", pattern,
+                        'the drawing has no bolts: lines called "bolt:NAME"',
                     )  # fmt: skip
                 for name in names:
                     first = self.claimed.setdefault(name, k)

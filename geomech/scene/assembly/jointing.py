@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -17,6 +16,7 @@ from ...shapes.curves import Chords, ended_on
 from ...shapes.joint_networks.joint_sets import (
     FisherAngle,
     Law,
+    Poles,
     apparent_dip,
     discs,
     parallel_set,
@@ -202,7 +202,7 @@ def _set(shape: JointSetShape, geometry: Geometry, box: np.ndarray, rng: np.rand
         return poisson_lines(name, region, turn, shape.p21_per_m, rng)
     if shape.kind == "voronoi":
         return voronoi(name, region, shape.cell_area_m2, rng)
-    return discs(name, region, rng=rng, **_in_space(shape, geometry, length))
+    return discs(name, region, _poles(shape, geometry), length, shape.p32_per_m, rng)
 
 
 def asked(shape: JointSetShape, geometry: Geometry) -> dict[str, float]:
@@ -218,7 +218,7 @@ def asked(shape: JointSetShape, geometry: Geometry) -> dict[str, float]:
         return expected.of_poisson_lines(turn, shape.p21_per_m)
     if shape.kind == "voronoi":
         return expected.of_voronoi(shape.cell_area_m2)
-    return expected.of_discs(**_in_space(shape, geometry, length))
+    return expected.of_discs(_poles(shape, geometry), length, shape.p32_per_m)
 
 
 def _laws(
@@ -240,15 +240,13 @@ def _laws(
     return turn, spacing, length, gap
 
 
-def _in_space(shape: JointSetShape, geometry: Geometry, length: Law) -> dict[str, Any]:
-    return {
-        "dip": math.radians(shape.dip_deg),
-        "dip_direction": math.radians(shape.dip_direction_deg),
-        "fisher": shape.fisher,
-        "diameter": length,
-        "per_volume_area": shape.p32_per_m,
-        "section": math.radians(geometry.section_azimuth_deg),
-    }
+def _poles(shape: JointSetShape, geometry: Geometry) -> Poles:
+    return Poles(
+        math.radians(shape.dip_deg),
+        math.radians(shape.dip_direction_deg),
+        shape.fisher,
+        math.radians(geometry.section_azimuth_deg),
+    )
 
 
 def _names(blocks: Blocks, block: int) -> tuple[tuple[str, ...], ...]:

@@ -153,7 +153,7 @@ def _free_back(c: Check) -> None:
     x += c.drawn.origin[0]
     c.warn(
         ("geometry",),
-        f"nothing supports the back of the slope:  {counted(count, 'block')} that may move {'is' if count == 1 else 'are'} free "
+        f"nothing supports the back of the slope: {counted(count, 'block')} that may move {'is' if count == 1 else 'are'} free "
         f"at x = {x:.6g} m over {height:.3g} m, and leave the rock there",
         'draw fixed rock behind it ([zones.NAME] fixed = true), or call those edges "guided:y" or "fixed"',
     )

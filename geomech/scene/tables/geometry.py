@@ -149,7 +149,7 @@ class TraceFile(Table):
     )
     layers: dict[str, str] = Field(
         {},
-        description="kinds of its layers (or sets; with wildcards):  "
+        description="kinds of its layers (or sets; with wildcards): "
         '{ "J1*" = "joint:bedding", "Rock" = "zone:rock" }, also "crack:", "hole", "edge:", "load:", '
         '"fixed", "bolt:", "water", "monitor:"; "" uses the layer\'s name; layers that match no entry are '
         "left out (unset: all are read)",

@@ -64,7 +64,7 @@ class ZoneTable(Table):
         "more (unset: a block is one cell)",
     )
     cells: Literal["triangles", "quads"] = Field(
-        "triangles", description='shape of the cells of `mesh_size_m`:  "triangles" or "quads"'
+        "triangles", description='shape of the cells of `mesh_size_m`: "triangles" or "quads"'
     )
     cell_joint: str | None = Field(
         None,

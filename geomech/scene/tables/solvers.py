@@ -39,7 +39,7 @@ class DdaTable(Table):
     )
     equilibrium: Literal["", "start", "loads"] = Field(
         "",
-        description='when static equilibrium is computed, independent of the time step:  "" never, "start" before the run begins, '
+        description='when static equilibrium is computed, independent of the time step: "" never, "start" before the run begins, '
         '"loads" at every load of a static run too; a run ends if there is none, or only one after blocks have moved by '
         "more than a two-thousandth of their size in addition to elastic displacements",
     )
@@ -179,7 +179,7 @@ class GrowthTable(Table):
     correct: bool = Field(True, description="predictor-corrector growth steps: paths of second order")
     initiation: Literal["", "surface", "everywhere"] = Field(
         "",
-        description='where cracks initiate when intact rock reaches its strength:  "" nowhere, "surface" on outlines, '
+        description='where cracks initiate when intact rock reaches its strength: "" nowhere, "surface" on outlines, '
         'holes and crack faces, "everywhere" inside blocks too',
     )
     initiation_distance_m: NotNegative = Field(

@@ -11,6 +11,7 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 
@@ -43,6 +44,16 @@ class Cutting:
     partings: tuple[Parting, ...] = ()
 
 
+class _Rules(NamedTuple):
+    """Arguments of `cut` that decide which edges are left out."""
+
+    tolerance: float
+    dead_ends: str
+    shortest_crack: float
+    smallest_area: float
+    lasting: int
+
+
 def cut(
     zones: Sequence[Zone],
     joints: Sequence[Joint],
@@ -73,6 +84,7 @@ def cut(
     # Crossings have two digits more than the drawing: corners of blocks stay on the lines of their neighbours.
     decimals += 2
     mends: list[Mend] = []
+    rules = _Rules(tolerance, dead_ends, shortest_crack, smallest_area, lasting)
     grid = 10.0**-decimals
     graph = noded(drawn, tolerance, decimals, mends)
     reach = None
@@ -81,9 +93,7 @@ def cut(
         zone = _zones_of(arrangement, graph.source >= drawn.n_outlines, zones, origin)
         if reach is None:
             reach = trace_lengths(graph, drawn, ~_outside(arrangement, zone))
-        keep, stay = _kept(
-            arrangement, graph, drawn, zone, tolerance, dead_ends, shortest_crack, smallest_area, lasting, mends
-        )
+        keep, stay = _kept(arrangement, graph, drawn, zone, rules, mends)
         # Faces do not change, except those between which an edge is removed.
         bounds = (arrangement.left != arrangement.right) & ~_outside(arrangement, zone)
         if keep[bounds].all():
@@ -184,7 +194,7 @@ def _outside(arrangement: Arrangement, zone: np.ndarray) -> np.ndarray:
 
 
 def _kept(
-    arrangement: Arrangement, graph: Graph, drawn: Drawn, zone, tolerance, dead_ends, shortest, smallest, lasting, mends
+    arrangement: Arrangement, graph: Graph, drawn: Drawn, zone: np.ndarray, rules: _Rules, mends: list[Mend]
 ) -> tuple[np.ndarray, list[Mend]]:
     """(n_edges,) False for edges to be left out; and the small blocks that are kept.
 
@@ -195,15 +205,17 @@ def _kept(
     keep = ~(joint & _outside(arrangement, zone))
     dead = arrangement.dead & keep & joint
     if dead.any():
-        shortest, reported = (np.inf, []) if dead_ends == "trim" else (max(shortest, tolerance), mends)
+        shortest, reported = np.inf, []
+        if rules.dead_ends != "trim":
+            shortest, reported = max(rules.shortest_crack, rules.tolerance), mends
         keep[_short_dead_ends(arrangement, dead, shortest, reported)] = False
     area, rim = arrangement.areas_and_rims()
-    thin = 2 * area < tolerance * rim
-    small = np.flatnonzero((zone >= 0) & ((area < smallest) | thin))
+    thin = 2 * area < rules.tolerance * rim
+    small = np.flatnonzero((zone >= 0) & ((area < rules.smallest_area) | thin))
     if not len(small):
         return keep, []
     return keep, _join_small(
-        arrangement, graph, zone, keep, drawn.rank[graph.source], small, np.where(thin[small], 0, lasting), mends
+        arrangement, graph, zone, keep, drawn.rank[graph.source], small, np.where(thin[small], 0, rules.lasting), mends
     )
 
 

@@ -12,7 +12,7 @@ import math
 
 import numpy as np
 
-from .joint_sets import FisherAngle, Law, fisher_rule, mean_pole, poles_about
+from .joint_sets import FisherAngle, Law, Poles, fisher_rule, mean_pole, poles_about
 
 
 def of_parallel(angle: Law | FisherAngle, spacing: Law, length: Law | None, gap: Law | None) -> dict[str, float]:
@@ -61,13 +61,11 @@ def of_voronoi(cell_area: float) -> dict[str, float]:
     return {"p21_per_m": p21, "p10_per_m": 2 / math.pi * p21, "spacing_m": 0.5 * math.pi / p21}
 
 
-def of_discs(
-    *, dip: float, dip_direction: float, fisher: float, diameter: Law, per_volume_area: float, section: float
-) -> dict[str, float]:
+def of_discs(poles: Poles, diameter: Law, per_volume_area: float) -> dict[str, float]:
     """Discs cut by the section: P21 = P32 E[sin θ] with θ between pole and the section's normal, traces of mean π/4
     E[D²]/E[D] and mean square 2/3 E[D³]/E[D] (Warburton 1980)."""
-    mean = mean_pole(dip, dip_direction, section)
-    pole = poles_about(mean, fisher, *fisher_rule())
+    mean = mean_pole(poles.dip, poles.dip_direction, poles.section)
+    pole = poles_about(mean, poles.fisher, *fisher_rule())
     flat = np.hypot(pole[:, 0], pole[:, 1])
     p21 = per_volume_area * float(flat.mean())
     first, second, third = diameter.moments

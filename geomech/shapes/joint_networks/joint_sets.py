@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -274,24 +275,25 @@ def poisson_traces(
     return Joint(name, tuple(_touching(_centred(centre, angle.sample(rng, n), length.lengths(rng, n)), region)))
 
 
-def discs(
-    name: str,
-    region: np.ndarray,
-    *,
-    dip: float,
-    dip_direction: float,
-    fisher: float,
-    diameter: Law,
-    per_volume_area: float,
-    section: float,
-    rng: np.random.Generator,
-) -> Joint:
-    """Randomly located discs in space, cut by the vertical section with its x axis at azimuth ``section`` (Baecher,
-    Lanney & Einstein 1977).
+class Poles(NamedTuple):
+    """Orientation of planes in space, and the section that cuts them.
 
-    ``per_volume_area`` (P32, m²/m³) of joint; poles have Fisher's distribution about the mean with constant ``fisher``
-    (0: no scatter). Angles in rad, azimuths clockwise from north.
+    Poles have Fisher's distribution with constant ``fisher`` (0: no scatter) about the pole of the mean ``dip`` and
+    ``dip_direction``; the vertical ``section`` has its x axis at this azimuth. Angles in rad, azimuths clockwise from
+    north.
     """
+
+    dip: float
+    dip_direction: float
+    fisher: float
+    section: float
+
+
+def discs(
+    name: str, region: np.ndarray, poles: Poles, diameter: Law, per_volume_area: float, rng: np.random.Generator
+) -> Joint:
+    """Randomly located discs in space, ``per_volume_area`` (P32, m²/m³) of them, cut by the section of ``poles``
+    (Baecher, Lanney & Einstein 1977)."""
     middle, radius = _circle(region)
     largest = diameter.mean + 5 * diameter.deviation + (8 * diameter.mean if diameter.law == "exponential" else 0.0)
     reach = radius + 0.5 * largest
@@ -299,9 +301,9 @@ def discs(
     n = rng.poisson(per_volume_area / mean_area * (2 * reach) ** 2 * largest)
     radii = 0.5 * diameter.lengths(rng, n)
     centre = np.column_stack([rng.uniform(-reach, reach, (n, 2)), rng.uniform(-0.5 * largest, 0.5 * largest, n)])
-    pole = mean_pole(dip, dip_direction, section)
-    if fisher > 0:
-        pole = poles_about(pole, fisher, rng.random(n), rng.uniform(0, 2 * math.pi, n))
+    pole = mean_pole(poles.dip, poles.dip_direction, poles.section)
+    if poles.fisher > 0:
+        pole = poles_about(pole, poles.fisher, rng.random(n), rng.uniform(0, 2 * math.pi, n))
     else:
         pole = np.tile(pole, (n, 1))
     # The section is z = 0: a disc is cut along the line in its plane, as far as its rim extends.

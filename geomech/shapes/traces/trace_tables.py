@@ -199,7 +199,8 @@ def _read_geojson(path: Path, set_property: str) -> FieldFile:
 def _of_geometry(
     shape: dict[str, Any], layer: str, label: str, place: str, lines: list[FieldLine], left: dict[str, int]
 ) -> None:
-    kind, given = shape.get("type") or "", shape.get("coordinates")
+    kind: str = shape.get("type") or ""
+    given: Any = shape.get("coordinates")
     if kind == "GeometryCollection":
         for part in shape["geometries"]:
             _of_geometry(part, layer, label, place, lines, left)

@@ -106,6 +106,11 @@ def test_waves_come_from_where_the_block_is_loaded():
     waves = WaveTime(given)
     assert waves.drive(tips, given.blocks, dt * 1.001)[0] == 1e5
     assert waves.drive(tips, given.blocks, dt, {0: base})[0] == pytest.approx(1e5 / 5, rel=1e-9)
+    # Round-off of the balanced loads on the near side is no load.
+    side = np.array([[[0.5, 0.0], [0.5, 1.0]]])
+    both = np.concatenate([base.segments, side]), np.concatenate([base.tractions, np.full((1, 2, 2), 1e-16)])
+    rounded = replace(base, segments=both[0], tractions=both[1])
+    assert waves.drive(tips, given.blocks, dt, {0: rounded})[0] == pytest.approx(1e5 / 5, rel=1e-9)
 
 
 def test_slow_shaking_is_its_quasi_static_limit():

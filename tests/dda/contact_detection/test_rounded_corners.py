@@ -148,7 +148,9 @@ def slid(step, dt, way=1, slab=SLAB, corner=90.0, end=0.4, speed=0.0, **settings
 
 @pytest.mark.parametrize("way", [1, -1])
 @pytest.mark.parametrize("step", [0.0, 1e-6, 1e-5, 1e-4])
-@pytest.mark.parametrize("dt", [8e-3, 4e-3, 2e-3, 1e-3])
+@pytest.mark.parametrize(
+    "dt", [8e-3, pytest.param(4e-3, marks=pytest.mark.slow), 2e-3, pytest.param(1e-3, marks=pytest.mark.slow)]
+)
 def test_a_slab_slides_over_steps_that_are_none(step, way, dt):
     """x'' = g (sin β − tan φ cos β) over a joint whose far side stands higher by less than a fiftieth of the rounding
     length, 9.5 mm: to what springs give under the weight, 1e-7 of the way, and 4e-6 of the speed at the longest step (it
@@ -197,7 +199,7 @@ def climbed(dt: float, depth: float, speed: float, rounding: float = 0.05):
     return np.array(on_arc), energy / of_weight, state.vertices[5, 1], budget
 
 
-@pytest.mark.parametrize("depth, speed", [(0.01, 0.6), (0.01, 0.5)])
+@pytest.mark.parametrize("depth, speed", [(0.01, 0.6), pytest.param(0.01, 0.5, marks=pytest.mark.slow)])
 def test_a_ramp_is_climbed_at_the_cost_of_its_height(depth, speed):
     """½ v² + g h stays: slow enough not to leave the arc (v² < g R), the square loses what the normal's turning in a step
     takes, v²/2 times the sum of its squares, of first order in dt, and gains nothing. The crest ends by a step of a

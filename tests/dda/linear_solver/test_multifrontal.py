@@ -8,6 +8,7 @@ from scipy.sparse import bsr_array
 from scipy.sparse.linalg import splu
 from scipy.spatial import Delaunay
 
+from geomech.compiled import kept
 from geomech.dda.linear_solver import (
     block_solver,
     front_elimination,
@@ -182,6 +183,11 @@ def test_rough_solutions_have_the_residual_asked_for_and_leave_the_exact_ones_al
 def test_products_of_parts_of_fronts_are_those_of_numpy(dtype):
     rng = np.random.default_rng(3)
     front = rng.normal(size=(720, 700)).astype(dtype)
+
+    @kept(error_model="numpy", nogil=True)
+    def add_product(a, at_a, row_a, b, at_b, row_b, c, at_c, row_c, rows, k, n, keep, width, units):  # noqa: PLR0913
+        front_elimination._add_product(a, at_a, row_a, b, at_b, row_b, c, at_c, row_c, rows, k, n, keep, width, units)
+
     units, width = np.array([1, 0], dtype), simd.BYTES // front.itemsize
     # Of whole registers and not, one and more; the last one is for BLAS.
     for rows, k, n in ((6, 1, 1), (12, 7, 16), (6, 12, 18), (18, 12, 33), (12, 30, 64), (30, 5, 70), (660, 30, 660)):
@@ -192,7 +198,7 @@ def test_products_of_parts_of_fronts_are_those_of_numpy(dtype):
             expected = c.astype(float)
             expected[60 : 60 + rows, 40 : 40 + n] = product + (front[60 : 60 + rows, 40 : 40 + n] if keep else 0.0)
             given = front.ravel(), 24 * 700, 700, front.ravel(), 35, 700, c.reshape(-1), 60 * 700 + 40, 700
-            front_elimination._add_product(*given, rows, k, n, keep, width, units)
+            add_product(*given, rows, k, n, keep, width, units)
             # What lies beside them is as it was.
             assert np.allclose(c, expected, rtol=0.0, atol=100 * np.finfo(dtype).eps, equal_nan=True)
 

@@ -117,7 +117,7 @@ def test_a_drawn_crack_stands_beside_dead_ends(tmp_path):
         (("p20_per_m2 = 0.1", "p21_per_m = 0.1"), "needs `p20_per_m2`"),
         (
             ('ends_on = ["beds"]', 'ends_on = ["bed"]'),
-            r"geometry.joint_sets\[1\].*no joints 'bed' before this set.*'fault', 'beds'",
+            r"geometry.joint_sets\[1\].*no joints 'bed' are defined before this set.*'fault', 'beds'",
         ),
         (("points = [[5, 0], [5, 10]]", "points = [[5, 0], [5, 0]]"), r"geometry.joints\[0\].*without length"),
         (("angle_deg = 10", "dip_deg = 10"), "both `dip_deg` and `dip_direction_deg`"),

@@ -11,6 +11,7 @@ from geomech.shapes import Joint, Zone, cut
 from geomech.shapes.joint_networks.fracture_statistics import block_sizes, set_statistics
 from geomech.shapes.joint_networks.joint_sets import (
     Law,
+    Poles,
     apparent_dip,
     discs,
     parallel_set,
@@ -73,15 +74,15 @@ def test_poisson_lines_of_all_directions():
 
 def test_discs_cut_by_the_section():
     """P21 = P32 E[sin θ], θ between the poles and the section's normal: 1 for poles in the section, cos 60° here."""
-    asked = {"dip": math.radians(90), "fisher": 0.0, "diameter": Law(5.0, 1.0, "lognormal"), "per_volume_area": 0.4}
+    diameter, p32 = Law(5.0, 1.0, "lognormal"), 0.4
     for direction, factor in ((0.0, 1.0), (math.radians(60), 0.5)):
-        joint = discs("joint:a", REGION, dip_direction=direction, section=0.0, rng=np.random.default_rng(5), **asked)
+        poles = Poles(math.radians(90), direction, 0.0, 0.0)
+        joint = discs("joint:a", REGION, poles, diameter, p32, np.random.default_rng(5))
         found = set_statistics(joint, REGION)
         assert found.p21 == pytest.approx(0.4 * factor, rel=4 * 1.1 / math.sqrt(found.traces))
         assert abs(found.mean_angle) == pytest.approx(math.pi / 2, abs=1e-9)
-    spread = discs(
-        "joint:a", REGION, dip_direction=0.0, section=0.0, rng=np.random.default_rng(5), **{**asked, "fisher": 100}
-    )
+    poles = Poles(math.radians(90), 0.0, 100, 0.0)
+    spread = discs("joint:a", REGION, poles, diameter, p32, np.random.default_rng(5))
     # Fisher's constant K spreads poles by 81°/√K (Priest 1993, 3.6): in the section by 1/√K rad.
     assert set_statistics(spread, REGION).angle_deviation == pytest.approx(0.1, rel=0.15)
 

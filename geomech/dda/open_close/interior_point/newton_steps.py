@@ -61,7 +61,9 @@ def _work(
                 parts[q] = undecided(first, last, normal, width, slip, shear, kn, ks, mu, base, rough, _CLEAR)
             else:
                 if task == _PREDICT:
-                    better[first:last] = 0.0
+                    for c in range(first, last):
+                        for k in range(better.shape[1]):
+                            better[c, k] = 0.0
                 elif task == _CORRECT:
                     second_order(first, last, epsilon, unit, changed, better)
                 else:
