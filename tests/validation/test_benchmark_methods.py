@@ -89,6 +89,7 @@ def test_growth_by_increments_gives_what_fresh_bodies_give():
     assert found["difference"] < 1e-12
 
 
+@pytest.mark.slow
 def test_corrected_steps_come_to_the_path_of_uncorrected_ones_much_sooner():
     """Hooking edge cracks: the reference is what steps along the tangent, a method of first order, tend to. Corrected
     ones are nearer with 10 increments than those with 40, and with 40 (where what a chord may be off by counts) by a

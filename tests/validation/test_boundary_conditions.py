@@ -111,6 +111,7 @@ def test_three_point_bending(ratio, tolerance, rolling):
     assert held.tips["k_i"][0] == pytest.approx(k, rel=rolling)
 
 
+@pytest.mark.slow
 def test_the_collocation_of_a_bent_beam_converges():
     """To the digits of its table, by an order of magnitude for twice the terms."""
     found = [bent_beam.three_point_bending(0.5, terms) for terms in (40, 80, 160)]

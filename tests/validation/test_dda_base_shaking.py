@@ -74,7 +74,7 @@ def sliding_case(name: str) -> tuple[float, float, np.ndarray, np.ndarray]:
     [
         ("sine on the level", "base", "penalty"),
         ("sine on an incline", "ground", "penalty"),
-        ("sine on the level", "ground", "augmented"),
+        pytest.param("sine on the level", "ground", "augmented", marks=pytest.mark.slow),
         pytest.param("sine on an incline", "ground", "augmented", marks=pytest.mark.slow),
         pytest.param("El Centro on the level", "ground", "penalty", marks=pytest.mark.slow),
         pytest.param("El Centro on an incline", "ground", "penalty", marks=pytest.mark.slow),

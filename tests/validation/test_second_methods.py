@@ -126,6 +126,7 @@ def test_cracks_from_a_hole_against_bowie(cracks):
     assert cracked_hole.factor(200.0, cracks, [0.0, 1.0, 0.0]) == pytest.approx(math.sqrt(whole / 200.0), rel=1e-3)
 
 
+@pytest.mark.slow
 def test_boundary_collocation_against_isida_and_tada():
     """Isida's table has five digits, 4e-5, where his series had converged (not at 0.9: 8e-4); Tada's formula is good to
     0.1 % as he says. Exponential convergence: twice the terms, ten times the digits or more."""
