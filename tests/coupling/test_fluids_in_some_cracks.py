@@ -104,7 +104,7 @@ def test_fluids_add_up_and_come_out_of_holes():
 
 def test_cracks_that_nothing_connects_are_told_and_strangers_refused(scene):
     (warning,) = [fault for fault in scene().warnings if "unconnected cracks" in fault.message]
-    assert "3 cracks" in warning.message and "'fracture', 'fault', 'notch'" in warning.message
+    assert "3 unconnected cracks" in warning.message and "'fracture', 'fault', 'notch'" in warning.message
     with pytest.raises(SceneError, match="there is no crack 'fracure'"):
         scene('cracks = ["fracure"]')
     with pytest.raises(SceneError, match='`fills` has to hold "cracks"'):

@@ -57,4 +57,4 @@ def test_what_is_given_at_cracks_is_what_is_taken(dynamic):
     for names in (BLOCKS, GIVEN, TAKEN):
         for name, told in names.items():
             assert (f">{told}<" in text) == bool(energy.get(name)), name
-    assert float(re.search(r"together, ([\d.e+-]+) is", text).group(1)) < 0.01
+    assert float(re.search(r"blocks and cracks, ([\d.e+-]+) is", text).group(1)) < 0.01

@@ -172,7 +172,7 @@ def test_page_of_a_benchmark(tmp_path, capsys):
     assert page.count(DOT) == 2 and Read(page).table("error")
     (folder / "points.json").write_text("{")
     assert main(["report", str(folder)]) != DONE
-    assert "points.json is no JSON" in capsys.readouterr().err
+    assert "points.json is not" in capsys.readouterr().err
 
 
 def test_no_page_where_none_is_asked(runs, capsys):

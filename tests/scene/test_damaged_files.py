@@ -137,7 +137,7 @@ def test_a_name_that_is_no_utf8_is_refused_with_its_line(tmp_path):
 )  # fmt: skip
 def test_a_scene_nested_too_deep_is_refused_with_its_line(tmp_path, text):
     (tmp_path / "scene.toml").write_text("# a scene\n" + text + "\n")
-    with pytest.raises(SceneError, match=r"scene\.toml:2\n    tables and arrays stand in one another"):
+    with pytest.raises(SceneError, match=r"scene\.toml:2\n    tables and arrays are nested deeper than"):
         load_scene(tmp_path / "scene.toml")
 
 
@@ -199,7 +199,7 @@ def test_a_plain_script_is_read_in_this_process(tmp_path, monkeypatch):
 def test_an_integer_that_python_does_not_read_is_refused_with_its_line(tmp_path):
     path = tmp_path / "scene.toml"
     path.write_text("[run]\nend_time_s = " + "9" * 5000 + "\n")
-    with pytest.raises(SceneError, match=r"scene\.toml:2\n    no number"):
+    with pytest.raises(SceneError, match=r"scene\.toml:2\n    not a number"):
         load_scene(path)
 
 

@@ -128,7 +128,7 @@ def test_edge_lines_that_name_nothing_or_clash():
     (flaw,) = flaws(zone, edges=[EdgeLine("top", (0.0, 1.1), (1.0, 1.1))])
     assert "no block edge lies on the line" in flaw.message
     (flaw,) = flaws(zone, edges=[EdgeLine("top", (0.0, 1.0), (1.0, 1.0)), EdgeLine("load", (0.2, 1.0), (0.4, 1.0))])
-    assert flaw.index == 1 and "called 'top' already" in flaw.message
+    assert flaw.index == 1 and "already called 'top'" in flaw.message
     (flaw,) = flaws(zone, edges=[EdgeLine("top", (0.0, 1.0), (1.0, 1.0), "stone")])
     assert "no zone 'stone'" in flaw.message
 

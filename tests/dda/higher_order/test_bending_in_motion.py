@@ -111,7 +111,7 @@ def test_a_state_goes_on_where_it_was():
 
 def test_what_is_not_supported_is_refused_by_name():
     polygons = [rectangle(-1, -1, 3, 0), rectangle(0, 0, 2, 1)]
-    with pytest.raises(ValueError, match="order 3: it moves by Newmark"):
+    with pytest.raises(ValueError, match="order 3: it supports Newmark"):
         system_of(polygons, [1, 0], [1, 3], dynamic_factor=1.0, spectral_radius=0.8)
     with pytest.raises(ValueError, match="restitution"):
         system_of(polygons, [1, 0], [1, 3], joint=JointLaw("bouncy", 0.5, restitution=0.5))

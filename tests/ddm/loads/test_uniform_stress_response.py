@@ -41,7 +41,7 @@ def test_a_scaled_solution_is_the_solution(aperture):
             body.compliance(exact)  # as the coupling asks for it, whenever states are new
             warm = exact if known is None else known
     assert was_scaled == 36 if aperture == np.inf else 6 < was_scaled < 36
-    assert len(body.even) <= KEPT and body.work.solutions_scaled == was_scaled
+    assert len(body.uniform_responses) <= KEPT and body.work.solutions_scaled == was_scaled
 
 
 def test_faces_with_memory_and_holes_are_solved_for():
