@@ -12,7 +12,6 @@ import numpy as np
 import pytest
 import shapely
 
-from geomech.coupling.crack_cost import crack_cost
 from geomech.output.tables.joint_statistics import joint_statistics
 from geomech.scene import load_scene
 from geomech.shapes import Joint, Zone, cut
@@ -76,15 +75,6 @@ def test_statistics_are_those_that_fractopo_publishes(tmp_path, name):
     lines = 0.5 * (published["i_nodes"] + published["y_nodes"])
     assert entry["p20_per_m2"] == pytest.approx(lines / published["area_m2"], rel=0.005)
     assert entry["mean_length_m"] == pytest.approx(entry["p21_per_m"] * published["area_m2"] / lines, rel=0.005)
-
-
-def test_elements_follow_a_map_not_its_vertices(tmp_path):
-    """KB7, five cracked blocks of 321 digitised sides: 15 230 and 7 870 unknowns; 22 200 and 10 780 where elements follow
-    vertices."""
-    _, scene = loaded("kb7", tmp_path)
-    cost = crack_cost(scene.problem())
-    assert cost.sides.sum() == 321
-    assert cost.on_sides.sum() < 16_000 and cost.on_cracks.sum() < 8_300
 
 
 def test_the_rock_of_many_blocks_has_no_seams():

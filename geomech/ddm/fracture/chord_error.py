@@ -15,7 +15,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ...model import Cracks
-from ..mesh.grading import sagittas
 from .tip_factors import factors
 
 if TYPE_CHECKING:
@@ -24,6 +23,10 @@ if TYPE_CHECKING:
 
 _log = logging.getLogger(__name__)
 
+#: Bends between these (rad) may be a curve's: a circle of twelve sides turns by 30° at each.
+LEAST_BEND, MOST_BEND = np.radians(0.1), np.radians(31.0)
+#: Neighbouring chords of a curve, and its neighbouring bends, differ by less than this factor.
+LIKE = 2.0
 #: A mouth this near to a chord's middle (as part of the chord) is where the arc is halved.
 NEAR_MIDDLE = 0.2
 
@@ -52,6 +55,21 @@ def with_halved_chords(body: CrackedBody) -> tuple[list[np.ndarray], Cracks, lis
     loops, cracks = followed(body.loops, body.cracks)
     supports = [replace(one, on=tuple(map(tuple, at))) for one, at in zip(body.supports, _supported(body))]
     return loops, cracks, supports
+
+
+def sagittas(loop: np.ndarray) -> np.ndarray:
+    """(n,) m, how far the curve that ``loop`` (n, 2) may stand for lies off each of its edges, positive to the right;
+    0 of straight ones."""
+    along = np.roll(loop, -1, axis=0) - loop
+    before = np.roll(along, 1, axis=0)
+    length = np.hypot(*along.T)
+    bend = np.arctan2(before[:, 0] * along[:, 1] - before[:, 1] * along[:, 0], np.sum(before * along, axis=1))
+    ahead = np.roll(bend, -1)
+    small, large = np.minimum(abs(bend), abs(ahead)), np.maximum(abs(bend), abs(ahead))
+    curved = (bend * ahead > 0) & (small > LEAST_BEND) & (large < MOST_BEND) & (large < LIKE * small)
+    for other in (np.roll(length, 1), np.roll(length, -1)):
+        curved &= (length < LIKE * other) & (other < LIKE * length)
+    return np.where(curved, np.sign(bend) * 0.5 * length * np.tan((abs(bend) + abs(ahead)) / 8), 0.0)
 
 
 def followed(loops: list[np.ndarray], cracks: Cracks) -> tuple[list[np.ndarray], Cracks]:

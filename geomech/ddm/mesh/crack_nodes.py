@@ -1,5 +1,5 @@
 """Topology of a crack network: the segment ends at each node, nodes where a crack runs straight on, shared end
-points, pieces of one digitised line."""
+points."""
 
 from __future__ import annotations
 
@@ -10,13 +10,6 @@ import numpy as np
 from ...compiled import kept
 from ...model import Cracks
 from ..kernels import shape_functions
-
-#: Pieces of one loop or crack with no more between them than so many times the length that elements are wanted to have …
-REACH = 2.0
-#: … and headings within this are one behind the other, not beside each other, …
-ONWARD = math.radians(60)
-#: … and within this (a slight kink) in line, rad.
-IN_LINE = math.radians(20)
 
 _jit = kept(error_model="numpy", nogil=True)
 
@@ -93,12 +86,7 @@ def cut(nodes, segments, tip, pieces, fractions):
 
 
 def share_ends(pieces: np.ndarray) -> np.ndarray:
-    """(m, m) bool: which of ``pieces`` (m, 2, 2) follow each other on one ``line`` (m,), a loop or a crack, and turn so
-    little between them that there is no rock between them; None if no piece is short compared with the elements
-    ``wanted`` (m,), m. ``wanted`` is 0 of growth increments and curved walls, which were not digitised.
-
-    Extends ``touching`` (m, m) by pieces of the line up to `ONWARD`, and by pieces that touch one in line with them.
-    """
+    """(m, m) bool: which of ``pieces`` (m, 2, 2) have an end point in common, bit for bit; the diagonal is True."""
     flat = np.ascontiguousarray(pieces).reshape(-1, 2)
     return _share_ends(flat, np.argsort(flat[:, 0]))
 
@@ -116,58 +104,3 @@ def _share_ends(points, order):
             if points[j, 1] == points[i, 1]:
                 out[i // 2, j // 2] = out[j // 2, i // 2] = True
     return out
-
-
-def in_line(touching: np.ndarray, pieces: np.ndarray, wanted: np.ndarray, line: np.ndarray) -> np.ndarray | None:
-    """(m, m) bool: which of ``pieces`` (m, 2, 2) that follow each other on one ``line`` (m,), a loop or a crack, go on so
-    nearly straight that what is between them is no rock; None where elements, ``wanted`` (m,) m long, are shorter than
-    all of it. 0 is wanted of increments of growth, and of curved walls, which are compared as before.
-
-    Adds to ``touching`` (m, m) those that are one behind the other, and what meets a piece that another is in line with.
-    """
-    short = np.hypot(*(pieces[:, 1] - pieces[:, 0]).T) < REACH * wanted
-    if not short.any():
-        return None
-    out, onward = _in_line(np.ascontiguousarray(pieces), wanted, line, _next(np.ascontiguousarray(pieces), line))
-    touching |= onward
-    lines = out.astype(np.float32)
-    touching |= lines @ touching.astype(np.float32) @ lines > 0.5
-    return out
-
-
-@_jit
-def _next(pieces, line):
-    """(m,) the piece of the same ``line`` that begins where each ends; −1 where none does."""
-    out = np.full(len(pieces), -1)
-    for i in range(len(pieces)):
-        # The next in the list; of a loop the last's is the first.
-        for j in (i + 1, np.searchsorted(line[: i + 1], line[i])):
-            here = 0 <= j < len(pieces) and j != i and line[j] == line[i]
-            if here and pieces[j, 0, 0] == pieces[i, 1, 0] and pieces[j, 0, 1] == pieces[i, 1, 1]:
-                out[i] = j
-                break
-    return out
-
-
-@_jit
-def _in_line(pieces, wanted, line, after):
-    """Which pieces are in line, and which one behind the other, both (m, m)."""
-    n = len(pieces)
-    out, onward = np.zeros((n, n), np.bool_), np.zeros((n, n), np.bool_)
-    for a in range(n):
-        out[a, a] = True
-        way, turned, least, most, last, b = 0.0, 0.0, 0.0, 0.0, a, after[a]
-        while b >= 0 and b != a and wanted[b] > 0:
-            px, py = pieces[last, 1, 0] - pieces[last, 0, 0], pieces[last, 1, 1] - pieces[last, 0, 1]
-            qx, qy = pieces[b, 1, 0] - pieces[b, 0, 0], pieces[b, 1, 1] - pieces[b, 0, 1]
-            if last != a:
-                way += math.hypot(px, py)
-            turned += math.atan2(px * qy - py * qx, px * qx + py * qy)
-            least, most = min(least, turned), max(most, turned)
-            if way > REACH * wanted[a] or most - least > ONWARD:
-                break
-            onward[a, b] = onward[b, a] = True
-            if most - least < IN_LINE:
-                out[a, b] = out[b, a] = True
-            last, b = b, after[b]
-    return out, onward

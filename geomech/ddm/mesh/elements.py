@@ -6,11 +6,6 @@ junctions and mouths: element sizes shrink geometrically towards them. Finally, 
 distance to others are halved. A slight kink is no longer graded once the tip is three increments past it, where it does
 not affect the stress intensity factors. A sharp kink stays graded: where a wing leaves a flaw, the wedge of rock at the
 corner drives the wing at any length (without grading, K_I was 13 % low at a wing of 1.2 flaw lengths).
-
-Edges and segments shorter than the elements of a straight line are digitised: they sample a curve. Elements then follow
-the curve, not its vertices: slight bends of such cracks are not graded (`grading.CURVED`), corners of such outlines as far
-as K at the nearest crack needs it, and pieces that follow each other do not limit each other's length
-(`crack_nodes.in_line`).
 """
 
 from __future__ import annotations
@@ -24,8 +19,8 @@ import numpy as np
 from ...model import Cracks, DdmSettings
 from ...model.blocks.polygon import signed_area
 from ..system.influence_matrix import ElementSet
-from .crack_nodes import cut, ends_at, in_line, share_ends, straight_on
-from .grading import CURVED, KINK, NEAR_CORNER, Grading, sagittas
+from .crack_nodes import cut, ends_at, share_ends, straight_on
+from .grading import KINK, NEAR_CORNER, Grading
 from .half_plane import ON_SURFACE, HalfPlane
 from .proximity import Pieces, keep_apart
 
@@ -37,9 +32,6 @@ LEFT_BEHIND = 3
 STRAIGHT = math.radians(0.1)
 #: … their elements get one length when the ratio of the lengths is below this.
 ALIKE = 1.2
-#: Chords of a curved wall (`grading.sagittas`) longer than this part of an element do limit each other's length, and take
-#: two elements each: initiation needs the stress on the wall (with one each, 0.6 % of error for 0.5 % at a circle of 64).
-SMOOTH = 1 / 6
 #: A mouth nearer to an element's end than this part of its length moves that end; no shorter element is made.
 SLIVER = 0.08
 
@@ -92,27 +84,24 @@ def mesh(
         (cracks.nodes[k], _layers_at(cracks, k, sides_of_rock, grading))
         for k in (np.flatnonzero(cracks.surface & (cracks.valence > 0)).tolist() if len(edges) else ())
     ]
-    corners = _corner_layers(loops, cracks, settings, grading)
-    key: tuple = float(extent), tuple((*point, deep) for point, deep in mouths), tuple(corners)
+    corners = _corners_near_cracks(cracks, loops, settings, grading)
+    key: tuple = float(extent), tuple((*point, deep) for point, deep in [*mouths, *corners])
     if known is not None and known.sides[0] == key:
         sides = known.sides
     else:
-        sides = key, _boundary(loops, edges, mouths, corners, settings, grading, extent, marks), _straight_on(loops)
+        sides = key, _boundary(loops, edges, mouths, settings, grading, extent, [*marks, *corners]), _straight_on(loops)
     boundary = sides[1]
     crack = _cracks(cracks, settings, grading, extent, sides_of_rock)
     start, end, kind, source = (np.concatenate(pair) for pair in zip(boundary, crack))
     source[len(boundary[0]) :] += len(edges)
     pieces = np.concatenate([edges, cracks.nodes[cracks.segments]])
     touching, n_pieces = _touching(sides[2], pieces, len(edges), cracks, extent), len(pieces)
-    line = _digitised(touching, pieces, edge_loop, loops, cracks, settings) if grading.target is None else None
     if half_plane is not None:
         (start, end, pieces), kind, source, touching = _with_images(
             half_plane, (start, end, pieces), kind, source, touching, ON_SURFACE * extent
         )
-        line = None if line is None else np.kron(np.eye(2, dtype=bool), line)
     start, end, kind, source = keep_apart(
-        start, end, kind, source, Pieces(pieces, touching, line, len(edges), n_pieces), settings.grading_ratio,
-        extent,
+        start, end, kind, source, Pieces(pieces, touching, len(edges), n_pieces), settings.grading_ratio, extent,
         # Images have no unknowns.
         (2 if half_plane is None else 1) * (settings.order + 1),
     )  # fmt: skip
@@ -161,58 +150,21 @@ def _with_images(half_plane: HalfPlane, ends, kind, source, touching, near: floa
     return ends, np.concatenate([kind, kind]), np.concatenate([source, source + n]), both
 
 
-def _digitised(touching, pieces, edge_loop, loops, cracks: Cracks, settings: DdmSettings) -> np.ndarray | None:
-    """Which ``pieces`` are in line (`in_line`, which extends ``touching``): of loops without their curved walls, and of
-    cracks as they were drawn."""
-    wanted = _wanted_of_edges(loops, settings)
-    n_edges = len(wanted)
-    curved = np.concatenate([sagittas(loop) != 0 for loop in loops]) if loops else np.zeros(0, bool)
-    long = np.hypot(*(pieces[:n_edges, 1] - pieces[:n_edges, 0]).T) > SMOOTH * wanted
-    wanted[curved & long] = 0.0
-    line = np.concatenate([edge_loop, -1 - cracks.crack])
-    return in_line(touching, pieces, np.concatenate([wanted, _wanted_of_cracks(cracks, settings)]), line)
-
-
-def _corner_layers(loops: list[np.ndarray], cracks: Cracks, settings: DdmSettings, grading: Grading) -> list[int]:
-    """Graded layers at every vertex of the ``loops``: more at re-entrant corners near which cracks run, fewer at those of
-    a digitised line far from cracks."""
-    if not loops:
+def _corners_near_cracks(cracks: Cracks, loops: list[np.ndarray], settings: DdmSettings, grading: Grading):
+    """Re-entrant corners of the outline near which cracks run: (point (2,), graded layers) of each."""
+    if grading.target is not None or not cracks.n_segments:
         return []
-    angles = np.concatenate([interior_angles(loop) for loop in loops])
-    layers = [grading.at_corner(angle) for angle in angles.tolist()]
-    if grading.target is not None:
-        return layers
-    points = np.concatenate(loops)
-    length = np.concatenate([np.hypot(*(np.roll(loop, -1, axis=0) - loop).T) for loop in loops])
-    arm = np.maximum(length, np.concatenate([np.roll(own, 1) for own in np.split(length, _firsts(loops)[1:-1])]))
-    wanted, span = _wanted_of_edges(loops, settings), max(_spans(loops))
+    found = []
     ends = cracks.nodes[cracks.segments]
-    for k in np.flatnonzero(np.array(layers) > 0).tolist():
-        off = float(_distance(points[k], ends).min(initial=np.inf))
-        # A crack that begins at the corner has a mouth there.
-        if angles[k] > np.pi + KINK and 1e-7 * span < off < NEAR_CORNER * wanted[k]:
-            layers[k] = max(layers[k], grading.near_crack(float(angles[k])))
-        if arm[k] < wanted[k]:
-            layers[k] = min(layers[k], grading.away_from_cracks(float(angles[k]), float(arm[k]), off))
-    return layers
-
-
-def _firsts(loops: list[np.ndarray]) -> np.ndarray:
-    """Numbers of the loops' first vertices, and of all vertices."""
-    return np.cumsum([0] + [len(loop) for loop in loops])
-
-
-def _wanted_of_edges(loops: list[np.ndarray], settings: DdmSettings) -> np.ndarray:
-    """(n_edges,) m, how long elements of the ``loops`` are where nothing is near."""
-    return np.repeat(np.array(_spans(loops)) / settings.elements_per_side, [len(loop) for loop in loops])
-
-
-def _wanted_of_cracks(cracks: Cracks, settings: DdmSettings) -> np.ndarray:
-    """(n_segments,) m, how long elements of each crack were if it was straight; 0 of what has grown, where every increment is
-    an element."""
-    drawn = cracks.birth_cycle == 0
-    total = np.bincount(cracks.crack, np.where(drawn, cracks.lengths, 0.0)) if cracks.n_segments else np.zeros(0)
-    return np.where(drawn, total[cracks.crack] / settings.elements_per_crack, 0.0)
+    for loop, span in zip(loops, _spans(loops)):
+        angles = interior_angles(loop)
+        for k in np.flatnonzero(angles > np.pi + KINK):
+            off = _distance(loop[k], ends)
+            # A crack that begins at the corner has its mouth there.
+            near = off.min() < NEAR_CORNER * span / settings.elements_per_side and off.min() > 1e-7 * span
+            if near:
+                found.append((loop[k], grading.near_crack(float(angles[k]))))
+    return found
 
 
 def _distance(point: np.ndarray, ends: np.ndarray) -> np.ndarray:
@@ -229,13 +181,13 @@ def _spans(loops: list[np.ndarray]) -> list[float]:
     return spans[:1] * len(loops) if loops and signed_area(loops[0]) > 0 else spans
 
 
-def _boundary(loops, edges, mouths, corners, settings, grading, extent, marks):
+def _boundary(loops, edges, mouths, settings, grading, extent, marks):
     if not len(edges):
         return np.empty((0, 2)), np.empty((0, 2)), np.empty(0, np.int64), np.empty(0, np.int64)
     length = np.hypot(*(edges[:, 1] - edges[:, 0]).T)
     spans = _spans(loops)
     angles = np.concatenate([interior_angles(loop) for loop in loops])
-    corner = list(corners)
+    corner = [grading.at_corner(angle) for angle in angles]
     if grading.target is not None:
         for point, deep in [*mouths, *marks]:
             for k in np.flatnonzero(np.hypot(*(edges[:, 0] - point).T) <= 1e-7 * max(spans)):
@@ -243,7 +195,7 @@ def _boundary(loops, edges, mouths, corners, settings, grading, extent, marks):
     for point, deep in marks:
         for k in np.flatnonzero(np.hypot(*(edges[:, 0] - point).T) <= 1e-7 * max(spans)):
             corner[k] = max(corner[k], deep)
-    first = _firsts(loops)
+    first = np.cumsum([0] + [len(loop) for loop in loops])
     lines: list[np.ndarray] = []
     for k in range(len(loops)):
         n_edges, span = len(loops[k]), spans[k]
@@ -358,7 +310,7 @@ def _cracks(cracks: Cracks, settings: DdmSettings, grading: Grading, extent: flo
     # Rounded to nine digits first: both halves of a crack drawn in two, with 2½ of five elements each, get the same
     # number.
     count = np.maximum(1, np.rint(np.round(settings.elements_per_crack * share, 9)).astype(int))
-    layers = _node_layers(cracks, length / count, settings, grading, edges)
+    layers = _node_layers(cracks, length / count, grading, edges)
     inner: list[float] = []
     pieces = np.ones(n, np.int64)
     for s in np.flatnonzero((count > 1) | layers.any(axis=1)).tolist():
@@ -381,13 +333,10 @@ def _cracks(cracks: Cracks, settings: DdmSettings, grading: Grading, extent: flo
     return cut(nodes, segments, tip, pieces, np.array(inner, dtype=float))
 
 
-def _node_layers(
-    cracks: Cracks, size: np.ndarray, settings: DdmSettings, grading: Grading, edges: np.ndarray
-) -> np.ndarray:
+def _node_layers(cracks: Cracks, size: np.ndarray, grading: Grading, edges: np.ndarray) -> np.ndarray:
     """(n_segments, 2) graded layers at the start and end of every segment; ``size`` is its element length."""
     layers = np.zeros((cracks.n_segments, 2), int)
-    closed, surface, length = _closed(cracks), cracks.surface, cracks.lengths
-    wanted = _wanted_of_cracks(cracks, settings)
+    closed, surface = _closed(cracks), cracks.surface
     first, ends = ends_at(cracks)
     plain = (cracks.valence == 0) | ((cracks.valence == 1) & ~surface)
     if grading.target is None:
@@ -407,9 +356,7 @@ def _node_layers(
             # Straight on: one segment arrives in the direction in which the other leaves.
             turn = _heading(cracks, s) - _heading(cracks, r) + (math.pi if e == f else 0.0)
             turn = abs(math.remainder(turn, 2 * math.pi))
-            if max(length[s], length[r]) < min(wanted[s], wanted[r]) and turn < CURVED and grading.target is None:
-                deep = grading.at_bend_of_curve
-            elif closed[s] and closed[r]:
+            if closed[s] and closed[r]:
                 deep = grading.at_closed_kink(turn)
             else:
                 deep = grading.at_kink(turn, turn > KINK and _left_behind(cracks, first, ends, here))

@@ -31,18 +31,6 @@ FOLD, FOLD_SHRINKS = math.radians(120), math.radians(20 / 3)
 #: 0.01 of their crack); ungraded kinks leave this relative error of K, proportional to the turn up to the angle given
 #: with it.
 CLOSED_KINK, CLOSED_EXPONENT, CLOSED_ERROR, CLOSED_TURN = math.radians(5) - 1e-9, 0.41, 1.1e-2, math.radians(25)
-#: Bends by less than this (rad) may be those of a curve that is given by points of it: a circle of twelve sides turns by
-#: 30° at each. Between sides shorter than elements are they are taken for that, and of cracks they are not graded: what is
-#: left of K then, 1e-4 (open) to 1e-2 (closed, by 20°), is a tenth to a half of what the chords themselves cost
-#: (`tests/ddm/mesh/test_digitised_lines.py`).
-CURVED = math.radians(31)
-#: A wall is a curve (`sagittas`) where it bends by no less than this, rad, at each end of a side, …
-LEAST_BEND = math.radians(0.1)
-#: … and its neighbouring sides, and neighbouring bends, differ by less than this factor.
-LIKE = 2.0
-#: What a corner between short sides costs falls like (side / distance to the nearest crack)^FAR: measured 1 with the side,
-#: 2 to 2.6 with the distance, of bends by 30° to 90° (the same tests).
-FAR = 1.5
 #: Re-entrant corners of the outline with a crack within this many outline elements get the layers that leave this error
 #: of K, unless no layers are wanted: three, enough elsewhere, left 1.5e-2 at a right-angled corner
 #: (`tests/ddm/mesh/test_corner_beside_crack.py`).
@@ -99,21 +87,6 @@ def at_graded_kink(turn: float) -> float:
     return 2.4e-2 * (turn / (math.pi / 2)) ** 1.6
 
 
-def sagittas(loop: np.ndarray) -> np.ndarray:
-    """(n,) m, how far the curve that ``loop`` (n, 2) may stand for lies off each of its edges, positive to the right;
-    0 of straight ones."""
-    along = np.roll(loop, -1, axis=0) - loop
-    before = np.roll(along, 1, axis=0)
-    length = np.hypot(*along.T)
-    bend = np.arctan2(before[:, 0] * along[:, 1] - before[:, 1] * along[:, 0], np.sum(before * along, axis=1))
-    ahead = np.roll(bend, -1)
-    small, large = np.minimum(abs(bend), abs(ahead)), np.maximum(abs(bend), abs(ahead))
-    curved = (bend * ahead > 0) & (small > LEAST_BEND) & (large < CURVED) & (large < LIKE * small)
-    for other in (np.roll(length, 1), np.roll(length, -1)):
-        curved &= (length < LIKE * other) & (other < LIKE * length)
-    return np.where(curved, np.sign(bend) * 0.5 * length * np.tan((abs(bend) + abs(ahead)) / 8), 0.0)
-
-
 @dataclass(frozen=True)
 class Grading:
     """``ratio`` of neighbouring layers; ``layers`` of them at each node, or as many as the ``target`` error
@@ -161,19 +134,6 @@ class Grading:
         error, power = ungraded(angle, "outline")
         wanted = self._layers_for(math.log(max(error / CORNER_ERROR, 1.0)) / power)
         return max(self.at_corner(angle), wanted + self.layers - KINK_LAYERS)
-
-    def away_from_cracks(self, angle: float, side: float, distance: float) -> int:
-        """At a corner of the outline (``angle`` of rock, rad) between sides of no more than ``side`` m, ``distance`` m from
-        the nearest crack: those that leave K the error of a kink."""
-        error, power = ungraded(angle, "outline")
-        error *= min(1.0, side / distance) ** FAR if distance > 0 else 1.0
-        wanted = self._layers_for(math.log(max(error / KINK_ERROR, 1.0)) / power)
-        return max(0, wanted + self.layers - KINK_LAYERS)
-
-    @property
-    def at_bend_of_curve(self) -> int:
-        """At a slight bend of a crack that was digitised."""
-        return max(0, self.layers - KINK_LAYERS)
 
     def at_closed_kink(self, turn: float) -> int:
         """Layers at a kink of ``turn`` (rad) of a crack drawn closed; no fewer than at an open one."""

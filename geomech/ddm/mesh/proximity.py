@@ -31,8 +31,6 @@ AT_NODE = 0.01
 #: them may be almost detached, and equilibrium errors at its end bend it. (Measured with dislocations on short cracks
 #: at 3.5° to an edge: K off by 1 %; by 64 % with a ten-thousandth of the longer face.)
 AT_BOUNDARY = 0.0001
-#: What `Sources.meeting` says of two pieces of one digitised line: they are not compared.
-IN_LINE = 2.0
 #: Shortest element that halving may make, relative to the extent of the geometry.
 FLOOR = 1e-10
 #: An element at that limit is refused if its length exceeds this many times its distance from another.
@@ -73,7 +71,7 @@ class Sources(NamedTuple):
 
     images    number from which on sources are images behind a free surface
     span      (n_sources,)  length, m
-    meeting   (n_sources, n_sources)  0: they do not meet; 1: they meet; `IN_LINE`; −sin of the angle between cracks where acute
+    meeting   (n_sources, n_sources)  0: they do not meet; 1: they meet; −sin of the angle between cracks where acute
     chained   largest length relative to the distance where they meet; at an acute angle `AT_ACUTE`, and ``acute_share`` times
               `GRADED`
     """
@@ -152,8 +150,6 @@ def _compare(elements, length, sources, i, j, out):
     start, end, n_edges = elements.start, elements.end, sources.n_edges
     one, other = elements.source[i], elements.source[j]
     meet = sources.meeting[one, other]
-    if meet == IN_LINE:
-        return
     allowed = APART
     if meet != 0:
         allowed = sources.chained if meet > 0 else min(sources.chained, AT_ACUTE)
@@ -179,13 +175,11 @@ class Pieces(NamedTuple):
 
     ends       (n_sources, 2, 2) m, the first ``n_edges`` edges, then crack segments
     touching   (n_sources, n_sources) bool, which of them meet
-    line       the same, which of them are in line (`crack_nodes.in_line`); None: none
     images     number from which on they are images behind a free surface
     """
 
     ends: np.ndarray
     touching: np.ndarray
-    line: np.ndarray | None
     n_edges: int
     images: int
 
@@ -205,8 +199,6 @@ def keep_apart(start, end, kind, source, pieces: Pieces, ratio: float, extent: f
     else:
         acute_share = LOW if unknowns <= 6 else 1.0
         meeting = _meeting(pieces.ends, pieces.touching, pieces.n_edges, np.cos(ACUTE))
-    if pieces.line is not None:
-        meeting[pieces.line & ~np.eye(len(pieces.ends), dtype=bool)] = IN_LINE
     span = np.hypot(*(pieces.ends[:, 1] - pieces.ends[:, 0]).T)
     sources = Sources(pieces.n_edges, pieces.images, span, meeting, chained, float(acute_share))
     most = max(4 * len(start), MOST_UNKNOWNS // unknowns)

@@ -112,10 +112,19 @@ class _PathOf:
         return np.full(10_000, 1), np.zeros(10_000)
 
 
+class _Found:
+    """Ten thousand contacts, none of a face that keeps its cohesion as a whole."""
+
+    whole = None
+
+    def __len__(self):
+        return 10_000
+
+
 def proposed(path, **solver):
     """The states that ``path`` proposes to the search of a step of 10 000 contacts in statics."""
     search = object.__new__(iteration._Search)
-    search.solver, search.found, search.large = ContactSolver(**solver), path.bonded, False
+    search.solver, search.found, search.large = ContactSolver(**solver), _Found(), False
     search.spent, search.offered = 0, set()
     return search._proposed(path)
 
