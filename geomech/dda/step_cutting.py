@@ -280,7 +280,7 @@ class StepCutting:
         if not pressed.any() and not strayed.any():
             return None
         search.motion, search.glue_holds = moved, found.relies_on_glue
-        # Only these pairs may meet in another way; all pairs are searched again if any of them does.
+        # Only these pairs may meet differently; all pairs are searched again if one of them does.
         near = search.near
         some = strayed[near.pairs].any(axis=1)
         at = near.of_contacts(found.block[pressed], found.other[pressed], len(strayed))
@@ -292,8 +292,8 @@ class StepCutting:
         return again if self._meets_otherwise(attempt, found, again, state) else None
 
     def _meets_otherwise(self, attempt: Attempt, found: ContactSet, again: ContactSet, state: np.ndarray) -> bool:
-        """Whether corners that ``found`` has pressing in ``state`` (n,), or does not have, meet otherwise in ``again``, the
-        contacts of all pairs of blocks or of some, which the motion of the ``attempt`` has told."""
+        """Whether corners meet differently in ``again``, contacts searched for with the motion of the ``attempt``, than in
+        ``found``, which the attempt left in ``state`` (n,): pressed ones in another direction, or some that ``found`` lacks."""
         if again.lumped is not None:
             again = again.lumped
         if self._redirected(found, again, state):

@@ -31,10 +31,9 @@ from ...model import OPEN, SLIP, STICK, ContactSolver
 from ..equation_records import ContactMotion, ContactStiffness
 from ..linear_solver import assembly
 from .equations import Equations, States
+from .interior_point.central_path import SLIPPED
 from .interior_point.contact_terms import balance
 
-#: The bond of a contact that has slipped and not lost all cohesion: it may slide.
-_SLIPPED = 2
 #: α, the over-relaxation.
 _RELAXATION = 1.7
 #: Turns between two looks at how many states have changed.
@@ -147,7 +146,7 @@ def split(equations: Equations, bonded: np.ndarray, solver: ContactSolver) -> Pr
     contacts = ContactMotion(found.block, found.other, order, vectors)
     between = _Springs(equations, contacts)
 
-    slipped, slides = bonded == _SLIPPED, found.state == SLIP
+    slipped, slides = bonded == SLIPPED, found.state == SLIP
     friction = np.where(slides, springs.friction, springs.peak)
     firm = np.where(slides, springs.sliding, springs.hold + np.where(slipped, springs.cohesion, 0.0))
     held = (bonded > 0) & ~slipped
