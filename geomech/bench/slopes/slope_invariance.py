@@ -93,7 +93,11 @@ BOUNDS = {
     },
 }
 #: Words of warnings in which a run says that its result is unreliable.
-WARNED = ("nothing holds", *sorted({words for invariant in INVARIANTS.values() for words in invariant.reported}))
+WARNED = (
+    "nothing holds",
+    "does not resolve vibrations",
+    *sorted({words for invariant in INVARIANTS.values() for words in invariant.reported}),
+)
 _MODULES = (
     "drawn_slopes", "limited_runs", "moved_mass", "random_slopes", "refusals", "slope_invariance", "slope_invariants",
 )  # fmt: skip
