@@ -221,8 +221,8 @@ class Coupling:
             stopped = yield from self._load_step()
             if stopped:
                 break
-        if not self.static and not self.endless:
-            check_dissipation(self.now.budget, self.now.state.time)
+        if not self.endless:
+            check_dissipation(self.now.budget, self.now.state.time, self.static)
 
     def _load_step(self):
         """All passes at one load. Returns True when a stop event has occurred."""

@@ -16,6 +16,9 @@ UNPAID = 0.25
 DISSIPATED = 0.05
 #: … and their kinetic energy as a fraction of it. Blocks that have come to rest have rightly lost their energy.
 IN_MOTION = 0.01
+#: Fraction of it that static steps may take. A load that acts at once leaves half of its work; what is far beyond has
+#: moved blocks that nothing held.
+UNHELD = 0.8
 
 
 class BudgetWatch:
@@ -38,9 +41,21 @@ class BudgetWatch:
         )
 
 
-def check_dissipation(budget: EnergyBudget, time: float) -> None:
-    """Warn at the end of a run, ``time`` s, if the time integration has damped vibrations that matter to its result."""
+def check_dissipation(budget: EnergyBudget, time: float, static: bool) -> None:
+    """Warn at the end of a run, ``time`` s, if the time integration has damped vibrations that matter to its result,
+    or, in statics, a motion from one place to another."""
     energy, turnover = budget.last, budget.turnover
+    if static:
+        if turnover and budget.scheme > UNHELD * turnover:
+            log.warning(
+                "t = %g s: static steps have dissipated %.2g of all converted energy (scheme_loss in history.csv): on "
+                "their way blocks moved that nothing held, under a load that acts before the weight or the rock that "
+                "resists it, or as a mechanism; where they rest depends on the time step. Apply weight and water "
+                "together, or follow the motion with dda.dynamic_factor = 1",
+                time,
+                budget.scheme / turnover,
+            )
+        return
     if energy is None or not turnover or energy.kinetic < IN_MOTION * turnover or budget.scheme < DISSIPATED * turnover:
         return
     log.warning(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 import re
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 
@@ -18,6 +19,7 @@ from geomech.model import (
     Blocks,
     Cracks,
     DdaSettings,
+    EdgeTraction,
     GrowthSettings,
     History,
     JointLaw,
@@ -169,3 +171,26 @@ def test_vibrations_that_the_step_does_not_resolve_are_told_of(caplog):
         weighed_column(end / 4, end, newmark=(0.25, 0.5)),
     ):
         assert of_dissipation(rests, caplog)[1] is None
+
+
+@pytest.mark.parametrize("together", [True, False])
+def test_static_steps_that_move_what_nothing_holds_are_told_of(together, caplog):
+    """A tank of half the weight that water lifts, before its weight is there or as it comes: it floats off, and
+    settles."""
+    weight = 2500.0 * 9.81 * 20.0
+    lift = [0.0, 0.5 * weight]
+    problem = weighed_column(1.0, 4.0)
+    problem = replace(
+        problem,
+        dda=replace(problem.dda, dynamic_factor=0.0),
+        loads=Loads(
+            gravity=History(np.array([0.0, 3.0]), np.array([[0.0, 0.0], [0.0, -9.81]])),
+            edge_tractions=(EdgeTraction("top", History.ramp([0.0, lift[1] / 2.0 / 3.0])),)
+            if together
+            else (EdgeTraction("top", History.constant([0.0, lift[1] / 2.0])),),
+        ),
+        blocks=replace(problem.blocks, edge_name=np.array([0, 0, 1, 0, 0, 0, 0, 0]), edge_names=("", "top")),
+    )
+    with caplog.at_level(logging.WARNING):
+        *_, _last = cycles(problem)
+    assert any("nothing held" in record.getMessage() for record in caplog.records) is not together
