@@ -87,7 +87,7 @@ def test_of_blocks_that_are_alike_the_first_breaks(monkeypatch):
     blocks = Blocks.from_polygons([np.array([[x, 0.0], [x + 1, 0.0], [x + 1, 1.0], [x, 1.0]]) for x in (0.0, 2.0)])
     for off in OFF:
         size = {0: 1.0 - off, 1: 1.0 + off}
-        found = {b: [initiation.Birth("tension", "surface", size[b], (0.0, 0.0), (0.0, 0.1))] for b in size}
+        found = {b: [initiation.NewCrack("tension", "surface", size[b], (0.0, 0.0), (0.0, 0.1))] for b in size}
         monkeypatch.setattr(initiation, "births", lambda solution, *rest: found[solution])  # noqa: B023
         born, where = born_first(blocks, (ROCK,), {0: 0, 1: 1}, GrowthSettings())
         assert where == 0 and born == found[0]

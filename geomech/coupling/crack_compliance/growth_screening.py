@@ -86,13 +86,13 @@ class GrowthScreening:
         self._known = {child: known[parent[child]] for child in whole.tolist() if parent[child] in known}
 
     def _bound(self, now: CoupledBlocks, block: int, known: _Known) -> None:
-        from ...ddm.fracture.sif_bound import TipBound, is_bounded, most_per_factor
+        from ...ddm.fracture.sif_bound import TipBound, is_bounded, largest_k_eq_per_k
 
         body = now.bodies[block]
         known.never = not is_bounded(body)
         if not known.never:
             known.bound = TipBound(body)
-            known.per_factor = most_per_factor(now.problem.growth.criterion, body.material)
+            known.per_factor = largest_k_eq_per_k(now.problem.growth.criterion, body.material)
 
     def _cannot(self, now: CoupledBlocks, block: int, dt: float) -> bool:
         known, body, load = self._known.get(block), now.bodies[block], now.loads[block]

@@ -13,7 +13,7 @@ from ...model import Blocks, Cracks, GrowthSettings, Material
 def born_first(
     blocks: Blocks, materials: Sequence[Material], solutions: dict, settings: GrowthSettings
 ) -> tuple[Sequence, int]:
-    """The candidate cracks (`ddm.growth.initiation.Birth`) of the most overstressed block (keys of ``solutions``),
+    """The candidate cracks (`ddm.growth.initiation.NewCrack`) of the most overstressed block (keys of ``solutions``),
     whether or not it has reached its strength, and the number of that block; ((), −1) if no material has a strength."""
     from ...ddm.growth.initiation import births
     from ...ddm.growth.tie_tolerance import reached
@@ -38,7 +38,7 @@ def bear_in_blocks(
     """``cracks`` with those that start in the most overstressed block, as a `Growth`, and the new cracks; (None, ()) if
     no block reaches ``enough`` times its strength. ``limits(block)``: loops around its rock. Only one block at a time,
     since new cracks change the loads of the others."""
-    from ...ddm.growth.initiation import bear
+    from ...ddm.growth.initiation import add_new_cracks
     from ...ddm.growth.tie_tolerance import reached
     from ...ddm.growth.tip_advance import Growth
 
@@ -49,4 +49,4 @@ def bear_in_blocks(
     of_block = np.flatnonzero(cracks.block == where)
     best = [replace(birth, segment=int(of_block[birth.segment])) if birth.segment >= 0 else birth for birth in best]
     grown = np.zeros(sum(len(solution.tips) for solution in solutions.values()))
-    return Growth(bear(cracks, limits, best, cycle, where), grown, ()), best
+    return Growth(add_new_cracks(cracks, limits, best, cycle, where), grown, ()), best

@@ -53,7 +53,7 @@ def elastic_bodies(
         work = works[-1] if old is None else old.work
         if not problem.run.skip:
             old = None
-        bodies[b] = None if old is None else old.found_again(_loops(problem, blocks, b), own, material)
+        bodies[b] = None if old is None else old.reusable_for(_loops(problem, blocks, b), own, material)
         if bodies[b] is not None:
             work.bodies_kept += 1
             continue
@@ -227,7 +227,7 @@ def tip_rows(problem: Problem, blocks: Blocks, solutions: dict, nodes_of: dict[i
     """TIP rows of all solved bodies with kink angle and K_eq; nodes numbered in the whole network."""
     if not solutions:
         return np.empty(0, TIP)
-    from ...ddm.fracture.f_criterion import judged, judged_rows
+    from ...ddm.fracture.f_criterion import apply_criterion_to_rows, judged
 
     rows, of = [], list(solutions.items())
     for b, solution in of:
@@ -242,5 +242,5 @@ def tip_rows(problem: Problem, blocks: Blocks, solutions: dict, nodes_of: dict[i
     rock = blocks.material[tips["block"]]
     for m in np.unique(rock).tolist():
         own = rock == m
-        tips["angle"][own], tips["k_eq"][own] = judged_rows(tips[own], problem.growth, problem.materials[m])
+        tips["angle"][own], tips["k_eq"][own] = apply_criterion_to_rows(tips[own], problem.growth, problem.materials[m])
     return tips

@@ -289,13 +289,13 @@ class CrackEnergy:
             gone = {block: solutions[block] for block in cut if block in solutions}
             solutions = {block: of for block, of in solutions.items() if block not in gone}
             for block, of in gone.items():
-                rubbed, of_cement = of.given_way
+                rubbed, of_cement = of.dissipated_in_step
                 self._runs_through(block, rubbed, of_cement.bond)
                 each[block] = 0.0
         hangs = {block: block in by_mean_stress for block in solutions}
         done = sum(self._work_at_rest(before, solutions, hangs, each)) if self.static else work
         stored = sum(solution.crack_energy + solution.filling_energy for solution in solutions.values())
-        rubbed, released_there = zip(*(of.given_way for of in solutions.values())) if solutions else ((), ())
+        rubbed, released_there = zip(*(of.dissipated_in_step for of in solutions.values())) if solutions else ((), ())
         friction, bond = sum(rubbed), sum(of.bond for of in released_there)
         if self.static:
             done += sum(of.slip_onset + of.break_onset for of in released_there)
