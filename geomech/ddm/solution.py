@@ -237,7 +237,7 @@ class Solution:
         body = self.body
         # A_ΓC w and A_CC w follow from W and S, which the body keeps.
         follows = body._w @ self.jumps if self.jumps.size else np.zeros_like(self._u)
-        on_boundary = body._outside.times(self._x + follows, lifted=follows) + self._boundary_load
+        on_boundary = body._outside.times(self._x + follows, rigid_part=follows) + self._boundary_load
         on_faces = (
             body.crack_system.matrix @ self.jumps + body._cg @ (self._x + follows) + self.face_load - self._traction
         )

@@ -105,7 +105,7 @@ def boundary_loads(
     acting = BoundaryForces(
         result.vertices,
         motion,
-        beside_acting(result.contacts, blocks.n_blocks),
+        contacts_of_loaded_pairs(result.contacts, blocks.n_blocks),
         forces.edges,
         forces.points,
         problem.run.boundary_stress,
@@ -125,7 +125,7 @@ def boundary_loads(
     return dict(zip(bodies, loads))
 
 
-def beside_acting(contacts: np.ndarray, n_blocks: int) -> np.ndarray:
+def contacts_of_loaded_pairs(contacts: np.ndarray, n_blocks: int) -> np.ndarray:
     """CONTACT rows of all pairs of blocks with a loaded contact, the open ones included: they show where a face
     ends."""
     pair = np.minimum(contacts["block"], contacts["other"]) * n_blocks + np.maximum(

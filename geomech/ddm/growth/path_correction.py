@@ -44,7 +44,7 @@ STIFF = 2.0
 #: bend by 17° instead of 6°, then back, and miss the driving load by 14 %.)
 SMOOTH, GENTLE = np.radians(4.2), 1.0
 #: Largest number of trials. The secant iteration needs two or three to come within the tolerance.
-LOOKS = 5
+TRIALS = 5
 #: Bounds of the slope −1 − κ of the turn at the end against that of the chord; beyond them two trials are too close
 #: together to determine it.
 SLOPES = (-39.0, 0.0)
@@ -163,7 +163,7 @@ class Chords:
         if (np.abs(tips["angle"] - angle)[seen] <= ACCEPTED_TURN).all():
             tips["angle"] = angle
             return True
-        return self.looks == LOOKS or not unsettled.any()
+        return self.looks == TRIALS or not unsettled.any()
 
     def remember(self, memory: Memory, tips: np.ndarray, growth: Growth, cycle: int) -> None:
         """Store in ``memory``, by their ends, the data of the accepted steps."""

@@ -154,9 +154,9 @@ class BoundarySystem:
         self.work.back_substitutions += right.shape[1]
         return np.matmul(self.factor.inverse, np.asfortranarray(right), out=np.empty(right.shape, order="F"))
 
-    def times(self, u: np.ndarray, regularisation: np.ndarray) -> np.ndarray:
-        """A_ΓΓ ``u``, plus the terms that remove the rigid motions, applied to ``regularisation``."""
-        return self.matrix @ u + self.rigid @ (self.weights @ regularisation) / self.extent
+    def times(self, u: np.ndarray, rigid_part: np.ndarray) -> np.ndarray:
+        """A_ΓΓ ``u``, plus the terms that remove the rigid motions, applied to ``rigid_part``."""
+        return self.matrix @ u + self.rigid @ (self.weights @ rigid_part) / self.extent
 
 
 @dataclass(frozen=True, eq=False)

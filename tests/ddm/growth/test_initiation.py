@@ -156,7 +156,7 @@ def test_nothing_is_born_unasked_or_without_strength_or_room():
     solution = solved(load, holes=[polygon(24)])
     assert new_cracks(solution, ROCK, GrowthSettings()) == []
     assert new_cracks(solution, Material("steel", 2e11, 0.3), SURFACE) == []
-    with pytest.raises(ValueError, match=r"no place .* 'inside'"):
+    with pytest.raises(ValueError, match=r"initiation must be one of .* 'inside'"):
         new_cracks(solution, ROCK, GrowthSettings(initiation="inside"))
     # A crack that stands before the wall at one side leaves no room there.
     wall = Cracks.from_polylines([[[0.104, -0.03], [0.104, 0.03]]])

@@ -10,7 +10,7 @@ import numpy as np
 from ...model import Blocks, Cracks, GrowthSettings, Material
 
 
-def born_first(
+def first_new_cracks(
     blocks: Blocks, materials: Sequence[Material], solutions: dict, settings: GrowthSettings
 ) -> tuple[Sequence, int]:
     """The candidate cracks (`ddm.growth.initiation.NewCrack`) of the most overstressed block (keys of ``solutions``),
@@ -25,7 +25,7 @@ def born_first(
     return found.get(where, ()), where
 
 
-def bear_in_blocks(
+def initiate_in_blocks(
     cracks: Cracks,
     blocks: Blocks,
     limits: Callable[[int], list[np.ndarray]],
@@ -42,7 +42,7 @@ def bear_in_blocks(
     from ...ddm.growth.tie_tolerance import reached
     from ...ddm.growth.tip_advance import Growth
 
-    best, where = born_first(blocks, materials, solutions, settings)
+    best, where = first_new_cracks(blocks, materials, solutions, settings)
     if not best or not reached(best[0].overstress, enough):
         return None, ()
     # Segments of a body are those of its block, in the same order.
