@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -32,6 +32,8 @@ LEFT_BEHIND = 3
 STRAIGHT = math.radians(0.1)
 #: … their elements get one length when the ratio of the lengths is below this.
 ALIKE = 1.2
+#: Mouths and further points within this part of the extent of an edge, or of a vertex, lie on it.
+ON_EDGE = 1e-7
 #: A mouth nearer to an element's end than this part of its length moves that end; no shorter element is made.
 SLIVER = 0.08
 
@@ -78,6 +80,7 @@ def mesh(
     edges, edge_loop = outline_edges(loops) if known is None else (known.edges, known.edge_loop)
     points = np.concatenate([edges.reshape(-1, 2), cracks.nodes])
     extent = np.ptp(points, axis=0).max() if len(points) else 0.0
+    cracks = _with_mouths_on(edges, cracks, ON_EDGE * extent)
     grading = Grading.of(settings)
     sides_of_rock = edges if half_plane is None else np.concatenate([edges, half_plane.edge(points)])
     mouths = [
@@ -130,6 +133,34 @@ def mesh(
         edge_loop,
         sides,
     )  # fmt: skip
+
+
+def _with_mouths_on(edges: np.ndarray, cracks: Cracks, near: float) -> Cracks:
+    """``cracks`` with their mouths moved onto the nearest of ``edges`` (m, 2, 2), or to its end where that is within
+    ``near``, m.
+
+    A mouth drawn 1e-14 of the extent beside its edge would bend the boundary there, and the nodes of its elements
+    would lie off the edge, to which loads are applied: seen from within the rock, they would miss the traction on it.
+    """
+    mouths = np.flatnonzero(cracks.surface & (cracks.valence > 0))
+    if not len(edges) or not len(mouths):
+        return cracks
+    a, d = edges[:, 0], edges[:, 1] - edges[:, 0]
+    length = np.hypot(*d.T)
+    t = d / length[:, None]
+    nodes = cracks.nodes.copy()
+    for mouth in mouths.tolist():
+        rel = nodes[mouth] - a
+        along, across = np.sum(rel * t, axis=1), rel[:, 1] * t[:, 0] - rel[:, 0] * t[:, 1]
+        beyond = along - np.clip(along, 0.0, length)
+        k = int(np.argmin(np.hypot(across, beyond)))
+        if np.hypot(across[k], beyond[k]) > near:
+            continue
+        if along[k] <= near or along[k] >= length[k] - near:
+            nodes[mouth] = edges[k, 0 if along[k] <= near else 1]
+        else:
+            nodes[mouth] -= across[k] * np.array([-t[k, 1], t[k, 0]])
+    return cracks if np.array_equal(nodes, cracks.nodes) else replace(cracks, nodes=nodes)
 
 
 def _with_images(half_plane: HalfPlane, ends, kind, source, touching, near: float):
