@@ -88,7 +88,7 @@ def test_of_blocks_that_are_alike_the_first_breaks(monkeypatch):
     for off in OFF:
         size = {0: 1.0 - off, 1: 1.0 + off}
         found = {b: [initiation.NewCrack("tension", "surface", size[b], (0.0, 0.0), (0.0, 0.1))] for b in size}
-        monkeypatch.setattr(initiation, "births", lambda solution, *rest: found[solution])  # noqa: B023
+        monkeypatch.setattr(initiation, "new_cracks", lambda solution, *rest: found[solution])  # noqa: B023
         born, where = first_new_cracks(blocks, (ROCK,), {0: 0, 1: 1}, GrowthSettings())
         assert where == 0 and born == found[0]
 

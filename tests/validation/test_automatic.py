@@ -207,7 +207,7 @@ def test_a_target_that_settings_ask_for_is_met():
         solution = body.solve(MIXED)
         assert off(solution, factors(best)) < said(solution) + 1e-5 and said(solution) <= target
         # The next body begins with the mesh that was needed.
-        assert ddm.Body([], network(), ROCK, body.asked, solution.body).settings == solution.body.settings
+        assert ddm.Body([], network(), ROCK, body.requested, solution.body).settings == solution.body.settings
 
 
 def test_a_target_that_no_mesh_meets_is_refused():

@@ -15,10 +15,10 @@ def first_new_cracks(
 ) -> tuple[Sequence, int]:
     """The candidate cracks (`ddm.growth.initiation.NewCrack`) of the most overstressed block (keys of ``solutions``),
     whether or not it has reached its strength, and the number of that block; ((), −1) if no material has a strength."""
-    from ...ddm.growth.initiation import births
+    from ...ddm.growth.initiation import new_cracks
     from ...ddm.growth.tie_tolerance import reached
 
-    found = {b: births(solution, materials[blocks.material[b]], settings, b) for b, solution in solutions.items()}
+    found = {b: new_cracks(solution, materials[blocks.material[b]], settings, b) for b, solution in solutions.items()}
     most = max((of[0].overstress for of in found.values() if of), default=0.0)
     # Among equally overstressed blocks, the first one.
     where = next((b for b, of in found.items() if of and reached(of[0].overstress, most)), -1)

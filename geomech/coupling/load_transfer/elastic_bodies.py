@@ -177,7 +177,7 @@ def solve_bodies(
             raise ddm.TargetMissed(failure.solution, failure.target, f"{_called(b, names)}: ") from failure
 
     solutions = dict(zip(bodies, parallel_map(solved, list(bodies), threads_for(bodies))))
-    if any(body.asked.target_error is not None for body in bodies.values()):
+    if any(body.requested.target_error is not None for body in bodies.values()):
         # Solutions that meet the target error may belong to refined bodies.
         bodies.update((b, solution.body) for b, solution in solutions.items())
     return solutions
@@ -227,7 +227,7 @@ def tip_rows(problem: Problem, blocks: Blocks, solutions: dict, nodes_of: dict[i
     """TIP rows of all solved bodies with kink angle and K_eq; nodes numbered in the whole network."""
     if not solutions:
         return np.empty(0, TIP)
-    from ...ddm.fracture.f_criterion import apply_criterion_to_rows, judged
+    from ...ddm.fracture.f_criterion import apply_criterion, apply_criterion_to_rows
 
     rows, of = [], list(solutions.items())
     for b, solution in of:
@@ -236,7 +236,9 @@ def tip_rows(problem: Problem, blocks: Blocks, solutions: dict, nodes_of: dict[i
         rows.append(tips)
     tips = rows[0] if len(rows) == 1 else np.concatenate(rows)
     if problem.growth.trial_kink > 0:
-        angle, k_eq = zip(*(judged(each, problem.growth, problem.materials[blocks.material[b]]) for b, each in of))
+        angle, k_eq = zip(
+            *(apply_criterion(each, problem.growth, problem.materials[blocks.material[b]]) for b, each in of)
+        )
         tips["angle"], tips["k_eq"] = np.concatenate(angle), np.concatenate(k_eq)
         return tips
     rock = blocks.material[tips["block"]]

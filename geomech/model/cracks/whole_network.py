@@ -58,7 +58,7 @@ def _walls(blocks: Blocks) -> tuple[np.ndarray, list[str]]:
 
 
 def _birth(segment: np.ndarray, before: Cracks, number: int) -> int:
-    """NewCrack cycle of ``segment`` (2, 2): that of the segment of ``before`` that contains it, else ``number``."""
+    """Birth cycle of ``segment`` (2, 2): that of the segment of ``before`` that contains it, else ``number``."""
     start, end = before.nodes[before.segments].swapaxes(0, 1)
     along = end - start
     size = np.hypot(*along.T)
