@@ -402,9 +402,9 @@ def test_safety_prints_trials_and_mechanism(tmp_path, capsys):
     assert f"factor of safety {factor:.4f}" in out
     assert "slab: 1.00 of the fastest, towards -153°" in out
     # The search begins near the largest factor with admissible forces: trials at rest below the factor, motion above it.
-    tried = re.findall(r"F = ([0-9.]+): (at rest|moves on)", err)
+    tried = re.findall(r"F = ([0-9.]+): (at rest|keeps moving)", err)
     assert {word for f, word in tried if float(f) < factor - 1e-3} == {"at rest"}
-    assert {word for f, word in tried if float(f) > factor + 1e-3} == {"moves on"}
+    assert {word for f, word in tried if float(f) > factor + 1e-3} == {"keeps moving"}
     told = json.loads(answer.read_text())["scene"]
     assert told["factor_of_safety"] == pytest.approx(factor, rel=1e-6)
     assert list(told["moving"]) == ["slab"]

@@ -1,4 +1,4 @@
-"""Blocks and cracks drive each other: tractions from contacts, growth, compliance back, splitting, the cycle."""
+"""Coupling of DDA and DDM: boundary tractions from contact forces, crack compliance, growth, splitting, the cycle."""
 
 from .cycle import Coupling, cycles
 

@@ -14,7 +14,7 @@ from ..model.blocks.polygon import winding_number
 from .crack_compliance.growth_screening import GrowthScreening
 from .crack_compliance.load_extrapolation import LoadExtrapolation
 from .crack_compliance.mean_stress_response import ByMeanStress
-from .crack_compliance.quasi_newton import Settling
+from .crack_compliance.quasi_newton import QuasiNewton
 from .load_transfer.boundary_tractions import BoundaryLoad
 from .load_transfer.elastic_bodies import elastic_bodies, inherited, solve_bodies
 from .monitoring.crack_energy import CrackEnergy
@@ -54,7 +54,7 @@ class CrackedBlocks:
         self.compliances: dict[int, tuple] = {}
         self.by_mean_stress = ByMeanStress()
         self.growth_screening = GrowthScreening()
-        self.settling, self.extrapolation = Settling(), LoadExtrapolation()
+        self.quasi_newton, self.extrapolation = QuasiNewton(), LoadExtrapolation()
         #: Curvature of each tip's path in its last increments.
         self.chords: Memory = {}
         # Slip and damage of frictional crack faces at the start of the load step, where all its passes begin.
@@ -138,7 +138,7 @@ class CrackedBlocks:
         )
         self.by_mean_stress = self.by_mean_stress.inherited(parent, whole) if len(whole) else ByMeanStress()
         self.growth_screening.renumber(parent, whole)
-        self.settling, self.extrapolation = Settling(), LoadExtrapolation()
+        self.quasi_newton, self.extrapolation = QuasiNewton(), LoadExtrapolation()
         self._take_bodies()
 
     def take_step(self, state: State, budget: dda.EnergyBudget) -> None:

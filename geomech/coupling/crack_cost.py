@@ -1,8 +1,8 @@
-"""Memory and time that the cracked blocks of a problem need, estimated from their elements before any matrix is made.
+"""Memory and time that the cracked blocks of a problem need, estimated from their numbers of elements.
 
-A block with m unknowns on its outline and n on its cracks keeps A_ΓΓ and its factors (2 m² numbers), A_CΓ and A_ΓΓ⁻¹ A_ΓC
-(2 m n), S and factors of its states (4 n²), and takes ⅔ m³ + 2 m² n + 2 m n² + ⅔ n³ multiplications to make. What is iterated
-on instead takes a memory and a time that grow with m + n (`ddm.iterative.gmres`, `ddm.iterative.boundary_gmres`).
+A block with m unknowns on its outline and n on its cracks stores A_ΓΓ and its factors (2 m² numbers), A_CΓ and A_ΓΓ⁻¹ A_ΓC
+(2 m n), S and factors of its states (4 n²), and takes ⅔ m³ + 2 m² n + 2 m n² + ⅔ n³ multiplications to set up. Memory
+and time of iterative solutions are proportional to m + n (`ddm.iterative.gmres`, `ddm.iterative.boundary_gmres`).
 """
 
 from __future__ import annotations
@@ -16,19 +16,18 @@ from ..ddm.iterative.crack_gmres import CROSSOVER as MANY_ON_CRACKS
 from ..ddm.mesh.elements import mesh
 from ..model import Problem, counted
 
-#: Multiplications a second of dense factors, and bytes and seconds of an unknown that is iterated on; rough values of one
-#: thread, for an estimate to a factor of two or three.
+#: Multiplications per second of dense factorisation, and bytes and seconds per unknown of iterative solutions; rough
+#: values for one thread, good to a factor of two or three.
 RATE, BYTES, SECONDS = 1.5e10, 4e4, 3e-4
-#: Unknowns of one block from which its size is worth a word on what makes it so.
+#: Number of unknowns of one block from which the cause of its size is reported.
 LARGE = 3000
-#: An outline has been digitised finer than elements are long where its sides are more than so many times `elements_per_side`
-#: about its four sides.
+#: An outline counts as digitised too finely if it has more than this many times 4 `elements_per_side` sides.
 FINE = 5
 
 
 class CrackCost(NamedTuple):
-    """Cracked ``blocks`` (numbers), their unknowns ``on_sides`` and ``on_cracks``, and their ``sides`` (n,); ``memory``,
-    bytes, and ``seconds`` to make them."""
+    """Cracked ``blocks`` (numbers), their unknowns ``on_sides`` and ``on_cracks`` and numbers of ``sides``, (n,) each;
+    ``memory`` in bytes and ``seconds`` of processor time to set them up."""
 
     blocks: np.ndarray
     on_sides: np.ndarray
@@ -39,8 +38,8 @@ class CrackCost(NamedTuple):
 
 
 def crack_cost(problem: Problem) -> CrackCost:
-    """Of the blocks of ``problem`` that hold cracks and move; bodies without an end are left out. Raises ValueError where
-    rock is too thin for elements."""
+    """Cost of the moving blocks of ``problem`` with cracks, without unbounded bodies. Raises ValueError if rock is too
+    thin for elements."""
     blocks, cracks = problem.blocks, problem.cracks
     rigid = np.array([material.rigid for material in problem.materials], bool)
     cracked = np.unique(cracks.block) if problem.endless is None else np.zeros(0, int)
@@ -70,14 +69,14 @@ def cost_lines(problem: Problem) -> list[str]:
     name = problem.blocks.names[cost.blocks[most]] if problem.blocks.names else f"block {cost.blocks[most]}"
     each = f" (most in {name}: {cost.on_sides[most]} and {cost.on_cracks[most]})" if len(cost.blocks) > 1 else ""
     lines = [
-        f"{counted(len(cost.blocks), 'cracked block')}, {cost.on_sides.sum()} unknowns on sides, {cost.on_cracks.sum()} on "
-        f"cracks{each}: about {cost.memory / 1e9:.2g} GB, {cost.seconds:.2g} s of processor time to make, a share of it for "
-        "every change of cracks"
+        f"{counted(len(cost.blocks), 'cracked block')}, {cost.on_sides.sum()} unknowns on sides, {cost.on_cracks.sum()} "
+        f"on cracks{each}: about {cost.memory / 1e9:.2g} GB, {cost.seconds:.2g} s of processor time to set up, a part of "
+        "which again for every change of cracks"
     ]
     per_block = 4 * FINE * problem.ddm.elements_per_side
     if cost.on_sides[most] + cost.on_cracks[most] > LARGE and cost.sides[most] > per_block:
         lines.append(
-            f"{name} has {cost.sides[most]} sides: where they were digitised finer than is known of them, simplify_m in "
-            "[[geometry.traces]] leaves out vertices within a distance that you say"
+            f"{name} has {cost.sides[most]} sides: if they were digitised more finely than needed, set simplify_m in "
+            "[[geometry.traces]] to drop vertices within that distance"
         )
     return lines

@@ -7,8 +7,8 @@ load step. Every pass is yielded as a `Cycle`.
 - With stepping "events" (`event_stepping`), load steps end at changes of state. With control "toughness", every pass in
   which cracks grow is a load step of its own.
 - When a crack cuts a block, the block is split in the configuration of that pass. In statics the next passes at the
-  same
-  load start from there (except for a block that was connected by a thin ligament only); in dynamics the next step does.
+  same load start from there (except for a block that was connected by a thin ligament only); in dynamics the next step
+  does.
 - In statics a load is held while tips run. After every ``max_passes`` passes the configuration is accepted and the next
   passes at this load start from it, up to `MOST_PASSES` passes in total.
 """
@@ -29,8 +29,8 @@ from ..dda.step_control.overlap_energy import Overlap, OverlapWatch
 from ..model import TIP, Cycle, Event, Problem, State
 from .coupled_state import CrackedBlocks
 from .cycle_record import event, record
-from .growth.crack_growth import births, growth_of_tips, initiations, part_here, take_growth
-from .growth.dynamic_tips import TipsInTime
+from .growth.crack_growth import births, blocks_to_split, growth_of_tips, initiations, take_growth
+from .growth.dynamic_tips import DynamicTips
 from .growth.event_stepping import SETTLED, TOGETHER, EventSteps
 from .growth.first_state_change import FirstChange
 from .load_pass import Balance, balanced, toughness
@@ -123,7 +123,7 @@ class Coupling:
         self.length = dda.StepLength(problem.dda)
         self.static = problem.dda.dynamic_factor == 0.0
         if self.endless and (not self.static or problem.dda.equilibrium):
-            raise ValueError('rock without an end is for static runs: dynamic_factor = 0 and equilibrium ""')
+            raise ValueError('unbounded rock is for static runs only: dynamic_factor = 0 and equilibrium ""')
         self.events: EventSteps | None = None
         if problem.run.stepping == "events":
             if not self.static or problem.dda.equilibrium == "loads":
@@ -139,7 +139,7 @@ class Coupling:
             raise ValueError('control "toughness" needs stepping "events"')
         #: Events from applying the growth that ended the last load step (control "toughness").
         self._brought: tuple[Event, ...] = ()
-        self.tips = None if self.static else TipsInTime(problem)
+        self.tips = None if self.static else DynamicTips(problem)
         self.range, self.balance, self.mechanism = dda.ElasticRange(), LoadBalance(), Mechanism()
         self.energy, self.bending, self.overlaps = BudgetWatch(), BendingWatch(), OverlapWatch()
         self.unstable = GrowthWatch()
@@ -286,8 +286,8 @@ class Coupling:
         except dda.NotConverged as failure:
             if not (step.stops or self._stops(step.pending)):
                 raise
-            # The stop event stands, even though the pieces find no equilibrium after it.
-            log.warning("cycle %d shows the blocks before they moved on: %s", now.number, failure)
+            # The stop event is reported even if the parts find no equilibrium after it.
+            log.warning("cycle %d shows the blocks at the last equilibrium: %s", now.number, failure)
             now.state = now.state if step.load_time is None else replace(now.state, time=step.load_time)
             return None
         result = found.result
@@ -328,11 +328,11 @@ class Coupling:
         if growth is not None:
             found.tips["grown"] = growth.grown
             if self.tips is not None:
-                self.tips.went(found.tips)
+                self.tips.record_growth(found.tips)
             events += initiations(now, found.tips, state)
             step.stops = self._stops(events)
         # Blocks are split in the configuration of the pass, in equilibrium with the tractions on their crack faces.
-        cut = () if self.endless else part_here(now, growth, state)
+        cut = () if self.endless else blocks_to_split(now, growth, state)
         parts = len(cut) > 0
         ends = growth is None or self.follows or (parts and not self.static)
         many = step.most > growing.max_passes and (step.growth_pass + 1) % growing.max_passes == 0
@@ -369,7 +369,7 @@ class Coupling:
         now, result = self.now, found.result
         if step.growth_pass == step.most and not step.stops and self._grow_on(step, found.tips):
             log.warning(
-                "cycle %d: tips still grow after %d passes at one load; going on to the next load",
+                "cycle %d: tips still grow after %d passes at one load; continuing with the next load",
                 now.number,
                 step.growth_pass,
             )
@@ -387,7 +387,11 @@ class Coupling:
 
     def _longest(self, step: _LoadStep, tips: np.ndarray) -> np.ndarray | float:
         """Largest growth of each tip in the step, m; infinite in statics."""
-        return np.inf if self.tips is None else self.tips.may_go(tips, self.now.blocks, step.whole, self.now.loads)
+        return (
+            np.inf
+            if self.tips is None
+            else self.tips.remaining_growth(tips, self.now.blocks, step.whole, self.now.loads)
+        )
 
     def _grow_on(self, step: _LoadStep, tips: np.ndarray) -> bool:
         """Whether any tip still exceeds its toughness after the last pass and has growth left in the step."""
@@ -432,15 +436,15 @@ class Coupling:
         return self.now.strain_solutions(), self.now.by_mean_stress, bool(self.now.state.stress.any())
 
     def _excavated(self) -> tuple[Event, ...]:
-        """Remove the blocks whose time of excavation has come; one event for each."""
+        """Remove the blocks that are excavated at the present time; one event for each."""
         now = self.now
         return tuple(
-            event(now, "excavation", now.state, now.blocks.area_moments(b)[1], f"{now.blocks.names[b]} is taken out")
+            event(now, "excavation", now.state, now.blocks.area_moments(b)[1], f"{now.blocks.names[b]} is excavated")
             for b in now.take_out()
         )
 
     def _still(self, events: tuple[Event, ...], growth_pass: int = 0) -> Cycle:
-        """The record of blocks that have not moved."""
+        """The record of a cycle in which blocks have not moved."""
         return record(self.now, self.now.state, np.empty(0, TIP), {}, events, growth_pass, {})
 
     def _stops(self, events: tuple[Event, ...]) -> bool:

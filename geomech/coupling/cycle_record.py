@@ -1,5 +1,4 @@
-"""The record of a cycle: with the scene's leading load, its axial strain, all crack faces in one table; and of
-events."""
+"""Records of cycles and events: leading load, axial strain, and all crack faces in one table."""
 
 from __future__ import annotations
 
@@ -27,8 +26,8 @@ def record(
     now: CrackedBlocks, state: State, tips: np.ndarray, solutions: dict, events: tuple[Event, ...], growth_pass: int,
     statistics: dict[str, float], left_out: Mapping[int, Body] = MappingProxyType({}),
 ) -> Cycle:  # fmt: skip
-    """What observers see of a pass that brought the blocks to ``state`` (or of blocks that stand at it). The bodies that
-    were ``left_out`` are solved when somebody asks for what is in them."""
+    """The record of a pass that ended at ``state`` (or of blocks at rest there). Bodies ``left_out`` of the pass are
+    solved when their results are used."""
     motion = now.motion(state)
     endless = now.problem.endless
     if endless is not None:
@@ -60,8 +59,8 @@ def record(
         skips=skips(now, work),
         shortened=shortened(now.block_work),
     )
-    vars(cycle)["motion"] = motion  # known here: the property need not find it again
-    del vars(cycle)["faces"]  # found when somebody asks for them
+    vars(cycle)["motion"] = motion  # already known
+    del vars(cycle)["faces"]  # computed on first use
     if left_out:
         del vars(cycle)["tips"], vars(cycle)["bodies"]
         vars(cycle)["_rest"] = _LeftOut(now, solutions, dict(left_out))
@@ -69,7 +68,7 @@ def record(
 
 
 class _LazyCycle(Cycle):
-    """A cycle whose crack faces are joined, and bodies that were left out solved, on demand."""
+    """A cycle that joins crack faces and solves bodies left out on demand."""
 
     _rest: _LeftOut
 
@@ -87,8 +86,8 @@ class _LazyCycle(Cycle):
 
 
 class _LeftOut:
-    """What it takes to solve bodies that were left out of a pass as they would have been in it: ``now`` as it is, which
-    goes on."""
+    """Solves bodies left out of a pass as they would have been solved in it, from a copy of the data in ``now``, which
+    will change."""
 
     def __init__(self, now: CrackedBlocks, solutions: dict, left_out: dict[int, Body]) -> None:
         self._told, self._solutions, self._left_out = now.growth_screening, solutions, left_out
@@ -105,13 +104,13 @@ class _LeftOut:
         return {block: found[block] for block in self._order}
 
     def tips(self, solutions: dict[int, Any]) -> np.ndarray:
-        """Their TIP rows."""
+        """TIP rows of all bodies."""
         return tip_rows(self._problem, self._blocks, solutions, self._nodes_of)
 
 
 def skips(now: CrackedBlocks, work: dict[str, int]) -> dict[str, Skip]:
-    """What has not been done until now, since nothing had changed, for those of which there was some. Where each piece
-    of work is timed, the first, in which kernels are loaded, is left out of its mean."""
+    """Operations skipped so far because nothing had changed, by kind; kinds without any are left out. The mean time of
+    an operation excludes the first one, which loads kernels."""
     blocks, seconds = now.block_work, now.timed.seconds
     found = {
         "pair searches": Skip(blocks.pair_searches_kept, blocks.pair_searches - 1, blocks.pair_search_s),
@@ -132,16 +131,17 @@ def skips(now: CrackedBlocks, work: dict[str, int]) -> dict[str, Skip]:
 
 
 def event(now: CrackedBlocks, kind: str, state: State, point, detail: str) -> Event:
-    """What happened at ``state`` in the present cycle, at ``point`` (reference coordinates)."""
+    """An event at ``state`` in the present cycle, at ``point`` (reference coordinates)."""
     load = leading_load(now.problem, now.blocks, state.time, now.acted)
     return Event(kind, now.number, state.time, load, (float(point[0]), float(point[1])), detail)
 
 
 def leading_load(problem: Problem, blocks: Blocks, now: float, acted: Mapping[str, float]) -> float:
-    """Normal component of the traction on the scene's leading edge, Pa, positive in compression; 0 without one. Where
-    the block of that edge is moved, what it takes counts too, over the edge's length; ``acted`` are the statistics of
-    the step. In rock without an end the load is what leads there. Where the weight leads (`WEIGHT`), that of a column
-    as high as the scene, ρ g h of the heaviest moving rock, Pa."""
+    """The load that a run is plotted against, Pa, positive in compression; 0 if there is none.
+
+    On a leading edge: the normal traction, plus, if the block of that edge has a prescribed motion, the force of that
+    motion over the edge's length (from the statistics ``acted`` of the step). In unbounded rock: its leading load. If
+    the weight leads (`WEIGHT`): ρ g h of a column of the heaviest moving rock as high as the scene."""
     if problem.endless is not None:
         return problem.endless.load_at(now)
     name = problem.load_edge
@@ -161,7 +161,7 @@ def leading_load(problem: Problem, blocks: Blocks, now: float, acted: Mapping[st
 
 
 def _weight_of_a_column(problem: Problem, now: float) -> float:
-    # Of the problem's blocks, not the present ones: cut and fallen blocks must not change what a load is called.
+    # From the problem's blocks, not the present ones: split and fallen blocks must not change the scale of the load.
     blocks = problem.blocks
     moving = blocks.material[~blocks.fixed]
     density = max((problem.materials[m].density for m in np.unique(moving).tolist()), default=0.0)
@@ -178,7 +178,7 @@ def axial_strain(gauge, motion: Motion) -> float:
 
 
 def joined_faces(cracks: Cracks, solutions: dict) -> CrackFaces | None:
-    """The faces of all solved bodies (block → solution), segments counted in the whole network."""
+    """The faces of all solved bodies (block → solution), with segments numbered in the whole network."""
     if not solutions:
         return None
     faces = [

@@ -23,7 +23,7 @@ from ..model import TIP, Motion, State
 from .coupled_state import CrackedBlocks
 from .crack_compliance.added_compliance import crack_responses, passive, stress_rotations, times
 from .crack_compliance.load_extrapolation import Answer
-from .crack_compliance.quasi_newton import Settling
+from .crack_compliance.quasi_newton import QuasiNewton
 from .load_path import loads_at
 from .load_transfer.elastic_bodies import boundary_loads, threads_for, tip_rows
 from .parallel_map import parallel_map
@@ -31,31 +31,32 @@ from .parallel_map import parallel_map
 #: Relative tolerance of the crack strain in statics, of the block's strain.
 COMPLIANCE_TOLERANCE = 1e-6
 
-#: The same in dynamics. The next step corrects the rest, which is far below the accuracy of any measured toughness.
+#: Relative tolerance in dynamics. The next step corrects the remaining difference, which is far below the accuracy of
+#: any measured toughness.
 DYNAMIC_TOLERANCE = 1e-4
 
 #: Strain scale of a nearly unstrained block, as a fraction of the largest strain of a cracked block: a block in free
 #: flight has hardly any strain to compare with.
 STILL = 1e-3
 
-#: Most iterations of a pass. One or two suffice at unchanged contact states, three after growth, more where contacts
-#: and crack faces open and close. The next step corrects what is left.
+#: Largest number of iterations of a pass. One or two suffice with unchanged contact states, three after growth, more
+#: where contacts and crack faces open and close. The next step corrects the remaining difference.
 COMPLIANCE_PASSES = 20
 
-#: Most iterations of a static pass while every two of them at least halve the mismatch.
-COMING_TOGETHER = 40
+#: Largest number of iterations of a static pass as long as every two of them halve the mismatch.
+MOST_CONVERGING = 40
 
 #: Static iterations after which a block with oscillating forces and crack strain takes the mean-stress response
 #: (`mean_stress_response`). The choice is made from the last half of them; in the last one alone rounding could decide.
 PATIENCE = 10
 
 #: Relative mismatch of the assumed crack strain below which it did not cause a cut of the time step.
-CERTAIN = 1e-2
+AGREED = 1e-2
 
-#: Mismatch above which the pass has failed. In dynamics half the time step is then tried, up to `SHORTER` times: the
+#: Mismatch above which the pass has failed. In dynamics half the time step is then tried, up to `HALVINGS` times: the
 #: shorter the step, the more the inertia limits the strain.
-NO_ANSWER = 0.1
-SHORTER = 4
+FAILED = 0.1
+HALVINGS = 4
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,10 +81,10 @@ def balanced(now: CrackedBlocks, dt: float, load_time: float | None) -> Balance:
     """
     begun, static = now.response, now.system.scheme.static
     # In statics the mean-stress response is used only where the iteration fails without it.
-    for soft_ones_hang in (False, True) if static else (True,) * (1 + SHORTER):
+    for soft_by_mean_stress in (False, True) if static else (True,) * (1 + HALVINGS):
         now.response = begun
-        found, differences = _passes(now, dt, load_time, soft_ones_hang)
-        lost = np.flatnonzero(differences > NO_ANSWER)
+        found, differences = _passes(now, dt, load_time, soft_by_mean_stress)
+        lost = np.flatnonzero(differences > FAILED)
         if not len(lost):
             return found
         dt = dt if static else 0.5 * found.result.dt
@@ -96,7 +97,7 @@ def balanced(now: CrackedBlocks, dt: float, load_time: float | None) -> Balance:
 
 
 @dataclass
-class _Chase:
+class _OscillatingBlocks:
     """Blocks whose forces and crack strain oscillate in the iteration, for a step of ``asked`` s.
 
     ``blocks``: since the full step was last tried (``tried_whole``); ``lately``: in the last iterations; ``doubt``:
@@ -114,34 +115,36 @@ class _Chase:
         again; the returned blocks take the mean-stress response first."""
         # In a shortened static step blocks agree because inertia limits their motion; that is not equilibrium.
         give_way = _softest(now, self.blocks) if self.static and dt != self.asked and self.tried_whole else set()
-        if not self.static or dt == self.asked or ((self.tried_whole or self.doubt < CERTAIN) and not give_way):
+        if not self.static or dt == self.asked or ((self.tried_whole or self.doubt < AGREED) and not give_way):
             return True, set()
         # A crack strain assumed in the first iterations may have caused the cut of a static step.
         self.tried_whole, self.blocks = True, set()
         return False, give_way
 
-    def goes_on(self, now: CrackedBlocks, attempt: int, differences: np.ndarray) -> set[int]:
+    def after_iteration(self, now: CrackedBlocks, attempt: int, differences: np.ndarray) -> set[int]:
         """Blocks that take the mean-stress response after iteration ``attempt``, in which assumed and found crack
         strain differ by ``differences`` (n_cracked,)."""
-        chasing = set(np.array(list(now.bodies), int)[differences > NO_ANSWER].tolist())
-        self.blocks |= chasing
-        self.lately = self.lately | chasing if attempt >= PATIENCE // 2 else set()
+        oscillating = set(np.array(list(now.bodies), int)[differences > FAILED].tolist())
+        self.blocks |= oscillating
+        self.lately = self.lately | oscillating if attempt >= PATIENCE // 2 else set()
         return _softest(now, self.lately) if attempt + 1 == PATIENCE else set()
 
 
-def _passes(now: CrackedBlocks, dt: float, load_time: float | None, soft_ones_hang: bool) -> tuple[Balance, np.ndarray]:
+def _passes(
+    now: CrackedBlocks, dt: float, load_time: float | None, soft_by_mean_stress: bool
+) -> tuple[Balance, np.ndarray]:
     """The iterations of a step of at most ``dt`` s; returns the result and the remaining relative mismatch of crack
     strain (n_cracked,)."""
-    static, settling = now.system.scheme.static, now.settling
+    static, quasi_newton = now.system.scheme.static, now.quasi_newton
     if static:
-        settling.begin(tuple(now.bodies))
+        quasi_newton.begin(tuple(now.bodies))
     else:
-        settling.forget()  # in motion, contact changes of the last step need not recur
+        quasi_newton.forget()  # in motion, contact changes of the last step need not recur
     tolerance = COMPLIANCE_TOLERANCE if static else DYNAMIC_TOLERANCE
     response = _expected(now, now.state.time + dt if load_time is None else load_time) if static else now.response
-    result, iterations, chase = None, 0, _Chase(static, dt)
+    result, iterations, oscillating = None, 0, _OscillatingBlocks(static, dt)
     left: list[float] = []
-    for attempt in range(COMING_TOGETHER if static else COMPLIANCE_PASSES):
+    for attempt in range(MOST_CONVERGING if static else COMPLIANCE_PASSES):
         result = _step(now, dt, load_time, response, result)
         # Iterations of different step lengths, and so in statics of different loads, would never agree.
         cut, dt = result.dt < dt, min(dt, result.dt)
@@ -152,32 +155,32 @@ def _passes(now: CrackedBlocks, dt: float, load_time: float | None, soft_ones_ha
             return Balance(result, {}, np.empty(0, TIP)), np.zeros(0)
         if not static:
             now.by_mean_stress.take_all(now.bodies)
-        elif soft_ones_hang:
+        elif soft_by_mean_stress:
             now.by_mean_stress.find(now.bodies, now.system.compliance, result.contacts)
         # A block with the mean-stress response needs no contact forces until the iteration has converged.
         solved = not all(block in now.by_mean_stress for block in now.bodies)
         if solved:
             _solve_bodies(now, result)
-        response, differences, answer = _take_response(now, result.state, settling, tolerance)
+        response, differences, answer = _take_response(now, result.state, quasi_newton, tolerance)
         left.append(float(differences.max()))
-        chase.doubt = max(chase.doubt, left[-1]) if cut else chase.doubt
+        oscillating.doubt = max(oscillating.doubt, left[-1]) if cut else oscillating.doubt
         if left[-1] < tolerance:
             if static:
                 _remember(now, answer)
-            done, give_way = chase.agreed(now, dt)
+            done, give_way = oscillating.agreed(now, dt)
             if done:
                 break
-            dt = chase.asked
+            dt = oscillating.asked
         else:
-            give_way = chase.goes_on(now, attempt, differences)
+            give_way = oscillating.after_iteration(now, attempt, differences)
         if attempt + 1 >= COMPLIANCE_PASSES and not left[-1] < 0.5 * left[-3]:
             break
         for block in sorted(give_way):
             now.by_mean_stress.add(block)
         if give_way:
             # The oscillation may have caused the cut of the step.
-            dt = chase.asked
-            settling.forget()
+            dt = oscillating.asked
+            quasi_newton.forget()
     left_out = {} if solved else _solve_what_may_grow(now, result)
     statistics = {
         "open_close_iterations": iterations,
@@ -201,11 +204,11 @@ def _step(
 
 def _with_tips(now: CrackedBlocks, result: StepResult, statistics: dict[str, float], left_out: dict) -> Balance:
     """The result of the last iteration, with its tips. Bodies ``left_out`` are solved as well where any tip grows."""
-    tips = _judged(now)
+    tips = _tips_with_criterion(now)
     if left_out and (tips["k_eq"] >= toughness(now, tips)).any():
         # The step is repeated with the growth, so all tips are needed.
         _solve(now, now.bodies)
-        left_out, tips = {}, _judged(now)
+        left_out, tips = {}, _tips_with_criterion(now)
     for body in left_out.values():
         body.work.solutions_left_out += 1
     if not now.system.scheme.static:
@@ -213,15 +216,15 @@ def _with_tips(now: CrackedBlocks, result: StepResult, statistics: dict[str, flo
     return Balance(result, now.solutions, tips, statistics, left_out)
 
 
-def _softest(now: CrackedBlocks, chasing: set[int]) -> set[int]:
-    """The soft block among the oscillating ones (``chasing``), which drives the others. Where several are soft, all
+def _softest(now: CrackedBlocks, oscillating: set[int]) -> set[int]:
+    """The soft block among the oscillating ones (``oscillating``), which drives the others. Where several are soft, all
     soft blocks: they drive each other, and rounding would decide between them."""
 
     def soft(block: int) -> bool:
         return now.by_mean_stress.soft(block, now.bodies[block], now.system.compliance[block])
 
-    found = {block for block in chasing if soft(block)}
-    return {block for block in now.bodies if soft(block)} if len(found) > 1 else found or chasing
+    found = {block for block in oscillating if soft(block)}
+    return {block for block in now.bodies if soft(block)} if len(found) > 1 else found or oscillating
 
 
 def toughness(now: CrackedBlocks, tips: np.ndarray) -> np.ndarray:
@@ -230,7 +233,7 @@ def toughness(now: CrackedBlocks, tips: np.ndarray) -> np.ndarray:
     return k_ic[now.blocks.material[tips["block"]]]
 
 
-def _judged(now: CrackedBlocks) -> np.ndarray:
+def _tips_with_criterion(now: CrackedBlocks) -> np.ndarray:
     return tip_rows(now.problem, now.blocks, now.solutions, now.nodes_of)
 
 
@@ -248,7 +251,7 @@ def _expected(now: CrackedBlocks, time: float) -> dda.CrackResponse:
     known, beyond, s = now.extrapolation.at(loads_at(now.problem.loads, time), blocks, _systems(now))
     last, grown = now.extrapolation.last(blocks), np.zeros_like(beyond)
     if last is not None:
-        for b, solution in _answers_to_the_last_forces(now, numbers[~known].tolist()).items():
+        for b, solution in _solutions_under_last_forces(now, numbers[~known].tolist()).items():
             k = blocks.index(b)
             known[k], s[k] = True, now.compliances[b][2]
             beyond[k] = last.strain[k] - s[k] @ last.stress[k]
@@ -263,7 +266,7 @@ def _expected(now: CrackedBlocks, time: float) -> dda.CrackResponse:
         size = _strained(now.system.compliance[numbers], last.stress, last.strain + grown)
         if known.all():
             offset, s = response.offset[numbers], response.compliance[numbers]
-            response.offset[numbers] = now.settling.next(offset, grown, s, size)
+            response.offset[numbers] = now.quasi_newton.next(offset, grown, s, size)
         else:
             response.offset[numbers] += grown
     return response
@@ -276,7 +279,7 @@ def _strained(elastic: np.ndarray, stress: np.ndarray, strain: np.ndarray) -> np
     return np.maximum(size, STILL * size.max())
 
 
-def _answers_to_the_last_forces(now: CrackedBlocks, grown: list[int]) -> dict:
+def _solutions_under_last_forces(now: CrackedBlocks, grown: list[int]) -> dict:
     """Solutions (block →) of the ``grown`` blocks under the boundary forces of the last pass, where these are known.
     Sets their compliances."""
     asked = {b: now.bodies[b] for b in grown if b in now.loads and b not in now.by_mean_stress}
@@ -341,7 +344,7 @@ def _solve(now: CrackedBlocks, bodies: dict) -> None:
 
 
 def _take_response(
-    now: CrackedBlocks, state: State, settling: Settling, tolerance: float
+    now: CrackedBlocks, state: State, quasi_newton: QuasiNewton, tolerance: float
 ) -> tuple[dda.CrackResponse, np.ndarray, Answer]:
     """The crack response for the next iteration, the relative mismatch of the assumed one (n_cracked,), and the strains
     found. Sets ``now.response``, with which the next step begins."""
@@ -377,7 +380,7 @@ def _take_response(
             differences = np.abs(residual).max(axis=1) / size
             if differences.max() >= tolerance:
                 before = again.offset[blocks] - residual
-                again.offset[blocks] = settling.next(before, residual, again.compliance[blocks], size)
+                again.offset[blocks] = quasi_newton.next(before, residual, again.compliance[blocks], size)
     now.response = after
     own_stress = times(stress_rotations(-state.rotation[blocks]), state.stress[blocks])
     return again, differences, Answer(loads_at(now.problem.loads, state.time), _systems(now), strain, own_stress, known)

@@ -1,4 +1,4 @@
-"""Work on many blocks side by side: they are independent of each other as long as their loads are given."""
+"""Parallel work on blocks, which are independent of each other under given loads."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import TypeVar
 _Item = TypeVar("_Item")
 _Result = TypeVar("_Result")
 
-#: The processors this process may use, where the system gives them.
+#: Number of processors that this process may use.
 THREADS = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 _pools: dict[int, ThreadPoolExecutor] = {}
 
@@ -18,8 +18,8 @@ _pools: dict[int, ThreadPoolExecutor] = {}
 def parallel_map(work: Callable[[_Item], _Result], items: Sequence[_Item], threads: int | None = None) -> list[_Result]:
     """``work(item)`` of all ``items``, in their order, on ``threads`` threads (default `THREADS`).
 
-    Every item is worked on by one thread alone, so that results do not depend on how many there are; ``work`` must
-    change nothing that two items share. Of several exceptions that of the first item is raised, when all have ended.
+    Each item is processed by one thread, so that results do not depend on the number of threads; ``work`` must not
+    modify shared data. If several items raise, the exception of the first item is raised after all have ended.
     """
     threads = min(THREADS if threads is None else threads, len(items))
     if threads < 2:

@@ -1,4 +1,4 @@
-"""How long each phase of a run takes."""
+"""Wall time of the phases of a run."""
 
 from __future__ import annotations
 

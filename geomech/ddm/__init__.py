@@ -8,7 +8,7 @@
     sol = ddm.solve_to(loops, cracks, material, load, target_error=1e-6)    # the mesh follows from the error
     sol.tip_errors                                                          # how far to trust each K
 
-`criteria` say where a tip goes, `tip_advance` takes it there, and `propagate` does both again and again:
+`criteria` give the growth direction of a tip, `tip_advance` extends the crack, and `propagate` repeats both:
 
     for step in ddm.propagate(loops, cracks, material, load, control="toughness"):
         step.load_factor, step.cracks, step.tips, step.solution

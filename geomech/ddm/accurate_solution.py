@@ -1,4 +1,4 @@
-"""A body solved on finer and finer meshes, until its stress intensity factors are good to a target error."""
+"""A body solved on successively finer meshes until its stress intensity factors reach a target error."""
 
 from __future__ import annotations
 
@@ -29,10 +29,10 @@ def solve_to(
 ) -> Solution:
     """The body under ``load`` with stress intensity factors to ``target_error``, relative to the largest K.
 
-    Meshes of two orders, and of further ones while their K differ by more than the target. ``tip_errors`` of the
-    solution, which is that of the last mesh, is what it differs by from the one before: a bound of the error, ten times
-    as large as a rule. Raises `TargetMissed`, with the last solution, when the highest order does not reach the target.
-    ``body``: further arguments of `Body`.
+    Solves on meshes of increasing order, at least two, until K of the last two differ by no more than the target. The
+    result is the last solution; its ``tip_errors`` are the differences from the one before, usually ten times the true
+    error. Raises `TargetMissed`, with the last solution, if the highest order does not reach the target. ``body``:
+    further arguments of `Body`.
 
     >>> rock = Material("rock", 17e9, 0.21)
     >>> crack = Cracks.from_polylines([np.array([[-1.0, 0.0], [1.0, 0.0]])])
@@ -41,7 +41,7 @@ def solve_to(
     True
     """
     check_target(target_error)
-    # What is graded for twice the target is a tenth finer the second time.
+    # Begin with a tenfold target; the next mesh is graded more finely.
     order = order_for(min(10 * target_error, 0.5))
     settings = of_order(DdmSettings(nodes=nodes), min(order, HIGHEST - 2), min(2 * target_error, 0.5))
     before = Body(loops, cracks, material, settings, **body).solve(load)

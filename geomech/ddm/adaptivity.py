@@ -1,9 +1,10 @@
-"""From the error that is asked for to order, elements and grading.
+"""Element order, number of elements and grading for a target error.
 
-More elements of one order do not make K more accurate, a higher order does: by a factor of ten to a hundred from one
-even order to the next (odd ones are hardly better than the even one below). So a straight crack is one element as long
-as nothing is near (`proximity` halves what is), a side of a body two, and the order follows the target. The orders are
-those whose median error over the problems of `tests/validation/test_automatic.py` is below half the target.
+A higher order makes K more accurate, more elements of the same order do not: from one even order to the next the error
+falls by a factor of ten to a hundred (an odd order is hardly better than the even one below). A straight crack is
+therefore one element unless something is near it (`proximity` divides it then), a side of a body two elements, and the
+order follows from the target: it is the lowest whose median error over the problems of
+`tests/validation/test_automatic.py` is below half the target.
 """
 
 from __future__ import annotations
@@ -18,14 +19,14 @@ from .kernels import shape_functions
 _ORDERS = ((1e-2, 2), (1e-4, 4), (1e-5, 6), (1e-7, 8))
 #: The order for smaller errors.
 HIGHEST = 10
-#: Elements are graded by this ratio: half as many layers do what those of 0.3 do.
+#: Grading ratio of element lengths; needs half as many layers as 0.3.
 _RATIO = 0.15
 _PER_SIDE = 2
 
 
 def for_target(settings: DdmSettings) -> DdmSettings:
-    """``settings`` with the mesh that their ``target_error`` asks for; as they are without one. ValueError when it is
-    not between 0 and 1."""
+    """``settings`` with the mesh for their ``target_error``; unchanged if there is none. Raises ValueError if it is not
+    between 0 and 1."""
     target = settings.target_error
     if target is None:
         return settings
@@ -40,7 +41,7 @@ def check_target(target: float) -> None:
 
 
 def order_for(target: float) -> int:
-    """The order whose median error is below half the ``target``."""
+    """The lowest order whose median error is below half the ``target``."""
     return next((p for error, p in _ORDERS if target >= 0.999 * error), HIGHEST)
 
 
@@ -52,7 +53,7 @@ def of_order(settings: DdmSettings, order: int, target: float) -> DdmSettings:
         elements_per_crack=1,
         elements_per_side=_PER_SIDE,
         grading_ratio=_RATIO,
-        # Only the ends of supports ask for these: corners, kinks and mouths are graded for the target itself.
+        # Used at the ends of supports only: corners, kinks and mouths are graded for the target itself.
         grading_layers=math.ceil(-math.log10(target)),
         grading_error=target,
         target_error=None,
@@ -60,8 +61,8 @@ def of_order(settings: DdmSettings, order: int, target: float) -> DdmSettings:
 
 
 def finer(settings: DdmSettings) -> DdmSettings:
-    """The next even order, graded one step deeper; at the highest order the even one below instead, as what differs
-    from it is known then as well."""
+    """The next even order, graded one step deeper; at the highest order the even one below, since the difference
+    between the two is all that is needed."""
     up = settings.order < shape_functions.MAX_ORDER
     error = settings.grading_error
     return replace(

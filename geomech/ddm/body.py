@@ -1,13 +1,13 @@
-"""A block with cracks: its matrices, made once for a geometry, and its solution under any load.
+"""An elastic body with cracks: its matrices, computed once for a geometry, and its solution under any load.
 
-The total stress in the rock is that of the boundary tractions as Kelvin line forces, of the boundary's own displacement
-and of the cracks' opening and slip as displacement jumps, and of a particular field (Somigliana's identity): the plane
-outside stays at rest. So the traction seen from *outside* the boundary must vanish,
+By Somigliana's identity the total stress in the rock is the sum of the stresses of the boundary tractions (Kelvin line
+forces), of the boundary displacement and the opening and slip of cracks (displacement jumps), and of a particular
+field; the plane outside the boundary is then at rest. So the traction on the *outside* of the boundary must vanish,
 
     A_ΓΓ u + A_ΓC w + g = 0,        A_CΓ u + A_CC w + r = −p n,
 
-u the boundary displacement, w slip and opening. A_ΓΓ is factored once and everything else happens on the Schur
-complement S = A_CC − A_CΓ A_ΓΓ⁻¹ A_ΓC of the crack unknowns. The matrices depend on nothing but geometry and ν.
+with u the boundary displacement and w slip and opening. A_ΓΓ is factored once; all else uses the Schur complement S =
+A_CC − A_CΓ A_ΓΓ⁻¹ A_ΓC of the crack unknowns. The matrices depend only on geometry and ν.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from .crack_contact.face_contact import settle_faces
 from .crack_contact.face_equations import FaceEquations
 from .crack_contact.face_laws import SMOOTH, FaceLaws, FaceMemory, all_smooth, check_laws
 from .fracture.chord_error import with_halved_chords
-from .fracture.target_error import met
+from .fracture.target_error import refined_to_target
 from .fracture.tip_elements import tip_elements
 from .fracture.weight_functions import TipFunctionals
 from .iterative.boundary_gmres import is_iterated
@@ -44,7 +44,7 @@ from .mesh.geometry_checks import check_cracks, check_outline, new_segments
 from .mesh.half_plane import HalfPlane
 from .mesh.point_location import outlined
 from .solution import Solution
-from .system.bordered_factor import SMALLEST, Bordered
+from .system.bordered_factor import SMALLEST_BORDERED, Bordered
 from .system.boundary_system import BoundarySystem
 from .system.displacement_jumps import closing, strain_weights
 from .system.influence_matrix import ElementSet, influence, reuse
@@ -57,14 +57,14 @@ _log = logging.getLogger(__name__)
 class Body:
     """An elastic body with cracks.
 
-    ``loops``: (n, 2) arrays, the outline counter-clockwise, then holes clockwise; [] is the infinite plane. ``holes``:
-    more of them, which may run either way, in the infinite plane too. ``half_plane``: the rock is that below a free
-    surface instead of all of the plane; cracks may end at it. ``cracks``: those of this body. ``previous``: an earlier
-    body of which whatever is unchanged, element by element, is reused, factors included (`bordered_factor`): growth costs the
-    rows and columns of the new elements. ``face_laws``: what crack faces do to each other (`face_laws`), the ``law`` of
-    a crack segment counts in them. ``counts``: operations that making it took; ``work``: those since then, by all bodies
-    that share it. Raises ValueError naming the item on geometry that is no body, numpy.linalg.LinAlgError when cracks
-    cut a part off.
+    ``loops``: (n, 2) arrays, the outline counter-clockwise, then holes clockwise; [] for the infinite plane. ``holes``:
+    further holes in either direction, also in the infinite plane. ``half_plane``: the rock is that below a free
+    surface, where cracks may end. ``cracks``: those of this body. ``previous``: an earlier body whose unchanged
+    elements are reused, factors included (`bordered_factor`); growth then costs the rows and columns of the new
+    elements. ``face_laws``: laws of the crack faces (`face_laws`), selected by the ``law`` of each crack segment.
+    ``counts``: operations that setting up the body took; ``work``: operations since then of all bodies that share it.
+    Raises ValueError, naming the item, if the geometry is not a body, and numpy.linalg.LinAlgError if cracks cut off a
+    part.
 
     >>> rock = Material("rock", 17e9, 0.21, k_ic=2e6)
     >>> crack = Cracks.from_polylines([np.array([[-1.0, 0.0], [1.0, 0.0]])])
@@ -88,12 +88,12 @@ class Body:
     ):
         self.half_plane = half_plane
         self.material, self.cracks = material, cracks
-        #: What was asked for; ``settings`` are those of the mesh, which a target error decides.
-        self.asked = DdmSettings() if settings is None else settings
-        self.settings = settings = for_target(self.asked)
+        #: The settings given; ``settings`` are those of the mesh, which may follow from a target error.
+        self.requested = DdmSettings() if settings is None else settings
+        self.settings = settings = for_target(self.requested)
         self._finer: Body | None = None
         self._finer_before: Body | None = None
-        if previous is not None and previous.asked == self.asked:
+        if previous is not None and previous.requested == self.requested:
             self.settings = settings = previous.settings
             self._finer_before = previous._finer or previous._finer_before
         self.supports, self.face_laws = tuple(supports), tuple(face_laws)
@@ -141,20 +141,21 @@ class Body:
         self.compressed = is_compressed("compressed" if many else solver, self.faces.n_unknowns, factored)
         if half_plane is not None and self.boundary.n_unknowns > FACTORABLE:
             raise ValueError(
-                f"half_plane: {self.boundary.n_unknowns} unknowns on holes, but below a free surface no more than {FACTORABLE} are "
-                "solved for: ask for a larger target_error, or draw the surface as a side of a large block"
+                f"half_plane: {self.boundary.n_unknowns} unknowns on holes, but below a free surface no more than "
+                f"{FACTORABLE} can be solved: set a larger target_error, or draw the surface as a side of a large block"
             )
         self._functionals: tuple[tuple, TipFunctionals] | None = None
-        #: Bodies with trial kinks (`f_criterion`): length → number of the direction → body.
+        #: Bodies with trial kinks (`f_criterion`), by kink length and direction number.
         self.trials: dict[float, dict[int, Body]] = {}
-        #: How cracks answer to an even stress, by the states of their faces (`uniform_stress_response`).
+        #: Responses to uniform stress, by the states of the crack faces (`uniform_stress_response`).
         self.uniform_responses: dict[bytes, UniformStressResponse] = {}
         #: Where faces stand on bases, and how unit tractions move them by the states of the cracks (`rigid_bases`).
         self.on_bases: dict[bytes, object] = {}
         self._assemble(previous, holds, many)
 
     def _measure(self, same: Body | None) -> None:
-        """Area, centroid and moments of the rock, and of the holes in it; those of a body with the ``same`` outlines."""
+        """Compute area, centroid and moments of the rock and its holes, or copy those of a body with the ``same``
+        loops."""
         if self.outlined and same is not None:
             self.area, self.centroid, self._second = same.area, same.centroid, same._second
             self._reach, self.hole_moments = same._reach, same.hole_moments
@@ -173,7 +174,7 @@ class Body:
         return self.material.effective_poissons_ratio
 
     def remeshed(self, settings: DdmSettings, previous: Body | None = None) -> Body:
-        """The same body with another mesh; ``previous`` as of `Body`."""
+        """The same body with another mesh; ``previous`` as in `Body`."""
         n_outlines = int(self.outlined)
         return Body(
             self.loops[:n_outlines],
@@ -188,16 +189,16 @@ class Body:
         )
 
     @property
-    def one_finer(self) -> Body:
-        """The same body with the next finer mesh (at the highest order the one below), kept; it goes by what this body
-        was ``asked`` for, too."""
+    def refined(self) -> Body:
+        """The same body with the next finer mesh (at the highest order the one below); cached. It has the same
+        requested settings."""
         if self._finer is None:
             self._finer = self.remeshed(finer(self.settings), self._finer_before)
-            self._finer.asked, self._finer_before = self.asked, None
+            self._finer.requested, self._finer_before = self.requested, None
         return self._finer
 
     @cached_property
-    def rounder(self) -> Body | None:
+    def with_rounded_walls(self) -> Body | None:
         """The same body with every chord of a curved wall halved (`with_halved_chords`); None where all are straight."""
         halved = with_halved_chords(self)
         if halved is None:
@@ -216,7 +217,8 @@ class Body:
         )
 
     def _in_half_plane(self, edges: np.ndarray) -> np.ndarray:
-        """``edges`` (m, 2, 2) and a piece of the free surface. Raises ValueError on what does not stand below it."""
+        """``edges`` (m, 2, 2) and a piece of the free surface. Raises ValueError if anything is not below the
+        surface."""
         if self.outlined:
             raise ValueError("half_plane: the body has an outline; a half-plane has none but its surface")
         self.half_plane.check_inside(self.loops, self.cracks)
@@ -229,21 +231,21 @@ class Body:
 
     @property
     def limits(self) -> list[np.ndarray]:
-        """Loops about what is not rock, that above a free surface included, and the outline."""
+        """Loops that bound the rock: outline, holes, and one around the region above a free surface."""
         if self.half_plane is None:
             return self.loops
         return [*self.loops, self.half_plane.region_above_surface(self._vertices)]
 
     @property
     def sides(self) -> np.ndarray:
-        """(m, 2, 2) edges of the loops and, of a free surface, the piece that is in sight."""
+        """(m, 2, 2) edges of the loops, and the piece of a free surface above the structure."""
         if self.half_plane is None:
             return self.mesh.edges
         return np.concatenate([self.mesh.edges, self.half_plane.edge(self._vertices)])
 
-    def found_again(self, loops: list[np.ndarray], cracks: Cracks, material: Material) -> Body | None:
-        """This body where ``loops``, ``cracks`` and ``material`` are its own, else None. What cracks and blocks are
-        called and when they grew may differ: the body is then a copy that shares all else with this one."""
+    def reusable_for(self, loops: list[np.ndarray], cracks: Cracks, material: Material) -> Body | None:
+        """This body if ``loops``, ``cracks`` and ``material`` equal its own, else None. If names or birth cycles of
+        cracks differ, the result is a copy that shares everything else."""
         own = self.cracks
         same = (
             material == self.material
@@ -252,7 +254,7 @@ class Body:
                 np.array_equal(getattr(own, name), getattr(cracks, name))
                 for name in ("nodes", "segments", "aperture", "surface", "law")
             )
-            # Iteration goes by cracks.
+            # The iterative solution groups elements by crack.
             and (not self.compressed or np.array_equal(own.crack, cracks.crack))
         )
         if not same:
@@ -273,7 +275,7 @@ class Body:
         self.boundary = g = system.elements
         g_old, same_boundary = system.at_old, system.unchanged
         c_old = c.found_in(old.faces if old else None)
-        c_seen = c.seen_in(old.faces if old else None, c_old)
+        c_seen = c.same_place_in(old.faces if old else None, c_old)
         self.counts["elements"] = g.n + c.n
         self.counts["elements_new"] += int((g_old < 0).sum() + (c_old < 0).sum())
         if not same_boundary:
@@ -304,14 +306,14 @@ class Body:
 
         if (self.compressed or iterated) and not (old and (old.compressed or old._outside.iterated)):
             of = [f"{g.n_unknowns} on the boundary"] * iterated + [f"{c.n_unknowns} on cracks"] * self.compressed
-            _log.info("unknowns that are iterated on, not factored: %s", ", ".join(of))
+            _log.info("solved iteratively instead of factored: %s", ", ".join(of))
         if self.compressed:
             on_boundary, crack = gc(np.arange(c.n)), self.cracks.crack[c.source]
             on_both = system.factor if system.iterated else None
             self._w, self.crack_system = compressed(c, crack, system.solve, on_boundary, self._cg, nu, tol, on_both)
             return
-        # W = A_ΓΓ⁻¹ A_ΓC and S by the columns and rows of new elements; A_ΓC and A_CC are not kept, as they are cheaper
-        # to make again, should the boundary change, than to carry along.
+        # W = A_ΓΓ⁻¹ A_ΓC and S are extended by the columns and rows of new elements. A_ΓC and A_CC are not kept: they
+        # are cheaper to recompute if the boundary changes than to carry along.
         kept = same_boundary and not old.compressed
 
         def follow(k):
@@ -325,13 +327,13 @@ class Body:
             direct = influence(c.take(r), c.take(k), nu, tol)
             if not g.n:
                 return direct
-            # Column-major like the first: a difference of both orders takes several times as long.
+            # Column-major like the first: subtracting arrays of different order takes several times as long.
             if len(r) == c.n:
                 return direct - (self._cg @ w.of(k).T if len(k) < c.n else (w.dense @ self._cg.dense.T).T)
             return direct - ((w @ self._cg.of(r).T) if len(k) == c.n else w.of(k) @ self._cg.of(r).T).T
 
         known = old.crack_system.matrix if kept else None
-        if known is None or not known.n or c.n_unknowns < SMALLEST:
+        if known is None or not known.n or c.n_unknowns < SMALLEST_BORDERED:
             whole = reuse(None if known is None else known.dense, c_old, c_old, c, c, schur)
             matrix = Bordered.whole(c, whole)
         else:
@@ -339,7 +341,7 @@ class Body:
         self.crack_system = CrackSystem(matrix, self.work, old.crack_system if kept else None, c_old)
 
     def _imposed(self, applied: Applied) -> np.ndarray:
-        """(h_unknowns,) 2μ times what the supports hold of displacement, less that of particular fields."""
+        """(h_unknowns,) 2μ times the displacement that supports prescribe, minus that of particular fields."""
         holds, load = self._outside.holds, applied.load
         values = () if load.displacements is None else load.displacements
         if load.displacements is not None and len(values) != len(self.supports):
@@ -353,7 +355,7 @@ class Body:
         return 2 * self.material.shear_modulus * holds.imposed(shift)
 
     def _straight(self, k: int) -> np.ndarray:
-        """(2, 2) support ``k`` in the direction it was given in."""
+        """(2, 2) ends of support ``k`` in the order given."""
         on = self.supports[k].on
         return self.support_segments[k] if isinstance(on, int) else np.array(on)
 
@@ -369,22 +371,22 @@ class Body:
     ) -> Solution:
         """The body under ``load``.
 
-        Where a ``target_error`` was asked for, its K are compared with those of a finer mesh, unless ``meet_target`` is
-        False: the solution then has `tip_errors` below the target and may be of a finer ``body`` than this one.
+        With a ``target_error`` in the settings, and unless ``meet_target`` is False, K is compared with that of a finer
+        mesh: the result has `tip_errors` below the target and may belong to a finer ``body`` than this one.
 
-        ``history``: the solution, of this or an earlier body, from which the load went on to this one, or its
-        ``memory``. Faces with friction begin with its slip and its broken cement, so that the answer is a step of a
-        process; without it they begin as if never loaded. ``warm``: a solution whose face states are no more than the
-        first guess of the contact, by default ``history``; smooth faces have no memory and need nothing else.
+        ``history``: the solution, of this or an earlier body, at the end of the previous load step, or its ``memory``.
+        Faces with friction start with its slip and broken cement; without it they start as if never loaded. ``warm``: a
+        solution whose face states are the first guess of the contact, by default ``history``. It does not affect the
+        result, and frictionless faces need nothing else.
 
-        Raises OutOfEquilibrium when force or moment do not vanish within the tolerance, relative to the loads' size;
-        `faces.NotConverged` when the contact of crack faces does not settle; `TargetMissed` when no mesh meets the
+        Raises OutOfEquilibrium if force or moment do not vanish within the tolerance, relative to the size of the
+        loads; `NotConverged` if the contact of crack faces does not converge; `TargetMissed` if no mesh reaches the
         target.
         """
-        target = self.asked.target_error
+        target = self.requested.target_error
         if target is not None and meet_target and len(self.cracks.tips):
             rough = self.solve(load, warm, equilibrium_tolerance, history, False)
-            return met(rough, target, lambda body: body.solve(load, warm, np.inf, history, False))
+            return refined_to_target(rough, target, lambda body: body.solve(load, warm, np.inf, history, False))
         try:
             return self._solved(load, warm, equilibrium_tolerance, history)
         except NotSolved as failure:
@@ -392,11 +394,12 @@ class Body:
             return self._solved(load, warm, equilibrium_tolerance, history)
 
     def _factor_after_all(self, failure: NotSolved) -> None:
-        """The iteration was picked by the number of unknowns; elements that are very unlike, or parts that hardly hang
-        together, stop it. Raises ``failure`` where it was asked for, or where there are too many to factor."""
+        """Switch to factors after the iterative solution, chosen by the number of unknowns, has failed: elements of
+        very different lengths, or nearly separated parts, stop its convergence. Raises ``failure`` if the iterative
+        solver was requested, or if there are too many unknowns to factor."""
         if self.settings.solver != "auto" or self.faces.n_unknowns + self.boundary.n_unknowns > FACTORABLE:
             raise failure
-        _log.info("%s; factored instead", failure)
+        _log.info("%s; solved with factors instead", failure)
         before = copy(self)
         self.compressed, self._factored_after_all = False, True
         vars(self).pop("face_equations", None)
@@ -409,8 +412,8 @@ class Body:
         equilibrium_tolerance: float,
         history: Solution | FaceMemory | None,
     ) -> Solution:
-        applied, units, rest, imposed = self.lay_out(load, equilibrium_tolerance)
-        # Rough faces have equations of their own: the inverse of S is no use to them.
+        applied, units, rest, imposed = self.decompose(load, equilibrium_tolerance)
+        # Faces with friction have other equations, for which S⁻¹ is of no use.
         opening = np.zeros_like if self.rough else self.crack_system.opened
         g, r, y, reduced, opened = self._loads.add(units, rest, self._outside, self._cg, opening)
         pressure = load.face_pressure(self.faces.nodes, self.faces.source, self.cracks.n_segments)
@@ -421,17 +424,17 @@ class Body:
         edge_density = sum(on_edges) if on_edges else None
         return Solution(self, applied, y, answer, g, r, imposed, edge_density)
 
-    def lay_out(
+    def decompose(
         self, load: BodyLoad, equilibrium_tolerance: float = np.inf
     ) -> tuple[Applied, list[tuple[UnitLoad, np.ndarray]], np.ndarray, np.ndarray]:
-        """What ``load`` comes to here: fields and line forces, the unit loads in it with their sizes, traction (n,) on
-        boundary and cracks besides, and the displacement that supports impose."""
+        """The parts of ``load`` on this body: fields and line forces; unit loads with their sizes; the remaining
+        traction (n,) on boundary and cracks; and the displacement that supports prescribe."""
         applied = apply(load, self)
         if self.outlined:
             check_equilibrium(applied, self, equilibrium_tolerance)
         n_g, uniform = self.boundary.n_unknowns, applied.particular.uniform
         rest = np.zeros(n_g + self.faces.n_unknowns)
-        if uniform.any() and len(self.loops) == self.outlined:  # else it is among the unit loads
+        if uniform.any() and len(self.loops) == self.outlined:  # otherwise it is one of the unit loads
             rest[n_g:] = on_elements(self.faces, uniform)
         if not applied.plain:
             tol = 2 * OFF * self._extent
@@ -444,20 +447,21 @@ class Body:
         return applied, self._loads.of(applied), rest, imposed
 
     def closed_traction(self, load: BodyLoad) -> np.ndarray:
-        """(n_crack_unknowns,) Pa, along and normal: what ``load`` brings to crack faces that nothing opens or moves."""
-        _, units, rest, _ = self.lay_out(load)
+        """(n_crack_unknowns,) Pa, tangential and normal: traction of ``load`` on crack faces without opening or
+        slip."""
+        _, units, rest, _ = self.decompose(load)
         total = rest + sum(unit.applied @ size for unit, size in units)
         n_g = self.boundary.n_unknowns
         return total[n_g:] - self._cg @ self._outside.solve(total[:n_g]) if n_g else total
 
-    def unit_answers(self, segments: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """What forces of one N/m at the ends of ``segments`` (m, 2, 2) come to, A_ΓΓ⁻¹ g (n_boundary_unknowns, 4 m) and
-        traction on closed faces (n_crack_unknowns, 4 m): columns as of `UnitLoad`."""
+    def unit_responses(self, segments: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Responses to forces of 1 N/m at the ends of ``segments`` (m, 2, 2): A_ΓΓ⁻¹ g (n_boundary_unknowns, 4 m) and
+        traction on closed faces (n_crack_unknowns, 4 m); columns as in `UnitLoad`."""
         return self._loads.answers(segments, self._outside, self._cg)
 
     def k_functionals(self, solution: Solution | None = None) -> TipFunctionals:
-        """K_I and K_II of all tips as functions of the load, for the face states of ``solution`` (all open if None);
-        kept until others are asked for."""
+        """K_I and K_II of all tips as linear functions of the load, for the face states of ``solution`` (all open if
+        None). The last ones are cached."""
         began = None if solution is None else solution.began
         key = (b"" if solution is None else solution.face_states.key), began
         if self._functionals is None or self._functionals[0][0] != key[0] or self._functionals[0][1] is not began:
@@ -466,17 +470,17 @@ class Body:
 
     @cached_property
     def laws(self) -> FaceLaws:
-        """The faces' laws, node by node."""
+        """The laws of the faces at each node."""
         return FaceLaws(self.face_laws, self.faces, self.cracks, 2 * self.material.shear_modulus)
 
     @cached_property
-    def never_loaded(self) -> FaceMemory:
-        """What faces remember that have no history."""
+    def initial_memory(self) -> FaceMemory:
+        """Memory of faces that have never been loaded."""
         return FaceMemory.none(self.faces)
 
     @cached_property
     def face_equations(self) -> FaceEquations:
-        """The equations of crack faces in any state of contact."""
+        """The equations of crack faces in any contact state."""
         return FaceEquations(self.crack_system, self.laws, self.work)
 
     @cached_property
@@ -495,13 +499,13 @@ class Body:
         return strain_weights(self.faces) / (self.area * 2 * self.material.shear_modulus)
 
     def compliance(self, sol: Solution | None = None) -> np.ndarray:
-        """(3, 3) added compliance, 1/Pa: mean crack strain (xx, yy, xy; engineering shear) per uniform boundary stress,
-        with the face states of ``sol`` (all open if None); symmetrised. Raises ValueError in the infinite plane
-        and with supports, against which a uniform boundary stress says nothing."""
+        """(3, 3) added compliance due to cracks, 1/Pa: mean crack strain (xx, yy, xy; engineering shear) per uniform
+        boundary stress, with the face states of ``sol`` (all open if None); symmetrised. Raises ValueError in the
+        infinite plane and with supports, where it is not defined."""
         if not self.outlined:
-            raise ValueError("the mean strain of cracks needs a body with an outline")
+            raise ValueError("the mean strain of cracks is defined for a body with an outline only")
         if self.supports:
-            raise ValueError("the compliance that cracks add is that of a body without supports")
+            raise ValueError("the compliance added by cracks is defined for a body without supports only")
         if not self.faces.n:
             return np.zeros((3, 3))
         if scales(self):
@@ -518,7 +522,7 @@ class Body:
         return 0.5 * (response + response.T)
 
     def _jumps_of(self, right: np.ndarray, sol: Solution | None) -> np.ndarray:
-        """(n_unknowns, k) jumps under the loads ``right`` of the faces, with the states of ``sol``."""
+        """(n_unknowns, k) jumps under the face loads ``right``, with the face states of ``sol``."""
         if sol is not None and self.rough:
             return self.face_equations.tangent(right, sol.face_states)
         closed = np.zeros(self.faces.n_unknowns, bool) if sol is None else sol.closed

@@ -1,4 +1,4 @@
-"""What solving has taken: counts that go on from body to body."""
+"""Counts of the operations that solutions take, summed over bodies."""
 
 from __future__ import annotations
 
@@ -8,18 +8,18 @@ from dataclasses import dataclass, fields
 
 @dataclass(eq=False)
 class Work:
-    """Counts of work; bodies that are given the same one add to it.
+    """Operation counts; bodies can share one object and add to it.
 
-    bodies, elements_assembled     geometries, and elements whose influence on others was worked out
+    bodies, elements_assembled     geometries, and elements whose influence was computed
     boundary_assemblies, boundary_factorisations     of A_ΓΓ
-    crack_factorisations           of the crack unknowns' equations, whole or with nodes held
-    crack_borderings               of these factors by what is new, instead
-    back_substitutions             right-hand sides solved for with these
-    solutions, contact_solves      loads solved for, and passes of the contact of crack faces in them
-    compliances                    of cracked bodies, worked out
-    solutions_left_out             of bodies whose cracks could not grow, and nobody asked
-    solutions_scaled               under an even stress, from those under unit ones
-    bodies_kept, solutions_kept, compliances_kept     what was asked for again with nothing changed, and so not done
+    crack_factorisations           of the equations of the crack unknowns, whole or with constrained nodes
+    crack_borderings               extensions of these factors by new unknowns
+    back_substitutions             right-hand sides solved with factors
+    solutions, contact_solves      loads solved, and iterations of the contact of crack faces in them
+    compliances                    of cracked bodies, computed
+    solutions_left_out             of bodies whose cracks could not grow and whose solution was not used
+    solutions_scaled               under uniform stress, combined from those under unit stresses
+    bodies_kept, solutions_kept, compliances_kept     reused because nothing had changed
     """
 
     bodies: int = 0
@@ -40,6 +40,6 @@ class Work:
 
     @classmethod
     def total(cls, parts: Iterable[Work]) -> Work:
-        """The sums of ``parts``: bodies that are made or solved side by side count apart."""
+        """The sum of ``parts``; bodies solved in parallel have separate counts."""
         parts = list(parts)
         return cls(**{each.name: sum(getattr(part, each.name) for part in parts) for each in fields(cls)})

@@ -1,7 +1,7 @@
-"""What loads, face contact, error estimates and weight functions rely on of a body with cracks and of its solution.
+"""Protocols of a body with cracks and of its solution, for loads, face contact, error estimates and weight functions.
 
-`geomech.ddm.body.Body` and `geomech.ddm.solution.Solution` are these; whoever is called by them takes these protocols, so
-that modules depend on each other in one direction only.
+`geomech.ddm.body.Body` and `geomech.ddm.solution.Solution` satisfy them. Modules that these two call use the protocols,
+so that imports run in one direction only.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 
 class LoadParts(Protocol):
-    """A load as it is on a given body: what of it is a field, and what is traction on edges."""
+    """A load on a given body, split into fields and tractions on edges."""
 
     load: BodyLoad
     particular: Any
@@ -57,7 +57,7 @@ class CrackedBody(Protocol):
     crack_system: Any
     uniform_responses: dict[bytes, Any]
     work: Work
-    never_loaded: FaceMemory
+    initial_memory: FaceMemory
     laws: FaceLaws
     face_equations: FaceEquations
     tip_elements: tuple[np.ndarray, ...]
@@ -82,14 +82,14 @@ class CrackedBody(Protocol):
     def sides(self) -> np.ndarray: ...
 
     @property
-    def one_finer(self) -> CrackedBody: ...
+    def refined(self) -> CrackedBody: ...
 
     @property
-    def rounder(self) -> CrackedBody | None: ...
+    def with_rounded_walls(self) -> CrackedBody | None: ...
 
     def remeshed(self, settings: DdmSettings) -> CrackedBody: ...
 
-    def lay_out(self, load: BodyLoad) -> tuple[Any, list[Any], np.ndarray, np.ndarray]: ...
+    def decompose(self, load: BodyLoad) -> tuple[Any, list[Any], np.ndarray, np.ndarray]: ...
 
     def solve(
         self,
@@ -102,7 +102,7 @@ class CrackedBody(Protocol):
 
 
 class SolvedBody(Protocol):
-    """A body under a load: what its cracks do."""
+    """A body under a load, with the state of its cracks."""
 
     body: CrackedBody
     load: BodyLoad

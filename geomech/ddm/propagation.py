@@ -1,11 +1,11 @@
-"""Cracks that grow in one elastic body, without blocks: solve, ask the criterion, advance, again.
+"""Growth of cracks in one elastic body without blocks: solve, apply the criterion, advance the tips, repeat.
 
     for step in ddm.propagate([], cracks, rock, ddm.BodyLoad(remote_stress=[0, 1e6, 0]), control="toughness"):
         print(step.load_factor, step.cracks.lengths.sum(), step.tips["k_i"])
 
-Under a fixed load tips advance while their K_eq is at least K_Ic. Under a controlled one the load follows the cracks:
-every step stands at the load factor at which the most driven tip has just K_eq = K_Ic, so that growth is quasi-static
-whether the factor rises (stable) or falls (it would run away under a dead load).
+Under a fixed load tips advance while K_eq ≥ K_Ic. Under a controlled load each step is solved at the load factor at
+which the largest K_eq equals K_Ic: growth is quasi-static whether the factor rises (stable growth) or falls (growth
+that would be unstable under a dead load).
 """
 
 from __future__ import annotations
@@ -18,38 +18,38 @@ import numpy as np
 
 from ..model import TIP, Cracks, DdmSettings, Event, GrowthSettings, Material
 from .body import Body
-from .fracture.f_criterion import check_criterion, judged
-from .growth.initiation import Birth, bear, births
+from .fracture.f_criterion import apply_criterion, check_criterion
+from .growth.initiation import NewCrack, add_new_cracks, new_cracks
 from .growth.path_correction import Memory, corrected
 from .growth.tie_tolerance import reached
 from .growth.tip_advance import Growth, advance
 from .loads.body_loads import BodyLoad
 from .solution import Solution
 
-#: Under a controlled load, tips driven within this part of the most driven one grow with it: K at a graded kink is
-#: right to some 1e-3, and of two tips that are images of one another both should go.
+#: Under a controlled load, tips whose K_eq/K_Ic is within this fraction of the largest grow with it: K at a graded kink
+#: is accurate to some 1e-3, and both of two symmetric tips should grow.
 TOGETHER = 0.01
-#: The controlled load is good when the drive is off one by less than this.
+#: Tolerance of the largest K_eq/K_Ic, which the controlled load brings to one.
 PRECISION = 1e-9
-#: And this is as near to one as a search that ends beside a jump of the drive (faces that close) must come to grow.
+#: Tolerance where the search ends at a jump of K_eq (faces that close).
 SETTLED = 1e-6
-#: How much the factor is raised while nothing is driven enough, and how often.
+#: Factor by which the load is raised while no tip reaches K_Ic, and largest number of raises.
 WIDER, RAISES = 4.0, 12
 
-#: The load at a factor, of the cracks as they then are: per-segment pressures need them.
+#: The load at a factor, for the current cracks (pressures per segment depend on them).
 Loading = Callable[[float, Cracks], BodyLoad]
 
 
 @dataclass(frozen=True, eq=False)
 class Step:
-    """One network under one load, and how it went on.
+    """One network under one load, and its growth.
 
     number       0, 1, 2 …
     load_factor  1 under a fixed load
-    cracks       the network that was solved
-    solution     its solution; None where cracks cut a part off and nothing holds it (the last step then)
-    tips         TIP rows with the criterion's ``k_eq`` and the ``angle`` that was followed; ``grown`` m
-    growth       the network after this step and what tips met on the way; None when nothing grew (the last step)
+    cracks       the network solved
+    solution     its solution; None in the last step if cracks cut off an unsupported part
+    tips         TIP rows with the criterion's ``k_eq`` and the ``angle`` taken; ``grown`` m
+    growth       the network after this step and the joins made; None in the last step, if nothing grew
     events       initiation, birth, coalescence, self, daylighting; arrest or split in the last step
     """
 
@@ -75,22 +75,21 @@ def propagate(
     max_factor: float = math.inf,
     **body,
 ) -> Iterator[Step]:
-    """Grow ``cracks`` in the body with outline ``loops`` ([] the infinite plane), one `Step` an increment.
+    """Grow ``cracks`` in the body with outline ``loops`` ([] for the infinite plane); yields one `Step` per increment.
 
-    ``load``: a `BodyLoad`, or ``load(factor, cracks)`` that gives one. ``control``: "load" holds the factor at 1 until
-    no tip is driven; "toughness" finds in every step the factor, starting from the last one, at which the largest
-    K_eq/K_Ic is one. A `BodyLoad` is then multiplied as a whole; with a function, part of the load can stand (in-situ
-    stress) while another rises, and where K does not rise steadily with the factor, some crossing of one is found, not
-    always the first. The run ends with the event "arrest" when nothing grows (or the factor would pass ``max_factor``),
-    "split" when cracks have cut off a part that nothing holds, or after ``max_steps``. ``body``: further arguments of
-    `Body`. Raises ValueError on an unknown control or criterion and on a material without toughness, and what `Body`
-    and its ``solve`` raise.
+    ``load``: a `BodyLoad`, which the factor multiplies as a whole, or a function ``load(factor, cracks)`` that returns
+    one, so that part of the load (in-situ stress) can stay constant. ``control``: "load" keeps the factor at 1 until no
+    tip grows; "toughness" searches in each step, starting from the last factor, for the one at which the largest
+    K_eq/K_Ic is one. If K does not increase monotonically with the factor, this need not be the first such factor. The
+    run ends with the event "arrest" if nothing grows or the factor would exceed ``max_factor``, "split" if cracks have
+    cut off an unsupported part, or after ``max_steps``. ``body``: further arguments of `Body`. Raises ValueError for an
+    unknown control or criterion or a material without toughness, and the errors of `Body` and its ``solve``.
 
     >>> rock = Material("rock", 17e9, 0.21, k_ic=2e6)
     >>> crack = Cracks.from_polylines([np.array([[-5e-3, -5e-3], [5e-3, 5e-3]])], aperture=np.inf)
     >>> load = ddm.BodyLoad(remote_stress=[0.0, -10e6, 0.0])
     >>> steps = ddm.propagate([], crack, rock, load, GrowthSettings(increment=1e-3), control="toughness", max_steps=3)
-    >>> [len(step.tips) for step in steps]  # wing cracks from both ends
+    >>> [len(step.tips) for step in steps]  # wing cracks at both ends
     [2, 2, 2]
     """
     if control not in ("load", "toughness"):
@@ -99,29 +98,28 @@ def propagate(
     check_criterion(growth)
     if not math.isfinite(material.k_ic):
         raise ValueError(
-            f"material {material.name!r} has no fracture toughness, so that no crack in it could ever grow: give it "
-            "k_ic, Pa √m"
+            f"material {material.name!r} has no fracture toughness, so no crack in it can grow: give it k_ic, Pa √m"
         )
     run = _Run(list(loops), material, load, growth, settings, body, control == "toughness", max_factor)
     return run.steps(cracks, max_steps)
 
 
 class _Run:
-    """What stays the same from step to step, and the body, load factor and solution that the last one left."""
+    """Input of the run, with body, load factor and solution of the last step."""
 
     def __init__(self, loops, material, load, growth, settings, options, controlled, max_factor):
         self.loops, self.material, self.load, self.growth = loops, material, load, growth
         self.settings, self.options = settings, options
         self.controlled, self.max_factor = controlled, max_factor
-        #: A drive is enough to grow.
+        #: Value of K_eq/K_Ic from which tips grow.
         self.enough = 1 - SETTLED if controlled else 1.0
         self.factor, self.drive, self.tip_drive = 1.0, 0.0, 0.0
-        self.births: list[Birth] = []
+        self.new_cracks: list[NewCrack] = []
         self.body: Body | None = None
         self.solution: Solution | None = None
         self.number = 0
         self.chords: Memory = {}
-        #: What was solved last: factor, solution with its history, and tips.
+        #: Last load factor, solution, its history, and tips.
         self._last: tuple[float, Solution, Solution | None, np.ndarray] | None = None
 
     def steps(self, cracks: Cracks, max_steps: int) -> Iterator[Step]:
@@ -133,7 +131,7 @@ class _Run:
                 self.body = self._body(cracks, self.body)
                 self.solution, tips = self._settled()
             except (np.linalg.LinAlgError, NotConverged) as failure:
-                # A piece that has come off rattles between closed faces: it has no equilibrium to converge to.
+                # A part that has been cut off is loose between closed faces and has no unique equilibrium.
                 if not self.number or (isinstance(failure, NotConverged) and not joined):
                     raise
                 at = cracks.nodes.mean(axis=0)
@@ -142,7 +140,7 @@ class _Run:
                 return
             growth, born = self._grow(tips), ()
             if growth is None:
-                growth, born = self._bear(tips)
+                growth, born = self._initiate(tips)
             events = self._events(cracks, tips, growth, born)
             yield Step(self.number, self.factor, cracks, self.solution, tips, growth, events)
             if growth is None:
@@ -150,8 +148,8 @@ class _Run:
             cracks, joined = growth.cracks, joined or bool(growth.joins)
 
     def _body(self, cracks: Cracks, previous: Body | None) -> Body:
-        # A step that was tried as it is taken.
-        same = None if previous is None else previous.found_again(previous.given_loops, cracks, self.material)
+        # Reuse the body of the trial step if it was accepted.
+        same = None if previous is None else previous.reusable_for(previous.given_loops, cracks, self.material)
         if same is not None:
             return same
         return Body(self.loops, cracks, self.material, self.settings, previous=previous, **self.options)
@@ -165,7 +163,7 @@ class _Run:
 
     def _solve(self, body: Body, factor: float) -> tuple[Solution, np.ndarray]:
         """Solution and tips of a body at a load factor."""
-        # Rough faces go on from what they had slipped by in the last step; smooth ones forget.
+        # Faces with friction continue from the slip of the last step; smooth faces have no memory.
         history = self.solution if body.rough else None
         known = self._known(body, factor, history)
         if known is not None:
@@ -173,15 +171,15 @@ class _Run:
         else:
             load = self._load_at(factor, body.cracks)
             solution = body.solve(load, warm=self.solution, history=history)
-            if body is self.body:  # a finer one may meet the target error
+            if body is self.body:  # it may be a finer one that reaches the target error
                 self.body = solution.body
             tips = solution.tips.copy()
-            tips["angle"], tips["k_eq"] = judged(solution, self.growth, self.material)
+            tips["angle"], tips["k_eq"] = apply_criterion(solution, self.growth, self.material)
         self._last = factor, solution, history, tips
         return solution, tips.copy()
 
     def _known(self, body: Body, factor: float, history: Solution | None) -> tuple[Solution, np.ndarray] | None:
-        """The same where it is what was solved last, or so many times that."""
+        """The last solution, or a multiple of it, if it applies."""
         if self._last is None or self._last[1].body is not body:
             return None
         before, solution, began, tips = self._last
@@ -191,20 +189,20 @@ class _Run:
             return None
         solution = solution.scaled(self.load if factor == 1.0 else self.load.scaled(factor), factor / before)
         tips = solution.tips.copy()
-        tips["angle"], tips["k_eq"] = judged(solution, self.growth, self.material)
+        tips["angle"], tips["k_eq"] = apply_criterion(solution, self.growth, self.material)
         return solution, tips
 
     def _drives(self, factor: float) -> tuple[Solution, np.ndarray]:
-        """Solution and tips at a load factor; finds out how hard tips and whole rock are driven there."""
+        """Solution and tips at a load factor; stores the largest K_eq/K_Ic and overstress there."""
         solution, tips = self._solve(self.body, factor)
         self.factor = factor
         self.tip_drive = float(np.max(tips["k_eq"], initial=0.0)) / self.material.k_ic
-        self.births = births(solution, self.material, self.growth)
-        self.drive = max([self.tip_drive, *(birth.overstress for birth in self.births[:1])])
+        self.new_cracks = new_cracks(solution, self.material, self.growth)
+        self.drive = max([self.tip_drive, *(birth.overstress for birth in self.new_cracks[:1])])
         return solution, tips
 
     def _settled(self) -> tuple[Solution, np.ndarray]:
-        """Solution and tips at the load of this step, which sets the factor."""
+        """Find the load factor of this step; returns solution and tips there."""
         if not self.controlled:
             return self._drives(1.0)
         found = None
@@ -221,11 +219,11 @@ class _Run:
             low, high = (factor, high) if rest < 0 else (low, factor)
             if abs(rest) <= PRECISION:
                 return found
-            # Exact where everything scales with the factor.
+            # Exact if everything is proportional to the factor.
             factor = min(factor / self.drive if self.drive > 0 else WIDER * factor, self.max_factor)
         if low is None:
             if excess(0.0) >= 0:
-                return found  # what stands without the factor drives them already
+                return found  # the constant part of the load already suffices
             low = 0.0
         for _ in range(RAISES):
             if high is not None or low >= self.max_factor:
@@ -263,21 +261,21 @@ class _Run:
             tips["grown"] = growth.grown
         return growth
 
-    def _bear(self, tips: np.ndarray) -> tuple[Growth | None, Sequence[Birth]]:
-        """New cracks when whole rock fails; only where no tip grows, which would relieve it."""
-        if not self.births or not reached(self.births[0].overstress, self.enough):
+    def _initiate(self, tips: np.ndarray) -> tuple[Growth | None, Sequence[NewCrack]]:
+        """New cracks where intact rock fails; only if no tip grows, since growth would relieve the rock."""
+        if not self.new_cracks or not reached(self.new_cracks[0].overstress, self.enough):
             return None, ()
-        cracks = bear(self.body.cracks, lambda block: self.body.limits, self.births, self.number + 1)
-        return Growth(cracks, np.zeros(len(tips)), ()), self.births
+        cracks = add_new_cracks(self.body.cracks, lambda block: self.body.limits, self.new_cracks, self.number + 1)
+        return Growth(cracks, np.zeros(len(tips)), ()), self.new_cracks
 
     # -- events --------------------------------------------------------------------------------------------------
 
     def _events(
-        self, cracks: Cracks, tips: np.ndarray, growth: Growth | None, born: Sequence[Birth]
+        self, cracks: Cracks, tips: np.ndarray, growth: Growth | None, born: Sequence[NewCrack]
     ) -> tuple[Event, ...]:
         if growth is None:
             at = tips["point"][np.argmax(reached(tips["k_eq"], tips["k_eq"].max()))] if len(tips) else np.zeros(2)
-            return (self._event("arrest", at, "nothing is driven any more"),)
+            return (self._event("arrest", at, "no tip reaches its toughness"),)
         names = growth.cracks.names[len(cracks.names) :]
         events = [
             self._event("birth", birth.start, f"{name} starts in {birth.kind} ({birth.place})")

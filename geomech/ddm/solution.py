@@ -1,4 +1,4 @@
-"""What a solved body knows: stress intensity factors, crack faces, fields anywhere, the strain its cracks carry."""
+"""Results of a solved body: stress intensity factors, crack faces, fields at any point, mean strain of the cracks."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 
 from ..conventions import normal_of
 from ..model import OPEN, SLIP, STICK, CrackFaces
-from .crack_contact.face_contact import FaceAnswer
+from .crack_contact.face_contact import FaceSolution
 from .crack_contact.face_laws import FaceStates, Released
 from .crack_contact.frictional_contact import stored_by_fillings
 from .kernels import shape_functions
@@ -28,18 +28,17 @@ if TYPE_CHECKING:
     from .loads.body_loads import BodyLoad
 
 
-#: A residual above this is reported in the log.
+#: Residual above which a warning is logged.
 WORTH_A_WARNING = 1e-3
 _log = logging.getLogger(__name__)
 
 
 class Solution:
-    """A body under a load; everything is computed when it is asked for.
+    """A body under a load; results are computed on first use.
 
-    ``jumps`` (n_unknowns,) are slip and opening at the collocation nodes of the crack elements, times 2μ, ``closed``
-    which openings are used up; ``solves`` counts the contact's passes. ``memory`` is what rough faces keep for the next
-    load and ``began`` what they had from the last (None: all faces are smooth); ``face_load`` (n_unknowns,) what the load
-    brings to closed faces, Pa.
+    ``jumps`` (n_unknowns,): slip and opening at the collocation nodes of the crack elements, times 2μ; ``closed``:
+    closed nodes; ``solves``: iterations of the contact. ``memory`` and ``began``: memory of the faces after and before
+    this load (None if all faces are smooth); ``face_load`` (n_unknowns,): traction of the load on closed faces, Pa.
     """
 
     def __init__(
@@ -47,7 +46,7 @@ class Solution:
         body: CrackedBody,
         applied: Applied,
         eliminated: np.ndarray,
-        answer: FaceAnswer,
+        answer: FaceSolution,
         boundary_load: np.ndarray,
         face_load: np.ndarray,
         imposed: np.ndarray,
@@ -62,25 +61,24 @@ class Solution:
 
     @property
     def scales(self) -> bool:
-        """Whether so many times the load brings so many times everything: with smooth faces that touch unloaded or
-        never close."""
+        """Whether all results are proportional to the load: smooth faces that touch without load or never close."""
         return not self.body.rough and not np.any(self.body.closing[0])
 
     def scaled(self, load: BodyLoad, factor: float) -> Solution:
-        """What the body answers to the ``load``, which is ``factor`` (positive) times this one, where it `scales`."""
-        answer = FaceAnswer(factor * self.jumps, factor * self._traction, self.closed, 0)
+        """The solution for ``load``, which is ``factor`` (positive) times this one; valid if it `scales`."""
+        answer = FaceSolution(factor * self.jumps, factor * self._traction, self.closed, 0)
         parts = (factor * x for x in (self._boundary_load, self.face_load, self._imposed))
         edge_density = None if self._edge_density is None else factor * self._edge_density
         return Solution(self.body, apply(load, self.body), factor * self._eliminated, answer, *parts, edge_density)
 
     @cached_property
     def _x(self) -> np.ndarray:
-        """(n_unknowns,) the boundary's unknowns: 2μ times its displacement, reactions where it is supported."""
+        """(n_unknowns,) boundary unknowns: 2μ times displacement, or reactions where supported."""
         return -self._eliminated - self.body._w @ self.jumps
 
     @cached_property
     def _u(self) -> np.ndarray:
-        """(n_unknowns,) 2μ times the displacement of the boundary, without the particular field's."""
+        """(n_unknowns,) 2μ times the displacement of the boundary, without that of the particular field."""
         return self._on_supports[0]
 
     @cached_property
@@ -90,13 +88,13 @@ class Solution:
 
     @cached_property
     def reactions(self) -> Reactions:
-        """What the supports do to the body: tractions along them and their resultants."""
+        """Tractions along the supports and their resultants."""
         return reactions(self.body, self._on_supports[1], self._applied.particular)
 
     @cached_property
     def states(self) -> np.ndarray:
-        """(n_elements, p+1) OPEN, STICK or SLIP at the collocation nodes of the crack elements; smooth faces that are
-        closed SLIP."""
+        """(n_elements, p+1) OPEN, STICK or SLIP at the collocation nodes of the crack elements; closed smooth faces are
+        SLIP."""
         c = self.body.faces
         closed = self.closed.reshape(c.n, 2, c.per)[:, 1]
         if self.memory is None:
@@ -106,7 +104,7 @@ class Solution:
 
     @cached_property
     def face_states(self) -> FaceStates:
-        """The states of contact, as the equations of the faces have them."""
+        """The contact states in the form of the face equations."""
         if self.memory is not None:
             return self.memory.states
         c = self.body.faces
@@ -115,12 +113,12 @@ class Solution:
 
     @property
     def frictional_work(self) -> float:
-        """J/m turned into heat by friction between crack faces, from the first solution of the history to this one."""
+        """J/m dissipated by friction of crack faces since the beginning of the history."""
         return 0.0 if self.memory is None else self.memory.work
 
     @property
-    def given_way(self) -> tuple[float, Released]:
-        """J/m of this step of the history alone: rubbed off between crack faces, and what they released."""
+    def dissipated_in_step(self) -> tuple[float, Released]:
+        """J/m of this step alone: friction loss of crack faces, and energy released by breaking cement."""
         if self.memory is None:
             return 0.0, Released()
         released = (now - before for now, before in zip(self.memory.released, self.began.released))
@@ -128,7 +126,7 @@ class Solution:
 
     @cached_property
     def filling_energy(self) -> float:
-        """J/m stored in what is between crack faces."""
+        """J/m stored in the filling of cracks."""
         if self.memory is None:
             return 0.0
         stored = stored_by_fillings(self.body.laws, self.memory.pressure, self.memory.shear)
@@ -136,10 +134,10 @@ class Solution:
 
     @cached_property
     def tips(self) -> np.ndarray:
-        """TIP rows in the order of the network's ``tips``, k_i and k_ii in Pa √m filled.
+        """TIP rows in the order of the network's ``tips``, with k_i and k_ii in Pa √m.
 
         From the leading coefficient of the tip element, D ≈ d√r: K = μ√(2π)/(4(1−ν)) d (Crouch & Starfield 1983).
-        K_I is zero where the faces next to the tip are closed, and never negative at a crack without aperture.
+        K_I is zero if the faces next to the tip are closed, and never negative for a crack without aperture.
         """
         body, c = self.body, self.body.faces
         known, element, last, lead, touching = body.tip_elements
@@ -154,23 +152,23 @@ class Solution:
 
     @property
     def _shut(self) -> np.ndarray:
-        """(n_elements, p+1) which nodes are closed without a filling that gives."""
+        """(n_elements, p+1) bool: nodes that are closed without a compliant filling."""
         body, c = self.body, self.body.faces
         closed = self.closed.reshape(c.n, 2, c.per)[:, 1]
         return closed & np.isinf(body.laws.normal).reshape(closed.shape) if body.rough else closed
 
     @cached_property
     def tip_errors(self) -> np.ndarray:
-        """(n_tips, 2) estimated errors of K_I and K_II, Pa √m, against a finer mesh (`sif_error_estimate`): as much work
-        again."""
+        """(n_tips, 2) estimated errors of K_I and K_II, Pa √m, by comparison with a finer mesh (`sif_error_estimate`);
+        takes as long as the solution."""
         from .fracture.sif_error_estimate import tip_errors
 
         return tip_errors(self)
 
     @cached_property
     def faces(self) -> CrackFaces:
-        """Opening, slip, traction and state at the ends and collocation nodes of every element. Traction and state are
-        those of the nodes; between and beyond them traction is interpolated linearly, state is the nearest node's."""
+        """Opening, slip, traction and state at the ends and collocation nodes of each element. Traction at the ends is
+        extrapolated linearly from the nodes; state is that of the nearest node."""
         body, c = self.body, self.body.faces
         points, values = c.samples
         jumps = self.jumps.reshape(c.n, 2, c.per) @ values / (2 * body.material.shear_modulus)
@@ -187,9 +185,9 @@ class Solution:
 
     @cached_property
     def reserve(self) -> np.ndarray:
-        """(n_elements, p+1) Pa: how far faces are from leaving their `states`, linear in the load while all states
-        stand. Open ones: the stress that closes a crack as long as their element by their gap (inf: they never meet);
-        sticking ones: what is left of their strength, or of what presses them; others that are closed the latter."""
+        """(n_elements, p+1) Pa: margin before a node leaves its state in `states`; linear in the load as long as all
+        states remain. Open: the stress that closes a crack of the element's length by the gap (inf if the faces never
+        meet). Sticking: remaining shear strength, or the pressure if that is less. Otherwise closed: the pressure."""
         laws, faces = self.body.laws, self.faces
         normal, shear = faces.traction[:, 1:-1].transpose(2, 0, 1)
         broken = np.zeros(len(laws.closes), bool) if self.memory is None else self.memory.broken
@@ -210,8 +208,8 @@ class Solution:
 
     @cached_property
     def crack_energy(self) -> float:
-        """J/m by which the body's elastic energy is larger than without jumps at its cracks: ½ ∫ (t₀ − t)·[u] ds
-        (Clapeyron), t₀ the traction that the loads bring to closed faces, t that on the faces."""
+        """J/m by which crack jumps increase the elastic energy of the body: ½ ∫ (t₀ − t)·[u] ds (Clapeyron), with t₀
+        the traction of the loads on closed faces and t that on the faces."""
         body, c = self.body, self.body.faces
         if not self.jumps.size:
             return 0.0
@@ -220,12 +218,12 @@ class Solution:
 
     @property
     def closed_traction(self) -> np.ndarray:
-        """(n_crack_unknowns,) Pa: the same of this load, t₀, as `Body.closed_traction` has it."""
+        """(n_crack_unknowns,) Pa: t₀ of this load (`Body.closed_traction`)."""
         return self.face_load - self.body._cg @ self._eliminated if self.jumps.size else np.zeros(0)
 
     def work_at_cracks(self, closed: np.ndarray) -> float:
-        """J/m ∫ t₀·[u] ds: by reciprocity the work of the load that brings t₀, ``closed`` (n_crack_unknowns,), to closed
-        faces on the displacement that the cracks of this solution add to the body."""
+        """J/m, ∫ t₀·[u] ds with t₀ = ``closed`` (n_crack_unknowns,), the traction of some load on closed faces: by
+        reciprocity the work of that load on the displacement that the cracks of this solution add to the body."""
         c = self.body.faces
         if not self.jumps.size:
             return 0.0
@@ -234,12 +232,12 @@ class Solution:
 
     @cached_property
     def residual(self) -> float:
-        """Largest traction left over at the collocation nodes, relative to the largest that acts there (`_acting`).
-        Mostly what loads, discretised, lack in equilibrium; logs a warning above 1e-3."""
+        """Largest residual traction at the collocation nodes, relative to the largest acting traction (`_acting`). It
+        is mostly due to discretised loads that are not exactly in equilibrium. Logs a warning above 1e-3."""
         body = self.body
-        # A_ΓC w and A_CC w by way of W and S, which is what the body keeps.
+        # A_ΓC w and A_CC w follow from W and S, which the body keeps.
         follows = body._w @ self.jumps if self.jumps.size else np.zeros_like(self._u)
-        on_boundary = body._outside.times(self._x + follows, lifted=follows) + self._boundary_load
+        on_boundary = body._outside.times(self._x + follows, rigid_part=follows) + self._boundary_load
         on_faces = (
             body.crack_system.matrix @ self.jumps + body._cg @ (self._x + follows) + self.face_load - self._traction
         )
@@ -247,18 +245,18 @@ class Solution:
         left = max((float(np.abs(x).max()) for x in (on_boundary, on_faces) if x.size), default=0.0)
         residual = left / scale if scale else left
         if residual > WORTH_A_WARNING:
-            _log.warning("the body's equations are left with a residual of %.1e", residual)
+            _log.warning("the equations of the body have a residual of %.1e", residual)
         return residual
 
     @property
     def _acting(self) -> float:
-        """Pa: the largest traction of loads at collocation nodes of boundary and cracks, of fluid and contact on crack
-        faces, or the stress 2μ u/L that an imposed displacement u means over the body's extent L."""
+        """Pa: largest traction of loads at the collocation nodes of boundary and cracks and of fluid and contact on
+        crack faces, or the stress 2μ u/L of a prescribed displacement u over the body's extent L."""
         body, imposed = self.body, self._imposed
         on_boundary, on_faces = self._boundary_load, self.face_load
         if imposed.size:
-            # What supports impose is among the loads, as the jump it is at their ends: the finer the elements there,
-            # the larger.
+            # The loads include prescribed displacements, whose jump at the supports' ends gives a traction that grows
+            # as elements shrink.
             on_boundary = on_boundary - body._outside.known @ imposed
             on_faces = on_faces - body._c_known @ imposed
         sizes = (on_boundary, on_faces, self._traction, imposed / body._extent)
@@ -266,7 +264,7 @@ class Solution:
 
     @cached_property
     def condition(self) -> float:
-        """Estimated condition number of the matrices solved with, the worse one. Rows are scaled to one size."""
+        """Estimated condition number of the worse of the two matrices, rows scaled to equal size."""
         body = self.body
         cracks = body.crack_system.rcond(self.closed) if not body.rough else body.face_equations.rcond(self.face_states)
         return 1.0 / min(cracks, body._outside.factor.rcond)
@@ -274,29 +272,29 @@ class Solution:
     def stress(self, points: np.ndarray, side: float = 1.0) -> np.ndarray:
         """(n, 3) total stress at ``points`` (n, 2), Pa.
 
-        Where there is no rock, outside the outline, in a hole and above the surface of a half-plane, it is nan, and so
-        are the displacement and all else. On a boundary, and nearer to it than a millionth of the body's extent, it is
-        the rock's; on a crack that of the upper face (left of its segment), or the lower with ``side`` −1. At crack
-        tips it is that a fiftieth of the element's length beside, and so it is nearer than that to other ends of
-        elements (corners, crack nodes): the discrete field has no value there.
+        All fields are nan where there is no rock: outside the outline, in holes and above the surface of a half-plane.
+        Points within a millionth of the body's extent of a boundary count as rock. On a crack the result is that of the
+        upper face (left of its segment), or of the lower face with ``side`` −1. Within a fiftieth of the element's
+        length of tips, corners and crack nodes, where the discrete field is singular, the result is that at this
+        distance.
         """
         return self._total(points, side)[0]
 
     def principal_stress(self, points: np.ndarray, side: float = 1.0) -> tuple[np.ndarray, np.ndarray]:
-        """(n, 2) in-plane principal stresses of `stress`, Pa, the larger first, and the angle (n,) from x to the larger
-        one's direction, rad, in (−π/2, π/2]."""
+        """(n, 2) in-plane principal stresses of `stress`, Pa, the larger first, and the angle (n,) from x to its
+        direction, rad, in (−π/2, π/2]."""
         xx, yy, xy = self.stress(points, side).T
         mean, radius = 0.5 * (xx + yy), np.hypot(0.5 * (xx - yy), xy)
         return np.column_stack([mean + radius, mean - radius]), 0.5 * np.arctan2(2 * xy, xx - yy)
 
     def displacement(self, points: np.ndarray, side: float = 1.0) -> np.ndarray:
-        """(n, 2) displacement at ``points`` (n, 2), m, on cracks that of the face on ``side``. What no support holds of
-        the mean displacement and mean rotation of the outline is zero; in the infinite plane cracks add to the uniform
-        strain about the origin, in a half-plane to that of whole ground about the surface's point."""
+        """(n, 2) displacement at ``points`` (n, 2), m, on cracks that of the face on ``side``. Mean displacement and
+        rotation of the outline are zero as far as supports leave them free. In the infinite plane the uniform strain
+        has zero displacement at the origin, in a half-plane at the point that defines the surface."""
         return self.fields(points, side)[1]
 
     def fields(self, points: np.ndarray, side: float = 1.0) -> tuple[np.ndarray, np.ndarray]:
-        """`stress` and `displacement` at ``points`` (n, 2) in the time of one of them."""
+        """`stress` and `displacement` at ``points`` (n, 2), in the time of one of them."""
         points = np.asarray(points, dtype=float).reshape(-1, 2)
         stress, displacement = self._total(points, side)
         return stress, displacement - _rigid(self._motion, self.body.centroid, points)
@@ -335,8 +333,8 @@ class Solution:
         for part in self._applied.lines:
             add(part.start, part.end, np.zeros(len(part.start), np.int64), part.density, 2 * OFF * body._extent, True)
         if body.outlined:
-            # Forces that are in equilibrium but for the discretisation's error: their logarithms in units of the body,
-            # or displacement would know the unit of length.
+            # The forces are in equilibrium only up to discretisation error. With logarithms in units of the body's
+            # extent the displacement does not depend on the unit of length.
             shift += net * (3 - 4 * nu) * np.log(body._extent) / (4 * np.pi * (1 - nu))
         shift /= 2 * body.material.shear_modulus
         stress, shift = stress + self._applied.stress(where), shift + self._applied.displacement(where)
@@ -367,8 +365,8 @@ class Solution:
 
     @cached_property
     def _motion(self) -> np.ndarray:
-        """(3,) mean displacement (2) and rotation of the outline, as far as no support resists them, before they are
-        taken out; about the body's centroid."""
+        """(3,) mean displacement and rotation of the outline about the centroid, as far as supports leave them free;
+        subtracted from all displacements."""
         body, g = self.body, self.body.boundary
         if not body.outlined:
             return np.zeros(3)
@@ -394,11 +392,11 @@ class Solution:
 def _kelvin_constant(
     start: np.ndarray, end: np.ndarray, density: np.ndarray, nu: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """(2,) 2μ times the translation by which line forces in their own frames differ from Kelvin's solution, and their
-    sum.
+    """(2,) 2μ times the translation by which the line forces of the kernels differ from Kelvin's solution, and (2,) the
+    sum of the forces.
 
-    The kernels have −y²/r² for his x²/r² = 1 − y²/r², which moves every element by a constant along itself; without it
-    the plane would not be at rest far away.
+    The kernels have −y²/r² instead of Kelvin's x²/r² = 1 − y²/r², which shifts each element's field by a constant along
+    the element. The correction brings the plane to rest at infinity.
     """
     whole = 0.5 * density @ shape_functions.moments()[shape_functions.ORDINARY, : density.shape[2]]
     along = end - start

@@ -32,7 +32,7 @@ def arch(n: int, ratio: float) -> dda.BlockSystem:
 
 
 def rest(system: dda.BlockSystem) -> dda.Equilibrium:
-    # Settling, an arch that stands moves by its elastic shortening, 1e-4 m: one that has gone a centimetre falls.
+    # QuasiNewton, an arch that stands moves by its elastic shortening, 1e-4 m: one that has gone a centimetre falls.
     return dda.equilibrium(system, State.at_rest(system.blocks), WEIGHT, reach=0.01)
 
 

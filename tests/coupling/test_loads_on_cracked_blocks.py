@@ -110,8 +110,8 @@ def test_a_cracked_block_that_is_taken_out_has_no_tips_any_more():
     records = list(cycles(problem(loads, end=4.0)))
     told = [event for record in records for event in record.events]
     assert [(e.kind, e.time, e.detail) for e in told] == [
-        ("excavation", 1.0, "top is taken out"),
-        ("excavation", 2.0, "cracked is taken out"),
+        ("excavation", 1.0, "top is excavated"),
+        ("excavation", 2.0, "cracked is excavated"),
     ]
     by_time = {round(record.state.time, 6): record for record in records}
     # Without the block above, the slot feels a fifth of the stress there was (0.5 of 2.5 block heights of weight at its

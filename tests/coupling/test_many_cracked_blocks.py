@@ -90,7 +90,7 @@ def test_results_do_not_depend_on_the_number_of_threads(monkeypatch):
 def test_leaving_out_what_has_not_changed_changes_nothing(monkeypatch, friction):
     kept, work, events = results(plates(friction))
     with monkeypatch.context() as always:
-        always.setattr(Body, "found_again", lambda *of: None)
+        always.setattr(Body, "reusable_for", lambda *of: None)
         always.setattr(elastic_bodies, "_same_question", lambda *of: False)
         done, all_work, all_events = results(plates(friction))
     assert work["bodies_kept"] > work["bodies"] - 4 > 0

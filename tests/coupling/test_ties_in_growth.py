@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from geomech.coupling import cycles
-from geomech.coupling.growth.crack_birth import born_first
+from geomech.coupling.growth.crack_initiation import first_new_cracks
 from geomech.coupling.growth.tip_speed_limit import TipSpeed
 from geomech.ddm.growth import initiation
 from geomech.model import (
@@ -87,9 +87,9 @@ def test_of_blocks_that_are_alike_the_first_breaks(monkeypatch):
     blocks = Blocks.from_polygons([np.array([[x, 0.0], [x + 1, 0.0], [x + 1, 1.0], [x, 1.0]]) for x in (0.0, 2.0)])
     for off in OFF:
         size = {0: 1.0 - off, 1: 1.0 + off}
-        found = {b: [initiation.Birth("tension", "surface", size[b], (0.0, 0.0), (0.0, 0.1))] for b in size}
-        monkeypatch.setattr(initiation, "births", lambda solution, *rest: found[solution])  # noqa: B023
-        born, where = born_first(blocks, (ROCK,), {0: 0, 1: 1}, GrowthSettings())
+        found = {b: [initiation.NewCrack("tension", "surface", size[b], (0.0, 0.0), (0.0, 0.1))] for b in size}
+        monkeypatch.setattr(initiation, "new_cracks", lambda solution, *rest: found[solution])  # noqa: B023
+        born, where = first_new_cracks(blocks, (ROCK,), {0: 0, 1: 1}, GrowthSettings())
         assert where == 0 and born == found[0]
 
 

@@ -207,7 +207,7 @@ def test_a_target_that_settings_ask_for_is_met():
         solution = body.solve(MIXED)
         assert off(solution, factors(best)) < said(solution) + 1e-5 and said(solution) <= target
         # The next body begins with the mesh that was needed.
-        assert ddm.Body([], network(), ROCK, body.asked, solution.body).settings == solution.body.settings
+        assert ddm.Body([], network(), ROCK, body.requested, solution.body).settings == solution.body.settings
 
 
 def test_a_target_that_no_mesh_meets_is_refused():
@@ -215,7 +215,7 @@ def test_a_target_that_no_mesh_meets_is_refused():
     cracks = Cracks.from_polylines([np.array([[-1, 0], [0, 0.1], [1, 0]])])
     bending = ddm.BodyLoad(remote_stress=[1.0, 0.1, -0.4])
     with pytest.raises(
-        ddm.TargetMissed, match=r"not to the target_error of 1.0e-11; the worst are at the tip at"
+        ddm.TargetMissed, match=r"not to the target_error of 1.0e-11; the largest error is at the tip at"
     ) as one:
         ddm.Body([], cracks, ROCK, DdmSettings(target_error=1e-11)).solve(bending)
     with pytest.raises(ddm.TargetMissed) as other:

@@ -70,7 +70,9 @@ def test_an_edge_crack_in_a_disc():
     assert short - tip > 0 and 0.6 * error < chord_errors(coarse)[0, 0] < 1.4 * error
     disc = circle(sides, 0.5)[::-1]
     numbered = [part for k in range(sides) for part in _halved_load(coarse.body, k, np.array([[k, 0], [k + 1, 0]]))]
-    assert [number for number, _ in numbered] == list(range(len(coarse.body.rounder.loops[0]))) and len(disc) == sides
+    assert [number for number, _ in numbered] == list(range(len(coarse.body.with_rounded_walls.loops[0]))) and len(
+        disc
+    ) == sides
     np.testing.assert_allclose([value[:, 0] for _, value in numbered[:3]], [[0, 0.5], [0.5, 1], [1, 1.5]])
 
 

@@ -78,10 +78,10 @@ def _run(tolerance: float) -> tuple[np.ndarray, int, float]:
 def _until(tolerance: float) -> Iterator[None]:
     from ...coupling import load_pass
 
-    before = load_pass.COMPLIANCE_TOLERANCE, load_pass.NO_ANSWER
+    before = load_pass.COMPLIANCE_TOLERANCE, load_pass.FAILED
     # With a loose tolerance the coupling itself would report that it has not converged.
-    load_pass.COMPLIANCE_TOLERANCE, load_pass.NO_ANSWER = tolerance, max(before[1], tolerance)
+    load_pass.COMPLIANCE_TOLERANCE, load_pass.FAILED = tolerance, max(before[1], tolerance)
     try:
         yield
     finally:
-        load_pass.COMPLIANCE_TOLERANCE, load_pass.NO_ANSWER = before
+        load_pass.COMPLIANCE_TOLERANCE, load_pass.FAILED = before

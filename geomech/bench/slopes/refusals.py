@@ -63,7 +63,7 @@ REASONS = (
     Reason(
         "crack faces not found",
         ddm.NotConverged,
-        r"crack faces did not settle|are open in no state that holds",
+        r"crack faces did not settle|have no contact state that satisfies",
         "the faces of a block's cracks find no consistent states: the block is named",
     ),
 )

@@ -33,7 +33,7 @@ class Invariant:
 #: strain.
 _HANGS, _STRAINED = "no common strain", "beyond the elastic range"
 #: Faces in a blade of rock, for which the crack solver reports place, length and violation of their laws.
-_UNSETTLED = "left with a violation"
+_UNSETTLED = "the remaining violation"
 
 INVARIANTS = {
     "area": Invariant("area of all blocks, as drawn or parted, off what it was", 1e-9),

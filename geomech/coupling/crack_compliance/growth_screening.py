@@ -1,10 +1,10 @@
-"""Skips the solution of moving blocks whose cracks cannot grow, until somebody asks for it.
+"""Skips the solution of moving blocks whose cracks cannot grow, until its results are used.
 
 In motion a block responds to its mean stress (`mean_stress_response`), so that the full solution only gives the loading
 of its tips. Where an upper bound of K under the present forces (`ddm.fracture.sif_bound`) is below the toughness, the
 pass continues without that solution, with the same blocks. The bound is computed after several solutions with tips far
-from their toughness; otherwise it would cost more than it saves. Where skipped solutions are requested after most
-passes, as by a table of all tips, nothing is skipped.
+from their toughness; otherwise it would cost more than it saves. If skipped solutions are requested after most passes,
+for example by a table of all tips, nothing is skipped.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from ...ddm.fracture.sif_bound import TipBound
     from ...model import Blocks, Problem
 
-#: Solutions of a body before its bound is computed, which takes about as long as twenty of them …
+#: Number of solutions of a body before its bound is computed, which takes about as long as twenty solutions …
 STOOD = 5
 #: … and largest K_eq/K_Ic at which it is: bounds are several times K.
 FAR = 0.1
@@ -39,8 +39,8 @@ class CoupledBlocks(Protocol):
 
 @dataclass(eq=False)
 class _Known:
-    """Data of the body with this ``crack_system``: number of times it was ``solved``; the ``bound``; ``per_factor``:
-    largest K_eq per unit K; ``never``: it has no bound."""
+    """Data of the body with this ``crack_system``: number of times ``solved``; the ``bound``; ``per_factor``: largest
+    K_eq per unit K; ``never``: no bound exists."""
 
     crack_system: object
     solved: int = 0
@@ -51,7 +51,8 @@ class _Known:
 
 @dataclass(eq=False)
 class GrowthScreening:
-    """``passes`` in which solutions were skipped, and in how many of them they were ``asked`` for afterwards."""
+    """Selects the blocks to skip. ``passes``: number of passes in which solutions were skipped; ``asked``: in how many
+    of them a skipped solution was requested later."""
 
     passes: int = 0
     asked: int = 0
@@ -86,13 +87,13 @@ class GrowthScreening:
         self._known = {child: known[parent[child]] for child in whole.tolist() if parent[child] in known}
 
     def _bound(self, now: CoupledBlocks, block: int, known: _Known) -> None:
-        from ...ddm.fracture.sif_bound import TipBound, is_bounded, most_per_factor
+        from ...ddm.fracture.sif_bound import TipBound, is_bounded, largest_k_eq_per_k
 
         body = now.bodies[block]
         known.never = not is_bounded(body)
         if not known.never:
             known.bound = TipBound(body)
-            known.per_factor = most_per_factor(now.problem.growth.criterion, body.material)
+            known.per_factor = largest_k_eq_per_k(now.problem.growth.criterion, body.material)
 
     def _cannot(self, now: CoupledBlocks, block: int, dt: float) -> bool:
         known, body, load = self._known.get(block), now.bodies[block], now.loads[block]

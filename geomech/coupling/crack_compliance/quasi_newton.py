@@ -30,8 +30,8 @@ _SAME = 1e-6
 _LEAST = 0.05
 
 
-class Settling:
-    """The next offset of the crack strains, from those tried so far and their residuals.
+class QuasiNewton:
+    """Computes the next offset of the crack strains from earlier offsets and residuals.
 
     Where S has changed with the states of crack faces, the history is dropped. A block whose residual has changed its
     sign is then relaxed by Aitken's factor (Irons & Tuck 1969); faces that close for one response and open for the
@@ -49,7 +49,7 @@ class Settling:
         self._residuals: list[np.ndarray] = []
         self._compliance: np.ndarray | None = None
         self._last: tuple[np.ndarray, np.ndarray] | None = None
-        #: Largest relative residual of the last pass, where changes of earlier solutions were used.
+        #: Largest relative residual of the last pass, if changes of earlier solutions were used in it.
         self._led: float | None = None
 
     def begin(self, blocks: tuple[int, ...]) -> None:

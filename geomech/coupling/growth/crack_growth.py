@@ -14,7 +14,7 @@ from ..load_transfer.elastic_bodies import tip_rows
 from ..load_transfer.unbounded_rock import loads_of, take_endless
 from ..splitting.block_splitting import divided, split_blocks
 from ..splitting.contact_initialisation import contacts_after, holds_together
-from ..splitting.part_initial_stress import begin_in_motion
+from ..splitting.part_initial_stress import initialise_moving_parts
 from ..splitting.part_mean_stress import rotated_mean_stress
 
 
@@ -60,20 +60,20 @@ def drive(now: CrackedBlocks, found: Balance) -> float:
     """Largest K_eq/K_Ic of all tips, or largest stress over strength where cracks may start: growth begins at 1."""
     most = float(np.max(found.tips["k_eq"] / toughness(now, found.tips), initial=0.0))
     if now.problem.growth.initiation:
-        from .crack_birth import born_first
+        from .crack_initiation import first_new_cracks
 
         with now.timed("growth"):
-            born, _ = born_first(now.blocks, now.problem.materials, found.solutions, now.problem.growth)
+            born, _ = first_new_cracks(now.blocks, now.problem.materials, found.solutions, now.problem.growth)
         most = max([most, *(birth.overstress for birth in born[:1])])
     return most
 
 
 def births(now: CrackedBlocks, solutions: dict, state: State, enough: float = 1.0):
     """New cracks and their events, where no tip grows and intact rock reaches ``enough`` times its strength."""
-    from .crack_birth import bear_in_blocks
+    from .crack_initiation import initiate_in_blocks
 
     with now.timed("growth"):
-        growth, born = bear_in_blocks(
+        growth, born = initiate_in_blocks(
             now.cracks, now.blocks, now.limits, now.problem.materials, solutions, now.problem.growth, now.number, enough
         )
     names = growth.cracks.names[now.cracks.n_cracks :] if growth is not None else ()
@@ -96,7 +96,7 @@ def initiations(now: CrackedBlocks, tips: np.ndarray, state: State) -> tuple[Eve
     return tuple(events)
 
 
-def part_here(now: CrackedBlocks, growth, state: State) -> list[int]:
+def blocks_to_split(now: CrackedBlocks, growth, state: State) -> list[int]:
     """The blocks that ``growth`` (None: no growth) cuts in two and whose parts can start from ``state``, the end of the
     pass."""
     if growth is None or not growth.joins:
@@ -133,7 +133,7 @@ def take_growth(now: CrackedBlocks, growth, state: State, solutions: dict) -> tu
     stored = {block: of.crack_energy for block, of in now.strain_solutions().items()}
     now.take_split(split)
     if now.problem.dda.dynamic_factor != 0.0:
-        begin_in_motion(now, split, cut, begun, stored)
+        initialise_moving_parts(now, split, cut, begun, stored)
     with now.timed("growth"):
         contacts = contacts_after(
             now.system, split, cut, solutions if stands else {}, loads, now.problem.loads, begun.contacts

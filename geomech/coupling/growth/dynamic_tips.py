@@ -14,20 +14,22 @@ from .tip_speed_limit import TipSpeed
 from .wave_arrival import WaveTime
 
 
-class TipsInTime:
+class DynamicTips:
     """`TipSpeed` and `WaveTime` of the tips of ``problem``."""
 
     def __init__(self, problem: Problem) -> None:
         self.speed, self.waves = TipSpeed(problem), WaveTime(problem)
         self._k_ic = np.array([m.k_ic for m in problem.materials])
 
-    def may_go(self, tips: np.ndarray, blocks: Blocks, dt: float, loads: Mapping[int, BoundaryLoad]) -> np.ndarray:
+    def remaining_growth(
+        self, tips: np.ndarray, blocks: Blocks, dt: float, loads: Mapping[int, BoundaryLoad]
+    ) -> np.ndarray:
         """(n_tips,) m, remaining growth of ``tips`` in the present step of ``dt`` s."""
         return np.where(self._driven(tips, blocks, dt, loads), self.speed.left(tips, blocks, dt), 0.0)
 
-    def went(self, tips: np.ndarray) -> None:
-        """Take note of what ``tips`` have ``grown`` in a pass of the present step."""
-        self.speed.went(tips)
+    def record_growth(self, tips: np.ndarray) -> None:
+        """Record the growth (``grown``) of ``tips`` in a pass of the present step."""
+        self.speed.record_growth(tips)
 
     def end(self, tips: np.ndarray, blocks: Blocks, dt: float, loads: Mapping[int, BoundaryLoad]) -> None:
         """The step of ``dt`` s ends with ``tips``."""

@@ -22,12 +22,12 @@ _LARGEST_KINK = 2.2
 PROPORTIONAL = 1e-3
 
 
-class FeltTips:
-    """``tips``, those of skipped blocks included, with K under the mean stress in blocks that respond to that alone,
-    ``hang`` (block → solution). Computed on first use, since it is needed only where something grows."""
+class MeanStressTips:
+    """``tips``, including those of skipped blocks, with K under the mean stress in blocks with the mean-stress
+    response, ``under_mean_stress`` (block → solution). Computed on first use, since it is needed only if something grows."""
 
-    def __init__(self, tips: np.ndarray, hang: dict[int, Solution]) -> None:
-        self._tips, self._hang = tips, hang
+    def __init__(self, tips: np.ndarray, under_mean_stress: dict[int, Solution]) -> None:
+        self._tips, self._hang = tips, under_mean_stress
 
     def __getstate__(self) -> dict[str, np.ndarray]:
         return {"rows": self.rows}

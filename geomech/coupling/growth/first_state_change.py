@@ -28,10 +28,10 @@ log = logging.getLogger(__name__)
 #: Relative tolerance of the time of a change (and of its load, where loads are proportional to time); with more than
 #: `MANY` contacts the second one.
 FOUND, ROUGHLY, MANY = 1e-6, 1e-3, 100
-#: First trial on a way without prediction, as a fraction of it: near the start all states persist.
-FIRST_LOOK = 1 / 64
-#: Trials for one change; after these it is reported at the time at which it is known to have occurred.
-LOOKS = 12
+#: First trial without a prediction, as a fraction of the interval: near the start all states persist.
+FIRST_TRIAL = 1 / 64
+#: Largest number of trials for one change; it is then reported at the earliest time at which it has been seen.
+TRIALS = 12
 #: A step to a change is short if it is less than this fraction of the longest step. After a short one, changes within
 #: `MORE` times (with many contacts `MUCH_MORE` times) the previous interval are taken together, otherwise within
 #: `LESS`.
@@ -62,7 +62,7 @@ class FirstChange:
         self._seen: Watched | None = None
         self._older: Watched | None = None
         #: The pass that was reported last.
-        self._told: Watched | None = None
+        self._reported: Watched | None = None
         #: Time at which the next change is expected, s, after a step most of the way there.
         self.expected: float | None = None
         #: Time of the last change, and the interval within which others are taken with the next; s.
@@ -96,15 +96,15 @@ class FirstChange:
         within = (FOUND if len(high.key) <= MANY else ROUGHLY) * max(abs(start), abs(high.time))
         search = _Search(1 if high.time > start else -1, within, max(self._near, within), approach)
         way = search.way
-        for look in range(LOOKS):
-            aim, at = self._next_look(look, search, changes, low, high)
+        for look in range(TRIALS):
+            aim, at = self._next_trial(look, search, changes, low, high)
             if aim is None:
                 break
             try:
                 last = solve(aim)
             except NotConverged as failure:
                 # The blocks have consistent states farther on: the change is reported there.
-                log.debug("no look at t = %g s: %s", aim, failure)
+                log.debug("no trial at t = %g s: %s", aim, failure)
                 last = None
                 break
             seen = Watched.of(now, last, self.kinds)
@@ -126,7 +126,7 @@ class FirstChange:
         self._reach(high.time, most, within, MORE if len(high.key) <= MANY else MUCH_MORE)
         return found
 
-    def _next_look(
+    def _next_trial(
         self, look: int, search: _Search, changes: list[Change], low: list[Watched], high: Watched
     ) -> tuple[float | None, float | None]:
         """The next trial time, s (None: the pass ``high`` is the change), and the predicted time of the first of
@@ -139,7 +139,7 @@ class FirstChange:
             return None, at
         if at is None or way * (at - high.time) > 0 or look % 3 == 2:
             # Something else happens in between, or the interval shrinks from one side only.
-            share, at = FIRST_LOOK if len(low) == 1 else 0.5, None
+            share, at = FIRST_TRIAL if len(low) == 1 else 0.5, None
             aim = low[-1].time + share * (high.time - low[-1].time)
         else:
             aim = search.beyond(at)
@@ -158,11 +158,11 @@ class FirstChange:
             return [self._seen] if self._older is None else [self._older, self._seen]
         start = now.state.time
         try:
-            first = Watched.of(now, solve(start + FIRST_LOOK * (high.time - start)), self.kinds)
+            first = Watched.of(now, solve(start + FIRST_TRIAL * (high.time - start)), self.kinds)
         except NotConverged:
             return []
-        if self._told is None:
-            self._told = first
+        if self._reported is None:
+            self._reported = first
         return [first]
 
     def _reach(self, time: float, most: float, within: float, more: float) -> None:
@@ -189,8 +189,8 @@ class FirstChange:
         """Changes of state between the previous pass and ``found``."""
         if not self.kinds:
             return ()
-        seen, before = Watched.of(now, found, self.kinds), self._told
-        self._told = seen
+        seen, before = Watched.of(now, found, self.kinds), self._reported
+        self._reported = seen
         changes = [] if before is None else seen.changes(now, before)
         return tuple(event(now, change.kind, found.result.state, change.point, change.detail) for change in changes)
 

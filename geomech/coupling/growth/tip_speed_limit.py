@@ -36,8 +36,8 @@ class TipSpeed:
         way = way + self._of(self._kept, tips) - self._of(self._gone, tips)
         return np.where(reached(way, self._shortest), way, 0.0)
 
-    def went(self, tips: np.ndarray) -> None:
-        """Take note of what ``tips`` have ``grown`` in a pass of the present step."""
+    def record_growth(self, tips: np.ndarray) -> None:
+        """Record the growth (``grown``) of ``tips`` in a pass of the present step."""
         for key, grown in zip(_keys(tips), tips["grown"].tolist()):
             if grown > 0:
                 self._gone[key] = self._gone.get(key, 0.0) + grown

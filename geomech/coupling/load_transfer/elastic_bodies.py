@@ -53,7 +53,7 @@ def elastic_bodies(
         work = works[-1] if old is None else old.work
         if not problem.run.skip:
             old = None
-        bodies[b] = None if old is None else old.found_again(_loops(problem, blocks, b), own, material)
+        bodies[b] = None if old is None else old.reusable_for(_loops(problem, blocks, b), own, material)
         if bodies[b] is not None:
             work.bodies_kept += 1
             continue
@@ -105,7 +105,7 @@ def boundary_loads(
     acting = BoundaryForces(
         result.vertices,
         motion,
-        beside_acting(result.contacts, blocks.n_blocks),
+        contacts_of_loaded_pairs(result.contacts, blocks.n_blocks),
         forces.edges,
         forces.points,
         problem.run.boundary_stress,
@@ -125,7 +125,7 @@ def boundary_loads(
     return dict(zip(bodies, loads))
 
 
-def beside_acting(contacts: np.ndarray, n_blocks: int) -> np.ndarray:
+def contacts_of_loaded_pairs(contacts: np.ndarray, n_blocks: int) -> np.ndarray:
     """CONTACT rows of all pairs of blocks with a loaded contact, the open ones included: they show where a face
     ends."""
     pair = np.minimum(contacts["block"], contacts["other"]) * n_blocks + np.maximum(
@@ -177,7 +177,7 @@ def solve_bodies(
             raise ddm.TargetMissed(failure.solution, failure.target, f"{_called(b, names)}: ") from failure
 
     solutions = dict(zip(bodies, parallel_map(solved, list(bodies), threads_for(bodies))))
-    if any(body.asked.target_error is not None for body in bodies.values()):
+    if any(body.requested.target_error is not None for body in bodies.values()):
         # Solutions that meet the target error may belong to refined bodies.
         bodies.update((b, solution.body) for b, solution in solutions.items())
     return solutions
@@ -227,7 +227,7 @@ def tip_rows(problem: Problem, blocks: Blocks, solutions: dict, nodes_of: dict[i
     """TIP rows of all solved bodies with kink angle and K_eq; nodes numbered in the whole network."""
     if not solutions:
         return np.empty(0, TIP)
-    from ...ddm.fracture.f_criterion import judged, judged_rows
+    from ...ddm.fracture.f_criterion import apply_criterion, apply_criterion_to_rows
 
     rows, of = [], list(solutions.items())
     for b, solution in of:
@@ -236,11 +236,13 @@ def tip_rows(problem: Problem, blocks: Blocks, solutions: dict, nodes_of: dict[i
         rows.append(tips)
     tips = rows[0] if len(rows) == 1 else np.concatenate(rows)
     if problem.growth.trial_kink > 0:
-        angle, k_eq = zip(*(judged(each, problem.growth, problem.materials[blocks.material[b]]) for b, each in of))
+        angle, k_eq = zip(
+            *(apply_criterion(each, problem.growth, problem.materials[blocks.material[b]]) for b, each in of)
+        )
         tips["angle"], tips["k_eq"] = np.concatenate(angle), np.concatenate(k_eq)
         return tips
     rock = blocks.material[tips["block"]]
     for m in np.unique(rock).tolist():
         own = rock == m
-        tips["angle"][own], tips["k_eq"][own] = judged_rows(tips[own], problem.growth, problem.materials[m])
+        tips["angle"][own], tips["k_eq"][own] = apply_criterion_to_rows(tips[own], problem.growth, problem.materials[m])
     return tips

@@ -1,4 +1,5 @@
-"""Warns of boundary loads that are not in equilibrium: stress intensity factors are uncertain by as much."""
+"""Warns of boundary loads that are not in equilibrium, which causes a relative error of the same size in stress
+intensity factors."""
 
 from __future__ import annotations
 
@@ -16,8 +17,8 @@ BEYOND = 1e-5
 
 
 class LoadBalance:
-    """The largest imbalance of any block so far; ``reported`` is the last one of which a warning was given. A new one
-    follows whenever it has doubled."""
+    """The largest imbalance of any block so far. ``reported``: value at the last warning; the next warning follows when
+    it has doubled."""
 
     def __init__(self) -> None:
         self.reported = 0.0
@@ -34,7 +35,7 @@ class LoadBalance:
         if most > max(BEYOND + self.strain, 2.0 * self.reported):
             self.reported = most
             log.warning(
-                "t = %g s: the forces on %s that its cracks are solved for are out of balance by %.1e of their size; "
-                "its stress intensity factors are as uncertain",
+                "t = %g s: the forces on %s are out of balance by %.1e of their size; the stress intensity factors of "
+                "its cracks have an error of the same order",
                 time, blocks.names[b] if blocks.names else f"block {b}", most,
             )  # fmt: skip

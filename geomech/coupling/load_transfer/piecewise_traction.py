@@ -103,11 +103,11 @@ def on_grid(place, length):
 def add(found, ax, ay, bx, by, tax, tay, tbx, tby):
     """Add a piece from a to b, unless its traction is zero."""
     if tax != 0 or tay != 0 or tbx != 0 or tby != 0:
-        add_even_so(found, ax, ay, bx, by, tax, tay, tbx, tby)
+        add_always(found, ax, ay, bx, by, tax, tay, tbx, tby)
 
 
 @jit
-def add_even_so(found, ax, ay, bx, by, tax, tay, tbx, tby):
+def add_always(found, ax, ay, bx, by, tax, tay, tbx, tby):
     """Add a piece from a to b."""
     k = found.count[0]
     found.count[0] += 1
@@ -192,7 +192,7 @@ def add_base(found, of, start, low, high, p_low, p_high, wx, wy):
             x1, y1 = of.vertices[vertex[k], 0], of.vertices[vertex[k], 1]
         p = p_low + (places[k - 1] - low) / (high - low) * (p_high - p_low)
         q = p_low + (places[k] - low) / (high - low) * (p_high - p_low)
-        add_even_so(found, x0, y0, x1, y1, p * wx, p * wy, q * wx, q * wy)
+        add_always(found, x0, y0, x1, y1, p * wx, p * wy, q * wx, q * wy)
         x0, y0 = x1, y1
 
 

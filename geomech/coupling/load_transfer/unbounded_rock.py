@@ -61,16 +61,16 @@ def take_endless(now: CrackedBlocks, cracks: Cracks, state: State) -> tuple[Even
         return ()
     now.cracks, now.bodies = cracks, {}
     at = cracks.nodes[cracks.segments[cracks.birth_cycle == cracks.birth_cycle.max()]].mean(axis=(0, 1))
-    return (event(now, "split", state, at, "cracks have cut a piece off, and nothing holds it"),)
+    return (event(now, "split", state, at, "cracks have cut off an unsupported piece"),)
 
 
 def out_of_sight(now: CrackedBlocks, growth, state: State) -> tuple[Event, ...]:
-    """An event where ``growth`` leaves the window, beyond which nothing is drawn and intersections are not searched."""
+    """An event if ``growth`` leaves the window, outside which nothing is drawn and intersections are not detected."""
     outline = now.blocks.loops(0)[0]
     for node in growth.cracks.nodes:
         if winding_number([outline], node) > 0.25:
             continue
         away = distance_to_edges(node, outline, np.roll(outline, -1, axis=0))
         if away > ON_EDGE * np.ptp(outline, axis=0).max():
-            return (event(now, "out of sight", state, node, "a crack grows out of the piece of rock that is drawn"),)
+            return (event(now, "out of sight", state, node, "a crack grows out of the rock in the drawing"),)
     return ()

@@ -27,7 +27,7 @@ def relax(now: CrackedBlocks, load_time: float) -> tuple[Event, ...]:
     now.state, now.budget = found.state, now.budget.cut()
     if not found.collapsed:
         if not found.converged:
-            log.warning("t = %g s: %s; going on from there", load_time, found.reason)
+            log.warning("t = %g s: %s; continuing from there", load_time, found.reason)
         elif load_time == begun.time:
             dda.warn_of_toes(now.system, begun, found.state, now.problem.loads, load_time, now.response)
         return ()
@@ -50,7 +50,7 @@ def _fallen(now: CrackedBlocks, found: dda.Equilibrium, where: str, time: float)
 
 def lost(now: CrackedBlocks, state: State) -> tuple[Event, ...]:
     """A collapse event if a block has moved farther than the extent of the blocks: in statics nothing will stop it, and
-    ever shorter steps would follow it."""
+    steps would become ever shorter."""
     moved = np.hypot(*(state.vertices - now.blocks.vertices).T)
     farthest = int(np.argmax(moved))
     if not moved[farthest] > np.hypot(*np.ptp(now.blocks.vertices, axis=0)):
@@ -70,15 +70,15 @@ def unsupported(now: CrackedBlocks, result: dda.StepResult, mechanism: Mechanism
     reported = event(now, "mechanism", result.state, now.blocks.vertices[int(now.blocks.vertex_start[block])], detail)
     if now.problem.run.stepping == "events":
         log.warning(
-            "cycle %d, t = %g s: %s; the run ends: no load has an equilibrium from here on. Follow it with "
-            'dda.dynamic_factor = 1 and stepping "fixed"',
+            "cycle %d, t = %g s: %s; the run ends, as there is no equilibrium beyond this load. To follow the motion, "
+            'set dda.dynamic_factor = 1 and stepping "fixed"',
             now.number, result.state.time, detail,
         )  # fmt: skip
         return (reported,)
     load = f" and a load of {reported.load / 1e3:.4g} kPa" if reported.load else ""
     log.warning(
-        "cycle %d, t = %g s%s: %s. What they move by from here on means nothing in a static run: follow it with "
-        "dda.dynamic_factor = 1, find its limit with `geomech safety`, or end here: "
+        "cycle %d, t = %g s%s: %s. Their further displacements have no meaning in a static run: follow the motion with "
+        "dda.dynamic_factor = 1, find the factor of safety with `geomech safety`, or end the run here with "
         'run.stop_at = ["mechanism"]',
         now.number, result.state.time, load, detail,
     )  # fmt: skip

@@ -1,5 +1,5 @@
-"""Energy balance of cracks: what blocks spend on their cracks is stored around them, lost in friction, released by
-breaking cement and at growing tips, or set free where blocks split.
+"""Energy balance of cracks: the work of blocks on their cracks is stored around them, dissipated in friction, released
+by breaking cement and at growing tips, or released where blocks split.
 
 - DDA gives the work of the mean stress on the crack strain, A σ : dε_c.
 - Stored: a body with jumps [u] whose faces carry t, where the same loads would cause t₀ on closed faces, stores
@@ -33,7 +33,7 @@ import numpy as np
 
 from ...model import Blocks, Material, State
 from ..crack_compliance.crack_opening_work import first_work_on_cracks, work_on_cracks
-from ..growth.energy_release import FeltTips, Loaded, kink_release, mean_release
+from ..growth.energy_release import Loaded, MeanStressTips, kink_release, mean_release
 
 if TYPE_CHECKING:
     from ...ddm import Solution
@@ -52,8 +52,8 @@ def _add(sums: dict[int, float], block: int, energy: float) -> None:
 
 @dataclass(frozen=True)
 class _Growing:
-    """A tip in ``block`` that grows by ``way``, m; what it released before growth and the fracture energy (``cost``),
-    J/m²; ``share``: the factor on its release after growth from the change of load within the step."""
+    """A tip in ``block`` that grows by ``way``, m. ``cost``: fracture energy, J/m²; ``share``: factor on its release
+    after growth, for the change of load within the step."""
 
     way: float
     before: float
@@ -66,21 +66,22 @@ class _Growing:
 class CrackEnergy:
     """Sums since the beginning of a run, J/m.
 
-    work       of the blocks' mean stress (at the midpoint of each step) on the strain of their cracks uneven     in
-    statics: work of the forces beyond that of their mean stress stored     now, around cracks and in their filling
-    friction   lost between crack faces bond       released by the cement of crack faces as it breaks fracture
-    released at growing tips, as far as the blocks supply it: by the K of the mean stress in blocks that respond
-               to that alone (`by_mean_stress`); in statics no more than the fracture energy
+    work       of the mean stress of the blocks (at the midpoint of each step) on the strain of their cracks
+    uneven     in statics: work of the forces beyond that of their mean stress
+    stored     now, around cracks and in their filling
+    friction   dissipated between crack faces
+    bond       released by breaking cement of crack faces
+    fracture   released at growing tips, as far as the blocks supply it: by K of the mean stress in blocks with the
+               mean-stress response (`by_mean_stress`); in statics no more than the fracture energy
     runaway    in statics: released at tips beyond the fracture energy; lost
     toughness  K_Ic²/E' times the growth of all tips: the fracture energy. A block of uniform strain stores no bending
                energy and spends none; where bending opens cracks, fracture is less
-    parting    released as tips met something and blocks split: the last ligaments, what cracks stored that are block
-    edges
-               now, what the blocks stored less their parts (and new contacts); and where cracks are cut into stressed
-               rock
-    set_free   by the blocks themselves as they split residual   work + uneven + set_free − stored − friction − bond −
-    fracture − runaway − parting: the error of increments
-               and steps
+    parting    released as tips join something and blocks split: the last ligaments, the energy of cracks that are block
+               edges now, the energy of blocks minus that of their parts (and new contacts); and where cracks are cut
+               into stressed rock
+    set_free   by the blocks themselves as they split
+    residual   work + uneven + set_free − stored − friction − bond − fracture − runaway − parting: the error of
+               increments and steps
     """
 
     static: bool = False
@@ -101,7 +102,7 @@ class CrackEnergy:
     _asked: float = 0.0
     _parted: bool = False
     #: block → whether it responds to its mean stress alone.
-    _hangs: dict[int, bool] = field(default_factory=dict)
+    _by_mean_response: dict[int, bool] = field(default_factory=dict)
     _growing: dict[_Key, _Growing] = field(default_factory=dict)
     #: block with growing tips → its mean stress, Pa, its limit, the strain of its cracks then, and the factor as of a
     #: tip.
@@ -109,14 +110,14 @@ class CrackEnergy:
     #: Blocks of limited softness (`ByMeanStress.limit`) in which tips have grown in the present step.
     _grown: set[int] = field(default_factory=set)
     #: block with mean-stress response → its loading at the beginning of the present step.
-    _hung: dict[int, Loaded] = field(default_factory=dict)
+    _loaded_by_mean: dict[int, Loaded] = field(default_factory=dict)
     #: Statics: block → its solution at the beginning of the present step, and the fracture energy since then, J/m.
     _rested: dict[int, Solution] = field(default_factory=dict)
     _taken: dict[int, float] = field(default_factory=dict)
     #: Tips with K of the straining forces: at the beginning of the step, in its first pass and in its last one.
-    _began: FeltTips | None = None
-    _first: FeltTips | None = None
-    _last: FeltTips | None = None
+    _began: MeanStressTips | None = None
+    _first: MeanStressTips | None = None
+    _last: MeanStressTips | None = None
     #: … and the crack strains of blocks with mean-stress response.
     _strain_began: dict[int, np.ndarray] = field(default_factory=dict)
     _strain_first: dict[int, np.ndarray] = field(default_factory=dict)
@@ -134,9 +135,9 @@ class CrackEnergy:
         """A pass of the present step has ended with ``tips``, of which some may be about to grow. ``solutions``: block
         → the `ddm.Solution` that gives its crack strain; ``by_mean_stress``: blocks that respond to their mean stress
         alone. The blocks began the step ``stressed`` or not."""
-        hang = {block: of for block, of in solutions.items() if block in by_mean_stress}
-        self._strain_last = {block: of.crack_strain for block, of in hang.items()}
-        self._last = FeltTips(tips, hang)
+        under_mean_stress = {block: of for block, of in solutions.items() if block in by_mean_stress}
+        self._strain_last = {block: of.crack_strain for block, of in under_mean_stress.items()}
+        self._last = MeanStressTips(tips, under_mean_stress)
         if self._first is None:
             self._first, self._strain_first = self._last, self._strain_last
         if not len(tips):
@@ -148,7 +149,7 @@ class CrackEnergy:
         tips = self._last.rows
         rock = blocks.material[tips["block"]]
         modulus = np.array([m.plane_modulus for m in materials])[rock]
-        hangs = np.array([block in by_mean_stress for block in tips["block"].tolist()])
+        by_mean_response = np.array([block in by_mean_stress for block in tips["block"].tolist()])
         keys = _keys(tips)
         release = (tips["k_i"] ** 2 + tips["k_ii"] ** 2) / modulus
         now = dict(zip(keys, release.tolist()))
@@ -162,8 +163,8 @@ class CrackEnergy:
                 _add(self._released, of.block, released)
                 _add(self._lost, of.block, max(0.0, released - taken) if self.static else 0.0)
             else:
-                # A tip that has met something: G has no bound as the last ligament breaks, and its integral follows no
-                # rule.
+                # A tip has joined something: G is unbounded as the last ligament breaks, and no quadrature rule
+                # applies.
                 self._parted = True
         for block, (stress, limit, strain, share) in self._limited.items():
             # A block of limited softness (`ByMeanStress.limit`) spends less on growth as its limit falls.
@@ -172,7 +173,7 @@ class CrackEnergy:
                 less, known = now_limit - limit, solutions[block]
                 both = float(strain @ less @ stress + known.crack_strain @ less @ now_stress)
                 _add(self._released, block, 0.5 * known.body.area * share * both)
-        turned = np.where(hangs, kink_release(tips), tips["k_eq"] ** 2) / modulus
+        turned = np.where(by_mean_response, kink_release(tips), tips["k_eq"] ** 2) / modulus
         shares = self._shares(stressed)
         grows = np.flatnonzero(tips["grown"] > 0)
         cost = np.array([m.k_ic for m in materials])[rock] ** 2 / modulus
@@ -223,11 +224,11 @@ class CrackEnergy:
     def parts(self, parent: np.ndarray) -> None:
         """Blocks split in the present step; ``parent`` (n_blocks,): number of each block before."""
         self._parted = True
-        self._hangs, self._limited, self._strain_last = {}, {}, {}
+        self._by_mean_response, self._limited, self._strain_last = {}, {}, {}
         whole = np.bincount(parent)[parent] == 1
         now = {int(parent[child]): child for child in np.flatnonzero(whole).tolist()}
         self._grown = {now[block] for block in self._grown if block in now}
-        self._hung = {now[block]: of for block, of in self._hung.items() if block in now}
+        self._loaded_by_mean = {now[block]: of for block, of in self._loaded_by_mean.items() if block in now}
         if not self.static:
             return
         for block in [block for block in self._rested if block not in now]:
@@ -289,13 +290,13 @@ class CrackEnergy:
             gone = {block: solutions[block] for block in cut if block in solutions}
             solutions = {block: of for block, of in solutions.items() if block not in gone}
             for block, of in gone.items():
-                rubbed, of_cement = of.given_way
+                rubbed, of_cement = of.dissipated_in_step
                 self._runs_through(block, rubbed, of_cement.bond)
                 each[block] = 0.0
-        hangs = {block: block in by_mean_stress for block in solutions}
-        done = sum(self._work_at_rest(before, solutions, hangs, each)) if self.static else work
+        by_mean_response = {block: block in by_mean_stress for block in solutions}
+        done = sum(self._work_at_rest(before, solutions, by_mean_response, each)) if self.static else work
         stored = sum(solution.crack_energy + solution.filling_energy for solution in solutions.values())
-        rubbed, released_there = zip(*(of.given_way for of in solutions.values())) if solutions else ((), ())
+        rubbed, released_there = zip(*(of.dissipated_in_step for of in solutions.values())) if solutions else ((), ())
         friction, bond = sum(rubbed), sum(of.bond for of in released_there)
         if self.static:
             done += sum(of.slip_onset + of.break_onset for of in released_there)
@@ -303,11 +304,13 @@ class CrackEnergy:
             # Moving blocks have already spent this on their cracks.
             bond -= sum(of.break_onset for of in released_there)
         # A block that starts to respond to its mean stress, or has been split, stored energy in another way.
-        self._parted |= any(hangs.get(block) != hung for block, hung in self._hangs.items() if block not in cut)
+        self._parted |= any(
+            by_mean_response.get(block) != was for block, was in self._by_mean_response.items() if block not in cut
+        )
         # Cracks cut into stressed rock open against less than the stress they replace: the difference is released.
-        new = [block for block, of in solutions.items() if block not in self._hangs and of.jumps.size]
+        new = [block for block, of in solutions.items() if block not in self._by_mean_response and of.jumps.size]
         self._parted |= bool(np.any(before.stress[new]))
-        self._hangs = hangs
+        self._by_mean_response = by_mean_response
         self._release_of_limited(solutions, by_mean_stress)
         released, lost = sum(self._released.values()), sum(self._lost.values())
         rest = done + set_free - (stored - self.stored) - friction - bond - released
@@ -325,11 +328,13 @@ class CrackEnergy:
         self._released, self._lost, self._taken = {}, {}, {}
         self._asked, self._parted = 0.0, False
         self._began, self._first, self._strain_began = self._last, None, self._strain_last
-        # What grows now does so as the next step begins.
+        # The present growth takes place at the beginning of the next step.
         self._growing = {key: replace(of, share=1.0) for key, of in self._growing.items()}
         self._limited = {block: (*of[:3], 1.0) for block, of in self._limited.items()}
         self._grown = set()
-        self._hung = {block: Loaded.of(block, of, by_mean_stress) for block, of in solutions.items() if hangs[block]}
+        self._loaded_by_mean = {
+            block: Loaded.of(block, of, by_mean_stress) for block, of in solutions.items() if by_mean_response[block]
+        }
         self._rested = dict(solutions) if self.static else {}
 
     def _release_of_limited(self, solutions: dict[int, Solution], by_mean_stress: ByMeanStress) -> None:
@@ -340,20 +345,20 @@ class CrackEnergy:
             if block not in solutions or block not in by_mean_stress:
                 continue
             now = Loaded.of(block, solutions[block], by_mean_stress)
-            before = self._hung.get(block, Loaded(np.zeros(3), np.zeros(3), True))
+            before = self._loaded_by_mean.get(block, Loaded(np.zeros(3), np.zeros(3), True))
             if now.in_proportion and before.in_proportion:
                 between = float(before.stress @ now.strain - now.stress @ before.strain)
                 self._released[block] = released = 0.5 * solutions[block].body.area * between
                 self._lost[block] = max(0.0, released - self._taken.get(block, 0.0)) if self.static else 0.0
 
     def _work_at_rest(
-        self, before: State, solutions: dict[int, Solution], hangs: dict[int, bool], by_mean: np.ndarray
+        self, before: State, solutions: dict[int, Solution], by_mean_response: dict[int, bool], by_mean: np.ndarray
     ) -> Iterator[float]:
         """J/m that static forces have done in opening cracks, block by block. ``by_mean`` (n_blocks,): work of the mean
-        stress, which is all of it where a block ``hangs`` and where no forces act on its cracks."""
+        stress, which is all of it where a block ``by_mean_response`` and where no forces act on its cracks."""
         for block, of in solutions.items():
             began = self._rested.get(block)
-            if hangs[block] or self._hangs.get(block, False):
+            if by_mean_response[block] or self._by_mean_response.get(block, False):
                 yield float(by_mean[block])
             elif began is not None:
                 yield work_on_cracks(began, of)

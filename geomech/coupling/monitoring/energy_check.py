@@ -26,8 +26,8 @@ class BudgetWatch:
             return
         self._told = 2.0 * abs(share)
         log.warning(
-            "t = %g s: %.2g of all converted energy is not accounted for (budget_residual in history.csv): shorten the "
-            "time step, where cracks grow also growth.increment_m",
+            "t = %g s: %.2g of all converted energy is not accounted for (budget_residual in history.csv): reduce the "
+            "time step and, where cracks grow, growth.increment_m",
             time,
             share,
         )
@@ -71,8 +71,8 @@ class GrowthWatch:
             return
         self._told = True
         log.warning(
-            "t = %g s: cracks grow unstably at constant load and have released %.3g J/m so far, which in statics no motion "
-            "takes up (growth_release in history.csv); dda.dynamic_factor = 1 follows the motion",
+            "t = %g s: cracks grow unstably at constant load and have released %.3g J/m so far, which a static run does "
+            "not convert to motion (growth_release in history.csv); set dda.dynamic_factor = 1 to follow the motion",
             time,
             budget.released,
         )

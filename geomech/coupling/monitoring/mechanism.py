@@ -17,14 +17,14 @@ from ...model import Blocks
 log = logging.getLogger(__name__)
 
 #: Unbalanced force, relative to the forces on a block, below which the block counts as supported.
-HELD = 1e-2
+SUPPORTED = 1e-2
 #: Above that, it must have decreased by the first fraction over the second number of load steps. Slowly rising loads on
 #: elastic rock leave less than the limit above, and settling blocks fade faster: a column of 100 m, in steps of 10 ms,
 #: by a third.
 FADES, STEPS = 0.1, 5
 #: A block in free flight (unbalanced by nearly its weight) may still land: it is reported when it has moved this
 #: fraction of its size.
-FLYING, GONE = 0.99, 0.05
+FLYING, MOVED = 0.99, 0.05
 #: Number of blocks that are named.
 NAMED = 4
 
@@ -42,7 +42,7 @@ class Mechanism:
         """After the load step of ``result``: the fastest block and a message, if blocks have been unbalanced for
         `STEPS` load steps and the unbalanced force does not fade; otherwise None."""
         ratio = float(result.statistics["unbalanced_ratio"])
-        if not ratio > HELD:
+        if not ratio > SUPPORTED:
             self.ratios, self.ways, self.reported = [], [], False
             return None
         self.ratios = [*self.ratios[-STEPS:], ratio]
@@ -53,7 +53,7 @@ class Mechanism:
         speed[np.asarray(blocks.fixed, bool)] = 0.0
         if self._stretches(result, blocks, int(np.argmax(speed))):
             return None
-        if ratio > FLYING and not _has_gone(int(np.argmax(speed)), result, blocks):
+        if ratio > FLYING and not _has_moved(int(np.argmax(speed)), result, blocks):
             return None
         self.reported = True
         moving = np.flatnonzero(speed > 0.1 * speed.max())
@@ -67,15 +67,15 @@ class Mechanism:
 
     def _stretches(self, result: dda.StepResult, blocks: Blocks, block: int) -> bool:
         """Whether a bolt that is being stretched will stop the ``block``: its force, extrapolated along the present
-        motion, balances the rest before the block has moved `GONE` of its size."""
+        motion, balances the rest before the block has moved `MOVED` of its size."""
         bolts = result.state.bolts
         if not (bolts["installed"] & ~bolts["broken"]).any():
             return False
         gained, way = self.ratios[0] - self.ratios[-1], self.ways[-1] - self.ways[0]
-        return gained > 0 and way * self.ratios[-1] <= gained * GONE * float(np.sqrt(blocks.areas()[block]))
+        return gained > 0 and way * self.ratios[-1] <= gained * MOVED * float(np.sqrt(blocks.areas()[block]))
 
 
-def _has_gone(block: int, result: dda.StepResult, blocks: Blocks) -> bool:
+def _has_moved(block: int, result: dda.StepResult, blocks: Blocks) -> bool:
     own = slice(blocks.vertex_start[block], blocks.vertex_start[block + 1])
     way = np.hypot(*(result.state.vertices[own] - blocks.vertices[own]).T)
-    return bool(way.min() > GONE * np.sqrt(blocks.areas()[block]))
+    return bool(way.min() > MOVED * np.sqrt(blocks.areas()[block]))

@@ -49,9 +49,9 @@ _FARTHEST = 0.02
 #: amount. Half of the overlap that is refused in a drawing.
 _OPENED = 0.5 * REFUSED
 #: Largest mean crack strain that counts as small: the strain at failure of rock is a few thousandths.
-_SMALL = 0.01
+_SMALL_STRAIN = 0.01
 #: Forces smaller than this fraction of the largest are round-off.
-_NOTHING = 1e-12
+_ROUND_OFF = 1e-12
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,7 +116,7 @@ class _Faces:
 
 def holds_together(state: State, blocks: np.ndarray) -> bool:
     """Whether the crack strains of ``blocks`` (numbers) in ``state`` are small, so that their parts can start there."""
-    return bool(np.abs(state.crack_strain[blocks]).max(initial=0.0) <= _SMALL)
+    return bool(np.abs(state.crack_strain[blocks]).max(initial=0.0) <= _SMALL_STRAIN)
 
 
 def _along(points: np.ndarray, a: np.ndarray, b: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -188,7 +188,7 @@ def _contacts(
     across = found.geometry[:, 1:3]
     normal = np.sum(inherited.force * across, axis=1)
     shear = np.sum(inherited.force * normal_of(across), axis=1)
-    least = _NOTHING * np.abs(inherited.force).max(initial=0.0)
+    least = _ROUND_OFF * np.abs(inherited.force).max(initial=0.0)
     normal = np.where((normal > least) | ((found.bonded == WHOLE) & (normal < -least)), normal, 0.0)
     rough = np.array([joint.roughness is not None for joint in system.joints])[found.law]
     keeps = ~inherited.known & (found.state != OPEN) & (is_part[found.block] | is_part[found.other])

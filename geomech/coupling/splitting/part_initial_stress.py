@@ -1,12 +1,13 @@
-"""What parts begin with in motion: as much stress of their own as there is energy for, and their own cracks' strain.
+"""Initial stress and crack strain of the parts of a moving block that splits.
 
-The last solution of the whole body gives the mean stress of every part, unlike the whole's where it was bent. A block
-of one strain has stored nothing of that: its parts would begin with more energy than it had. What there is besides its
-own is what its cracks have stored, the part of it that the block has been spending, less what those keep that are still
-cracks, of a part. So parts begin with σ₀ + λ (σ − σ₀), σ₀ the stress of the whole, and the largest λ ≤ 1 with which
-they store no more than the whole and its cracks did; what is left is set free as they part. The rest of their stress
-comes in motion, by the work of the forces on them. The cracks of parts begin with the strain that they answer with to
-that stress: where they began with that of the whole, their first step would close what is no longer theirs, against it.
+The last solution of the whole body gives the mean stress σ of each part, which differs from the stress σ₀ of the whole
+if the block was bent. A DDA block has uniform strain and has stored no bending energy, so that parts with stress σ
+could start with more energy than the whole had. Available besides the energy of the whole is what its cracks have
+stored at the block's expense, minus what remains in cracks of the parts. The parts therefore start with σ₀ + λ (σ − σ₀)
+and the largest λ ≤ 1 for which they store no more than the whole and its cracks did; the remaining energy is released
+by the split. The rest of their stress develops in motion, by the work of the forces on them. Their cracks start with
+the strain that corresponds to the initial stress. With the crack strain of the whole, the first step would close cracks
+that are now block edges.
 """
 
 from __future__ import annotations
@@ -23,11 +24,11 @@ from ..crack_compliance.added_compliance import crack_response, passive, strain_
 from .block_splitting import Split
 
 
-def begin_in_motion(
+def initialise_moving_parts(
     now: CrackedBlocks, split: Split, before: Blocks, state: State, stored: Mapping[int, float]
 ) -> None:
-    """Give the parts of ``split``, which ``now`` has taken, what they are to begin with; ``before`` are the blocks that
-    were cut, in ``state``, ``stored`` J/m what each had at its cracks."""
+    """Set the initial stress and crack strain of the parts of ``split``, which ``now`` has accepted. ``before``: the
+    blocks before the split, in ``state``; ``stored``: energy at the cracks of each, J/m."""
     is_part = np.bincount(split.parent, minlength=before.n_blocks)[split.parent] > 1
     cracked = [part for part in np.flatnonzero(is_part).tolist() if part in now.bodies]
 
@@ -40,7 +41,7 @@ def begin_in_motion(
     for part in cracked:
         parent = int(split.parent[part])
         left[parent] = left.get(parent, 0.0) - answer(part, state.stress[parent]).crack_energy
-    begun = paid_stress(split, before, state, now.system.compliance, left)
+    begun = affordable_stress(split, before, state, now.system.compliance, left)
     strain = begun.crack_strain.copy()
     for part in cracked:
         turn, found = float(begun.rotation[part]), answer(part, begun.stress[part])
@@ -52,12 +53,12 @@ def begin_in_motion(
     now.state = replace(begun, crack_strain=strain)
 
 
-def paid_stress(
+def affordable_stress(
     split: Split, before: Blocks, state: State, compliance: np.ndarray, stored: Mapping[int, float]
 ) -> State:
-    """The state of ``split`` of the blocks ``before`` in ``state`` with the stress of parts that is paid for;
-    ``compliance`` (n_parts, 3, 3) of the rock, 1/Pa, of blocks after, and J/m ``stored`` at the cracks, of blocks
-    before."""
+    """The state of ``split`` with the stress σ₀ + λ (σ − σ₀) of the parts. ``before``: the blocks before the split, in
+    ``state``; ``compliance`` (n_blocks after, 3, 3) of the rock, 1/Pa; ``stored``: J/m at the cracks of blocks before
+    the split."""
     stress = split.state.stress.copy()
     areas = split.blocks.areas(split.state.vertices)
     count = np.bincount(split.parent, minlength=before.n_blocks)
@@ -72,7 +73,7 @@ def paid_stress(
 
 
 def _largest(square: float, linear: float, energy: float) -> float:
-    """The largest λ up to one with ``square`` λ² + ``linear`` λ ≤ ``energy``, which is not negative."""
+    """The largest λ ≤ 1 with ``square`` λ² + ``linear`` λ ≤ ``energy`` (≥ 0)."""
     if square + linear <= energy:
         return 1.0
     # Without cancellation where linear > 0.

@@ -1,4 +1,4 @@
-"""Mean stress of a part of a solved body: what a block that is cut off begins with."""
+"""Mean stress of a part of a solved body, the initial stress of a block that is cut off."""
 
 from __future__ import annotations
 
@@ -8,15 +8,15 @@ from ...conventions import rotate_stress
 
 
 def rotated_mean_stress(solution, loops: list[np.ndarray], angle: float) -> np.ndarray:
-    """(3,) mean of ``solution``'s stress over a polygon, by area-weighted sampling of its triangles, turned by
-    ``angle`` rad. The sampling is exact for stress that is linear in x; it keeps away from the corners, where the
-    stress of the solution before the cut is singular."""
+    """(3,) mean of the stress of ``solution`` over a polygon, rotated by ``angle`` rad: area-weighted samples of its
+    triangles. It is exact for stress linear in x, and no sample is close to a corner, where the stress before the cut
+    is singular."""
     import shapely
 
     polygon = shapely.Polygon(loops[0], loops[1:])
     triangles = shapely.get_parts(shapely.constrained_delaunay_triangles(polygon))
     corners = np.array([shapely.get_coordinates(t)[:3] for t in triangles])
-    for _ in range(4):  # quartered four times
+    for _ in range(4):  # four subdivisions into four triangles each
         middle = (corners + np.roll(corners, -1, axis=1)) / 2
         corners = np.concatenate(
             [np.stack([corners[:, k], middle[:, k], middle[:, k - 1]], axis=1) for k in range(3)] + [middle]

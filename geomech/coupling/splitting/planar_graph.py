@@ -1,7 +1,7 @@
-"""The planar graph of one block's outline, holes and cracks, and its faces: what the block falls into.
+"""The planar graph of a block's outline, holes and cracks; its faces are the parts of a split block.
 
-The nodes are already shared (mouths lie on the edges, crossings have a node), so nothing is snapped here, and every
-coordinate that comes out is one that went in.
+Nodes are already shared (mouths lie on edges, intersections have a node), so nothing is snapped here and coordinates
+are kept exactly.
 """
 
 from __future__ import annotations
@@ -17,9 +17,9 @@ from ...model.blocks.polygon import signed_area
 
 _log = logging.getLogger(__name__)
 
-#: Faces smaller than this part of their block are merged into a neighbour.
+#: Faces smaller than this fraction of the block's area are merged into a neighbour.
 SLIVER_AREA = 1e-8
-#: A mouth lies on an edge when it is nearer to it than this part of the block's size.
+#: A mouth lies on an edge if its distance from it is less than this fraction of the block's size.
 ON_EDGE = 1e-9
 
 
@@ -27,8 +27,8 @@ ON_EDGE = 1e-9
 class BlockGraph:
     """Nodes of a block: its vertices first, then the crack nodes that are not vertices.
 
-    points    (n, 2); where loops touch, the first of the vertices there stands for all
-    node      crack node → node here
+    points    (n, 2); where loops touch, the first of the vertices there represents all
+    node      crack node → node of this graph
     vertex    (n,) old vertex, −1 for others
     edges     (m, 2) boundary pieces, rock on the left; ``edge`` (m,) the old edge, ``span`` (m, 2) the part of it
     segments  rows in the crack network; ``ends`` (k, 2) their nodes here
@@ -73,7 +73,7 @@ class BlockGraph:
                         f"{cracks.names[cracks.crack[row]]}: its mouth ({p[0]:g}, {p[1]:g}) is {distance:.3g} m off "
                         f"the boundary of {blocks.names[block]}"
                     )
-                # A mouth at a vertex but for round-off is that vertex.
+                # A mouth that coincides with a vertex up to round-off is that vertex.
                 for end, at in ((0.0, edge), (1.0, int(blocks.next_vertex[own[edge]] - first))):
                     if abs(along - end) * np.hypot(*(b[edge] - a[edge])) <= 1e-12 * size:
                         node[n] = own_node[at]
@@ -94,7 +94,7 @@ class BlockGraph:
                 old.append(own[k])
                 span.append((t0, t1))
         ends = np.array([[node[n] for n in pair] for pair in cracks.segments[segments].tolist()], dtype=int)
-        # Loops that touch are one: a crack from one to the other divides the rock.
+        # Loops that touch count as one: a crack from one to the other divides the rock.
         loops = np.array(loop)
         for at, first_there in enumerate(own_node):
             if at != first_there:
@@ -112,8 +112,8 @@ class BlockGraph:
         )
 
     def closes(self) -> bool:
-        """Whether the cracks, with each boundary loop shrunk to a point, hold a cycle: only then do they divide
-        rock."""
+        """Whether the cracks, with each boundary loop contracted to a point, contain a cycle: only then do they divide
+        the rock."""
         root = list(range(len(self.points)))
 
         def find(n: int) -> int:
@@ -135,7 +135,7 @@ class BlockGraph:
 
 
 def _on_boundary(a: np.ndarray, b: np.ndarray, p: np.ndarray) -> tuple[int, float, float]:
-    """The edge (of those from ``a`` to ``b``) nearest to ``p``, where on it (0 to 1), and how far away."""
+    """The edge (of those from ``a`` to ``b``) nearest to ``p``, the coordinate on it (0 to 1), and the distance."""
     d = b - a
     along = np.clip(np.sum((p - a) * d, axis=1) / np.sum(d * d, axis=1), 0.0, 1.0)
     distance = np.hypot(*(a + along[:, None] * d - p).T)
@@ -144,7 +144,7 @@ def _on_boundary(a: np.ndarray, b: np.ndarray, p: np.ndarray) -> tuple[int, floa
 
 
 def _faces(graph: BlockGraph, kept: np.ndarray) -> list[list[np.ndarray]]:
-    """The faces of rock: rings of node numbers, outline counter-clockwise first, then holes clockwise."""
+    """The faces of the rock as rings of node numbers: outline counter-clockwise, then holes clockwise."""
     import shapely
     from shapely.geometry.polygon import orient
 
@@ -153,7 +153,7 @@ def _faces(graph: BlockGraph, kept: np.ndarray) -> list[list[np.ndarray]]:
     number: dict[tuple, int] = {}
     for n, point in enumerate(graph.points.tolist()):
         number.setdefault(tuple(point), n)
-    # Seen from a hole's own void, its edges run the other way.
+    # Around the void of a hole its edges run in the opposite direction.
     backwards = {(b, a) for a, b in graph.edges.tolist()}
     found = []
     for face in faces:
@@ -175,8 +175,8 @@ def _area(graph: BlockGraph, rings: list[np.ndarray]) -> float:
 
 
 def faces_without_slivers(graph: BlockGraph, names: str) -> tuple[list[list[np.ndarray]], np.ndarray]:
-    """Faces above the least area, and which crack segments are kept. A sliver is opened to the neighbour with which it
-    shares the longest side, by taking that side out of the network."""
+    """Faces that are not slivers, and the crack segments kept. A sliver is merged with the neighbour with which it
+    shares the longest side, by removing that side from the network."""
     kept = np.ones(len(graph.ends), bool)
     by_ends = {frozenset(pair): k for k, pair in enumerate(graph.ends.tolist())}
     while True:

@@ -1,8 +1,7 @@
-"""Impulses of rigid blocks that strike each other: Newton's restitution across the contact, Coulomb's friction along
-it.
+"""Impulses of colliding rigid blocks: Newton's restitution normal to the contact, Coulomb friction along it.
 
-Contact i has the relative velocity uᵢ of its vertex against its edge, across it (n, positive apart) and along it (t).
-Impulses p change u = u₀ + W p, W = J M⁻¹ Jᵀ of the blocks' rigid motion, so that
+Contact i has the relative velocity uᵢ of its vertex and edge, normal to the edge (n, positive when separating) and
+along it (t). Impulses p change u = u₀ + W p, W = J M⁻¹ Jᵀ of the blocks' rigid motion, so that
 
     uₙ ≥ gₙ,   pₙ ≥ 0,   pₙ (uₙ − gₙ) = 0          gₙ = −e uₙ(before) where blocks strike
     |pₜ| ≤ μ pₙ,   pₜ against uₜ − gₜ where it reaches that
@@ -19,24 +18,24 @@ import numpy as np
 
 from ...compiled import kept
 
-#: Sweeps end where none has changed a relative velocity by more than this part of the largest that is asked for: far
-#: below the per cent to which coefficients of restitution are known, and …
+#: Sweeps end when no relative velocity changes by more than this fraction of the largest required one, far below the
+#: accuracy of coefficients of restitution, …
 _WITHIN = 1e-9
-#: … after so many in any case: 100 bricks in a column that is struck take 4 000.
+#: … or after this number: a struck column of 100 bricks takes 4 000.
 _SWEEPS = 20_000
 
 
 class ImpulseProblem(NamedTuple):
-    """Contacts (n,) of rigid blocks, and what their relative velocities are to be.
+    """Contacts (n,) of rigid blocks and their required relative velocities.
 
     block, other     (n,)          the vertex's block and the edge's
     normal           (n, 2)        outward of the edge
     arms             (n, 2, 2)     m, from the centroids of both to where they touch
-    inverse          (n_blocks, 3) 1/(kg/m), 1/(kg m): of mass, mass, moment of inertia; 0 for what is fixed
+    inverse          (n_blocks, 3) 1/(kg/m), 1/(kg m): of mass, mass, moment of inertia; 0 if fixed
     velocity         (n_blocks, 3) m/s, m/s, rad/s before
     across, along    (n,)          m/s: gₙ and gₜ
     friction         (n,)          μ
-    glued            (n,) bool     held both ways: uₙ = gₙ and uₜ = gₜ
+    glued            (n,) bool     bilateral: uₙ = gₙ and uₜ = gₜ
     """
 
     block: np.ndarray
@@ -51,7 +50,7 @@ class ImpulseProblem(NamedTuple):
     glued: np.ndarray
 
     def impulses(self) -> tuple[np.ndarray, np.ndarray]:
-        """(n, 2) N s of each contact across its edge and along it, and (n_blocks, 3) the velocities after them."""
+        """(n, 2) N s: normal and tangential impulse of each contact, and (n_blocks, 3) the velocities after them."""
         velocity = np.ascontiguousarray(self.velocity, dtype=float).copy()
         impulse = _swept(
             self.block, self.other, self.normal, self.arms, self.inverse, velocity, self.across, self.along,
@@ -70,18 +69,17 @@ class ImpulseProblem(NamedTuple):
         return out * self.inverse
 
     def passed_on(self, which: np.ndarray) -> np.ndarray:
-        """(n_blocks, 3) the velocities after impulses of the contacts ``which`` (n,) alone."""
+        """(n_blocks, 3) the velocities after the impulses of the contacts ``which`` (n,) alone."""
         per_contact = ("block", "other", "normal", "arms", "across", "along", "friction", "glued")
         return self._replace(**{name: getattr(self, name)[which] for name in per_contact}).impulses()[1]
 
     def speeds(self, velocity: np.ndarray) -> np.ndarray:
-        """(n, 2) m/s of the vertices against their edges, across and along, where blocks have ``velocity``
-        (n_blocks, 3)."""
+        """(n, 2) m/s: relative velocities of vertices and edges, normal and tangential, for the block velocities
+        ``velocity`` (n_blocks, 3)."""
         return self.relative(velocity[self.block], velocity[self.other])
 
     def relative(self, first: np.ndarray, second: np.ndarray) -> np.ndarray:
-        """(n, 2) m/s of the vertices against their edges, across and along, where the vertices' blocks have velocities
-        ``first`` and the edges' ``second`` (n, 3)."""
+        """`speeds` for the velocities ``first`` (n, 3) of the vertices' blocks and ``second`` (n, 3) of the edges'."""
         speed = np.zeros((len(self.block), 2))
         for side, (v, sign) in enumerate(((first, 1.0), (second, -1.0))):
             arm = self.arms[:, side]
@@ -97,7 +95,8 @@ def _swept(block, other, normal, arms, inverse, velocity, across, along, frictio
     blocks' centroids."""
     n = block.shape[0]
     impulse = np.zeros((n, 2))
-    # Of each contact and way: what a unit impulse does to its own relative velocity, and its moments about both blocks.
+    # For each contact and direction: change of its own relative velocity by a unit impulse, and moments about both
+    # blocks.
     own = np.zeros((n, 2))
     moment = np.zeros((n, 2, 2))
     largest = 0.0

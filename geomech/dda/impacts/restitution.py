@@ -1,21 +1,22 @@
 """Impacts of blocks whose joint law names a coefficient of restitution e: v′ = −e v across the contact.
 
-An implicit step holds blocks apart by forces over all of its length. Where one begins to touch within it, how much of
-its speed is left depends on the part of the step in which it does: Shi's scheme leaves between nothing and all of it.
-With a coefficient of restitution the impact is an impulse at its moment instead:
+An implicit step applies contact forces over its whole length. If blocks collide within the step, the speed that remains
+depends on the time of the collision in the step: in Shi's scheme it is anything from zero to all of it. With a
+coefficient of restitution the impact is an impulse at the time of the collision:
 
-1. The step is solved as if blocks that come together at a speed did not touch. Their gap closes at the time t* where
-   the cubic of its values and rates at both ends does.
-2. On the geometry of t*, impulses (`ImpulseProblem`) change the velocity across it by −(1 + e) u(t*), with Coulomb's
-   friction along it. Contacts that are closed pass them on, and do not let blocks come nearer for them.
-3. Blocks move on with the change of velocity for the rest of the step, dt − t*: no time is lost, and the forces of the
-   step have done their work on the way without the impact, which does its own.
-4. What has come back by the end of the step, or is met by what others have made of it, ends it touching and at rest.
+1. The step is solved as if colliding blocks did not touch. Their gap closes at the root t* of the cubic that has its
+   values and rates at both ends of the step.
+2. In the geometry at t*, impulses (`ImpulseProblem`) change the normal relative velocity by −(1 + e) u(t*), with Coulomb
+   friction along the contact. Closed contacts transmit them, and prevent blocks from approaching because of them.
+3. Blocks move with the change of velocity for the rest of the step, dt − t*: no time is lost, and the forces of the
+   step do their work along the path without impact, the impulses do theirs.
+4. Contacts that have closed again by the end of the step, or that others have made to collide, end it touching and at
+   rest.
 
-So neither the rebound nor its time depends on the step. Energy is never gained: e is lowered for this step where
-friction and an eccentric impact would (Newton's law allows it, Kane & Levinson 1985). A closing that is slower than
-what gravity makes in a step is none of this: there blocks come to rest as without restitution. No impact strains its
-blocks: Newton's law knows of speeds alone.
+So neither the rebound nor its time depends on the step length. Energy never increases: e is reduced for the step where
+Newton's law would create energy in eccentric impacts with friction (Kane & Levinson 1985). Contacts that close more
+slowly than the speed gained by gravity in one step are excluded: there blocks come to rest as without restitution.
+Impacts do not strain blocks, since Newton's law contains speeds only.
 """
 
 from __future__ import annotations
@@ -30,14 +31,14 @@ from ..open_close.contact_set import ContactSet
 from ..open_close.equations import Settled
 from .impulses import ImpulseProblem
 
-#: The time of an impact is known to 2⁻ⁿ of the step.
+#: n: the time of an impact is found to 2⁻ⁿ of the step.
 _HALVINGS = 45
 
 
 @dataclass(frozen=True, eq=False)
 class RigidBlocks:
     """Blocks as rigid bodies at the end of a step without impacts: ``centroid`` (n_blocks, 2) m, ``inverse``
-    (n_blocks, 3) of mass, mass and moment of inertia, 0 for what is held, and the ``velocity`` (n_blocks, 3), which was
+    (n_blocks, 3) of mass, mass and moment of inertia, 0 if constrained, and the ``velocity`` (n_blocks, 3), which was
     ``begun`` at its start; ``turn`` (n_blocks,) rad in the step; all contacts' ``normal`` and ``point`` (n, 2)."""
 
     centroid: np.ndarray
@@ -55,11 +56,8 @@ class RigidBlocks:
 
 
 class Rebound(NamedTuple):
-    """What impacts have done: rigid ``velocity`` (n_blocks, 3) after them, by what blocks have ``moved`` (n_blocks, 3)
-    m and
-    rad beside the step's displacement, and the energies (J/m) that restitution (``lost``) and friction (``rubbed``)
-    have
-    taken."""
+    """Result of impacts: rigid ``velocity`` (n_blocks, 3) after them, additional displacement (``moved``, (n_blocks, 3)
+    m and rad), and the energies (J/m) dissipated by restitution (``lost``) and friction (``rubbed``)."""
 
     velocity: np.ndarray
     moved: np.ndarray
@@ -69,11 +67,11 @@ class Rebound(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Striking:
-    """Contacts of a step whose blocks come together with a coefficient of restitution.
+    """Contacts of a step whose blocks collide with a coefficient of restitution.
 
     which        (n,) bool   of all contacts of the step
-    restitution  (n,)        e of each; nan where the law names none
-    speed        (n, 2)      m/s, the rigid blocks' relative velocity across the contact and along it as the step begins
+    restitution  (n,)        e of each; nan if the law has none
+    speed        (n, 2)      m/s, normal and tangential relative velocity of the rigid blocks at the start of the step
     """
 
     which: np.ndarray
@@ -82,28 +80,28 @@ class Striking:
 
     @classmethod
     def of(cls, found: ContactSet, restitution: np.ndarray, speed: np.ndarray, slowest: float) -> Striking | None:
-        """None where no open contact with a ``restitution`` (n,) closes faster than ``slowest`` m/s by its ``speed``
+        """None if no open contact with a ``restitution`` (n,) closes faster than ``slowest`` m/s, given its ``speed``
         (n, 2) m/s."""
         which = ~np.isnan(restitution) & (found.state == OPEN) & (found.bonded == 0) & (speed[:, 0] < -slowest)
         return cls(which, restitution, speed) if which.any() else None
 
     def apart(self, gap: np.ndarray, far: float) -> np.ndarray:
-        """The starting ``gap`` (n,) m with which these contacts stay open in the step, ``far`` m more than it is."""
+        """The starting ``gap`` (n,) m increased by ``far`` m at these contacts, so that they stay open in the step."""
         return np.where(self.which, gap + far, gap)
 
     def back(self, settled: Settled, far: float) -> Settled:
-        """What is ``settled`` with the gaps as they are."""
+        """``settled`` with the true gaps, ``far`` m less."""
         return replace(settled, gap=np.where(self.which, settled.gap - far, settled.gap))
 
     def closed(self, gap: np.ndarray) -> np.ndarray:
-        """(n,) bool: those that are closed at the end of the step, where contacts have this ``gap`` (n,) m."""
+        """(n,) bool: these contacts that are closed at the end of the step, with ``gap`` (n,) m."""
         return self.which & (gap < 0.0)
 
     def rebound(
         self, found: ContactSet, settled: Settled, struck: np.ndarray, gap: np.ndarray, blocks: RigidBlocks, dt: float
     ) -> Rebound:
-        """What comes of the contacts ``struck`` (n,), whose ``gap`` (n,) m at the end of a step of ``dt`` is below
-        0."""
+        """Result of the impacts of the contacts ``struck`` (n,), whose ``gap`` (n,) m at the end of a step of ``dt`` is
+        negative."""
         rows, problem = _of_closed(found, settled, struck, blocks)
         hit, bouncing = struck[rows], np.nan_to_num(self.restitution[rows])
         rates = self.speed[rows, 0], problem.speeds(blocks.velocity)[:, 0]
@@ -117,7 +115,7 @@ class Striking:
             )
         )
         there[:, 0] = np.minimum(there[:, 0], 0.0)
-        # What sticks or was closed goes on as it did; what slides may be stopped.
+        # Sticking and closed contacts keep their velocity; sliding ones may be stopped.
         along = np.where(hit, ended[:, 1] - there[:, 1], np.where(settled.state[rows] == SLIP, 0.0, ended[:, 1]))
         dull = ended[:, 0] - np.where(hit, there[:, 0], 0.0)
         problem = problem._replace(along=along)
@@ -128,7 +126,7 @@ class Striking:
             impulse, after = at_rest + share * (impulse - at_rest), least + share * (after - least)
         change = problem.speeds(after - blocks.velocity)
         lost, rubbed = _works(impulse, np.where(hit[:, None], there, ended), change)
-        # Friction that pushes tips on whose own blow turns them back gives what restitution takes more.
+        # If friction does positive work on tips that the impact turns back, restitution dissipates it.
         lost, rubbed = lost + min(rubbed, 0.0), max(rubbed, 0.0)
         moved = problem._replace(
             across=np.zeros(len(rows)), along=np.zeros(len(rows)), velocity=problem.made_by(
@@ -140,8 +138,8 @@ class Striking:
     def landed(
         self, found: ContactSet, settled: Settled, struck: np.ndarray, gap: np.ndarray, blocks: RigidBlocks,
     ) -> Rebound:  # fmt: skip
-        """What comes of contacts ``struck`` (n,) that are closed by ``gap`` (n,) m < 0 for all that: they end the step
-        touching and do not come nearer."""
+        """Result for contacts ``struck`` (n,) that are still closed, ``gap`` (n,) m < 0: they end the step touching and
+        do not approach further."""
         rows, problem = _of_closed(found, settled, struck, blocks)
         ended, nothing = problem.speeds(blocks.velocity), np.zeros(len(rows))
         problem = problem._replace(along=nothing, friction=nothing)
@@ -157,8 +155,7 @@ class Striking:
 def _of_closed(
     found: ContactSet, settled: Settled, struck: np.ndarray, blocks: RigidBlocks
 ) -> tuple[np.ndarray, ImpulseProblem]:
-    """The contacts that are closed or ``struck`` (n,), and the problem of their impulses but for what it asks of
-    them."""
+    """The contacts that are closed or ``struck`` (n,), and their impulse problem without required velocities."""
     rows = np.flatnonzero((settled.state != OPEN) | struck)
     friction = np.where(struck, found.springs.friction, settled.springs.friction)[rows]
     nothing, both = np.zeros(len(rows)), (found.block[rows], found.other[rows])
@@ -170,7 +167,7 @@ def _of_closed(
 
 
 def _turned_back(problem: ImpulseProblem, blocks: RigidBlocks, part: np.ndarray) -> ImpulseProblem:
-    """The contacts as they were before this ``part`` (n,) of the step's turns."""
+    """The ``problem`` in the geometry before the fraction ``part`` (n,) of the rotations in the step."""
 
     def back(vectors: np.ndarray, owner: np.ndarray) -> np.ndarray:
         angle = part * blocks.turn[owner]
@@ -182,17 +179,15 @@ def _turned_back(problem: ImpulseProblem, blocks: RigidBlocks, part: np.ndarray)
 
 
 def _works(impulse: np.ndarray, before: np.ndarray, change: np.ndarray) -> tuple[float, float]:
-    """J/m that ``impulse`` (n, 2) across contacts and along them takes, where relative velocities were ``before`` (n,
-    2)
-    and had this ``change`` (n, 2): −p (u + u′)/2 (Thomson & Tait 1867, § 308)."""
+    """J/m dissipated by normal and by tangential ``impulse`` (n, 2), with relative velocities ``before`` (n, 2) and
+    their ``change`` (n, 2): −p (u + u′)/2 (Thomson & Tait 1867, § 308)."""
     across, along = (-impulse * (before + 0.5 * change)).sum(axis=0).tolist()
     return across, along
 
 
 def touching_time(gap: np.ndarray, left: np.ndarray, begun: np.ndarray, ended: np.ndarray, dt: float) -> np.ndarray:
-    """(n,) s at which a ``gap`` (n,) m closes that is ``left`` m < 0 after ``dt``, with the rates ``begun`` and
-    ``ended``
-    m/s: a root of the cubic of these, by halving."""
+    """(n,) s: time at which a ``gap`` (n,) m closes that is ``left`` m < 0 after ``dt``, with the rates ``begun`` and
+    ``ended`` m/s: root of the cubic with these values, by bisection."""
     low, high = np.zeros(len(gap)), np.ones(len(gap))
     for _ in range(_HALVINGS):
         x = 0.5 * (low + high)
@@ -210,13 +205,12 @@ def _without_gain(
     least: np.ndarray,
     most: np.ndarray,
 ) -> float:
-    """The largest part s of the way from impulses ``dull`` to those ``bounced`` (n, 2) that gains no energy; they lead
-    to
-    velocities ``least`` and ``most`` (n_blocks, 3), where relative ones were ``before`` (n, 2) them."""
+    """The largest s in [0, 1] for which impulses ``dull`` + s (``bounced`` − ``dull``) (n, 2) create no energy. The two
+    give the velocities ``least`` and ``most`` (n_blocks, 3); relative velocities ``before`` (n, 2)."""
     start = problem.speeds(least - problem.velocity)
     way = problem.speeds(most - least)
     more = bounced - dull
-    # Work of dull + s more on before + ½ (start + s way), a square in s.
+    # Work of dull + s more on before + ½ (start + s way), quadratic in s.
     zeroth = float((dull * (before + 0.5 * start)).sum())
     first = float((more * (before + 0.5 * start)).sum() + 0.5 * (dull * way).sum())
     second = 0.5 * float((more * way).sum())

@@ -1,1 +1,1 @@
-"""What contacts carry: penalty springs, joint stiffness, Coulomb friction, bonds, nonlinear laws."""
+"""Contact laws: penalty springs, joint stiffness, Coulomb friction, bonds, nonlinear laws."""

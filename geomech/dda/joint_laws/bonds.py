@@ -1,21 +1,21 @@
-"""Bonds of whole faces: the strength of a bond between two faces, and when it fails.
+"""Bonds of whole faces: strength of a bond between two faces, and its failure.
 
-Two bonded edges are joined by contacts at the ends of their overlap ℓ. Their pulls Tᵢ at the distances aᵢ from its middle
-are the resultants T = Σ Tᵢ and M = Σ Tᵢ aᵢ of the stress along the face, which between blocks that deform evenly is a
-straight line. Its extreme fibre is at
+Two bonded edges are joined by contacts at the ends of their overlap ℓ. The tensile forces Tᵢ of these, at distances aᵢ
+from the midpoint, have the resultants T = Σ Tᵢ and M = Σ Tᵢ aᵢ of the stress along the face, which is linear between
+blocks of uniform strain. The stress in the extreme fibre is
 
     σ = T/ℓ + 6 |M|/ℓ²      (Navier; for two corners 2 (2 T₁ − T₀)/ℓ at the end 1),
 
-and where that reaches the tensile strength a brittle bond fails from end to end, unless the resultant presses within
-the face: then the crack from its edge ends before the other, and what is left holds by friction and cohesion but no
-pull. Sheared, the face bears Σ |Sᵢ| ≤ c ℓ + tan φ Σ Nᵢ wherever along it Σ Nᵢ acts: what one end does not bear the
-other does. The corners one by one would bear three times the moment, and half the cohesion where one end slips before
-the other.
+When it reaches the tensile strength, a brittle bond fails over its whole length, unless the resultant is compressive
+and within the face: then the crack from the edge stops before the other end, and the rest of the face keeps friction
+and cohesion but no tensile strength. In shear the face carries Σ |Sᵢ| ≤ c ℓ + tan φ Σ Nᵢ wherever Σ Nᵢ acts: either end
+can carry the other's share. Corners considered one by one would carry three times the moment, and half the cohesion if
+one end slips before the other.
 
-What has no tensile strength opens without breaking anything: it may close again, with its cohesion, while states are
-sought, and has lost that only if it is open in the end. Bonds break one after the other as a load that grows evenly
-from the step's start would break them: where f(t) = f₀ + t (f₁ − f₀) is by how much a face is loaded beyond its
-strength, the one that comes first to f = 0.
+A contact without tensile strength opens without breaking: it may close again, with its cohesion, during the open–close
+iteration, and loses it only if it is open at the end. Bonds break one after the other, in the order in which a load
+that grows linearly during the step would break them: with f(t) = f₀ + t (f₁ − f₀) the load of a face minus its
+strength, the face that reaches f = 0 first.
 """
 
 from __future__ import annotations
@@ -29,23 +29,23 @@ from ...compiled import UNCOUNTED, kept, part
 from ...model import OPEN, SLIP, STICK
 from .coulomb_return import ContactStates, Strengths
 
-#: Bonds of a CONTACT row: whole, and cracked from its edge, so that it holds only while it is pressed.
+#: Bond states of a CONTACT row: intact, and cracked from its edge (cohesion only under compression).
 WHOLE, CRACKED = 1, 3
-#: Contacts whose normals are nearer in direction than this (cosine) may lie on one face …
+#: Contacts may lie on one face if the angle between their normals is less than this (cosine) …
 ALIGNED = 0.9986
-#: … if they are off its line by less than this part of their distance (sine of the same angle, about 3°).
+#: … and if their offset from its line is less than this fraction of their distance (sine of the same angle, about 3°).
 OFF_LINE = 0.053
-#: The tributary lengths of a face's contacts add up to its length but for this part: otherwise it has gaps.
+#: Relative difference between a face's length and the sum of its tributary lengths above which it has gaps.
 WITHOUT_GAPS = 1e-2
 
 
 @dataclass(frozen=True, eq=False)
 class BondedFaces:
-    """Faces (m,) that at least two bonds hold, as a step begins.
+    """Faces (m,) with at least two bonds at the start of a step.
 
-    start   (m + 1,)  where the contacts of each begin in ``rows``
+    start   (m + 1,)  first position of each face's contacts in ``rows``
     rows    (k,)      contacts, rows of the step's `ContactSet`
-    arm     (k,) m    from the middle of the face
+    arm     (k,) m    from the midpoint of the face
     length  (m,) m
     """
 
@@ -62,7 +62,7 @@ class BondedFaces:
 
     @classmethod
     def of(cls, block: np.ndarray, other: np.ndarray, geometry: np.ndarray, bonded: np.ndarray) -> BondedFaces | None:
-        """Faces among the contacts (n,) of a `ContactSet`; None without any."""
+        """Faces among the contacts (n,) of a `ContactSet`; None if there are none."""
         some = np.flatnonzero(((bonded == WHOLE) | (bonded == CRACKED)) & (geometry[:, 4] > 0))
         if len(some) < 2:
             return None
@@ -80,8 +80,8 @@ class BondedFaces:
 def on_lines(
     block: np.ndarray, other: np.ndarray, geometry: np.ndarray, some: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """The contacts ``some`` (k,) of a `ContactSet`, face by face: their rows, where each face begins among them and
-    ends, and where they lie along it (m)."""
+    """The contacts ``some`` (k,) of a `ContactSet` grouped by face: their rows, the begin and end of each face among
+    these, and their coordinates along it (m)."""
     first, last = np.minimum(block[some], other[some]), np.maximum(block[some], other[some])
     order = np.lexsort((last, first))
     some = some[order]
@@ -95,7 +95,7 @@ def on_lines(
 
 @kept(fastmath=False, error_model="numpy", nogil=True)
 def _on_one_line(first, last, swapped, geometry):
-    """Number of the face of each contact (n,), and where it lies along it (m), the contacts ordered by pairs of
+    """Face number of each contact (n,) and its coordinate along the face (m); contacts are ordered by pairs of
     blocks."""
     n = first.shape[0]
     face, lead, along = np.empty(n, np.int64), np.empty(n, np.int64), np.zeros(n)
@@ -123,15 +123,15 @@ def _on_one_line(first, last, swapped, geometry):
 
 @part(fastmath=False, error_model="numpy", nogil=True, **UNCOUNTED)
 def _when(before, after, strength):
-    """At which part of the step something is loaded to its ``strength`` (N) that is beyond it by ``before`` as the step
-    begins and ``after`` at its end; below zero where it is beyond it already."""
+    """Fraction of the step at which the ``strength`` (N) is reached, with load minus strength ``before`` at the start
+    of the step and ``after`` at its end; negative if it is exceeded from the start."""
     if before > 0.0:
         return -before / (before + strength)
     return -before / max(after - before, 1e-300)
 
 
 class FaceBonds(NamedTuple):
-    """`BondedFaces` as kernels take them."""
+    """`BondedFaces` for kernels."""
 
     start: np.ndarray
     rows: np.ndarray
@@ -144,15 +144,15 @@ class FaceBonds(NamedTuple):
 
 
 class ForcesBefore(NamedTuple):
-    """Normal and shear forces of contacts (n,) as the step begins, N."""
+    """Normal and shear forces of contacts (n,) at the start of the step, N."""
 
     normal: np.ndarray
     shear: np.ndarray
 
 
 class _FaceLoads(NamedTuple):
-    """A face's loads (N; ``fibre`` at its extreme fibre times its length) and strengths (N): tensile, ``capacity`` in
-    shear, of which ``firm`` does not depend on pressure."""
+    """Loads of a face (N; ``fibre``: stress in the extreme fibre times length) and strengths (N): tensile, and
+    ``capacity`` in shear, of which ``firm`` does not depend on pressure."""
 
     fibre: float
     drawn: float
@@ -163,8 +163,8 @@ class _FaceLoads(NamedTuple):
 
 @kept(fastmath=False, error_model="numpy", nogil=True)
 def first_to_break(faces, forces, before, states, new_bonded, strengths):
-    """(n,) at which part of the step each bond that ``new_bonded`` calls broken has come to its strength; inf for others.
-    Arguments as for `check_faces`; there may be no faces."""
+    """(n,) fraction of the step at which each bond that is broken in ``new_bonded`` reaches its strength; inf for
+    others. Arguments as for `check_faces`; there may be no faces."""
     state, bonded = states.state, states.bonded
     n = state.shape[0]
     out, done = np.full(n, np.inf), np.zeros(n, np.bool_)
@@ -195,7 +195,7 @@ def first_to_break(faces, forces, before, states, new_bonded, strengths):
 
 @part(fastmath=False, error_model="numpy", nogil=True, **UNCOUNTED)
 def _times_of_face(f, faces, forces, before, bonded, strengths):
-    """At which parts of the step the whole face ``f`` comes to its strength in tension and in shear; inf where it does
+    """Fractions of the step at which the whole face ``f`` reaches its tensile and shear strength; inf if it does
     not."""
     pull = moment = pull0 = moment0 = strength = drawn = drawn0 = capacity = capacity0 = 0.0
     for k in range(faces.start[f], faces.start[f + 1]):
@@ -248,8 +248,8 @@ def _bond_of_face(f, faces, states):
 
 @part(fastmath=False, error_model="numpy", nogil=True, **UNCOUNTED)
 def _stick_again(f, faces, forces, states, strengths, called, violation):
-    """Call for all contacts of the face ``f`` to stick: a fallback of the open–close iteration that does not know of
-    faces has released contacts that the face holds."""
+    """Request that all contacts of the face ``f`` stick: a method of the open–close iteration that treats contacts one
+    by one has released contacts that the face holds."""
     for k in range(faces.start[f], faces.start[f + 1]):
         c = faces.rows[k]
         called.state[c], called.bonded[c] = STICK, states.bonded[c]
@@ -262,9 +262,9 @@ def _stick_again(f, faces, forces, states, strengths, called, violation):
 
 @kept(fastmath=False, error_model="numpy", nogil=True, **UNCOUNTED)
 def check_faces(face_bonds, forces, forces_before, tried, strength, slack, new, violation):
-    """Correct, in place, the states ``new`` and the ``violation`` of `check_states` for contacts whose whole face is
-    bonded. Plain tuples: ``face_bonds`` (`FaceBonds`), ``forces_before`` (`ForcesBefore`), the states that were ``tried``
-    (`ContactStates`) and their ``strength`` (`Strengths`); other arguments as there."""
+    """Correct, in place, the states ``new`` and the ``violation`` of `check_states` for contacts of bonded faces. Plain
+    tuples: ``face_bonds`` (`FaceBonds`), ``forces_before`` (`ForcesBefore`), the states ``tried`` (`ContactStates`) and
+    their ``strength`` (`Strengths`); other arguments as there."""
     faces, before, states = FaceBonds(*face_bonds), ForcesBefore(*forces_before), ContactStates(*tried)
     strengths, called = Strengths(*strength), ContactStates(*new)
     for f in range(faces.length.shape[0]):
@@ -294,7 +294,7 @@ def check_faces(face_bonds, forces, forces_before, tried, strength, slack, new, 
             for k in range(faces.start[f], faces.start[f + 1]):
                 c = faces.rows[k]
                 opens = opens or before.normal[c] + when * (forces[c, 0] - before.normal[c]) <= 0.0
-            # Before its corners would open it may slide, and then they need not.
+            # It may slide before its corners would open; then they do not open.
             pulls = pulls and (loads.strength > 0.0 or opens)
         for k in range(faces.start[f], faces.start[f + 1]):
             c = faces.rows[k]
@@ -308,8 +308,8 @@ def check_faces(face_bonds, forces, forces_before, tried, strength, slack, new, 
 
 @part(fastmath=False, error_model="numpy", nogil=True, **UNCOUNTED)
 def _break_bond(c, forces, before, states, strengths, called, violation, loads, breaks):
-    """What contact ``c`` of a bonded face with these ``loads`` is called to be; ``breaks``: whether the face parts,
-    slides and pulls, and at which part of the step it slides."""
+    """Set the state required of contact ``c`` of a bonded face with these ``loads``; ``breaks``: whether the face
+    parts, slides and is in tension, and the fraction of the step at which it slides."""
     parts, slides, pulls, when = breaks
     called.state[c], called.bonded[c], violation[c] = STICK, states.bonded[c], 0.0
     if parts:

@@ -62,7 +62,7 @@ class ContactStates(NamedTuple):
 
 
 class Strengths(NamedTuple):
-    """What `check_states` reads of `penalty_springs.Springs`, (n,) each."""
+    """The fields of `penalty_springs.Springs` that `check_states` uses, (n,) each."""
 
     normal: np.ndarray
     shear: np.ndarray
@@ -132,7 +132,7 @@ def check_states(forces, states, strengths, shear0, slack):
             continue
         pull = tension[c] if bonded[c] == 1 else 0.0
         if -forces[c, 0] > pull * (1.0 + _KNOWN) + normal[c] * slack[c]:
-            # Without tensile strength it opens without breaking: it may close again before the states are found.
+            # Without tensile strength it opens without breaking, since it may close again during the iteration.
             new_state[c], new_bonded[c] = OPEN, (0 if pull > 0.0 else bonded[c])
             violation[c] = normal[c] * abs(gap)
         elif state[c] == STICK:

@@ -1,19 +1,19 @@
-"""Speeds at the end of a step that the step itself cannot bring about: sliding that friction stops within it, and
-contact vibrations that it does not resolve.
+"""Correction of velocities at the end of a step: sliding that friction stops within the step, and contact vibrations
+that the step does not resolve.
 
-A step weighs its forces over its whole length: friction that stops a block half way goes on pulling until the end, and
-leaves it with a speed of the order of a dt, often backwards. What was missed is an impulse: over the rest r = dt − t* of
-the step, t* by the line from the sliding speed u₀ at the start to the one that friction all along would have left at the
-end, friction may have had any value |S| ≤ μN + c instead (Coulomb). Of these that is taken which leaves no sliding, or
-the one nearest to it (Moreau 1988: Coulomb's law between velocities and impulses).
+A step applies its forces over its whole length. Friction that stops a block within the step would keep acting until its
+end and leave the block with a speed of the order of a dt, often backwards. The correction is an impulse. Sliding stops
+at t*, the zero of the line from the sliding speed u₀ at the start to the speed at the end with full friction. Over the
+rest r = dt − t* of the step, friction may have any value |S| ≤ μN + c (Coulomb); the value is taken that leaves no
+sliding, or the nearest admissible one (Moreau 1988: Coulomb's law between velocities and impulses).
 
-A contact that stays closed on a spring that is stiff compared with m/dt² hardly moves, and v' = 2 d/dt − v only turns its speed
-about from step to step, undamped: forces then swing about those that hold the blocks, and contacts near their strength
-change their state in every step. Such a contact ends the step with the mean speed d/dt that it had in it.
+A closed contact whose spring is stiff compared with m/dt² hardly moves, and v' = 2 d/dt − v merely reverses its speed
+from step to step, without damping. Forces then oscillate about equilibrium, and contacts near their strength change
+their state in every step. Such a contact ends the step with its mean speed d/dt in the step.
 
-Blocks answer as in the step: 2M/dt² Δd + (springs) Δd = impulse/dt, Δv = 2 Δd/dt, with all contacts that stay closed; so
-momentum is passed on between blocks, not lost, and a spring that the step does resolve keeps its vibration. Kinetic
-energy never grows.
+The response of blocks is that of the step: 2M/dt² Δd + (springs) Δd = impulse/dt, Δv = 2 Δd/dt, with all contacts that
+stay closed. Momentum is therefore transferred between blocks and not lost, and a spring that the step resolves keeps
+its vibration. Kinetic energy never increases.
 """
 
 from __future__ import annotations
@@ -30,29 +30,28 @@ from ..linear_solver import assembly
 from ..open_close.contact_set import ContactSet
 from ..open_close.settled_states import Settled
 
-#: Impulses beyond what friction can exert are brought back to it this many times, or until no more than this part of the
-#: contacts that stop have such.
+#: Impulses beyond the friction limit are reduced to it at most this many times, or until no more than this fraction of
+#: the stopping contacts exceed it.
 _ROUNDS, _LEFT = 4, 0.1
-#: A spring k turns the speed of a mass m about in every step of Shi's, instead of swinging, from k dt² = 16 m on: there
-#: its two roots are real, and one of them tends to −1.
+#: Value of k dt²/m from which a spring k reverses the speed of a mass m in every step of Shi's scheme: both roots are
+#: real, and one tends to −1.
 _TURNS_ABOUT = 16.0
-#: Blocks at rest move by as much as the rounding of so many contacts one upon the other: a wall of 1 000 bricks by four
-#: times that of one contact in a step, of 10 000 by nineteen. To stop them takes three solutions, and they go on so.
+#: Displacement of blocks at rest per step due to rounding, in units of the rounding of one contact: 4 in a wall of 1
+#: 000 bricks, 19 in one of 10 000. Slower sliding is not stopped, which would take three solutions in every step.
 _PASSED_ON = 20.0
-#: A step stops sliding where its speed is more than this part of what the largest force of a contact on the block gives
-#: it in so long a time; with it all that is slower, else nothing. (One brick that slides on a wall of 10 000 shakes
-#: hundreds of contacts at their strength, by 1e-11 m each, of 1e-12 J in all, in every step, which all blocks' equations
-#: were solved for three times more.)
-_WORTH = 1e-3
-#: … and takes vibrations out that swing the forces of contacts by more than this part of the largest: less hardly brings
-#: one to its strength.
+#: Sliding is stopped if any speed exceeds this fraction of the velocity change that the largest contact force on the
+#: block causes in a step. (A brick that slides on a wall of 10 000 moves hundreds of contacts at their strength by
+#: 1e-11 m per step, 1e-12 J in all; stopping these would take three more solutions of all equations.)
+_WORTHWHILE = 1e-3
+#: Vibrations are removed if they change contact forces by more than this fraction of the largest: smaller ones hardly
+#: bring contacts to their strength.
 _SWING = 1e-2
 
 
 @dataclass(frozen=True, eq=False)
 class Unresolved:
-    """Speeds ``apart`` and ``along`` (n,) m/s of contacts beyond their mean ones in the step, where springs hold them
-    that the step does not resolve; 0 elsewhere."""
+    """Speeds ``apart`` and ``along`` (n,) m/s of contacts minus their mean speeds in the step, for springs that the
+    step does not resolve; 0 for others."""
 
     apart: np.ndarray
     along: np.ndarray
@@ -61,8 +60,8 @@ class Unresolved:
     def of(
         cls, found: ContactSet, settled: Settled, slid: np.ndarray, speeds: np.ndarray, mass: np.ndarray, dt: float,
     ) -> Unresolved | None:  # fmt: skip
-        """None where there is nothing worth it. ``slid`` (n,) m along the edge in the step, ``speeds`` (n, 2) m/s at
-        its end across the edge and along it, ``mass`` (n_blocks,) kg, infinite if fixed."""
+        """None if the vibrations are negligible. ``slid`` (n,) m: motion along the edge in the step; ``speeds`` (n, 2)
+        m/s across and along the edge at its end; ``mass`` (n_blocks,) kg, infinite if fixed."""
         light = np.where(mass[found.block] <= mass[found.other], found.block, found.other)
         stiff, springs = _TURNS_ABOUT * mass[light] / (dt * dt), settled.springs
         holds = (found.state != OPEN) & (settled.state != OPEN) & (springs.normal > stiff)
@@ -78,8 +77,8 @@ class Unresolved:
 
 @dataclass(frozen=True, eq=False)
 class Stopped:
-    """Contacts ``rows`` whose sliding comes to a stop in the step. ``sense`` ±1 along the edge is that of the sliding;
-    speeds (m/s) in that sense ``before`` and ``after`` the step."""
+    """Contacts ``rows`` whose sliding stops in the step. ``sense``: ±1, direction of sliding along the edge; speeds
+    (m/s) in that direction ``before`` and ``after`` the step."""
 
     rows: np.ndarray
     sense: np.ndarray
@@ -91,9 +90,8 @@ class Stopped:
         cls, found: ContactSet, settled: Settled, slid: np.ndarray, along: np.ndarray, mass: np.ndarray, dt: float,
         slack: float,
     ) -> Stopped | None:  # fmt: skip
-        """None where nothing stops. ``slid`` (n,) m along the edge in the step, ``along`` (n,) m/s the speed there at
-        its end; ``mass`` (n_blocks,) kg, infinite if fixed. Speeds that carry no farther in a step than the ``slack`` (m)
-        of contacts one upon the other are none."""
+        """None if no sliding stops. ``slid`` (n,) m: motion along the edge in the step; ``along`` (n,) m/s: speed at
+        its end; ``mass`` (n_blocks,) kg, infinite if fixed; ``slack`` m: round-off of a contact (see `_PASSED_ON`)."""
         stuck = (found.state == SLIP) & (settled.state == STICK) & (found.direction != 0.0)
         rows = np.flatnonzero(stuck | ((settled.state == SLIP) & (settled.direction != 0.0)))
         if not len(rows):
@@ -104,7 +102,7 @@ class Stopped:
         before = sense * (2.0 * slid[rows] / dt - after)
         keep = (np.abs(after) * dt > _PASSED_ON * slack) & (before > 0.0) & (sense * after < 0.0)
         light = np.where(mass[found.block] <= mass[found.other], found.block, found.other)
-        if not _worth_it(found, rows[keep], np.abs(after[keep]) / dt, light, mass, settled.normal_force, _WORTH):
+        if not _worth_it(found, rows[keep], np.abs(after[keep]) / dt, light, mass, settled.normal_force, _WORTHWHILE):
             return None
         return cls(rows[keep], sense[keep], before[keep], sense[keep] * after[keep])
 
@@ -113,9 +111,9 @@ def _worth_it(
     found: ContactSet, rows: np.ndarray, deceleration: np.ndarray, light: np.ndarray, mass: np.ndarray,
     force: np.ndarray, worth: float,
 ) -> bool:  # fmt: skip
-    """Whether it takes more than the part ``worth`` of the largest force on its blocks to give any of the contacts
-    ``rows`` its ``deceleration`` (m/s²); ``light`` (n,) are the lighter blocks of all contacts, ``mass`` (n_blocks,) kg,
-    ``force`` (n,) N presses all contacts."""
+    """Whether the ``deceleration`` (m/s²) of any of the contacts ``rows`` takes more than the fraction ``worth`` of the
+    largest force on its blocks. Of all contacts: ``light`` (n,), the lighter block, and normal ``force`` (n,) N;
+    ``mass`` (n_blocks,) kg."""
     if not len(rows):
         return False
     largest = np.zeros(len(mass))
@@ -153,8 +151,8 @@ def stop(
     stopped: Stopped | None, unresolved: Unresolved | None, pattern: assembly.Pattern, matrix: np.ndarray,
     vectors: np.ndarray, found: ContactSet, settled: Settled, dt: float,
 ) -> tuple[np.ndarray, float]:  # fmt: skip
-    """(n_free, 6) m: Δd by whose rate 2 Δd/dt the velocities change, in the unknowns of `assembly`; and the energy (J/m)
-    that friction takes thereby. ``matrix`` (n, 6, 6) and ``vectors`` (n_contacts, 2, 12) as solved with. Raises
+    """(n_free, 6) m: Δd in the unknowns of `assembly`, velocities change by 2 Δd/dt; and the energy (J/m) dissipated by
+    friction. ``matrix`` (n, 6, 6) and ``vectors`` (n_contacts, 2, 12) are those of the step. Raises
     numpy.linalg.LinAlgError."""
     springs, nothing = settled.springs, np.zeros(len(found))
     apart, along = (nothing, nothing) if unresolved is None else (unresolved.apart, unresolved.along)
@@ -165,7 +163,7 @@ def stop(
     filled: ContactStiffness | None = None
 
     def answer(state, direction, friction, push, pull) -> np.ndarray:
-        # Other contacts keep what they carry: closed ones their gap, sticking ones their place, sliding ones their
+        # Other contacts keep their states: closed ones their gap, sticking ones their position, sliding ones their
         # friction.
         in_states = SpringsInStates(
             state, direction, 0.5 * dt * apart, springs.normal, springs.shear, friction, push, springs.lift, pull
@@ -183,7 +181,7 @@ def stop(
     resisted, pushed = -sense * settled.shear_force[rows], settled.normal_force[rows]
     slips = settled.state[rows] == SLIP
     strength = np.maximum(springs.friction[rows] * pushed + springs.sliding[rows], np.abs(resisted))
-    # Friction all along, which those that slid to the end had, leaves the speed ``full``.
+    # Full friction during the whole step, which sliding contacts had, leaves the speed ``full``.
     full, bound = np.where(slips, u1, np.nan), np.full(len(rows), np.nan)
     for _ in range(_ROUNDS):
         given = ~np.isnan(bound)
@@ -198,7 +196,7 @@ def stop(
         force = np.where(given, push[rows], pull[rows] - springs.shear[rows] * moved)
         total = resisted - sense * force
         stuck = np.isnan(full)
-        # By how much a newton of friction more slows those that stuck: what the impulse has done, over the impulse.
+        # Change of speed per newton of friction of contacts that stuck: effect of the impulse over the impulse.
         with np.errstate(invalid="ignore", divide="ignore"):
             slowed = np.abs(moved[stuck] * 2.0 / dt / force[stuck])
         full[stuck] = u1[stuck] - np.nan_to_num(slowed, posinf=0.0) * (strength[stuck] - resisted[stuck])
@@ -206,7 +204,7 @@ def stop(
         share = np.clip(np.where(slowing > 0.0, u0 / np.where(slowing > 0.0, slowing, 1.0), 1.0), 0.0, 1.0)
         least = strength * (2.0 * share - 1.0)
         beyond = ~given & ((total < least) | (total > strength))
-        # What friction at its bound has stopped and more, sticks.
+        # Contacts that friction at its limit would reverse stick.
         speed = u1 + sense * moved * 2.0 / dt
         within = given & (np.where(bound < strength, speed, -speed) > 0.0)
         if np.count_nonzero(beyond | within) <= _LEFT * len(rows):
@@ -246,8 +244,8 @@ def kinetic_energy(velocity: np.ndarray, moments: np.ndarray, system) -> float:
 def dissipating(
     change: np.ndarray, velocity: np.ndarray, moments: np.ndarray, density: np.ndarray, fixed: np.ndarray
 ) -> tuple[np.ndarray, float]:
-    """The part of ``change`` (n_blocks, 6) of ``velocity`` that does not raise the kinetic energy of the blocks that
-    are not ``fixed``, and what it takes of it, J/m."""
+    """The largest fraction of ``change`` (n_blocks, 6) of ``velocity`` that does not increase the kinetic energy of
+    blocks that are not ``fixed``, applied; and the energy it dissipates, J/m."""
     mass = np.where(fixed, 0.0, density)
     first = float((mass * _product(velocity, change, moments)).sum())
     second = float((mass * _product(change, change, moments)).sum())

@@ -1,9 +1,9 @@
-"""Joint laws that are no straight line: tangents at the forces at hand, and by how much a solution misses the laws.
+"""Nonlinear joint laws: their tangents at the present forces, and the misfit between a solution and the laws.
 
-Every contact enters the step as a line: N = −k (g − κ p), |S| ≤ μ N + c. A law that bends (Barton & Bandis' strength,
-hyperbolic closure), that remembers how far it slid (softening, mobilised roughness) or that lifts its faces is replaced
-by its tangent at the normal force and the secant over the slip of the last open–close iteration. The step is settled
-only when the lines and the laws agree on the forces, so that nothing lags behind by a step.
+Each contact enters the step with linear laws: N = −k (g − κ p), |S| ≤ μ N + c. A curved law (Barton & Bandis' strength,
+hyperbolic closure), a law that depends on past slip (softening, mobilised roughness) and dilation are replaced by the
+tangent at the normal force and the secant over the slip of the last open–close iteration. The step has converged only
+when linear and nonlinear laws give the same forces, so that nothing lags by a step.
 
 Strength and dilation: Barton & Choubey (1977) eqs. 7 and 11; mobilised roughness beyond the peak: Barton, Bandis &
 Bakhtar (1985) fig. 4; closure: Bandis, Lumsden & Barton (1983) eq. 8.
@@ -26,10 +26,10 @@ if TYPE_CHECKING:
 #: JRC mobilised over its peak, at slips over that of the peak.
 _SLIP_OVER_PEAK = np.array([1.0, 2.0, 4.0, 10.0, 25.0, 100.0])
 _ROUGHNESS_LEFT = np.array([1.0, 0.85, 0.70, 0.50, 0.40, 0.0])
-#: Where faces hardly press, the shear stiffness is that under this part of the wall's strength.
+#: Lower limit of the normal stress for the shear stiffness, relative to the wall's strength.
 _LEAST_PRESSURE = 1e-6
-#: Forces that differ from their laws by less than this part of the contact's own force agree with them. Slip wears the
-#: strength by successive substitution, so it is not as small as the round-off that the other states satisfy.
+#: Tolerance between forces and laws, relative to the contact's force. Wear by slip is found by successive substitution,
+#: so it is larger than the round-off tolerance of contact states.
 _AGREED = 1e-8
 
 
@@ -74,7 +74,7 @@ class CurvedJoints:
         """``springs`` and starting ``gap`` (n,) with the tangents of the laws at ``normal_force`` N and ``plastic``
         slip m.
 
-        ``springs`` and ``gap`` are those of straight laws, dashpots included, which ``found`` is without.
+        ``springs`` and ``gap`` are those of linear laws and include dashpots, which ``found`` does not.
         """
         t, law, length, at = self._table, self.law, self.length, self.rows
         face = length > 0
@@ -96,11 +96,11 @@ class CurvedJoints:
 
         stiff = normal + drag
         start = (springs.normal[at] * gap[at] + normal * (gap0 + offset) - undamped * gap0) / stiff
-        # Slip is what the shear spring does not take up; the lift counts slip alone on the way out.
+        # Slip is motion minus the elastic part of the shear spring; away from the start, slip alone causes dilation.
         out = lift * direction[at] < 0
         share = np.where(out, lift / shear, 0.0)
         start = start + share * (found.shear[at] - direction[at] * sliding)
-        # … and on the way back the motion along the edge, of which the unknowns have not what is given.
+        # … and on the way back all motion along the edge, including the prescribed part, which is not in the unknowns.
         start = start - np.where(lift * direction[at] > 0, lift * found.stretch[at], 0.0)
         stiff = stiff / (1.0 - stiff * share * direction[at] * friction)
 
@@ -119,7 +119,7 @@ class CurvedJoints:
 
     def _strength(self, pressure, plastic, n, bonded):
         t, law, length = self._table, self.law, self.length
-        # Strength left at the step's start for those that stick, at its end for those that slide.
+        # Remaining strength at the start of the step for sticking contacts, at its end for sliding ones.
         left, left_sliding = self._left(self._wear, slides=False), self._left(self._wear + np.abs(plastic), slides=True)
         fall = t.friction[law] - t.residual_friction[law]
         peak, friction = t.residual_friction[law] + fall * left, t.residual_friction[law] + fall * left_sliding
@@ -137,13 +137,13 @@ class CurvedJoints:
         return friction, sliding, peak, hold, cohesion
 
     def _left(self, wear, slides: bool) -> np.ndarray:
-        """Part of the way from residual to peak strength that is left after ``wear``."""
+        """Fraction of the difference between peak and residual strength that remains after ``wear``."""
         d = self._table.softening[self.law]
         at_once = np.where((wear > 0) | slides, 0.0, 1.0)
         return np.where(d > 0, np.clip(1.0 - wear / np.where(d > 0, d, 1.0), 0.0, 1.0), at_once)
 
     def _roughness(self, wear) -> np.ndarray:
-        """JRC that is mobilised after ``wear`` beyond the peak."""
+        """JRC mobilised after ``wear`` beyond the peak."""
         t, law = self._table, self.law
         return t.jrc[law] * np.interp(1.0 + wear / t.peak_slip[law], _SLIP_OVER_PEAK, _ROUGHNESS_LEFT)
 
@@ -155,7 +155,7 @@ class CurvedJoints:
         return tangent, closed - n / tangent
 
     def _lift(self, pressure, plastic, direction) -> np.ndarray:
-        """m of lift per m of slip along the edge's direction; falling where a contact slides back to where it began."""
+        """Dilation, m per m of slip along the edge's direction; negative where a contact slides back to its start."""
         t, law = self._table, self.law
         before, after = self._slip, self._slip + plastic
         middle = 0.5 * (before + after)
@@ -176,8 +176,8 @@ class CurvedJoints:
     def misfit(
         self, was: Springs, gap_was: np.ndarray, now: Springs, gap_now: np.ndarray, state, forces: np.ndarray
     ) -> np.ndarray:
-        """(n,) N by which the ``forces`` (n, 4) of `check_states`, on the lines that were, miss the laws; 0 where they
-        agree."""
+        """(n,) N: misfit between the ``forces`` (n, 4) of `check_states`, found with the previous linear laws, and the
+        nonlinear laws; 0 within the tolerance."""
         out = np.zeros(len(state))
         at = self.rows
         n, s, gap, slide = forces[at].T

@@ -9,35 +9,34 @@ import numpy as np
 
 from ...model import JointLaw
 
-#: Penalty over E' where the settings name none. Shi (1988) advises 10 to 100. The two springs of a face give way by a
-#: part 1/(2 · 40) of what the block itself is shortened; brick walls take about as many iterations a step from 1 to 40
-#: E', half as many again with 160 and twice as many with 1000. The shear spring is as stiff.
+#: Default penalty over E', for normal and shear springs. Shi (1988) recommends 10 to 100. At 40 the two springs of a
+#: face deform by 1/80 of the shortening of the block. Brick walls take about the same number of iterations per step
+#: from 1 to 40 E', 1.5 times as many with 160 and twice as many with 1000.
 PENALTY_RATIO = 40.0
-#: A spring that is stiffer than so many times m/dt², m the mass of the lighter block, swings within the step: what it adds
-#: no step resolves, and contacts of rock that an impact shakes open and close by micrometres. Springs "resolved" are no
-#: stiffer in motion (a slope of 1 000 blocks at 5 ms: 14 open–close iterations a step become 9), and not softer than this
-#: part of E'. (Where contacts take such springs only as they close, and keep them until they open, loaded ones are given
-#: no energy, but seven in ten contacts of that slope have not opened after 2 s. Ten slopes that slide take a tenth fewer
-#: iterations then and no less time, instead of a third fewer; and of 400 steps of walls struck at 3 to 30 m/s 60 are
-#: cut, for 9.)
+#: Springs "resolved": largest stiffness in motion, in units of m/dt² with m the mass of the lighter block, and
+#: smallest, relative to E'. Stiffer springs oscillate within the step, which does not resolve them, and after an impact
+#: contacts open and close by micrometres. (A slope of 1 000 blocks at 5 ms: 9 open–close iterations per step instead of
+#: 14. Without the change of loaded springs, if contacts take the stiffness as they close and keep it until they open, no
+#: energy is added. But 70 % of that slope's contacts have not opened after 2 s; ten sliding slopes take 9 % fewer
+#: iterations instead of 30 %; and in walls struck at 3 to 30 m/s, 60 cuts in 400 steps instead of 9.)
 RESOLVED, SOFTEST = 100.0, 0.5
-#: Between unlike blocks the geometric mean of both E' counts, at most this many times the softer. By the stiffer one
-#: alone walls of two rocks 1 : 1000 do not settle and 1 : 10⁶ costs five digits; by the softer one alone, steel platens
-#: on rock give way twelve times as much as they need.
+#: Between blocks of different E' the geometric mean is used, limited to this multiple of the smaller one. With the
+#: larger E' alone, walls of two rocks with a ratio of 1000 do not converge, and a ratio of 10⁶ costs five digits; with
+#: the smaller alone, steel platens on rock deform twelve times more than necessary.
 _MOST_CONTRAST = 32.0
-#: A joint's stiffness per area acts on a contact's tributary length, and on no less than this part of the smaller
-#: block's size, √area. A corner has no length: were it as stiff as the solver's penalty, blocks that slide or turn from
-#: a face onto a corner would begin on it with the penetration of the soft face, a hundred times the force and energy
-#: from nowhere, and what comes to lie on a sliver of a face would store its shear force in a spring that is next to
-#: none. Faces of slabs up to 100 : 1 are longer than that.
+#: Smallest length for the stiffness of a joint (Pa/m times tributary length), relative to the smaller block's size
+#: √area. A corner has no tributary length. With the penalty stiffness, a block that slides or turns from a soft face
+#: onto a corner would start with the penetration of the face: a hundred times the force, and energy from nothing. On a
+#: very short face, shear would be stored in a spring of almost no stiffness. Faces of slabs up to 100 : 1 are longer
+#: than this.
 _LEAST_FACE = 0.05
 
 
 @dataclass(frozen=True, eq=False)
 class JointTable:
-    """Joint laws as arrays (n_laws,); stiffness nan where the solver's penalty is to be used. Slopes are tangents of
-    angles, lengths m, stresses Pa; ``jrc`` 0 where a joint is not rough, ``closure`` inf where its stiffness is
-    constant."""
+    """Joint laws as arrays (n_laws,). Stiffness is nan where the penalty is used, ``jrc`` 0 where a joint is not rough,
+    ``closure`` inf where stiffness is constant. Friction and dilation are tangents of angles, lengths m, stresses
+    Pa."""
 
     friction: np.ndarray
     residual_friction: np.ndarray
@@ -94,10 +93,10 @@ class JointTable:
 class Springs:
     """Per contact (n,): stiffness N/m and strengths N, all per metre of thickness.
 
-    A contact that slides carries ``friction`` N + ``sliding``, one that sticks up to ``peak`` N + ``hold``, plus
-    ``cohesion`` while it is bonded; it is pulled off at ``tension``. ``lift`` is what sliding opens, m per m along the
-    edge's direction. ``keeps`` marks those that slip does not wholly rob of cohesion. Laws that are no straight lines
-    are here as the tangents at the forces at hand (`CurvedJoints`).
+    A sliding contact carries ``friction`` N + ``sliding``, a sticking one up to ``peak`` N + ``hold``, plus
+    ``cohesion`` while it is bonded; it opens at the tensile force ``tension``. ``lift``: dilation, m per m of slip
+    along the edge's direction. ``keeps``: contacts that keep some cohesion after slip. Nonlinear laws are represented
+    by their tangents at the present forces (`CurvedJoints`).
     """
 
     normal: np.ndarray
@@ -124,10 +123,10 @@ def penalties(
     """(n,) Pa: penalty stiffness of contacts with tributary ``length`` (n,) m between ``block`` and ``other`` (n,); E'
     ``modulus`` Pa, ``area`` m², ``fixed`` and ``rigid`` (n_blocks,).
 
-    `PENALTY_RATIO` times the E' of both (a block that is fixed or rigid does not give way: the other's, so that a
-    platen has the same springs whether it stands or is moved) times the ratio of the face to the
-    block's depth behind it where that is above one, ≈ 4 ℓ²/A: the springs of a slab 1000 : 1 would otherwise give way
-    by twelve times its own shortening, and so give way by the hundredth that those of a square do.
+    `PENALTY_RATIO` times the combined E' of both blocks (if one is fixed or rigid, that of the other, so that a platen
+    has the same springs whether it is fixed or moving), times the ratio of the face length to the block's depth behind
+    it, ≈ 4 ℓ²/A, where that is above one. Without this factor the springs of a slab 1000 : 1 would deform by twelve
+    times its own shortening; with it, by a hundredth, as for a square.
     """
     hold, hold_other = fixed[block] | rigid[block], fixed[other] | rigid[other]
     neither = hold & hold_other
@@ -140,16 +139,16 @@ def penalties(
 
 
 def resolved(stiffness: np.ndarray, block: np.ndarray, other: np.ndarray, mass: np.ndarray, dt: float) -> np.ndarray:
-    """(n,) Pa: of the penalty ``stiffness`` (n,) Pa of contacts between ``block`` and ``other`` (n,) as much as steps of
-    ``dt`` s resolve; ``mass`` (n_blocks,) kg/m, infinite where fixed. Of all steps of a run alike, however these are cut: a
-    force that is a stiffness times a gap must not jump with them."""
+    """(n,) Pa: penalty ``stiffness`` (n,) Pa of contacts between ``block`` and ``other`` (n,), limited to what steps of
+    ``dt`` s resolve; ``mass`` (n_blocks,) kg/m, infinite where fixed. ``dt`` is the same for all steps of a run, even
+    if they are cut: forces, stiffness times gap, must not jump."""
     lighter = np.minimum(mass[block], mass[other])
     return np.clip(RESOLVED * lighter / dt**2, SOFTEST / PENALTY_RATIO * stiffness, stiffness)
 
 
 def least_face(block: np.ndarray, other: np.ndarray, area: np.ndarray, fixed: np.ndarray) -> np.ndarray:
-    """(n,) m of face that the stiffness of a contact between ``block`` and ``other`` (n,) is that of at least; ``area``
-    m² and ``fixed`` (n_blocks,)."""
+    """(n,) m: smallest length for the stiffness of a contact between ``block`` and ``other`` (n,); ``area`` m² and
+    ``fixed`` (n_blocks,)."""
     free = np.where(fixed, np.inf, area)
     smaller = np.minimum(free[block], free[other])
     return _LEAST_FACE * np.sqrt(np.where(np.isfinite(smaller), smaller, np.minimum(area[block], area[other])))
@@ -163,10 +162,11 @@ def contact_springs(
     normal_penalty: np.ndarray,
     shear_penalty: np.ndarray,
 ) -> Springs:
-    """Springs of contacts with joint ``law`` (n,) and tributary ``length`` (n,) m, that have not slipped.
+    """Springs of contacts with joint ``law`` (n,) and tributary ``length`` (n,) m before slip.
 
-    A law's stiffness (Pa/m) times the tributary length, at ``least`` (n,) m (`least_face`), takes the place of the
-    penalty (Pa). A lone corner has no tributary length and neither cohesion nor tensile strength.
+    If a law has a stiffness (Pa/m), that times the tributary length, or times ``least`` (n,) m (`least_face`) if
+    longer, replaces the penalty (Pa). A single corner has no tributary length and neither cohesion nor tensile
+    strength.
     """
     bearing = np.maximum(length, least)
     kn, ks = table.normal_stiffness[law], table.shear_stiffness[law]
@@ -195,13 +195,13 @@ def over_a_step(
     dt: float,
     arc: np.ndarray | float = 0.0,
 ) -> tuple[Springs, np.ndarray]:
-    """Springs and starting gap (n,) m whose forces are those that act over a step of ``dt``: ``weight`` θ times that of
-    its end and 1 − θ times that of its start, N = −kₙ (θ g₁ + (1−θ) g₀) − c ġ and S = S₀ − θ kₛ Δs.
+    """Springs and starting gap (n,) m for the forces that act over a step of ``dt``: ``weight`` θ times the force at
+    its end plus 1 − θ times that at its start, N = −kₙ (θ g₁ + (1−θ) g₀) − c ġ and S = S₀ − θ kₛ Δs.
 
-    c = ``damping`` · 2 √(kₙ m), ġ the mean over the step, ``mass`` (n,) kg of the lighter free block. What is open at
-    the start has no force there, unless ``joined`` (n,) by a bond, and approach counts for the dashpot only from
-    touching on: neither acts across an open gap. A step much longer than the contact's period leaves the spring as it
-    was. ``arc`` (n,) m as in `ContactSet`: what is added to g₁ though no displacement of the step does.
+    c = ``damping`` · 2 √(kₙ m), ġ the mean rate over the step, ``mass`` (n,) kg of the lighter free block. A contact
+    that is open at the start has no force there, unless it is ``joined`` (n,) by a bond, and its dashpot acts only
+    after closure. In a step much longer than the period of the contact the spring is unchanged. ``arc`` (n,) m as in
+    `ContactSet`: a contribution to g₁ that is not linear in the displacement.
     """
     if damping == 0.0 and np.all(weight == 1.0):
         return springs, gap + arc
@@ -213,6 +213,6 @@ def over_a_step(
 
 
 def end_of_step(start: np.ndarray, over: np.ndarray, sticking: np.ndarray, weight: float | np.ndarray) -> np.ndarray:
-    """(n,) N shear force at the end of a step from that at its ``start`` and the one that acted ``over`` it; sliding
-    contacts keep the latter."""
+    """(n,) N: shear force at the end of a step, from that at its ``start`` and the one that acted ``over`` it; for
+    sliding contacts the latter."""
     return over if np.all(weight == 1.0) else np.where(sticking, start + (over - start) / weight, over)

@@ -1,4 +1,4 @@
-"""Joint laws with their strength divided by a factor F, as strength reduction asks for them: tan φ/F, c/F, σₜ/F."""
+"""Joint laws with strength divided by a factor F, for strength reduction: tan φ/F, c/F, σₜ/F."""
 
 from __future__ import annotations
 
@@ -9,12 +9,11 @@ from ...model import JointLaw
 
 
 def reduced(law: JointLaw, factor: float) -> JointLaw:
-    """``law`` with tan φ, cohesion and tensile strength (their residuals too) divided by ``factor``; an angle of
-    dilation is kept as long as it is below that of friction.
+    """``law`` with tan φ, cohesion and tensile strength (residual values included) divided by ``factor``; the dilation
+    angle is kept as long as it is below the friction angle.
 
-    A face that yields before others do keeps its cohesion on what it slips until these yield too, unless the law says
-    what strength slip leaves: limit equilibrium counts all of it, and which face yields first is a matter of how stiff
-    springs share loads."""
+    Unless the law gives a residual strength, a face that yields before others keeps its cohesion while it slips, as in
+    limit equilibrium: which face yields first depends only on how springs share the load."""
     if law.roughness is not None:
         rough = replace(law.roughness, reduction=law.roughness.reduction * factor)
         return replace(law, roughness=rough)

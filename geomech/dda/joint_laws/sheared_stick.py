@@ -1,7 +1,7 @@
-"""Contacts that a step begins with a motion along their edges which no unknown of its equations has: given motion, arcs.
+"""Sticking contacts with tangential motion in the step that is not part of the unknowns: prescribed motion, arcs.
 
-Sticking they bear −k of it besides, k the stiffness of their shear springs. Where a law bends, that is the stiffness at
-the normal force with which the step ends, and is found with it.
+Their shear force contains −k times this motion, k the stiffness of the shear spring. For a nonlinear law this is the
+stiffness at the normal force at the end of the step, and is found together with it.
 """
 
 from __future__ import annotations
@@ -18,9 +18,9 @@ from ..open_close.settled_states import Settled
 from .nonlinear_laws import CurvedJoints
 from .penalty_springs import Springs
 
-#: Shear forces are found to this part of a contact's own force, as those of laws that bend are.
+#: Tolerance of shear forces, relative to the contact's force, as for nonlinear laws.
 _AGREED = 1e-8
-#: … in so many rounds, which stiffnesses that follow the normal force need four to six of.
+#: Largest number of iterations; stiffness that depends on the normal force takes four to six.
 _ROUNDS = 30
 
 
@@ -32,10 +32,10 @@ def settle_sheared_sticks(
     stretch: np.ndarray,
     curved: CurvedJoints | None,
 ) -> Settled:
-    """What ``settle`` makes of the contacts ``found`` with the motion ``stretch`` (n,) m in their shear springs; the
-    step's ``springs``, starting ``gap`` (n,) m and laws that are ``curved`` as for `open_close.settle`.
+    """Result of ``settle`` for the contacts ``found`` with the motion ``stretch`` (n,) m in their shear springs;
+    ``springs``, starting ``gap`` (n,) m and ``curved`` laws of the step as for `open_close.settle`.
 
-    Raises `Unsettled` where stiffness and normal force do not find each other."""
+    Raises `Unsettled` if stiffness and normal force do not converge."""
     if curved is None:
         return settle(replace(found, shear=found.shear - springs.shear * stretch))
 
@@ -47,7 +47,7 @@ def settle_sheared_sticks(
     for _ in range(_ROUNDS):
         settled = settle(replace(found, shear=found.shear - stiffness * stretch))
         iterations += settled.iterations
-        # (What the unknowns themselves move may be too little to tell of a stiffness that is another.)
+        # (The motion of the unknowns may be too small to determine another stiffness.)
         better = stiffness_at(
             settled.state, settled.direction, settled.bonded, settled.normal_force, settled.slip + np.zeros(len(found))
         )
@@ -55,4 +55,4 @@ def settle_sheared_sticks(
         if not off[settled.state != OPEN].any():
             return replace(settled, iterations=iterations)
         stiffness = better
-    raise Unsettled("given motion and the stiffness of joints that follows their pressure do not settle")
+    raise Unsettled("prescribed motion and the pressure-dependent stiffness of joints do not converge")

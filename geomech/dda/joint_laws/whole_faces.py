@@ -1,10 +1,10 @@
-"""Cohesion of whole faces, as limit equilibrium counts it: c ℓ of a face of the length ℓ for as long as it touches
-anywhere, |S| ≤ c ℓ + N tan φ.
+"""Cohesion of whole faces, as in limit equilibrium: c ℓ of a face of length ℓ as long as any part of it is closed, |S|
+≤ c ℓ + N tan φ.
 
-A contact at one end of a face holds the cohesion of its tributary length, half of the face. An end that opens would
-take that half along. Blocks that strain evenly bear on one end of a face and part by a micrometre at the other, where
-rock, which follows the face, would not; the cohesion of the ends that are open then goes to those that are closed. The
-shear force of a face acts along its line, so that it does not matter which of its ends bears it.
+A contact at one end of a face has the cohesion of its tributary length, half of the face, which would be lost when this
+end opens. A block of uniform strain may be open by a micrometre at one end, where real rock would follow the face. The
+cohesion of open ends is therefore assigned to the closed ones. The shear force of a face acts along its line, so that
+it does not matter which end carries it.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from .bonds import on_lines
 
 @dataclass(frozen=True, eq=False)
 class WholeFaces:
-    """Faces that hold cohesion, among the contacts (n,) of a step.
+    """Faces with cohesion among the contacts (n,) of a step.
 
     face      (n,)     number of the face, −1 for contacts without cohesion or without length
     length    (n,) m   tributary length
@@ -47,8 +47,8 @@ class WholeFaces:
         return cls(face, geometry[:, 4].copy(), cohesion)
 
     def cohesive(self, state: np.ndarray, bonded: np.ndarray) -> np.ndarray:
-        """(n,) m of its face whose cohesion each contact holds in ``state`` with ``bonded`` (n,): closed ones share
-        what is bonded of theirs."""
+        """(n,) m: length of face whose cohesion each contact carries in ``state`` with ``bonded`` (n,): closed contacts
+        share the bonded length of their face."""
         some = (self.face >= 0) & (bonded > 0)
         face, closed = self.face[some], state[some] != OPEN
         number = int(self.face.max()) + 1
@@ -60,7 +60,7 @@ class WholeFaces:
         return out
 
     def touch(self, state: np.ndarray) -> np.ndarray:
-        """(n,) whether the contact is on a face of which another is closed in ``state`` (n,)."""
+        """(n,) bool: contacts on a face that has another contact closed in ``state`` (n,)."""
         known = self.face >= 0
         touches = np.zeros(int(self.face.max()) + 1, bool)
         touches[self.face[known & (state != OPEN)]] = True

@@ -4,16 +4,16 @@ Forces N and S of the contacts are statically admissible at the factor F if ever
 
     N ≥ 0,    |S| ≤ (c ℓ + N tan φ)/F.
 
-The least sum of forces that such contact forces leave unbalanced, U(F), is a linear programme (Livesley 1978, Int. J.
-Numer. Methods Eng. 12, 1853-1871). U is zero up to the largest F with admissible forces; beyond, its dual solution gives
-dU/d(1/F), with which Newton's method finds that F from above in a few programmes. No equilibrium exists above it (static
-theorem). Friction that dilates by less than its angle may fail below it (Drescher & Detournay 1993, Géotechnique 43,
-443-456): blocks can be wedged against one another in many ways, and the deformation selects one. The search for a factor
-begins at this bound and follows the deformation, so that its answer may lie below; the difference shows how much depends
-on the way in which the blocks are wedged.
+The smallest sum of unbalanced forces, U(F), over all such contact forces is a linear programme (Livesley 1978, Int. J.
+Numer. Methods Eng. 12, 1853-1871). U is zero up to the largest F with admissible forces; beyond it, the dual solution
+gives dU/d(1/F), with which Newton's method finds that F from above in a few programmes. No equilibrium exists above it
+(static theorem). With friction that dilates by less than its angle, blocks may fail below it (Drescher & Detournay
+1993, Géotechnique 43, 443-456): they can be wedged against one another in many ways, of which the deformation selects
+one. The search for a factor starts at this bound and follows the deformation, so its result may be lower; the
+difference is a measure of how much depends on the wedging.
 
-The loads are those that the contact forces of an equilibrium balance, whatever they come from: weight, water, anchors.
-Joints with tensile strength are left out: a face that is bent holds less than the sum of what its ends would hold.
+The loads are all forces that contact forces balance in an equilibrium: weight, water, anchors. Joints with tensile
+strength are not covered: a bent face carries less than the sum of the strengths at its ends.
 """
 
 from __future__ import annotations
@@ -31,11 +31,11 @@ from ..open_close.contact_set import ContactSet
 from ..results import contact_resultants
 from ..system import BlockSystem
 
-#: The bound is sought up to this factor.
+#: Largest factor of the search.
 _FARTHEST = 64.0
-#: Loads are balanced to this part of the largest load on a block.
+#: Tolerance of equilibrium, relative to the largest load on a block.
 _BALANCED = 1e-6
-#: Newton's method ends when F changes by less than this part.
+#: Relative change of F below which Newton's method ends.
 _PRECISE = 1e-4
 
 
@@ -44,12 +44,12 @@ class AdmissibleForces:
     """The linear programme of the contacts (n,) of blocks at rest.
 
     matrix    (3 m, 2 n)  sparse: forces x, y and moments over √area on the m free blocks, by N and S of each contact
-    loads     (3 m,)      what balances the loads in the same rows, over the largest of them
+    loads     (3 m,)      the resultants that balance the loads, in the same rows, relative to the largest load
     friction  (n,)        tan φ
-    cohesion  (n,)        c ℓ of the contact's part of its face, in the unit of the loads; 0 once it is lost
+    cohesion  (n,)        c ℓ of the contact's part of its face, in units of the largest load; 0 once it is lost
     reduced   (n,) bool   whether the strength of the contact is divided by the factor
-    bolts     (3 m, k)    sparse: the same forces and moments by the pull of each bolt
-    pull      (k, 2)      least and largest pull of the bolts beside what is among the loads, in the unit of the loads
+    bolts     (3 m, k)    sparse: forces and moments by the pull of each bolt
+    pull      (k, 2)      smallest and largest pull of the bolts in addition to the loads, in units of the largest load
     """
 
     matrix: Any
@@ -65,10 +65,10 @@ class AdmissibleForces:
         cls, system: BlockSystem, state: State, rest: State, joints: Sequence[JointLaw], chosen: Collection[str],
         bolts: Sequence[Bolt] = (),
     ) -> AdmissibleForces | None:  # fmt: skip
-        """Of the blocks of ``system``, in equilibrium in ``state``, on all contacts that touch there or at ``rest``;
-        ``joints`` with their whole strength, of which that of the laws ``chosen`` is divided. ``bolts`` (the loads')
-        may pull with anything up to their yield force; without, with what they do in ``state``. None where the
-        programme does not hold: rough joints, those that soften, and those with tensile strength."""
+        """The programme for the blocks of ``system``, in equilibrium in ``state``, with all contacts that touch there
+        or in the state ``rest``. ``joints``: laws with full strength; the strength of those in ``chosen`` is divided.
+        ``bolts`` may pull with any force up to yield; if not given, they keep their forces in ``state``. None if the
+        programme does not apply: rough or softening joints, and joints with tensile strength."""
         if any(_varies(law) or law.tensile_strength > 0.0 for law in joints):
             return None
         from scipy import sparse
@@ -85,7 +85,7 @@ class AdmissibleForces:
         normal, at, law = near.geometry[rows, 1:3], near.geometry[rows, 5:7], near.law[rows]
         pair, ends = np.stack([near.block[rows], near.other[rows]], axis=1), np.stack([at, at], axis=1)
         along = np.stack([-normal[:, 1], normal[:, 0]], axis=1)
-        # Faces that have parted by a hair could hold their cohesion as well.
+        # Faces open by less than the precision of coordinates count with their cohesion.
         length = near.geometry[rows, 4] * ((near.bonded > 0) | (near.gap_before <= near.precision))[rows]
 
         def of_laws(name: str) -> np.ndarray:
@@ -99,9 +99,9 @@ class AdmissibleForces:
         )  # fmt: skip
 
     def unbalanced(self, factor: float) -> tuple[float, float]:
-        """The least sum of forces and moments that admissible forces at the ``factor`` leave unbalanced, in the unit of
-        the loads, and its derivative by 1/``factor``. The unknowns are pushes along both edges of the friction cone of
-        each contact, what cohesion holds of shear, pulls of bolts, and what is left. Raises `Unsolved`."""
+        """U at the ``factor``, in units of the largest load, and dU/d(1/F). The unknowns are forces along both edges of
+        the friction cone of each contact, shear carried by cohesion, bolt forces, and the unbalanced remainder. Raises
+        `Unsolved`."""
         from scipy import optimize, sparse
 
         share = np.where(self.reduced, 1.0 / factor, 1.0)
@@ -133,8 +133,8 @@ class AdmissibleForces:
         return self.unbalanced(factor)[0] <= _BALANCED
 
     def largest_factor(self, first: float = 1.0) -> float:
-        """The largest factor with admissible forces, sought from ``first`` on; 0 without any down to 1/64, inf where
-        they exist at 64. Raises `Unsolved`."""
+        """The largest factor with admissible forces, searched from ``first``; 0 if there are none down to 1/64, inf if
+        there are some at 64. Raises `Unsolved`."""
         low, high, factor, step = 0.0, math.inf, first, _PRECISE
         while True:
             left, slope = self.unbalanced(factor)
@@ -142,7 +142,7 @@ class AdmissibleForces:
                 low = factor
                 if low >= _FARTHEST:
                     return math.inf
-                # Newton's method that ends on the admissible side is hardly below the bound.
+                # An admissible iterate of Newton's method is only slightly below the bound.
                 factor = 2.0 * low if math.isinf(high) else min(low * (1.0 + step), 0.5 * (low + high))
                 step *= 4.0
                 continue
@@ -161,7 +161,7 @@ class Unsolved(RuntimeError):
 
 @dataclass(frozen=True, eq=False)
 class _Rows:
-    """Rows of the free blocks' equilibrium: ``number`` (n_blocks,) of each, −1 of others; ``centre`` (n_blocks, 2) m and
+    """Equilibrium equations of the free blocks: ``number`` (n_blocks,), −1 for others; ``centre`` (n_blocks, 2) m and
     ``size`` √area (n_blocks,) m."""
 
     number: np.ndarray
@@ -176,8 +176,9 @@ class _Rows:
         return cls(np.where(free, np.cumsum(free) - 1, -1), moments[:, 1:3], np.sqrt(moments[:, 0]))
 
     def by(self, ways: np.ndarray, pair: np.ndarray, points: np.ndarray):
-        """Sparse (3 m, n): forces and moments over √area by forces along ``ways`` (n, 2) on the first block of each
-        ``pair`` (n, 2) and against them on the second (GROUND: none), at its own ``points`` (n, 2, 2) m."""
+        """Sparse (3 m, n): forces, and moments over √area, of unit forces along ``ways`` (n, 2) on the first block of
+        each ``pair`` (n, 2) and opposite ones on the second (GROUND: none), each at its own point of ``points`` (n, 2,
+        2) m."""
         from scipy import sparse
 
         entries = []
@@ -193,8 +194,8 @@ class _Rows:
 
 
 def _pulls(rows_of: _Rows, bolts: Sequence[Bolt], state: State) -> tuple[Any, np.ndarray]:
-    """Sparse (3 m, k) of the ``bolts`` that act in ``state``, and the least and largest pull (k, 2) N/m of each beside
-    its force there."""
+    """Sparse (3 m, k) columns of the ``bolts`` that act in ``state``, and the smallest and largest change (k, 2) N/m of
+    each bolt's force from its value there."""
     acting = [
         (bolt, row) for bolt, row in zip(bolts, state.bolts, strict=False) if row["installed"] and not row["broken"]
     ]
@@ -207,7 +208,7 @@ def _pulls(rows_of: _Rows, bolts: Sequence[Bolt], state: State) -> tuple[Any, np
 
 
 def _touching(near: ContactSet, drawn: ContactSet, n_vertices: int) -> np.ndarray:
-    """Rows of the contacts ``near`` that touch, or that touch where they were ``drawn``."""
+    """Rows of the contacts ``near`` that touch now or in the initial geometry, ``drawn``."""
     drawn_on = (drawn.vertex * n_vertices + drawn.edge)[drawn.gap_before <= drawn.precision]
     return np.flatnonzero((near.gap_before <= near.precision) | np.isin(near.vertex * n_vertices + near.edge, drawn_on))
 

@@ -1,5 +1,5 @@
-"""What a factor of safety counts on that is not joint strength alone: toes, anchors, cohesion of faces that have parted
-at one end, the way in which blocks are wedged; and the warnings that name it."""
+"""Resistance other than joint strength in a factor of safety: toes, anchors, cohesion of partly open faces, wedging of
+blocks; and the warnings about it."""
 
 from __future__ import annotations
 
@@ -24,21 +24,21 @@ from .stability_trial import Trial
 
 log = logging.getLogger(__name__)
 
-#: So many blocks with toes are named.
+#: Number of blocks with toes that are named.
 _LISTED = 8
-#: Toes bar the way of blocks that come nearer to what they touch by this part of the fastest block's way, and hold
-#: what is more than this part of their block's weight.
-_BARRED, _BEARS = 1e-3, 1e-3
-#: Admissible forces up to a factor that is within this part of that of rigid blocks are explained by it.
+#: A toe is an obstacle if its block approaches what it touches by more than this fraction of the fastest block's
+#: displacement, and bears load if its force is more than this fraction of its block's weight.
+_OBSTACLE, _BEARS = 1e-3, 1e-3
+#: Relative difference below which the bound of admissible forces equals the factor of rigid blocks.
 _AS_RIGID = 1e-2
-#: A bolt within this part of its yield force is at it.
+#: Relative distance from the yield force within which a bolt yields.
 _AT_YIELD = 1e-6
-#: A bolt that never yields has taken on load when it bears more than its pretension by this part.
+#: Relative increase over the pretension from which a bolt without yield force counts as loaded.
 _TAKEN = 1e-3
 
 
 def toes_in_the_way(system: BlockSystem, state: State, failed: Trial | None = None) -> tuple[Toe, ...]:
-    """The toes of blocks in ``state`` that bar the way of what has ``failed``; all of them without."""
+    """The toes in ``state`` that are obstacles to the mechanism of the trial ``failed``; all toes if None."""
     found = system.contacts_near(state)
     off = system.finder.toes_among(found, state.vertices)
     borne = {(int(row["vertex"]), int(row["edge"])): row for row in state.contacts[state.contacts["state"] != OPEN]}
@@ -53,7 +53,7 @@ def toes_in_the_way(system: BlockSystem, state: State, failed: Trial | None = No
                 x, y = at - centre[block]
                 apart += sign * (failed.displacement[block] + failed.rotation[block] * np.array([-y, x]))
             fastest = float(np.hypot(*failed.displacement.T).max())
-            if not apart @ found.geometry[k, 1:3] < -_BARRED * fastest:
+            if not apart @ found.geometry[k, 1:3] < -_OBSTACLE * fastest:
                 continue
         row = borne.get((int(found.vertex[k]), int(found.edge[k])))
         force = 0.0 if row is None else float(row["normal_force"])
@@ -64,7 +64,7 @@ def toes_in_the_way(system: BlockSystem, state: State, failed: Trial | None = No
 
 
 def bearing_toes(system: BlockSystem, state: State, loads: Loads, load_time: float) -> tuple[Toe, ...]:
-    """The toes that bear forces in ``state``."""
+    """The toes that bear load in ``state``."""
     weight = system.mass * float(np.hypot(*loads.gravity.at(load_time)))
     system.finder.toes = FREE
     return tuple(toe for toe in toes_in_the_way(system, state) if toe.force > _BEARS * weight[toe.block])
@@ -73,8 +73,8 @@ def bearing_toes(system: BlockSystem, state: State, loads: Loads, load_time: flo
 def warn_of_toes(
     system: BlockSystem, begun: State, found: State, loads: Loads, load_time: float, crack: CrackResponse | None = None
 ) -> None:
-    """Log which toes hold blocks that have come to rest in ``found`` from ``begun`` and would not with rounded ones: a
-    search for equilibrium outside `factor_of_safety` takes corners as sharp as they are drawn."""
+    """Log the toes that support blocks at rest in ``found`` if, started from ``begun`` with rounded toes, the blocks
+    would collapse. Searches for equilibrium outside `factor_of_safety` use the sharp corners of the drawing."""
     finder = system.finder
     before = finder.toes
     try:
@@ -88,8 +88,8 @@ def warn_of_toes(
     if other.collapsed:
         one = len({toe.block for toe in toes}) == 1
         log.warning(
-            "t = %g s: %s and hold%s %.4g kN/m with %s sharp tip%s; rounded, blocks do not stand: `geomech safety` tells "
-            "the factor",
+            "t = %g s: %s and hold%s %.4g kN/m with %s sharp tip%s; rounded, blocks do not stand: see the factor of "
+            "`geomech safety`",
             load_time, _where(system.blocks, toes), "s" if one else "", sum(toe.force for toe in toes) / 1e3,
             "its" if one else "their", "" if one else "s",
         )  # fmt: skip
@@ -98,15 +98,15 @@ def warn_of_toes(
 def with_toes(
     blocks: Blocks, found: FactorOfSafety, toes: tuple[Toe, ...], other: FactorOfSafety | None, hold: bool
 ) -> FactorOfSafety:
-    """The answer ``found`` with the ``toes`` that ``hold`` in it, or would were their tips sharp, and the ``other``
-    answer without them, or with them."""
+    """The answer ``found`` with its ``toes``: those that ``hold`` in it, with the ``other`` answer without them; or
+    those that would hold with sharp tips, with the ``other`` answer with sharp tips."""
     lines = _of_toes(blocks, toes, other, hold)
     factor = None if other is None else other.factor
     return replace(found, toes=toes, toes_hold=hold, other_factor=factor, warnings=(*found.warnings, *lines))
 
 
 def _of_toes(blocks: Blocks, toes: tuple[Toe, ...], other: FactorOfSafety | None, hold: bool) -> tuple[str, ...]:
-    """What toes hold or would, in words; ``other`` is the answer without them or with sharp tips."""
+    """Warnings about toes; arguments as for `with_toes`."""
 
     def factor(of: FactorOfSafety) -> str:
         return f"{of.factor:.4f}" if math.isfinite(of.upper) else f"above {of.lower:g}"
@@ -119,16 +119,16 @@ def _of_toes(blocks: Blocks, toes: tuple[Toe, ...], other: FactorOfSafety | None
         return (f"{where} and {what} {force:.4g} kN/m; without {'it' if one else 'them'} {without}",)
     off = max(toe.stands_off for toe in toes)
     rounded = (
-        f"rounded, it stands off by {off:.3g} m and holds nothing before it has moved as far. A sharp tip would hold"
+        f"rounded, it stands off by {off:.3g} m and holds nothing before it has moved that far. A sharp tip would hold"
         if one
-        else f"rounded, they stand off by up to {off:.3g} m and hold nothing before they have moved as far. Sharp tips "
-        "would hold"
+        else f"rounded, they stand off by up to {off:.3g} m and hold nothing before they have moved that far. Sharp "
+        "tips would hold"
     )
     return (f"{where}; {rounded}: factor {factor(other)}, which is not to be relied on",)
 
 
 def _where(blocks: Blocks, toes: tuple[Toe, ...]) -> str:
-    """Which toes touch what, and where."""
+    """Text that names the toes, what they touch, and where."""
 
     def name(block: int) -> str:
         return repr(blocks.names[block] if blocks.names else f"block {block}")
@@ -146,12 +146,12 @@ def _where(blocks: Blocks, toes: tuple[Toe, ...]) -> str:
 
 
 def _metres(value: float) -> str:
-    """To the millimetre; adding zero makes a plain 0 of −0."""
+    """Text to the millimetre; adding zero turns −0 into 0."""
     return f"{round(value, 3) + 0.0:.7g}"
 
 
 def _anchors(loads: Loads, state: State, moved: np.ndarray) -> tuple[Anchor, ...]:
-    """What the bolts of ``loads`` hold in ``state``."""
+    """Forces and displacements of the bolts of ``loads`` in ``state``."""
     out = []
     for bolt, name, row in zip(loads.bolts, labels(loads.bolts), state.bolts, strict=False):
         if not row["installed"] or row["broken"]:
@@ -164,8 +164,8 @@ def _anchors(loads: Loads, state: State, moved: np.ndarray) -> tuple[Anchor, ...
 
 
 def with_anchors(blocks: Blocks, loads: Loads, found: FactorOfSafety) -> FactorOfSafety:
-    """The answer ``found`` with what bolts hold in it, and a warning where they hold less than they could or only after
-    their blocks have visibly moved."""
+    """The answer ``found`` with its bolt forces, and a warning for bolts without yield force or bolts whose block must
+    move visibly before they take load."""
     anchors, lines = _anchors(loads, found.state, found.moved), []
     size = np.sqrt(blocks.areas())
     for bolt, anchor in zip((b for b, row in zip(loads.bolts, found.state.bolts, strict=False)
@@ -186,8 +186,8 @@ def with_anchors(blocks: Blocks, loads: Loads, found: FactorOfSafety) -> FactorO
 
 @dataclass(frozen=True)
 class PartedFace:
-    """A face between ``block`` and ``other`` that holds cohesion though it is open by up to ``gap`` m at an end, on
-    ``length`` m of it."""
+    """A face between ``block`` and ``other`` whose cohesion counts although it is open by up to ``gap`` m at one end,
+    over ``length`` m."""
 
     block: int
     other: int
@@ -196,7 +196,7 @@ class PartedFace:
 
 
 def parted_faces(system: BlockSystem, state: State) -> tuple[PartedFace, ...]:
-    """Faces that in ``state`` touch at some of their ends and not at others, the one that is open farthest first."""
+    """Faces that in ``state`` touch at one end and not at the other, the widest gap first."""
     near = system.contacts_near(state)
     if near.whole is None:
         return ()
@@ -206,8 +206,8 @@ def parted_faces(system: BlockSystem, state: State) -> tuple[PartedFace, ...]:
 
 
 def hairline_faces(system: BlockSystem, state: State) -> tuple[PartedFace, ...]:
-    """Faces of joints with cohesion that in ``state`` are open at all of their ends, by less than what blocks are known
-    to, and so hold nothing, bonded still or not; the one that is open farthest first."""
+    """Faces of joints with cohesion that in ``state`` are open at all ends by less than the precision of block
+    positions, and therefore carry nothing; the widest gap first."""
     near = system.contacts_near(state)
     cohesion = np.array([joint.cohesion for joint in system.joints])[near.law]
     whole = WholeFaces.of(near.block, near.other, near.geometry, near.law, cohesion)
@@ -220,7 +220,7 @@ def hairline_faces(system: BlockSystem, state: State) -> tuple[PartedFace, ...]:
 
 
 def _faces(near: ContactSet, whole: WholeFaces, contacts: list[np.ndarray]) -> tuple[PartedFace, ...]:
-    """The faces whose open ends are these ``contacts`` (numbers in ``near``), the one that is open farthest first."""
+    """The faces whose open ends are these ``contacts`` (numbers in ``near``), the widest gap first."""
     out = [
         PartedFace(
             int(near.block[own[0]]), int(near.other[own[0]]), float(near.gap_before[own].max()),
@@ -234,17 +234,19 @@ def _faces(near: ContactSet, whole: WholeFaces, contacts: list[np.ndarray]) -> t
 def with_rigid_blocks(
     blocks: Blocks, found: FactorOfSafety, loose: tuple[PartedFace, ...], rigid: FactorOfSafety
 ) -> FactorOfSafety:
-    """The answer ``found`` with the answer of ``rigid`` blocks, and the faces that are ``loose`` in it by a hair."""
+    """The answer ``found`` with that of ``rigid`` blocks, and the ``loose`` faces, which are barely open in it."""
     if loose:
         worst, one = loose[0], len(loose) == 1
         a, b = (blocks.names[k] if blocks.names else f"block {k}" for k in (worst.block, worst.other))
         what = (
             f"{'a face' if one else f'{len(loose)} faces'} with cohesion between {a!r} and {b!r}"
             f"{'' if one else ' and others'} hold{'s' if one else ''} nothing, open by {1e3 * worst.gap:.2g} mm because "
-            "blocks strain evenly"
+            "blocks have uniform strain"
         )
     else:
-        what = "blocks strain evenly and so bear on few points of faces with cohesion, which others would hold too"
+        what = (
+            "blocks of uniform strain touch at few points of faces with cohesion, where real blocks would touch at more"
+        )
     line = f"{what}; rigid blocks have the factor {rigid.factor:.4f}"
     return replace(found, factor_if_rigid=rigid.factor, warnings=(*found.warnings, line))
 
@@ -252,7 +254,7 @@ def with_rigid_blocks(
 def with_parted_faces(
     blocks: Blocks, found: FactorOfSafety, parted: tuple[PartedFace, ...], other: FactorOfSafety
 ) -> FactorOfSafety:
-    """The answer ``found`` with the faces that have ``parted`` in it, and the ``other`` answer if these lose
+    """The answer ``found`` with the faces ``parted`` at one end, and the ``other`` answer in which open ends lose their
     cohesion."""
     worst = parted[0]
     a, b = (blocks.names[k] if blocks.names else f"block {k}" for k in (worst.block, worst.other))
@@ -266,8 +268,8 @@ def with_parted_faces(
 
 
 def with_admissible_forces(found: FactorOfSafety, largest: float | None) -> FactorOfSafety:
-    """The answer ``found`` with the ``largest`` factor that has admissible contact forces, if that is clearly beyond
-    it; without a warning where rigid blocks reach it, which is told already."""
+    """The answer ``found`` with the ``largest`` factor that has admissible contact forces, if that is clearly larger.
+    There is no warning if it is the factor of rigid blocks, which is reported already."""
     if largest is None:
         return found
     rigid = found.factor_if_rigid
@@ -277,7 +279,7 @@ def with_admissible_forces(found: FactorOfSafety, largest: float | None) -> Fact
     line = (
         f"friction does not determine how the blocks are wedged against one another: contact forces that balance the "
         f"loads within the strength of all joints exist {bound}, which is an upper bound. The factor {found.factor:.4f} "
-        "is that of the contact forces which the deformation of the blocks brings about, and moves with the stiffness "
+        "is that of the contact forces which result from the deformation of the blocks, and depends on the stiffness "
         "of blocks and joints"
     )
     return replace(found, admissible=largest, warnings=(*found.warnings, line))

@@ -1,15 +1,15 @@
-"""How far blocks may move on their way to an equilibrium: beyond, what they come to rest on was not there to begin with.
+"""Largest displacement of blocks on the way to an equilibrium of the structure as drawn.
 
-A search for equilibrium moves blocks until forces balance. Where they balance at once, joints give by what they are
-pressed, blocks by what they are strained, and bolts by what they are stretched: that much moves in an equilibrium of the
-structure that was drawn. A block that slides or falls until it lands balances too, but as another structure. Blocks of
-the size h = √area have therefore collapsed, wherever they end, once a vertex has moved farther than
+A search for equilibrium moves blocks until forces balance. In an equilibrium of the structure as drawn, displacements
+are limited to the compression of joints, the strain of blocks and the elongation of bolts. A block that slides or falls
+until it lands is in equilibrium too, but as part of another structure. Blocks of size h = √area have therefore
+collapsed, wherever they end, once a vertex has moved farther than
 
-    h / 2000  +  five times the largest displacement were no joint to fail  +  what stretches a bolt to its yield force
+    h / 2000  +  five times the largest displacement without joint failure  +  the displacement that makes a bolt yield
 
-and twice what blocks of higher order deflect (what stretches a bolt counts h / 10 at most, and nothing for a bolt that
-never yields: what it may take is a matter of how far blocks may move), and than any other block that has not. Blocks
-that were drawn apart from all that holds them first fall on it: their way counts from there.
+plus twice the deflection of blocks of higher order, and farther than any block that has not collapsed. The term for
+bolts is at most h / 10, and zero for a bolt without yield force, whose load depends on the displacement allowed. Blocks
+drawn apart from their supports first fall onto them; their displacement counts from there.
 """
 
 from __future__ import annotations
@@ -27,30 +27,30 @@ from .sharp_toes import SHARP
 
 log = logging.getLogger(__name__)
 
-#: What blocks may move beside what elasticity explains, in parts of their size √area. Slopes, walls and arches that
-#: stand move by 1e-6 to 1e-5 of it on springs of 40 E'.
+#: Displacement allowed in addition to elastic ones, relative to the block's size √area. Stable slopes, walls and arches
+#: move by 1e-6 to 1e-5 of it on springs of 40 E'.
 MOVED = 5e-4
-#: A block may move this many times as far as a bolt that holds it is stretched, at most: what moves at 70° to a bolt
-#: stretches it by a third of its way; what is wedged in above the block that it holds moves farther than this.
+#: Largest displacement of a bolted block, in units of the bolt's elongation: a block that moves at 70° to its bolt
+#: stretches it by a third of its displacement. The second number is for blocks wedged in above the bolted one.
 _STRETCHED, _WEDGED = 3.0, 10.0
-#: No bolt lets a block move by more than this part of its size.
+#: Largest displacement allowed by bolts, relative to the block's size.
 _FARTHEST = 0.1
 #: The strength of joints that do not fail, Pa.
 _UNBREAKABLE = 1e15
-#: With what is left out of balance below this part of forces, joints that do not fail have borne the loads.
+#: Unbalanced force, relative to all forces, below which joints that cannot fail bear the loads.
 _BALANCED = 1e-3
-#: Such a step is so long, s: it leaves inertia no part.
+#: Length of that static step, s: inertia is negligible.
 _LONG = 1e4
-#: Where joints open and slide a little, blocks move so many times as far as where no joint fails: beams of voussoirs sag
-#: twice as much as glued ones.
+#: Factor on displacements without joint failure, for joints that open and slide a little: voussoir beams sag twice as
+#: much as bonded ones.
 _OPENING = 5.0
 
 
 class DisplacementLimit:
-    """How far the blocks of a ``system`` may move from ``begin`` under ``loads`` of ``load_time`` s.
+    """Displacement limit of the blocks of ``system`` from ``begin`` under ``loads`` of ``load_time`` s.
 
-    ``reference`` (n_vertices, 2) m: where the way of each vertex counts from; ``seated`` (n_blocks,) False for blocks
-    that nothing touches which is held."""
+    ``reference`` (n_vertices, 2) m: positions from which displacements count; ``seated`` (n_blocks,): False for blocks
+    without a chain of contacts to a support."""
 
     def __init__(self, system: BlockSystem, begin: State, loads: Loads, load_time: float) -> None:
         self._system, self._loads, self._time = system, loads, load_time
@@ -64,7 +64,7 @@ class DisplacementLimit:
         self._seat(near.block[touches], near.other[touches])
 
     def _constrained(self) -> np.ndarray:
-        """(n_blocks,) what is held by anything but contacts."""
+        """(n_blocks,) bool: blocks held by something other than contacts."""
         system, blocks = self._system, self._system.blocks
         constrained = system.fixed.copy()
         if blocks.constrained is not None:
@@ -76,7 +76,7 @@ class DisplacementLimit:
         return constrained
 
     def _seat(self, block: np.ndarray, other: np.ndarray) -> None:
-        """Seat what touches seated blocks, one after the other."""
+        """Mark as seated all blocks that touch seated blocks, repeatedly."""
         bolts = [(bolt.block, bolt.other) for bolt in self._loads.bolts if bolt.other != GROUND]
         one = np.concatenate([block, np.array([a for a, _ in bolts], int)])
         two = np.concatenate([other, np.array([b for _, b in bolts], int)])
@@ -87,7 +87,7 @@ class DisplacementLimit:
             self.seated[one[new]] = self.seated[two[new]] = True
 
     def follow(self, result: StepResult) -> None:
-        """Count the way of blocks that are not yet seated from where ``result`` has brought them."""
+        """Restart the displacements of blocks not seated before the step ``result`` from their new positions."""
         if self.seated.all():
             return
         loose = np.repeat(~self.seated, np.diff(self._system.vertex_start))
@@ -96,12 +96,12 @@ class DisplacementLimit:
         self._seat(rows["block"], rows["other"])
 
     def moved(self, vertices: np.ndarray) -> np.ndarray:
-        """(n_blocks,) m by which the farthest vertex of each block has moved."""
+        """(n_blocks,) m: largest displacement of each block's vertices."""
         way = np.hypot(*(vertices - self.reference).T)
         return np.maximum.reduceat(way, self._system.vertex_start[:-1])
 
     def allowed(self, state: State) -> np.ndarray:
-        """(n_blocks,) m that each block may move, with ``state`` what it is."""
+        """(n_blocks,) m: limit of each block in ``state``."""
         own = MOVED * self._size
         moved = self.moved(state.vertices)
         if not (moved > own)[~self._system.fixed].any():
@@ -111,20 +111,20 @@ class DisplacementLimit:
         return own + float(moved[within].max(initial=0.0))
 
     def farthest(self) -> np.ndarray:
-        """(n_blocks,) m that no block may move more than, whatever else happens."""
+        """(n_blocks,) m: upper bound of the limit in any state."""
         own = MOVED * self._size + self.elastic
         stretched = any(not math.isinf(bolt.yield_force) for bolt in self._loads.bolts)
         return own + _FARTHEST * self._size if stretched else own
 
     def beyond(self, state: State) -> np.ndarray:
-        """Indices of the blocks that have moved farther than they may, the one that has most so first."""
+        """Indices of the blocks beyond their limit, the largest excess first."""
         moved, allowed = self.moved(state.vertices), self.allowed(state)
         share = np.where(self._system.fixed | ~self.seated, 0.0, moved / allowed)
         order = np.argsort(-share, kind="stable")
         return order[share[order] > 1.0]
 
     def stretching(self, state: State, moved: np.ndarray) -> np.ndarray:
-        """(n_blocks,) m: how much of the way that blocks have ``moved`` (n_blocks,) has stretched a bolt elastically."""
+        """(n_blocks,) m: part of the displacements ``moved`` (n_blocks,) that stretches a bolt elastically."""
         longest = np.zeros(len(moved))
         for bolt, row in zip(self._loads.bolts, state.bolts, strict=False):
             if not row["installed"] or row["broken"] or not bolt.stiffness > 0.0 or math.isinf(bolt.yield_force):
@@ -137,15 +137,15 @@ class DisplacementLimit:
         return np.minimum(longest, _FARTHEST * self._size)
 
     def bending(self, state: State) -> float:
-        """m: what deflections of blocks of higher order explain: a beam goes down by as much as it bends, and what lies on
-        it by twice that."""
+        """m: displacement due to the deflection of blocks of higher order: a beam sags by its deflection, blocks on it
+        by up to twice that."""
         deflected = self._system.deflected
         return 0.0 if deflected is None else 2.0 * float(deflected.deflection_of(state)[0].max())
 
     @property
     def elastic(self) -> float:
-        """m: what strains explain at most, from the largest displacement of a vertex were no joint to fail; 0 where
-        joints alone do not hold the blocks."""
+        """m: displacement due to strain, from the largest displacement of a vertex without joint failure; 0 if joints
+        alone do not support the blocks."""
         if self._elastic is None:
             end = without_failure(self._system, self._begin, self._loads, self._time)
             way = 0.0 if end is None else float(np.hypot(*(end.vertices - self._begin.vertices).T).max())
@@ -154,8 +154,8 @@ class DisplacementLimit:
 
 
 def without_failure(system: BlockSystem, begin: State, loads: Loads, load_time: float) -> State | None:
-    """The static equilibrium of the blocks of ``system`` from ``begin`` were no joint to fail, under ``loads`` of
-    ``load_time`` s; None where joints alone do not hold the blocks."""
+    """Static equilibrium of the blocks of ``system`` from ``begin`` with joints that cannot fail, under ``loads`` of
+    ``load_time`` s; None if joints alone do not support the blocks."""
     laws = [
         JointLaw(
             law.name, law.friction_angle, _UNBREAKABLE, _UNBREAKABLE, normal_stiffness=law.normal_stiffness,
@@ -165,11 +165,11 @@ def without_failure(system: BlockSystem, begin: State, loads: Loads, load_time: 
     ]  # fmt: skip
     begin = replace(begin, time=0.0, contacts=np.empty(0, CONTACT), velocity=np.zeros_like(begin.velocity))
     unbreakable = system.with_joints(laws)
-    # Bonds would draw together what stands off.
+    # With rounded toes, bonds would pull the gap at the toe closed.
     unbreakable.finder.toes = SHARP
     try:
         result = unbreakable.step(begin, loads, _LONG, load_time=load_time, pseudo_inertia=True)
     except (NotConverged, ValueError) as failure:
-        log.debug("what elasticity explains is not known: %s", failure)
+        log.debug("no displacements without joint failure: %s", failure)
         return None
     return None if result.statistics["unbalanced_ratio"] > _BALANCED else result.state

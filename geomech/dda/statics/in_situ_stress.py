@@ -1,10 +1,9 @@
-"""Blocks under in-situ stress and at rest: stress and contact forces that fit one another before anything moves.
+"""Equilibrium of blocks under in-situ stress: stress and contact forces that are consistent before the run starts.
 
-A first-order block carries the mean of a linear stress field, its value at the centroid, and the contact forces that go
-with it are found by statics: from blocks that have the stress and contacts that have no force yet the blocks relax,
-closing their contacts by what the penalty lets in and losing as much of their stress; given it back, they relax again,
-by that part of that part, and so on. The positions that are reached become the reference: displacements count from
-there.
+A first-order block carries the mean of a linear stress field, its value at the centroid. The contact forces are found
+by relaxation: blocks with the stress, and contacts without force, relax; the contacts close by the penalty penetration,
+and the blocks lose the corresponding stress. The lost stress is added again and the blocks relax again, by a smaller
+amount, and so on. The positions reached become the reference configuration, from which displacements count.
 """
 
 from __future__ import annotations
@@ -20,14 +19,14 @@ from .pseudo_time_equilibrium import Equilibrium, equilibrium
 
 log = logging.getLogger(__name__)
 
-#: The stress is given back at most so often. What is missing after each falls by the share that contacts have of the
-#: compliance, a fortieth and less with penalty springs.
+#: Largest number of corrections of the stress. Each reduces the error by the ratio of contact to total compliance, a
+#: fortieth or less with penalty springs.
 _PASSES = 12
 
 
 class NoInSituEquilibrium(RuntimeError):
-    """The blocks do not come to rest under their stress and loads: the message says which move, ``found`` where the
-    search ended."""
+    """The blocks do not come to rest under their stress and loads. The message names the blocks that move; ``found``:
+    where the search ended."""
 
     def __init__(self, message: str, found: Equilibrium | None = None) -> None:
         super().__init__(message)
@@ -41,8 +40,8 @@ class InSituState:
     blocks      with the positions at rest as their reference
     state       at time 0, without velocity and displacement, with stress and contact forces
     settled     m, the largest displacement from the blocks as drawn
-    deviation   largest difference of a free block's stress from the in-situ one, over the largest in-situ stress: what
-                the supports and weights do not let the blocks keep
+    deviation   largest difference between a free block's stress and the in-situ stress, relative to the largest in-situ
+                stress: the part that is inconsistent with supports and weights
     """
 
     blocks: Blocks
@@ -56,11 +55,10 @@ def in_situ_state(
 ) -> InSituState:
     """The blocks of ``system`` at rest under ``stress`` and the ``loads`` of time 0 (gravity, tractions, water …).
 
-    ``tolerance`` of the unbalanced force as in `equilibrium`; the stress is given back until that changes it by less
-    than ``stress_tolerance`` of itself. Where weight and supports ask for another stress than ``stress``, that one is
-    what the blocks end with, and ``deviation`` says by how much; the part that nothing contradicts (as the horizontal
-    one between walls) stays. Raises `NoInSituEquilibrium` when the blocks do not come to rest, and ValueError for blocks
-    of higher order.
+    ``tolerance`` of the unbalanced force as in `equilibrium`; the stress is corrected until its relative change is
+    below ``stress_tolerance``. If ``stress`` is inconsistent with weight and supports, the blocks end with a consistent
+    stress, and ``deviation`` gives the difference; consistent components (such as horizontal stress between walls) are
+    kept. Raises `NoInSituEquilibrium` when the blocks do not come to rest, and ValueError for blocks of higher order.
     """
     blocks = system.blocks
     if system.deflected is not None or system.order_choice is not None:

@@ -1,6 +1,6 @@
-"""How much of their strength joints have mobilised in an equilibrium: Σ|S| / Σ (c ℓ + N tan φ) over their contacts.
+"""Mobilised fraction of joint strength in an equilibrium: Σ|S| / Σ (c ℓ + N tan φ) over the contacts of a joint.
 
-Strengths are those of the state, divided by the factor it was found at: where a joint slides all along, the share is 1.
+Strengths are divided by the factor of that equilibrium: the fraction is 1 where a joint slides over its whole length.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from ...model import OPEN, SLIP, Blocks, JointLaw, State
 from ...model.joints.joint_law import STEEPEST
 from ..joint_laws.reduced_strength import reduced
 
-#: Faces without a name are told by their blocks up to so many pairs, and in one line beyond.
+#: Largest number of block pairs whose unnamed faces are listed separately; more are summed in one line.
 _FEW = 12
 
 
@@ -25,9 +25,9 @@ class MobilisedJoint:
     blocks, where there are many).
 
     length             m, of its faces
-    normal, shear      N/m, sums of the magnitudes over what touches
-    strength           N/m, c ℓ + N tan φ of what touches, divided by the factor if it is reduced
-    slides, parted     parts of its length that slide, and that do not touch
+    normal, shear      N/m, sums of magnitudes over closed contacts
+    strength           N/m, c ℓ + N tan φ of closed contacts, divided by the factor if it is reduced
+    slides, parted     fractions of its length that slide, and that are open
     reduced            whether its strength was divided by the factor
     """
 
@@ -43,15 +43,15 @@ class MobilisedJoint:
 
     @property
     def share(self) -> float:
-        """Of its strength; 0 where nothing presses."""
+        """Mobilised fraction of its strength; 0 without strength."""
         return self.shear / self.strength if self.strength > 0 else 0.0
 
 
 def mobilised_joints(
     blocks: Blocks, joints: Sequence[JointLaw], state: State, factor: float, chosen: Collection[str] | None = None
 ) -> list[MobilisedJoint]:
-    """Every joint, the most mobilised one first; ``joints`` as they were before the strength of those ``chosen`` (None:
-    of all) was divided by ``factor``."""
+    """All joints, the most mobilised first. ``joints``: laws before the strength of those in ``chosen`` (None: all) was
+    divided by ``factor``."""
     laws = [reduced(law, factor) if chosen is None or law.name in chosen else law for law in joints]
     rows = state.contacts[state.contacts["length"] > 0]
     names = list(zip(_names(blocks, rows), rows["law"].tolist()))
@@ -80,8 +80,7 @@ def mobilised_joints(
 
 
 def _names(blocks: Blocks, rows: np.ndarray) -> list[str]:
-    """What the faces of contacts are called: as they were drawn, on either side, else by their two blocks while these
-    are few."""
+    """Names of the faces of contacts: the edge name on either side, otherwise the two blocks if these are few."""
     drawn = [blocks.edge_names[k] for k in blocks.edge_name[rows["edge"]]]
     pairs = [tuple(sorted(pair)) for pair in zip(rows["block"].tolist(), rows["other"].tolist())]
     faces = list(zip(pairs, rows["law"].tolist()))
@@ -92,7 +91,7 @@ def _names(blocks: Blocks, rows: np.ndarray) -> list[str]:
 
 
 def _strength(law: JointLaw, row: np.void) -> float:
-    """What holds the shear of one contact, N/m; of a rough joint after Barton & Choubey (1977)."""
+    """Shear strength of one contact, N/m; of a rough joint after Barton & Choubey (1977)."""
     normal, length = max(float(row["normal_force"]), 0.0), float(row["length"])
     rough = law.roughness
     if rough is not None:

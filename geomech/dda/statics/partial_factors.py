@@ -1,8 +1,8 @@
-"""Which strength is divided before, and along which joints, a factor of safety is sought.
+"""Partial factors applied to strength before the search for a factor of safety, and the choice of joints to reduce.
 
-Design codes divide cohesion, tan φ and tensile strength by partial factors γ of their own (as EN 1997-1, 2.4.6.2) and
-ask whether what is left suffices: c/γ_c, tan φ/γ_φ, σₜ/γ_t. The factor that is found then comes on top of them, and
-the design holds from 1 on. Along chosen joints alone strength is reduced by laws of their own for their faces.
+Design codes divide cohesion, tan φ and tensile strength by separate partial factors (EN 1997-1, 2.4.6.2): c/γ_c, tan
+φ/γ_φ, σₜ/γ_t. The factor of safety is then additional, and the design is verified if it is at least 1. To reduce the
+strength of selected joints only, their faces get joint laws of their own.
 """
 
 from __future__ import annotations
@@ -14,14 +14,14 @@ from dataclasses import dataclass, fields, replace
 from ...model import JointLaw, Problem
 from .strength_reduction import NothingToReduce
 
-#: What the edges along drawn joints are called: this, and the joint's name.
+#: Prefix of the edge names along drawn joints.
 _DRAWN = "joint:"
 
 
 @dataclass(frozen=True)
 class PartialFactors:
-    """What ``cohesion``, ``friction`` (tan φ) and tensile strength (``tension``) are divided by, residuals too. Raises
-    `NothingToReduce` for what is not a positive number."""
+    """Divisors of ``cohesion``, ``friction`` (tan φ) and tensile strength (``tension``), residual values included.
+    Raises `NothingToReduce` unless they are positive numbers."""
 
     cohesion: float = 1.0
     friction: float = 1.0
@@ -35,7 +35,7 @@ class PartialFactors:
 
     @classmethod
     def of(cls, given: Mapping[str, float] | Iterable[str] | PartialFactors | None) -> PartialFactors:
-        """From a mapping, or from words as "cohesion=1.25". Raises `NothingToReduce` that names what is wrong."""
+        """From a mapping, or from texts such as "cohesion=1.25". Raises `NothingToReduce` naming the fault."""
         if given is None or isinstance(given, PartialFactors):
             return given or cls()
         if not isinstance(given, Mapping):
@@ -48,7 +48,7 @@ class PartialFactors:
 
     @property
     def plain(self) -> bool:
-        """Whether nothing is divided."""
+        """Whether all factors are 1."""
         return self == PartialFactors()
 
     def design(self, law: JointLaw) -> JointLaw:
@@ -122,7 +122,7 @@ def design_problem(
 
 
 def _with_own_laws(problem: Problem, edge: str) -> tuple[Problem, list[str]]:
-    """With laws of their own for the faces whose edges are called ``edge``, and these laws' names."""
+    """The problem with separate laws for the faces whose edges are called ``edge``, and the names of these laws."""
     laws, joint_of, new = list(problem.joints), dict(problem.joint_of), {}
     for other in problem.blocks.edge_names:
         law = problem.joint_index(edge, other)

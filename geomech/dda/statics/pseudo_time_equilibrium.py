@@ -1,11 +1,11 @@
-"""Static equilibrium found by itself: pseudo-time continuation of static steps.
+"""Static equilibrium by pseudo-transient continuation of static steps.
 
-A static step, which carries no velocity over, solves (2M/dt² + K) d = F: of the unbalanced force, inertia takes 2M
-d/dt². With small dt the blocks move gently until their contacts have closed; large dt is Newton's method for statics.
-dt therefore starts at some transits of sound through a block and grows from step to step (pseudo-transient
-continuation: Mulder & van Leer 1985; Kelley & Keyes 1998), until 2M d/dt² is below the tolerance. If the blocks are
-unsupported it never is, and they keep moving: a collapse. Blocks that come to rest only after moving farther than
-strains, joints and bolts explain (`displacement_limit`), as a block that slides onto a floor, have collapsed as well.
+A static step, which carries no velocity over, solves (2M/dt² + K) d = F: the inertia term 2M d/dt² carries the
+unbalanced force. With small dt the blocks move little until their contacts have closed; large dt is Newton's method for
+statics. dt therefore starts at some transit times of sound through a block and grows from step to step
+(pseudo-transient continuation: Mulder & van Leer 1985; Kelley & Keyes 1998), until 2M d/dt² is below the tolerance. Unsupported
+blocks keep moving: they have collapsed. Blocks that come to rest only beyond the `displacement_limit`, such as a block
+that slides onto a floor, have collapsed as well.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from .displacement_limit import DisplacementLimit
 
 log = logging.getLogger(__name__)
 
-#: One row a static step on the way.
+#: One row per static step.
 RELAXATION_STEP = np.dtype(
     [
         ("dt", np.float64),  # s, of pseudo-time
@@ -35,11 +35,11 @@ RELAXATION_STEP = np.dtype(
         ("cuts", np.int64),
     ]
 )
-#: The first step is this many transits of sound through the smallest block. A wall of a thousand bricks settles in 103,
-#: 69, 65, 51 and 55 open–close iterations from 10, 30, 100, 300 and 1000 of them, the last after one cut; in much
-#: shorter steps forces change so little that round-off decides about contacts.
+#: Length of the first step in transit times of sound through the smallest block. A wall of a thousand bricks takes 103,
+#: 69, 65, 51 and 55 open–close iterations for values of 10, 30, 100, 300 and 1000, the last after one cut; in much
+#: shorter steps forces change so little that round-off decides contact states.
 _FIRST_TRANSITS = 100.0
-#: dt grows by this factor from step to step, unless blocks already move nearly as far as allowed.
+#: Growth factor of dt per step, and the fraction of the allowed displacement above which dt stays constant.
 _GROWTH, _NEARLY = 4.0, 0.3
 #: Blocks that have moved by this fraction of their size √area, and are no closer to balance after this number of steps,
 #: keep moving; a block in free flight (unbalanced by nearly its weight) may still land. Stable walls and slopes take 3
@@ -57,12 +57,12 @@ class Equilibrium:
 
     state       at the time it began, with no velocity
     converged   True: the unbalanced force is below the tolerance
-    collapsed   True: there is no equilibrium within reach; ``moving`` says which blocks go, the fastest first
+    collapsed   True: there is no equilibrium within reach; ``moving``: the blocks that move, the fastest first
     reason      one sentence
-    history     RELAXATION_STEP rows, one a step
-    moved       (n_blocks,) m by which the farthest vertex of each block has moved; of blocks that were drawn apart from
-                all others since they have come to rest on one
-    result      the final StepResult: contact forces and what else acted (None if no step was made)
+    history     RELAXATION_STEP rows, one per step
+    moved       (n_blocks,) m, largest displacement of each block's vertices; of blocks drawn apart from all others,
+                since they landed
+    result      the final StepResult, with contact and other forces (None if no step was made)
     """
 
     state: State
@@ -89,16 +89,15 @@ def equilibrium(
     limit: DisplacementLimit | None = None,
     follow: bool = True,
 ) -> Equilibrium:
-    """Find where the blocks of ``system`` come to rest from ``state`` under ``loads`` at ``load_time`` (default:
+    """Find the equilibrium of the blocks of ``system`` from ``state`` under ``loads`` at ``load_time`` (default:
     state.time).
 
     ``tolerance`` bounds the unbalanced force on any block over the mean force on blocks. Blocks that move farther than
-    ``limit`` allows (by default, one that begins here) have collapsed, and are followed to where they come to rest if
-    that is not far, unless ``follow`` is False. A block that has moved ``reach`` m and is still out of balance has also
-    collapsed; by default that is a tenth of the blocks' extent, or a twentieth of the block's own size once the
-    unbalanced force has stopped falling; with a ``reach`` of the caller's there is no other limit. ``watch`` sees every
-    step and its RELAXATION_STEP. Raises ValueError for a tolerance that is not positive; without an equilibrium the
-    result says so.
+    ``limit`` allows (default: a limit from ``state``) have collapsed; unless ``follow`` is False, they are followed
+    until they come to rest nearby. An unbalanced block that has moved ``reach`` m has also collapsed. The default of
+    ``reach`` is a tenth of the extent of the blocks, or a twentieth of the block's own size once the unbalanced force
+    no longer decreases; if it is given, no other limit applies. ``watch`` is called with every step and its
+    RELAXATION_STEP. Raises ValueError for a tolerance that is not positive.
     """
     if not tolerance > 0:
         raise ValueError(f"the tolerance of the unbalanced force must be positive, got {tolerance!r}")
@@ -124,15 +123,15 @@ class _Relaxation:
         self.system, self.loads, self.time, self.crack = system, loads, time, crack
         self.state, self.start = state, state.time
         self.limit = limit or DisplacementLimit(system, state, loads, time)
-        # With a reach of the caller's there is no other limit.
-        self.judged = reach is None
+        # A given reach replaces the displacement limit.
+        self.limited = reach is None
         self.reach = 0.1 * float(np.hypot(*np.ptp(blocks.vertices, axis=0))) if reach is None else reach
         self.size = np.sqrt(blocks.areas())
         self.travelled = np.zeros(blocks.n_blocks)
         self.history: list[np.void] = []
         self.result: StepResult | None = None
         #: Blocks that have moved beyond the limit, and the last step in which a block was in free flight.
-        self.gone: tuple[int, ...] = ()
+        self.beyond_limit: tuple[int, ...] = ()
         self.last_flight = 0
 
     def run(
@@ -146,16 +145,16 @@ class _Relaxation:
                     self.state, self.loads, dt, self.crack, self.time, pseudo_inertia=True
                 )
             except NotConverged as failure:
-                return self._ended(False, bool(self.gone), str(failure))
+                return self._ended(False, bool(self.beyond_limit), str(failure))
             row, moved = self._take(result)
             if watch is not None:
                 watch(result, row)
             self.limit.follow(result)
-            if self.judged and not self.gone:
-                self.gone = tuple(self.limit.beyond(self.state).tolist())
+            if self.limited and not self.beyond_limit:
+                self.beyond_limit = tuple(self.limit.beyond(self.state).tolist())
             if row["unbalanced"] <= tolerance:
                 return self._at_rest(float(row["unbalanced"]))
-            if self.gone and not follow:
+            if self.beyond_limit and not follow:
                 break
             self.travelled += moved
             statistics = result.statistics
@@ -164,14 +163,14 @@ class _Relaxation:
                 return self._ended(False, True, collapse)
             moves_far = statistics["limit_share"] > _NEARLY
             dt = min(result.dt if moves_far else _GROWTH * result.dt, longest)
-        if self.gone:
+        if self.beyond_limit:
             farthest = self.limit.moved(self.state.vertices).max()
             return self._ended(False, True, f"no equilibrium: blocks have moved {farthest:.3g} m and go on")
         unbalanced = self.history[-1]["unbalanced"]
         return self._ended(False, False, f"unbalanced force {unbalanced:.2g} after {max_steps} steps")
 
     def _take(self, result: StepResult) -> tuple[np.void, np.ndarray]:
-        """Go on from ``result``; its RELAXATION_STEP, and how far the centroids have moved (n_blocks,), m."""
+        """Accept ``result``; returns its RELAXATION_STEP and the displacements (n_blocks,) of the centroids, m."""
         # Pseudo-time is not the time of the loads, which do not change here.
         self.state = replace(result.state, time=self.start)
         moved = np.hypot(*(result.forces.centroid - _centroids(self.system, self.state)).T)
@@ -191,23 +190,23 @@ class _Relaxation:
         return row, moved
 
     def _at_rest(self, unbalanced: float) -> Equilibrium:
-        """The answer where the blocks are in balance: a collapse if they had to move too far for it."""
-        if self.gone:
-            far = self.limit.moved(self.state.vertices)[list(self.gone)].max()
+        """The result for balanced blocks: a collapse if they had to move beyond the limit."""
+        if self.beyond_limit:
+            far = self.limit.moved(self.state.vertices)[list(self.beyond_limit)].max()
             return self._ended(
                 False, True, f"no equilibrium where the blocks are: they come to rest {far:.3g} m farther"
             )
         return self._ended(True, False, f"unbalanced force {unbalanced:.2g} of the mean force")
 
     def _collapse(self, unbalanced_ratio: float) -> str:
-        """Why blocks that are out of balance have collapsed; empty where they may still come to rest."""
+        """The reason why unbalanced blocks have collapsed; "" if they may still come to rest."""
         farthest, n = self.travelled.max(), len(self.history)
         if farthest > self.reach:
             return f"no equilibrium: blocks have moved {farthest:.3g} m and go on"
         if unbalanced_ratio > _FLYING:
             self.last_flight = n
         since = n - _IN_VAIN
-        if not self.judged or since <= self.last_flight or not (self.travelled > _GONE * self.size).any():
+        if not self.limited or since <= self.last_flight or not (self.travelled > _GONE * self.size).any():
             return ""
         forces = [float(row["unbalanced"]) for row in self.history]
         if min(forces[since:]) < min(forces[:since]):
@@ -215,8 +214,8 @@ class _Relaxation:
         return f"no equilibrium: blocks have moved {farthest:.3g} m, and {_IN_VAIN} steps brought no more balance"
 
     def _ended(self, converged: bool, collapsed: bool, reason: str) -> Equilibrium:
-        """The answer, with the blocks that move named in its ``reason``."""
-        blocks, state, moving = self.system.blocks, self.state, self.gone
+        """The result, with the moving blocks named in its ``reason``."""
+        blocks, state, moving = self.system.blocks, self.state, self.beyond_limit
         if not converged and not moving and self.result is not None:
             speed = np.hypot(*self.result.state.velocity[:, :2].T)
             order = np.argsort(-speed, kind="stable")
@@ -249,7 +248,7 @@ def _centroids(system: BlockSystem, state: State) -> np.ndarray:
 
 
 def rounding_force(system: BlockSystem) -> float:
-    """Force of springs like the stiffest contacts' under the rounding of coordinates, N/m."""
+    """Force in the stiffest contact springs due to the rounding of coordinates, N/m."""
     modulus = max((m.plane_modulus for m in system.materials if not m.rigid), default=0.0)
     return _PENALTY * modulus * system.rounding
 

@@ -1,4 +1,4 @@
-"""The answer of a search for a factor of safety: its bracket, the mechanism, and what counted in it."""
+"""Result of a search for a factor of safety: bracket, mechanism, and the resistances counted."""
 
 from __future__ import annotations
 
@@ -11,15 +11,15 @@ from ...model import Blocks, State
 from .sharp_toes import Toe
 from .stability_trial import Trial
 
-#: So many blocks of a mechanism are described; one that turns by more than this (rad) as it goes its own size is said
-#: to.
+#: Number of blocks of a mechanism that are described, and rotation (rad) per displacement of one block size above which
+#: a block is said to turn.
 _LISTED, _TURNS = 8, 0.05
 
 
 @dataclass(frozen=True)
 class Anchor:
-    """A bolt of the loads as it holds at the factor: ``force`` N/m in it, by how much it is stretched (``stretch`` m)
-    since it was installed, how far its block has ``moved`` (m) for that, and whether it ``yields``."""
+    """A bolt at the factor: its ``force`` N/m, elongation since installation (``stretch`` m), displacement of its block
+    (``moved`` m), and whether it ``yields``."""
 
     name: str
     force: float
@@ -30,18 +30,17 @@ class Anchor:
 
 @dataclass(frozen=True, eq=False)
 class FactorOfSafety:
-    """``factor`` lies between ``lower``, the largest F with an equilibrium that was found, and ``upper``, the smallest
-    without (inf: none up to 64); ``trials`` in the order made; ``mechanism``: what moves just above the factor, in
-    words, a line a block; ``moving`` those blocks, the fastest first; ``state`` the equilibrium at ``lower``; ``moved``
-    (n_blocks,) m, how far blocks have come to it, the initial settlement included; ``anchors`` what bolts hold there.
+    """``factor`` lies between ``lower``, the largest F with an equilibrium, and ``upper``, the smallest without one
+    (inf: none up to 64). ``trials``: in the order made; ``mechanism``: text, one line per block that moves just above
+    the factor; ``moving``: these blocks, the fastest first; ``state``: the equilibrium at ``lower``; ``moved``
+    (n_blocks,) m: displacements in it, including the initial settlement; ``anchors``: bolt forces in it.
 
-    ``toes`` bar the way of what moves. Where they are rounded and hold nothing, ``other_factor`` is what it would be
-    were their tips sharp; where they hold (``toes_hold``), what it is without them; None where it is not known.
-    ``factor_if_parted``: what it is if faces lose the cohesion of an end that opens, where that is another;
-    ``factor_if_rigid``: what it is of rigid blocks, where faces of elastic ones hold nothing for being open by a hair.
-    ``admissible``: the largest factor with admissible contact forces (`admissible_forces`), where that is beyond the
-    factor by more than one per cent; None where it is not, or is not known.
-    ``warnings`` in words."""
+    ``toes``: obstacles to the mechanism. If they are rounded and carry nothing, ``other_factor`` is the factor with
+    sharp tips; if they carry load (``toes_hold``), it is the factor without them; None if unknown.
+    ``factor_if_parted``: factor if open ends of faces lose their cohesion, if that differs; ``factor_if_rigid``: factor
+    of rigid blocks, if faces of elastic blocks carry nothing because they are barely open. ``admissible``: largest
+    factor with admissible contact forces (`admissible_forces`), if it exceeds the factor by more than one per cent,
+    otherwise None. ``warnings``: texts."""
 
     factor: float
     lower: float
@@ -62,11 +61,11 @@ class FactorOfSafety:
 
     @property
     def failed(self) -> Trial | None:
-        """The trial at ``upper``; None without any."""
+        """The trial at ``upper``; None if there is none."""
         return next((t for t in reversed(self.trials) if t.factor == self.upper), None)
 
     def table(self, title: str = "factor of safety") -> str:
-        """The trials by F, the factor under its ``title``, and the mechanism, as text."""
+        """Text: the trials by F, the factor with the ``title``, and the mechanism."""
         lines = ["       F  equilibrium  steps  unbalanced  drift m/s²"]
         for t in sorted(self.trials, key=lambda t: t.factor):
             answer = "yes" if t.stable else "no"
@@ -85,8 +84,8 @@ class FactorOfSafety:
         return "\n".join([*lines, *(f"  warning: {line}" for line in self.warnings)])
 
     def as_dict(self, blocks: Blocks) -> dict[str, object]:
-        """Plain numbers for a file: the answer, its trials, and how ``blocks`` move at failure, the farthest one
-        by 1."""
+        """Plain data for a file: the answer, its trials, and the motion of ``blocks`` at failure, scaled to a largest
+        displacement of 1."""
         failed = min((t for t in self.trials if not t.stable), key=lambda t: t.factor, default=None)
         moving = {}
         if failed is not None and self.moving:
@@ -137,7 +136,7 @@ def mechanism_of(blocks: Blocks, trial: Trial, moving: tuple[int, ...]) -> tuple
         (x, y), turn = trial.displacement[block], trial.rotation[block]
         far = math.hypot(x, y)
         name = blocks.names[block] if blocks.names else f"block {block}"
-        # Adding zero makes a plain 0 of −0.
+        # Adding zero turns −0 into 0.
         text = f"{name}: {far / fastest:.2f} of the fastest, towards {round(math.degrees(math.atan2(y, x))) + 0}°"
         size = math.sqrt(abs(float(blocks.areas()[block])))
         if abs(turn) * size > _TURNS * far:

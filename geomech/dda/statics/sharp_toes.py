@@ -1,18 +1,19 @@
-"""Sharp toes: corners of a block that stick in a re-entrant corner, between a face that they slide along and what ends it.
+"""Sharp toes: corners of a block in a re-entrant corner, between the face on which the block slides and the obstacle at
+its end.
 
-A block on a plane that ends in a floor, and the active block of a bilinear plane, touch with their last corner what bars
-the way. Two sharp corners there hold any force, whatever the joints are like; rock has no such corners, and to cut a
-centimetre off the toe, which changes nothing in the forces, frees the block. Rounded by a circle that touches both its
-edges at the rounding length ρ from the tip, the corner with the half angle α and the inward bisector b stands off a
-line with the normal n by
+The last corner of a block on a plane that ends at a floor, or of the active block of a bilinear plane, touches an
+obstacle. Two sharp corners can carry any force there, whatever the joints. Real rock has no such corners, and cutting a
+centimetre off the toe, which does not change the forces, would release the block. Let the corner, with half angle α and
+inward bisector b, be rounded by a circle that touches its edges at the rounding length ρ from the tip. Its distance
+from a line with normal n through the tip is
 
     δ = ρ (b·n / cos α − tan α)
 
-when its tip is on it, and the block moves on by as much before it is held.
+so that the block can move by this much before it is stopped.
 
-A rim of a few centimetres at the end of a plane holds as a sharp corner does, and no rounding frees it. What the factor
-is without it is found by leaving out, with the corners, all faces shorter than a tenth of their block's size that stand
-at the end of a longer face of the same two blocks.
+A rim of a few centimetres at the end of a plane acts like a sharp corner, but rounding does not release it. The factor
+without it is found by leaving out the corners and all faces shorter than a tenth of their block's size at the end of a
+longer face of the same two blocks.
 """
 
 from __future__ import annotations
@@ -21,28 +22,29 @@ from dataclasses import dataclass
 
 import numpy as np
 
-#: Sides that lean to an edge by less than this (sine of 3°) make a face with it, which is no toe's.
+#: Sides inclined to an edge by less than this (sine of 3°) form a face with it, not a toe.
 _LEAN = 0.053
-#: Toes that hold nothing stand off by this part of their block's size, √area.
+#: Distance by which a toe that must not carry load is moved off, relative to its block's size √area.
 _FAR = 0.02
-#: A corner is a toe's so near to the end of a face, in rounding lengths or parts of its block's size, √area, …
+#: A corner is a toe if its distance from the end of a face is less than this, in rounding lengths or relative to its
+#: block's size √area, …
 _NEAR, _NEAR_IN_SIZES = 1.0, 1e-3
-#: … whose sides are no farther apart than this part of that.
+#: … and the gap of that face is less than this fraction of that distance.
 _TOUCHING = 0.1
-#: Faces up to this part of their block's size hold as a toe does, at the end of a face that is longer than that, to
-#: which they lean by more than this (sine of 20°).
+#: A face shorter than this fraction of its block's size counts as a toe at the end of a longer face to which it is
+#: inclined by more than this (sine of 20°).
 _SHORT, _LEANS = 0.1, 0.34
-#: What toes do in a search for equilibrium: hold with their sharp tips, are rounded, or hold nothing at all.
+#: Treatment of toes in a search for equilibrium: sharp tips as drawn, rounded, or without load.
 SHARP, ROUNDED, FREE = "sharp", "rounded", "free"
 
 
 @dataclass(frozen=True)
 class Toe:
-    """A corner of ``block`` at the point ``at`` (m) that bars its way along a face by touching ``other``.
+    """A corner of ``block`` at the point ``at`` (m) that obstructs its sliding along a face by touching ``other``.
 
     vertex, edge  of the blocks
-    stands_off    m by which the rounded corner stands off where the sharp one touches
-    force         N/m that it bears
+    stands_off    m, distance of the rounded corner from the line that the sharp one touches
+    force         N/m, that it carries
     """
 
     block: int
@@ -56,8 +58,8 @@ class Toe:
 
 @dataclass(frozen=True, eq=False)
 class ToeCorners:
-    """Of each vertex (n_vertices,): the next one and the one before on its outline, its block (``owner``), its rounding
-    length m, the size √area (m) of its block, and where it was ``drawn`` (n_vertices, 2)."""
+    """Arrays (n_vertices,): next and previous vertex on the outline, block (``owner``), rounding length m, size √area
+    (m) of the block, and initial position (``drawn``, (n_vertices, 2))."""
 
     after: np.ndarray
     before: np.ndarray
@@ -71,15 +73,15 @@ def stand_off(
     vertex: np.ndarray, edge: np.ndarray, met: np.ndarray, geometry: np.ndarray, vertices: np.ndarray,
     corners: ToeCorners, toes: str,
 ) -> np.ndarray:  # fmt: skip
-    """(n,) m by which the corner of each contact that is a toe's stands off its edge, when ``toes`` are `ROUNDED` or
-    `FREE`; below zero for other contacts.
+    """(n,) m: distance of the corner of each toe contact from its edge if ``toes`` are `ROUNDED` or `FREE`; negative
+    for other contacts.
 
-    ``vertex``, ``edge``, the corner that is ``met`` and ``geometry`` (n, 7) as in `ContactSet`, springs at the corners; ``vertices`` (n_vertices, 2)
-    m. Of those that are `FREE` are also corners that have come to touch what they were drawn apart from, and the ends of
-    short faces beside longer ones.
+    ``vertex``, ``edge``, the corner ``met`` and ``geometry`` (n, 7) as in `ContactSet`, with springs at the corners;
+    ``vertices`` (n_vertices, 2) m. `FREE` also includes corners that have come to touch something they were drawn apart
+    from, and the ends of short faces next to longer ones.
     """
     out = np.full(len(vertex), -1.0)
-    # Two corners that meet are rounded already.
+    # Corner-to-corner contacts are rounded already.
     lone = (geometry[:, 4] <= 0.0) & (met < 0)
     near = np.maximum(_NEAR * corners.rounding, _NEAR_IN_SIZES * corners.size)
     faces = np.flatnonzero(
@@ -90,7 +92,7 @@ def stand_off(
         out[short] = _FAR * corners.size[vertex[short]]
     if not lone.any():
         return out
-    # Vertices that end a face which touches: those that stand on it, and those near which another's stand.
+    # Ends of closed faces: vertices in contact with the face, and vertices of it near a contact of another block.
     ends = np.zeros(len(vertices), bool)
     ends[vertex[faces]] = True
     start, end = edge[faces], corners.after[edge[faces]]
@@ -115,7 +117,7 @@ def stand_off(
     middle = half / np.maximum(np.hypot(half[:, 0], half[:, 1]), 1e-300)[:, None]
     cosine = np.einsum("na,na->n", middle, one)
     leans = np.minimum(np.einsum("na,na->n", one, n), np.einsum("na,na->n", two, n))
-    # A side that lies along the edge makes a face with it as soon as they come to lie on each other.
+    # A side parallel to the edge forms a face with it once they touch.
     sharp = (leans > _LEAN) & (cosine > _LEAN)
     if toes == FREE:
         off = _FAR * corners.size[v]
@@ -129,10 +131,10 @@ def stand_off(
 def _short_faces(
     vertex: np.ndarray, edge: np.ndarray, geometry: np.ndarray, faces: np.ndarray, corners: ToeCorners
 ) -> np.ndarray:
-    """Rows of the contacts on a short face beside a longer one of the same two blocks, corners at its ends included;
+    """Rows of the contacts on short faces next to longer ones of the same two blocks, with the corners at their ends;
     ``faces``: rows of the contacts on faces."""
     size = np.minimum(corners.size[vertex], corners.size[edge])
-    # Each end of a face stands for half of it.
+    # Each end of a face has half of its length.
     length = 2.0 * geometry[:, 4]
     is_short = length <= _SHORT * size
     some, long = faces[is_short[faces]], faces[~is_short[faces]]
@@ -154,7 +156,7 @@ def _cross(one: np.ndarray, two: np.ndarray) -> np.ndarray:
 
 
 def _drawn_apart(vertex: np.ndarray, edge: np.ndarray, corners: ToeCorners) -> np.ndarray:
-    """(n,) m by which each ``vertex`` was drawn off the line of its ``edge``."""
+    """(n,) m: initial distance of each ``vertex`` from the line of its ``edge``."""
     start = corners.drawn[edge]
     along, out = corners.drawn[corners.after[edge]] - start, corners.drawn[vertex] - start
     return (out[:, 0] * along[:, 1] - out[:, 1] * along[:, 0]) / np.hypot(along[:, 0], along[:, 1])

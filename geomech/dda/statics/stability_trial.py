@@ -3,8 +3,8 @@
 In static steps of length dt an unbalanced acceleration a moves a block by a dt²/2. In a stable trial the unbalanced
 force falls to round-off within a few steps. If it remains, the steps show the direction of motion. The trial is
 unstable if no contact closes in that direction and the unbalanced force, extrapolated along the motion, lasts beyond
-the displacement that an equilibrium allows (`displacement_limit`). Undecided cases, as a corner about to touch, are
-continued with longer steps until the blocks are at rest or have moved too far.
+the displacement that an equilibrium allows (`displacement_limit`). Undecided cases, such as a corner about to touch,
+are continued with longer steps until the blocks are at rest or have moved too far.
 """
 
 from __future__ import annotations
@@ -88,7 +88,7 @@ def stability_trial(
     blocks, way = system.blocks, _Way(system, limit)
     longest = dt = under.longest(system)
     ratios: list[float] = []
-    told: StepResult | None = None
+    mechanism: StepResult | None = None
     result: StepResult | None = None
     stable, reason, more, most = False, f"still moving after {under.max_steps} steps", 0, math.inf
     for _ in range(under.max_steps):
@@ -106,14 +106,14 @@ def stability_trial(
             reason = f"at rest {'' if stable else 'only '}after {way.of(state)}"
             break
         slow = len(ratios) >= _LEAST_STEPS and ratios[-1] > _FALLING * ratios[-1 - _STEPS]
-        if slow and told is None:
+        if slow and mechanism is None:
             # The motion now shows the mechanism, with the step length of all trials.
-            told = result
-        if told is not None:
+            mechanism = result
+        if mechanism is not None:
             # Steps kept short by contacts do not move the blocks far.
             more += 1 if math.isinf(most) else _MORE_STEPS // _SHORT_STEPS
             if more > _MORE_STEPS or len(limit.beyond(state)) or way.goes_on(result, ratios):
-                reason = f"moves on after {way.of(state)}"
+                reason = f"keeps moving after {way.of(state)}"
                 break
             # If contacts found no states in a longer step, they hardly will in the next.
             most = result.dt if result.statistics["step_cuts"] else most
@@ -126,7 +126,7 @@ def stability_trial(
     if result is None:
         nothing = np.zeros((blocks.n_blocks, 2))
         return Trial(factor, False, 0, math.nan, math.nan, nothing, nothing[:, 0], moved, reason), state
-    shown = result if stable or told is None else told
+    shown = result if stable or mechanism is None else mechanism
     a, free = shown.acceleration, ~blocks.fixed
     step = 0.5 * shown.dt**2 * a
     trial = Trial(

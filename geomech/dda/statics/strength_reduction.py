@@ -7,9 +7,9 @@ a force, not a displacement: in a static step of length dt an unbalanced force m
 stable trial it falls to round-off within a few steps; in an unstable one it remains (`stability_trial`), and for
 sliding it grows as A − B/F. Two unstable trials thus predict F, and a few more enclose it.
 
-The search begins below the largest factor at which any contact forces at all could balance the loads
-(`admissible_forces`), and tries it from just below and from just above: most networks of rigid joints fail there. Where
-they fail earlier, or later (as contacts that were not there hold), trials go on.
+The search starts with trials just below and just above the largest factor at which any contact forces could balance the
+loads (`admissible_forces`), where most networks of rigid joints fail. If blocks fail earlier, or later (because new
+contacts carry load), further trials follow.
 
 As in limit equilibrium, sharp toes in re-entrant corners are rounded (`sharp_toes`), and a face keeps its whole
 cohesion while any part of it is in contact (`whole_faces`). The factors without these assumptions are reported as well,
@@ -59,10 +59,10 @@ _FARTHEST = 64.0
 _BEYOND = 1e-2
 #: Factor from step to step in the search for a stable trial near a known factor; and of the first trial below a bound.
 _NEARBY, _BELOW = 0.85, 0.95
-#: The bound is sought from here: Newton's method comes from above, and most slopes fail below.
+#: Start of the search for the bound: Newton's method approaches from above, and most slopes fail below this.
 _FIRST = 2.0
-#: Trials beside an expected factor are made so many tolerances from it; near a bound, a second one fails so much farther
-#: above the first that their drifts point at the factor.
+#: Distance of trials from an expected factor, in tolerances; and relative distance of a second failing trial above a
+#: bound, so that the drifts of both predict the factor.
 _BESIDE, _SECOND = 0.4, 0.01
 
 
@@ -136,9 +136,8 @@ def factor_of_safety(
         raise NothingToReduce("all blocks are fixed: none could fail")
     if loads.base is not None and loads.base.frame == "ground":
         raise NothingToReduce(
-            'statics know no ground that moves: leave the base\'s motion out, or give it the frame "base", in which it '
-            "is the"
-            " weight's own kind of force, the one of the time that is asked for"
+            "a static search cannot include a moving ground: leave out the motion of the base, or give it the frame "
+            '"base", in which it is a body force at the time of the search'
         )
     under = TrialLoads(loads, load_time, unbalanced, max_steps, time_step)
     rest = State.at_rest(blocks) if state is None else state
@@ -150,8 +149,8 @@ def factor_of_safety(
 
 @dataclass(frozen=True)
 class Counted:
-    """Assumptions of a factor beside strength: ``toes`` "rounded", "sharp" or "free" (`sharp_toes`), and the cohesion
-    of ``whole_faces`` (`whole_faces`)."""
+    """Assumptions of a factor: ``toes`` "rounded", "sharp" or "free" (`sharp_toes`), and whether cohesion counts on
+    ``whole_faces`` (`whole_faces`)."""
 
     toes: str = ROUNDED
     whole_faces: bool = True
@@ -179,7 +178,7 @@ class _Search:
         return system
 
     def answer(self, counted: Counted, watch: Callable[[Trial], None] | None) -> FactorOfSafety:
-        """The factor with bolt forces, the factors without toes, and those with parted faces counted otherwise."""
+        """The factor with its bolt forces, and the factors with other assumptions about toes and partly open faces."""
         try:
             found, counted = self._found(counted, watch)
         except NotConverged:
@@ -199,9 +198,9 @@ class _Search:
         return with_admissible_forces(found, largest)
 
     def _found(self, counted: Counted, watch: Callable[[Trial], None] | None) -> tuple[FactorOfSafety, Counted]:
-        """The factor, and what has been ``counted`` in it: of the cohesion of whole faces, or of what touches of them,
-        the larger. What balances without the cohesion of open ends balances with it, but a face that bears shear by
-        cohesion alone, pressed by nothing, may have no consistent states: open it holds nothing, and closed it opens."""
+        """The factor and its assumptions: the larger of the factors with cohesion on whole faces and on closed contacts
+        only. In theory the first is always the larger. But a face that carries shear by cohesion alone, without
+        pressure, may have no consistent state: if open it carries nothing, and if closed it opens."""
         aim, whole = self.aim(counted), counted.whole_faces and self._cohesive
         touching = replace(counted, whole_faces=False)
         try:
@@ -236,8 +235,8 @@ class _Search:
             return 0.0
 
     def _admissible_beyond(self, found: FactorOfSafety, counted: Counted) -> float | None:
-        """The largest factor with admissible contact forces; None if that is hardly more than what was ``found``, or is
-        not known."""
+        """The largest factor with admissible contact forces; None if it is unknown or hardly larger than that
+        ``found``."""
         if not math.isfinite(found.upper):
             return None
         forces = AdmissibleForces.of(
@@ -269,8 +268,8 @@ class _Search:
         return bearing_toes(self.system(found.lower, counted), found.state, self.under.loads, self.under.time)
 
     def _with_parted_faces(self, found: FactorOfSafety, counted: Counted, beyond: bool) -> FactorOfSafety:
-        """The answer ``found`` with that of rigid blocks, where faces have parted by a hair or forces are admissible
-        ``beyond`` the factor, and with that without the cohesion of open ends."""
+        """The answer ``found`` with the factor of rigid blocks, if faces are barely open or forces are admissible
+        ``beyond`` the factor, and the factor without the cohesion of open ends."""
         system = self.system(found.lower, counted)
         loose = hairline_faces(system, found.state)
         if loose or beyond:
@@ -299,9 +298,9 @@ class _Search:
         self, counted: Counted, first: float = 1.0, above: float = math.inf, stands: bool = False,
         watch: Callable[[Trial], None] | None = None, aim: float | None = None,
     ) -> FactorOfSafety:  # fmt: skip
-        """Enclose the factor, starting with a trial at ``first``, or near the ``aim`` (None: as by `aim`). Raises
-        `_NoOther` if blocks are stable at ``first`` and it was only asked whether any ``stands``, or if they are unstable
-        at a factor ``above``; `NotConverged` if they are stable at none."""
+        """Enclose the factor, starting with a trial at ``first``, or near ``aim`` (None: from `aim`). Raises `_NoOther`
+        if blocks are stable at ``first`` and only a factor below it is of interest (``stands``), or if they are
+        unstable at the factor ``above``; `NotConverged` if they are stable at none."""
         near = stands or math.isfinite(above)
         aim = 0.0 if near else self.aim(counted) if aim is None else aim
         bracket = _Bracket(self, counted, watch, aim)
@@ -315,7 +314,7 @@ class _Search:
             if trial.factor <= 1.0 / _FARTHEST:
                 raise NotConverged(
                     f"the blocks do not stand even with joints {_FARTHEST:g} times as strong: {trial.reason}; "
-                    "what moves is not held by joint strength, or the contacts find no states"
+                    "the moving blocks do not depend on joint strength, or no contact states were found"
                 )
             trial = bracket.begin((_NEARBY if known else 0.5) * trial.factor)
         if first < above < math.inf and not bracket.tried(above).stable:
@@ -448,8 +447,8 @@ def _next_factor(trials: Sequence[Trial], lower: float, upper: float, tolerance:
 
 
 def _beside(aim: float, lower: float, tolerance: float) -> float | None:
-    """The factor to try next to the expected one, ``aim``: just below or, where blocks are stable nearly up to that,
-    just above; None where they are stable beyond."""
+    """The factor to try near the expected one, ``aim``: just below it or, if blocks are stable nearly up to it, just
+    above; None if they are stable beyond it."""
     margin = _BESIDE * tolerance
     if lower < aim * (1.0 - 2.0 * margin):
         return aim * (1.0 - margin)

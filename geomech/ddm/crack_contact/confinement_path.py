@@ -1,17 +1,17 @@
-"""Contact states of crack faces found by taking a confining pressure away.
+"""Contact states of crack faces, found by gradually removing a confining pressure.
 
-Under enough confining pressure all faces are closed and stick. With z d more of it than the load brings, the laws of the
-faces read
+Under sufficient confining pressure all faces are closed and stick. With an additional pressure z d the laws of the
+faces are
 
     gap ≥ 0,   λ_n + z d ≥ 0,   |λ_t| ≤ c + (λ_n + z d) tan φ,
 
-and their solution is piecewise linear in z. From z = 1, where the start satisfies all of them, z is lowered until one
-node reaches a limit. That node changes its state, and z goes on in the direction in which the node obeys the law of its
-new state, upwards again where it must. At z = 0 the load's own solution is reached: Lemke's method (1965) for the linear
-complementarity problem, as Klarbring (1986) uses it for friction. Newton's method takes a handful of solutions but may
-cycle where the discrete compliance is not a P-matrix, as in thin wedges of rock and under strong friction; the path
-takes one solution for each change of a node, and ends there, too. It fails only where no solution with less confinement
-exists nearby (a "ray").
+and their solution is piecewise linear in z. From z = 1, where the starting states satisfy all laws, z is lowered until
+one node reaches a limit. That node changes its state, and z continues in the direction in which the node obeys the law
+of its new state, which may be upwards. z = 0 is the solution for the load. This is Lemke's method (1965) for the linear
+complementarity problem, which Klarbring (1986) uses for friction. Newton's method takes a handful of solutions but may
+cycle if the discrete compliance is not a P-matrix, as in thin wedges of rock and under strong friction. The path takes
+one solution for each state change and ends there too. It fails only where no solution with less confinement exists
+nearby (a "ray").
 """
 
 from __future__ import annotations
@@ -23,17 +23,17 @@ import numpy as np
 from .face_equations import FaceProblem, FaceValues
 from .face_laws import FaceStates
 
-#: Confining pressure beyond what the start needs, relative to the largest stress, and its variation from node to node:
-#: with equal values, nodes of symmetric cracks would reach their limits at once.
+#: Additional confining pressure at the start, relative to the largest stress, and its variation from node to node: with
+#: equal values, nodes of symmetric cracks would reach their limits simultaneously.
 _SPARE, _UNEVEN = 1e-2, 0.2
 #: Friction coefficient below which cohesion is added in place of pressure.
 _LITTLE_FRICTION = 0.05
 #: Largest confinement z (the start has 1), and most changes of state per node.
 _LARGEST, _CHANGES = 2.0, 8
-#: Rate of a margin that is zero but for round-off.
+#: Rate of change below which a margin counts as constant (round-off).
 _FLAT = 1e-13
-#: Margins of a node: of contact (pressure or gap), of slip against and along the tangent, of slip that would turn back,
-#: and of cement about to be pulled or pressed.
+#: Margins of a node against: loss or onset of contact, slip along the tangent, slip against it, reversal of slip, and a
+#: change of cement between tension and compression.
 _CONTACT, _SLIP_ALONG, _SLIP_AGAINST, _RETURN, _CEMENT = range(5)
 
 
@@ -51,7 +51,7 @@ def confinement_path(problem: FaceProblem, states: FaceStates, disputed: np.ndar
     start = path.begin(states, disputed)
     end = path.follow(start)
     if end.confinement > 0.0 and not path.everywhere:
-        # Confinement of all faces leads along another path.
+        # Confining all faces gives a different path.
         everything = path.begin(states, np.ones(len(disputed), bool))
         other = path.follow(everything)
         return other if other.confinement < end.confinement else end
@@ -69,7 +69,7 @@ class _Path:
     def begin(self, states: FaceStates, disputed: np.ndarray) -> FaceStates:
         """Confine the ``disputed`` nodes, and neighbours that do not obey their laws."""
         problem, laws = self._problem, self._problem.laws
-        # Faces with an aperture may close but begin open.
+        # Faces with an aperture can close but start open.
         can = (laws.closes & (laws.aperture == 0.0)) | self._cemented | (laws.closes & states.closed)
         disputed = disputed & can
         while True:
@@ -109,7 +109,7 @@ class _Path:
         self._right[laws.across] += pressure * stress
 
     def _margins(self, states: FaceStates, values: FaceValues, cohesion: np.ndarray) -> np.ndarray:
-        """(5, n_nodes) by how much the nodes obey their laws, infinite where a law does not concern them."""
+        """(5, n_nodes) margins by which nodes satisfy their laws; infinite where a law does not apply."""
         laws = self._problem.laws
         rough = states.closed & laws.rough
         limit = cohesion + np.where(states.pulled, 0.0, laws.friction * values.pressure)
@@ -163,7 +163,7 @@ class _Path:
         closed, way, pulled = states.closed.copy(), states.way.copy(), states.pulled.copy()
         if law == _CONTACT:
             closed[node] = not closed[node]
-            # Faces that close were free to slip, and continue.
+            # Faces that close while slipping continue to slip.
             way[node] = np.sign(slip) if closed[node] and self._problem.laws.rough[node] else 0
             grows = _CONTACT
         elif law == _RETURN:

@@ -19,17 +19,17 @@ from .frictionless_contact import NotConverged, Settled, settle
 if TYPE_CHECKING:
     from ..interfaces import CrackedBody, SolvedBody
 
-#: Largest fraction of a crack whose nodes may violate the contact conditions: the tip of a blade of rock has no
+#: Largest fraction of a crack whose nodes may violate the contact conditions, as in a thin blade of rock that has no
 #: influence on distant crack tips.
 UNDECIDED = 0.03
-#: Thickness of rock between tip and side, over the extent of the body, that a message mentions when faces do not
-#: converge.
+#: Thickness of rock between a tip and the outline, relative to the body's extent, below which the message for faces
+#: that do not converge mentions it.
 BY_A_THREAD = 1e-2
 _log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True, eq=False)
-class FaceAnswer:
+class FaceSolution:
     """Result: slip and opening ``jumps`` (times 2μ) and ``traction`` on the faces (n_unknowns,); ``closed``
     (n_unknowns,) bool: openings at −aperture; number of ``solves``; face ``memory`` after this load and before it
     (``began``)."""
@@ -49,14 +49,14 @@ def settle_faces(
     pressure: np.ndarray | float,
     warm: SolvedBody | None,
     history: SolvedBody | FaceMemory | None = None,
-) -> FaceAnswer:
+) -> FaceSolution:
     """Contact state of the faces of ``body``. ``load_traction`` (n_unknowns,): of the loads on closed faces;
     ``opened``: S⁻¹ of it; ``pressure`` (n_elements, p+1): of fluid at the nodes. ``warm`` and ``history`` as in
     `Body.solve`."""
     c = body.faces
     n = c.n_unknowns
     if n == 0:
-        return FaceAnswer(np.zeros(0), np.zeros(0), np.zeros(0, bool), 0)
+        return FaceSolution(np.zeros(0), np.zeros(0), np.zeros(0, bool), 0)
     on_faces = np.zeros((c.n, 2, c.per))
     on_faces[:, 1] = -pressure
     applied = on_faces.ravel()
@@ -77,7 +77,7 @@ def settle_faces(
     closed = np.zeros(n, bool)
     if not can_close.any():
         respond(closed)
-        return FaceAnswer(state["w"], state["traction"], closed, 1)
+        return FaceSolution(state["w"], state["traction"], closed, 1)
     warm = history if warm is None and not isinstance(history, FaceMemory) else warm
     if warm is not None and warm.body.faces.per == c.per:  # a first guess: nodes of another order have none
         at = c.found_in(warm.body.faces)
@@ -87,12 +87,12 @@ def settle_faces(
     settled = settle(respond, can_close, closed, lambda shut, disputed: _by_path(body, right, shut, disputed))
     if settled.undecided.any():
         _judge(body, settled)
-    return FaceAnswer(state["w"], state["traction"], settled.closed, settled.solves)
+    return FaceSolution(state["w"], state["traction"], settled.closed, settled.solves)
 
 
 def _by_path(body: CrackedBody, right: np.ndarray, closed: np.ndarray, disputed: np.ndarray) -> np.ndarray:
     """(n_unknowns,) bool: closed nodes of faces without friction, by `confinement_path` from ``closed``."""
-    problem = FaceProblem(body.face_equations, right, body.never_loaded)
+    problem = FaceProblem(body.face_equations, right, body.initial_memory)
     at = problem.laws.across
     n = len(at)
     states = FaceStates(closed[at], np.zeros(n, np.int8), np.zeros(n, bool))
@@ -102,7 +102,7 @@ def _by_path(body: CrackedBody, right: np.ndarray, closed: np.ndarray, disputed:
 
 
 def _thin_bridge(body: CrackedBody) -> str:
-    """Text for messages: the tip that has next to no rock between it and the outline."""
+    """Text for messages: the tip with hardly any rock between it and the outline; "" if there is none."""
     cracks, edges = body.cracks, body.mesh.edges
     if not (len(edges) and len(cracks.tips)):
         return ""
@@ -121,8 +121,8 @@ def _thin_bridge(body: CrackedBody) -> str:
 
 
 def _judge(body: CrackedBody, settled: Settled) -> None:
-    """Log the nodes without a consistent contact state. Raises NotConverged, naming the crack, when they are more than
-    the last bit of a crack at a mouth or junction."""
+    """Log the nodes without a consistent contact state. Raises NotConverged, naming the crack, if they extend over more
+    than the last part of a crack at a mouth or junction."""
     c, cracks = body.faces, body.cracks
     at = np.flatnonzero(settled.undecided.reshape(c.n, -1).any(axis=1))
     crack = cracks.crack[c.source]
@@ -131,8 +131,8 @@ def _judge(body: CrackedBody, settled: Settled) -> None:
         length, own = float(c.length[here].sum()), float(c.length[crack == number].sum())
         x, y = c.start[here[0]]
         where = (
-            f"faces of {cracks.names[number]!r} beside ({x:.6g}, {y:.6g}) are open in no state that holds at all "
-            "their points"
+            f"faces of {cracks.names[number]!r} near ({x:.6g}, {y:.6g}) have no contact state that satisfies the "
+            "conditions at all points"
         )
         if length > UNDECIDED * own or (c.kind[here] != shape_functions.ORDINARY).any():
             raise NotConverged(
@@ -140,7 +140,7 @@ def _judge(body: CrackedBody, settled: Settled) -> None:
                 f"aperture, friction, or a finer mesh{_thin_bridge(body)}"
             )
         _log.warning(
-            "%s, over %.3g m; they are left with a violation of %.1e of the largest stress",
+            "%s, over %.3g m; the remaining violation is %.1e of the largest stress",
             where,
             length,
             settled.violation,
@@ -153,9 +153,9 @@ def _rough(
     applied: np.ndarray,
     warm: SolvedBody | None,
     history: SolvedBody | FaceMemory | None,
-) -> FaceAnswer:
+) -> FaceSolution:
     laws = body.laws
-    began = body.never_loaded if history is None else _memory(history, body)
+    began = body.initial_memory if history is None else _memory(history, body)
     first = history if warm is None else warm
     guess: FaceStates | None = None if first is None else _memory(first, body).states
     w, reaction, memory, solves, missed = settle_rough(body.face_equations, right, began, guess)
@@ -163,7 +163,7 @@ def _rough(
         _judge(body, Settled(memory.states.closed, solves, missed.undecided, missed.violation))
     closed = np.zeros(len(right), bool)
     closed[laws.across] = memory.states.closed
-    return FaceAnswer(w, applied - reaction, closed, solves, memory, began)
+    return FaceSolution(w, applied - reaction, closed, solves, memory, began)
 
 
 def _memory(of: SolvedBody | FaceMemory, body: CrackedBody) -> FaceMemory:

@@ -22,15 +22,15 @@ import numpy as np
 from ..counters import Work
 from ..iterative.crack_gmres import Iterated, IterativeCrackSystem
 from ..system.bordered_factor import BorderedFactor
-from ..system.closed_face_factor import HeldFactor
+from ..system.closed_face_factor import ClosedFaceFactor
 from ..system.contact_rows import Rows
 from ..system.dense_lu import Factor
 from ..system.schur_complement import CrackSystem
 from ..system.updated_factor import UpdatedFactor
 from .face_laws import FaceLaws, FaceMemory, FaceStates
 
-#: What solves the equations of given states.
-AnyFactor = Factor | BorderedFactor | HeldFactor | UpdatedFactor | Iterated
+#: Solvers for the equations of given states.
+AnyFactor = Factor | BorderedFactor | ClosedFaceFactor | UpdatedFactor | Iterated
 #: Smallest load, Pa; strengths divided by it are still finite.
 NO_STRESS = 1e-100
 #: Number of states whose factors are kept.
@@ -53,8 +53,8 @@ class FaceEquations:
     def solve(
         self, right: np.ndarray, states: FaceStates, memory: FaceMemory, cohesion: np.ndarray | float = 0.0
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Jumps and λ, (n,) or (n, k), under ``right`` (n,) or (n, k), with more ``cohesion`` than the laws', Pa: one
-        for all nodes, (n_nodes,) or (n_nodes, k)."""
+        """Jumps and λ, (n,) or (n, k), under ``right`` (n,) or (n, k). ``cohesion``, Pa, is added to that of the laws:
+        one number, (n_nodes,) or (n_nodes, k)."""
         if right.ndim == 1:
             more = np.broadcast_to(cohesion, len(self.laws.along))
             w, reaction = self.solve(right[:, None], states, memory, more[:, None])
@@ -73,7 +73,7 @@ class FaceEquations:
         # It may be infinite where nothing slips.
         shear = states.way[:, None] * np.where(slipping[:, None], bound, 0.0)
         free, factor = self._factor(states)
-        if isinstance(factor, HeldFactor):
+        if isinstance(factor, ClosedFaceFactor):
             extra[t] = shear
             reaction = np.empty_like(right)
             for k in range(right.shape[1]):
@@ -105,7 +105,7 @@ class FaceEquations:
         return w, reaction
 
     def _pull_of(self, w: np.ndarray) -> np.ndarray:
-        """S ``w`` of prescribed jumps; updated, since few of them change from state to state."""
+        """S ``w`` of prescribed jumps; updated incrementally, since few of them change between states."""
         if self._pull is not None and not isinstance(self.system, IterativeCrackSystem):
             changed = np.flatnonzero(w != self._pull[0])
             if len(changed) < FEW_CHANGED * len(w):
@@ -119,7 +119,7 @@ class FaceEquations:
             self._pull = w.copy(), pull
         return pull
 
-    def _opened(self, right: np.ndarray, factor: HeldFactor) -> np.ndarray:
+    def _opened(self, right: np.ndarray, factor: ClosedFaceFactor) -> np.ndarray:
         """S⁻¹ ``right``, computed once for each of the last two loads."""
         for known, opened in self._last:
             if np.array_equal(known, right):
@@ -223,8 +223,8 @@ class FaceProblem:
     def solve_confined(
         self, states: FaceStates, right: np.ndarray, cohesion: np.ndarray
     ) -> tuple[FaceValues, FaceValues]:
-        """The same, and with ``right`` and more ``cohesion`` (n_nodes,) than the laws' in place of the problem's
-        own."""
+        """The solution, and that with ``right`` in place of the problem's and with additional ``cohesion``
+        (n_nodes,)."""
         both = np.stack([self.right, right], axis=1), np.stack([np.zeros_like(cohesion), cohesion], axis=1)
         w, reaction = self.equations.solve(both[0], states, self.memory, both[1])
         bare, confined = (self._values(states, w[:, k], reaction[:, k]) for k in (0, 1))

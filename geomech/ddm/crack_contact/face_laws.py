@@ -60,9 +60,9 @@ class Released(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class FaceMemory:
-    """State of the crack ``elements`` kept from load to load: ``rest`` (n,) slip (times 2μ) of zero shear; ``broken``
-    (n,) lost cement; ``work`` J/m of friction since the beginning; ``states``; ``pressure`` and ``shear`` (n,) Pa;
-    ``released``."""
+    """State of the crack ``elements`` carried from load to load. ``rest`` (n,): slip (times 2μ) at zero shear;
+    ``broken`` (n,) bool: lost cement; ``work``: J/m of friction since the beginning; ``states``; ``pressure`` and
+    ``shear`` (n,) Pa; ``released``."""
 
     elements: ElementSet
     rest: np.ndarray

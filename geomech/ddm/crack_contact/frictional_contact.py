@@ -1,11 +1,11 @@
-"""Frictional contact of crack faces: which nodes are open, stick or slip, and the jumps that go with it.
+"""Frictional contact of crack faces: which nodes are open, stick or slip, and the resulting jumps.
 
 The equations of nodes in given states are linear (`face_equations`); the states satisfy the inequalities gap ≥ 0,
 λ_n ≥ 0 (cemented: ≥ −strength), |λ_t| ≤ c + λ_n tan φ, with slip opposed to its shear. All nodes that violate one
 change state at once: Newton's method for the semismooth equations (Alart & Curnier 1991), which needs a handful of
-solutions however many cracks interact. Where it cycles, the states are found by taking a confining pressure away
-(`confinement_path`). The result satisfies all inequalities to the tolerance; `Missed` names the nodes that do not (in
-blades of rock thinner than the elements no state may fit).
+solutions however many cracks interact. Where it cycles, the states are found by removing a confining pressure
+(`confinement_path`). The result satisfies all inequalities to the tolerance, except at the nodes listed in `Missed` (in
+blades of rock thinner than the elements there may be no solution).
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ class Missed(NamedTuple):
 
 
 class _Settled(NamedTuple):
-    """Contact states, the solution in them, and what they miss."""
+    """Contact states, the solution in them, and its violations."""
 
     states: FaceStates
     values: FaceValues
@@ -89,8 +89,8 @@ def admissible(problem: FaceProblem, states: FaceStates) -> FaceStates:
 
 
 def newton(problem: FaceProblem, states: FaceStates) -> tuple[_Settled | None, FaceStates, np.ndarray]:
-    """The states that satisfy all inequalities, None where the iteration cycles; the states of fewest violations, and
-    the nodes (n_nodes,) that have changed since."""
+    """The states that satisfy all inequalities, or None if the iteration cycles; the states with the fewest violations;
+    and the nodes (n_nodes,) bool that have changed since."""
     best, fewest, patience = states, len(states.closed) + 1, _PATIENCE
     disputed = np.zeros(len(states.closed), bool)
     while patience > 0:
@@ -139,7 +139,7 @@ def settle_rough(
         drive = -found.values.reaction[laws.across] / np.where(cemented, laws.strength, np.inf)
         if not drive.max() > 1 + TOLERANCE:
             break
-        # The most stressed nodes break first, and the others are judged after that.
+        # The most stressed nodes break first; the others are checked again afterwards.
         broken = broken | cemented & (drive > max(1.0, 0.5 * drive.max()))
         problem = FaceProblem(equations, right, replace(memory, broken=broken))
         was = found.states
@@ -149,7 +149,7 @@ def settle_rough(
 
 
 def _remembered(problem: FaceProblem, memory: FaceMemory, found: _Settled) -> FaceMemory:
-    """What faces remember of the load of ``problem``, whose solution is ``found``; ``memory`` of the load before."""
+    """Face memory after the load of ``problem``, whose solution is ``found``; ``memory``: before it."""
     laws, broken, states = problem.laws, problem.memory.broken, found.states
     w, reaction = found.values.jumps, found.values.reaction
     slip = w[laws.along]

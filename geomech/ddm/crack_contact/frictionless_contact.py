@@ -7,8 +7,8 @@ tractions of the loads on closed faces). At every node the opening is at least â
 
 Solved by block principal pivoting (JÃºdice & Pires 1994): all violated nodes change state at once, as in Newton's
 method. Where rock ends in a thin blade, between a crack and a side that it meets at a few degrees, the discrete
-compliance is not a P-matrix (a loaded point of the blade moves the wrong way), and that cycles; the states are then
-found by taking a confining pressure away (`confinement_path`). Nodes that violate their conditions even then are
+compliance is not a P-matrix (a loaded point of the blade moves the wrong way), and the iteration cycles; the states are
+then found by removing a confining pressure (`confinement_path`). Nodes that violate their conditions even then are
 undecided: the discrete problem has no solution there.
 """
 
@@ -19,7 +19,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-#: Most states tried before the search; a cycle ends it earlier.
+#: Largest number of states tried before the search, which begins earlier if they cycle.
 _MOST = 50
 
 

@@ -1,9 +1,10 @@
-"""What K loses where a curved wall was handed over as chords.
+"""Error of K where a polygon stands for a curved wall.
 
-A polygon is taken for a curve where two sides of about one length meet others at like bends of no more than 31°. Between
-such bends the arc lies off the chord of length L by its sagitta, ½ L tan (β/4), β the angle by which it turns. The body
-whose chords are halved, with their middles and the mouths of cracks on the arcs, has a quarter of that error, so that K
-on both differ by three quarters of it: a polygon that was meant as one is given an error that it does not have.
+A polygon is taken for a curve where two sides of similar length meet others at similar angles of no more than 31°.
+Between two such angles, of mean β, the arc deviates from its chord of length L by the sagitta ½ L tan(β/4). A second
+body, with each chord halved at the arc and the mouths of cracks moved to the arc, has a quarter of the error; K on both
+bodies differs by three quarters of it. A polygon that was meant as a polygon is thus given an error that it does not
+have.
 """
 
 from __future__ import annotations
@@ -23,43 +24,44 @@ if TYPE_CHECKING:
 
 _log = logging.getLogger(__name__)
 
-#: Bends between these (rad) may be a curve's: a circle of twelve sides turns by 30° at each.
+#: Angles (rad) between sides that may represent a curve; a circle of twelve sides has 30°.
 LEAST_BEND, MOST_BEND = np.radians(0.1), np.radians(31.0)
-#: Neighbouring chords of a curve, and its neighbouring bends, differ by less than this factor.
+#: Largest ratio of the lengths of neighbouring chords of a curve, and of neighbouring angles.
 LIKE = 2.0
-#: A mouth this near to a chord's middle (as part of the chord) is where the arc is halved.
+#: A crack mouth within this fraction of a chord from its midpoint becomes the point where the arc is halved.
 NEAR_MIDDLE = 0.2
 
 
 def chord_errors(solution: SolvedBody) -> np.ndarray:
-    """(n_tips, 2) Pa √m: by how much K_I and K_II change when curved walls are followed more closely; zeros where there
-    are none. Logs a warning where that cannot be estimated."""
+    """(n_tips, 2) Pa √m: change of K_I and K_II when the chords of curved walls are halved; zeros without curved walls.
+    Logs a warning if it cannot be computed."""
     k = factors(solution)
     try:
-        body, load = solution.body.rounder, solution.load
+        body, load = solution.body.with_rounded_walls, solution.load
         if body is None or not len(k):
             return np.zeros_like(k)
         sides = [side for where, value in load.sides for side in _halved_load(solution.body, where, value)]
         other = body.solve(replace(load, sides=sides), None, np.inf, solution.began, False)
     except (ValueError, np.linalg.LinAlgError) as failure:
-        _log.warning("what stress intensity factors lose by the chords of curved walls is not known: %s", failure)
+        _log.warning(
+            "the error of stress intensity factors due to chords of curved walls cannot be estimated: %s", failure
+        )
         return np.zeros_like(k)
     return np.abs(factors(other) - k)
 
 
 def with_halved_chords(body: CrackedBody) -> tuple[list[np.ndarray], Cracks, list[Support]] | None:
-    """Loops, cracks and supports of ``body`` with every chord of a curved wall halved, on the curve, and the mouths on
-    it moved there; None where all walls are straight. Raises ValueError where a crack is too short to be followed."""
+    """Loops, cracks and supports of ``body`` with each chord of a curved wall halved at the arc and crack mouths moved
+    to the arc; None if all walls are straight. Raises ValueError if a crack does not reach the arc."""
     if not any(sagittas(loop).any() for loop in body.loops):
         return None
-    loops, cracks = followed(body.loops, body.cracks)
+    loops, cracks = with_arcs_halved(body.loops, body.cracks)
     supports = [replace(one, on=tuple(map(tuple, at))) for one, at in zip(body.supports, _supported(body))]
     return loops, cracks, supports
 
 
 def sagittas(loop: np.ndarray) -> np.ndarray:
-    """(n,) m, how far the curve that ``loop`` (n, 2) may stand for lies off each of its edges, positive to the right;
-    0 of straight ones."""
+    """(n,) m: sagitta of the arc over each edge of ``loop`` (n, 2), positive to the right; 0 for straight edges."""
     along = np.roll(loop, -1, axis=0) - loop
     before = np.roll(along, 1, axis=0)
     length = np.hypot(*along.T)
@@ -72,9 +74,9 @@ def sagittas(loop: np.ndarray) -> np.ndarray:
     return np.where(curved, np.sign(bend) * 0.5 * length * np.tan((abs(bend) + abs(ahead)) / 8), 0.0)
 
 
-def followed(loops: list[np.ndarray], cracks: Cracks) -> tuple[list[np.ndarray], Cracks]:
-    """``loops`` with a vertex more on each arc, and on each mouth there, and ``cracks`` that end on the arcs. Raises
-    ValueError where a crack would end before it began."""
+def with_arcs_halved(loops: list[np.ndarray], cracks: Cracks) -> tuple[list[np.ndarray], Cracks]:
+    """``loops`` with an additional vertex on each arc and at each crack mouth there, and ``cracks`` extended or
+    shortened to end on the arcs. Raises ValueError if nothing would be left of a crack."""
     nodes, out = cracks.nodes.copy(), []
     mouths = np.flatnonzero(cracks.surface & (cracks.valence > 0))
     for loop in loops:
@@ -107,7 +109,7 @@ def _middle(a: np.ndarray, b: np.ndarray, sagitta: float) -> np.ndarray:
 
 
 def _end_on_arc(cracks: Cracks, node: int, a: np.ndarray, b: np.ndarray, sagitta: float) -> np.ndarray:
-    """(2,) where the crack that ends at ``node`` on the chord from ``a`` to ``b`` meets the arc."""
+    """(2,) point where the crack that ends at ``node`` on the chord from ``a`` to ``b`` meets the arc."""
     segment, end = np.argwhere(cracks.segments == node)[0]
     mouth, inner = cracks.nodes[node], cracks.nodes[cracks.segments[segment, 1 - end]]
     half = 0.5 * np.hypot(*(b - a))
@@ -125,7 +127,7 @@ def _end_on_arc(cracks: Cracks, node: int, a: np.ndarray, b: np.ndarray, sagitta
 
 
 def _halved_load(body: CrackedBody, where, value) -> list[tuple]:
-    """The traction ``value`` of the side ``where`` of ``body`` on its `Body.rounder`, which numbers its sides differently."""
+    """The traction ``value`` of the side ``where`` of ``body`` on `Body.with_rounded_walls`, which has other side numbers."""
     if not isinstance(where, (int, np.integer)):
         return [(where, value)]
     parts = 1 + np.concatenate([sagittas(loop) != 0 for loop in body.loops])

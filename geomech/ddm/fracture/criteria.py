@@ -91,10 +91,10 @@ def largest_relative_release_rate(
     """F-criterion (Shen & Stephansson 1993): the kink with the largest F = G_I/G_Ic + G_II/G_IIc, with K_eq = √F K_Ic.
 
     So F = (k_1/K_Ic)² + (k_2/K_IIc)² with the factors k_1, k_2 of an infinitesimal kink (`kink_factors`); a kink that
-    closes (k_1 < 0) has only its second part. K_IIc = K_Ic makes it the energy criterion, an infinite K_IIc that of
-    K_IIc = K_Ic gives the energy criterion, an infinite K_IIc that of the largest k_1. Tractions on the faces of a
-    closed kink (friction, stress along the crack) do not enter: for an infinitesimal kink they are negligible against
-    k_1 and k_2 (see `f_criterion` for kinks of finite length). Kinks beyond 126° are not considered.
+    closes (k_1 < 0) has only its second part. K_IIc = K_Ic gives the criterion of maximum energy release rate, an
+    infinite K_IIc that of the largest k_1. Tractions on the faces of a closed kink (friction, stress along the crack)
+    do not enter: for an infinitesimal kink they are negligible against k_1 and k_2 (see `f_criterion` for kinks of
+    finite length). Kinks beyond 126° are not considered.
     """
     k_i, k_ii = _tips(k_i, k_ii)
     share = material.k_ic / material.k_iic if np.isfinite(material.k_iic) else 0.0

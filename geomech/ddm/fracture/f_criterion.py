@@ -32,30 +32,32 @@ if TYPE_CHECKING:
 DIRECTIONS = np.radians(np.arange(-120.0, 121.0, 10.0))
 
 
-def judged(solution: Solution, growth: GrowthSettings, material: Material) -> tuple[np.ndarray, np.ndarray]:
-    """(n_tips,) angle and K_eq of the tips of ``solution`` by the criterion in ``growth``. Raises ValueError for an
-    unknown criterion, or one that trial kinks do not support."""
+def apply_criterion(solution: Solution, growth: GrowthSettings, material: Material) -> tuple[np.ndarray, np.ndarray]:
+    """(n_tips,) growth angle and K_eq of the tips of ``solution`` by the criterion in ``growth``. Raises ValueError for
+    an unknown criterion, or one that trial kinks do not support."""
     if growth.trial_kink > 0:
         check_criterion(growth)
         return driven(solution, growth.trial_kink, material)
-    return judged_rows(solution.tips, growth, material)
+    return apply_criterion_to_rows(solution.tips, growth, material)
 
 
-def judged_rows(tips: np.ndarray, growth: GrowthSettings, material: Material) -> tuple[np.ndarray, np.ndarray]:
-    """The same for TIP rows of one or more bodies, by a criterion that needs only K. Raises ValueError for an unknown
-    criterion."""
+def apply_criterion_to_rows(
+    tips: np.ndarray, growth: GrowthSettings, material: Material
+) -> tuple[np.ndarray, np.ndarray]:
+    """`apply_criterion` to TIP rows of one or more bodies, by a criterion that needs only K. Raises ValueError for an
+    unknown criterion."""
     check_criterion(growth)
     return CRITERIA[growth.criterion](tips["k_i"], tips["k_ii"], material)
 
 
 def check_criterion(growth: GrowthSettings) -> None:
-    """Raise ValueError where `judged` would."""
+    """Raise ValueError where `apply_criterion` would."""
     if growth.criterion not in CRITERIA:
         raise ValueError(f"no growth criterion {growth.criterion!r}; there are {', '.join(CRITERIA)}")
     if not 0 <= growth.trial_kink < np.inf:
         raise ValueError(f"trial_kink must be a length, got {growth.trial_kink!r}")
     if growth.trial_kink and growth.criterion != "f":
-        raise ValueError(f'trial kinks are judged by the criterion "f", not by {growth.criterion!r}')
+        raise ValueError(f'trial kinks need the criterion "f", not {growth.criterion!r}')
 
 
 def driven(solution: Solution, length: float, material: Material) -> tuple[np.ndarray, np.ndarray]:

@@ -1,4 +1,4 @@
-"""Upper bound of stress intensity factors under loads of which only the size is known.
+"""Upper bound of stress intensity factors under loads of known size and unknown distribution.
 
 While faces stay open, K is linear in the load, K = ∮ h · t ds + …, with h (x) the weight function (Bueckner 1970): here
 K of a force at x together with the body force, linear in the distance from the centroid, that keeps the body in
@@ -26,7 +26,8 @@ if TYPE_CHECKING:
     from ..body import Body
     from ..loads.body_loads import BodyLoad
 
-#: Safety factor on h (the exact maximum is 0.98 to 1.02 times the linear one in `tests/ddm/test_tip_bound.py`).
+#: Safety factor on h (the exact maximum is 0.98 to 1.02 times that of the linear function in
+#: `tests/ddm/fracture/test_sif_bound.py`).
 MARGIN = 1.25
 
 
@@ -40,7 +41,7 @@ class TipBound:
 
     largest  (n_tips,) largest K of a unit force on the outline, Pa √m
     force    (n_tips, 2, 4) K_I and K_II of a unit gradient of the body force, xx, xy, yx, yy
-    even     (n_tips, 2, 3) of a unit uniform stress
+    uniform  (n_tips, 2, 3) of a unit uniform stress
     """
 
     def __init__(self, body: Body) -> None:
@@ -66,7 +67,7 @@ class TipBound:
         self.largest = MARGIN * np.sqrt((ends**2).sum(axis=(0, -1))).max(axis=(1, 2))
         self.force = to_force[:, :, 2:].transpose(1, 0, 2)
         unit = np.column_stack([-on_elements(body.faces, of) for of in np.eye(3)])
-        self.even = (known.on_faces.T @ unit).reshape(2, n, 3).transpose(1, 0, 2)
+        self.uniform = (known.on_faces.T @ unit).reshape(2, n, 3).transpose(1, 0, 2)
 
     def at_most(self, load: BodyLoad) -> np.ndarray:
         """(n_tips,) upper bound of √(K_I² + K_II²) under ``load``, Pa √m: tractions on segments of the outline, body
@@ -76,12 +77,12 @@ class TipBound:
         gradient = load.body_force_gradient
         k = self.force @ (0.5 * (gradient + gradient.T)).ravel()
         if load.remote_stress is not None:
-            k = k + self.even @ load.remote_stress
+            k = k + self.uniform @ load.remote_stress
         return self.largest * size + np.hypot(k[:, 0], k[:, 1])
 
 
 @lru_cache(maxsize=64)
-def most_per_factor(criterion: str, material: Material) -> float:
+def largest_k_eq_per_k(criterion: str, material: Material) -> float:
     """Largest K_eq of the ``criterion`` in ``material`` for √(K_I² + K_II²) = 1; K_eq is proportional to both."""
     angle = np.linspace(-np.pi, np.pi, 721)
     _, k_eq = CRITERIA[criterion](np.cos(angle), np.sin(angle), material)

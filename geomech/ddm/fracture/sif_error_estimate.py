@@ -51,15 +51,15 @@ def warn(errors: np.ndarray, k: np.ndarray) -> None:
     if errors.max(initial=0.0) > WORTH_A_WARNING * largest(k):
         at = int(np.argmax(errors.max(axis=1)))
         _log.warning(
-            "stress intensity factors are uncertain by %.1f %% at tip %d: ask for a smaller target_error",
+            "stress intensity factors are uncertain by %.1f %% at tip %d: set a smaller target_error",
             100 * errors.max() / max(largest(k), np.finfo(float).tiny),
             at,
         )
 
 
 def floor(body: CrackedBody) -> float:
-    """Relative error of K where grading stops because of round-off (`grading.Grading.finest`). A finer solution has it,
-    too, and cannot show it. Only meshes made for a target error are graded that far."""
+    """Relative error of K because grading stops at the limit of round-off (`grading.Grading.finest`). A finer solution
+    has the same error, so the comparison does not show it. Only meshes for a target error are graded that far."""
     grading = Grading.of(body.settings)
     if grading.target is None:
         return 0.0
@@ -77,8 +77,8 @@ def floor(body: CrackedBody) -> float:
 
 
 def _left_at(body: CrackedBody, point: np.ndarray, part: float) -> float:
-    """Error of an element of the fraction ``part`` of its side or segment that ends at ``point``, if that is a node of
-    the geometry."""
+    """Error due to an ungraded element at ``point`` with length ``part`` relative to its side or segment; 0 if the
+    point is not a node of the geometry."""
     network, left = body.cracks, 0.0
     for node in np.flatnonzero((network.nodes == point).all(axis=1) & (network.valence > 0)).tolist():
         where = "mouth" if network.surface[node] else "crack"

@@ -1,4 +1,4 @@
-"""Stress intensity factors to a target error: finer meshes, until two solutions agree to the target."""
+"""Stress intensity factors to a target error: meshes are refined until two solutions agree."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ if TYPE_CHECKING:
 
 
 class TargetMissed(ValueError):
-    """The ``target`` error cannot be reached by any mesh; ``solution`` is the best one, with its `tip_errors`, and
-    ``reached`` the largest of these, relative to the largest K."""
+    """No mesh reaches the ``target`` error. ``solution``: the best one, with its `tip_errors`; ``reached``: the largest
+    of these, relative to the largest K."""
 
     def __init__(self, solution: SolvedBody, target: float, where: str = "") -> None:
 
@@ -28,23 +28,23 @@ class TargetMissed(ValueError):
         at = int(np.argmax(solution.tip_errors.max(axis=1)))
         x, y = solution.body.cracks.nodes[solution.body.cracks.tips[at]]
         chords = chord_errors(solution).max() > 0.25 * solution.tip_errors.max()
-        mend = "give the curved wall more sides" if chords else "ask for a larger target_error"
+        mend = "give the curved wall more sides" if chords else "set a larger target_error"
         super().__init__(
-            f"{where}stress intensity factors are good to {self.reached:.1e} of the largest, not to the target_error of "
-            f"{target:.1e}; the worst are at the tip at ({x:.6g}, {y:.6g}): {mend}"
+            f"{where}stress intensity factors are accurate to {self.reached:.1e} of the largest, not to the target_error "
+            f"of {target:.1e}; the largest error is at the tip at ({x:.6g}, {y:.6g}): {mend}"
         )
 
 
-def met(solution: SolvedBody, target: float, again: Callable[[CrackedBody], SolvedBody]) -> SolvedBody:
-    """``solution``, or one on a finer mesh, whose K is accurate to ``target`` by comparison with a still finer one.
-    ``again`` solves for the same load on another body. Raises `TargetMissed` when the finest mesh does not suffice."""
+def refined_to_target(solution: SolvedBody, target: float, again: Callable[[CrackedBody], SolvedBody]) -> SolvedBody:
+    """``solution``, or one on a finer mesh, whose K agrees to ``target`` with that of the next finer mesh. ``again``
+    solves for the same load on another body. Raises `TargetMissed` if the finest mesh does not suffice."""
 
     while True:
         k = factors(solution)
         if not len(k):
             return solution
         up = solution.body.settings.order < shape_functions.MAX_ORDER
-        other = again(solution.body.one_finer)
+        other = again(solution.body.refined)
         better = factors(other)
         by_chords = SAFETY * chord_errors(solution)
         solution.tip_errors = SAFETY * np.abs(better - k) + floor(solution.body) * largest(k) + by_chords

@@ -10,8 +10,8 @@ from ..system.influence_matrix import ElementSet
 
 
 def tip_elements(cracks: Cracks, faces: ElementSet) -> tuple[np.ndarray, ...]:
-    """Geometry of the tips (TIP rows, factors zero), and of each its element, the last node of that element, weights
-    (n_tips, p+1) from nodal values to the coefficient of √r, and whether its faces touch without load."""
+    """The tips as TIP rows (factors zero) and, for each: its element, the last node of that element, weights (n_tips,
+    p+1) that give the coefficient of √r from nodal values, and whether its faces touch without load."""
     n = len(cracks.tips)
     rows, element, last = np.zeros(n, TIP), np.zeros(n, int), np.zeros(n, int)
     lead, touching = np.zeros((n, faces.per)), np.zeros(n, bool)

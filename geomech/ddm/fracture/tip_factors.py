@@ -24,7 +24,7 @@ def largest(k: np.ndarray) -> float:
 
 
 def negligible(solution: SolvedBody) -> float:
-    """Pa √m: K below which a value is round-off of the stress on the cracks, as where closed faces shield the tips."""
+    """Pa √m: K below this is round-off of the stress on the cracks, for example where closed faces shield the tips."""
     return (
         ROUND_OFF
         * float(np.abs(solution.face_load).max(initial=0.0))

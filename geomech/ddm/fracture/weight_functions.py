@@ -43,7 +43,7 @@ class TipFunctionals:
         n_nodes = c.n * c.per
         states = FaceStates.open(n_nodes) if solution is None else solution.face_states
         began = None if solution is None else solution.began
-        memory = body.never_loaded if began is None else began
+        memory = body.initial_memory if began is None else began
         _, element, last, lead, touching = body.tip_elements
         n = len(element)
         factor = np.sqrt(2 * np.pi) / (8 * (1 - body.nu))
@@ -64,7 +64,7 @@ class TipFunctionals:
         """(n_tips, 2) K_I and K_II under ``load``, Pa √m: those of a solution, as long as the face states do not
         change. Raises ValueError for loads that the body does not support (equilibrium is not checked)."""
         body = self.body
-        _, units, rest, _ = body.lay_out(load)
+        _, units, rest, _ = body.decompose(load)
         k = self.constant + self.on_faces.T @ self._fluid(load)
         if rest.any():
             n_g = len(self.on_boundary)
@@ -79,7 +79,7 @@ class TipFunctionals:
         """(n_tips, 2) upper bounds of |K_I| and |K_II|, Pa √m, under any load at the places of ``load`` whose tractions
         and forces nowhere exceed ``growth`` times its largest, with any sign and distribution."""
         body = self.body
-        _, units, rest, _ = body.lay_out(load)
+        _, units, rest, _ = body.decompose(load)
         fluid = self._fluid(load)
         k = np.abs(self.constant) + growth * (np.abs(self.on_faces.T) @ np.abs(fluid))
         if rest.any():

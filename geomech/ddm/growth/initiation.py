@@ -1,4 +1,4 @@
-"""Crack initiation in intact rock: at a surface, a hole, the face of another crack, or in the interior.
+"""Crack initiation in intact rock: at an outline, a hole, the face of another crack, or in the interior.
 
 Intact rock fails where it reaches its strength. With principal stresses σ1 ≥ σ3 (in the plane, tension positive),
 tensile strength T, cohesion c and friction angle φ, the stress over strength ("overstress") is
@@ -36,7 +36,7 @@ from .tie_tolerance import ONE_WAY, TIED, in_order, reached
 PLACES = ("", "surface", "everywhere")
 #: Smallest angle between a new crack and its surface: below it, a skin thinner than any increment would peel off.
 LEAST_ANGLE = math.radians(10.0)
-#: New cracks at one time: within this fraction of the largest overstress, as symmetric ones are.
+#: Cracks whose overstress is within this fraction of the largest start together, for example symmetric ones.
 TOGETHER = 1e-3
 #: Default spacing of new cracks, and their distance from other cracks, in increments.
 SPACING, APART = 5.0, 2.0
@@ -53,9 +53,9 @@ _BESIDE = 1e-6
 
 
 @dataclass(frozen=True)
-class Birth:
-    """A new crack from ``start`` to ``end``: ``kind`` "tension" or "shear", ``place`` "surface" (start on an outline or
-    hole), "face" (start on ``segment`` of another crack) or "rock"; ``overstress`` 1 at failure."""
+class NewCrack:
+    """A new crack from ``start`` to ``end``. ``kind``: "tension" or "shear"; ``place``: "surface" (starts on an outline
+    or hole), "face" (starts on ``segment`` of another crack) or "rock"; ``overstress``: 1 at failure."""
 
     kind: str
     place: str
@@ -86,21 +86,21 @@ def overstress(stress: np.ndarray, material: Material) -> tuple[np.ndarray, np.n
     return tension, shear, np.where(has_direction, 0.5 * np.arctan2(2 * xy, xx - yy), 0.0)
 
 
-def births(solution: Solution, material: Material, settings: GrowthSettings, block: int = 0) -> list[Birth]:
-    """The new cracks that would start first under this load, most overstressed first, whether or not that exceeds 1.
+def new_cracks(solution: Solution, material: Material, settings: GrowthSettings, block: int = 0) -> list[NewCrack]:
+    """The new cracks that would start first under this load, by decreasing overstress, whether or not it reaches 1.
 
     ``settings.initiation``: where to search ("surface" includes crack faces). Each crack has the length
     settings.increment, keeps settings.initiation_spacing from tips, mouths, junctions and other new cracks, and crosses
     nothing. Those within 0.1 % of the first start with it. ``block``: number of the block in the body's cracks. [] if
-    the rock has no strength to exceed, or no room. Raises ValueError for an unknown place.
+    the rock has no finite strength or there is no room for a crack. Raises ValueError for an unknown place.
     """
     if settings.initiation not in PLACES:
-        raise ValueError(f"no place for cracks to be born {settings.initiation!r}; there are {PLACES[1:]}")
+        raise ValueError(f"initiation must be one of {PLACES[1:]}, got {settings.initiation!r}")
     if not settings.initiation or not (math.isfinite(material.tensile_strength) or math.isfinite(material.cohesion)):
         return []
     network = Network(solution.body.cracks, lambda block: solution.body.limits, 0)
     spacing = _spacing(settings)
-    chosen: list[Birth] = []
+    chosen: list[NewCrack] = []
     for birth in _candidates(solution, material, settings):
         if birth.overstress <= 0 or (chosen and birth.overstress < (1 - TOGETHER) * chosen[0].overstress):
             break
@@ -110,19 +110,19 @@ def births(solution: Solution, material: Material, settings: GrowthSettings, blo
     return chosen
 
 
-def bear(
+def add_new_cracks(
     cracks: Cracks,
     loops_of: Callable[[int], Sequence[np.ndarray]],
-    births: Sequence[Birth],
+    new: Sequence[NewCrack],
     cycle: int,
     block: int = 0,
 ) -> Cracks:
-    """``cracks`` with the new cracks ``births``, named "born 1", "born 2" …; ``segment`` numbers are those in
+    """``cracks`` with the ``new`` cracks added, named "born 1", "born 2" …; their ``segment`` numbers refer to
     ``cracks``."""
     network = Network(cracks, loops_of, cycle)
     pieces = [[row] for row in network.rows]
     number = sum(name.startswith("born ") for name in cracks.names)
-    for birth in births:
+    for birth in new:
         number += 1
         start = network.add_node(birth.start, surface=birth.place == "surface")
         if birth.place == "face":
@@ -144,9 +144,9 @@ def _spacing(settings: GrowthSettings) -> float:
 # -- places ----------------------------------------------------------------------------------------------------------
 
 
-def _candidates(solution: Solution, material: Material, settings: GrowthSettings) -> list[Birth]:
+def _candidates(solution: Solution, material: Material, settings: GrowthSettings) -> list[NewCrack]:
     """All possible new cracks, most overstressed first."""
-    found: list[Birth] = []
+    found: list[NewCrack] = []
     surfaces = [_on_curves(solution), _on_sides(solution), _on_faces(solution)]
     if solution.body.half_plane is not None:
         surfaces.append(_on_free_surface(solution, settings))
@@ -161,14 +161,14 @@ def _candidates(solution: Solution, material: Material, settings: GrowthSettings
     return [found[k] for k in in_order([-b.overstress for b in found], TIED * most)]
 
 
-# Points (n, 2) of surfaces, unit vectors into the rock, crack segments (−1 on outlines), and a function that gives the
-# stress at selected ones.
+# Each of the following returns points (n, 2) of surfaces, unit vectors into the rock, crack segments (−1 on outlines),
+# and a function that gives the stress at selected points.
 
 
 def _on_curves(solution: Solution):
-    """Sides of polygons that represent curves, by their midpoints. At the vertices the stress is that of the polygon,
-    and at the midpoints less than that of the curve; its mean over a side is accurate to 0.4 % for a hole of 64 sides,
-    2.4 % for 24."""
+    """Sides of polygons that represent curves, at their midpoints, with the mean stress over the side: accurate to 0.4
+    % for a hole of 64 sides and 2.4 % for 24. At vertices the polygon's own stress concentration governs, and at
+    midpoints stress is lower than on the curve."""
     body, g = solution.body, solution.body.boundary
     sides = np.flatnonzero(_sides_of_curves(body.loops))
     edge = body.mesh.edges[sides]
@@ -188,7 +188,7 @@ def _on_curves(solution: Solution):
 
 
 def _on_sides(solution: Solution):
-    """The other sides of outline and holes, by their collocation points; of corner elements the central ones."""
+    """The other sides of outline and holes, at their collocation points; on corner elements only the central ones."""
     body, g = solution.body, solution.body.boundary
     edge = body.mesh.edges[g.source]
     t = shape_functions.nodes(g.family, g.order)
@@ -200,7 +200,7 @@ def _on_sides(solution: Solution):
 
 
 def _on_faces(solution: Solution):
-    """Both faces of the cracks, by central points: a crack at the end of an increment would leave a sliver of it."""
+    """Both faces of the cracks, at central points only: a new crack at the end of an increment would leave a sliver."""
     c = solution.body.faces
     t = shape_functions.nodes(c.family, c.order)
     middle = np.flatnonzero(np.abs(t) <= max(0.5, np.abs(t).min()))
@@ -212,7 +212,7 @@ def _on_faces(solution: Solution):
 
 
 def _on_free_surface(solution: Solution, settings: GrowthSettings):
-    """The surface of a half-plane, evenly spaced, to one extent beyond the structure below it."""
+    """Evenly spaced points on the surface of a half-plane, up to one extent beyond the structure below it."""
     body, rock = solution.body, solution.body.half_plane
     assert rock is not None
     below = np.concatenate([*body.loops, body.cracks.nodes, np.empty((0, 2))])
@@ -260,8 +260,8 @@ def _turns(loop: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _away(cracks: Cracks, points: np.ndarray, own: np.ndarray, settings: GrowthSettings) -> np.ndarray:
-    """(n,) bool: points at sufficient distance from tips, mouths, junctions and corners of cracks, where stress
-    intensity governs, and from all cracks unless they lie on a face (``own`` ≥ 0)."""
+    """(n,) bool: points far enough from tips, mouths, junctions and corners of cracks, where stress intensity governs,
+    and, unless they lie on a face (``own`` ≥ 0), from all cracks."""
     free = np.ones(len(points), bool)
     if not cracks.n_segments:
         return free
@@ -292,7 +292,7 @@ def _corners(cracks: Cracks) -> np.ndarray:
 # -- directions ------------------------------------------------------------------------------------------------------
 
 
-def _from_surface(solution, material, settings, points, inward, segment, stress) -> Iterator[Birth]:
+def _from_surface(solution, material, settings, points, inward, segment, stress) -> Iterator[NewCrack]:
     """Cracks from surface points into the rock, in the directions given by the ``stress`` there."""
     loops = solution.body.limits
     for kind, way in _ways(stress, material, inward):
@@ -309,7 +309,7 @@ def _from_surface(solution, material, settings, points, inward, segment, stress)
             felt = np.einsum("k,nkc->nc", weight * root, solution.stress(inner.reshape(-1, 2)).reshape(-1, len(t), 3))
         size = _on_plane(kind, felt, way[here], material)
         for row, value in zip(here.tolist(), size.tolist()):
-            yield Birth(
+            yield NewCrack(
                 kind,
                 "face" if segment[row] >= 0 else "surface",
                 value,
@@ -351,7 +351,7 @@ def _on_plane(kind: str, stress: np.ndarray, way: np.ndarray, material: Material
     return np.maximum(rub + pull * math.tan(material.friction_angle), 0.0) / material.cohesion
 
 
-def _in_rock(solution, material, settings) -> Iterator[Birth]:
+def _in_rock(solution, material, settings) -> Iterator[NewCrack]:
     """Cracks in the interior, with their midpoints on a grid."""
     body = solution.body
     corners = np.concatenate([*body.loops, body.cracks.nodes, np.empty((0, 2))])
@@ -378,10 +378,12 @@ def _in_rock(solution, material, settings) -> Iterator[Birth]:
     for k in np.flatnonzero(np.maximum(tension, shear) > 0).tolist():
         value = float(max(tension[k], shear[k]))
         kind = "tension" if tears[k] else "shear"
-        yield Birth(kind, "rock", value, tuple((points[k] - half[k]).tolist()), tuple((points[k] + half[k]).tolist()))
+        yield NewCrack(
+            kind, "rock", value, tuple((points[k] - half[k]).tolist()), tuple((points[k] + half[k]).tolist())
+        )
 
 
-def _has_room(network: Network, birth: Birth, settings: GrowthSettings, block: int) -> bool:
+def _has_room(network: Network, birth: NewCrack, settings: GrowthSettings, block: int) -> bool:
     """Whether the new crack touches nothing but the surface it starts from."""
     clearance = CLEARANCE * settings.increment
     start = network.add_node(birth.start, surface=birth.place == "surface")

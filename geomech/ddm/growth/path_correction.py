@@ -43,8 +43,8 @@ STIFF = 2.0
 #: second trial shows whether it overshoots: κ above the second number. (Steps of 1 mm under 140 MPa would otherwise
 #: bend by 17° instead of 6°, then back, and miss the driving load by 14 %.)
 SMOOTH, GENTLE = np.radians(4.2), 1.0
-#: Most trials. Secants need two or three; the rest is then of the order of the tolerance.
-LOOKS = 5
+#: Largest number of trials. The secant iteration needs two or three to come within the tolerance.
+TRIALS = 5
 #: Bounds of the slope −1 − κ of the turn at the end against that of the chord; beyond them two trials are too close
 #: together to determine it.
 SLOPES = (-39.0, 0.0)
@@ -56,9 +56,9 @@ CHANGED = 0.3
 #: A trial whose correction would be smaller than this is the step: its K_II turns the next one, and another body need
 #: not be solved. (Wings of the two-crack specimen in increments of 1, ½ and ¼ mm stay within 16, 10 and 3 µm of those
 #: corrected to 0.03°.)
-AS_TRIED = np.radians(0.25)
-#: Smallest turn between two trials that determines the slope.
-TELLING = np.radians(0.5)
+ACCEPTED_TURN = np.radians(0.25)
+#: Smallest difference in angle between two trials from which the slope is computed.
+DISTINCT_TRIALS = np.radians(0.5)
 #: The chord lies between the first trial and the first correction, since the condition falls at least as fast as the
 #: chord turns; it may lie outside by this fraction of their difference (tension along the crack, round-off).
 OUTSIDE = 0.2
@@ -76,7 +76,7 @@ class Remembered(NamedTuple):
 
     def kappa_at(self, start: float) -> float:
         """κ, given the angle ``start`` of the criterion at the end of the chord."""
-        if abs(self.angle - self.tried) > TELLING:
+        if abs(self.angle - self.tried) > DISTINCT_TRIALS:
             return -1 - float(np.clip((start - self.ahead) / (self.angle - self.tried), *SLOPES))
         return self.kappa
 
@@ -103,7 +103,7 @@ class Chords:
             last, start = known.get(tuple(point)), float(self.start[row])
             if last is not None and abs(start) <= KINK:
                 self.kappa[row] = last.kappa_at(start)
-                # Without κ a trial is judged as one along the tangent, so it has to be one.
+                # Without κ the trial must be along the tangent, since it is evaluated as such.
                 if np.isfinite(self.kappa[row]) and max(abs(last.angle), abs(last.start)) <= KINK:
                     self.first[row] = start + SMOOTH_SHARE * (start - last.start + last.angle)
         self.share = np.where(np.abs(self.start) > KINK, KINK_SHARE, SMOOTH_SHARE)
@@ -131,7 +131,7 @@ class Chords:
         )
         share = np.maximum(self.share, 1 - 1 / np.maximum(kappa, 1.0))
         rest = share * turns - (1 - share) * (angle - self.start)
-        off = np.abs(rest) > TOLERANCE  # not where there is nothing ahead, nan
+        off = np.abs(rest) > TOLERANCE  # False for nan: nothing ahead
         seen = np.isfinite(rest)
         if first:
             # Closing faces make the condition discontinuous; secants must not diverge across the jump.
@@ -149,7 +149,7 @@ class Chords:
             self.whole = angle + self.share * turns
             smooth = self.onward & (np.abs(rest) < SMOOTH) & (kappa < STIFF)
             unsettled = off & ~np.where(known, left <= TOLERANCE, smooth)
-            # That determines κ: the next trial has half a turn, which suits trials without correction (`AS_TRIED`). A
+            # That determines κ: the next trial has half a turn, which suits trials without correction (`ACCEPTED_TURN`). A
             # straight path does not determine κ.
             told = known | (smooth & ~(straight & (np.abs(turns) < ONE_WAY)))
         else:
@@ -160,10 +160,10 @@ class Chords:
                 tips["angle"][gentle], unsettled = self.whole[gentle], unsettled & ~gentle
         self.last_angle, self.last_turns = angle, turns
         self.kappa = np.where(told, kappa, np.nan)
-        if (np.abs(tips["angle"] - angle)[seen] <= AS_TRIED).all():
+        if (np.abs(tips["angle"] - angle)[seen] <= ACCEPTED_TURN).all():
             tips["angle"] = angle
             return True
-        return self.looks == LOOKS or not unsettled.any()
+        return self.looks == TRIALS or not unsettled.any()
 
     def remember(self, memory: Memory, tips: np.ndarray, growth: Growth, cycle: int) -> None:
         """Store in ``memory``, by their ends, the data of the accepted steps."""
@@ -185,12 +185,12 @@ class Chords:
         return np.where((kappa >= STIFF) & (np.abs(self.start) <= KINK), kappa, 0.0)
 
     def _secant(self, turns: np.ndarray, angle: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """κ from the last two trials, and whether it is known (n_tips,); unchanged where they are too close together,
-        and 0 where it was unknown."""
+        """κ (n_tips,) from the last two trials, and whether it is known. Where the trials are too close together κ is
+        unchanged, or 0 if it was unknown."""
         with np.errstate(divide="ignore", invalid="ignore"):
             slope = (turns - self.last_turns) / (angle - self.last_angle)
         known = np.isfinite(self.kappa)
-        tells = np.isfinite(slope) & (np.abs(angle - self.last_angle) > np.where(known, TELLING, ONE_WAY))
+        tells = np.isfinite(slope) & (np.abs(angle - self.last_angle) > np.where(known, DISTINCT_TRIALS, ONE_WAY))
         return np.where(tells, -1 - np.clip(slope, *SLOPES), np.where(known, self.kappa, 0.0)), known | tells
 
 
@@ -219,7 +219,7 @@ def corrected(
         angle = tips["angle"].copy()
         settled = chords.bend(tips, growth.grown, look_ahead(growth.cracks), growth.cracks, cycle)
         if np.array_equal(angle, tips["angle"]):
-            break  # as it was tried
+            break  # the trial step is accepted
         tried, growth = growth, grow()
         stuck = (tried.grown > 0) & (growth.grown == 0)
         if stuck.any():

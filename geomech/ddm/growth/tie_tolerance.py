@@ -37,7 +37,7 @@ def in_order(values: Sequence[float], apart: float) -> list[int]:
 
 
 def best(value: np.ndarray, turn: np.ndarray) -> int:
-    """The direction, of those at ``turn`` (n,) rad from straight ahead, with the largest ``value`` (n,); of equal ones
-    that with the smallest turn, and of two equal turns the one to the left (counter-clockwise)."""
+    """Index of the direction with the largest ``value`` (n,), among those at ``turn`` (n,) rad from straight ahead; of
+    equal values that with the smallest turn, of equal turns the one to the left (counter-clockwise)."""
     as_good = np.flatnonzero(reached(value, np.max(value)))
     return int(as_good[np.argmin(np.abs(turn[as_good]) - ONE_WAY * (turn[as_good] > 0))])

@@ -2,10 +2,10 @@
 
 A step is straight, from the tip by its increment along its growth angle. In this order, it
 
-1. meets another driven tip that approaches it, halfway (both end at a common node); 2. is cut where it would cross a
-crack face or a boundary, and joins it there; 3. goes to a crack or a boundary ahead of it instead, if its end comes
-close to that, closer than its start, and nothing is
-   in between;
+1. meets another driven tip that approaches it, halfway (both end at a common node);
+2. is cut where it would cross a crack face or a boundary, and joins it there;
+3. goes to a crack or a boundary ahead of it instead, if its end comes close to that, closer than its start, and nothing
+   is in between;
 4. otherwise ends in the rock as a tip.
 
 The network stays a planar graph: segments meet at common nodes only. A distance equal to the join distance does not
@@ -30,7 +30,8 @@ from .tie_tolerance import ONE_WAY, in_order, reached
 SLIVER = 0.1
 #: Clearance between paths, as a fraction of that length; also the tolerance of lengths.
 CLEARANCE = 1e-3
-#: A tip (first) or another node (second) is preferred to the bare face if its distance times this is smaller.
+#: A tip (first number) or another node (second) is preferred to a point on a face if its distance times this number is
+#: smaller.
 PREFER_TIP, PREFER_NODE = 0.6, 0.9
 #: A face crossed within this fraction of the join distance from one of its nodes is joined at that node.
 SNAP_TO_TIP, SNAP_TO_NODE = 0.5, 0.1
@@ -38,9 +39,9 @@ SNAP_TO_TIP, SNAP_TO_NODE = 0.5, 0.1
 AHEAD = math.cos(math.radians(60.0) + ONE_WAY)
 #: Two tips meet halfway when each lies within this angle of the other's growth direction.
 FACING = math.cos(math.radians(45.0) + ONE_WAY)
-#: A path that would meet a boundary or a crack at a smaller angle goes straight across to it instead: the mouth would
-#: be too sharp to be resolved, now or once a block is split there (a body below 3° is refused), and the rock between
-#: carries hardly anything.
+#: A path that would meet a boundary or a crack at a smaller angle goes to it at a right angle instead. The mouth would
+#: be too sharp to resolve, also after a block is split there (bodies with angles below 3° are refused), and the rock in
+#: between carries hardly any load.
 GRAZES = math.sin(math.radians(5.0) - ONE_WAY)
 #: A tip that would turn back along its own crack more sharply than this does not grow.
 TURN_BACK = math.radians(170.0)
@@ -48,8 +49,8 @@ TURN_BACK = math.radians(170.0)
 
 @dataclass(frozen=True)
 class Join:
-    """A tip that met something. ``tip_node``: number before growth; ``other_crack``: −1 for the boundary; ``kind``:
-    "coalescence" (with another crack), "self" (with its own) or "daylighting"."""
+    """A tip that joined a crack or the boundary. ``tip_node``: number before growth; ``other_crack``: −1 for the
+    boundary; ``kind``: "coalescence" (with another crack), "self" (with its own) or "daylighting"."""
 
     kind: str
     tip_node: int
@@ -125,7 +126,7 @@ def advance(
         if int(tip["node"]) not in loose:
             raise ValueError(f"node {int(tip['node'])} of crack {int(tip['crack'])} is not a tip of the network")
         if not math.isfinite(tip["angle"]):
-            raise ValueError(f"crack {int(tip['crack'])} would grow from node {int(tip['node'])} at no finite angle")
+            raise ValueError(f"crack {int(tip['crack'])}: the growth angle at node {int(tip['node'])} is not finite")
         if abs(tip["angle"]) > TURN_BACK:
             continue
         heading = math.atan2(tip["direction"][1], tip["direction"][0]) + float(tip["angle"])
@@ -142,7 +143,7 @@ def advance(
     work = _Work(Network(cracks, loops_of, cycle), settings)
     met = _meet_half_way(work, steps, grown)
     for step in steps:
-        # A tip that another one has joined meanwhile is no tip any more.
+        # A tip that another one has joined is no longer a tip.
         if step.row not in met and work.network.is_tip(step.node):
             _advance_one(work, step, grown)
     return Growth(work.network.freeze(), grown, tuple(work.joins))
@@ -178,7 +179,7 @@ def _meet_half_way(work: _Work, steps: list[_Step], grown: np.ndarray) -> set[in
                 continue
             d = (b.start[0] - a.start[0], b.start[1] - a.start[1])
             gap = math.hypot(*d)
-            # Closer than a few slivers there is no room for two segments: one tip then simply reaches the other.
+            # Below a few sliver lengths there is no room for two segments: one tip grows to the other.
             if not (work.nearer(4 * work.sliver, gap) and work.nearer(gap, a.length + b.length + work.reach)):
                 continue
             d = (d[0] / gap, d[1] / gap)
@@ -276,7 +277,8 @@ def _blocked(work: _Work, step: _Step) -> list[_Way] | None:
             met.append((t, obstacle))
     if not met:
         return None
-    # At a corner, junction or mouth it meets several at once: the boundary then counts, which knows its mouths.
+    # At a corner, junction or mouth several obstacles are met at once: the boundary is taken first, as it includes
+    # mouths.
     met.sort(key=lambda each: each[1].row is not None)
     t, obstacle = met[in_order([t for t, _ in met], work.clearance / step.length)[0]]
     hit = (step.start[0] + t * (step.end[0] - step.start[0]), step.start[1] + t * (step.end[1] - step.start[1]))
@@ -307,7 +309,7 @@ def _attracted(work: _Work, step: _Step) -> list[_Way]:
         if obstacle.row is not None and obstacle.row in tail:
             continue
         distance, at = nearest_on(step.end, obstacle.a, obstacle.b)
-        # Something that recedes, as a crack the tip has passed, is not joined.
+        # An obstacle that the step moves away from, such as a crack already passed, is not joined.
         if not work.nearer(distance, min(work.reach, nearest_on(step.start, obstacle.a, obstacle.b)[0])):
             continue
         is_own = obstacle.row is not None and obstacle.row.crack == own

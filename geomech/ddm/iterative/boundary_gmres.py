@@ -99,11 +99,11 @@ class IteratedBoundary:
         self.scale = scales(elements)
         self._last: tuple[np.ndarray, np.ndarray] | None = None
 
-        def lifted(numbers: np.ndarray) -> np.ndarray:
+        def regularised(numbers: np.ndarray) -> np.ndarray:
             unknowns = elements.unknowns(numbers)
             return between(numbers) + rigid[unknowns] @ weights[:, unknowns] / extent
 
-        self._patches = Patches(elements, np.zeros(elements.n, int), nu, tol, lifted, NEAR)
+        self._patches = Patches(elements, np.zeros(elements.n, int), nu, tol, regularised, NEAR)
         zero = np.zeros(self.n)
         self._patches.change(Rows(np.zeros(self.n, bool), zero, zero, elements.per))
 

@@ -29,7 +29,7 @@ class Particular:
 
     @property
     def sizes(self) -> np.ndarray:
-        """(6,) of the unit body forces it is made of."""
+        """(6,) factors of the unit body forces."""
         return np.concatenate([self.force, self.gradient.ravel()])
 
     def stress(self, points: np.ndarray) -> np.ndarray:
@@ -59,12 +59,13 @@ class Particular:
 
 
 @dataclass(frozen=True, eq=False)
-class GrowingWithDepth:
-    """Stress that grows with depth below a free surface, as ``force`` (2,) N/m³ asks for: ``slopes`` (3,) Pa/m of the
-    stress along the surface, out of it, and of shear, out of the rock; ``uniform`` (3,) Pa added everywhere.
+class DepthDependentStress:
+    """Stress that is linear in depth below a free surface, in equilibrium with a body force ``force`` (2,) N/m³.
+    ``slopes`` (3,) Pa/m: derivatives, along the outward normal, of the stress along the surface, normal to it, and of
+    shear; ``uniform`` (3,) Pa added everywhere.
 
-    Balance ties the last two to the force; the first is the rock's history. A strain that is linear in one direction is
-    compatible, so any will do: it bends the plane."""
+    Equilibrium determines the last two slopes. The first depends on the history of the rock and is arbitrary, since a
+    strain that is linear in one direction is compatible (it bends the plane)."""
 
     half_plane: HalfPlane
     force: np.ndarray
@@ -75,9 +76,9 @@ class GrowingWithDepth:
     @classmethod
     def of(
         cls, half_plane: HalfPlane, force: np.ndarray, k0: float | None, uniform: np.ndarray, material: Material
-    ) -> GrowingWithDepth:
-        """Of a uniform ``force``, with ``k0`` times the stress out of the surface along it; None: that of rock that was
-        never free to widen, ν/(1−ν)."""
+    ) -> DepthDependentStress:
+        """The stress for a uniform ``force``, with ``k0`` the ratio of the stress along the surface to that normal to
+        it; None: ν/(1−ν), laterally confined rock."""
         nu = material.effective_poissons_ratio
         along, out = half_plane.turned(force)
         slopes = np.array([-out * (nu / (1 - nu) if k0 is None else k0), -out, -along])
@@ -85,12 +86,12 @@ class GrowingWithDepth:
 
     @property
     def gradient(self) -> np.ndarray:
-        """(2, 2) the force's, none."""
+        """(2, 2) gradient of the force: zero."""
         return np.zeros((2, 2))
 
     @property
     def sizes(self) -> np.ndarray:
-        """(3,) of the unit slopes it is made of."""
+        """(3,) factors of the unit slopes."""
         return self.slopes
 
     def stress(self, points: np.ndarray) -> np.ndarray:
@@ -102,7 +103,7 @@ class GrowingWithDepth:
         return self.half_plane.stress_of(self.half_plane.frame(points)[:, 1:] * self.slopes)
 
     def displacement(self, points: np.ndarray) -> np.ndarray:
-        """(n, 2) m, of both (no rotation, zero at the surface's point)."""
+        """(n, 2) m, of both (no rotation, zero at the point that defines the surface)."""
         x, y = self.half_plane.frame(points).T
         a, b, g = self.material.compliance() @ self.slopes
         bent = np.column_stack([a * x * y + 0.5 * g * y * y, 0.5 * (b * y * y - a * x * x)])
@@ -112,7 +113,7 @@ class GrowingWithDepth:
         return bent @ self.half_plane.turn + even
 
 
-def edge_densities(edges: np.ndarray, particular: Particular | GrowingWithDepth) -> np.ndarray:
+def edge_densities(edges: np.ndarray, particular: Particular | DepthDependentStress) -> np.ndarray:
     """(m, 2, 3) monomials of −σ_p n (n outward, the uniform part included) along every edge (m, 2, 2), local
     components."""
     a, b = edges[:, 0], edges[:, 1]

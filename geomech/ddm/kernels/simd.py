@@ -1,9 +1,8 @@
-"""Eight numbers at a time: numba types whose every operation is a vector instruction or a few.
+"""SIMD types for Numba: vectors of eight real or complex numbers (lanes).
 
-Compilers find such instructions by themselves only in loops that they can see through. These types ask for them: + − ×
-÷ of real or complex lanes with lanes or with a number, and the functions below. What comes out of a lane depends on
-what went into it and on nothing else, neither on its place nor on its neighbours. Products may be fused with sums where
-the processor can.
+Compilers vectorise only loops that they can analyse. These types produce vector instructions directly: + − × ÷ of lanes
+with lanes or a number, and the functions below. The result in a lane depends only on the inputs in that lane, not on
+its position or the other lanes. Products and sums may be fused if the processor supports it.
 
     load(array, at)             real lanes at …, at + 7 of a flat array
     load_complex(array, at)     real parts first, imaginary parts behind them
@@ -22,7 +21,7 @@ the processor can.
     angle(y, x)                 atan2 within 2 ulp, with signed zeros, not of two zeros
     term(b, u, v, c), value(b, q)           a polynomial with real coefficients c at a complex point q
 
-Kernels that use them are declared by `compiled.kept`, so that a change here compiles them again.
+Kernels that use them are declared with `compiled.kept`, so that they are recompiled after changes here.
 """
 
 from __future__ import annotations
@@ -41,7 +40,7 @@ WIDTH = 8
 
 _F8 = ir.VectorType(ir.DoubleType(), WIDTH)
 _I8 = ir.VectorType(ir.IntType(64), WIDTH)
-#: A product and a sum may become one instruction; nothing else is given away.
+#: Allows fused multiply-add and no other reordering.
 _FUSE = ("contract",)
 
 
@@ -50,7 +49,7 @@ _C8 = ir.ArrayType(_F8, 2)
 
 
 class LanesType(types.Type):
-    """Numba's type of lanes: as many numbers as a register holds, or two such for complex ones."""
+    """Numba type of lanes: one vector, or two for complex numbers."""
 
     pass
 
@@ -65,7 +64,7 @@ class _LanesModel(models.PrimitiveModel):
 
 
 def _wide(builder, kind, value):
-    """``value`` of numba type ``kind`` in every lane, unless it is lanes already."""
+    """``value`` of Numba type ``kind`` in every lane; lanes are returned unchanged."""
     if kind is lanes:
         return value
     if isinstance(kind, types.Integer):
@@ -258,7 +257,7 @@ def _address(context, builder, kind, array, at):
 
 
 def _at(builder, at, parts: int):
-    """Where the ``parts`` of lanes begin."""
+    """Addresses at which the ``parts`` of lanes begin."""
     return [builder.add(at, ir.Constant(at.type, WIDTH * k)) for k in range(parts)]
 
 
@@ -299,7 +298,7 @@ def store(typing, array, at, x):
 
 
 def _addresses(context, builder, sig, array, at, places, first):
-    """Of one lane after the other."""
+    """Address of each lane in turn."""
     data = builder.gep(context.make_array(sig.args[0])(context, builder, array).data, [at])
     places = builder.gep(context.make_array(sig.args[2])(context, builder, places).data, [first])
     for k in range(WIDTH):
@@ -309,7 +308,7 @@ def _addresses(context, builder, sig, array, at, places, first):
 
 @intrinsic
 def gather(typing, array, at, places, first):
-    """Lanes of an ``array`` behind ``at``, at the ``places`` from the ``first`` on."""
+    """Lane k from ``array[at + places[first + k]]``."""
 
     def code(context, builder, sig, args):
         out = ir.Constant(_F8, ir.Undefined)
@@ -322,7 +321,7 @@ def gather(typing, array, at, places, first):
 
 @intrinsic
 def scatter(typing, array, at, places, first, x):
-    """Write lanes there."""
+    """Write lane k to ``array[at + places[first + k]]``."""
 
     def code(context, builder, sig, args):
         for k, address in _addresses(context, builder, sig, *args[:4]):
@@ -334,10 +333,10 @@ def scatter(typing, array, at, places, first, x):
 
 @intrinsic
 def pile(typing, array, at, places, first, x):
-    """Add lanes to what stands there."""
+    """Add lane k to ``array[at + places[first + k]]``; lanes with the same address must hold the same number."""
 
     def code(context, builder, sig, args):
-        # Read first: lanes that stand for one place must all write the same.
+        # All reads before the writes, so that lanes with the same address write the same sum.
         found = [(k, address, builder.load(address)) for k, address in _addresses(context, builder, sig, *args[:4])]
         for k, address, old in found:
             builder.store(builder.fadd(old, builder.extract_element(args[4], k)), address)
@@ -385,7 +384,7 @@ def size(typing, x):
 
 @intrinsic
 def signed(typing, x, s):
-    """Lanes of the size of ``x`` with the sign of ``s``."""
+    """|``x``| with the sign of ``s``."""
     return lanes(lanes, lanes), _by_llvm("copysign", 2)
 
 

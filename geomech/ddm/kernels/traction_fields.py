@@ -9,13 +9,13 @@ import numpy as np
 
 from ..system.influence_matrix import ElementSet, line_forces, project_total
 
-#: Degree of the polynomials; they are those through Gauss points, so force and moment are Gauss quadrature's.
+#: Degree of the polynomials. They interpolate at Gauss points, so force and moment are those of Gauss quadrature.
 DEGREE = 6
-#: Pieces are halved until the polynomial is this near to the function, in units of the function's largest value.
+#: Pieces are halved until the polynomial deviates from the function by less than this, relative to its largest value.
 TOLERANCE = 1e-9
-#: A jump of the function is left somewhere in a piece 2^−20 of an element long.
+#: Largest number of halvings: a jump of the function is located to 2^−20 of an element.
 _HALVINGS = 20
-#: Pieces whose influence is kept in memory at a time.
+#: Number of pieces whose influence is in memory at one time.
 _AT_ONCE = 100
 
 
@@ -29,14 +29,14 @@ class LineForces:
 
     @classmethod
     def join(cls, parts: list[LineForces | None]) -> LineForces | None:
-        """All of them; None for none."""
+        """The ``parts`` as one; None if there are none."""
         parts = [part for part in parts if part is not None]
         if not parts:
             return None
         return cls(*(np.concatenate([getattr(p, name) for p in parts]) for name in ("start", "end", "density")))
 
     def on(self, targets: ElementSet, on_boundary: bool, nu: float, tol: float) -> np.ndarray:
-        """(n_unknowns,) traction at the collocation nodes of ``targets``; on the boundary, seen from outside."""
+        """(n_unknowns,) traction at the collocation nodes of ``targets``; on the boundary, on its outer side."""
         out = np.zeros(targets.n_unknowns)
         if not len(out):
             return out
@@ -73,7 +73,7 @@ def pieces(boundary: ElementSet, edge: int, segment: np.ndarray | None = None) -
     a, d = segment[0], segment[1] - segment[0]
     s = np.stack([(start - a) @ d, (end - a) @ d]) / (d @ d)
     lo, hi = np.clip(s, 0.0, 1.0)
-    # Those left whole stay so to the bit.
+    # Uncut elements keep their coordinates exactly.
     new_start = np.where((lo == s[0])[:, None], start, a + lo[:, None] * d)
     new_end = np.where((hi == s[1])[:, None], end, a + hi[:, None] * d)
     keep = hi - lo > 1e-12
@@ -106,7 +106,7 @@ def approximate(
         off = np.abs(at(start, end, between) - np.einsum("ij,njc->nic", guess, values)).max(axis=(1, 2), initial=0.0)
         good = (off <= TOLERANCE * scale) | (level == _HALVINGS)
         if before is not None:
-            # Where neither half is better than the whole was, round-off in the coordinates is all there is.
+            # If neither half is better than the whole, the error is round-off of the coordinates.
             noise = (off.reshape(2, -1) > 0.5 * before).all(axis=0)
             good |= np.concatenate([noise, noise])
         t = (end - start)[good] / np.hypot(*(end - start)[good].T)[:, None]

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..kernels.body_force_fields import GrowingWithDepth, Particular
+from ..kernels.body_force_fields import DepthDependentStress, Particular
 from ..kernels.point_forces import KelvinLoad, MelanLoad, WedgeLoad
 from ..kernels.traction_fields import LineForces, approximate, pieces
 from ..mesh.edge_location import OFF, onto_boundary, sides_for
@@ -36,7 +36,7 @@ class Applied:
     """
 
     load: BodyLoad
-    particular: Particular | GrowingWithDepth
+    particular: Particular | DepthDependentStress
     segments: np.ndarray
     tractions: np.ndarray
     functions: LineForces | None = None
@@ -128,14 +128,14 @@ def apply(load: BodyLoad, body: CrackedBody) -> Applied:
     return out
 
 
-def _particular(load: BodyLoad, body: CrackedBody) -> Particular | GrowingWithDepth:
+def _particular(load: BodyLoad, body: CrackedBody) -> Particular | DepthDependentStress:
     force = np.zeros(2) if load.body_force is None else load.body_force
     gradient = np.zeros((2, 2)) if load.body_force_gradient is None else load.body_force_gradient
     uniform = np.zeros(3) if load.remote_stress is None else load.remote_stress
     if body.half_plane is not None:
         body.half_plane.check_uniform(uniform)
         body.half_plane.check_force(gradient)
-        return GrowingWithDepth.of(body.half_plane, force, load.k0, uniform, body.material)
+        return DepthDependentStress.of(body.half_plane, force, load.k0, uniform, body.material)
     if load.k0 is not None:
         raise ValueError("k0: stress that grows with depth is possible in a half-plane only")
     if not body.outlined and (force.any() or gradient.any()):

@@ -156,7 +156,7 @@ class _Faces:
         changes from step to step."""
         body, n = self.body, int(self.first[-1])
         rows = np.concatenate([base.rows for base in self.bases])
-        y, reduced = body.unit_answers(self.segments[rows])
+        y, reduced = body.unit_responses(self.segments[rows])
         of_nodes = np.zeros((len(rows), 4, 2, n))
         done = 0
         for k, base in enumerate(self.bases):

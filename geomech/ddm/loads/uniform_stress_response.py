@@ -56,7 +56,7 @@ class UniformStressSolution:
     memory = None
     began = None
     frictional_work = filling_energy = 0.0
-    given_way = 0.0, Released()
+    dissipated_in_step = 0.0, Released()
 
     def __init__(self, body: CrackedBody, response: UniformStressResponse, stress: np.ndarray) -> None:
         self.body, self.closed, self._response = body, response.closed, response

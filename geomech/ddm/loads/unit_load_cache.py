@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ...model import Material
-from ..kernels.body_force_fields import GrowingWithDepth, Particular, edge_densities
+from ..kernels.body_force_fields import DepthDependentStress, Particular, edge_densities
 from ..mesh.edge_location import OFF, onto_boundary, sides_for
 from ..mesh.elements import Mesh
 from ..system.boundary_system import BoundarySystem
@@ -299,11 +299,11 @@ class UnitLoads:
             densities[here, 1, 1, k + 1] = 0.5 * (b - a)[here, k]
         return densities
 
-    def _particular(self, name: str) -> list[Particular | GrowingWithDepth]:
+    def _particular(self, name: str) -> list[Particular | DepthDependentStress]:
         """Particular fields of unit body forces or of unit remote stresses."""
         none, rock = np.zeros(2), self.faces.half_plane
         if name == "force" and rock is not None:
-            return [GrowingWithDepth(rock, none, unit, np.zeros(3), self.material) for unit in np.eye(3)]
+            return [DepthDependentStress(rock, none, unit, np.zeros(3), self.material) for unit in np.eye(3)]
         if name == "remote":
             return [Particular(self.centroid, none, np.zeros((2, 2)), unit, self.material) for unit in np.eye(3)]
         return [

@@ -1,13 +1,14 @@
 """Matrix and factors of the crack unknowns while cracks grow: factored once, then bordered by the new unknowns.
 
-Unknowns are kept in the order in which they came (`growing_lu`). A body that grows shares matrix and factors with its
+Unknowns are kept in order of arrival (`growing_lu`). A body with grown cracks shares matrix and factors with its
 predecessor, which stays valid, and computes only the rows and columns of new elements. Elements at tips are replaced in
-the next increment: they are a last, loose border of each body. Their rows are reused, since a tip element that becomes
-an ordinary one has other shape functions but the same collocation points. An element removed elsewhere stays in the
-matrix, and one more unknown replaces its equation by w = 0 (Woodbury's formula).
+the next increment: they form a last, loose border of each body. Their rows are reused, since a tip element that becomes
+an ordinary one gets other shape functions but keeps its collocation points. An element removed elsewhere stays in the
+matrix, and an additional unknown replaces its equation by w = 0 (Woodbury's formula).
 
-Elimination in order of arrival pivots only within each group, and loses a factor ‖L‖ ‖U‖ / ‖S‖ in accuracy against free
-pivoting (Higham 2002, §13.2). S is factored again where that loss matters, and when much of it has been removed.
+Elimination in order of arrival pivots only within each group. Compared with free pivoting it loses a factor ‖L‖ ‖U‖ /
+‖S‖ in accuracy (Higham 2002, §13.2). S is factored again where that loss matters, and after much of it has been
+removed.
 """
 
 from __future__ import annotations
@@ -22,24 +23,24 @@ from .dense_lu import Factor
 from .growing_lu import Border, GrowingFactor, Known, loss
 from .influence_matrix import ElementSet, unknowns_of
 
-#: Fraction of removed elements above which S is factored again: they take their share of time.
-GONE = 0.25
-#: Bodies that grow from one in several ways keep their own unknowns loose, up to this fraction; beyond it they copy the
-#: shared part.
+#: Fraction of removed elements above which S is factored again, as they still cost time.
+REMOVED = 0.25
+#: Several bodies may grow from one in different ways. Each keeps its own unknowns loose up to this fraction of all;
+#: beyond it the shared part is copied.
 LOOSE = 0.15
 #: Number of unknowns below which factoring takes less time than bordering.
-SMALLEST = 200
-#: Loss of accuracy, ‖L‖ ‖U‖ / ‖S‖ over the reciprocal condition, above which S is factored again: K then still agrees
-#: with that of new factors to 1e-10.
+SMALLEST_BORDERED = 200
+#: Loss of accuracy, ‖L‖ ‖U‖ / ‖S‖ divided by the reciprocal condition, above which S is factored again: at this loss K
+#: agrees with that of new factors to 1e-10.
 LOSS = 5e6
-#: Meaning of a singular matrix.
+#: Error text for a singular matrix.
 SINGULAR = "cracks separate a part from the body"
 
 
 class Bordered:
-    """S of the crack ``elements``: the first ``n_firm`` unknowns of the ``firm`` matrix, and behind them a ``loose``
+    """S of the crack ``elements``: the first ``n_firm`` unknowns of the ``firm`` matrix, followed by a ``loose``
     border. ``at`` (n_places,): numbers of the elements in this order, −1 for a removed element and for the unknown that
-    replaces its equation. A matrix that has not grown has an empty border, and ``firm`` is made when it grows."""
+    replaces its equation. Before any growth there is a `WholeMatrix` instead."""
 
     def __init__(
         self,
@@ -51,7 +52,7 @@ class Bordered:
         together: tuple[Border, int] | None = None,
     ):
         self.elements, self.firm, self.n_firm, self.at, self.loose = elements, firm, n_firm, at, loose
-        #: The loose border and, before it, the groups that became firm together.
+        #: The last growth as one border, with the number of its unknowns that became firm.
         self.together = together
         self.n = elements.n_unknowns
         #: L (transposed) and U of the loose border, after its elimination.
@@ -66,7 +67,7 @@ class Bordered:
 
     @property
     def unfactored(self) -> bool:
-        """Whether asking for factors will compute those of a whole matrix."""
+        """Whether `factored` will have to factor a whole matrix."""
         return self.firm.unfactored
 
     def grown(
@@ -76,19 +77,20 @@ class Bordered:
         seen: np.ndarray,
         compute: Callable[[np.ndarray, np.ndarray], np.ndarray],
     ) -> Bordered | WholeMatrix:
-        """S of ``elements``. ``was`` (n,): their numbers here, −1 where new; ``seen`` (n,): numbers of elements at the
-        same place, whose rows are reused; ``compute(rows, columns)``: computes blocks between elements."""
+        """S of the grown cracks' ``elements``. ``was`` (n,): their numbers here, −1 where new; ``seen`` (n,): numbers
+        here of elements at the same place, whose rows are reused; ``compute(rows, columns)`` computes blocks between
+        elements."""
         if np.array_equal(was, np.arange(self.elements.n)):
             return self
         out = self._changed(elements, was, seen, compute)
-        if np.count_nonzero(out.at < 0) > 2 * GONE * elements.n:
+        if np.count_nonzero(out.at < 0) > 2 * REMOVED * elements.n:
             return Bordered.whole(elements, out.dense)
         return out
 
     def _changed(self, elements: ElementSet, was: np.ndarray, seen: np.ndarray, compute) -> Bordered:
         width = 2 * elements.per
         n_places = self.n_firm // width
-        now = np.full(self.elements.n + 1, -1)  # the last entry stands for elements removed before
+        now = np.full(self.elements.n + 1, -1)  # the last entry is for elements removed earlier
         now[was[was >= 0]] = np.flatnonzero(was >= 0)
         firm, loose = now[self.at[:n_places]], self.at[n_places:]
         given_up = np.flatnonzero((self.at[:n_places] >= 0) & (firm < 0))
@@ -97,7 +99,7 @@ class Bordered:
         came, at_tip = np.flatnonzero(~settled), _at_tips(elements, settled)
         came = np.concatenate([came[~at_tip[came]], came[at_tip[came]]])
         n_inner = len(came) - int(at_tip[came].sum())
-        # Places in the loose border: of unchanged elements, and of elements of another kind with the same rows.
+        # Places in the loose border of unchanged elements (columns) and of elements with the same rows.
         place = np.full(self.elements.n + 1, -1)
         place[loose] = np.arange(len(loose))
         column, row = place[was[came]], place[seen[came]]
@@ -105,17 +107,17 @@ class Bordered:
         names = [elements.keys[k] for k in came[:n_inner].tolist()]
         m = width * n_inner
         base, n = self.firm, self.n_firm
-        inner, outer = _parted(border, m, self._known(row, column, width, 0, m), self._known(row, column, width, m))
+        inner, outer = _divided(border, m, self._known(row, column, width, 0, m), self._known(row, column, width, m))
         if given_up.size:
             names += [(place, "given up") for place in given_up.tolist()]
-            extra = self._giving_up(given_up, n, m)
-            inner, outer = _followed(inner, extra), _pushed(outer, len(extra.corner))
+            extra = self._replaced_equations(given_up, n, m)
+            inner, outer = _joined(inner, extra), _shifted(outer, len(extra.corner))
         n_new, together = len(inner.corner), None
         if n_new:
-            if base.n > n and not base.went_on(n, n_new, names):
-                # Another body has grown from here in another way.
+            if base.n > n and not base.continues_with(n, n_new, names):
+                # Another body has already grown from this one in a different way.
                 if width * len(came) < LOOSE * n and not given_up.size:
-                    inner, outer = _parted(border, 0, None, self._known(row, column, width))
+                    inner, outer = _divided(border, 0, None, self._known(row, column, width))
                     names, n_inner, n_new = [], 0, 0
                 else:
                     base = base.part(n)
@@ -127,8 +129,8 @@ class Bordered:
         return Bordered(elements, base, n + n_new, at, outer, together)
 
     def _border(self, elements, came, firm, row, column, compute) -> Border:
-        """Rows and columns of the elements that ``came`` (k,), against those at the places ``firm``. ``row`` and
-        ``column`` (k,): places in the loose border, −1 where they are computed."""
+        """Border of the new elements ``came`` (k,) to those at the places ``firm``. ``row`` and ``column`` (k,): places
+        in the loose border that their rows and columns are copied from, −1 where these are computed."""
         width = 2 * elements.per
         every, (old, fresh) = np.arange(elements.n), (np.flatnonzero(row >= 0), np.flatnonzero(row < 0))
         old_c, new_c = np.flatnonzero(column >= 0), np.flatnonzero(column < 0)
@@ -160,8 +162,8 @@ class Bordered:
         return Border(down, right, corner, scale, None)
 
     def _known(self, row: np.ndarray, column: np.ndarray, width: int, first: int = 0, end: int | None = None):
-        """Known factors of the elements at ``row`` and ``column`` of the eliminated loose border; unknowns from
-        ``first`` to ``end``."""
+        """Factors that are already known of the elements at ``row`` and ``column`` of the eliminated loose border, for
+        the unknowns from ``first`` to ``end``."""
         if self.eliminated is None:
             return None
         row, column = (x[first // width : None if end is None else end // width] for x in (row, column))
@@ -170,9 +172,9 @@ class Bordered:
         lower, upper = self.eliminated
         return Known(at[0], at[1], lower, at[2], at[3], upper)
 
-    def _giving_up(self, places: np.ndarray, n: int, n_between: int) -> Border:
-        """The unknowns that replace the equations of the elements at ``places`` by w = 0, behind ``n`` and
-        ``n_between`` others; scaled so that they are of the size of jumps."""
+    def _replaced_equations(self, places: np.ndarray, n: int, n_between: int) -> Border:
+        """Border of the unknowns that replace the equations of the elements at ``places`` by w = 0. They follow ``n`` +
+        ``n_between`` others and are scaled to the size of jumps."""
         width = 2 * self.elements.per
         at = unknowns_of(places, width)
         k = len(at)
@@ -266,20 +268,20 @@ class WholeMatrix:
 
 
 class BorderedFactor:
-    """Factors of the `Bordered` matrix ``of``; see `Factor`. ``rcond``: worst of the diagonal blocks; ``growth``: loss
-    of accuracy as described at the top."""
+    """Factors of the `Bordered` matrix ``of``, with the interface of `Factor`. ``rcond``: smallest of the diagonal
+    blocks; ``growth``: the loss of accuracy described at the top."""
 
     def __init__(self, of: Bordered):
         self.n, self._places, self._firm, self._n_firm = of.n, of.places, of.firm, of.n_firm
         firm, n = of.firm, of.n_firm
         border, m = of.together or (None, 0)
         if m and firm.is_next(n - m, m):
-            # At once: triangular solutions with forty columns take hardly more time than with twenty.
-            self._lower, self._upper, t = firm.eliminate_with(n - m, border, m, SINGULAR)
+            # Both in one solution: forty columns take hardly more time than twenty.
+            self._lower, self._upper, t = firm.eliminate_next(n - m, border, m, SINGULAR)
             self.rcond, self.growth = firm.eliminate(n, SINGULAR)
         else:
             self.rcond, self.growth = firm.eliminate(n, SINGULAR)
-            self._lower, self._upper, t = firm.beside(n, of.loose)
+            self._lower, self._upper, t = firm.eliminate_border(n, of.loose)
         self._scale, self._t = of.loose.scale, Factor(t, SINGULAR)
         self.rcond = min(self.rcond, self._t.rcond)
         self.growth = max(self.growth, loss(self._lower, self._upper, t))
@@ -288,36 +290,36 @@ class BorderedFactor:
     def solve(self, right: np.ndarray, transposed: bool = False) -> np.ndarray:
         """Solution for ``right`` (n,) or (n, k), of the ``transposed`` system if asked."""
         n = self._n_firm
-        # Transposed, gathering runs along memory.
+        # Transposed, so that indexing runs along memory.
         x = np.zeros((*right.shape[1:], n + len(self._scale))).T
         x.T[..., self._places] = right.T
         beside, below = (self._lower, self._upper) if transposed else (self._upper, self._lower)
         scale = self._scale if right.ndim == 1 else self._scale[:, None]
-        y = self._firm.forth(n, x[:n], transposed)
+        y = self._firm.forward_substitution(n, x[:n], transposed)
         last = self._t.solve((x[n:] if transposed else x[n:] * scale) - below.T @ y, transposed)
-        x[:n] = self._firm.back(n, y - beside @ last, transposed)
+        x[:n] = self._firm.back_substitution(n, y - beside @ last, transposed)
         x[n:] = last * scale if transposed else last
         return x.T[..., self._places].T
 
 
 def _entries(matrix: np.ndarray, rows: np.ndarray, columns: np.ndarray) -> np.ndarray:
-    """``matrix[rows, columns]``, column-major, gathered along memory."""
+    """``matrix[rows, columns]``, column-major, indexed along memory."""
     if matrix.flags.f_contiguous or matrix.strides[0] < matrix.strides[1]:
         return matrix.T[np.ix_(columns, rows)].T
     return np.asfortranarray(matrix[np.ix_(rows, columns)])
 
 
 def _at_tips(elements: ElementSet, settled: np.ndarray) -> np.ndarray:
-    """(n,) bool: elements on a segment that ends at a tip and of which none is ``settled``: these are tried, bent, and
-    graded as they turn."""
+    """(n,) bool: elements on segments that end at a tip and have no ``settled`` element. Growth may still bend these
+    segments and grade them anew."""
     source = elements.source
     ends, stands = np.zeros((2, int(source.max(initial=0)) + 1), bool)
     ends[source[elements.kind != shape_functions.ORDINARY]], stands[source[settled]] = True, True
     return (ends & ~stands)[source]
 
 
-def _parted(border: Border, m: int, known: Known | None, known_after: Known | None) -> tuple[Border, Border]:
-    """A border divided: its first ``m`` unknowns and the rest, with what is ``known`` of them."""
+def _divided(border: Border, m: int, known: Known | None, known_after: Known | None) -> tuple[Border, Border]:
+    """The ``border`` divided into its first ``m`` unknowns and the rest, with what is ``known`` of their factors."""
     down, right, corner, scale, _ = border
     return (
         Border(down[:m], right[:, :m], corner[:m, :m], scale[:m], known),
@@ -331,8 +333,8 @@ def _parted(border: Border, m: int, known: Known | None, known_after: Known | No
     )
 
 
-def _followed(border: Border, other: Border) -> Border:
-    """The ``border`` followed by the ``other``, as one."""
+def _joined(border: Border, other: Border) -> Border:
+    """One border of the unknowns of ``border`` and then those of ``other``."""
     n = border.down.shape[1]
     return Border(
         np.concatenate([border.down, other.down[:, :n]]),
@@ -343,8 +345,8 @@ def _followed(border: Border, other: Border) -> Border:
     )
 
 
-def _pushed(border: Border, k: int) -> Border:
-    """The ``border`` behind ``k`` more unknowns, with zero coupling to them."""
+def _shifted(border: Border, k: int) -> Border:
+    """The ``border`` placed after ``k`` more unknowns, which it is not coupled to."""
     nothing = np.zeros((len(border.corner), k))
     return border._replace(
         down=np.concatenate([border.down, nothing], axis=1), right=np.concatenate([border.right, nothing.T])

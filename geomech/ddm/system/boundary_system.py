@@ -1,8 +1,9 @@
 """The boundary equations of a body: A_ΓΓ with its rigid motions removed, and its factors.
 
-Unknown is the displacement of the boundary, or the reaction where it is supported (see `supports`). The rigid motions
-of a loop that its supports leave free cause no stress and span the null space of A_ΓΓ. With R these motions and Q their
-mean over the loop, A_ΓΓ + R Qᵀ/extent is regular, and Qᵀu = 0 follows for loads in equilibrium.
+The unknowns are the displacements of the boundary, or the reactions where it is supported (see `supports`). Rigid
+motions of a loop that its supports leave free cause no stress: they span the null space of A_ΓΓ. Let R be these motions
+and Q their mean over the loop. Then A_ΓΓ + R Qᵀ/extent is regular, and for loads in equilibrium its solution satisfies
+Qᵀu = 0.
 """
 
 from __future__ import annotations
@@ -20,25 +21,28 @@ from ..mesh.elements import Mesh
 from .dense_lu import Factor
 from .influence_matrix import ElementSet, influence, reuse
 
-#: The inverse of up to INVERTED unknowns is computed once OFTEN bodies have used the same boundary.
+#: Once OFTEN bodies have used the same boundary, the inverse is computed, for up to INVERTED unknowns.
 OFTEN, INVERTED = 8, 800
 
 
 class BoundarySystem:
-    """A_ΓΓ of ``mesh.boundary``; parts unchanged since ``previous`` (with the same supports) are taken from it.
+    """A_ΓΓ of ``mesh.boundary``. What has not changed since ``previous`` (with the same supports) is reused.
 
-    elements      the boundary elements
-    holds         the supported ones, or None
-    matrix        (n, n) traction, seen from outside, from displacement (times 2μ) or reaction of the boundary; an
-                  operator where it is ``iterated``
-    known         (n, h) the same from the displacement of supported elements rigid         (n, k) rigid motions of
-    every loop that no support resists, nodal values weights       (k, n) their mean over the loop free_motions  those
-    of the whole body, None without supports anchors       of supported holes, or None: terms added to the boundary rows
-    of ``matrix`` and of all loads factor        of ``matrix`` with the rigid motions removed unchanged     whether
-    everything is that of ``previous``; ``at_old`` (n_elements,) element numbers there, −1 where new
+        elements      the boundary elements
+        holds         the supported ones, or None
+        matrix        (n, n) traction, seen from outside, from displacement (times 2μ) or reaction of the boundary;
+                      an operator if ``iterated``
+        known         (n, h) the same from the displacement of supported elements
+        rigid         (n, k) rigid motions of each loop that no support resists, nodal values
+        weights       (k, n) their mean over the loop
+        free_motions  those of the whole body; None without supports
+        anchors       of supported holes, or None: terms added to the boundary rows of ``matrix`` and of all loads
+        factor        of ``matrix`` with the rigid motions removed
+        unchanged     whether everything equals ``previous``
+        at_old        (n_elements,) element numbers in ``previous``, −1 where new
 
-    ``iterated``: solved iteratively, not factored (`boundary_gmres.is_iterated`). Raises numpy.linalg.LinAlgError when
-    the equations are singular.
+    With ``iterated``, the equations are solved iteratively and not factored (`boundary_gmres.is_iterated`). Raises
+    numpy.linalg.LinAlgError when they are singular.
     """
 
     def __init__(
@@ -63,7 +67,7 @@ class BoundarySystem:
             and g.n == previous.elements.n
             and np.array_equal(at_old, np.arange(g.n))
         )
-        #: Number of bodies, one after the other, that have used this boundary unchanged.
+        #: Number of successive bodies that have used this boundary unchanged.
         self.generation = previous.generation + 1 if self.unchanged else 0
         if self.unchanged:
             self.elements, self.holds, self.extent = previous.elements, previous.holds, previous.extent
@@ -77,7 +81,7 @@ class BoundarySystem:
             self.known, self.free_motions, self.anchors = np.empty((g.n_unknowns, 0)), None, None
             self.matrix = jumps = Compressed(g, g, nu, tol)
             if holds is not None:
-                self._hold_motions(mesh)
+                self._constrain_rigid_motions(mesh)
                 self.matrix, self.known = SupportedBoundaryMatrix(jumps, holds, nu, tol), PrescribedJumps(jumps, holds)
 
             def between(elements):
@@ -85,7 +89,7 @@ class BoundarySystem:
 
             self.factor = IteratedBoundary(g, self.matrix, self.rigid, self.weights, extent, nu, tol, between)
             return
-        # With anchored holes, the old matrix does not contain tractions alone.
+        # With anchored holes, the old matrix contains the anchors' terms besides tractions.
         dense = previous is not None and previous.anchors is None and not previous.iterated
         known = previous.matrix if dense else None
         self.matrix = reuse(known, at_old, at_old, g, g, lambda r, k: self.influence_on(g.take(r), k))
@@ -94,17 +98,17 @@ class BoundarySystem:
         self.free_motions: FreeMotions | None = None
         self.anchors: Anchors | None = None
         if holds is not None:
-            self._hold_motions(mesh)
+            self._constrain_rigid_motions(mesh)
         if self.anchors is not None:
             anchors = self.anchors
             self.anchored(self.matrix, holds.mixed(anchors.of_jumps(g), anchors.of_shapes(holds.sources)))
             self.anchored(self.known, anchors.of_jumps(holds.sources))
-        # Column-major like the matrix: a sum of both orders takes several times as long.
-        lifted = (self.weights.T @ self.rigid.T).T / extent
-        self.factor = Factor(self.matrix + lifted, "the boundary equations are singular")
+        # Column-major like the matrix: adding arrays of different order takes several times as long.
+        regularisation = (self.weights.T @ self.rigid.T).T / extent
+        self.factor = Factor(self.matrix + regularisation, "the boundary equations are singular")
 
-    def _hold_motions(self, mesh: Mesh) -> None:
-        """Keep the rigid motions that are free, and anchor holes against the others."""
+    def _constrain_rigid_motions(self, mesh: Mesh) -> None:
+        """Keep the free rigid motions; anchor holes against the others."""
         holds, g = self.holds, self.elements
         loop_of = mesh.edge_loop[g.source]
         _, centre, radius = outline_centroid(g.take(np.flatnonzero(loop_of == 0)))
@@ -128,8 +132,8 @@ class BoundarySystem:
         self.anchors = anchors if anchors.number else None
 
     def anchored(self, rows: np.ndarray, motions: np.ndarray) -> np.ndarray:
-        """Add to ``rows`` (boundary rows, k), in place, the effect of the sources that give supported holes ``motions``
-        (r, k)."""
+        """Add to ``rows`` (boundary rows, k), in place, the tractions of the sources that move supported holes by
+        ``motions`` (r, k)."""
         rows += self.anchors.rows @ motions
         return rows
 
@@ -139,20 +143,20 @@ class BoundarySystem:
         return matrix if self.holds is None else self.holds.swapped(targets, elements, matrix, self._nu, self._tol)
 
     def solve(self, right: np.ndarray, transposed: bool = False) -> np.ndarray:
-        """A_ΓΓ⁻¹ ``right`` (n,) or (n, k), without rigid motions; ``transposed``: A_ΓΓ⁻ᵀ."""
+        """A_ΓΓ⁻¹ ``right`` (n,) or (n, k), without rigid motions; A_ΓΓ⁻ᵀ ``right`` if ``transposed``."""
         self.work.back_substitutions += 1 if right.ndim == 1 else right.shape[1]
         return self.factor.solve(np.asfortranarray(right), transposed)
 
     def solve_few(self, right: np.ndarray) -> np.ndarray:
-        """The same for the few columns (n, k) of new elements."""
+        """`solve` for the few columns (n, k) of new elements."""
         if self.iterated or self.generation <= OFTEN or self.elements.n_unknowns > INVERTED:
             return self.solve(right)
         self.work.back_substitutions += right.shape[1]
         return np.matmul(self.factor.inverse, np.asfortranarray(right), out=np.empty(right.shape, order="F"))
 
-    def times(self, u: np.ndarray, lifted: np.ndarray) -> np.ndarray:
-        """A_ΓΓ ``u``, plus the terms that remove the rigid motions, from ``lifted``."""
-        return self.matrix @ u + self.rigid @ (self.weights @ lifted) / self.extent
+    def times(self, u: np.ndarray, rigid_part: np.ndarray) -> np.ndarray:
+        """A_ΓΓ ``u``, plus the terms that remove the rigid motions, applied to ``rigid_part``."""
+        return self.matrix @ u + self.rigid @ (self.weights @ rigid_part) / self.extent
 
 
 @dataclass(frozen=True, eq=False)
@@ -165,7 +169,8 @@ class FreeMotions:
     combinations: np.ndarray
 
     def part(self, force: np.ndarray, moment: float, about: np.ndarray) -> tuple[np.ndarray, float]:
-        """The part of a ``force`` (2,) and a ``moment`` about a point that does work on these motions."""
+        """The part of a ``force`` (2,) and a ``moment`` about the point ``about`` (2,) that does work on these
+        motions."""
         arm = self.centre - about
         own = moment - (arm[0] * force[1] - arm[1] * force[0])
         ways = self.combinations
@@ -174,7 +179,7 @@ class FreeMotions:
 
 
 def outline_centroid(g: ElementSet) -> tuple[float, np.ndarray, float]:
-    """Length of ``g``, mean (2,) of its points and their root mean square distance from it."""
+    """Total length of ``g``, centroid (2,) of its points and their root mean square distance from it."""
     x, ds = g.nodes, g.quadrature
     perimeter = ds.sum()
     middle = np.einsum("ej,ejc->c", ds, x) / perimeter
@@ -185,9 +190,9 @@ def outline_centroid(g: ElementSet) -> tuple[float, np.ndarray, float]:
 def rigid_motions(
     g: ElementSet, edge_loop: np.ndarray, about: tuple[np.ndarray, float] | None = None
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Rigid motions of every loop in nodal unknowns (n, 3L), and their mean over the loop (3L, n). ``edge_loop`` (m,):
-    loop of every edge. The rotation is ``about`` a centre and moves points at a radius by one; by default those of the
-    loop."""
+    """Rigid motions of each loop in nodal unknowns (n, 3L), and their mean over the loop (3L, n). ``edge_loop`` (m,):
+    loop of each edge. The rotation is about the centre in ``about`` and moves points at the radius given there by one;
+    the default is the loop's own centre and radius."""
     n_loops = int(edge_loop.max()) + 1 if len(edge_loop) else 0
     modes = np.zeros((g.n, 2, g.per, 3 * n_loops))
     weights = np.zeros_like(modes)

@@ -1,12 +1,13 @@
-"""The equations of crack faces in contact by those of open ones: no factors of their own.
+"""Solution of the equations of crack faces in contact with the factors of S for open faces (Woodbury's formula).
 
-With S x = z, unknowns that are held have x_h = 0 and an equation that is given up, z_h = ρ_h, and where a node slides
-the equation across, times its friction m, is added to that along it: z_t + m z_a = b_t. So z = b̂ + B ρ and
+Write S x = z. Constrained unknowns have x_h = 0 and give up their equation, whose residual is unknown: z_h = ρ_h. At a
+sliding node the normal equation, times the friction factor m, is added to the tangential one: z_t + m z_a = b_t. So z =
+b̂ + B ρ and
 
     x = S⁻¹ b̂ + (S⁻¹ B) ρ,        (S⁻¹ B)_h ρ = −(S⁻¹ b̂)_h,
 
-of the size of what is held (Woodbury's formula). Columns of S⁻¹ outlast states and loads, so that a change of state costs
-a factor of that size, not one of all unknowns.
+a system of the size of the constrained unknowns. Columns of S⁻¹ are kept for other states and loads, so that a change
+of state takes a factorisation of that size instead of one of all unknowns.
 """
 
 from __future__ import annotations
@@ -23,16 +24,15 @@ if TYPE_CHECKING:
 
 
 class InverseColumns(Protocol):
-    """Who keeps columns of S⁻¹."""
+    """Provides columns of S⁻¹."""
 
     def inverse_columns(self, unknowns: np.ndarray) -> np.ndarray:
         """(n, len(unknowns)) columns of S⁻¹."""
 
 
-class HeldFactor:
-    """Solves the equations of the free unknowns that ``rows`` leave of S, without springs; ``open_factor`` are factors
-    of S, ``inverse`` knows columns of its inverse. Raises LinAlgError, with ``what``, where they are
-    singular."""
+class ClosedFaceFactor:
+    """Solves the equations that ``rows`` (without springs) leave of S. ``open_factor``: factors of S; ``inverse``
+    provides columns of S⁻¹. Raises LinAlgError, with the text ``what``, when they are singular."""
 
     def __init__(
         self,
@@ -45,7 +45,7 @@ class HeldFactor:
         self._free, self._prescribed = np.flatnonzero(~rows.prescribed), np.flatnonzero(rows.prescribed)
         along = np.flatnonzero(rows.mixed)
         across, mixed = along + rows.per, rows.mixed[along]
-        # Of sliding nodes whose equation across is none of those given up it is added to the right side.
+        # If the normal equation of a sliding node is kept, it is added on the right-hand side.
         loose = ~rows.prescribed[across]
         self._loose = along[loose], across[loose], mixed[loose]
         at = np.full(len(rows.prescribed), -1)
@@ -60,10 +60,10 @@ class HeldFactor:
         self.rcond = min(open_factor.rcond, self._small.rcond)
 
     def respond(self, opened: np.ndarray, shear: np.ndarray, fixed: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Jumps w (n,) and what is missing in the held equations, (n,), with w = ``fixed`` where they are held, and a
-        further ``shear`` (n,) Pa on the faces, at few nodes; ``opened`` = S⁻¹ right are the jumps of open faces.
+        """Jumps w (n,), with w = ``fixed`` where constrained, and residuals (n,) of the equations given up. ``opened``
+        = S⁻¹ right: jumps of open faces; ``shear`` (n,) Pa: a further shear traction on the faces at few nodes.
 
-        As above for w, with ρ beside what ``right`` is there: nothing of the size of S is solved or multiplied."""
+        As above, with ρ added to ``right``. No solution or product of the size of S is needed."""
         w = opened.copy()
         pushed = np.flatnonzero(shear)
         if len(pushed):

@@ -1,4 +1,4 @@
-"""Changes of the crack equations by contact of the crack faces."""
+"""How contact of crack faces changes the crack equations."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ import numpy as np
 @dataclass(frozen=True, eq=False)
 class Rows:
     """Contact as a change of the equations S w = right. ``prescribed`` (n,) bool: unknowns with a given value and no
-    equation; ``mixed`` (n,): factor with which the equation across a node is added to that along it, ``per`` places
-    before; ``spring`` (n,): subtracted from the diagonal."""
+    equation; ``mixed`` (n,): at the index of a node's tangential equation, the factor by which its normal equation,
+    ``per`` rows later, is added to it (friction); ``spring`` (n,): subtracted from the diagonal."""
 
     prescribed: np.ndarray
     mixed: np.ndarray

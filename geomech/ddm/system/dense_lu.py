@@ -1,4 +1,4 @@
-"""LU factors of the dense matrices, row- or column-major without a copy more."""
+"""LU factors of dense matrices, row- or column-major, without an extra copy."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ import numpy as np
 
 
 class Factor:
-    """LU of a square ``matrix`` (left as it is), its rows brought to one size. Raises LinAlgError, with
+    """LU of a square ``matrix`` (left unchanged), with its rows scaled to equal size. Raises LinAlgError, with the text
     ``what``, when it is singular.
 
-    Tractions on an element go with one over its length: unscaled, elements of very different lengths would look
-    singular. Scales are powers of two, so that no bit of the solution depends on them.
+    Tractions on an element are proportional to one over its length: without scaling, elements of very different lengths
+    would look singular. The scales are powers of two and therefore add no round-off.
     """
 
     def __init__(self, matrix: np.ndarray, what: str):
@@ -26,8 +26,7 @@ class Factor:
         if not np.isfinite(size).all():
             raise np.linalg.LinAlgError(f"{what} (not finite)")
         self.scale = np.ldexp(1.0, -np.frexp(size)[1])
-        # LAPACK is column-major: of a row-major matrix factor the transpose, which is the same memory, and solve the
-        # transposed system.
+        # LAPACK is column-major: a row-major matrix is the transpose in the same memory, which is factored instead.
         scaled = matrix * self.scale[:, None]
         self._transposed = 0 if scaled.flags.f_contiguous else 1
         self._lu, self._pivots, info = lapack.dgetrf(scaled.T if self._transposed else scaled, overwrite_a=True)
@@ -38,17 +37,17 @@ class Factor:
 
     @property
     def columns(self) -> bool:
-        """Whether it is the matrix that is factored, not what is transposed to it."""
+        """Whether the matrix itself is factored, not its transpose."""
         return self.n == 0 or not self._transposed
 
     @property
     def lu(self) -> np.ndarray:
-        """(n, n) L and U, of the matrix whose rows are multiplied by ``scale`` (n,) and then taken as `rows` says."""
+        """(n, n) L and U of the matrix whose rows are multiplied by ``scale`` (n,) and then ordered by `rows`."""
         return self._lu if self.n else np.empty((0, 0))
 
     @property
     def rows(self) -> np.ndarray:
-        """(n,) numbers of the rows in the order of their pivots."""
+        """(n,) row numbers in pivot order."""
         order = list(range(self.n))
         for k, pivot in enumerate(self._pivots.tolist() if self.n else ()):
             order[k], order[pivot] = order[pivot], order[k]
@@ -58,7 +57,7 @@ class Factor:
         """Solution for ``right`` (n,) or (n, k), of the ``transposed`` system if asked."""
         if self.n == 0 or right.size == 0:
             return np.zeros_like(right)
-        from scipy.linalg.lapack import dgetrs  # not kept: a compiled function cannot be stored in a checkpoint
+        from scipy.linalg.lapack import dgetrs  # imported here: a checkpoint cannot store a compiled function
 
         scale = self.scale if right.ndim == 1 else self.scale[:, None]
         if transposed:
@@ -67,6 +66,6 @@ class Factor:
 
     @cached_property
     def inverse(self) -> np.ndarray:
-        """(n, n) for what is solved for again and again, a few columns at a time: products take half the time of
-        solutions with thin triangles."""
+        """(n, n) inverse, for many solutions of a few columns each: a product takes half the time of two triangular
+        solutions."""
         return self.solve(np.eye(self.n, order="F"))

@@ -1,4 +1,4 @@
-"""Slip and opening at the nodes of cracks: where they can close, and the strain that they add up to."""
+"""Slip and opening at crack nodes: which can close, and the mean strain that they cause."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ from .influence_matrix import ElementSet
 
 
 def closing(faces: ElementSet, cracks: Cracks, twice_modulus: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """(n_unknowns,) aperture (times ``twice_modulus``, 2μ; zero for slip), which unknowns can close (bool) and what
-    they are then."""
+    """Three arrays (n_unknowns,): aperture (times ``twice_modulus``, 2μ; zero for slip), whether an unknown can close,
+    and its value when closed."""
     aperture = np.zeros((faces.n, 2, faces.per))
     aperture[:, 1] = twice_modulus * cracks.aperture[faces.source, None]
     can_close = np.zeros(aperture.shape, bool)
@@ -20,8 +20,8 @@ def closing(faces: ElementSet, cracks: Cracks, twice_modulus: float) -> tuple[np
 
 
 def strain_weights(faces: ElementSet) -> np.ndarray:
-    """(3, n_unknowns) strain of the cracks, integrated over their body (xx, yy, xy; engineering shear), from nodal slip
-    and opening."""
+    """(3, n_unknowns) weights of nodal slip and opening in the strain of the cracks, integrated over the body (xx, yy,
+    xy; engineering shear)."""
     t, n = faces.tangent, faces.normal
     out = np.empty((3, faces.n, 2, faces.per))
     for component, axis in enumerate((t, n)):

@@ -1,11 +1,11 @@
-"""A matrix that grows at its end, piece by piece, and its LU factors, in arrays with room: what is there stays.
+"""A matrix that grows by appended borders, and its LU factors, in arrays with spare capacity.
 
-Of the matrix [[A, B], [C, D]] with A = Pᵀ L U,
+The matrix [[A, B], [C, D]] with A = Pᵀ L U has
 
     B' = L⁻¹ P B,    C' = C U⁻¹,    D − C' B' = P₂ᵀ L₂ U₂,
 
-which are two triangular solutions and factors of something as small as D. Whoever holds the first n unknowns does not
-see what came behind them: bodies that grow from one another share the arrays.
+so that a border takes two triangular solutions and factors of the size of D. The first n unknowns do not depend on
+later ones: bodies that grow from one another share the arrays.
 """
 
 from __future__ import annotations
@@ -17,14 +17,14 @@ import numpy as np
 
 from .dense_lu import Factor
 
-#: Room is made for so many times the unknowns, and so many more.
+#: Capacity allocated: ROOM times the unknowns needed plus MORE_ROOM.
 ROOM, MORE_ROOM = 1.5, 200
 
 
 class Known(NamedTuple):
-    """What is known of L and U before elimination: of the ``rows`` (numbers) the first columns of L, which are those
-    ``as_rows`` of ``lower``, transposed, and of the ``columns`` the first rows of U, those ``as_columns`` of
-    ``upper``."""
+    """Parts of L and U that are known before elimination. For the ``rows`` (numbers): the first columns of L, which are
+    the columns ``as_rows`` of ``lower``, transposed. For the ``columns``: the first rows of U, which are the columns
+    ``as_columns`` of ``upper``."""
 
     rows: np.ndarray
     as_rows: np.ndarray
@@ -35,8 +35,8 @@ class Known(NamedTuple):
 
 
 class Border(NamedTuple):
-    """Unknowns behind n others: their rows ``down`` (k, n), columns ``right`` (n, k) and own block ``corner``, the
-    ``scale`` (k,) that brings rows to one size, and what is ``known`` of their factors."""
+    """k unknowns that follow n others: their rows ``down`` (k, n), columns ``right`` (n, k) and diagonal block
+    ``corner`` (k, k), the ``scale`` (k,) that makes rows equal in size, and what is ``known`` of their factors."""
 
     down: np.ndarray
     right: np.ndarray
@@ -46,21 +46,21 @@ class Border(NamedTuple):
 
 
 class GrowingFactor:
-    """``matrix`` (n, n) and what comes behind it; of what is named in ``names``, place by place. ``factor``: of the
-    matrix, column-major, if it is known."""
+    """A ``matrix`` (n, n) with the borders appended to it, and its factors. ``names``: an identifier of each element,
+    in order. ``factor``: of the matrix, column-major, if known."""
 
     def __init__(self, matrix: np.ndarray, names: list[Hashable], factor: Factor | None = None):
         self.n, self.names, self._factor = len(matrix), names, factor
         self._room(len(matrix))
-        #: The first matrix, and the borders that came behind it.
+        #: The first matrix and the borders appended to it.
         self._first = matrix
         self._borders: list[Border] = []
-        #: Ends of what came together, what was known of it, and of what is eliminated the worst reciprocal condition
-        #: and loss of accuracy so far.
+        #: For each group (the matrix or a border): number of unknowns up to its end, factors known in advance and, once
+        #: eliminated, the worst reciprocal condition and loss of accuracy so far.
         self._ends = [self.n]
         self._known: list[Known | None] = [None]
         self._trust: list[tuple[float, float]] = []
-        #: All of the matrix so far in one array, with room, and how many unknowns are in it; once asked for.
+        #: The assembled matrix, with spare capacity, and the number of unknowns in it; made on demand.
         self._whole, self._in_whole = np.empty((0, 0), order="F"), 0
 
     def _room(self, n: int) -> None:
@@ -69,7 +69,7 @@ class GrowingFactor:
         self.scale, self.order = np.empty(room), np.empty(room, int)
 
     def __getstate__(self) -> dict:
-        """Without the room, which may hold anything."""
+        """Without the uninitialised capacity."""
         n = self.n
         arrays = {name: getattr(self, name)[(slice(n),) * getattr(self, name).ndim].copy() for name in _ARRAYS}
         none = {"_whole": np.empty((0, 0), order="F"), "_in_whole": 0}
@@ -84,7 +84,7 @@ class GrowingFactor:
             getattr(self, name)[(slice(self.n),) * short.ndim] = short
 
     def append(self, border: Border, names: list[Hashable]) -> None:
-        """Put ``border`` behind all that is there."""
+        """Append the unknowns of ``border``, whose elements are called ``names``."""
         n, end = self.n, self.n + len(border.corner)
         if end > len(self.lu):
             before = self.lu, self.scale, self.order
@@ -97,13 +97,13 @@ class GrowingFactor:
         self._ends.append(end)
         self._known.append(border.known)
 
-    def went_on(self, n: int, more: int, names: list[Hashable]) -> bool:
-        """Whether what came behind the first ``n`` unknowns are ``more`` that are called ``names``."""
+    def continues_with(self, n: int, more: int, names: list[Hashable]) -> bool:
+        """Whether the first ``n`` unknowns are already followed by ``more``, of the elements ``names``."""
         at = len(self.names) * n // self.n
         return n + more in self._ends and self.names[at : at + len(names)] == names
 
     def part(self, n: int) -> GrowingFactor:
-        """A copy of the first ``n`` unknowns, that may grow in another way."""
+        """A copy of the first ``n`` unknowns, which can grow in another way."""
         at = self._ends.index(n) + 1
         out = GrowingFactor(self._first, self.names[: len(self.names) * n // self.n], self._factor)
         out.n, out._borders = n, self._borders[: at - 1]
@@ -114,7 +114,7 @@ class GrowingFactor:
         return out
 
     def matrix(self, n: int) -> np.ndarray:
-        """(n, n), column-major, the first ``n`` unknowns' matrix: a view, not to be written to."""
+        """(n, n) matrix of the first ``n`` unknowns, column-major: a view that must not be written to."""
         if n > len(self._whole):
             room = int(ROOM * n) + MORE_ROOM
             self._whole, self._in_whole = np.empty((room, room), order="F"), 0
@@ -134,12 +134,12 @@ class GrowingFactor:
 
     @property
     def unfactored(self) -> bool:
-        """Whether asking for factors makes those of the first matrix."""
+        """Whether the first matrix has not been factored yet."""
         return not self._trust and self._factor is None
 
     def eliminate(self, n: int, what: str) -> tuple[float, float]:
-        """Make the factors of the first ``n`` unknowns; the worst reciprocal condition of a diagonal block and the
-        worst `loss` of accuracy. Raises LinAlgError with ``what`` when one is singular."""
+        """Factor the first ``n`` unknowns; returns the smallest reciprocal condition of a diagonal block and the
+        largest `loss` of accuracy. Raises LinAlgError with the text ``what`` when a block is singular."""
         upto = self._ends.index(n)
         for k in range(len(self._trust), upto + 1):
             first, end = self._ends[k - 1] if k else 0, self._ends[k]
@@ -150,12 +150,12 @@ class GrowingFactor:
                 self.scale[here], self._factor = factor.scale, None
                 self._trust.append((factor.rcond, 1.0))
             else:
-                lower, upper, t = self.beside(first, self._borders[k - 1]._replace(known=self._known[k]))
+                lower, upper, t = self.eliminate_border(first, self._borders[k - 1]._replace(known=self._known[k]))
                 self._eliminated(first, lower, upper, t, Factor(t, what))
         return self._trust[upto]
 
     def _eliminated(self, first: int, lower: np.ndarray, upper: np.ndarray, t: np.ndarray, factor: Factor) -> None:
-        """Keep the factors of the next unknowns, behind the ``first``."""
+        """Store the factors of the group that follows the ``first`` unknowns."""
         here, k = slice(first, first + factor.n), len(self._trust)
         self.lu[here, :first] = (lower * factor.scale).T[factor.rows]
         self.lu[:first, here] = upper
@@ -167,29 +167,34 @@ class GrowingFactor:
         self._known[k] = None
 
     def is_next(self, n: int, m: int) -> bool:
-        """Whether all of the first ``n`` unknowns are eliminated and the next ``m``, that came together, are not."""
+        """Whether the first ``n`` unknowns are eliminated and the next group, of ``m``, is not."""
         k = len(self._trust)
         return 0 < k < len(self._ends) and self._ends[k - 1 : k + 1] == [n, n + m]
 
-    def beside(self, n: int, border: Border) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Of what stands behind the first ``n`` unknowns, all eliminated, L transposed (n, k), U (n, k) and what is
-        left of its own block."""
+    def eliminate_border(self, n: int, border: Border) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Eliminate the first ``n`` unknowns, all factored, from a border of k: its part of L, transposed (n, k), its
+        part of U (n, k) and its Schur complement (k, k)."""
         # Column-major all the way.
         rows = border.down.T * border.scale
         columns = np.take(border.right.T, self.order[:n], axis=1)
         columns *= self.scale[self.order[:n]]
         known = border.known
         if known is None:
-            lower, upper = self._below(0, n, rows), self._above(0, n, columns.T)
+            lower, upper = self._solve_upper_transposed(0, n, rows), self._solve_lower(0, n, columns.T)
         else:
-            lower = self._beyond(n, rows, known.rows, known.lower, known.as_rows, self._below)
-            upper = self._beyond(n, columns.T, known.columns, known.upper, known.as_columns, self._above)
+            lower = self._solve_partly_known(
+                n, rows, known.rows, known.lower, known.as_rows, self._solve_upper_transposed
+            )
+            upper = self._solve_partly_known(
+                n, columns.T, known.columns, known.upper, known.as_columns, self._solve_lower
+            )
         t = np.array(border.corner * border.scale[:, None], order="F")
         t -= (upper.T @ lower).T
         return lower, upper, t
 
-    def _beyond(self, n: int, given: np.ndarray, names, before, which, solve) -> np.ndarray:
-        """``solve`` with ``given`` (n, k), where of the columns ``names`` the first rows are ``before[:, which]``."""
+    def _solve_partly_known(self, n: int, given: np.ndarray, names, before, which, solve) -> np.ndarray:
+        """``solve`` with ``given`` (n, k), where the first rows of the columns ``names`` are known: ``before[:,
+        which]``."""
         if not len(names):
             return solve(0, n, given)
         m, fresh, before = len(before), np.ones(given.shape[1], bool), before.T[which].T
@@ -198,67 +203,71 @@ class GrowingFactor:
         out.T[fresh] = solve(0, n, given.T[fresh].T).T
         out[:m, names] = before
         if m < n:
-            across = self.lu[:m, m:n].T if solve == self._below else self.lu[m:n, :m]
+            across = self.lu[:m, m:n].T if solve == self._solve_upper_transposed else self.lu[m:n, :m]
             out[m:, names] = solve(m, n, given[m:, names] - across @ before)
         return out
 
-    def eliminate_with(self, n: int, border: Border, m: int, what: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """The same for all but the first ``m`` of the ``border``, which stand behind the first ``n`` unknowns already
-        and are eliminated on the way."""
-        lower, upper, t = self.beside(n, border)
+    def eliminate_next(self, n: int, border: Border, m: int, what: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """As `eliminate_border`, for all but the first ``m`` unknowns of the ``border``. Those are already in the
+        matrix, after the first ``n``, and are factored here."""
+        lower, upper, t = self.eliminate_border(n, border)
         first = np.array(t[:m, :m], order="F")
         self._eliminated(n, lower[:, :m], upper[:, :m], first, Factor(first, what))
         end = n + m
         across = t[:m, m:] * self.scale[n:end, None] / border.scale[:m, None]
-        beyond = self._above(n, end, across[self.order[n:end] - n]), self._below(n, end, t[m:, :m].T)
+        beyond = (
+            self._solve_lower(n, end, across[self.order[n:end] - n]),
+            self._solve_upper_transposed(n, end, t[m:, :m].T),
+        )
         out_lower, out_upper = np.empty((2, t.shape[0] - m, end))
         out_lower[:, :n], out_upper[:, :n] = lower.T[m:], upper.T[m:]
         out_upper[:, n:], out_lower[:, n:] = beyond[0].T, beyond[1].T
         return out_lower.T, out_upper.T, t[m:, m:] - beyond[1].T @ beyond[0]
 
-    # -- triangles -----------------------------------------------------------------------------------------------
+    # -- triangular solutions ------------------------------------------------------------------------------------
 
-    def _below(self, first: int, end: int, x: np.ndarray) -> np.ndarray:
-        """U⁻ᵀ ``x`` between two unknowns."""
-        return self._triangle(first, end, x, lower=0, trans=1, unitdiag=0)
+    def _solve_upper_transposed(self, first: int, end: int, x: np.ndarray) -> np.ndarray:
+        """U⁻ᵀ ``x`` with the diagonal block of the unknowns from ``first`` to ``end``."""
+        return self._solve_triangular(first, end, x, lower=0, trans=1, unitdiag=0)
 
-    def _above(self, first: int, end: int, x: np.ndarray) -> np.ndarray:
-        """L⁻¹ ``x``."""
-        return self._triangle(first, end, x, lower=1, trans=0, unitdiag=1)
+    def _solve_lower(self, first: int, end: int, x: np.ndarray) -> np.ndarray:
+        """L⁻¹ ``x`` with that block."""
+        return self._solve_triangular(first, end, x, lower=1, trans=0, unitdiag=1)
 
-    def _triangle(self, first: int, end: int, x: np.ndarray, **which) -> np.ndarray:
+    def _solve_triangular(self, first: int, end: int, x: np.ndarray, **which) -> np.ndarray:
         from scipy.linalg.lapack import dtrtrs  # not kept: a compiled function cannot be stored in a checkpoint
 
         if not x.size:
             return x
-        # Columns that lie together are taken as they are, with all that stands below.
+        # Whole columns, contiguous in memory, avoid a copy.
         part = self.lu[first:end, first:end] if first else self.lu[:, :end]
         out = dtrtrs(part, np.asfortranarray(x if x.ndim > 1 else x[:, None]), **which, overwrite_b=True)[0]
         return out if x.ndim > 1 else out[:, 0]
 
-    def forth(self, n: int, x: np.ndarray, transposed: bool) -> np.ndarray:
-        """The first half of a solution with the first ``n`` unknowns: L⁻¹ P ``x`` (n,) or (n, k), or U⁻ᵀ ``x``."""
+    def forward_substitution(self, n: int, x: np.ndarray, transposed: bool) -> np.ndarray:
+        """Forward substitution with the first ``n`` unknowns: L⁻¹ P ``x`` (n,) or (n, k); U⁻ᵀ ``x`` if
+        ``transposed``."""
         if transposed:
-            return self._below(0, n, x.copy(order="F"))
+            return self._solve_upper_transposed(0, n, x.copy(order="F"))
         scale = self.scale[:n] if x.ndim == 1 else self.scale[:n, None]
-        return self._above(0, n, (x * scale)[self.order[:n]])
+        return self._solve_lower(0, n, (x * scale)[self.order[:n]])
 
-    def back(self, n: int, y: np.ndarray, transposed: bool) -> np.ndarray:
-        """The second half: U⁻¹ ``y``, or Pᵀ L⁻ᵀ ``y``."""
+    def back_substitution(self, n: int, y: np.ndarray, transposed: bool) -> np.ndarray:
+        """Back substitution: U⁻¹ ``y``; Pᵀ L⁻ᵀ ``y`` if ``transposed``."""
         if not transposed:
-            return self._triangle(0, n, y, lower=0, trans=0, unitdiag=0)
+            return self._solve_triangular(0, n, y, lower=0, trans=0, unitdiag=0)
         out = np.empty(y.shape)
-        out[self.order[:n]] = self._triangle(0, n, y, lower=1, trans=1, unitdiag=1)
+        out[self.order[:n]] = self._solve_triangular(0, n, y, lower=1, trans=1, unitdiag=1)
         return out * (self.scale[:n] if y.ndim == 1 else self.scale[:n, None])
 
 
-#: What has room.
+#: The arrays with spare capacity.
 _ARRAYS = ("lu", "scale", "order")
 
 
 def loss(lower: np.ndarray, upper: np.ndarray, t: np.ndarray) -> float:
-    """By how much elimination without pivoting magnifies round-off: ‖L‖ ‖U‖ over what is left, rows of one size (Higham
-    2002, §13.2)."""
+    """Factor by which elimination without pivoting magnifies round-off: ‖L‖ ‖U‖ over the Schur complement ``t``, rows
+    equal in size (Higham 2002, §13.2)."""
     rows = np.abs(lower).sum(axis=0).max(initial=0.0)
     with np.errstate(divide="ignore", invalid="ignore"):
         columns = np.abs(upper).max(axis=0, initial=0.0) / np.abs(t).max(axis=0, initial=0.0)

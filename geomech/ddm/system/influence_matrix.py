@@ -1,4 +1,4 @@
-"""Matrices between sets of elements, in nodal unknowns, and their reuse when only some elements are new."""
+"""Influence matrices between sets of elements, in nodal unknowns, and their reuse when only some elements are new."""
 
 from __future__ import annotations
 
@@ -16,15 +16,15 @@ from ..kernels import full_plane, shape_functions
 from ..kernels.full_plane import Elements, Kernel
 from ..mesh.half_plane import HalfPlane
 
-#: Element–point pairs (some 30 ns each) below which another thread does not pay for itself.
+#: Element–point pairs (some 30 ns each) that make another thread worthwhile.
 PAIRS_PER_THREAD = 8000
-#: The processors this process may use, where the system gives them.
+#: Number of processors that this process may use.
 THREADS = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 _pool: ThreadPoolExecutor | None = None
 
 
 def _spread(n: int, pairs: int, work: Callable[[int, int], None]) -> None:
-    """Run ``work(first, last)`` over range(n), in chunks on threads when there is enough of it."""
+    """Run ``work(first, last)`` over range(n), in chunks on several threads if ``pairs`` is large enough."""
     global _pool
     chunks = min(THREADS, pairs // PAIRS_PER_THREAD)
     if chunks < 2:
@@ -33,7 +33,7 @@ def _spread(n: int, pairs: int, work: Callable[[int, int], None]) -> None:
     if _pool is None:
         _pool = ThreadPoolExecutor(THREADS, thread_name_prefix="geomech-ddm")
     bounds = np.linspace(0, n, chunks + 1).astype(int)
-    # list() hands on what a thread raised.
+    # list() raises the exceptions of the threads.
     list(_pool.map(work, bounds[:-1].tolist(), bounds[1:].tolist()))
 
 
@@ -43,11 +43,11 @@ class ElementSet:
 
         start, end   (n, 2)   m
         kind         (n,)     see `shape_functions`
-        source       (n,)     the outline edge or crack segment each lies on
-        half_plane            the half-plane they stand in, None in the infinite plane
+        source       (n,)     the outline edge or crack segment that each lies on
+        half_plane            the half-plane that they are in; None in the infinite plane
 
-    Unknowns run element, component (along the tangent, along the normal left of it), node: 2(p+1) an element; so do
-    the rows of tractions collocated on them.
+    Unknowns are ordered by element, component (along the tangent, along the normal to its left) and node, 2(p+1) per
+    element; so are the rows of the tractions collocated on them.
     """
 
     start: np.ndarray
@@ -95,7 +95,7 @@ class ElementSet:
 
     @cached_property
     def keys(self) -> list[bytes]:
-        """What an element is, to the bit."""
+        """Keys that are equal for bitwise identical elements."""
         rows = np.column_stack([self.start, self.end, self.kind])
         return rows.view(np.dtype((np.void, 8 * rows.shape[1]))).ravel().tolist()
 
@@ -108,16 +108,16 @@ class ElementSet:
         return {key[:-8]: k for k, key in enumerate(self.keys)}
 
     def found_in(self, other: ElementSet | None) -> np.ndarray:
-        """(n,) the same element's number in ``other``, −1 where it is new."""
+        """(n,) number in ``other`` of the same element, −1 where there is none."""
         if other is None or (other.order, other.family) != (self.order, self.family):
             return np.full(self.n, -1)
         if other is self:
             return np.arange(self.n)
         return np.array([other.index_of.get(key, -1) for key in self.keys], dtype=int).reshape(self.n)
 
-    def seen_in(self, other: ElementSet | None, found: np.ndarray) -> np.ndarray:
-        """``found`` (n,), what `found_in` says, with the numbers of elements besides that stand in the same place in
-        ``other`` and are only of another kind: tractions on them are collocated at the same points."""
+    def same_place_in(self, other: ElementSet | None, found: np.ndarray) -> np.ndarray:
+        """``found`` (n,), the result of `found_in`, completed by elements of ``other`` at the same place but of another
+        kind: tractions on them are collocated at the same points."""
         out = found.copy()
         if other is not None and (other.order, other.family) == (self.order, self.family):
             for k in np.flatnonzero(found < 0).tolist():
@@ -126,8 +126,8 @@ class ElementSet:
 
     @cached_property
     def samples(self) -> tuple[np.ndarray, np.ndarray]:
-        """(n, p+3, 2) the ends and between them the collocation points of every element, and (n, p+1, p+3) what nodal
-        values have to be multiplied by (from the left) for the values there."""
+        """(n, p+3, 2) sample points of each element, its ends and between them its collocation points, and (n, p+1,
+        p+3) the shape functions there: nodal values times these are the values at the points."""
         t = np.concatenate([[-1.0], shape_functions.nodes(self.family, self.order), [1.0]])
         table = np.array([shape_functions.at(self.family, self.order, kind, t).T for kind in range(4)])
         return self.at(t), table[self.kind]
@@ -144,7 +144,7 @@ class ElementSet:
             self.family,
             self.half_plane,
         )
-        # What is known of them is not worked out again.
+        # Cached properties are taken along.
         known = vars(self)
         vars(out).update({name: known[name][which] for name in ("length", "tangent", "nodes") if name in known})
         return out
@@ -155,7 +155,7 @@ class ElementSet:
 
     @cached_property
     def _inverse_weight(self) -> np.ndarray:
-        """(n, p+1) one over the tip weight at the nodes."""
+        """(n, p+1) reciprocal of the tip weight at the nodes."""
         t = shape_functions.nodes(self.family, self.order)
         table = 1.0 / np.array([shape_functions.weight(kind, t) for kind in range(4)])
         return table[self.kind]
@@ -175,19 +175,19 @@ class ElementSet:
 
 
 def unknowns_of(elements: np.ndarray, width: int) -> np.ndarray:
-    """Indices of the unknowns of ``elements`` (k,) that have ``width`` each."""
+    """Indices of the unknowns of ``elements`` (k,), ``width`` per element."""
     return (elements[:, None] * width + np.arange(width)).ravel()
 
 
 @lru_cache
 def _to_nodal(family: str, order: int) -> np.ndarray:
-    """(4, p+1, p+1) from nodal values to monomials, for every kind of element."""
+    """(4, p+1, p+1) matrices from nodal values to monomial coefficients, one per kind of element."""
     return np.stack([shape_functions.to_monomials(family, order, kind) for kind in range(4)])
 
 
 class _Points(NamedTuple):
-    """Where tractions are asked for: ``at`` (n per, 2) m, ``per`` of them an element, on lines of these ``tangents``
-    (n per, 2)."""
+    """Points at which tractions are computed: ``at`` (n per, 2) m, ``per`` of them per element, on lines with the
+    ``tangents`` (n per, 2)."""
 
     at: np.ndarray
     tangents: np.ndarray
@@ -195,24 +195,25 @@ class _Points(NamedTuple):
 
     @classmethod
     def of(cls, points: np.ndarray, tangents: np.ndarray) -> _Points:
-        """``points`` (n, per, 2) on elements of ``tangents`` (n, 2)."""
+        """The ``points`` (n, per, 2) on elements with ``tangents`` (n, 2)."""
         per = points.shape[1]
         return cls(points.reshape(-1, 2), np.repeat(tangents, per, axis=0), per)
 
 
 def elements_of(start: np.ndarray, end: np.ndarray, kind: np.ndarray) -> Elements:
-    """Elements as the kernels read them."""
+    """Elements in the form that the kernels take."""
     return Elements(np.ascontiguousarray(start), np.ascontiguousarray(end), np.ascontiguousarray(kind, dtype=np.int64))
 
 
 def influence(targets: ElementSet, sources: ElementSet, nu: float, tol: float) -> np.ndarray:
-    """(targets.n_unknowns, sources.n_unknowns), column-major: traction (along, normal, left of the target) at the
-    collocation points from unit nodal jumps times 2μ. An entry depends on its two elements alone, to the bit."""
+    """(targets.n_unknowns, sources.n_unknowns), column-major: traction on the left side of the targets (tangential,
+    normal) at their collocation points, from unit nodal jumps times 2μ. Each entry depends on its two elements alone,
+    to the bit."""
     return _between(targets, sources, Kernel(nu, tol, 1.0, False))
 
 
 def image_influence(targets: ElementSet, sources: ElementSet, nu: float, tol: float) -> np.ndarray:
-    """What the free surface of their half-plane adds to `influence`."""
+    """Contribution of the free surface of the half-plane to `influence`."""
     nodal, out = _to_nodal(sources.family, sources.order), np.zeros((sources.n_unknowns, targets.n_unknowns))
     if out.size:
         points, elements = _Points.of(targets.nodes, targets.tangent), elements_of(*_ends(sources))
@@ -222,8 +223,8 @@ def image_influence(targets: ElementSet, sources: ElementSet, nu: float, tol: fl
 
 
 def line_influence(targets: ElementSet, sources: ElementSet, nu: float, tol: float, side: float) -> np.ndarray:
-    """As `influence`, from unit nodal line forces (per length) on ordinary ``sources``; points on one are seen from
-    ``side`` of it."""
+    """As `influence`, from unit nodal line forces (per length) on ordinary ``sources``; points on a source are taken on
+    its ``side`` (±1)."""
     return _between(targets, sources, Kernel(nu, tol, side, True))
 
 
@@ -241,8 +242,9 @@ def _between(targets: ElementSet, sources: ElementSet, kernel: Kernel) -> np.nda
 def line_forces(
     targets: ElementSet, start: np.ndarray, end: np.ndarray, degree: int, nu: float, tol: float, side: float
 ) -> np.ndarray:
-    """(targets.n_unknowns, m, 2, degree+1) traction from line forces t^k along (component 0) and across (1) straight
-    segments, Kelvin's solution integrated in closed form; points on a segment are seen from ``side`` of it."""
+    """(targets.n_unknowns, m, 2, degree+1) traction from line forces t^k along (component 0) and across (component 1)
+    straight segments: Kelvin's solution integrated in closed form. Points on a segment are taken on its ``side``
+    (±1)."""
     points, kernel = _Points.of(targets.nodes, targets.tangent), Kernel(nu, tol, side, True)
     return _line_forces(points, start, end, degree, kernel, targets.half_plane)
 
@@ -256,26 +258,27 @@ def _line_forces(
     return out.reshape(2 * len(points.at), len(start), 2, degree + 1)
 
 
-#: A traction that ends within this part of half an element from the element's end is left to the nodes: there the
-#: singularities of tractions and of displacement jumps cancel point by point.
+#: Distance from an element's end, relative to half its length, within which the end of a line force needs no
+#: projection: there the singularities of tractions and of displacement jumps cancel point by point.
 _AT_END = 0.01
 
 
 @lru_cache(maxsize=1)
 def _clustered() -> tuple[np.ndarray, np.ndarray]:
-    """Points in (0, 1) and weights (of a piece of length 2) of a quadrature for logarithms at both ends."""
+    """Points in (0, 1) and weights (that sum to 2) of a quadrature for integrands with logarithms at both ends."""
     x, q = np.polynomial.legendre.leggauss(14)
-    # s²(3 − 2s) takes the edge off them.
+    # The substitution s²(3 − 2s) makes the integrand smooth there.
     s = 0.5 * (1 + x)
     return s * s * (3 - 2 * s), 3 * s * (1 - s) * q
 
 
 def project_jumps(unit: np.ndarray, targets: ElementSet, start, end, nu: float, tol: float, side: float) -> None:
-    """Where line forces end on an element their traction jumps and is logarithmic: replace the nodal values in ``unit``
-    (`line_forces`) by those of the polynomial with the same moments, in place.
+    """Replace in ``unit`` (see `line_forces`), in place, the nodal tractions of elements on which a line force ends by
+    those of the polynomial with the same moments.
 
-    Sampled at nodes, a jump would be rounded to a node and the load's resultant with it (4 % in K_I in one case, 0.03 %
-    so); with the moments kept, what is lost acts on no more than the element's own surroundings.
+    At the end of a line force the traction jumps and has a logarithm. Sampled at nodes, the jump would move to a node
+    and change the load's resultant (error of K_I in one case: 4 %, with moments 0.03 %). With the moments kept, the
+    error is confined to the element's surroundings.
     """
     t, n, c, kernel = targets.tangent, targets.normal, 0.5 * targets.length, Kernel(nu, tol, side, True)
     middle = 0.5 * (targets.start + targets.end)
@@ -303,9 +306,9 @@ def project_jumps(unit: np.ndarray, targets: ElementSet, start, end, nu: float, 
 def project_total(
     rows: np.ndarray, targets: ElementSet, start, end, density: np.ndarray, nu: float, tol: float, side: float
 ) -> None:
-    """The same for the traction ``rows`` (n_unknowns,) that line forces of monomial ``density`` (m, 2, p+1) add up to,
-    in place: where any of them ends inside an element, that element gets moments of the sum, in which singularities of
-    pieces that meet cancel."""
+    """`project_jumps` for the traction ``rows`` (n_unknowns,) of the sum of line forces with monomial ``density`` (m,
+    2, p+1), in place. An element inside which one of them ends gets the moments of the sum, in which the singularities
+    of adjoining pieces cancel."""
     values = rows.reshape(targets.n, 2, targets.per)
     clustered, q = _clustered()
     ends = np.unique(np.concatenate([start, end]), axis=0)
@@ -331,7 +334,7 @@ def project_total(
 def _tractions(
     points: _Points, elements: Elements, order: int, kernel: Kernel, nodal: np.ndarray, half_plane: HalfPlane | None
 ) -> np.ndarray:
-    """(2 n per, 2 (p+1) m), column-major, at the ``points``."""
+    """(2 n per, 2 (p+1) m) tractions at the ``points``, column-major."""
     n, m = len(points.at), len(elements.start)
     out = np.empty((2 * (order + 1) * m, 2 * n))
     if not out.size:
@@ -358,7 +361,7 @@ def _images(
     half_plane: HalfPlane, points: _Points, elements: Elements, order: int, kernel: Kernel, nodal: np.ndarray,
     out: np.ndarray,
 ) -> Callable[[int, int], None]:  # fmt: skip
-    """What adds to ``out`` the tractions at points ``first`` … ``last`` that the free surface makes."""
+    """A function (first, last) that adds to ``out`` the tractions due to the free surface at these points."""
     from ..kernels import half_plane_images
 
     at = full_plane.lanes_of(_mirrored(half_plane.frame(points.at)))
@@ -378,7 +381,8 @@ def _framed(half_plane: HalfPlane, elements: Elements) -> Elements:
 
 
 def _mirrored(in_frame: np.ndarray) -> np.ndarray:
-    """(n, 2) mirror images of points in the frame of a free surface; on it the image is seen from outside."""
+    """(n, 2) mirror images of points in the frame of a free surface; the images of points on the surface lie
+    outside."""
     return np.column_stack([in_frame[:, 0], np.abs(in_frame[:, 1])])
 
 
@@ -386,7 +390,8 @@ def add_fields(
     points: np.ndarray, elements: Elements, density: np.ndarray, kernel: Kernel, stress: np.ndarray, shift: np.ndarray,
     half_plane: HalfPlane | None = None,
 ) -> None:  # fmt: skip
-    """Add the stress (n, 3) and 2μ times the displacement (n, 2) of ``elements`` with monomial ``density`` (m, 2, p+1)."""
+    """Add the stress (n, 3) and 2μ times the displacement (n, 2) of ``elements`` with monomial ``density`` (m, 2,
+    p+1)."""
     if not len(points) or not len(elements.start):
         return
     flat, elements = full_plane.lanes_of(points), elements_of(*elements)
@@ -417,9 +422,9 @@ def add_fields(
 def reuse(
     old: np.ndarray | None, rows: np.ndarray, columns: np.ndarray, row_set, column_set, compute, order: str = "F"
 ) -> np.ndarray:
-    """A matrix of which some is known: ``rows`` and ``columns`` (per element of ``row_set`` and ``column_set``) are the
-    old element numbers or −1, ``compute(row_elements, column_elements)`` makes blocks of it. ``order``: row- ("C") or
-    column-major, the way in which most of it is copied."""
+    """A matrix, parts of which are copied from ``old``: ``rows`` and ``columns`` (per element of ``row_set`` and
+    ``column_set``) are the old element numbers or −1; ``compute(row_elements, column_elements)`` computes new blocks.
+    ``order``: row-major ("C") or column-major ("F"), as most of it is copied."""
     if old is None or (rows < 0).all() or (columns < 0).all():
         return compute(np.arange(row_set.n), np.arange(column_set.n))
     unchanged = np.array_equal(rows, np.arange(row_set.n)) and np.array_equal(columns, np.arange(column_set.n))
@@ -437,9 +442,9 @@ def reuse(
 
 
 def copy_blocks(old: np.ndarray, out: np.ndarray, rows: np.ndarray, columns: np.ndarray, high: int, wide: int) -> None:
-    """Copy to ``out`` what it has of ``old``: blocks ``high`` × ``wide`` whose old numbers are ``rows`` and
-    ``columns``, or −1."""
-    # Elements mostly keep their order: copying a few slices is several times faster than gathering.
+    """Copy from ``old`` to ``out`` the blocks ``high`` × ``wide`` whose old numbers ``rows`` and ``columns`` are not
+    −1."""
+    # Elements mostly keep their order: copying a few slices is several times faster than fancy indexing.
     column_runs = list(_runs(columns))
     for r, was_r, m in _runs(rows):
         for k, was_k, n in column_runs:
@@ -449,7 +454,7 @@ def copy_blocks(old: np.ndarray, out: np.ndarray, rows: np.ndarray, columns: np.
 
 
 def _runs(old_numbers: np.ndarray):
-    """(first, first old number, length) of stretches that stood together before."""
+    """(first, first old number, length) of runs of consecutive old numbers."""
     kept = np.flatnonzero(old_numbers >= 0)
     breaks = np.flatnonzero((np.diff(kept) != 1) | (np.diff(old_numbers[kept]) != 1)) + 1
     for run in np.split(kept, breaks):

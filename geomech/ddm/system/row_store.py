@@ -1,4 +1,4 @@
-"""Rows by crack elements, kept while cracks grow: new ones are put behind the old, nothing is copied."""
+"""Matrix rows of crack elements that are kept while cracks grow: new rows are appended without copying the old."""
 
 from __future__ import annotations
 
@@ -9,43 +9,43 @@ import numpy as np
 from ..kernels.shape_functions import ORDINARY
 from .influence_matrix import ElementSet, unknowns_of
 
-#: Rows of elements that are gone are left out when there are so many times as many rows as are in use.
+#: Ratio of stored to used rows above which the rows of removed elements are dropped.
 CARRIED = 1.3
-#: Room is made for so many times the rows.
+#: Capacity allocated, relative to the rows needed.
 ROOM = 1.5
 
 
-class _Roomy:
-    """Rows with room for more behind them, shared by all that hold some of the first: what is there stays."""
+class _GrowingRows:
+    """Rows with spare capacity. Several matrices share the first rows, which never change."""
 
     def __init__(self, rows: np.ndarray):
         self.n, self.rows = len(rows), rows
 
     def __getstate__(self) -> np.ndarray:
-        """Without the room, which may hold anything; row- or column-major as they are: products differ by it in their
-        last bits."""
+        """Without the uninitialised capacity. The memory order is kept: the last bits of products depend on it."""
         return self.rows if self.n == len(self.rows) else self.rows[: self.n].copy(order="K")
 
     def __setstate__(self, rows: np.ndarray) -> None:
         self.n, self.rows = len(rows), rows
 
-    def followed(self, n: int, more: np.ndarray) -> _Roomy:
-        """Its first ``n`` rows and ``more`` behind them."""
+    def extended(self, n: int, more: np.ndarray) -> _GrowingRows:
+        """The first ``n`` rows, extended by ``more``."""
         if self.n == n and n + len(more) <= len(self.rows):
             self.rows[n : n + len(more)] = more
             self.n = n + len(more)
             return self
-        out = _Roomy(np.empty((int(ROOM * (n + len(more))), more.shape[1])))
+        out = _GrowingRows(np.empty((int(ROOM * (n + len(more))), more.shape[1])))
         out.n = n + len(more)
         out.rows[:n], out.rows[n : out.n] = self.rows[:n], more
         return out
 
 
 class KeptRows:
-    """A matrix (n, m) of the rows of ``elements``: the first ``n_firm`` of ``firm`` and behind them the ``loose`` ones,
-    of elements with a tip, which go when it moves on; ``at`` (n_elements,) is where the elements are in this order."""
+    """A matrix (n, m) of the rows of ``elements``: the first ``n_firm`` rows of ``firm``, then the ``loose`` rows of
+    tip elements, which are replaced when the tip advances. ``at`` (n_elements,): positions of the elements in this
+    order."""
 
-    def __init__(self, firm: _Roomy, n_firm: int, loose: np.ndarray, at: np.ndarray, width: int):
+    def __init__(self, firm: _GrowingRows, n_firm: int, loose: np.ndarray, at: np.ndarray, width: int):
         self._firm, self._n, self._loose, self.at, self._width = firm, n_firm, loose, at, width
         self._total = n_firm + len(loose)
         self._in_order = len(at) * width == self._total and bool((at == np.arange(len(at))).all())
@@ -54,15 +54,15 @@ class KeptRows:
     @classmethod
     def whole(cls, matrix: np.ndarray, elements: ElementSet) -> KeptRows:
         n, width = elements.n, 2 * elements.per
-        return cls(_Roomy(matrix), n * width, np.empty((0, matrix.shape[1])), np.arange(n), width)
+        return cls(_GrowingRows(matrix), n * width, np.empty((0, matrix.shape[1])), np.arange(n), width)
 
     def grown(self, elements: ElementSet, was: np.ndarray, compute: Callable[[np.ndarray], np.ndarray]) -> KeptRows:
-        """The matrix of ``elements`` whose numbers were ``was`` (n,), −1 where new; ``compute(elements)`` makes
+        """The matrix of ``elements`` whose old numbers are ``was`` (n,), −1 where new; ``compute(elements)`` computes
         rows."""
         width, n = self._width, self._n // self._width
-        at = np.append(self.at, -1)[was]  # its end stands for −1
+        at = np.append(self.at, -1)[was]  # the last entry is for −1
         new = np.flatnonzero(at < 0)
-        # What is not among the firm rows is loose, as it was, or computed.
+        # Other rows are old loose ones or are computed.
         come = np.flatnonzero((at < 0) | (at >= n))
         stay = elements.kind[come] == ORDINARY
         come = np.concatenate([come[stay], come[~stay]])
@@ -74,7 +74,7 @@ class KeptRows:
             rows[~old] = compute(come[~old]).reshape(len(new), width, m)
         at[come] = n + np.arange(len(come))
         rows = rows.reshape(width * len(come), m)
-        firm = self._firm.followed(self._n, rows[:k]) if k else self._firm
+        firm = self._firm.extended(self._n, rows[:k]) if k else self._firm
         out = KeptRows(firm, self._n + k, rows[k:], at, width)
         return out if out._total < CARRIED * len(out._places) else KeptRows.whole(out.dense, elements)
 
@@ -93,7 +93,7 @@ class KeptRows:
 
     def __matmul__(self, x: np.ndarray) -> np.ndarray:
         """(n,) or (n, k), column-major, the matrix times ``x`` (m,) or (m, k)."""
-        # Products into columns take half the time of products into rows.
+        # Writing the product column-major takes half the time.
         out = np.empty((self._total, *x.shape[1:]), order="F")
         np.matmul(self._firm.rows[: self._n], x, out=out[: self._n])
         if len(self._loose):
@@ -105,7 +105,7 @@ class KeptRows:
         return TransposedRows(self)
 
     def transposed_times(self, x: np.ndarray) -> np.ndarray:
-        """(m,) or (m, k), the transposed matrix times ``x`` (n,) or (n, k)."""
+        """(m,) or (m, k), the transpose times ``x`` (n,) or (n, k)."""
         if not self._in_order:
             given, x = x, np.zeros((self._total, *x.shape[1:]))
             x[self._places] = given
@@ -113,7 +113,7 @@ class KeptRows:
 
 
 class TransposedRows:
-    """The transposed (m, n) of ``rows``."""
+    """The transpose (m, n) of ``rows``."""
 
     def __init__(self, rows: KeptRows):
         self.rows = rows

@@ -1,9 +1,9 @@
-"""The equations of the crack unknowns, S w = right, some of them prescribed: the basis of contact, compliance and
+"""Solutions of the crack equations, S w = right, with some unknowns prescribed: used by contact, compliance and
 adjoints.
 
-S = A_CC − A_CΓ A_ΓΓ⁻¹ A_ΓC is the Schur complement of slip and opening (`body`). One factorisation of it serves all
-contact states: prescribing k unknowns needs a k × k system in columns of S⁻¹. Where cracks cut off a part that only
-closed faces support, S is singular, and the equations of the free unknowns are factored instead.
+S = A_CC − A_CΓ A_ΓΓ⁻¹ A_ΓC is the Schur complement for slip and opening (`body`). It is factored once for all contact
+states: prescribing k unknowns takes a k × k system in columns of S⁻¹. If cracks cut off a part that only closed faces
+support, S is singular, and the equations of the free unknowns are factored instead.
 """
 
 from __future__ import annotations
@@ -14,27 +14,26 @@ import numpy as np
 
 from ..counters import Work
 from .bordered_factor import LOSS, SINGULAR, Bordered, BorderedFactor
-from .closed_face_factor import HeldFactor
+from .closed_face_factor import ClosedFaceFactor
 from .contact_rows import Rows
 from .dense_lu import Factor
 from .updated_factor import BaseOf, ContactBase, UpdatedFactor
 
-#: Reciprocal condition of S below which contact is not based on its inverse.
+#: Reciprocal condition of S below which its inverse is not used for contact.
 _SAFE = 1e-11
-#: Number of unknowns from which factors of other contact states are reused: those of S where less than this fraction of
-#: the unknowns is prescribed, else those of other states (`updated_factor`).
+#: Number of unknowns from which factors of other contact states are reused: the factors of S if less than the fraction
+#: MOST_PRESCRIBED of the unknowns is prescribed, otherwise those of other states (`updated_factor`).
 WORTHWHILE, MOST_PRESCRIBED = 400, 0.05
-#: Number of sets of free unknowns whose factors are kept.
+#: Number of factorisations kept, each of one set of free unknowns.
 _KEPT = 8
-#: Number of states whose factors are kept for use by others: slipping faces, and faces that stick under falling load,
-#: have little in common.
+#: Number of states whose factors are kept for other states: more than one, as slipping faces and faces that stick
+#: during unloading have little in common.
 _BASES = 3
 
 
 class CrackSystem:
-    """``matrix`` is S; factors and columns of its inverse are computed on first use and kept. ``before``: the system
-    before the last growth, in which the elements had the numbers ``was`` (n_elements,), −1 where new; its factors are
-    reused."""
+    """Solves with S = ``matrix``; factors and columns of S⁻¹ are computed on first use and kept. ``before``: the system
+    before the last growth, whose factors are reused; ``was`` (n_elements,): element numbers there, −1 where new."""
 
     def __init__(
         self,
@@ -46,7 +45,7 @@ class CrackSystem:
         self.matrix, self._work = matrix, Work() if work is None else work
         self.n = matrix.n
         grown = [] if before is None else [base.grown(matrix, was) for base in before.bases]
-        #: Factors on which contact states are based, the last used one at the end.
+        #: Factors that contact states are based on, most recently used last.
         self.bases: list[BaseOf] = [base for base in grown if base is not None]
         self._factors: dict[bytes, tuple[np.ndarray, Factor]] = {}
         self._column_at = np.full(self.n, -1)
@@ -54,7 +53,7 @@ class CrackSystem:
         self._prescribed_factor: tuple[bytes, np.ndarray, Factor] | None = None
 
     def opened(self, right: np.ndarray) -> np.ndarray:
-        """S⁻¹ ``right``; zeros where S⁻¹ is not to be used (no `open_factor`)."""
+        """S⁻¹ ``right``; zeros if there is no `open_factor`."""
         if self.open_factor is None:
             return np.zeros_like(right)
         self._work.back_substitutions += 1 if right.ndim == 1 else right.shape[1]
@@ -86,14 +85,14 @@ class CrackSystem:
         reaction[at] = (right - self.matrix @ w)[at]
         return w, reaction
 
-    def changed(self, rows: Rows) -> tuple[np.ndarray, Factor | BorderedFactor | HeldFactor | UpdatedFactor]:
-        """The free unknowns (indices) and the factors of their equations."""
+    def changed(self, rows: Rows) -> tuple[np.ndarray, Factor | BorderedFactor | ClosedFaceFactor | UpdatedFactor]:
+        """Indices of the unknowns that ``rows`` leave free, and factors of their equations."""
         free, moving = np.flatnonzero(~rows.prescribed), np.flatnonzero(rows.mixed)
         if len(free) == self.n and not len(moving) and not rows.spring.any() and self.open_factor is not None:
             return free, self.open_factor
         lasting = self.n >= WORTHWHILE and not rows.spring.any()
         if lasting and self.n - len(free) < MOST_PRESCRIBED * self.n and self.open_factor is not None:
-            return free, HeldFactor(rows, self.open_factor, self, SINGULAR)
+            return free, ClosedFaceFactor(rows, self.open_factor, self, SINGULAR)
         updated = self._updated(rows) if lasting else None
         if updated is not None:
             return free, updated
@@ -114,7 +113,7 @@ class CrackSystem:
         return free, factor
 
     def _updated(self, rows: Rows) -> UpdatedFactor | None:
-        """Factors based on those of the most similar state; None where none is similar enough."""
+        """Factors updated from those of the most similar state; None if none is similar enough."""
         borders = [base.border(rows) for base in self.bases]
         if not borders:
             return None
@@ -125,12 +124,12 @@ class CrackSystem:
         return updated
 
     def rcond(self, closed: np.ndarray) -> float:
-        """Reciprocal condition of the matrix solved when ``closed`` (n,) bool are prescribed."""
+        """Reciprocal condition of the matrix that is factored when the unknowns ``closed`` (n,) bool are prescribed."""
         return (self.open_factor or self._free_factor(closed)[1]).rcond
 
     @cached_property
     def open_factor(self) -> Factor | BorderedFactor | None:
-        """Factors of S with all faces open; None when only closed faces support a part of the body."""
+        """Factors of S with all faces open; None if a part of the body is supported by closed faces alone."""
         if not self.matrix.is_whole:
             try:
                 self._work.crack_borderings += 1
@@ -140,7 +139,7 @@ class CrackSystem:
                     return factor
             except np.linalg.LinAlgError:
                 pass
-            # Only pivoting in the whole matrix can decide.
+            # Whether S is singular can only be decided with pivoting in the whole matrix.
             self.matrix = Bordered.whole(self.matrix.elements, self.matrix.dense)
         try:
             self._work.crack_factorisations += 1
@@ -163,10 +162,10 @@ class CrackSystem:
         return self._factors[key]
 
     def inverse_columns(self, unknowns: np.ndarray) -> np.ndarray:
-        """(n, len(unknowns)) columns of S⁻¹, kept beyond the present load."""
+        """(n, len(unknowns)) columns of S⁻¹, kept for later loads."""
         missing = unknowns[self._column_at[unknowns] < 0]
         if len(missing):
-            # Whole elements: many columns take hardly more time than one, and neighbours will be needed.
+            # Whole elements: several columns take hardly more time than one, and the others will be needed.
             width = 2 * self.matrix.elements.per
             missing = (np.unique(missing // width)[:, None] * width + np.arange(width)).ravel()
             missing = missing[self._column_at[missing] < 0]
@@ -177,10 +176,11 @@ class CrackSystem:
         return self._columns[:, self._column_at[unknowns]]
 
     def _prescribed_columns(self, at: np.ndarray) -> tuple[np.ndarray, Factor]:
-        """Columns ``at`` of S⁻¹ and the factors of their rows ``at``; kept, as the same faces often stay closed."""
+        """Columns ``at`` of S⁻¹ and the factors of their rows ``at``; the last ones are kept, as faces often stay
+        closed."""
         key = at.tobytes()
         if self._prescribed_factor is None or self._prescribed_factor[0] != key:
             columns = self.inverse_columns(at)
-            factor = Factor(columns[at], "closed faces leave a part of the body without hold")
+            factor = Factor(columns[at], "closed faces leave a part of the body unsupported")
             self._prescribed_factor = key, columns, factor
         return self._prescribed_factor[1:]

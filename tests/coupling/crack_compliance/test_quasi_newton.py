@@ -9,7 +9,7 @@ import pytest
 
 from geomech.bench.cost.block_scenes import cracked_wall
 from geomech.coupling import cycles
-from geomech.coupling.crack_compliance.quasi_newton import Settling
+from geomech.coupling.crack_compliance.quasi_newton import QuasiNewton
 from geomech.dda import BlockSystem
 from geomech.model import History, Loads, State
 
@@ -58,7 +58,7 @@ def test_acceleration_solves_a_linear_agreement_in_as_many_passes_as_it_has_unkn
     turn = np.linalg.qr(np.random.default_rng(1).normal(size=(3, 3)))[0]
     matrix, given = turn @ np.diag([0.8, -0.5, 0.3]) @ turn.T, np.array([1.0, 2.0, 3.0])
     exact = np.linalg.solve(np.eye(3) - matrix, given)
-    settling, offset = Settling(), np.zeros((1, 3))
+    settling, offset = QuasiNewton(), np.zeros((1, 3))
     for _ in range(5):
         residual = (offset @ matrix.T + given) - offset
         offset = settling.next(offset, residual, np.ones((1, 3, 3)), np.ones(1))
@@ -71,7 +71,7 @@ def test_what_one_solution_has_learnt_another_need_not():
     it has led astray, nothing is kept."""
     turn = np.linalg.qr(np.random.default_rng(1).normal(size=(3, 3)))[0]
     matrix = turn @ np.diag([0.8, -0.5, 0.3]) @ turn.T
-    settling = Settling()
+    settling = QuasiNewton()
 
     def passes(matrix, given, most, blocks=(7,)) -> list[float]:
         """Largest differences of the passes of one solution."""
@@ -96,7 +96,7 @@ def test_what_one_solution_has_learnt_another_need_not():
 def test_answers_that_turn_about_with_the_states_of_faces_are_relaxed():
     """x = c − 1.3 x of a block whose S is another one in every pass: handing back what was found goes away from the
     answer for ever; relaxed, it is there to 1e-6 after a few passes. A second block, at peace, is not held back."""
-    settling, offset = Settling(), np.zeros((2, 3))
+    settling, offset = QuasiNewton(), np.zeros((2, 3))
     target = np.array([[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]])
     for n in range(8):
         found = np.stack([2.3 * target[0] - 1.3 * offset[0], target[1]])

@@ -37,7 +37,7 @@ def test_a_share_beyond_the_bound_is_told_and_again_when_it_has_doubled(caplog):
         for time, share in ((1.0, 0.9 * GAIN), (2.0, float("nan")), (3.0, -1.5 * GAIN), (4.0, 2.9 * GAIN), (5.0, 20.0)):
             watch.check(share, time)
     first, second = [record.getMessage() for record in caplog.records]
-    assert first.startswith("t = 3 s: -0.015 of all converted energy") and "shorten" in first
+    assert first.startswith("t = 3 s: -0.015 of all converted energy") and "reduce the time step" in first
     assert second.startswith("t = 5 s: 20 of all converted energy")
 
 

@@ -9,7 +9,7 @@ import pytest
 
 from geomech.coupling import Coupling
 from geomech.coupling.splitting.block_splitting import split_blocks
-from geomech.coupling.splitting.part_initial_stress import paid_stress
+from geomech.coupling.splitting.part_initial_stress import affordable_stress
 from geomech.model import (
     Blocks,
     Cracks,
@@ -52,7 +52,7 @@ def test_parts_store_no_more_than_the_whole_and_its_cracks_did(share, lean):
     had, asked = energy(blocks, state), energy(split.blocks, split.state)
     assert asked > had
     stored = share * (asked - had)
-    paid = paid_stress(split, blocks, state, ROCK.compliance()[None].repeat(2, axis=0), {0: stored})
+    paid = affordable_stress(split, blocks, state, ROCK.compliance()[None].repeat(2, axis=0), {0: stored})
     assert energy(split.blocks, paid) == pytest.approx(had + min(stored, asked - had), rel=1e-12)
     if share >= 1.0:
         np.testing.assert_allclose(paid.stress, split.state.stress, rtol=1e-12)

@@ -77,7 +77,7 @@ def test_tips_without_room_are_judged_by_kinks_of_no_length():
 
 def test_what_trial_kinks_cannot_do_is_refused():
     for growth, message in (
-        (GrowthSettings("mts", trial_kink=1e-3), 'by the criterion "f", not by'),
+        (GrowthSettings("mts", trial_kink=1e-3), 'the criterion "f", not'),
         (GrowthSettings("f", trial_kink=-1.0), "trial_kink must be a length"),
         (GrowthSettings("x"), "no growth criterion 'x'"),
     ):

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from geomech import ddm
-from geomech.ddm.growth.initiation import bear, births, material_length, overstress
+from geomech.ddm.growth.initiation import add_new_cracks, material_length, new_cracks, overstress
 from geomech.model import Cracks, DdmSettings, GrowthSettings, Material
 from geomech.reference.cracks.fracture import EDGE_CRACK
 
@@ -56,7 +56,7 @@ def test_hole_in_tension_cracks_where_kirsch_has_it():
     errors = []
     for n in (24, 48, 96):
         solution = solved(ddm.BodyLoad(remote_stress=[0.0, 5e6, 0.0]), holes=[polygon(n)])
-        pair = births(solution, ROCK, SURFACE)
+        pair = new_cracks(solution, ROCK, SURFACE)
         assert sorted(round(b.start[0], 2) for b in pair) == [-0.1, 0.1]
         for b in pair:
             assert (b.kind, b.place) == ("tension", "surface")
@@ -73,7 +73,7 @@ def test_mean_over_a_distance_of_the_kirsch_field():
     its sides (1 % at 96) is left in the first points."""
     d = 0.02
     settings = GrowthSettings(increment=5e-3, initiation="surface", initiation_distance=d)
-    first = births(solved(ddm.BodyLoad(remote_stress=[0.0, 5e6, 0.0]), holes=[polygon(96)]), ROCK, settings)[0]
+    first = new_cracks(solved(ddm.BodyLoad(remote_stress=[0.0, 5e6, 0.0]), holes=[polygon(96)]), ROCK, settings)[0]
     far = RADIUS + d
     mean = (2 * d + RADIUS * (1 - RADIUS / far) + RADIUS * (1 - (RADIUS / far) ** 3)) / (2 * d)
     assert first.overstress == pytest.approx(mean, rel=3e-3)
@@ -120,7 +120,7 @@ def test_a_pressed_block_fails_along_coulomb_planes():
     """Uniaxial compression at 2c cos φ/(1 − sin φ): planes at 45° − φ/2 to the load."""
     strength = 2 * ROCK.cohesion * math.cos(ROCK.friction_angle) / (1 - math.sin(ROCK.friction_angle))
     solution = solved(ddm.BodyLoad(remote_stress=[0.0, -strength, 0.0]), [block(0.05, 0.1)])
-    found = births(solution, ROCK, GrowthSettings(increment=2e-3, initiation="everywhere"))
+    found = new_cracks(solution, ROCK, GrowthSettings(increment=2e-3, initiation="everywhere"))
     assert {b.place for b in found} == {"surface", "rock"}
     for b in found:
         assert b.kind == "shear" and b.overstress == pytest.approx(1.0, rel=1e-3)
@@ -129,7 +129,7 @@ def test_a_pressed_block_fails_along_coulomb_planes():
     starts = np.array([b.start for b in found])
     gaps = np.hypot(*(starts[:, None] - starts[None]).transpose(2, 0, 1)) + np.eye(len(starts))
     assert gaps.min() >= 10e-3 * (1 - 1e-12)  # five increments
-    grown = bear(NONE, lambda b: [block(0.05, 0.1)], found, 4)
+    grown = add_new_cracks(NONE, lambda b: [block(0.05, 0.1)], found, 4)
     assert grown.n_cracks == len(found) and (grown.birth_cycle == 4).all()
     ddm.Body([block(0.05, 0.1)], grown, ROCK)  # refuses networks that are not sound
 
@@ -139,11 +139,11 @@ def test_a_face_of_a_crack_can_crack():
     angles."""
     crack = Cracks.from_polylines([[[-0.05, 0.0], [0.05, 0.0]]], aperture=math.inf)
     solution = solved(ddm.BodyLoad(remote_stress=[4e6, 0.0, 0.0]), cracks=crack)
-    found = births(solution, ROCK, GrowthSettings(increment=2e-3, initiation="surface"))
+    found = new_cracks(solution, ROCK, GrowthSettings(increment=2e-3, initiation="surface"))
     # Uniform tension σ is not disturbed by a crack along it.
     assert found[0].overstress == pytest.approx(0.8, rel=1e-9) and found[0].place == "face"
     assert abs(found[0].end[0] - found[0].start[0]) < 1e-9
-    grown = bear(crack, lambda b: [], found, 1)
+    grown = add_new_cracks(crack, lambda b: [], found, 1)
     junctions = np.flatnonzero(grown.valence == 3)
     assert len(junctions) == len(found) and grown.names[0] == "crack 0"
     assert grown.lengths[grown.crack == 0].sum() == pytest.approx(0.1, rel=1e-14)
@@ -154,13 +154,13 @@ def test_a_face_of_a_crack_can_crack():
 def test_nothing_is_born_unasked_or_without_strength_or_room():
     load = ddm.BodyLoad(remote_stress=[0.0, 50e6, 0.0])
     solution = solved(load, holes=[polygon(24)])
-    assert births(solution, ROCK, GrowthSettings()) == []
-    assert births(solution, Material("steel", 2e11, 0.3), SURFACE) == []
-    with pytest.raises(ValueError, match=r"no place .* 'inside'"):
-        births(solution, ROCK, GrowthSettings(initiation="inside"))
+    assert new_cracks(solution, ROCK, GrowthSettings()) == []
+    assert new_cracks(solution, Material("steel", 2e11, 0.3), SURFACE) == []
+    with pytest.raises(ValueError, match=r"initiation must be one of .* 'inside'"):
+        new_cracks(solution, ROCK, GrowthSettings(initiation="inside"))
     # A crack that stands before the wall at one side leaves no room there.
     wall = Cracks.from_polylines([[[0.104, -0.03], [0.104, 0.03]]])
-    starts = [b.start for b in births(solved(load, cracks=wall, holes=[polygon(24)]), ROCK, SURFACE)]
+    starts = [b.start for b in new_cracks(solved(load, cracks=wall, holes=[polygon(24)]), ROCK, SURFACE)]
     assert starts and all(x < 0.09 for x, _ in starts)
 
 
@@ -193,7 +193,7 @@ def test_a_sharp_notch_breaks_at_its_toughness():
     for strength in (8e6, 12e6, 20e6):
         rock = Material("rock", 17e9, 0.21, k_ic=1e6, tensile_strength=strength)
         distance = material_length(rock)
-        (first,) = births(
+        (first,) = new_cracks(
             solution, rock, GrowthSettings(increment=2e-3, initiation="surface", initiation_distance=distance)
         )
         assert first.start == (width - depth, 0.0)
@@ -201,5 +201,5 @@ def test_a_sharp_notch_breaks_at_its_toughness():
         off.append(first.overstress * rock.k_ic / k_i - 1)
         assert 0 < off[-1] < 0.12 * distance / depth
     assert off[2] < 0.01
-    cracked = bear(NONE, lambda b: [notched], [first], 1)
+    cracked = add_new_cracks(NONE, lambda b: [notched], [first], 1)
     ddm.Body([notched], cracked, ROCK)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from geomech.ddm.growth.path_correction import LOOKS, TOLERANCE, Chords, Remembered
+from geomech.ddm.growth.path_correction import TOLERANCE, TRIALS, Chords, Remembered
 from geomech.model import TIP, Cracks
 
 
@@ -20,7 +20,7 @@ def stepped(tips, ask, memory) -> tuple[float, int, Remembered]:
     chords = Chords(tips, None if memory is None else {(0.0, 0.0): memory})
     tips["angle"] = chords.first
     look = 0
-    while look < LOOKS:
+    while look < TRIALS:
         look += 1
         angle = float(tips["angle"][0])
         ends = np.array([[-1.0, 0.0], [0.0, 0.0], [np.cos(angle), np.sin(angle)]])

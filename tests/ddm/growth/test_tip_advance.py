@@ -336,7 +336,7 @@ def test_bad_tips_are_refused():
     with pytest.raises(ValueError, match="not a tip"):
         advance(cracks, lambda b: [], middle, SETTINGS, np.ones(2), 1)
     tips["angle"] = np.nan
-    with pytest.raises(ValueError, match="no finite angle"):
+    with pytest.raises(ValueError, match="is not finite"):
         advance(cracks, lambda b: [], tips, SETTINGS, np.ones(2), 1)
 
 

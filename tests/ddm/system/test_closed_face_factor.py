@@ -5,7 +5,7 @@ import pytest
 
 from geomech import ddm
 from geomech.ddm.system import schur_complement
-from geomech.ddm.system.closed_face_factor import HeldFactor
+from geomech.ddm.system.closed_face_factor import ClosedFaceFactor
 from geomech.ddm.system.contact_rows import Rows
 from geomech.ddm.system.dense_lu import Factor
 from geomech.model import Cracks, JointLaw, Material
@@ -40,7 +40,7 @@ class Inverse:
 @pytest.mark.parametrize("transposed", [False, True])
 def test_solutions(transposed):
     matrix, rows, own, rng = a_problem()
-    prescribed = HeldFactor(rows, Factor(matrix, "open"), Inverse(matrix), "held")
+    prescribed = ClosedFaceFactor(rows, Factor(matrix, "open"), Inverse(matrix), "held")
     right = rng.normal(size=(len(own), 3))
     expected = np.linalg.solve(own.T if transposed else own, right)
     np.testing.assert_allclose(prescribed.solve(right, transposed), expected, atol=1e-10)

@@ -44,7 +44,7 @@ def test_a_changed_state_is_solved_and_goes_through_a_checkpoint(transposed, tmp
     base = ContactBase(Factor(equations(matrix, before), "base"), before.mixed[free])
     of = BaseOf(base, WholeMatrix(SimpleNamespace(n_unknowns=n), matrix), at, PER)
     border = of.border(after)
-    assert min(len(border.new), len(border.gone), len(border.turned)) > 0
+    assert min(len(border.new), len(border.removed), len(border.changed)) > 0
     own = equations(matrix, after)
     right = rng.normal(size=(len(own), 2))
     expected = np.linalg.solve(own.T if transposed else own, right)

@@ -87,7 +87,7 @@ def test_an_old_checkpoint_is_named_and_not_unpickled(tmp_path):
     marker, path = tmp_path / "ran", tmp_path / "cycle_0000007.checkpoint"
     path.write_bytes(json.dumps(HEAD | {"format": 1}).encode() + b"\n" + pickle.dumps(_Runs(marker)))
     assert checkpoint_file.read_header(path) == {"format": 1}
-    with pytest.raises(NotResumable, match="of format 1, but this version of geomech reads format 3"):
+    with pytest.raises(NotResumable, match="of format 1, but this version of geomech reads format 4"):
         checkpoint_file.read(path)
     assert not marker.exists()
 
