@@ -61,7 +61,7 @@ class DeflectedBlocks:
         order: np.ndarray | None = None,
     ) -> None:  # fmt: skip
         self.blocks = blocks
-        self.order = np.where(fixed, 1, blocks.order if order is None else order).astype(np.int64)
+        self.order = np.where(fixed, 1, np.asarray(blocks.order if order is None else order)).astype(np.int64)
         self.basis = DeflectionBasis.of(blocks.vertices, blocks.next_vertex, blocks.vertex_start, self.order)
         self.rows = np.where(fixed, 0, 1 + -(-n_deflections(self.order) // 6)).astype(np.int64)
         self.bending = np.flatnonzero(self.order > 1)
