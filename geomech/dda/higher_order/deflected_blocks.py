@@ -129,14 +129,6 @@ class DeflectedBlocks:
         """R P (n, 2, m) at undeformed ``points`` (n, 2) of blocks ``owner`` (n,) rotated by ``angle`` (n_blocks,)."""
         return np.einsum("nab,nbj->naj", rotation_of(angle[owner]), self.basis.displacement(points, owner))
 
-    def displaced(self, vertices: np.ndarray, points: np.ndarray, owner: np.ndarray, angle: np.ndarray, q: np.ndarray):
-        """(n, 2) m: displacement of ``points`` (n, 2) due to deflections ``q`` (k,).
-
-        The blocks ``owner`` (n,) have these strained ``vertices`` and are rotated by ``angle`` (n_blocks,).
-        """
-        undeformed = self.material_points(vertices, points, owner)
-        return np.einsum("naj,nj->na", self.directions(undeformed, owner, angle), self.padded(q)[owner])
-
     @cached_property
     def _outline(self) -> tuple[np.ndarray, np.ndarray]:
         """P (n, k, 2, m) at k undeformed points of n edges of bending blocks, their ends included, and the blocks
