@@ -37,7 +37,7 @@ from .load_pass import Balance, balanced, toughness
 from .load_transfer.load_imbalance import LoadBalance
 from .load_transfer.unbounded_rock import out_of_sight, solved_pass
 from .monitoring.collapse import collapse_in_situ, lost, relax, unsupported
-from .monitoring.energy_check import BendingWatch, BudgetWatch, GrowthWatch
+from .monitoring.energy_check import BendingWatch, BudgetWatch, GrowthWatch, check_dissipation
 from .monitoring.mechanism import Mechanism
 
 if TYPE_CHECKING:
@@ -220,7 +220,9 @@ class Coupling:
             self.between()
             stopped = yield from self._load_step()
             if stopped:
-                return
+                break
+        if not self.endless:
+            check_dissipation(self.now.budget, self.now.state.time, self.static)
 
     def _load_step(self):
         """All passes at one load. Returns True when a stop event has occurred."""

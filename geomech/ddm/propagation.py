@@ -19,6 +19,7 @@ import numpy as np
 from ..model import TIP, Cracks, DdmSettings, Event, GrowthSettings, Material
 from .body import Body
 from .fracture.f_criterion import apply_criterion, check_criterion
+from .growth.cut_off_parts import cutting_segments
 from .growth.initiation import NewCrack, add_new_cracks, new_cracks
 from .growth.path_correction import Memory, corrected
 from .growth.tie_tolerance import reached
@@ -129,14 +130,15 @@ class _Run:
         for self.number in range(max_steps):
             try:
                 self.body = self._body(cracks, self.body)
+                if joined and not self.body.supports and cutting_segments(self.body).any():
+                    yield self._split(cracks, "cracks have cut off a part")
+                    return
                 self.solution, tips = self._settled()
             except (np.linalg.LinAlgError, NotConverged) as failure:
                 # A part that has been cut off is loose between closed faces and has no unique equilibrium.
                 if not self.number or (isinstance(failure, NotConverged) and not joined):
                     raise
-                at = cracks.nodes.mean(axis=0)
-                lost = self._event("split", at, str(failure))
-                yield Step(self.number, self.factor, cracks, None, np.empty(0, TIP), None, (lost,))
+                yield self._split(cracks, str(failure))
                 return
             growth, born = self._grow(tips), ()
             if growth is None:
@@ -146,6 +148,10 @@ class _Run:
             if growth is None:
                 return
             cracks, joined = growth.cracks, joined or bool(growth.joins)
+
+    def _split(self, cracks: Cracks, detail: str) -> Step:
+        lost = self._event("split", cracks.nodes.mean(axis=0), detail)
+        return Step(self.number, self.factor, cracks, None, np.empty(0, TIP), None, (lost,))
 
     def _body(self, cracks: Cracks, previous: Body | None) -> Body:
         # Reuse the body of the trial step if it was accepted.

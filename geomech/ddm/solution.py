@@ -38,7 +38,8 @@ class Solution:
 
     ``jumps`` (n_unknowns,): slip and opening at the collocation nodes of the crack elements, times 2μ; ``closed``:
     closed nodes; ``solves``: iterations of the contact. ``memory`` and ``began``: memory of the faces after and before
-    this load (None if all faces are smooth); ``face_load`` (n_unknowns,): traction of the load on closed faces, Pa.
+    this load (None if all faces are smooth); ``face_load`` (n_unknowns,): traction of the load on closed faces, Pa;
+    ``face_traction`` (n_unknowns,): of the solution on the faces, Pa.
     """
 
     def __init__(
@@ -55,7 +56,7 @@ class Solution:
         self.body, self.load, self.solves = body, applied.load, answer.solves
         self.closed, self.memory, self.began = answer.closed, answer.memory, answer.began
         self._applied, self._eliminated = applied, eliminated
-        self.jumps, self._traction = answer.jumps, answer.traction
+        self.jumps, self.face_traction = answer.jumps, answer.traction
         self._boundary_load, self.face_load, self._imposed = boundary_load, face_load, imposed
         self._edge_density = edge_density
 
@@ -66,7 +67,7 @@ class Solution:
 
     def scaled(self, load: BodyLoad, factor: float) -> Solution:
         """The solution for ``load``, which is ``factor`` (positive) times this one; valid if it `scales`."""
-        answer = FaceSolution(factor * self.jumps, factor * self._traction, self.closed, 0)
+        answer = FaceSolution(factor * self.jumps, factor * self.face_traction, self.closed, 0)
         parts = (factor * x for x in (self._boundary_load, self.face_load, self._imposed))
         edge_density = None if self._edge_density is None else factor * self._edge_density
         return Solution(self.body, apply(load, self.body), factor * self._eliminated, answer, *parts, edge_density)
@@ -173,7 +174,7 @@ class Solution:
         points, values = c.samples
         jumps = self.jumps.reshape(c.n, 2, c.per) @ values / (2 * body.material.shear_modulus)
         pad = [0, *range(c.per), c.per - 1]
-        traction = self._traction.reshape(c.n, 2, c.per)[:, :, pad]
+        traction = self.face_traction.reshape(c.n, 2, c.per)[:, :, pad]
         return CrackFaces(
             segment=c.source,
             points=points,
@@ -239,7 +240,7 @@ class Solution:
         follows = body._w @ self.jumps if self.jumps.size else np.zeros_like(self._u)
         on_boundary = body._outside.times(self._x + follows, rigid_part=follows) + self._boundary_load
         on_faces = (
-            body.crack_system.matrix @ self.jumps + body._cg @ (self._x + follows) + self.face_load - self._traction
+            body.crack_system.matrix @ self.jumps + body._cg @ (self._x + follows) + self.face_load - self.face_traction
         )
         scale = self._acting
         left = max((float(np.abs(x).max()) for x in (on_boundary, on_faces) if x.size), default=0.0)
@@ -259,7 +260,7 @@ class Solution:
             # as elements shrink.
             on_boundary = on_boundary - body._outside.known @ imposed
             on_faces = on_faces - body._c_known @ imposed
-        sizes = (on_boundary, on_faces, self._traction, imposed / body._extent)
+        sizes = (on_boundary, on_faces, self.face_traction, imposed / body._extent)
         return max((float(np.abs(x).max()) for x in sizes if x.size), default=0.0)
 
     @cached_property

@@ -11,7 +11,7 @@ from geomech import dda
 from geomech.bench.slopes.drawn_slopes import drawn, problem_of
 from geomech.bench.slopes.sliding_scenes import Slope
 from geomech.dda.joint_laws.penalty_springs import RESOLVED, SOFTEST, penalties, resolved
-from geomech.model import OPEN, Blocks, DdaSettings, History, JointLaw, Loads, Material
+from geomech.model import OPEN, Blocks, DdaSettings, History, JointLaw, Loads, Material, State
 
 ROCK = Material("rock", 20e9, 0.25, density=2600.0)
 MOTION = DdaSettings(time_step=5e-3, dynamic_factor=1.0)
@@ -69,6 +69,25 @@ def test_statics_after_motion_keep_the_forces():
     still = dda.BlockSystem(blocks, [ROCK], [law], settings=replace(MOTION, springs="resolved")).in_statics()
     result = still.step(moved.state, WEIGHT)
     assert np.abs(result.state.vertices - moved.state.vertices).max() < 1e-7
+
+
+def test_forces_that_new_faces_inherit_are_kept_as_their_springs_are_eased():
+    """A column bears its weight in statics, and its contacts are made anew with the forces they have, as those of a
+    block that a crack has cut; in motion they go on with these."""
+    blocks, law = column(4), JointLaw("joint", friction_angle=0.5)
+    moving = dda.BlockSystem(blocks, [ROCK], [law], settings=replace(MOTION, springs="resolved"))
+    still, state = moving.in_statics(), State.at_rest(blocks)
+    for _ in range(3):
+        state = still.step(state, WEIGHT, 1.0).state
+    found, rows = still.contacts_near(state), state.contacts
+    assert np.array_equal(found.vertex, rows["vertex"])
+    which = np.arange(len(rows))
+    forces = dda.InheritedContacts(which, rows["normal_force"], rows["shear_force"], rows["gap"], rows["slip"])
+    state = replace(state, contacts=still.inherited_contacts(state, found, forces))
+    result = moving.step(state, WEIGHT)
+    pressed = rows["state"] != OPEN
+    assert (result.contacts["stiffness"][pressed] < 0.02 * rows["stiffness"][pressed]).all()
+    assert result.contacts["normal_force"] == pytest.approx(rows["normal_force"], rel=1e-3, abs=1.0)
 
 
 def test_bonds_and_joints_with_a_stiffness_of_their_own_stay():

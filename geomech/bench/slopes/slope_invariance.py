@@ -54,6 +54,8 @@ FIRST, FRICTIONLESS_STEP = 3, 3e-3
 LEAST_SHARE = 0.01
 #: Noise of a vertex, relative to the extent of the blocks: round-off of coordinates.
 NOISE = 1e-12
+#: Differences of displacement below this multiple of the noise are those of the vertices themselves.
+ABOVE_NOISE = 10.0
 #: Centroids of a block in two variants are closer to each other than this part of the extent: parts of a block cut by
 #: cracks depend on the crack paths, and their distance is compared.
 SAME_BLOCK = 1e-2
@@ -93,7 +95,11 @@ BOUNDS = {
     },
 }
 #: Words of warnings in which a run says that its result is unreliable.
-WARNED = ("nothing holds", *sorted({words for invariant in INVARIANTS.values() for words in invariant.reported}))
+WARNED = (
+    "nothing holds",
+    "does not resolve vibrations",
+    *sorted({words for invariant in INVARIANTS.values() for words in invariant.reported}),
+)
 _MODULES = (
     "drawn_slopes", "limited_runs", "moved_mass", "random_slopes", "refusals", "slope_invariance", "slope_invariants",
 )  # fmt: skip
@@ -301,8 +307,8 @@ def _until(problem: Problem, end: float) -> Problem:
 
 
 def _difference(base: _Run, run: _Run, by: Isometry) -> float | None:
-    """The largest of: difference of a block's displacement over the largest displacement, of its position over the
-    extent, or of an energy over the largest energy; None if the blocks are not the same."""
+    """The largest of: difference of a block's displacement, beyond that of the vertices, over the largest displacement,
+    of its position over the extent, or of an energy over the largest energy; None if the blocks are not the same."""
     from scipy.spatial import cKDTree
 
     one, other = base.at, run.at
@@ -313,7 +319,8 @@ def _difference(base: _Run, run: _Run, by: Isometry) -> float | None:
     if len(set(at.tolist())) < len(at) or not (distance < SAME_BLOCK * extent).all():
         return None
     back = other.displacement[at] @ by.matrix
-    off = np.hypot(*(back - one.displacement).T).max(), np.abs(run.energies - base.energies).max()
+    away = max(0.0, np.hypot(*(back - one.displacement).T).max() - ABOVE_NOISE * NOISE * extent)
+    off = away, np.abs(run.energies - base.energies).max()
     size = np.hypot(*one.displacement.T).max(), np.abs(base.energies).max()
     shares = [float(each / of) if of > 0 else 0.0 for each, of in zip(off, size)]
     return max(*shares, float(distance.max()) / extent)

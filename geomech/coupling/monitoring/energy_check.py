@@ -1,5 +1,5 @@
-"""Warnings about the energy of a run: unexplained energy, cracks that take no energy from bent blocks, and energy
-released by unstable growth in statics."""
+"""Warnings about the energy of a run: unexplained energy, vibrations that the time step does not resolve, cracks that
+take no energy from bent blocks, and energy released by unstable growth in statics."""
 
 from __future__ import annotations
 
@@ -11,6 +11,14 @@ log = logging.getLogger(__name__)
 
 #: Fraction of the fracture energy that the blocks may not have supplied: increments and steps leave some per cent.
 UNPAID = 0.25
+#: Fraction of the energy turned over that the time integration may take from blocks that still move: the work of the
+#: weight is then off by up to as much, in proportion to the time step …
+DISSIPATED = 0.05
+#: … and their kinetic energy as a fraction of it. Blocks that have come to rest have rightly lost their energy.
+IN_MOTION = 0.01
+#: Fraction of it that static steps may take. A load that acts at once leaves half of its work; what is far beyond has
+#: moved blocks that nothing held.
+UNHELD = 0.8
 
 
 class BudgetWatch:
@@ -31,6 +39,33 @@ class BudgetWatch:
             time,
             share,
         )
+
+
+def check_dissipation(budget: EnergyBudget, time: float, static: bool) -> None:
+    """Warn at the end of a run, ``time`` s, if the time integration has damped vibrations that matter to its result,
+    or, in statics, a motion from one place to another."""
+    energy, turnover = budget.last, budget.turnover
+    if static:
+        if turnover and budget.scheme > UNHELD * turnover:
+            log.warning(
+                "t = %g s: static steps have dissipated %.2g of all converted energy (scheme_loss in history.csv): on "
+                "their way blocks moved that nothing held, under a load that acts before the weight or the rock that "
+                "resists it, or as a mechanism; where they rest depends on the time step. Apply weight and water "
+                "together, or follow the motion with dda.dynamic_factor = 1",
+                time,
+                budget.scheme / turnover,
+            )
+        return
+    if energy is None or not turnover or energy.kinetic < IN_MOTION * turnover or budget.scheme < DISSIPATED * turnover:
+        return
+    log.warning(
+        "t = %g s: the time integration has taken %.2g of all converted energy from blocks that still move (scheme_loss in "
+        "history.csv): the step does not resolve vibrations or impacts that matter to the result, whose error is of "
+        'that order and shrinks with dda.time_step_s. dda.equilibrium = "start" leaves out the swing of a load that '
+        "acts at once; dda.newmark = [0.25, 0.5] dissipates nothing",
+        time,
+        budget.scheme / turnover,
+    )
 
 
 class BendingWatch:

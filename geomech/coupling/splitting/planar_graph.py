@@ -1,7 +1,7 @@
 """The planar graph of a block's outline, holes and cracks; its faces are the parts of a split block.
 
-Nodes are already shared (mouths lie on edges, intersections have a node), so nothing is snapped here and coordinates
-are kept exactly.
+Nodes are already shared (mouths lie on edges, intersections have a node). A mouth that coincides with a vertex up to
+round-off is that vertex; coordinates are kept exactly.
 """
 
 from __future__ import annotations
@@ -19,8 +19,9 @@ _log = logging.getLogger(__name__)
 
 #: Faces smaller than this fraction of the block's area are merged into a neighbour.
 SLIVER_AREA = 1e-8
-#: A mouth lies on an edge if its distance from it is less than this fraction of the block's size.
-ON_EDGE = 1e-9
+#: A mouth lies on an edge, or at a vertex, if its distance is less than this fraction of the block's size, as in
+#: `ddm.mesh.elements`.
+ON_EDGE = 1e-7
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,12 +74,10 @@ class BlockGraph:
                         f"{cracks.names[cracks.crack[row]]}: its mouth ({p[0]:g}, {p[1]:g}) is {distance:.3g} m off "
                         f"the boundary of {blocks.names[block]}"
                     )
-                # A mouth that coincides with a vertex up to round-off is that vertex.
-                for end, at in ((0.0, edge), (1.0, int(blocks.next_vertex[own[edge]] - first))):
-                    if abs(along - end) * np.hypot(*(b[edge] - a[edge])) <= 1e-12 * size:
-                        node[n] = own_node[at]
-                        break
-                if n in node:
+                onward = int(blocks.next_vertex[own[edge]] - first)
+                nearest, at = (0.0, own_node[edge]) if along < 0.5 else (1.0, own_node[onward])
+                if abs(along - nearest) * np.hypot(*(b[edge] - a[edge])) <= ON_EDGE * size:
+                    node[n] = at
                     continue
                 mouths[edge].append((along, len(points)))
             known[p] = node[n] = len(points)

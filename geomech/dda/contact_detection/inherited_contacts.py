@@ -51,6 +51,7 @@ def inherited_rows(
     ):  # fmt: skip
         rows[name] = getattr(found, name)
     rows["normal_force"], rows["shear_force"], rows["gap"] = found.normal, found.shear, found.gap
+    rows["stiffness"] = found.springs.normal
     g = found.geometry
     rows["position"], rows["normal"], rows["point"], rows["length"] = g[:, 0], g[:, 1:3], g[:, 5:7], g[:, 4]
 

@@ -15,8 +15,10 @@ from ...model import JointLaw
 PENALTY_RATIO = 40.0
 #: Springs "resolved": largest stiffness in motion, in units of m/dt² with m the mass of the lighter block, and
 #: smallest, relative to E'. Stiffer springs oscillate within the step, which does not resolve them, and after an impact
-#: contacts open and close by micrometres. (A slope of 1 000 blocks at 5 ms: 7 open–close iterations per step instead of
-#: 16.)
+#: contacts open and close by micrometres. (A slope of 1 000 blocks at 5 ms: 9 open–close iterations per step instead of
+#: 14. Without the change of loaded springs, if contacts take the stiffness as they close and keep it until they open, no
+#: energy is added. But 70 % of that slope's contacts have not opened after 2 s; ten sliding slopes take 9 % fewer
+#: iterations instead of 30 %; and in walls struck at 3 to 30 m/s, 60 cuts in 400 steps instead of 9.)
 RESOLVED, SOFTEST = 100.0, 0.5
 #: Between blocks of different E' the geometric mean is used, limited to this multiple of the smaller one. With the
 #: larger E' alone, walls of two rocks with a ratio of 1000 do not converge, and a ratio of 10⁶ costs five digits; with

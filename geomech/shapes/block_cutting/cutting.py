@@ -24,6 +24,8 @@ from .planar_arrangement import Arrangement, arrange, following_in, gathered
 
 #: Two edges at a node continue straight if they turn by less than 5° (its cosine), allowing for hand-drawn traces.
 _STRAIGHT_ON = 0.9962
+#: Sides that turn by less than this, rad, are straight if rounding explains the turn.
+_NO_TURN = 1e-5
 
 
 @dataclass(frozen=True, eq=False)
@@ -359,10 +361,11 @@ def _blocks(
     before[following] = np.arange(len(points))
     a, b = points - points[before], points[following] - points
     off = np.abs(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0])
-    short = np.minimum(np.hypot(*a.T), np.hypot(*b.T))
-    # A neighbour's corner on a straight side is not a corner of this block. The turn, over the longer edge, is within
-    # the grid; next to a short edge it may be larger, and the corner stays.
-    flat = (off <= 8 * grid * short) & (np.einsum("ij,ij->i", a, b) > 0) & (label == label[before])
+    short, long = np.sort([np.hypot(*a.T), np.hypot(*b.T)], axis=0)
+    # A neighbour's corner on a straight side is not a corner of this block: it lies within a few steps of the grid off
+    # the side, and the side turns there by no more than rounding makes it turn.
+    flat = (off <= np.minimum(8 * grid, _NO_TURN * short) * long) & (label == label[before])
+    flat &= np.einsum("ij,ij->i", a, b) > 0
     kept = np.flatnonzero(~flat)
     owner = np.repeat(np.arange(len(loops)), count)[kept]
     count = np.bincount(owner, minlength=len(loops))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 import re
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 
@@ -18,6 +19,7 @@ from geomech.model import (
     Blocks,
     Cracks,
     DdaSettings,
+    EdgeTraction,
     GrowthSettings,
     History,
     JointLaw,
@@ -125,3 +127,70 @@ def test_a_scheme_that_gives_without_growth_is_told_of(caplog):
         assert grown.released == 0.5 and not caplog.records
         EnergyBudget().after(StepEnergy(**step), 1.0)
     assert "without work" in caplog.records[0].getMessage()
+
+
+def weighed_column(dt: float, end: float, **settings) -> Problem:
+    """A column of rock on the ground, to which the weight comes at once."""
+    column, ground = (
+        np.array([[-w, y], [w, y], [w, y + h], [-w, y + h]]) for w, y, h in ((1.0, 0.0, 10.0), (2, -1, 1))
+    )
+    return Problem(
+        title="a column under sudden weight",
+        blocks=Blocks.from_polygons([column, ground], fixed=[False, True]),
+        cracks=Cracks.from_polylines([]),
+        materials=(Material("rock", 1e9, 0.2, 2500.0),),
+        joints=(JointLaw("joint", friction_angle=0.5),),
+        loads=Loads(gravity=History.constant([0.0, -9.81])),
+        dda=DdaSettings(time_step=dt, dynamic_factor=1.0, **settings),
+        run=RunSettings(end_time=end),
+    )
+
+
+def of_dissipation(problem: Problem, caplog) -> tuple[float, float | None]:
+    """The work of gravity in a run of ``problem``, and the part of the energy that a warning says was dissipated."""
+    caplog.clear()
+    with caplog.at_level(logging.WARNING):
+        *_, last = cycles(problem)
+    told = [re.search(r"integration has taken (\S+) of all", record.getMessage()) for record in caplog.records]
+    shares = [float(each[1]) for each in told if each]
+    return last.statistics["gravity_work"], shares[0] if shares else None
+
+
+def test_vibrations_that_the_step_does_not_resolve_are_told_of(caplog):
+    """The lowest vibration of the column lasts 0.06 s: after a third of it, coarse steps are off by about what they
+    say; no step says so once the column rests, or begins in equilibrium, or if the scheme dissipates nothing."""
+    end = 0.02
+    fine, quiet = of_dissipation(weighed_column(end / 256, end), caplog)
+    assert quiet is None
+    for steps in (4, 8):
+        work, told = of_dissipation(weighed_column(end / steps, end), caplog)
+        assert told is not None and 0.2 * told < abs(work / fine - 1.0) < 2.0 * told
+    for rests in (
+        weighed_column(0.01, 3.0),
+        weighed_column(end / 4, end, equilibrium="start"),
+        weighed_column(end / 4, end, newmark=(0.25, 0.5)),
+    ):
+        assert of_dissipation(rests, caplog)[1] is None
+
+
+@pytest.mark.parametrize("together", [True, False])
+def test_static_steps_that_move_what_nothing_holds_are_told_of(together, caplog):
+    """A tank of half the weight that water lifts, before its weight is there or as it comes: it floats off, and
+    settles."""
+    weight = 2500.0 * 9.81 * 20.0
+    lift = [0.0, 0.5 * weight]
+    problem = weighed_column(1.0, 4.0)
+    problem = replace(
+        problem,
+        dda=replace(problem.dda, dynamic_factor=0.0),
+        loads=Loads(
+            gravity=History(np.array([0.0, 3.0]), np.array([[0.0, 0.0], [0.0, -9.81]])),
+            edge_tractions=(EdgeTraction("top", History.ramp([0.0, lift[1] / 2.0 / 3.0])),)
+            if together
+            else (EdgeTraction("top", History.constant([0.0, lift[1] / 2.0])),),
+        ),
+        blocks=replace(problem.blocks, edge_name=np.array([0, 0, 1, 0, 0, 0, 0, 0]), edge_names=("", "top")),
+    )
+    with caplog.at_level(logging.WARNING):
+        *_, _last = cycles(problem)
+    assert any("nothing held" in record.getMessage() for record in caplog.records) is not together

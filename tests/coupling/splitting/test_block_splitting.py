@@ -422,3 +422,13 @@ def test_growing_cracks_fragment_a_block(seed):
             assert split_blocks(blocks, state, cracks) is None
     assert splits >= 2
     np.testing.assert_allclose(totals(blocks, state), start, rtol=1e-11, atol=1e-12 * np.abs(start).max())
+
+
+@pytest.mark.parametrize("off", [1e-15, 1e-12, -1e-12, 1e-9, -1e-9])
+def test_a_mouth_a_hair_off_a_vertex_is_at_the_vertex(off):
+    """No part gets an edge of that length, which no elastic body could have."""
+    blocks = Blocks.from_polygons([SQUARE])
+    end = SQUARE[2] * np.array([1.0, 1.0])
+    cracks = network([[off, 0.0], end + [0.0, off]], [[0, 1]], surface=[0, 1])
+    split = split_blocks(blocks, moving(blocks), cracks)
+    assert [len(split.blocks.loops(b)[0]) for b in range(2)] == [3, 3]
