@@ -1,17 +1,16 @@
-"""Kernels that are kept between runs, each with all that it calls.
+"""Cache of compiled kernels that takes account of everything a kernel calls.
 
-Numba keeps compiled code with a digest of the one file that a kernel stands in. What the kernel calls is part of its
-code, so that after an upgrade in which only that has changed the old code would be taken: here the digest is of that
-too.
+Numba stores compiled code with a digest of the file that contains the kernel. Functions of other files that the kernel
+calls are part of its code, so after a change of these alone the old code would be used. Here the digest includes them.
 
-Numba leaves the copies of what a kernel calls open to whoever loads code of the same name earlier. In the run that
-compiles that is what was called, compiled by itself; in runs that find the kernel compiled it is the kernel's own copy,
-which was optimised with it and fuses other products with sums: other last digits. Here they are the kernel's alone, and
-what only kernels call (`part`) is made machine code nowhere else.
+Numba also leaves the compiled copies of called functions open to replacement by code of the same name that was loaded
+earlier. In the run that compiles, that is the function compiled by itself; in later runs it is the kernel's own copy,
+which was optimised together with the kernel and fuses other products and sums: the last digits differ. Here the copies
+belong to the kernel alone, and functions that only kernels call (`part`) are not compiled to machine code elsewhere.
 
-Most of the time of compiling goes into Numba's inference of types. While kernels are compiled it remembers what
-operators and functions give for arguments of given types, and compares its own settings by what is set in them; a
-`part` is compiled once for all integers that are passed to it, not once for each constant.
+Most of the compilation time is type inference in Numba. While kernels are compiled, the results of inference for given
+argument types are cached, settings are compared by their values, and a `part` is compiled once for all integer
+arguments, not once for each constant.
 """
 
 from __future__ import annotations
@@ -45,12 +44,12 @@ try:
     from numba.core.targetconfig import ConfigStack, TargetConfig
     from numba.core.types.functions import BaseFunction
     from numba.core.typing.templates import _OverloadFunctionTemplate
-except ImportError:  # reported below
+except ImportError:  # logged below
     IndexDataCacheFile = UserProvidedCacheLocator = JITCodeLibrary = Compiler = object
     ConfigStack = TargetConfig = BaseFunction = DefaultOptions = _OverloadFunctionTemplate = object
     Dispatcher = type(njit(lambda: None))
 
-#: What of Numba's inner parts is relied on; they may move in any version.
+#: Internals of Numba that are used here; they may change in any version.
 _INNER = (
     (JITCodeLibrary, ("_finalize_final_module", "_finalize_dynamic_globals", "_get_module_for_linking",
                       "_optimize_functions", "_raise_if_finalized")),
@@ -68,12 +67,12 @@ _INNER = (
 
 
 def moved() -> list[str]:
-    """What of `_INNER` this Numba has not got."""
+    """The members of `_INNER` that this version of Numba lacks."""
     return [f"{owner.__name__}.{name}" for owner, names in _INNER for name in names if not hasattr(owner, name)]
 
 
-#: Whether kernels are compiled and kept our way; else by Numba's own, whose last digits may differ between the run that
-#: compiles and later ones, and which does not see that a file has changed that a kernel calls into.
+#: Whether kernels are compiled and cached as described above. Otherwise Numba's own cache is used: last digits may
+#: differ between the run that compiles and later ones, and changes in called files are not noticed.
 OWN_WAY = not moved()
 if not OWN_WAY:
     log.warning("Numba %s has not got %s: kernels are kept in its own way", numba_version, ", ".join(moved()))
@@ -84,29 +83,29 @@ if kernel_place().instead_of is not None:
     )  # fmt: skip
 
 
-#: Further options of `kept` and `part` for kernels that make no arrays and call none that do: Numba then does not count
-#: who holds an array, which in loops that hand arrays to many small functions takes most of the time.
+#: Options of `kept` and `part` for kernels that allocate no arrays, neither themselves nor in functions they call: they
+#: switch off reference counting, which takes most of the time in loops that pass arrays to many small functions.
 UNCOUNTED = {"_nrt": False} if hasattr(DefaultOptions, "_nrt") else {}
 
 
 def kept(**options) -> Callable:
-    """``njit(cache=True, **options)`` for a kernel that Python calls: its compiled code goes with the sources of all
-    that it calls within its package, and calls nothing that is compiled elsewhere."""
+    """``njit(cache=True, **options)`` for a kernel that Python calls. The cached code depends on the sources of
+    everything it calls within its package, and uses no code compiled elsewhere."""
 
     def compiled(function: Callable) -> Dispatcher:
         if not OWN_WAY:
             return njit(cache=True, **options)(function)
-        # Only while this one is declared: other packages' kernels are theirs.
+        # Set only while this kernel is declared: other packages keep their own cache.
         before = config.CACHE_LOCATOR_CLASSES, config.CACHE_DIR
         config.CACHE_LOCATOR_CLASSES, config.CACHE_DIR = f"{__name__}.WithCalled", kernel_place().folder
         try:
             made = njit(cache=True, no_cfunc_wrapper=True, pipeline_class=_KernelCompiler, **options)(function)
         finally:
             config.CACHE_LOCATOR_CLASSES, config.CACHE_DIR = before
-        if isinstance(made, Dispatcher):  # not where compiling is switched off
+        if isinstance(made, Dispatcher):  # False if compilation is switched off
             file = made._cache._cache_file
             file.__class__ = _CacheFile
-            # Not the name that Numba itself gives: what stands there has no sums.
+            # Differs from Numba's own name: those files have no checksums.
             file._index_path = str(Path(file._index_path).with_suffix(".summed.nbi"))
         return made
 
@@ -114,13 +113,13 @@ def kept(**options) -> Callable:
 
 
 def part(**options) -> Callable:
-    """``njit(**options)`` for what kernels alone call: it is compiled with them."""
+    """``njit(**options)`` for functions that only kernels call: they are compiled with the kernels."""
 
     def compiled(function: Callable) -> Dispatcher:
         if not OWN_WAY:
             return njit(**options)(function)
         made = njit(no_cpython_wrapper=True, no_cfunc_wrapper=True, pipeline_class=_PartCompiler, **options)(function)
-        # Python cannot call it, and is refused with a message; nothing is stored where a call would look for it.
+        # A call from Python is refused with a message; nothing is stored where such a call would look for it.
         made._insert = lambda *signature, **how: None
         made._compile_for_args = functools.partial(_refuse, function.__qualname__)
         made.get_call_template = functools.partial(_with_any_integer, made.get_call_template)
@@ -134,7 +133,7 @@ def _refuse(name: str, *args, **kwargs) -> None:
 
 
 def _with_any_integer(get_call_template: Callable, args: tuple, kws: dict) -> tuple:
-    """The call of a part with the types ``args`` and ``kws``, constants taken as integers of any value."""
+    """The call of a part with the types ``args`` and ``kws``, with constants replaced by the integer type."""
     return get_call_template(
         tuple(_plain(each) for each in args), {name: _plain(each) for name, each in kws.items()}
     )  # fmt: skip
@@ -151,7 +150,7 @@ _PLAIN = (types.Number, types.Boolean, types.Array, types.UniTuple, types.Record
 
 @contextlib.contextmanager
 def _quick_inference() -> Iterator[None]:
-    """Numba's inference of types, with `_remembered_call_type` and `_same_settings`, and its own again afterwards."""
+    """Type inference of Numba with `_remembered_call_type` and `_same_settings` in this context."""
     replaced = (
         (BaseFunction, "get_call_type", _remembered_call_type),
         (_OverloadFunctionTemplate, "_get_impl", _implementation_for_kernels),
@@ -160,7 +159,7 @@ def _quick_inference() -> Iterator[None]:
         (TargetConfig, "__hash__", _hash_of_settings),
     )
     before, collects = [(owner, name, getattr(owner, name)) for owner, name, _ in replaced], gc.isenabled()
-    # What a compiler makes is in use until it is done: looking for what is not takes a twentieth of its time.
+    # A compiler's objects are in use until it is done; garbage collection would take a twentieth of the time.
     gc.disable()
     try:
         for owner, name, ours in replaced:
@@ -178,8 +177,8 @@ _signatures: dict[tuple, list[tuple]] = {}
 
 
 def _remembered_call_type(self: BaseFunction, context, args: tuple, kws: dict):
-    """The signature of a call of ``self``, found once for the same types and settings: Numba tries all that are
-    declared, in each of several rounds of inference."""
+    """The signature of a call of ``self``, cached by types and settings: Numba tries all declared signatures in each of
+    several passes of inference."""
     if type(self) is not types.Function or kws or not all(isinstance(each, _PLAIN) for each in args):
         return _call_type(self, context, args, kws)
     settings = _settings_for_kernels()
@@ -193,8 +192,8 @@ def _remembered_call_type(self: BaseFunction, context, args: tuple, kws: dict):
 
 
 def _settings_for_kernels() -> TargetConfig:
-    """The present settings without those that make no difference to what a kernel or a part calls; of other packages'
-    functions none are the same."""
+    """The present settings without those that do not affect functions called by kernels or parts; for functions of
+    other packages, all settings."""
     settings = ConfigStack.top_or_none().copy()
     settings.no_cpython_wrapper = settings.no_cfunc_wrapper = settings.release_gil = True
     return settings
@@ -204,18 +203,18 @@ _implementation = getattr(_OverloadFunctionTemplate, "_get_impl", None)
 
 
 def _implementation_for_kernels(self: _OverloadFunctionTemplate, args: tuple, kws: dict):
-    """What a function of Numba's own is made of for these types of arguments: found once for all kernels."""
+    """Implementation of one of Numba's own functions for these argument types, cached for all kernels."""
     with ConfigStack().enter(_settings_for_kernels()):
         return _implementation(self, args, kws)
 
 
 def _as_a_part(self: _OverloadFunctionTemplate) -> Callable:
-    """Functions of Numba's own are compiled with the kernels that call them, as a `part`, and by themselves not at all."""
+    """Compile Numba's own functions as a `part` of the kernels that call them, and not separately."""
     return functools.partial(jit, no_cpython_wrapper=True, no_cfunc_wrapper=True, pipeline_class=_PartCompiler)
 
 
 def _same_settings(self: TargetConfig, other: object) -> bool:
-    """Whether two sets of settings are the same; most are by what has been set in them."""
+    """Whether two sets of settings are equal, decided mostly by the values set in them."""
     if not isinstance(other, TargetConfig):
         return NotImplemented
     return self is other or self._values == other._values or self.values() == other.values()
@@ -227,18 +226,18 @@ def _hash_of(options: tuple[str, ...]) -> int:
 
 
 def _hash_of_settings(self: TargetConfig) -> int:
-    """What Numba's own gives, which is of the names of settings alone."""
+    """Same value as Numba's own hash, which uses the names of settings only."""
     return _hash_of(tuple(self.options))
 
 
 class _Kernel(JITCodeLibrary):
-    """Machine code that calls its own copies of what it was linked with."""
+    """Machine code that calls its own copies of the functions it was linked with."""
 
     def _optimize_functions(self, module: llvm.ModuleRef) -> None:
         _optimize_defined(self, module)
 
     def _finalize_final_module(self) -> None:
-        # What other kernels are linked with stays as it was: they must find one copy, not one by each way to it.
+        # Other kernels are linked with the original: they must find one copy, not one for each path to it.
         self._shared_module = _for_linking(self._final_module)
         for function in self._final_module.functions:
             if not function.is_declaration and function.linkage == llvm.Linkage.linkonce_odr:
@@ -251,14 +250,14 @@ class _Kernel(JITCodeLibrary):
 
 
 class _Part(JITCodeLibrary):
-    """Code to be linked with, of which no machine code is made."""
+    """Code for linking, without machine code."""
 
     @property
     def codegen(self) -> _Part:
         return self
 
     def set_env(self, name: str, environment) -> None:
-        """What the code takes from Python; passed on to the kernel that is linked with it."""
+        """Store the Python environment of the code, for the kernels linked with it."""
         self.environment = name, environment
 
     def _optimize_functions(self, module: llvm.ModuleRef) -> None:
@@ -284,7 +283,7 @@ def _optimize_defined(library: JITCodeLibrary, module: llvm.ModuleRef) -> None:
 
 
 def _for_linking(module: llvm.ModuleRef) -> llvm.ModuleRef:
-    """A copy of which others take what they need, as `CPUCodeLibrary._get_module_for_linking` makes it."""
+    """A copy for linking, as by `CPUCodeLibrary._get_module_for_linking`."""
     shared = module.clone()
     for function in shared.functions:
         if not function.is_declaration and function.linkage == llvm.Linkage.external:
@@ -293,7 +292,7 @@ def _for_linking(module: llvm.ModuleRef) -> llvm.ModuleRef:
 
 
 def _environments(library: JITCodeLibrary) -> dict:
-    """Those of the parts that a ``library`` was linked with, by name."""
+    """Environments of the parts that a ``library`` was linked with, by name."""
     found = {}
     for linked in library._linking_libraries:
         found |= _environments(linked)
@@ -303,7 +302,7 @@ def _environments(library: JITCodeLibrary) -> dict:
 
 
 class _KernelCompiler(Compiler):
-    """Numba's own, into a `_Kernel`."""
+    """Numba's compiler with a `_Kernel` as output."""
 
     library = _Kernel
     message = "compiling %s"
@@ -319,14 +318,14 @@ class _KernelCompiler(Compiler):
 
 
 class _PartCompiler(_KernelCompiler):
-    """Numba's own, into a `_Part`."""
+    """Numba's compiler with a `_Part` as output."""
 
     library = _Part
     message = ""
 
 
 class _CacheFile(IndexDataCacheFile):
-    """Numba's own, with a sum of what is kept: what is damaged is compiled again, and what cannot be kept is not."""
+    """Numba's cache file with a checksum: damaged entries are compiled again, and write errors are logged."""
 
     def _load_index(self) -> dict:
         try:
@@ -357,7 +356,7 @@ class _CacheFile(IndexDataCacheFile):
     def _save_data(self, name: str, data) -> None:
         stored = self._dump(data)
         with self._open_for_write(self._data_path(name)) as file:
-            # The sum stands behind what unpickling reads.
+            # The checksum follows the data that unpickling reads.
             file.write(stored + zlib.crc32(stored).to_bytes(4, "little"))
 
     def _drop(self, path: Path, error: Exception) -> None:
@@ -366,15 +365,15 @@ class _CacheFile(IndexDataCacheFile):
 
 
 class WithCalled(UserProvidedCacheLocator):
-    """The user's folder of kernels; a kernel's stamp is of its own file, of those that it calls into, and of the
-    constants that it takes from anywhere."""
+    """The user's folder of kernels. A kernel's stamp covers its own file, the files of functions it calls, and all
+    global constants used."""
 
     def __init__(self, function: Callable, file: str) -> None:
         super().__init__(function, file)
         self._function, self._file = function, file
 
     def ensure_cache_path(self) -> None:
-        """Make it, with a note of the sources that its kernels are of; other kernels whose sources are gone, go."""
+        """Create the folder with a note of its kernels' source; remove kernels whose sources no longer exist."""
         try:
             super().ensure_cache_path()
             noted = Path(self.get_cache_path()) / SOURCE
@@ -382,7 +381,7 @@ class WithCalled(UserProvidedCacheLocator):
                 noted.write_text(str(Path(self._file).absolute()), encoding="utf-8")
             _prune_once(noted.parent.parent)
         except OSError as error:
-            log.debug("%s: %s", self.get_cache_path(), error)  # reported when a kernel cannot be kept there
+            log.debug("%s: %s", self.get_cache_path(), error)  # a warning follows when a kernel cannot be stored
 
     def get_source_stamp(self) -> str:
         files, constants = compiled_in(self._function)
@@ -391,8 +390,8 @@ class WithCalled(UserProvidedCacheLocator):
 
 
 def compiled_in(function: Callable) -> tuple[set[str], dict[str, object]]:
-    """What ``function``'s compiled code is made of: the files of its package in which what it calls is defined, and so
-    on down, and the numbers and arrays that it and they take by name (module.name → value, or an array's bytes)."""
+    """Sources of the compiled code of ``function``: the files of its package that define the functions it calls,
+    recursively, and the global numbers and arrays that these use (module.name → value, or an array's bytes)."""
     package, files, constants, seen, rest = function.__module__.partition(".")[0], set(), {}, set(), [function]
     while rest:
         this = rest.pop()
@@ -425,7 +424,7 @@ def _digest(file: Path) -> bytes:
 
 
 def _names(code: CodeType) -> Iterator[str]:
-    """Global names that ``code`` uses, its inner functions' too."""
+    """Global names used in ``code`` and its inner functions."""
     yield from code.co_names
     for inner in code.co_consts:
         if isinstance(inner, CodeType):

@@ -33,10 +33,7 @@ from __future__ import annotations
 
 import numpy as np
 
-#: Order of in-plane stress and strain components in every array with a trailing axis of three.
-IN_PLANE = ("xx", "yy", "xy")
-
-#: Order of stress components in every file that is written.
+#: Order of stress components in every file that is written. (In arrays with a trailing axis of three: xx, yy, xy.)
 VTK_STRESS = ("XX", "YY", "ZZ", "XY", "YZ", "XZ")
 
 

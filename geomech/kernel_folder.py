@@ -1,8 +1,8 @@
-"""Where compiled kernels are kept: a folder that can be written, whatever this user's home is like.
+"""The folder of compiled kernels, which must be writable.
 
-They are kept outside the package: beside the sources they would outlive an uninstall, and what is left of a package
-folder shadows the next installation. What stands there is code that is run, so that a folder that others can write is
-not taken.
+It is outside the package: next to the sources, kernels would remain after an uninstall, and a leftover package folder
+would hide the next installation. The folder contains code that is executed, so one that others can write to is not
+used.
 """
 
 from __future__ import annotations
@@ -13,12 +13,13 @@ from functools import cache
 from pathlib import Path
 from typing import NamedTuple
 
-#: What the user may say.
+#: Environment variable with the user's choice.
 VARIABLE = "NUMBA_CACHE_DIR"
 
 
 class Place(NamedTuple):
-    """The ``folder``; ``instead_of`` that which cannot be written, None where it is the usual one."""
+    """The ``folder``, and the folder that it replaces because that cannot be written (``instead_of``; None for the
+    usual one)."""
 
     folder: str
     instead_of: str | None = None

@@ -1,11 +1,10 @@
 """Objects as plain data: one JSON text and the bytes of arrays, from which nothing but data can come back.
 
 A store is a list of nodes, one for each object that others may refer to: lists, tuples, dictionaries, sets, arrays and
-instances of the classes that the reader allows. Each object stands once however many refer to it, and an array that is
-a view of another goes on sharing its memory, laid out as it was: strides decide which of BLAS' ways a product is taken
-by, and so about its last bits. An instance is its class by name and its attributes; reading makes it without calling
-its class, and no function, no module and no class but those allowed can be named. What is read may be wrong data, never
-a program.
+instances of allowed classes. Each object is stored once, however many refer to it. An array that is a view of another
+keeps sharing its memory, with the same strides: strides determine how BLAS computes a product, and so its last bits. An
+instance is stored as the name of its class and its attributes; it is restored without calling the class, and only
+allowed classes can be named. A store may thus contain wrong data, but never code.
 """
 
 from __future__ import annotations
@@ -21,17 +20,17 @@ from typing import Any, BinaryIO
 
 import numpy as np
 
-#: Containers of Python's own that are made empty and filled.
+#: Built-in containers, which are created empty and filled later.
 _EMPTY = {"l": list, "d": dict, "S": set, "C": collections.Counter, "q": collections.deque}
 _KINDS = {kind: letter for letter, kind in _EMPTY.items()}
 
 
 class NotPlain(TypeError):
-    """Something that is no data: a function, an open file, an instance of a class that is not allowed."""
+    """An object that is not data: a function, an open file, an instance of a class that is not allowed."""
 
 
 class Broken(ValueError):
-    """A text that is no store, or names what is not allowed."""
+    """A file that is not a store, or names something that is not allowed."""
 
 
 class Allowed:
@@ -46,7 +45,7 @@ class Allowed:
         return name in self.classes or any(module == part or module.startswith(f"{part}.") for part in self.parts)
 
     def found(self, name: str) -> type:
-        """The class called ``name``. Raises Broken where it is not allowed, or none is called so."""
+        """The class called ``name``. Raises Broken if it is not allowed or does not exist."""
         module, _, path = name.partition(":")
         if not self.has(name):
             raise Broken(f"{name} is not allowed")
@@ -67,10 +66,10 @@ def name_of(kind: type) -> str:
 
 
 def write(file: BinaryIO, value: Any, allowed: Allowed) -> None:
-    """``value`` into ``file``. Raises NotPlain for what is no data."""
+    """Write ``value`` to ``file``. Raises NotPlain for anything that is not data."""
     table = _Table(allowed)
     root = table.written(value)
-    # Nodes are written as they are found; writing one finds others.
+    # Writing a node may add further nodes.
     for node in table.waiting():
         table.nodes.append(node)
     text = json.dumps(
@@ -83,7 +82,7 @@ def write(file: BinaryIO, value: Any, allowed: Allowed) -> None:
 
 
 def read(file: BinaryIO, allowed: Allowed) -> Any:
-    """What `write` has written. Raises Broken for anything else."""
+    """Read an object written by `write`. Raises Broken for anything else."""
     try:
         length = int.from_bytes(_exactly(file, 8), "little")
         text = json.loads(_exactly(file, length))
@@ -102,7 +101,7 @@ def _exactly(file: BinaryIO, length: int) -> bytes:
 
 
 def _memory(array: np.ndarray) -> memoryview:
-    """The bytes of a contiguous array, in the order in which they lie."""
+    """The bytes of a contiguous array in memory order."""
     flat = array.reshape(-1, order="A")
     return memoryview(flat.view(np.uint8) if flat.size and flat.dtype.itemsize else np.empty(0, np.uint8))
 
@@ -117,7 +116,7 @@ class _Table:
         self.classes: list[str] = []
         self._class_at: dict[type, int] = {}
         self._at: dict[int, int] = {}
-        self._objects: list[Any] = []  # alive as long as their ids are in use
+        self._objects: list[Any] = []  # kept alive as long as their ids are used
 
     def waiting(self):
         done = 0
@@ -126,7 +125,7 @@ class _Table:
             done += 1
 
     def written(self, value: Any) -> Any:
-        """``value`` as it stands in a node: itself, or where it is found."""
+        """``value`` as written in a node: itself, or a reference to its own node."""
         kind = type(value)
         if value is None or kind in (bool, int, str):
             return value
@@ -204,7 +203,7 @@ def _described(dtype: np.dtype) -> Any:
 
 
 def _dtype(described: Any) -> np.dtype:
-    """The dtype of a description that JSON has made lists of."""
+    """The dtype from its description after JSON has turned tuples into lists."""
 
     def tuples(part: Any) -> Any:
         # [[name, type], [name, type, shape]] are fields; a pair whose first is a type is a subarray.
@@ -219,7 +218,7 @@ def _dtype(described: Any) -> np.dtype:
 
 
 class _Reader:
-    """Objects of nodes: first all of them, empty; then what is in them."""
+    """Restores objects from nodes: first creates all of them empty, then fills them."""
 
     def __init__(self, file: BinaryIO, text: dict[str, Any], allowed: Allowed) -> None:
         self.allowed, self.nodes = allowed, text["nodes"]
@@ -230,7 +229,7 @@ class _Reader:
         for k, node in enumerate(self.nodes):
             self._object(k)
             later += self._filling(k, node)
-        # Attributes before dictionaries, whose keys may be found by them; last, what is set from a whole state.
+        # Attributes before dictionaries, whose keys may hash by them; objects restored from a whole state last.
         for _, fill in sorted(later, key=lambda entry: entry[0]):
             fill()
 
@@ -248,7 +247,7 @@ class _Reader:
         return [self.value(item) for item in written]
 
     def _bytes(self, file: BinaryIO) -> None:
-        """The arrays that own their memory, in the order in which they were written."""
+        """Read the arrays that own their memory, in the order written."""
         own = sorted((node[1], k) for k, node in enumerate(self.nodes) if node[0] == "a")
         start = file.tell()
         left = file.seek(0, io.SEEK_END) - start
@@ -256,7 +255,7 @@ class _Reader:
         for _, k in own:
             _, _, described, shape, order, writeable = self.nodes[k]
             dtype = _dtype(described)
-            # Before memory is taken for an array that the file does not hold.
+            # Checked before memory is allocated.
             if min(shape, default=0) < 0 or math.prod(shape) * dtype.itemsize > left:
                 raise Broken("the file ends within an array")
             array = np.empty(tuple(shape), dtype, order)
@@ -314,7 +313,7 @@ class _Reader:
         return types.MethodType(vars(type(owner))[name], owner)
 
     def _filling(self, k: int, node: list[Any]) -> list[tuple[int, Callable[[], None]]]:
-        """What fills the object of a node, and when."""
+        """Functions that fill the object of a node, with their order."""
         letter, *rest = node
         this = self.made[k]
         if letter in ("l", "q"):

@@ -1,4 +1,4 @@
-"""Going on with a run from its last checkpoint."""
+"""Resumes a run from its last checkpoint."""
 
 from __future__ import annotations
 
@@ -17,17 +17,17 @@ from .pipeline import CoupledRun, run
 
 log = logging.getLogger(__name__)
 
-#: Keys of a scene that may be changed when a run is gone on with: none of them changes what has happened.
+#: Keys of a scene that may be changed when a run is resumed: they do not affect the part that has been computed.
 ALLOWED = (
     "title", "run.end_time_s", "run.stop_at", "output.every", "output.interior", "output.interior_every",
     "output.checkpoint_every", "output.checkpoint_kept_mb", "render",
 )  # fmt: skip
-#: Ends of a run that are none.
+#: Reasons that do not count as the end of a run.
 _BROKEN_OFF = ("interrupted", "failed")
 
 
 class Finished(NotResumable):
-    """The run has come to its end."""
+    """The run is complete."""
 
 
 def resume(
@@ -38,8 +38,8 @@ def resume(
     quiet: bool = False,
     tell: Callable[[str], None] = log.warning,
 ) -> dict[str, Any]:
-    """Go on with the run in ``folder`` and return its summary: bit for bit the files it would have left uninterrupted,
-    on the same machine with as many threads, but for times of day. Rows and files that are later than the checkpoint
+    """Resume the run in ``folder`` and return its summary. On the same machine with the same number of threads all
+    files are bitwise those of an uninterrupted run, except for times of day. Rows and files later than the checkpoint
     are dropped.
 
     ``overrides``, as for `load_scene`, may change keys in `ALLOWED`. A later ``run.end_time_s`` lets a finished run go
@@ -63,7 +63,7 @@ def resume(
 
 
 class _Wish(NamedTuple):
-    """What was asked for, as `resume` has it."""
+    """Arguments of `resume`."""
 
     folder: Path
     overrides: tuple[str, ...] | Mapping[str, Any]
@@ -72,7 +72,7 @@ class _Wish(NamedTuple):
     tell: Callable[[str], None]
 
     def scene(self) -> Any:
-        """The run's scene, with what was changed."""
+        """The run's scene with the overrides."""
         from .scene import load_scene
 
         return load_scene(self.folder / "scene.toml", self.overrides)
@@ -97,7 +97,7 @@ def _resumed(wish: _Wish) -> dict[str, Any]:
     changes = {} if scene is None else _changes(header, scene.resolved())
     reason = _end_reason(folder)
     if reason is not None:
-        _refuse_finished(reason, changes, header, scene)
+        _refuse_finished(reason, header, scene)
     stored = checkpoint_file.read(path)
     problem = stored["coupling"].problem
     if scene is not None:
@@ -136,8 +136,8 @@ def _refuse_other_sources(header: Mapping[str, Any], path: Path) -> None:
 
 
 def _changes(header: Mapping[str, Any], resolved: Mapping[str, Any]) -> dict[str, tuple[Any, Any]]:
-    """Key → (value then, value now) of all that the scene has otherwise than at the checkpoint. Raises NotResumable for
-    what would change what has happened."""
+    """Key → (value at the checkpoint, value now) of all changes of the scene. Raises NotResumable for changes that
+    would affect the part already computed."""
     then, now = _flat(header["scene"]), _flat(json.loads(json.dumps(resolved)))
     changes = {
         key: (then.get(key), now.get(key)) for key in dict.fromkeys([*then, *now]) if then.get(key) != now.get(key)
@@ -168,7 +168,7 @@ def _flat(node: Any, path: str = "") -> dict[str, Any]:
 
 
 def _end_reason(folder: Path) -> str | None:
-    """Why the run ended by itself, as its summary has it; None where it did not."""
+    """The reason for the run's end from its summary; None if it has not ended by itself."""
     path = folder / "summary.json"
     if not path.is_file():
         return None
@@ -176,8 +176,8 @@ def _end_reason(folder: Path) -> str | None:
     return None if end.startswith(_BROKEN_OFF) else end
 
 
-def _refuse_finished(end: str, changes: Mapping[str, Any], header: Mapping[str, Any], scene: Any) -> None:
-    """Unless what ended the run has been changed so that it goes on."""
+def _refuse_finished(end: str, header: Mapping[str, Any], scene: Any) -> None:
+    """Raise Finished unless the scene has been changed so that the run continues."""
     settings = None if scene is None else scene.problem().run
     # Steps to events have none to go to where nothing holds the blocks.
     no_further = end == "mechanism" and settings is not None and settings.stepping == "events"

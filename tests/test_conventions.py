@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from geomech.conventions import IN_PLANE, VTK_STRESS, normal_of, outward_normal_of, rotate_stress, traction
+from geomech.conventions import VTK_STRESS, normal_of, outward_normal_of, rotate_stress, traction
 from geomech.ddm.fracture.criteria import CRITERIA
 from geomech.model import Blocks
 
@@ -16,7 +16,6 @@ def tensor(stress):
 
 
 def test_component_orders():
-    assert IN_PLANE == ("xx", "yy", "xy")
     assert VTK_STRESS == ("XX", "YY", "ZZ", "XY", "YZ", "XZ")
 
 

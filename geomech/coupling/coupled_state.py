@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -48,8 +48,8 @@ class CrackedBlocks:
         self.timed, self.each = Phases(), Phases()
         self.block_work = dda.Work()
         self.works: list[Work] = []
-        self.bodies: dict[int, object] = {}
-        self.solutions: dict[int, object] = {}
+        self.bodies: dict[int, Any] = {}
+        self.solutions: dict[int, Any] = {}
         self.loads: dict[int, BoundaryLoad] = {}
         self.compliances: dict[int, tuple] = {}
         self.by_mean_stress = ByMeanStress()
@@ -58,8 +58,8 @@ class CrackedBlocks:
         #: Curvature of each tip's path in its last increments.
         self.chords: Memory = {}
         # Slip and damage of frictional crack faces at the start of the load step, where all its passes begin.
-        self.history: dict[int, object] = {}
-        self.solved_from: dict[int, object] = {}
+        self.history: dict[int, Any] = {}
+        self.solved_from: dict[int, Any] = {}
         self.budget, self.crack_energy = dda.EnergyBudget(), CrackEnergy(problem.dda.dynamic_factor == 0.0)
         self.acted: dict[str, float] = {}
         self.removed: np.ndarray | None = None

@@ -104,6 +104,7 @@ class CrackedBody(Protocol):
 class SolvedBody(Protocol):
     """A body under a load, with the state of its cracks."""
 
+    jumps: np.ndarray
     body: CrackedBody
     load: BodyLoad
     closed: np.ndarray

@@ -1,7 +1,7 @@
-"""How the open–close iteration looks for contact states: the ways it goes, and the numbers that these are tuned by.
+"""Settings of the open–close iteration: its methods of finding contact states, and their parameters.
 
-``geomech bench contact-solver`` switches the methods off one by one and measures what each number is worth, over random
-slopes, slopes and walls under sudden weight, arches, debris and strength reduction: "measured" below means there.
+``geomech bench contact-solver`` measures the effect of each method and number, by switching methods off one by one, on
+random slopes, slopes and walls under sudden weight, arches, debris and strength reduction.
 """
 
 from __future__ import annotations
@@ -11,60 +11,61 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class ContactSolver:
-    """Settings of the contact solver. Parts are of 1, numbers are counts, unless a unit is given.
+    """Settings of the contact solver; fractions of 1 and counts unless a unit is given.
 
     Newton's method on contact states (`dda.open_close.iteration`)
-    newton_reduction     goes on while the wrong contacts fall to this part of the fewest so far …
-    newton_tries         … or for so many iterations although they do not: more lead nowhere on slopes that slide
-    newton_tries_if_few  … or for so many where few are wrong, and an iteration costs a fifth of one of the path
-    few_wrong            part of the contacts that are few
-    newton_to_finish     iterations from states that the path proposes to the end
+    newton_reduction     it continues while the number of inconsistent contacts falls to this fraction of its minimum …
+    newton_tries         … or for this many iterations without such a reduction: more are useless on sliding slopes
+    newton_tries_if_few  … or for this many if few are inconsistent; an iteration costs a fifth of one of the path
+    few_wrong            fraction of the contacts that counts as few
+    newton_to_finish     largest number of iterations from states proposed by the path
 
     Bonds
-    bonds_in_order       contacts up to which bonds break one by one, as a load that grows would break them; of more,
-                         those half as overloaded as the worst go together (a glued slope of 200 blocks: 412
-                         iterations one by one)
+    bonds_in_order       number of contacts up to which bonds break one by one, in the order of a growing load; with
+                         more contacts, those at least half as overloaded as the worst break together (a bonded slope of
+                         200 blocks takes 412 iterations one by one)
 
-    Slivers, of which no set of states may fit: states that return stand where
-    sliver_contacts      no more contacts are wrong than so many, …
-    sliver_force         … by no more than this part of the largest force on either of their blocks
+    Slivers, for which no states may be consistent: states that recur are accepted if
+    sliver_contacts      no more than this many contacts are inconsistent, …
+    sliver_force         … each by no more than this fraction of the largest force on its blocks
 
-    Patches of blocks about contacts that stay wrong (`dda.open_close.block_patches`)
-    patches              whether they are settled by themselves
-    patch_tries          this many times in a step
-    patch_wrong          where no more than this part of all contacts is wrong
-    patch_rings          patches reach so many blocks beyond these contacts
-    patch_share          and have at most this part of all blocks, …
-    patch_blocks         … and so many: their factors stand beside those of all
+    Patches of blocks around contacts that stay inconsistent (`dda.open_close.block_patches`)
+    patches              whether they are used
+    patch_tries          largest number of times in a step
+    patch_wrong          largest fraction of inconsistent contacts
+    patch_rings          number of rings of blocks around these contacts
+    patch_share          largest fraction of all blocks in a patch, …
+    patch_blocks         … and largest number: its factors are kept in addition to those of all blocks
 
-    Operator splitting (`dda.open_close.operator_splitting`), of steps in motion
+    Operator splitting (`dda.open_close.operator_splitting`) in dynamic steps
     splitting              whether it proposes states before the central path does
-    splitting_violation    at once where the forces of wrong contacts are more than this part of all normal forces (after
-                           an impact on a slope of 1 000 blocks Newton's method leads nowhere from there: 0.01 to 0.1 take
-                           as many factorisations)
-    splitting_wrong        where fewer than this part of the contacts is wrong, patches are tried before
-    splitting_iterations   substitutions at most: from the states of 60 Newton's method mostly ends in four iterations on
-                           a slope of 1 000 blocks that an impact shakes
-    splitting_settled      … or until no more than this part of the states changes within ten of them
+    splitting_violation    used at once if the forces of inconsistent contacts are more than this fraction of all normal
+                           forces (after an impact on a slope of 1 000 blocks Newton's method fails from there; 0.01 to
+                           0.1 take the same number of factorisations)
+    splitting_wrong        patches are tried first if fewer than this fraction of the contacts is inconsistent
+    splitting_iterations   largest number of substitutions: after 60, Newton's method mostly converges in four iterations
+                           on a slope of 1 000 blocks after an impact
+    splitting_settled      … or until no more than this fraction of the states changes in ten iterations
 
     Central path (`dda.open_close.interior_point`)
-    central_path            whether it is followed
-    path_iterations         so many at most in a step; what ends well takes 13 to 40
-    path_undecided          it proposes states when no more contacts are undecided than so many, …
-    path_undecided_share    … nor than this part of them, or than two, …
-    path_balance            … and no more than this part of the loads is out of balance
-    path_start              ε begins at so many times the mean of N²/kₙ (1 takes a third more iterations) …
-    path_least_start        … and not below this, in units of the squared load over the stiffness
-    path_correctors         correctors of a step at most (Gondzio 1996; none: a quarter more iterations)
-    path_recentred          this many times contacts are centred again where steps have become short, …
-    path_recentred_larger   … with so much larger an ε
-    path_load_rings         a contact's load is the largest within so many blocks of it: a pebble below a large block
-                            bears that one's
-    path_blocked            the path is blocked after so many steps in a row …
-    path_short              … that go less than this part of the way
+    central_path            whether it is used
+    path_iterations         largest number of iterations in a step; successful paths take 13 to 40
+    path_undecided          it proposes states when no more than this many contacts are undecided, …
+    path_undecided_share    … and no more than this fraction of them, or two, …
+    path_balance            … and no more than this fraction of the loads is unbalanced
+    path_start              initial ε in units of the mean of N²/kₙ (1 takes a third more iterations) …
+    path_least_start        … and its lower limit, in units of the squared load over the stiffness
+    path_correctors         largest number of correctors per step (Gondzio 1996; without, a quarter more iterations)
+    path_recentred          number of times that contacts are centred again when steps have become short, …
+    path_recentred_larger   … with ε larger by this factor
+    path_load_rings         number of rings of blocks over which the largest force is a contact's load: a pebble below a
+                            large block carries the load of that block
+    path_blocked            the path is blocked after this many successive steps …
+    path_short              … that are shorter than this fraction of the full step
 
-    large_system            free blocks from which a step in motion is halved as soon as its path is stopped: a slope of
-                            20 000 blocks under sudden weight found no states in 126 s, its half step in 43 iterations
+    large_system            number of free blocks from which a dynamic step is halved as soon as its path is stopped: on a
+                            slope of 20 000 blocks under sudden weight no states were found in 126 s, in half the step
+                            after 43 iterations
     """
 
     newton_reduction: float = 0.55

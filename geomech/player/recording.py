@@ -1,4 +1,4 @@
-"""A run as the page plays it: cycles thinned to a number of bytes, curves, tips, joints, events and units."""
+"""Data of a run for the page of the player: a selection of cycles, curves, tips, joints, events and units."""
 
 from __future__ import annotations
 
@@ -15,15 +15,15 @@ from ..output.run_record import PLACES
 from .frames import Frames, in_reference
 from .packing import Block
 
-#: Bytes of text that the cycles of one run may take in a page.
+#: Largest size of the cycles of one run in a page, bytes.
 BUDGET = 8_000_000
-#: A page holds no more cycles than a slider can tell apart.
+#: Largest number of cycles in a page, about the resolution of a slider.
 MOST_FRAMES = 400
-#: Curves have no more points than a screen.
+#: Largest number of points of a curve, about the width of a screen.
 MOST_ROWS = 2000
 #: Rows of tips and joints that a page holds.
 MOST_TIP_ROWS = 60_000
-#: Columns of history that are no curves.
+#: Columns of the history that are not shown as curves.
 _NUMBERS_OF_THE_SOLVER = ("cycle", "load_step", "growth_pass")
 
 
@@ -32,9 +32,9 @@ class NothingToPlay(ValueError):
 
 
 class Recording:
-    """Reads ``run`` for a page: what stands still once, cycles one by one.
+    """Reads ``run`` for a page: constant data once, cycles one by one.
 
-    Raises NothingToPlay where it has written no blocks, cracks or interior.
+    Raises NothingToPlay if it has written no blocks, cracks or interior fields.
     """
 
     def __init__(self, run: Run) -> None:
@@ -45,7 +45,7 @@ class Recording:
         self.frames = Frames(run, self.origin)
 
     def opening(self) -> dict[str, Any]:
-        """What stands still: title, places, names."""
+        """Constant data: title, places, names."""
         run, scene = self.run, self.run.scene
         return {
             "title": run.title,
@@ -58,8 +58,8 @@ class Recording:
         }
 
     def state(self, scale: float | None = None) -> dict[str, Any]:
-        """What grows with the run: how it ended, curves, tips, joints and events, and the magnification, by default
-        that of the run's pictures."""
+        """Data that grow with the run: end, curves, tips, joints, events, and the magnification (default: that of the
+        run's pictures)."""
         from ..render.pictures.look import final_cycle
 
         summary, final = self.run.summary, final_cycle(self.run)
@@ -77,8 +77,8 @@ class Recording:
         }
 
     def cycles(self, every: bool = False) -> list[int]:
-        """Cycles that can be drawn as they were: those whose interior is that of their own cracks. ``every``: all, with
-        the last interior before them."""
+        """Cycles whose interior fields were written for their own cracks. ``every``: all cycles, with the last interior
+        fields written before."""
         from ..render.pictures.field import agreeing
 
         written = written_cycles(self.run)
@@ -95,8 +95,8 @@ class Recording:
         return record
 
     def whole(self, budget: int = BUDGET, most: int = MOST_FRAMES) -> dict[str, Any]:
-        """The run in one record of about ``budget`` bytes: as many cycles as fit, first, last and those of events
-        first, the others spread evenly over what happens."""
+        """The run in one record of about ``budget`` bytes, with as many cycles as fit: first, last, those with events,
+        and others evenly distributed (see `evenly`)."""
         cycles = self.cycles()
         chosen = evenly(self.run, cycles, most)
         made = {number: self.frame(number) for number in sample(chosen, 6)}
@@ -105,20 +105,20 @@ class Recording:
             chosen = evenly(self.run, cycles, max(2, fitting))
         made |= {number: self.frame(number) for number in chosen if number not in made}
         while len(chosen) > 2 and (size := self._size({number: made[number] for number in chosen})) > budget:
-            # Every round leaves out one at least.
+            # Each pass drops at least one cycle.
             chosen = evenly(self.run, chosen, max(2, min(len(chosen) - 1, int(len(chosen) * budget / size))))
         frames = [made[number] for number in chosen]
         more = {"of": len(cycles), "ranges": picture_ranges(self.run)}
         return self.opening() | self.state() | _with_own_meshes(frames, self.frames.meshes) | more
 
     def _size(self, made: dict[int, dict[str, Any]]) -> int:
-        """Bytes of text that these frames take, with their meshes."""
+        """Size of these frames with their meshes, bytes."""
         record = _with_own_meshes(list(made.values()), self.frames.meshes)
         return sum(len(json.dumps(each)) for part in record.values() for each in part)
 
 
 def _with_own_meshes(frames: list[dict[str, Any]], meshes: list[dict[str, Any]]) -> dict[str, Any]:
-    """``frames`` with the meshes that they name, and no others."""
+    """``frames`` with only the meshes that they use."""
     used = sorted({frame[kind] for frame in frames for kind in ("blocks", "interior") if kind in frame})
     place = {old: new for new, old in enumerate(used)}
     renamed = [
@@ -175,8 +175,7 @@ def magnification(run: Run) -> float:
 
 
 def picture_ranges(run: Run) -> dict[str, list[float]]:
-    """Lowest and highest value, SI units, of the fields that the run's pictures show: the page begins with the same
-    colours."""
+    """Range, SI units, of the fields in the run's pictures, so that the page starts with the same colours."""
     from ..render.fields.quantity import limits, quantity
 
     if not run.series("blocks"):

@@ -143,7 +143,7 @@ def expected_of(field: FieldInfo) -> str:
 def describe_keys() -> str:
     """Every key of a scene, one per line: name, admissible values, default, description."""
     lines: list[str] = []
-    _describe(SceneTables, "", "", lines)
+    _describe(SceneTables, "", lines)
     return "\n".join(lines).strip() + "\n"
 
 
@@ -175,7 +175,7 @@ def _without_null(node: Any, names: bool = False) -> Any:
     return out
 
 
-def _describe(table: type[BaseModel], prefix: str, header: str, lines: list[str]) -> None:
+def _describe(table: type[BaseModel], prefix: str, lines: list[str]) -> None:
     later = []
     for name, field in table.model_fields.items():
         key = field.alias or name
@@ -196,7 +196,7 @@ def _describe(table: type[BaseModel], prefix: str, header: str, lines: list[str]
         lines.append(f"  {key} = {what}  ({default})\n      {field.description}")
     for inner, path, shown, description in later:
         lines.append(f"\n{shown}  {description}")
-        _describe(inner, path, shown, lines)
+        _describe(inner, path, lines)
 
 
 def written(value: Any) -> str:

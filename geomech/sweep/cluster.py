@@ -4,10 +4,10 @@
     dask worker tcp://HOST:8786 --nworkers 16 --nthreads 1   # on every machine
     geomech sweep SCENE … --scheduler tcp://HOST:8786    # anywhere that sees both
 
-The scheduler hands out jobs, hands them out again where a worker goes away, and sends rows back; the journal is written
-here alone. Each thread of a worker keeps a process of its own that makes the runs (`engine.LocalEngine` of one): Dask
-goes on hearing of its workers while kernels compute, and a run that crashes takes no worker with it. Where the
-scheduler goes away the sweep waits for it, and hands out what had not come back.
+The scheduler distributes jobs, repeats them if a worker disappears, and returns rows; the journal is written in this
+process only. Each thread of a worker has a process that makes the runs (a `engine.LocalEngine` with one worker), so
+that Dask workers stay responsive while kernels compute, and survive a run that crashes. If the scheduler disappears,
+the sweep waits for it and submits the missing jobs again.
 """
 
 from __future__ import annotations
@@ -29,8 +29,8 @@ from .. import __version__
 from .engine import LocalEngine, lost, program
 from .measures import Job
 
-#: Batches that wait at each thread of the cluster, beside the one that it works on: of short ones, and of those that
-#: take longer than `_LONG` s, so that few are under way when a sweep is stopped.
+#: Number of batches that wait at each thread of the cluster: short ones, and those that take longer than `_LONG` s
+#: (fewer, so that a sweep can be stopped sooner).
 _AHEAD, _AHEAD_LONG, _LONG = 2, 1, 2.0
 #: Seconds of work in a batch, and the most jobs in one.
 _BATCH_SECONDS, _MOST = 0.5, 256
@@ -39,16 +39,15 @@ _ATTEMPTS = 3
 
 
 class EngineRefused(RuntimeError):
-    """A cluster that cannot make the runs: the message says why, and what to do."""
+    """The cluster cannot make the runs; the message gives the reason and a way out."""
 
 
 class DaskEngine:
     """The cluster whose scheduler has this ``address``, or that of a ``client`` of dask.distributed (which stays open).
 
-    ``patience`` s: so long a scheduler that has gone away, and workers, are waited for. ``scene`` is looked for on
-    every worker, and ``folder`` where runs leave files. Raises EngineRefused where there is no such scheduler, no
-    worker,
-    another version of geomech, or no such scene.
+    ``patience`` s: waiting time for workers, and for a scheduler that has disappeared. ``scene``, and ``folder`` if
+    runs write files, must exist on each worker. Raises EngineRefused if there is no scheduler or worker, or if a worker
+    has another version of geomech or not this scene.
     """
 
     def __init__(
@@ -91,7 +90,7 @@ class DaskEngine:
             ) from error
 
     def _check_workers(self, seconds: float) -> None:
-        """Wait for workers, and refuse those that would make other runs."""
+        """Wait for workers, and refuse those with other sources or scenes."""
         until = time.monotonic() + seconds
         while not self._client.nthreads():
             if time.monotonic() > until:
@@ -196,13 +195,13 @@ class DaskEngine:
                 else:
                     again.append([job])
             return
-        # Cancelled or lost, as all are when the scheduler goes away.
+        # Cancelled or lost, as all jobs are when the scheduler disappears.
         again.append(batch)
         if self._client.status != "running":
             self._reconnect()
 
     def _reconnect(self) -> None:
-        """Wait for the scheduler to come back, and take a new client."""
+        """Wait until the scheduler is back, and connect a new client."""
         self.notes.append(f"the scheduler at {self.address} is gone: waiting for it")
         with suppress(Exception):
             self._client.close(timeout=1)
@@ -239,7 +238,7 @@ def made_there(jobs: list[Job]) -> list[dict[str, Any]]:
 
 
 def about(scene: str | None, folder: str | None) -> dict[str, Any]:
-    """What a machine has: version and sources of geomech, the scene, the folder that runs leave files in."""
+    """Data of a machine: version and sources of geomech, the scene, and whether the folder for files exists."""
     try:
         digest = hashlib.sha256(Path(scene).read_bytes()).hexdigest()[:12] if scene else ""
     except OSError:

@@ -1,9 +1,9 @@
-"""Runs in processes of this machine: as many as it has cores, one thread each, nothing to set up.
+"""Runs in processes of this machine, by default one per core and with one thread each.
 
-Workers are processes of their own (not forked, so that no thread and no lock is inherited), which take jobs over a pipe
-and hand rows back one by one. One that is killed is replaced and its job handed out again, `ATTEMPTS` times; where the
-system has killed it (as it does when memory runs out) one worker fewer goes on. Short jobs are handed out several at a
-time, so that workers do not wait for this process.
+Workers are separate processes (not forked, so that they inherit no threads or locks), which receive jobs over a pipe
+and return rows one by one. A worker that is killed is replaced and its job repeated, up to `ATTEMPTS` times; if the
+system has killed it (as when memory runs out), it is not replaced. Short jobs are sent in batches, so that workers do
+not wait for this process.
 """
 
 from __future__ import annotations
@@ -24,15 +24,15 @@ from typing import Any, Protocol, Self
 
 from .measures import FAILED, Job, carry_out
 
-#: A job whose worker was killed so many times counts as failed.
+#: Number of times that a job's worker may be killed before the job counts as failed.
 ATTEMPTS = 3
-#: Jobs are handed out so many seconds of work at a time, no more than `_MOST` of them.
+#: Seconds of work per batch, and largest number of jobs in it.
 _AHEAD, _MOST = 0.25, 64
 #: Set in every worker: libraries take one thread.
 ONE_THREAD = {
     f"{name}_NUM_THREADS": "1" for name in ("OMP", "OPENBLAS", "MKL", "NUMBA", "NUMEXPR", "VECLIB_MAXIMUM")
 }  # fmt: skip
-#: A worker is replaced after a job when it holds more than this part of the memory, divided by their number.
+#: A worker is replaced after a job if it uses more than this fraction of its share of the memory.
 _MEMORY = 0.8
 _WORKER = "from geomech.sweep.engine import work; work({handle})"
 #: Parts of the package that runs depend on.
@@ -41,7 +41,7 @@ _PARTS = ("model", "shapes", "scene", "dda", "ddm", "coupling", "output", "repor
 
 
 class Engine(Protocol):
-    """What makes runs: `results` yields the row of every job, in the order in which they end."""
+    """Carries out jobs; `results` yields their rows in the order in which they end."""
 
     workers: int
 
@@ -52,12 +52,12 @@ class Engine(Protocol):
     def results(self, jobs: Iterable[Job]) -> Iterator[dict[str, Any]]: ...
 
     def stop(self) -> None:
-        """Hand out no more jobs; `results` ends with those under way."""
+        """Send no more jobs; `results` ends with those in progress."""
 
 
 @functools.cache
 def program() -> str:
-    """A digest of the sources that runs depend on: rows of different programs do not belong into one table."""
+    """A digest of the sources that runs depend on: rows of different versions must not be in one table."""
     package, digest = Path(__file__).parent.parent, hashlib.sha256()
     for part in _PARTS:
         place = package / part
@@ -83,7 +83,7 @@ class _Worker:
 
     def give(self, jobs: list[Job]) -> None:
         self.jobs += jobs
-        with suppress(OSError):  # it has ended: noticed when its end is read
+        with suppress(OSError):  # the worker has ended, which is noticed on reading
             self.pipe.send(jobs)
 
     def end(self, kill: bool = False) -> None:
@@ -150,7 +150,7 @@ class LocalEngine:
                 yield from self._read(by_pipe[pipe], again, attempts)
 
     def _idle(self, wanted: bool) -> _Worker | None:
-        """A worker that has run out of jobs, or has but its last; a new one as long as there are too few."""
+        """A worker with at most one job left; a new one if there are too few workers."""
         if not wanted:
             return None
         usable = [each for each in self._all if not each.retiring]
@@ -163,7 +163,7 @@ class LocalEngine:
         return free
 
     def _pace(self) -> float:
-        """Seconds of a job, the mean of the last; infinite before any is known."""
+        """Mean duration of the last jobs, s; infinite before the first has ended."""
         return sum(self._known) / len(self._known) if self._known else float("inf")
 
     def _take(self, waiting: Iterator[Job], again: deque[Job]) -> list[Job]:
@@ -194,7 +194,7 @@ class LocalEngine:
         yield row
 
     def _buried(self, worker: _Worker, again: deque[Job], attempts: dict[int, int]) -> Iterator[dict[str, Any]]:
-        """What becomes of the jobs of a worker that is gone."""
+        """Handle the jobs of a worker that has ended."""
         worker.pipe.close()
         code = worker.process.wait()
         self._all.remove(worker)
@@ -214,7 +214,7 @@ class LocalEngine:
 
 
 def lost(job: Job, reason: str, attempts: int) -> dict[str, Any]:
-    """The row of a ``job`` that no worker has come back from."""
+    """The row of a ``job`` that no worker has completed."""
     return {
         "run": job.number, "status": FAILED, "reason": reason, "fails": None, "warnings": 0, "first_warnings": [],
         "seconds": 0.0, "processor_seconds": 0.0, "host": "", "process": 0, "attempts": attempts,
@@ -222,7 +222,7 @@ def lost(job: Job, reason: str, attempts: int) -> dict[str, Any]:
 
 
 def work(handle: int) -> None:
-    """A worker's life: jobs from the pipe ``handle``, rows back, until None comes or the other end is gone."""
+    """Main loop of a worker: read jobs from the pipe ``handle`` and write rows, until None or the end of the pipe."""
     prepare_worker()
     pipe = Connection(handle)
     with suppress(EOFError, OSError):
@@ -232,7 +232,7 @@ def work(handle: int) -> None:
 
 
 def prepare_worker() -> None:
-    """Ctrl-C in the terminal is for the sweep, which lets runs under way end; loops of references are seldom collected."""
+    """Ignore Ctrl-C, which is handled by the sweep (runs in progress are completed); collect garbage less often."""
     import gc
 
     with suppress(ValueError):  # another thread than the main one
@@ -241,7 +241,7 @@ def prepare_worker() -> None:
 
 
 def made(job: Job) -> dict[str, Any]:
-    """`carry_out`, the first on a machine of this program alone, so that kernels are compiled once."""
+    """`carry_out`. The first run of a version on a machine is made alone, so that kernels are compiled only once."""
     with _compiling_alone(job):
         return carry_out(job)
 
@@ -251,8 +251,8 @@ _WARM: set[str] = set()
 
 @contextmanager
 def _compiling_alone(job: Job) -> Iterator[None]:
-    """While no run of this kind has been made on this machine by this program, one goes on alone and the others wait:
-    kernels are kept, and compiled by none but the first."""
+    """Until this version has made a run of this kind on this machine, one process runs alone and the others wait, so
+    that only the first compiles kernels."""
     kind = f"{job.program}-{job.settings['measure']}"
     if job.settings["measure"] == "pause" or kind in _WARM:
         yield
@@ -281,7 +281,7 @@ def _compiling_alone(job: Job) -> Iterator[None]:
 
 @contextmanager
 def _locked(path: Path) -> Iterator[None]:
-    """The system's lock on ``path``; none where it has none."""
+    """A file lock on ``path``, if the system has such locks."""
     try:
         import fcntl
 
@@ -298,7 +298,7 @@ def _locked(path: Path) -> Iterator[None]:
 
 
 def _memory(process: int) -> float:
-    """Bytes that a process holds; 0 where it is not known."""
+    """Memory of a process in bytes; 0 if unknown."""
     try:
         return int(Path(f"/proc/{process}/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE")
     except (OSError, ValueError, IndexError):
@@ -307,7 +307,7 @@ def _memory(process: int) -> float:
 
 @functools.cache
 def _all_memory() -> float:
-    """Bytes of this machine, or of what this process may have."""
+    """Memory available to this process, bytes."""
     found = float(os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES"))
     for path in ("/sys/fs/cgroup/memory.max", "/sys/fs/cgroup/memory/memory.limit_in_bytes"):
         with suppress(OSError, ValueError):
@@ -316,8 +316,8 @@ def _all_memory() -> float:
 
 
 def time_left(done: int, total: int, durations: Iterable[float], workers: int, began: float) -> float:
-    """Seconds until ``total`` runs are done: what is left at the mean duration on all ``workers``, or, where waiting
-    has made the sweep slower than that, at the pace kept so far."""
+    """Seconds until ``total`` runs are done: the remaining runs at the mean duration on all ``workers`` or, if waiting
+    has made the sweep slower, at its pace so far."""
     known = list(durations)
     if not known or not done:
         return float("nan")

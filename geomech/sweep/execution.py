@@ -1,4 +1,4 @@
-"""A sweep from its plan to its table: runs handed out, rows kept as they come, progress shown; and its resumption."""
+"""Execution of a sweep: distributes runs, stores rows as they arrive, shows progress; and resumption."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ from .statistics import Probability, picked, probability
 
 log = logging.getLogger(__name__)
 
-#: Tables are written again after so many times the time that writing them has taken, and after so many seconds.
+#: Tables are rewritten after this many times the duration of writing them, and at most once in this many seconds.
 _SHARE, _SELDOM = 50.0, 5.0
 _STOPPING = "stopping when the runs under way are done; once more to stop at once"
 #: Folders of runs.
@@ -38,11 +38,11 @@ RUNS, PICTURED = "runs", "pictured"
 
 
 class CannotResume(ValueError):
-    """A sweep that cannot be gone on with: the message says why."""
+    """The sweep cannot be resumed; the message gives the reason."""
 
 
 class Telling(NamedTuple):
-    """What is said meanwhile: ``say`` takes a line; one a run (``log``), and how far it is every ``seconds``."""
+    """Messages during a sweep: ``say`` takes a line; one line per run if ``log``, and progress every ``seconds``."""
 
     say: Callable[[str], None] | None = None
     log: bool = False
@@ -51,8 +51,8 @@ class Telling(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Sweep:
-    """A sweep that has ended in ``folder``: its ``plan``, its ``rows`` by run, whether it is ``complete``, and the
-    probability of ``rare`` failure where that was asked for."""
+    """Result of a sweep in ``folder``: its ``plan``, ``rows`` by run, whether it is ``complete``, and the probability
+    of ``rare`` failure, if requested."""
 
     folder: Path
     plan: Plan
@@ -65,17 +65,18 @@ class Sweep:
 
     @property
     def probability(self) -> Probability:
-        """Of failure, by the runs as plain samples (of rare failures they are none: see ``rare``)."""
+        """Probability of failure from the runs as independent samples (not for methods for rare failures: see
+        ``rare``)."""
         return probability(self.rows)
 
     def column(self, name: str) -> np.ndarray:
-        """(n,) the numbers of a column, nan where a run has none."""
+        """(n,) numbers of a column, nan if a run has none."""
         from .statistics import numbers
 
         return numbers(self.rows, name)
 
     def text(self) -> str:
-        """What it came to, for the terminal."""
+        """Summary for the terminal."""
         lines = [
             f"{len(self.rows)} runs in {self.folder}" + ("" if self.complete else f", of {self._asked}: not complete")
         ]
@@ -100,7 +101,7 @@ class Sweep:
 
 
 def read_sweep(folder: Path | str) -> Sweep:
-    """The sweep in ``folder`` as far as it has come. Raises FileNotFoundError, SceneError."""
+    """The sweep in ``folder``, complete or not. Raises FileNotFoundError, SceneError."""
     folder = Path(folder)
     stored = json.loads((folder / PLAN).read_text(encoding="utf-8"))
     plan = read_plan(stored["plan"])
@@ -116,11 +117,6 @@ def read_sweep(folder: Path | str) -> Sweep:
     )  # fmt: skip
 
 
-def is_sweep(folder: Path) -> bool:
-    """Whether ``folder`` holds a sweep."""
-    return (folder / PLAN).is_file()
-
-
 def sweep(
     scene: str | Path,
     vary: Mapping[str, Any] | None = None,
@@ -132,7 +128,7 @@ def sweep(
     resume: bool = False,
     **settings: Any,
 ) -> Sweep:
-    """Many runs of ``scene`` (a path), a row of the table each.
+    """Many runs of ``scene`` (a path), one row of the table each.
 
     ``vary``: key of the scene → values, range or distribution (see `geomech.sweep.variables`); ``settings`` are the
     others of [sweep]: runs, seeds, sampling, seed, measure, fails, columns, derive, keep …; ``overrides``, ``variant``
@@ -162,7 +158,7 @@ def default_folder(scene: Path) -> Path:
 def engine_for(
     plan: Plan, folder: Path, workers: int | None = None, scheduler: str | None = None, client: Any = None
 ) -> Engine:
-    """The engine that is asked for."""
+    """The engine selected by the arguments."""
     if client is None and scheduler is None:
         return LocalEngine(workers)
     shared = folder.resolve() if plan.settings["keep"] != "none" else None
@@ -178,10 +174,10 @@ def carry_out_sweep(
     overwrite: bool = False,
     telling: Telling | None = None,
 ) -> Sweep:
-    """Make the runs of ``plan`` that ``folder`` has not yet, with ``engine``; the sweep as far as it came.
+    """Make the runs of ``plan`` that are not in ``folder`` yet with ``engine``; returns the sweep, complete or not.
 
-    A first interrupt hands out no more runs and waits for those under way, a second one ends them: raises
-    KeyboardInterrupt, with everything finished kept.
+    After a first interrupt no more runs are started and those in progress are completed; a second one ends them and
+    raises KeyboardInterrupt. Finished runs are kept.
     """
     with RunLock(folder) as lock:
         if lock.stale and telling and telling.say:
@@ -193,7 +189,7 @@ def carry_out_sweep(
 
 
 def _prepare(folder: Path, plan: Plan, resume: bool, overwrite: bool) -> None:
-    """The folder as this sweep may begin in it. Raises FolderTaken, CannotResume."""
+    """Prepare the folder for this sweep. Raises FolderTaken, CannotResume."""
     stored_at = folder / PLAN
     stored = json.loads(stored_at.read_text(encoding="utf-8")) if stored_at.is_file() else None
     table = "" if plan.settings["rare"] else digest_of(plan.table)
@@ -225,7 +221,7 @@ def _prepare(folder: Path, plan: Plan, resume: bool, overwrite: bool) -> None:
 
 
 def _files(plan: Plan) -> str:
-    """A digest of the scene and of what it reads."""
+    """A digest of the scene and the files it reads."""
     import hashlib
 
     digest = hashlib.sha256(plan.scene.read_bytes())
@@ -239,7 +235,7 @@ def _files(plan: Plan) -> str:
 
 
 class _Conduct:
-    """A sweep under way."""
+    """A sweep in progress."""
 
     def __init__(
         self, plan: Plan, folder: Path, journal: Journal, engine: Engine, interruption: Interruption, telling: Telling
@@ -294,7 +290,7 @@ class _Conduct:
         )  # fmt: skip
 
     def _make(self, numbers: Iterable[int], table: Sequence[Mapping[str, Any]]) -> None:
-        """Make those of the runs that the journal has not."""
+        """Make the runs that are not in the journal."""
         values = dict(zip(numbers, table, strict=True))
         missing = [number for number in values if number not in self.journal.rows]
         for row in self.engine.results(self._handed_out(missing, values)):
@@ -309,7 +305,8 @@ class _Conduct:
             self._write_sometimes()
 
     def _took(self, row: Mapping[str, Any]) -> None:
-        """Keep how long a run has taken; the first of a process, which loads and compiles, until there are others."""
+        """Record the duration of a run; that of a process's first run, which loads and compiles, only until there are
+        others."""
         process = row["host"], row["process"]
         if process in self.warm:
             if not self.settled:
@@ -398,7 +395,7 @@ class _Conduct:
             return None
 
     def _pictures(self) -> dict[str, int]:
-        """Make the typical, the worst and the median run once more, with pictures."""
+        """Repeat the typical, the worst and the median run with pictures."""
         if self.plan.settings["measure"] == "pause":
             return {}
         least = self.plan.settings["measure"] == "safety"
@@ -411,7 +408,7 @@ class _Conduct:
             place = self.folder.resolve() / PICTURED / f"{number:06d}"
             if not (place / "picture.png").is_file():
                 jobs[number] = self._job(number, values)._replace(folder=str(place), keep="all", pictures=True)
-        # Here, where the folder is, whatever made the runs.
+        # On this machine, where the folder is, whichever engine made the runs.
         with LocalEngine(min(len(jobs), self.engine.workers) or 1) as engine:
             for _ in engine.results(jobs.values()):
                 pass

@@ -1,7 +1,7 @@
-"""One run of a sweep and what it comes to: columns of the table.
+"""One run of a sweep and its columns of the table.
 
-safety   the factor of safety of `geomech.safety_report`, its mechanism, what moves at failure
-run      the scene run to its end: loads, growth, what has moved and how far, and all of its summary
+safety   the factor of safety of `geomech.safety_report`, its mechanism, and the blocks that move at failure
+run      the scene run to its end: loads, growth, displacements, and its summary
 pause    a sleep, for benchmarks of the engines
 
 A run that ends in an error has a status, "refused" (its scene cannot be drawn or has no answer) or "failed" (the
@@ -31,13 +31,13 @@ if TYPE_CHECKING:
     from ..model import Problem
 
 DONE, REFUSED, FAILED = "done", "refused", "failed"
-#: Columns that every measure has; what is written for one run and differs from machine to machine stands in `TIMES`.
+#: Columns of every measure that differ from machine to machine.
 TIMES = ("seconds", "processor_seconds", "host", "process", "attempts")
-#: Names in quotes and numbers: what two reasons of one kind differ by.
+#: Quoted names and numbers, which differ between reasons of the same kind.
 _OWN = re.compile(r"'[^']*'|(?<![\w])[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?")
-#: Errors that say that a scene has no answer, by the name of their class.
+#: Class names of errors for scenes without an answer.
 _REFUSALS = ("SceneError", "CracksInBlocks", "NothingToReduce")
-#: So much of a reason is kept, characters; so many warnings of a run, and so much of them.
+#: Number of characters kept of a reason, and number of warnings kept of a run.
 _REASON, _WARNED = 400, 3
 
 
@@ -86,7 +86,7 @@ def carry_out(job: Job) -> dict[str, Any]:
 
 
 def kind_of_reason(reason: str) -> str:
-    """A ``reason`` without the numbers and names that are a run's own."""
+    """A ``reason`` without numbers and names, which differ between runs."""
     return _OWN.sub("#", reason.splitlines()[0] if reason else "")
 
 
@@ -100,7 +100,7 @@ def _error_text(error: Exception) -> str:
 
 
 def _columns(job: Job, row: Mapping[str, Any]) -> dict[str, Any]:
-    """The columns that are expressions of others."""
+    """Columns computed from others."""
     names = {**row.get("_summary", {}), **{key: value for key, value in row.items() if not key.startswith("_")}}
     names["history"] = row.get("_history", {})
     found: dict[str, Any] = {}
@@ -113,7 +113,7 @@ def _columns(job: Job, row: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _fails(job: Job, row: dict[str, Any]) -> bool | None:
-    """Whether the slope fails; None where the run has no answer."""
+    """Whether the slope fails; None if the run has no answer."""
     if row["status"] != DONE:
         return None
     from .plan import FAILS
@@ -129,7 +129,7 @@ def _fails(job: Job, row: dict[str, Any]) -> bool | None:
 
 @contextmanager
 def _heard():
-    """The warnings of geomech meanwhile."""
+    """Collects the warnings of geomech in this context."""
     texts: list[str] = []
 
     class Listening(logging.Handler):
@@ -179,7 +179,7 @@ def _safety(job: Job) -> dict[str, Any]:
     return row
 
 
-def _of_blocks(problem: Problem, moving: np.ndarray, job: Job, vertices: np.ndarray | None = None) -> dict[str, Any]:
+def _of_blocks(problem: Problem, moving: np.ndarray, job: Job) -> dict[str, Any]:
     """Number, mass (kg/m) and volume (m³/m) of the blocks ``moving``, and the places they leave."""
     blocks = problem.blocks
     areas = np.abs(blocks.areas())
@@ -194,7 +194,8 @@ def _of_blocks(problem: Problem, moving: np.ndarray, job: Job, vertices: np.ndar
 
 
 def places_of(outlines: list[np.ndarray], box: tuple[float, float, float, float], cells: tuple[int, int]) -> str:
-    """Which cells of the ``box`` have their middle in one of the ``outlines``, as bits in text (`moved_cells`)."""
+    """Text with one bit per cell of the ``box``: whether its centre is inside one of the ``outlines`` (see
+    `moved_cells`)."""
     inside = np.zeros(cells[::-1], bool)
     x = box[0] + (np.arange(cells[0]) + 0.5) * (box[2] - box[0]) / cells[0]
     y = box[1] + (np.arange(cells[1]) + 0.5) * (box[3] - box[1]) / cells[1]
@@ -210,7 +211,7 @@ def places_of(outlines: list[np.ndarray], box: tuple[float, float, float, float]
 
 
 def moved_cells(text: str, cells: tuple[int, int]) -> np.ndarray:
-    """(ny, nx) bool: the cells that `places_of` has written."""
+    """(ny, nx) bool: the cells in a text of `places_of`."""
     bits = np.unpackbits(np.frombuffer(base64.b64decode(text), np.uint8))
     return bits[: cells[0] * cells[1]].reshape(cells[::-1]).astype(bool)
 
@@ -219,7 +220,7 @@ def moved_cells(text: str, cells: tuple[int, int]) -> np.ndarray:
 
 
 class _Watcher:
-    """Observer that keeps the first and the last cycle of a run, and its history where columns ask for it."""
+    """Observer that keeps the first and last cycle of a run, and its history if columns need it."""
 
     def __init__(self, with_history: bool) -> None:
         self.with_history = with_history
@@ -274,7 +275,7 @@ def _run(job: Job) -> dict[str, Any]:
 
 
 def _motion(job: Job, problem: Problem, last: Any) -> dict[str, Any]:
-    """What has moved, and how far: ``run_out_m`` is the longest way along x of a block that moves, m."""
+    """Moving blocks and their displacements; ``run_out_m``: largest displacement of a moving block along x, m."""
     from ..model.blocks.key_blocks import FALLS, SLIDES, key_blocks
 
     blocks, state = last.blocks, last.state
@@ -331,7 +332,7 @@ def _own_folder(job: Job) -> Path:
 
 
 def _keep(job: Job, row: Mapping[str, Any]) -> None:
-    """Write how the run was made into its folder, or remove the folder of one that is not to be kept."""
+    """Write into the run's folder how it was made, or remove the folder if it is not to be kept."""
     if job.folder is None:
         return
     wanted = job.keep == "all" or (job.keep == "failed" and (row["fails"] or row["status"] != DONE))

@@ -1,5 +1,4 @@
-"""The plan of a sweep: a scene, what varies in it, what is measured. All that is wrong with it is said before anything
-runs."""
+"""The plan of a sweep: a scene, its variables, and the measured quantity. All faults are reported before any run."""
 
 from __future__ import annotations
 
@@ -23,24 +22,24 @@ from .expressions import ExpressionError, evaluate, margin_of, names_in, parsed
 from .sampling import Design, correlation_matrix, run_table
 from .variables import Listed, Random, Variable, VariableError, variable
 
-#: Beside the scene.
+#: File with the settings of a sweep, in the folder of the scene.
 SWEEP_FILE = "sweep.toml"
-#: What a distribution may have outside the bounds of its key.
+#: Largest probability of a value outside the bounds of its key.
 _OUTSIDE = 1e-9
 #: More runs than this are refused unless ``limit`` allows them.
 LIMIT = 10_000
-#: So many scenes are drawn to see whether any of them can be; the others are tried as they are run.
+#: Number of scenes that are built in advance; the sweep is refused if none of them can be built.
 _DRAWN = 3
 FAILS = {"safety": "factor_of_safety < 1", "run": "moving_blocks > 0", "pause": "false"}
-#: The grid on which it is counted how often each place moves, cells along the longer side.
+#: Number of cells along the longer side of the map of moving places.
 _CELLS = 72
 
 
 @dataclass(frozen=True)
 class Plan:
-    """A checked plan. ``settings`` are those of [sweep]; ``variables`` in the order of the table's columns; ``keys``
-    name → the key of the scene it sets; ``derived`` key → expression; ``seeds`` of joint sets; ``box`` (x0, y0, x1, y1)
-    m and ``cells`` (nx, ny) of the map of what moves."""
+    """A checked plan. ``settings``: [sweep]; ``variables``: in column order; ``keys``: variable name → key of the
+    scene; ``derived``: key → expression; ``seeds`` of joint sets; ``box`` (x0, y0, x1, y1) m and ``cells`` (nx, ny) of
+    the map of moving places."""
 
     scene: Path
     variant: str | None
@@ -67,7 +66,7 @@ class Plan:
 
     @property
     def result(self) -> str:
-        """The column that is reported first: what `fails` compares, else that of the measure."""
+        """The column that is reported first: the one compared in `fails`, otherwise that of the measure."""
         first = next((name for name in sorted(names_in(self.fails)) if "." not in name), None)
         return (
             first
@@ -86,7 +85,7 @@ class Plan:
         return run_table(self.variables, self.design, self.seeds)
 
     def changes(self, values: Mapping[str, Any]) -> tuple[str, ...]:
-        """The changes "key=value" that make the scene of a run with these ``values``."""
+        """The overrides "key=value" of the scene for a run with these ``values``."""
         found = [f"{self.keys[name]}={_toml(value)}" for name, value in values.items() if name in self.keys]
         if "seed" in values:
             found.append(f"geometry.seed={values['seed']}")
@@ -104,7 +103,7 @@ class Plan:
         }  # fmt: skip
 
     def how_to_repeat(self, values: Mapping[str, Any]) -> str:
-        """The command that makes the run with these ``values`` alone."""
+        """The command that repeats the single run with these ``values``."""
         import shlex
 
         verb = "safety" if self.settings["measure"] == "safety" else "run"
@@ -130,10 +129,10 @@ def plan_of(
     source: str = "",
     alone: bool = False,
 ) -> Plan:
-    """The plan of a sweep over ``scene`` with the ``given`` settings, those of the file ``table`` (by default
-    sweep.toml beside the scene, where there is one) and those of the scene's [sweep]; the first that says something
-    counts, of `vary`, `derive` and `columns` name by name. ``limit``: more runs are refused (default 10 000). ``source``
-    stands before the names of given settings in messages ("--"). ``alone``: the given settings are all there are.
+    """The plan of a sweep over ``scene``. Settings are taken from ``given``, then from the file ``table`` (default:
+    sweep.toml in the scene's folder, if it exists), then from [sweep] of the scene; `vary`, `derive` and `columns` are
+    merged by name. ``limit``: largest number of runs (default 10 000). ``source``: prefix of the names of given
+    settings in messages ("--"). ``alone``: use the given settings only.
 
     Raises SceneError with every fault: unknown keys, empty ranges, distributions beyond a key's bounds …
     """
@@ -145,7 +144,7 @@ def plan_of(
     if settings is None or faults:
         raise SceneError([*faults, *wrong])
     if settings.measure == "run" and "run" not in tomllib.loads(path.read_text(encoding="utf-8-sig")):
-        load_scene(path, overrides, variant)  # which says that [run] is missing
+        load_scene(path, overrides, variant)  # reports that [run] is missing
     checker = _Checker(base, settings, place)
     plan = checker.plan(path.resolve(), tuple(overrides), variant)
     if checker.faults:
@@ -161,14 +160,14 @@ def plan_of(
 
 
 def read_plan(data: Mapping[str, Any]) -> Plan:
-    """The plan that `Plan.as_dict` has written, checked again. Raises SceneError."""
+    """The plan from the data of `Plan.as_dict`, checked again. Raises SceneError."""
     return plan_of(
         data["scene"], data["settings"], overrides=data["overrides"], variant=data["variant"], limit=10**9, alone=True
     )
 
 
 def _merged(base: Any, table: Path | None, given: dict[str, Any], source: str, alone: bool):
-    """The settings from all three places, a function that says where each stands, and faults."""
+    """The settings from all three sources, a function that gives the place of each, and faults."""
     sources: list[tuple[dict[str, Any], Any]] = []
     faults: list[Fault] = []
     if base.tables.sweep is not None and not alone:
@@ -260,7 +259,7 @@ def seeds_of(written: Any) -> tuple[int, ...]:
 
 
 class _Checker:
-    """Collects what is wrong with a sweep over the scene ``base``."""
+    """Collects the faults of a sweep over the scene ``base``."""
 
     def __init__(self, base: Any, settings: Any, place: Any) -> None:
         self.base, self.settings, self.place = base, settings, place
@@ -337,7 +336,8 @@ class _Checker:
         return seeds
 
     def _key(self, where: tuple[str, str], name: str) -> str | None:
-        """The key ``name`` as the scene has it, items of lists by number; None, and a fault, where there is none."""
+        """The key ``name`` in the scene's spelling, with list items by number; None, and a fault, if it does not
+        exist."""
         path: list[str | int] = []
         node: Any = self.data
         for part in path_of(name):
@@ -371,13 +371,13 @@ class _Checker:
         return dotted(tuple(path))
 
     def _is_map(self, path: Sequence[str | int]) -> bool:
-        """Whether names stand at ``path`` that the scene gives, of tables."""
+        """Whether ``path`` is a map from names chosen in the scene to tables."""
         table = table_at(tuple(path[:-1])) if path else None
         found = field_of(table, path[-1]) if table is not None else None
         return found is not None and kind_of(found.annotation)[0] == "map" and path[-1] != "parameters"
 
     def _check_kind(self, made: Variable, key: str) -> None:
-        """Numbers for numbers, and distributions within their bounds."""
+        """Check that values have the key's type, and distributions are within its bounds."""
         path = tuple(int(part) if str(part).isdecimal() else part for part in path_of(key))
         table = table_at(path[:-1])
         found = field_of(table, path[-1]) if table is not None else None
@@ -422,7 +422,7 @@ class _Checker:
         return not unknown
 
     def check_runs(self, plan: Plan, limit: int) -> None:
-        """What the runs together ask for."""
+        """Check the number of runs, samples, correlations and expressions, and try some scenes."""
         self._check_samples(plan)
         self._check_rare(plan)
         self._check_correlations(plan)
@@ -434,7 +434,7 @@ class _Checker:
             self.faults.append(Fault(self.place(where), message, f"ask for fewer, or say --limit {count}"))
 
     def _check_samples(self, plan: Plan) -> None:
-        """Numbers of runs and seeds."""
+        """Check the numbers of runs and seeds."""
         settings, seeds, random = self.settings, plan.seeds, plan.random
         if settings.runs and seeds and len(seeds) != settings.runs:
             self.refuse(
@@ -501,7 +501,7 @@ class _Checker:
                     )
 
     def check_values(self, plan: Plan) -> None:
-        """The tables of the scene with the first, the smallest and the largest value of every variable."""
+        """Check the scene's tables with the first, smallest and largest value of each variable."""
         rows = plan.table
         for each in plan.variables:
             values = [row[each.name] for row in rows]
@@ -530,7 +530,7 @@ class _Checker:
         return bool(faults)
 
     def check_scenes(self, plan: Plan) -> None:
-        """Refuse, with what the first is refused for, when none of the first scenes can be drawn."""
+        """Refuse the sweep, with the faults of the first scene, if none of the first scenes can be built."""
         to_run = plan.settings["measure"] == "run"
         first: SceneError | None = None
         step = max(1, len(plan.table) // _DRAWN)
@@ -545,7 +545,7 @@ class _Checker:
 
 
 def _map_of(scene: Any) -> tuple[tuple[float, float, float, float], tuple[int, int]]:
-    """A box around what may move of the ``scene``, and into how many cells it is divided."""
+    """A box around the movable blocks of ``scene``, and its numbers of cells."""
     problem = scene.problem()
     blocks = problem.blocks
     free = ~blocks.fixed[blocks.vertex_block] if not blocks.fixed.all() else blocks.fixed[blocks.vertex_block]

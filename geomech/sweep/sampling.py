@@ -1,4 +1,4 @@
-"""The table of a sweep's runs: every combination of listed values, and random samples of what is distributed.
+"""The table of a sweep's runs: all combinations of listed values, and samples of random variables.
 
 Samples are points in the unit cube, of plain Monte Carlo, a Latin hypercube (McKay, Beckman & Conover 1979), scrambled
 Sobol' points (Owen 1998) or Saltelli's design (Saltelli et al. 2010, for Sobol' sensitivities); a Gaussian copula
@@ -24,15 +24,14 @@ import numpy as np
 
 from .variables import Listed, Random, Variable
 
-SAMPLINGS = ("monte carlo", "latin hypercube", "sobol", "saltelli")
-#: Points so near the faces of the unit cube have no finite quantiles.
+#: Smallest distance of points from the faces of the unit cube, where quantiles are infinite.
 _INSIDE = 1e-15
 
 
 @dataclass(frozen=True)
 class Design:
-    """How random variables are sampled: the ``sampling`` of `SAMPLINGS`, so many ``runs``, from this ``seed``, with
-    ``correlations`` (name, name, coefficient of the underlying normal variables)."""
+    """How random variables are sampled: ``sampling`` is "monte carlo", "latin hypercube", "sobol" or "saltelli";
+    ``correlations``: (name, name, coefficient of the underlying normal variables)."""
 
     sampling: str = "monte carlo"
     runs: int = 1
@@ -40,8 +39,8 @@ class Design:
     correlations: tuple[tuple[str, str, float], ...] = ()
 
     def unit_points(self, dimensions: int) -> np.ndarray:
-        """(runs, dimensions) in (0, 1), uncorrelated; of Saltelli's design the whole groups of points that ``runs``
-        have room for."""
+        """(runs, dimensions) in (0, 1), uncorrelated; in Saltelli's design the number of whole groups that fit into
+        ``runs``."""
         if dimensions == 0:
             return np.empty((self.runs, 0))
         if self.sampling == "monte carlo":
@@ -53,7 +52,7 @@ class Design:
 
             kind = qmc.LatinHypercube if self.sampling == "latin hypercube" else qmc.Sobol
             with warnings.catch_warnings():
-                # Of numbers of points that are no power of two: they are still evenly spread, but not perfectly.
+                # Raised if the number of points is not a power of two, which spreads them slightly less evenly.
                 warnings.simplefilter("ignore", UserWarning)
                 found = _seeded(kind, dimensions, self.seed).random(self.runs)
         return np.clip(found, _INSIDE, 1.0 - _INSIDE)
@@ -79,7 +78,7 @@ class Design:
 
 
 def _seeded(kind: Any, dimensions: int, seed: int) -> Any:
-    """A sampler of `scipy.stats.qmc`: its seed is called otherwise since SciPy 1.15."""
+    """A sampler of `scipy.stats.qmc`, whose seed argument has another name since SciPy 1.15."""
     try:
         return kind(dimensions, rng=seed)
     except TypeError:
@@ -87,7 +86,7 @@ def _seeded(kind: Any, dimensions: int, seed: int) -> Any:
 
 
 def correlation_matrix(names: Sequence[str], pairs: Sequence[tuple[str, str, float]]) -> np.ndarray:
-    """(n, n): R. Raises ValueError where it is not positive definite."""
+    """(n, n): R. Raises ValueError if it is not positive definite."""
     matrix = np.eye(len(names))
     for a, b, value in pairs:
         i, j = names.index(a), names.index(b)
@@ -121,8 +120,8 @@ def samples(variables: Sequence[Random], design: Design) -> np.ndarray:
 
 
 def run_table(variables: Sequence[Variable], design: Design, seeds: Sequence[int] = ()) -> list[dict[str, Any]]:
-    """The values of every run, by name in the order of ``variables``: all combinations of listed values, each with all
-    samples of the random ones, of which the k-th takes the k-th of the ``seeds`` (as "seed")."""
+    """The values of each run by name, in the order of ``variables``: all combinations of listed values, each with all
+    samples of the random variables; the k-th sample has the k-th of the ``seeds`` (as "seed")."""
     listed = [each for each in variables if isinstance(each, Listed)]
     random = [each for each in variables if isinstance(each, Random)]
     drawn = samples(random, design).tolist() if random else [[] for _ in seeds or [0]]
@@ -140,5 +139,5 @@ def run_table(variables: Sequence[Variable], design: Design, seeds: Sequence[int
 
 
 def digest_of(table: Sequence[Mapping[str, Any]]) -> str:
-    """A digest by which two tables differ."""
+    """A digest of the table."""
     return hashlib.sha256(json.dumps(list(table)).encode()).hexdigest()[:16]

@@ -12,8 +12,7 @@ A variable is written as text, the same on the command line and in a scene:
     beta(0, 1, 2, 5)               bounds, then the exponents α and β of x^(α−1) (1−x)^(β−1)
     exponential(0.08, 0, 0.16)     mean before it is cut off, and where it is cut off
 
-Distributions but the bounded ones may have two more numbers, between which they are cut off (truncated and scaled to
-one again); inf is a number.
+Unbounded distributions may have two more numbers, between which they are truncated (and renormalised); inf is allowed.
 """
 
 from __future__ import annotations
@@ -26,7 +25,7 @@ from typing import Any
 
 import numpy as np
 
-#: Distribution → its parameters in order; what may be cut off has "low" and "high" behind them.
+#: Distribution → its parameters in order; truncatable ones end with "low" and "high".
 LAWS = {
     "normal": ("mean", "deviation"),
     "lognormal": ("mean", "deviation"),
@@ -37,15 +36,15 @@ LAWS = {
 }
 #: Those with bounds of their own.
 _BOUNDED = ("uniform", "triangular", "beta")
-#: A range ends with its last value when it comes this near to it, in parts of the step.
+#: Distance, in units of the step, below which a range includes its last value.
 _ROUNDOFF = 1e-9
-#: A list that a range writes out holds no more values.
+#: Largest number of values in a range.
 _MOST = 1_000_000
 _CALL = re.compile(r"\s*([a-z_]+)\s*\(([^()]*)\)\s*\Z")
 
 
 class VariableError(ValueError):
-    """A variable that cannot be: ``message`` and ``way_out``."""
+    """An invalid variable: ``message`` and ``way_out``."""
 
     def __init__(self, message: str, way_out: str) -> None:
         super().__init__(f"{message}: {way_out}")
@@ -81,11 +80,11 @@ class Random:
         return f"{self.law}({', '.join(f'{x:g}' for x in (*self.parameters, *cut))})"
 
     def quantile(self, share: np.ndarray) -> np.ndarray:
-        """The values that the variable stays below with probability ``share`` (n,) in (0, 1)."""
+        """Quantiles of the variable at probabilities ``share`` (n,) in (0, 1)."""
         law = self._law()
         share = np.asarray(share, dtype=float)
         if self._is_cut:
-            # From the nearer end, so that far tails keep their digits.
+            # Computed from the nearer end, so that far tails are accurate.
             below, above = float(law.cdf(self.low)), float(law.sf(self.high))
             lower = below + share * (1.0 - below - above)
             upper = above + (1.0 - share) * (1.0 - below - above)
@@ -109,7 +108,7 @@ class Random:
         return self.law not in _BOUNDED and (math.isfinite(self.low) or math.isfinite(self.high))
 
     def _law(self) -> Any:
-        """The distribution before it is cut off, of `scipy.stats`."""
+        """The distribution of `scipy.stats` before truncation."""
         from scipy import stats
 
         p = self.parameters
@@ -233,7 +232,7 @@ def _range(numbers: list[float], text: str) -> list[float | int]:
 
 
 def _rounded(value: float, step: float) -> float:
-    """``value`` without what adding ``step`` has left in its last digits."""
+    """``value`` without the round-off of adding ``step``."""
     digits = 12 - math.floor(math.log10(abs(step)))
     return round(value, max(0, digits))
 

@@ -3,6 +3,7 @@ else."""
 
 import numpy as np
 import pytest
+from block_problems import rectangle
 
 from geomech.coupling import cycles
 from geomech.model import (
@@ -30,10 +31,6 @@ from geomech.model import (
 )
 
 GRAVITY = History.constant([0.0, -9.81])
-
-
-def rectangle(x0, y0, x1, y1):
-    return np.array([[x0, y0], [x1, y0], [x1, y1], [x0, y1]], dtype=float)
 
 
 def problem(loads, end=2.0, dynamic=0.0, **run):

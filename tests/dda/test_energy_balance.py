@@ -7,6 +7,7 @@ import logging
 
 import numpy as np
 import pytest
+from block_problems import rectangle, turned
 
 from geomech import dda
 from geomech.model import (
@@ -24,15 +25,6 @@ from geomech.model import (
 GRAVITY = 9.81
 WEIGHT = Loads(gravity=History.constant([0.0, -GRAVITY]))
 ROCK = Material("rock", 10e9, 0.25, density=2600.0)
-
-
-def rectangle(x0: float, y0: float, x1: float, y1: float) -> np.ndarray:
-    return np.array([[x0, y0], [x1, y0], [x1, y1], [x0, y1]], dtype=float)
-
-
-def turned(polygon: np.ndarray, angle: float) -> np.ndarray:
-    c, s = np.cos(angle), np.sin(angle)
-    return polygon @ np.array([[c, s], [-s, c]])
 
 
 def wall(rows: int, width: int) -> Blocks:

@@ -5,16 +5,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from block_problems import rectangle
 
 from geomech import dda
 from geomech.dda.energy_balance import EnergyBudget
 from geomech.model import Blocks, Bolt, DdaSettings, Excavation, History, JointLaw, Loads, Material
 
 ROCK = Material("rock", 2e9, 0.2, density=2500.0)
-
-
-def rectangle(x0: float, y0: float, x1: float, y1: float) -> np.ndarray:
-    return np.array([[x0, y0], [x1, y0], [x1, y1], [x0, y1]], dtype=float)
 
 
 def pillar_and_roof() -> Blocks:

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from block_problems import rectangle, turned
 
 from geomech import dda
 from geomech.dda.loads.load_vectors import LoadMap, generalised
@@ -20,17 +21,7 @@ from geomech.model import (
     WaterTable,
 )
 
-
-def rectangle(x0: float, y0: float, x1: float, y1: float) -> np.ndarray:
-    return np.array([[x0, y0], [x1, y0], [x1, y1], [x0, y1]], dtype=float)
-
-
 ROCK = Material("rock", 10e9, 0.25, density=2600.0)
-
-
-def turned(polygon, angle):
-    c, s = np.cos(angle), np.sin(angle)
-    return polygon @ np.array([[c, s], [-s, c]])
 
 
 def resultant(blocks, loads, time=0.0, rotation=None, vertices=None):

@@ -6,15 +6,12 @@ import itertools
 
 import numpy as np
 import pytest
+from block_problems import rectangle
 
 from geomech import dda
 from geomech.model import Blocks, DdaSettings, EdgeTraction, History, JointLaw, Loads, Material, State
 
 GRAVITY = Loads(gravity=History.constant([0.0, -9.81]))
-
-
-def rectangle(x0: float, y0: float, x1: float, y1: float) -> np.ndarray:
-    return np.array([[x0, y0], [x1, y0], [x1, y1], [x0, y1]], dtype=float)
 
 
 def column(moduli: list[float], width: float = 1.0, strain: float = 1e-4):

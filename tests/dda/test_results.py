@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from block_problems import rectangle, turned
 
 from geomech import dda
 from geomech.conventions import rotate_stress
@@ -23,15 +24,6 @@ from geomech.model import (
 )  # fmt: skip
 
 GRAVITY = History.constant([0.0, -9.81])
-
-
-def rectangle(x0: float, y0: float, x1: float, y1: float) -> np.ndarray:
-    return np.array([[x0, y0], [x1, y0], [x1, y1], [x0, y1]], dtype=float)
-
-
-def turned(polygon: np.ndarray, angle: float) -> np.ndarray:
-    c, s = np.cos(angle), np.sin(angle)
-    return polygon @ np.array([[c, s], [-s, c]])
 
 
 def imbalance(system: dda.BlockSystem, before: State, result: dda.StepResult) -> float:

@@ -3,6 +3,7 @@ alone under loads written down by hand, and against handbook values."""
 
 import numpy as np
 import pytest
+from block_problems import rectangle
 
 from geomech import ddm
 from geomech.coupling import cycles
@@ -23,10 +24,6 @@ from geomech.model import (
 WEIGHT = 2200.0 * 9.81
 ROCK = Material("rock", 17e9, 0.21, 2200.0)  # no toughness given: nothing grows
 DOWN = Loads(gravity=History.constant([0.0, -9.81]))
-
-
-def rectangle(x0, y0, x1, y1):
-    return np.array([[x0, y0], [x1, y0], [x1, y1], [x0, y1]], dtype=float)
 
 
 def problem(polygons, fixed, lines, block=0, loads=DOWN, friction_deg=30.0, mouth=False, names=None, **dda):

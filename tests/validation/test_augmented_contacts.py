@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from block_problems import rectangle, turned
 
 from geomech import dda
 from geomech.model import (
@@ -25,15 +26,6 @@ from geomech.reference.blocks import block_motion as exact
 GRAVITY = 9.81
 YOUNGS_MODULUS = 10e9
 ROCK = Material("rock", YOUNGS_MODULUS, 0.25, density=2600.0)
-
-
-def rectangle(x0: float, y0: float, x1: float, y1: float) -> np.ndarray:
-    return np.array([[x0, y0], [x1, y0], [x1, y1], [x0, y1]], dtype=float)
-
-
-def turned(polygon: np.ndarray, angle: float) -> np.ndarray:
-    c, s = np.cos(angle), np.sin(angle)
-    return polygon @ np.array([[c, s], [-s, c]])
 
 
 def augmented(ratio: float | None, **more) -> DdaSettings:

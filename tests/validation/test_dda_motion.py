@@ -6,30 +6,13 @@ import itertools
 
 import numpy as np
 import pytest
+from block_problems import march, rectangle, turned
 
 from geomech import dda
 from geomech.model import Blocks, DdaSettings, EdgeTraction, History, JointLaw, Loads, Material, State
 from geomech.reference.blocks import block_motion as exact
 
 GRAVITY = 9.81
-
-
-def rectangle(x0: float, y0: float, x1: float, y1: float) -> np.ndarray:
-    return np.array([[x0, y0], [x1, y0], [x1, y1], [x0, y1]], dtype=float)
-
-
-def turned(polygon: np.ndarray, angle: float) -> np.ndarray:
-    c, s = np.cos(angle), np.sin(angle)
-    return polygon @ np.array([[c, s], [-s, c]])
-
-
-def march(system: dda.BlockSystem, state: State, loads: Loads, end: float, dt: float, watch=None) -> State:
-    while state.time < end * (1 - 1e-12):
-        result = system.step(state, loads, min(dt, end - state.time))
-        state = result.state
-        if watch is not None:
-            watch(result)
-    return state
 
 
 def incline(

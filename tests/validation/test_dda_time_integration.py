@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from block_problems import rectangle
 
 from geomech import dda
 from geomech.conventions import rotate_stress
@@ -29,10 +30,6 @@ SCHEMES = {
     "damped": (0.3025, 0.6),
     "strong": (1.0, 1.5),
 }
-
-
-def rectangle(x0: float, y0: float, x1: float, y1: float) -> np.ndarray:
-    return np.array([[x0, y0], [x1, y0], [x1, y1], [x0, y1]], dtype=float)
 
 
 def square(newmark, *, damping=0.0, **more) -> tuple[dda.BlockSystem, float]:

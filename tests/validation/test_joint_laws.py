@@ -9,6 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from block_problems import rectangle
 
 from geomech import dda
 from geomech.dda.joint_laws.nonlinear_laws import rough_strength
@@ -31,10 +32,6 @@ YOUNGS_MODULUS, POISSON = 50e9, 0.25
 PENALTY = 2 * 40 * YOUNGS_MODULUS / (1 - POISSON**2)
 ANGLE, RESIDUAL = math.radians(40), math.radians(30)
 ROUGH = Roughness(10.0, 50e6)
-
-
-def rectangle(x0: float, y0: float, x1: float, y1: float) -> np.ndarray:
-    return np.array([[x0, y0], [x1, y0], [x1, y1], [x0, y1]], dtype=float)
 
 
 SEAT = rectangle(-1, -0.5, 2, 0)

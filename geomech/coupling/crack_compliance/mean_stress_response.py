@@ -23,7 +23,7 @@ mean stress of a specimen in a shear box would put shear on its free sides: with
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -129,12 +129,12 @@ class ByMeanStress:
     def inherited(self, parent: np.ndarray, whole: np.ndarray) -> ByMeanStress:
         """The response of new blocks: of ``whole`` (k,) new numbers, the data of their ``parent`` (n_blocks,) are
         kept."""
-        solutions, memory, stress, softness = (
-            {child: known[parent[child]] for child in whole.tolist() if parent[child] in known}
-            for known in (self.solutions, self._memory, self.stress, self._softness)
-        )
+
+        def kept(known: dict[int, Any]) -> dict[int, Any]:
+            return {child: known[parent[child]] for child in whole.tolist() if parent[child] in known}
+
         own = {b for b in whole.tolist() if parent[b] in self._blocks}
-        return ByMeanStress(solutions, memory, stress, softness, own)
+        return ByMeanStress(kept(self.solutions), kept(self._memory), kept(self.stress), kept(self._softness), own)
 
     def soft(self, block: int, body: Body, elastic: np.ndarray) -> bool:
         """Whether open cracks make ``block`` more than `SOFT` times as soft as its rock in some direction."""

@@ -91,8 +91,8 @@ class EventSteps:
             found, excess = None, self._drive - 1
         search.add(start, excess)
         if found is None or abs(excess) > SETTLED:
-            way = self._back if self.follows and excess > 0 else self._ahead
-            found, excess = way(now, search, end)
+            back = self.follows and excess > 0
+            found, excess = self._back(now, search) if back else self._ahead(now, search, end)
         else:
             self.reached = True
         self._drive, self._rate = 1 + excess, search.slope
@@ -148,7 +148,7 @@ class EventSteps:
             self.reached = excess > 0
         return found, excess
 
-    def _back(self, now: CrackedBlocks, search: Crossing, end: float) -> tuple[Balance, float]:
+    def _back(self, now: CrackedBlocks, search: Crossing) -> tuple[Balance, float]:
         """Reduce the load to that at which K_eq = K_Ic for the most highly loaded tip; to zero if K_eq stays above."""
         start = now.state.time
         # Frictional faces continue to slip as the crack grows under a falling load. If the way back were divided into

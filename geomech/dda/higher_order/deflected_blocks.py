@@ -61,7 +61,7 @@ class DeflectedBlocks:
         order: np.ndarray | None = None,
     ) -> None:  # fmt: skip
         self.blocks = blocks
-        self.order = np.where(fixed, 1, blocks.order if order is None else order).astype(np.int64)
+        self.order = np.where(fixed, 1, np.asarray(blocks.order if order is None else order)).astype(np.int64)
         self.basis = DeflectionBasis.of(blocks.vertices, blocks.next_vertex, blocks.vertex_start, self.order)
         self.rows = np.where(fixed, 0, 1 + -(-n_deflections(self.order) // 6)).astype(np.int64)
         self.bending = np.flatnonzero(self.order > 1)
@@ -128,14 +128,6 @@ class DeflectedBlocks:
     def directions(self, points: np.ndarray, owner: np.ndarray, angle: np.ndarray) -> np.ndarray:
         """R P (n, 2, m) at undeformed ``points`` (n, 2) of blocks ``owner`` (n,) rotated by ``angle`` (n_blocks,)."""
         return np.einsum("nab,nbj->naj", rotation_of(angle[owner]), self.basis.displacement(points, owner))
-
-    def displaced(self, vertices: np.ndarray, points: np.ndarray, owner: np.ndarray, angle: np.ndarray, q: np.ndarray):
-        """(n, 2) m: displacement of ``points`` (n, 2) due to deflections ``q`` (k,).
-
-        The blocks ``owner`` (n,) have these strained ``vertices`` and are rotated by ``angle`` (n_blocks,).
-        """
-        undeformed = self.material_points(vertices, points, owner)
-        return np.einsum("naj,nj->na", self.directions(undeformed, owner, angle), self.padded(q)[owner])
 
     @cached_property
     def _outline(self) -> tuple[np.ndarray, np.ndarray]:

@@ -1,1 +1,1 @@
-"""Contact states and motion that agree with each other: the open–close iteration."""
+"""The open–close iteration: contact states that are consistent with the motion."""

@@ -1,13 +1,13 @@
-"""Contacts that do not penetrate: multipliers that take over what penalty springs hold.
+"""Contacts without penetration: augmented Lagrangian multipliers take over the forces of penalty springs.
 
 N = λₙ − kₙ g and S = λₜ − kₛ s, with the multipliers raised to N and S after every open–close iteration to the end
 (Uzawa; Hestenes 1969, Simo & Laursen 1992), until the gap g of closed contacts and the elastic motion s of sticking
-ones are below a tolerance. The penalty then decides how quickly, not how exactly, faces are held. The states are those
-of max(0, λₙ − kₙ g), so that contacts open and close by the same test. While the states stand, the map from multipliers
-to forces is linear and Anderson's (1965) mixing is GMRES on it, which soft springs in short steps need.
+ones are below a tolerance. The penalty then determines the rate of convergence, not the accuracy. The states are those
+of max(0, λₙ − kₙ g), so that contacts open and close by the same test. At constant states the map from multipliers to
+forces is linear, and Anderson's (1965) mixing is equivalent to GMRES on it, which soft springs in short steps need.
 
-Multipliers are remembered as the contact's forces; what is left of s is remembered too, so that tolerances do not add
-up to creep. Contacts with a joint's own stiffness have a spring that is real, and keep it.
+Multipliers are carried over as the contact's forces; the remaining s is carried over too, so that tolerances do not
+accumulate as creep. Contacts with a joint's own stiffness keep their springs, which are physical.
 """
 
 from __future__ import annotations
@@ -23,17 +23,17 @@ from .contact_set import ContactSet
 from .equations import Unsettled
 from .settled_states import Settled
 
-#: Former differences that Anderson's mixing combines.
+#: Number of earlier differences that Anderson's mixing combines.
 _DEPTH = 12
-#: Updates of the multipliers before the step is cut. Springs as soft as the blocks take about ten in statics.
+#: Largest number of multiplier updates before the step is cut. Springs as soft as the blocks take about ten in statics.
 _MOST_UPDATES = 60
-#: After so many, and again and again, the springs become so much stiffer (Bertsekas 1982): soft ones in short steps are
-#: slow where states still change.
+#: Number of updates after which the springs are stiffened, repeatedly, and by which factor (Bertsekas 1982): soft
+#: springs in short steps converge slowly while states change.
 _PATIENCE, _STIFFER = 10, 5.0
 
 
 class _Mixing:
-    """Anderson's mixing of the fixed point x = F(x), begun again whenever the unknowns are others."""
+    """Anderson's mixing for the fixed point x = F(x), restarted whenever the set of unknowns changes."""
 
     def __init__(self) -> None:
         self._which: bytes | None = None
@@ -62,11 +62,11 @@ def settle_augmented(
     held: tuple[np.ndarray, np.ndarray],
     tolerance: float,
 ) -> Settled:
-    """The settled step of ``found`` with multipliers; ``solve`` (contacts, springs, starting gaps, stretch) iterates
-    open–close states; ``springs`` and starting ``gap`` (n,) are those of the step, ``held`` (n,) twice says which contacts have
-    penalty springs, normal and shear. ``tolerance`` m.
+    """The converged step of ``found`` with multipliers. ``solve`` (contacts, springs, starting gaps, stretch) iterates
+    open–close states; ``springs`` and starting ``gap`` (n,) are those of the step; ``held``: two arrays (n,), which
+    contacts have normal and shear penalty springs; ``tolerance`` m.
 
-    Raises `Unsettled` when the multipliers do not settle.
+    Raises `Unsettled` if the multipliers do not converge.
     """
     n = len(found)
     closed = found.state != OPEN

@@ -1,10 +1,10 @@
-"""Contact states of a few blocks among many: the open-close iteration of a patch, with all blocks around it held where
-they are.
+"""Contact states of a few blocks among many: open–close iteration on a patch, with prescribed motion of the blocks
+around it.
 
-Where Newton's method on the states of all contacts does not end, the contacts that are still wrong mostly lie in a few
-places: one block that wedges itself between its neighbours. Their states are found on the blocks about them alone, in
-small systems that cost next to nothing, and the iteration on all contacts goes on from there (a nonlinear Schwarz
-method with the patches that need it; Cai & Keyes 2002).
+Where Newton's method on the states of all contacts does not converge, the inconsistent contacts are mostly in a few
+places, such as a block wedged between its neighbours. Their states are found on the surrounding blocks alone, in small
+systems of negligible cost, and the iteration on all contacts continues from there (a nonlinear Schwarz method on
+selected patches; Cai & Keyes 2002).
 """
 
 from __future__ import annotations
@@ -26,8 +26,9 @@ def settled_in_patch(
     equations: Equations, which: np.ndarray, states: States, answer: Answer, settle: Callable[[Equations], Settled],
     solver: ContactSolver,
 ) -> tuple[States | None, float]:  # fmt: skip
-    """``states`` with those of the contacts about ``which`` (n,) bool as ``settle`` finds them while all blocks farther
-    off move as in the ``answer``, None where it finds none; and what it took, in solutions of the whole system."""
+    """``states`` in which those of the contacts around ``which`` (n,) bool are replaced by the result of ``settle``,
+    with all other blocks moving as in ``answer``; None if it finds none. Also returns the cost in solutions of the
+    whole system."""
     pattern, found = equations.pattern, equations.found
     order, n = pattern.order, pattern.n
     if pattern.links is not None or equations.curved is not None:
@@ -57,7 +58,7 @@ def settled_in_patch(
         part, shear=part.shear - springs.shear * along,
         tried=(states.state[rows], states.direction[rows], bonded),
     )  # fmt: skip
-    # Bonds are lost when all else is right, not here.
+    # Bonds do not break here, only when everything else is consistent.
     holds = np.where(bonded > 0, np.inf, 0.0)
     springs = replace(springs, cohesion=springs.cohesion + holds, tension=springs.tension + holds)
     gap = answer.gap[rows] + apart - springs.lift * along
@@ -84,5 +85,5 @@ def settled_in_patch(
 
 
 def _of(unknowns: np.ndarray, inside: np.ndarray) -> np.ndarray:
-    """(6 k,) of the ``unknowns`` (6 n,), those of the blocks ``inside`` (n,) bool."""
+    """(6 k,) unknowns of the blocks ``inside`` (n,) bool, from the ``unknowns`` (6 n,) of all."""
     return unknowns.reshape(-1, 6)[inside].ravel()

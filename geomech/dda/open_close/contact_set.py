@@ -1,4 +1,4 @@
-"""The contacts of a step as it begins: where they are, what they remember, what holds them."""
+"""The contacts at the start of a step: geometry, history and springs."""
 
 from __future__ import annotations
 
@@ -18,40 +18,38 @@ from .settled_states import Settled
 
 @dataclass(frozen=True, eq=False)
 class ContactSet:
-    """Contacts (n,) as a step begins.
+    """Contacts (n,) at the start of a step.
 
     vertex, edge, block, other, law   as in CONTACT rows
-    corner      (n,)     the corner of the edge's block that the vertex meets where both are rounded corners
-                         (`rounded_corners`), −1 where the vertex meets the edge's line
-    tilt        (n,)     rad, from the edge's normal to that along which rounded corners meet; 0 where a line is met
-    precision   (n,)     m, to which the gaps of blocks that turn are followed
-    geometry    (n, 7)   position along the edge, outward normal (2), gap, tributary length, vertex (2): or, of the
-                faces in ``points``, where their springs stand
+    corner      (n,)     corner of the edge's block that the vertex meets if both are rounded (`rounded_corners`), −1 if
+                         it meets the edge's line
+    tilt        (n,)     rad, from the edge's normal to the contact normal of rounded corners; 0 on a line
+    precision   (n,)     m, accuracy of the gaps of rotating blocks
+    geometry    (n, 7)   position along the edge, outward normal (2), gap, tributary length, vertex (2); for the faces
+                         in ``points``, those of their springs
     springs              stiffness and strengths
-    state, direction, bonded   what was carried over: state and sense of sliding to try first, bond
+    state, direction, bonded   carried over: state and direction of sliding to try first, bond
     normal, shear, slip        forces N and sliding m
-    wear, lift                 m: way slid to and fro, and how far that has forced the faces apart (negative where they
-                               have to come nearer than the geometry says to meet)
-    stretch                    m: motion along the edge, still to be taken back, that the force of a sticking contact
-                               does not count yet: what multipliers have left of it, and what given motion makes of it
-                               in the step
-    inset       (n,)     bool: a bond's springs stand inside its face, for its blocks to bend
-    bare        (n,)     part of its face, from its corner on, that did not touch as the last step ended; −1: not known
-    released             J/m that shear had stored where faces part, and springs before they were eased, and that the new
-                         springs do not hold
-    unbent               J/m that the springs of bonds that break in this step had stored more inside their faces than
-                         at the corners
-    relies_on_glue             corners have been left out that hold as long as all bonds do
-    faces                      those that bonds hold at both ends; None without any
-    by_length   (n,)           contacts whose shear stiffness is that of a law
-    points, lumped             faces whose springs stand inside them, and the contacts with theirs at the corners; None
-                               without any
-    arc         (n,)     m that the step's motion, an arc where blocks turn, adds to the gap at its end beside the
-                straight one
-    swing       (n,)     m that it adds so to the motion along the edge
-    cohesive    (n,)     m of its face whose cohesion the contact holds; None: its tributary length
-    whole                      faces that keep their cohesion while they touch anywhere (`whole_faces`); or None
-    tried                      state, direction and bond that open–close iterations begin with, where these are others
+    wear, lift                 m: accumulated sliding distance, and dilation (negative: faces meet only closer than in
+                               the geometry)
+    stretch                    m: motion along the edge that is not yet in the force of a sticking contact: a remainder
+                               of multipliers, or a prescribed motion in the step
+    inset       (n,)     bool: the springs of a bond are inside its face, so that its blocks can bend
+    bare        (n,)     fraction of the face, from its corner, that was open at the end of the last step; −1: unknown
+    released             J/m stored in shear where faces open and in springs before they were softened, and not in the
+                         new springs
+    unbent               J/m that springs inside faces store beyond springs at the corners, for bonds that break in this
+                         step
+    relies_on_glue             corners have been left out that are held as long as all bonds hold
+    faces                      those with bonds at both ends; or None
+    by_length   (n,)           contacts whose shear stiffness is that of a joint law
+    points, lumped             faces with springs inside them, and the contacts with springs at the corners; or None
+    arc         (n,)     m, contribution of the rotation of blocks (an arc) to the gap at the end of the step, in
+                         addition to the linear motion
+    swing       (n,)     m, the same for the motion along the edge
+    cohesive    (n,)     m of its face whose cohesion the contact carries; None: its tributary length
+    whole                      faces that keep their cohesion while any part is closed (`whole_faces`); or None
+    tried                      state, direction and bond with which open–close iterations start, if they differ
     """
 
     vertex: np.ndarray
@@ -89,16 +87,15 @@ class ContactSet:
     tried: tuple[np.ndarray, np.ndarray, np.ndarray] | None = None
 
     def trying(self, rows: np.ndarray, without_lost: bool = False) -> ContactSet:
-        """The same contacts, of which open–close iterations begin with the states of CONTACT ``rows``, if these are
-        rows of the same contacts: those with which another attempt at the step has ended; ``without_lost`` of its bonds
-        that were lost there."""
+        """The same contacts, with open–close iterations starting from the states of CONTACT ``rows`` (the end of
+        another attempt at the step), if these are rows of the same contacts. ``without_lost``: bonds lost in that
+        attempt are restored."""
         if len(rows) != len(self) or not all(
             np.array_equal(rows[name], getattr(self, name)) for name in ("vertex", "edge")
         ):
             return self
         way = np.where(rows["state"] == SLIP, np.sign(rows["shear_force"]), 0.0)
-        # A bond that was lost in the other attempt may hold in this one; and which way what slides without force is not
-        # known.
+        # A bond lost in the other attempt may hold in this one, and the direction of sliding without force is unknown.
         known = (self.bonded == 0) | (rows["bonded"] == self.bonded) | without_lost
         known &= (rows["state"] != SLIP) | (way != 0) | (self.springs.friction == 0)
         bonded = rows["bonded"].copy() if without_lost else self.bonded
@@ -107,7 +104,7 @@ class ContactSet:
         )
 
     def part(self, rows: np.ndarray) -> ContactSet:
-        """The contacts ``rows`` (k,) alone, without the faces that they are ends of."""
+        """Only the contacts ``rows`` (k,), without data of whole faces."""
         n = len(self)
 
         def of(value):
@@ -122,31 +119,31 @@ class ContactSet:
         return ContactSet(**own | {"faces": None, "whole": None, "points": None, "lumped": None, "tried": tried})
 
     def expecting(self, state: np.ndarray, direction: np.ndarray) -> ContactSet:
-        """The same contacts, of which open–close iterations begin with these (n,)."""
+        """The same contacts, with open–close iterations starting from this ``state`` and ``direction`` (n,)."""
         if np.array_equal(state, self.state):
             return self
         return replace(self, tried=(state, direction, self.bonded))
 
     def trying_again(self, settled: Settled) -> ContactSet:
-        """The same contacts, of which open–close iterations begin with the states so ``settled`` with springs that stood
-        elsewhere. (The sense of sliding is that of each spring: forces at the corners of a face may have another.)"""
-        # A bond that was lost there may hold here.
+        """The same contacts, with open–close iterations starting from the states ``settled`` with springs at other
+        positions. (The direction of sliding is that of each spring; forces at the corners of a face may have
+        another.)"""
+        # A bond lost there may hold here.
         bonded = self.bonded if self.tried is None else self.tried[2]
         known = (bonded == 0) | (settled.bonded == bonded)
         tried = np.where(known, settled.state, self.state), np.where(known, settled.direction, self.direction), bonded
         return replace(self, tried=tried)
 
     def like(self, rows: np.ndarray) -> ContactSet:
-        """The same contacts `trying` the states of ``rows``, with the springs of faces on the parts that these press
-        on."""
+        """The same contacts `trying` the states of ``rows``, with the springs of faces on the parts closed in these."""
         again = self.trying(rows)
         if again is self or self.points is None:
             return again
         return replace(self.lumped.placed(self.points.pressed_by(rows["normal_force"])), tried=again.tried)
 
     def placed(self, points: FacePoints | None) -> ContactSet:
-        """These contacts, found at the corners, with the springs of faces where ``points`` say. Where a face parts, the
-        shear stress there goes; where it comes to touch there is none."""
+        """These contacts, found at the corners, with the springs of faces at ``points``. Where a face opens, its shear
+        stress is released; where it closes, there is none yet."""
         if points is None:
             return self
         was, springs = points.before(self.bare, self.by_length), points.springs(self.springs, self.by_length)
@@ -170,16 +167,16 @@ class ContactSet:
         )
 
     def misplaced(self, settled: Settled) -> ContactSet | None:
-        """The contacts with the springs of faces where the step, so ``settled``, has left them in contact; None if they
-        stand so."""
+        """The contacts with the springs of faces on the parts that are closed in the result ``settled``; None if they
+        are there already."""
         if self.points is None:
             return None
         better = self.points.better(settled.gap, settled.state, (settled.bonded == 1) & (self.springs.tension > 0))
         return None if better is None else self.lumped.placed(better)
 
     def sharing_cohesion(self, state: np.ndarray, bonded: np.ndarray) -> ContactSet:
-        """The contacts, of which those that are closed in ``state`` with ``bonded`` (n,) hold all the cohesion of their
-        whole faces; these ones if they do already."""
+        """The contacts, with the cohesion of whole faces assigned to those closed in ``state`` with ``bonded`` (n,);
+        unchanged if it is already."""
         if self.whole is None:
             return self
         cohesive = self.whole.cohesive(state, bonded)
@@ -190,8 +187,8 @@ class ContactSet:
         return replace(found, cohesive=cohesive, springs=springs).placed(self.points)
 
     def along(self, arc: np.ndarray, swing: np.ndarray) -> ContactSet:
-        """The contacts with gaps that follow an ``arc`` and motion along the edges that follows a ``swing`` (n,) m at
-        their corners."""
+        """The contacts with the contributions ``arc`` to gaps and ``swing`` to motion along the edges, (n,) m at their
+        corners."""
         if self.points is None:
             return replace(self, arc=arc, swing=swing)
         return replace(self.lumped, arc=arc, swing=swing).placed(self.points)
@@ -203,22 +200,22 @@ class ContactSet:
         return found.arc + np.zeros(len(found)), found.swing + np.zeros(len(found))
 
     def cornered(self, better: ContactSet) -> ContactSet:
-        """The contacts with springs at the corners of those faces that ``better``, by `misplaced`, has on other
-        parts."""
+        """The contacts, with springs at the corners of those faces whose springs `misplaced` has moved in
+        ``better``."""
         return self.lumped.placed(self.points.but(better.points))
 
     @cached_property
     def gap_before(self) -> np.ndarray:
-        """(n,) m from where the faces meet, negative where the vertex penetrates."""
+        """(n,) m: gap at the start of the step, including dilation; negative in penetration."""
         return self.geometry[:, 3] - self.lift
 
     @cached_property
     def gap(self) -> np.ndarray:
-        """(n,) m: the gap from which the step's straight motion leads to the one at its end."""
+        """(n,) m: the gap to which the linear motion of the step is added to give the gap at its end."""
         return self.gap_before + self.arc
 
     def blocks_of(self, contact: int) -> tuple[int, ...]:
-        """The two blocks of a ``contact``; none for −1."""
+        """The two blocks of a ``contact``; () for −1."""
         return () if contact < 0 else (int(self.block[contact]), int(self.other[contact]))
 
     def of_rows(self, value: np.ndarray) -> np.ndarray:
@@ -233,8 +230,8 @@ class ContactSet:
         return len(self.vertex)
 
     def rows(self, settled: Settled, acting: np.ndarray | None = None) -> np.ndarray:
-        """CONTACT rows of the finished step, on the geometry on which it was assembled: ``acting`` (n, 7) of the corners
-        where the forces acted, None where the step began."""
+        """CONTACT rows of the finished step, in the geometry in which the forces acted: ``acting`` (n, 7) at the
+        corners, None for that at the start of the step."""
         geometry, lift, points = self.geometry, self.lift, self.points
         gap, normal, shear = settled.gap, settled.normal_force, settled.shear_force
         if points is not None:

@@ -1,4 +1,4 @@
-"""The equations of a step in given contact states: what motion they make, and what states it calls for."""
+"""The equations of a step in given contact states: the motion, and the states that it requires."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ from ..linear_solver.block_solver import RESIDUAL
 from .contact_set import ContactSet
 from .settled_states import Settled
 
-#: What solutions with residuals below this part of the forces tell wrong states is not asked for more digits.
+#: Residual, relative to the forces, that suffices to recognise inconsistent states.
 _ROUGHLY = 1e-8
-#: Bonds that come to their strengths within this part of the same load break at once.
+#: Bonds that reach their strengths within this relative difference of the load break together.
 _AT_ONCE = 1e-6
 
 
@@ -32,13 +32,13 @@ class Unsettled(Exception):
 
 
 def plastic_slip(forces: np.ndarray, state: np.ndarray, shear_force: np.ndarray, springs: Springs) -> np.ndarray:
-    """(n,) m of slip in the step: the motion of sliding contacts without what their shear springs took up."""
+    """(n,) m: slip in the step, the motion of sliding contacts minus the elastic motion of their shear springs."""
     return np.where(state == SLIP, forces[:, 3] - (shear_force - forces[:, 1]) / springs.shear, 0.0)
 
 
 @dataclass(frozen=True, eq=False)
 class States:
-    """What each contact (n,) is tried as."""
+    """Trial states of contacts (n,)."""
 
     state: np.ndarray
     direction: np.ndarray
@@ -53,7 +53,7 @@ class States:
         return States(self.state, self.direction, np.where(self.state == OPEN, 0, self.bonded))
 
     def switched(self, wrong: np.ndarray, to: States) -> States:
-        """These states, and where ``wrong`` those of ``to``."""
+        """These states, replaced by those of ``to`` where ``wrong``."""
         pairs = ((self.state, to.state), (self.direction, to.direction), (self.bonded, to.bonded))
         return States(*(np.where(wrong, theirs, mine) for mine, theirs in pairs))
 
@@ -65,8 +65,8 @@ class States:
 
 @dataclass(frozen=True, eq=False)
 class Answer:
-    """The motion (6 n,) and forces (n, 4) that states make, the states they call for, by how much each is wrong (N),
-    whether the lines agree with curved laws, and the lines."""
+    """Solution in trial states: motion (6 n,) and forces (n, 4), the states these require, the violation of each
+    contact (N), whether linearised and nonlinear laws agree, and the linearised laws."""
 
     unknowns: np.ndarray
     forces: np.ndarray
@@ -80,7 +80,7 @@ class Answer:
 
 @dataclass(eq=False)
 class Equations:
-    """The step's equations but for the states; arguments as for `settle`."""
+    """The equations of a step without contact states; arguments as for `settle`."""
 
     pattern: assembly.Pattern
     matrix: np.ndarray
@@ -93,7 +93,7 @@ class Equations:
     curved: CurvedJoints | None
     statics: bool
     expected: np.ndarray | None = None
-    #: Whether patches and the central path, which know six unknowns a block, can be tried.
+    #: Whether patches and the central path can be used, which are for six unknowns per block.
     first_order = True
 
     def __post_init__(self) -> None:
@@ -105,12 +105,12 @@ class Equations:
         self.sides = assembly.sides_of(self.pattern.n, self.pattern.order, self.found.block, self.found.other)
 
     def room(self) -> np.ndarray:
-        """The flat matrix, for others to fill until the next answer: one of 100 000 blocks takes 200 MB."""
+        """The flat matrix, as work space until the next answer (200 MB for 100 000 blocks)."""
         self._held = None
         return self._data
 
     def answer(self, states: States, normal_force: np.ndarray, slip: np.ndarray) -> Answer:
-        """Solve with ``states``; forces and slip (n,) as last known bend the lines of curved laws. Raises
+        """Solve with ``states``. Nonlinear laws are linearised at ``normal_force`` and ``slip`` (n,). Raises
         `Unsettled`."""
         pattern, found, springs, gap = self.pattern, self.found, self.springs, self.gap
         state, direction, bonded = states.state, states.direction, states.bonded
@@ -158,8 +158,8 @@ class Equations:
     def _answered(
         self, states: States, springs: Springs, gap: np.ndarray, slip: np.ndarray, symmetric: bool, within: float
     ) -> Answer:
-        """The answer of the system as it is assembled, of lines with these ``springs`` and ``gap``, solved to a residual
-        ``within`` that part of the forces."""
+        """The solution of the assembled system, with linearised ``springs`` and ``gap``, to a relative residual of
+        ``within``."""
         pattern, found = self.pattern, self.found
         state, direction, bonded = states.state, states.direction, states.bonded
         try:
@@ -187,8 +187,8 @@ class Equations:
         return Answer(unknowns, forces, States(*called), violation, missed, slip, springs, gap)
 
     def first_bonds(self, states: States, answer: Answer, which: np.ndarray) -> np.ndarray:
-        """(n,) True for those of the bonds ``which`` (n,) bool that break first on either of their blocks' faces, as a
-        load that grows evenly over the step would break them."""
+        """(n,) bool: those of the bonds ``which`` (n,) bool that break first on the faces of their blocks under a load
+        that grows linearly during the step."""
         found, springs = self.found, answer.springs
         faces = BondedFaces.none() if found.faces is None else found.faces
         when = first_to_break(
@@ -204,9 +204,9 @@ class Equations:
         return which & (when <= least + _AT_ONCE * np.abs(least))
 
     def settled(self, states: States, answer: Answer, iterations: int) -> Settled:
-        """The ``answer`` of consistent ``states``; bonds that hold no pull are lost where they are open by more than gaps
-        are known to: a face that opens by a micrometre because of how springs share its load, and closes as that
-        grows, is whole."""
+        """The result for consistent ``states``. Bonds without tensile strength are lost where they are open by more
+        than the accuracy of gaps. (A face that opens by a micrometre only because of how springs share its load, and
+        closes as the load grows, stays bonded.)"""
         forces, springs = answer.forces, answer.springs
         known = np.maximum(self.slack, self.found.precision)
         open_bonds = (states.bonded > 0) & (states.state == OPEN) & (forces[:, 2] > known)

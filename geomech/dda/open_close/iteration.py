@@ -4,9 +4,9 @@ Given contact states make the step linear. Its solution is checked against them 
 contact is switched, and the step is solved again: a semismooth Newton method, which converges in two or three
 iterations where few contacts change. Bonds, whose loss is final, break only when everything else is consistent.
 
-If the number of inconsistent contacts does not fall, few of them are solved on the surrounding blocks alone
-(`block_patches`); of many, in a step in motion, operator splitting (`operator_splitting`) proposes states once. If neither
-leads on, the interior-point method (`CentralPath`) proposes states from which Newton's method
+If the number of inconsistent contacts does not decrease and few are left, their states are found on the surrounding
+blocks alone (`block_patches`); if many are left in a dynamic step, operator splitting (`operator_splitting`) proposes
+states once. If neither helps, the interior-point method (`CentralPath`) proposes states from which Newton's method
 continues. If that fails, the step is cut. Nonlinear joint laws are linearised within an iteration, which continues
 until the laws agree with their linearisation. All parameters are in `ContactSolver`.
 """
@@ -32,8 +32,9 @@ log = logging.getLogger(__name__)
 
 @dataclass(frozen=True)
 class Effort:
-    """What the search for states may take: ``max_iterations`` of Newton's method, and the ways of ``solver``; bonds
-    break ``in_order`` of a load that grows, or many at once; ``within_patch``: no patches of a patch."""
+    """Limits of the search for states: ``max_iterations`` of Newton's method and the methods of ``solver``.
+    ``in_order``: bonds break one by one under a growing load, otherwise several at once; ``within_patch``: the search
+    is itself on a patch."""
 
     max_iterations: int
     solver: ContactSolver
@@ -42,20 +43,21 @@ class Effort:
 
 
 def is_large(n_free: int, statics: bool, solver: ContactSolver) -> bool:
-    """Whether a step of so many free blocks in motion is cut as soon as contacts stop its central path: half the step
-    goes through in less than the path takes from there (`ContactSolver.large_system`)."""
+    """Whether a dynamic step of ``n_free`` blocks is cut as soon as contacts stop its central path: half the step takes
+    less time than continuing the path (`ContactSolver.large_system`)."""
     return not statics and n_free >= solver.large_system
 
 
 def settle(equations: Equations, max_iterations: int, solver: ContactSolver) -> Settled:
-    """Iterate from the states of the contacts of ``equations`` to consistent ones. An iteration is a solution of the
-    step's equations, those along the central path included.
+    """Iterate from the states of the contacts of ``equations`` to consistent ones. Each solution of the step's
+    equations counts as an iteration, also along the central path.
 
-    Bonds break where all else is right, and those first that a load growing from the step's start breaks first. Where
-    there are many contacts this takes long: those that open lose their bonds at once then, all that are overloaded by
-    half as much as the worst go together, and what is closed in the end gets its bond back.
+    Bonds break when everything else is consistent, in the order in which a load growing from the start of the step
+    breaks them. With many contacts this takes too long: then contacts that open lose their bonds at once, all bonds
+    overloaded by at least half as much as the worst break together, and contacts that are closed in the end get their
+    bonds back.
 
-    Raises `Unsettled` where no consistent states are found, or ``max_iterations`` of Newton's method do not suffice.
+    Raises `Unsettled` if no consistent states are found within ``max_iterations`` of Newton's method.
     """
     in_order = len(equations.found) <= solver.bonds_in_order
     effort = Effort(max_iterations, solver, in_order)
@@ -64,8 +66,8 @@ def settle(equations: Equations, max_iterations: int, solver: ContactSolver) -> 
 
 
 def _with_bonds_restored(equations: Equations, effort: Effort, settled: Settled) -> Settled:
-    """The step ``settled`` with the bonds that it has taken from contacts which are closed in the end; as it is where
-    that does not settle soon."""
+    """The result ``settled`` with restored bonds of contacts that lost them but are closed in the end; unchanged if
+    that does not converge soon."""
     found = equations.found
     began = found.bonded if found.tried is None else found.tried[2]
     effort = replace(effort, max_iterations=effort.max_iterations // 2, in_order=True)
@@ -83,7 +85,7 @@ def _with_bonds_restored(equations: Equations, effort: Effort, settled: Settled)
         try:
             settled = _Search(replace(equations, found=replace(found, tried=tried)), effort).settled()
         except Unsettled as failure:
-            log.debug("%d bonds that gave way on the way to the states are not restored: %s", lost.sum(), failure)
+            log.debug("%d bonds lost during the iteration are not restored: %s", lost.sum(), failure)
             return replace(settled, iterations=iterations + effort.max_iterations)
         iterations += settled.iterations
 
@@ -91,8 +93,8 @@ def _with_bonds_restored(equations: Equations, effort: Effort, settled: Settled)
 class _Search:
     """The search for the contact states of one step's ``equations``.
 
-    ``newton`` counts iterations of Newton's method, ``spent`` those of splitting, the central path and patches besides.
-    ``may_split``: operator splitting is still to be tried.
+    ``newton``: number of iterations of Newton's method; ``spent``: cost of splitting, the central path and patches in
+    iterations. ``may_split``: operator splitting has not been tried yet.
     """
 
     def __init__(self, equations: Equations, effort: Effort) -> None:
@@ -108,12 +110,12 @@ class _Search:
         self.offered: set[bytes] = set()
         self.patched = self.pivots = 0
         self.may_split = self.solver.splitting and not effort.within_patch and can_split(self.equations)
-        # What closes sticking, is pulled open by its own shear and closes again can only slide: neither fits.
+        # A contact that sticks when closed, is opened by its own shear and closes again must slide.
         self.closed, self.sheared = np.zeros(n, np.int64), np.zeros(n)
         self._restart()
 
     def _restart(self, proposed: bool = False) -> None:
-        """Other states than before are tried, ``proposed`` by the central path."""
+        """Restart the counts with other states, which may be ``proposed`` by the central path."""
         self.fewest, self.tries, self.proposed, self.falls = np.inf, 0, proposed, True
         self.best: tuple[States, Answer, np.ndarray] | None = None
 
@@ -164,8 +166,8 @@ class _Search:
         return self.equations.settled(self.states, answer, self.newton + round(self.spent))
 
     def _break_bonds(self, answer: Answer, bonds: np.ndarray) -> None:
-        """Take the ``bonds`` (n,) bool that give way first: none breaks before all else is right. What was tried knew of
-        bonds that are gone, and what is left has time of its own: there are fewer bonds each time."""
+        """Break the first of the overloaded ``bonds`` (n,) bool, once everything else is consistent, and restart the
+        search, whose limits count anew: the number of bonds decreases each time."""
         found = self.found
         if self.effort.in_order:
             first = self.equations.first_bonds(self.states, answer, bonds)
@@ -177,28 +179,28 @@ class _Search:
         self._restart()
 
     def _called(self, answer: Answer, wrong: np.ndarray) -> States:
-        """The states that the ``answer`` calls for."""
+        """The states that the ``answer`` requires."""
         closing = wrong & (self.states.state == OPEN) & (answer.called.state == STICK)
         called = answer.called.sliding(closing & (self.closed > 0), self.sheared)
         self.closed += closing
         return called
 
     def _count(self, number: int, answer: Answer, wrong: np.ndarray) -> None:
-        """Whether so many wrong contacts are fewer than before."""
+        """Record the ``number`` of inconsistent contacts, and whether it is a new minimum."""
         self.tries = 0 if number <= self.solver.newton_reduction * self.fewest else self.tries + 1
         self.falls = number < self.fewest
         if self.falls:
             self.fewest, self.best = number, (self.states, answer, wrong)
 
     def _overshoots(self, answer: Answer) -> bool:
-        """Whether the forces of wrong contacts are so large that operator splitting, while it is still to be tried, leads on
-        sooner than Newton's method."""
+        """Whether operator splitting, if not tried yet, is faster than Newton's method because the forces of
+        inconsistent contacts are large."""
         forces = float(np.abs(answer.forces[:, 0]).sum())
         return self.may_split and float(answer.violation.sum()) > self.solver.splitting_violation * forces
 
     def _most_tries(self, number: int) -> int:
-        """How many iterations may go by without a reduction: none of a large system, whose factors are dear, nor where
-        many are wrong that operator splitting finds for less."""
+        """Number of iterations allowed without a new minimum: none for a large system, whose factors are expensive, or
+        if operator splitting is cheaper for so many inconsistent contacts."""
         few = number <= self.solver.few_wrong * len(self.found)
         solver = self.equations.pattern.solver
         if few and (solver is None or solver.in_parts):
@@ -206,7 +208,8 @@ class _Search:
         return -1 if self.large else 0 if self.may_split else self.solver.newton_tries
 
     def _by_patch(self, answer: Answer, wrong: np.ndarray, number: int) -> bool:
-        """Whether the wrong contacts, few, were settled on the blocks about them alone, from the best states so far."""
+        """Whether the few inconsistent contacts could be solved on the blocks around them alone, from the best states
+        so far."""
         solver, effort = self.solver, self.effort
         if (
             not solver.patches
@@ -233,7 +236,7 @@ class _Search:
         return True
 
     def _by_splitting(self) -> bool:
-        """Whether operator splitting proposes states, which it does once. Raises `Unsettled`."""
+        """Whether operator splitting proposes states; it is used only once. Raises `Unsettled`."""
         if not self.may_split:
             return False
         self.may_split = False
@@ -249,8 +252,8 @@ class _Search:
         return True
 
     def _pivot(self, answer: Answer, wrong: np.ndarray, called: States, returned: bool) -> None:
-        """Switch all ``wrong`` contacts to the states ``called`` for or, once states have ``returned`` or fewer are not
-        wrong, those alone that are worst on their blocks, until fewer are wrong than ever before: block principal pivoting
+        """Switch all ``wrong`` contacts to the required states ``called``; or, once states have ``returned`` or the
+        number does not decrease, only the worst of each block until there is a new minimum: block principal pivoting
         (Júdice & Pires 1994). Raises `Unsettled`."""
         if not returned and self.tries <= self.solver.newton_tries:
             self.states = self.states.switched(wrong, called)
@@ -265,12 +268,12 @@ class _Search:
                 violation, found.block, found.other, self.equations.pattern.order
             )
         else:
-            # Where many that are worst lead back, one by one they do not (Murty 1974).
+            # Switching several worst contacts may cycle; switching one at a time does not (Murty 1974).
             some = np.arange(len(wrong)) == (violation.argmax() if self.pivots % 2 else wrong.argmax())
         self.states = self.states.switched(some, called)
 
     def _by_path(self, answer: Answer) -> None:
-        """States that the central path proposes. Raises `Unsettled` where it has none."""
+        """Continue with states proposed by the central path. Raises `Unsettled` if it has none."""
         equations, bonded = self.equations, self._bonds_on_path()
         if self.path is None or not np.array_equal(self.path.bonded, bonded):
             self.path = CentralPath(
@@ -285,9 +288,9 @@ class _Search:
         self._restart(proposed=True)
 
     def _bonds_on_path(self) -> np.ndarray:
-        """(n,) the bonds that the central path counts with: those of open contacts are gone, but not where cohesion belongs
-        to the whole face (`whole_faces`): it stays with a face of which one end is open. Such a face that holds no pull
-        is free to open and to slide under its cohesion."""
+        """(n,) bonds on the central path. Open contacts lose theirs, except on whole faces (`whole_faces`), which keep
+        their cohesion if one end is open. Such a face without tensile strength can open, and slide under its
+        cohesion."""
         states, found = self.states, self.found
         bonded = states.without_open_bonds().bonded
         if found.whole is None:
@@ -296,13 +299,14 @@ class _Search:
         return np.where(self._without_pull(bonded), SLIPPED, bonded)
 
     def _without_pull(self, bonded: np.ndarray) -> np.ndarray:
-        """(n,) which of the ``bonded`` contacts (n,) of whole faces hold no pull and keep their cohesion when they slide."""
+        """(n,) bool: ``bonded`` contacts (n,) of whole faces without tensile strength that keep their cohesion when
+        they slide."""
         springs = self.equations.springs
         return (self.found.whole.face >= 0) & (bonded > 0) & (springs.tension <= 0.0) & (springs.keeps > 0)
 
     def _bonds_after_path(self, state: np.ndarray, bonded: np.ndarray) -> np.ndarray:
-        """(n,) the bonds with which iterations go on from the ``state`` (n,) that the path proposes with ``bonded`` (n,):
-        faces that stick all along have not slipped."""
+        """(n,) bonds for the iterations after the path has proposed ``state`` (n,) with ``bonded`` (n,): faces that
+        stick over their whole length have not slipped."""
         whole = self.found.whole
         if whole is None:
             return bonded
@@ -312,9 +316,8 @@ class _Search:
         return np.where(known & ~slides[whole.face] & (bonded == SLIPPED), self.states.bonded, bonded)
 
     def _proposed(self, path: CentralPath) -> States | None:
-        """States that the ``path`` proposes once nearly all contacts are decided, none of those offered already; None
-        if it ends, is blocked, takes more than it may, or, of a large system, contacts have stopped it. Raises
-        `Unsettled`."""
+        """New states proposed by the ``path`` once nearly all contacts are decided; None if it ends, is blocked,
+        exceeds its limit or, in a large system, is stopped by contacts. Raises `Unsettled`."""
         solver, n = self.solver, len(self.found)
         while path.taken < solver.path_iterations:
             try:
@@ -324,7 +327,7 @@ class _Search:
             self.spent += 1
             if not path.arrived and (path.ended or path.blocked or (self.large and path.stopped)):
                 return None
-            # Where no load comes to in so short a time, contacts neither bear nor part: round-off decides.
+            # Contacts that carry no load in so short a step are neither closed nor open; round-off decides.
             few = max(2, min(solver.path_undecided, solver.path_undecided_share * n))
             decided = path.arrived or undecided <= few
             if decided and path.missed < solver.path_balance and path.epsilon < 1.0:
@@ -342,14 +345,14 @@ class _Search:
         name = ("open", "sticking", "sliding")[self.states.state[worst]]
         return Unsettled(
             f"contact states did not settle in {self.newton + round(self.spent)} open-close iterations; a contact that "
-            f"was {name} still disagrees with its motion",
+            f"was {name} is still inconsistent with its motion",
             worst,
         )
 
 
 def _negligible(answer: Answer, found: ContactSet, number: int, solver: ContactSolver) -> bool:
-    """Whether all contacts that are wrong, ``number`` of them, are so by next to nothing beside what others of their
-    blocks bear: of a sliver between blocks that bear a slope no set of states may fit."""
+    """Whether the violations of all ``number`` inconsistent contacts are negligible compared with the forces on their
+    blocks. For a sliver between loaded blocks there may be no consistent states."""
     if number > solver.sliver_contacts:
         return False
     largest = np.zeros(int(max(found.block.max(), found.other.max())) + 1)

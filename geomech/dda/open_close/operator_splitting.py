@@ -1,23 +1,23 @@
-"""Contact states of a step in motion by operator splitting: blocks and contacts are solved by turns, with one
-factorisation for many turns.
+"""Contact states of a dynamic step by operator splitting: blocks and contacts are solved alternately, with one
+factorisation for many iterations.
 
-With the blocks' equations A d = f + Gᵀ F, the relative motions q = G d of contacts, and the contact law F(q), springs
-of ρ on all contacts split the step into two problems that are easy alone (Douglas & Rachford 1956; Lions & Mercier
+With the blocks' equations A d = f + Gᵀ F, the relative motions q = G d of contacts, and the contact law F(q), springs ρ
+on all contacts split the step into two problems that are easy separately (Douglas & Rachford 1956; Lions & Mercier
 1979; known as ADMM, Boyd et al. 2011):
 
-    contacts   z:  ρ (z − ζ) = F(z)                     the law of each by itself, in closed form (Coulomb return)
-    blocks     d:  (A + Gᵀ ρ G) d = f + Gᵀ ρ (2 z − ζ)  one substitution, for the matrix stays what it is
+    contacts   z:  ρ (z − ζ) = F(z)                     law of each contact, in closed form (Coulomb return)
+    blocks     d:  (A + Gᵀ ρ G) d = f + Gᵀ ρ (2 z − ζ)  one substitution, as the matrix does not change
                ζ ← ζ + α (G d − z),  0 < α < 2          (α > 1: Eckstein & Bertsekas 1992)
 
-Where z = G d, the forces F(z) balance the blocks. Unlike Newton's method on states it does not overshoot where hundreds of
-contacts change at once, and hard springs do not slow it down: how fast it converges depends on the blocks, whose answer
-lies between their inertia 2m/dt² and their stiffness E'. A motion that a contact prevents
-converges the faster the larger ρ is, one that it leaves free the faster the smaller. So ρ is the geometric mean of the two
-where a contact slides along its edge; where a contact is closed it lies half way (in logarithms) between this mean and
-the stiffness, where it is open half way to the inertia: at first by the states that the step begins with, then by those that
-the turns have found, if many have changed. (With the mean alone twice the turns leave more states wrong; at the bounds
-themselves states go on changing.) What is left wrong in the end are contacts that bear next to nothing, and Newton's
-method finds all states from there. A turn takes a tenth of an iteration of it.
+Where z = G d, the forces F(z) balance the blocks. Unlike Newton's method on states it does not overshoot where hundreds
+of contacts change at once, and stiff springs do not slow it down: the rate of convergence depends on the blocks, whose
+response is between their inertia 2m/dt² and their stiffness E'. A motion that a contact prevents converges faster with
+larger ρ, a free motion with smaller ρ. Along the edge of a sliding contact, ρ is the geometric mean of the two; at a
+closed contact it is half way (logarithmically) between this mean and the stiffness, at an open one half way to the
+inertia. The states are at first those at the start of the step, later those found, if many have changed. (With the mean
+everywhere, twice the number of iterations leaves more inconsistent contacts; at the bounds, states keep changing.) The
+contacts that remain inconsistent carry hardly any load, and Newton's method finds all states from there. One iteration
+takes a tenth of the time of a Newton iteration.
 """
 
 from __future__ import annotations
@@ -36,16 +36,16 @@ from .interior_point.contact_terms import balance
 
 #: α, the over-relaxation.
 _RELAXATION = 1.7
-#: Turns between two looks at how many states have changed.
+#: Number of iterations between checks of how many states have changed.
 _LOOK = 10
-#: Turns after which ρ follows the states, where more than this part of them has changed since.
+#: Iterations after which ρ is adapted to the states, if more than this fraction of them has changed since.
 _FOLLOWS, _MANY = (20, 40, 80), 0.05
-#: What a turn and a factorisation take, in iterations of Newton's method.
+#: Cost of an iteration and of a factorisation, in Newton iterations.
 _TURN, _FACTORS = 0.1, 1.0
 
 
 class Proposal(NamedTuple):
-    """The ``states`` that contacts approach, and what it took, in iterations of Newton's method."""
+    """The ``states`` that contacts approach, and the cost in Newton iterations."""
 
     states: States
     spent: float
@@ -53,9 +53,9 @@ class Proposal(NamedTuple):
 
 @kept(fastmath={"contract"}, error_model="numpy", nogil=True, **UNCOUNTED)
 def _turn(unknowns, contacts, law, rho, held, relaxation, at_hand, states):
-    """One turn of the ``contacts`` (`ContactMotion`) about the blocks' ``unknowns`` (6 n_free,). ``law`` (n, 6): gap, kₙ,
-    kₛ, S₀, μ, c; ``rho`` (2, n) across and along; ``held`` (n,) by bonds. ``at_hand`` (n, 6) has ζ, z and the forces
-    ρ (2z − ζ − q), each across and along; ``states``: state and direction (n,) of z."""
+    """The contact part of one iteration, for the blocks' ``unknowns`` (6 n_free,) and ``contacts`` (`ContactMotion`).
+    ``law`` (n, 6): gap, kₙ, kₛ, S₀, μ, c; ``rho`` (2, n) normal and tangential; ``held`` (n,): bonded. ``at_hand`` (n,
+    6): ζ, z and the forces ρ (2z − ζ − q), each normal and tangential; ``states``: state and direction (n,) of z."""
     state, direction = states
     block, other, order, vectors = contacts
     for c in range(len(law)):
@@ -86,9 +86,8 @@ def _turn(unknowns, contacts, law, rho, held, relaxation, at_hand, states):
 
 
 def can_split(equations: Equations) -> bool:
-    """Not in statics, where no inertia holds blocks, nor for blocks of higher order or curved laws, nor where the system
-    is so small that its matrix is full; nor where no contact bore anything before, as under sudden weight, so that there
-    is nothing to begin with."""
+    """Whether splitting applies: not in statics (no inertia), for blocks of higher order, nonlinear laws or small
+    systems with a full matrix, nor without earlier contact forces to start from, as under sudden weight."""
     if equations.statics or equations.expected is None or not equations.first_order:
         return False
     if not equations.found.normal.any():
@@ -97,8 +96,8 @@ def can_split(equations: Equations) -> bool:
 
 
 class _Springs:
-    """The springs ρ of all contacts: ``rho`` (2, n) N/m, across the edge and along it, and ``correction``, by which the
-    blocks answer what is out of balance between them."""
+    """The springs ρ of all contacts: ``rho`` (2, n) N/m, normal and tangential, and ``correction``, the response of the
+    blocks to unbalanced forces."""
 
     def __init__(self, equations: Equations, contacts: ContactMotion) -> None:
         self._equations, self._contacts = equations, contacts
@@ -116,7 +115,7 @@ class _Springs:
         self._become(found.state if found.tried is None else found.tried[0])
 
     def _become(self, state: np.ndarray) -> None:
-        """Take ρ by the ``state`` (n,) of the contacts."""
+        """Set ρ according to the ``state`` (n,) of the contacts."""
         self._state = state.copy()
         across = np.where(state == OPEN, self._if_open, self._if_closed)
         self.rho = rho = np.stack([across, np.where(state == SLIP, self._mean, across)])
@@ -128,8 +127,8 @@ class _Springs:
         self.correction = pattern.solver.corrections(data)
 
     def follow(self, state: np.ndarray, at_hand: np.ndarray) -> bool:
-        """Take ρ by the ``state`` (n,) of the contacts, if many have another than before; ζ of what is ``at_hand`` (n, 6)
-        changes with it, the forces ρ (z − ζ) of the contacts do not."""
+        """Set ρ according to the ``state`` (n,) of the contacts if many have changed. ζ in ``at_hand`` (n, 6) is
+        adapted so that the contact forces ρ (z − ζ) stay the same."""
         if np.count_nonzero(state != self._state) <= _MANY * len(state):
             return False
         forces = self.rho.T * (at_hand[:, 2:4] - at_hand[:, :2])
@@ -139,7 +138,7 @@ class _Springs:
 
 
 def split(equations: Equations, bonded: np.ndarray, solver: ContactSolver) -> Proposal:
-    """The states that the step's contacts come to, with the bonds ``bonded`` (n,) kept, from the motion of the
+    """Proposed contact states of the step with fixed bonds ``bonded`` (n,), starting from the motion at the present
     velocities and the forces carried over. Raises numpy.linalg.LinAlgError."""
     pattern, found, springs = equations.pattern, equations.found, equations.springs
     order, vectors = pattern.order, np.ascontiguousarray(equations.vectors)
@@ -152,7 +151,7 @@ def split(equations: Equations, bonded: np.ndarray, solver: ContactSolver) -> Pr
     held = (bonded > 0) & ~slipped
     law = np.stack([equations.gap, springs.normal, springs.shear, found.shear, friction, firm], axis=1)
 
-    # Before the first turn z is not known: ζ begins as q − F/ρ.
+    # Before the first iteration z is unknown: ζ starts as q − F/ρ.
     unknowns, at_hand = equations.expected.copy(), np.zeros((len(found), 6))
     strength = np.where(held, np.inf, friction * np.maximum(found.normal, 0.0) + firm)
     forces = np.stack([found.normal, np.clip(found.shear, -strength, strength)], axis=1)

@@ -1,4 +1,4 @@
-"""What the open–close iteration ends with: consistent contact states, forces, gaps and slips."""
+"""Result of the open–close iteration: consistent contact states, forces, gaps and slips."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from ..joint_laws.penalty_springs import Springs
 
 @dataclass(frozen=True, eq=False)
 class Settled:
-    """A consistent set of contact states and what goes with it; ``unknowns`` (n_free, 6) scaled as in `assembly`.
+    """A consistent set of contact states and its solution; ``unknowns`` (n_free, 6) scaled as in `assembly`.
 
-    ``gap`` is counted from where the faces meet, ``slip`` is what the shear spring did not take up of the motion along
-    the edge, ``lifted`` what it added to the lift (all m); ``springs`` those of the final iteration; ``stretch`` what
-    multipliers have left of the motion of sticking contacts.
+    In m: ``gap`` including dilation; ``slip``: motion along the edge minus the elastic motion of the shear spring;
+    ``lifted``: dilation by it; ``stretch``: motion of sticking contacts that multipliers have not removed yet.
+    ``springs``: those of the final iteration.
     """
 
     unknowns: np.ndarray

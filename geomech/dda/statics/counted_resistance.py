@@ -6,6 +6,7 @@ from __future__ import annotations
 import logging
 import math
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -42,7 +43,7 @@ def toes_in_the_way(system: BlockSystem, state: State, failed: Trial | None = No
     found = system.contacts_near(state)
     off = system.finder.toes_among(found, state.vertices)
     borne = {(int(row["vertex"]), int(row["edge"])): row for row in state.contacts[state.contacts["state"] != OPEN]}
-    centre = None if failed is None else block_moments(state.vertices, system.next, system.vertex_start)[:, 1:3]
+    centre = block_moments(state.vertices, system.next, system.vertex_start)[:, 1:3]
     out = []
     for k in np.flatnonzero(off >= 0.0):
         a, b = int(found.block[k]), int(found.other[k])
@@ -105,7 +106,7 @@ def with_toes(
     return replace(found, toes=toes, toes_hold=hold, other_factor=factor, warnings=(*found.warnings, *lines))
 
 
-def _of_toes(blocks: Blocks, toes: tuple[Toe, ...], other: FactorOfSafety | None, hold: bool) -> tuple[str, ...]:
+def _of_toes(blocks: Blocks, toes: tuple[Toe, ...], other: Any, hold: bool) -> tuple[str, ...]:
     """Warnings about toes; arguments as for `with_toes`."""
 
     def factor(of: FactorOfSafety) -> str:

@@ -71,8 +71,8 @@ class DisplacementLimit:
             constrained |= blocks.constrained.any(axis=1)
         for bolt in self._loads.bolts:
             constrained[bolt.block] |= bolt.other == GROUND
-        for motion in (*self._loads.block_motions, *self._loads.point_motions):
-            constrained[motion.block] = True
+        constrained[[motion.block for motion in self._loads.block_motions]] = True
+        constrained[[motion.block for motion in self._loads.point_motions]] = True
         return constrained
 
     def _seat(self, block: np.ndarray, other: np.ndarray) -> None:

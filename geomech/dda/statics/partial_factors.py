@@ -58,12 +58,12 @@ class PartialFactors:
                 law, roughness=replace(law.roughness, reduction=law.roughness.reduction * self.friction)
             )  # fmt: skip
 
-        def angle(of: float | None) -> float | None:
-            return None if of is None else math.atan(math.tan(of) / self.friction)
+        def angle(of: float) -> float:
+            return math.atan(math.tan(of) / self.friction)
 
-        friction = angle(law.friction_angle)
+        friction, residual = angle(law.friction_angle), law.residual_friction_angle
         return replace(
-            law, friction_angle=friction, residual_friction_angle=angle(law.residual_friction_angle),
+            law, friction_angle=friction, residual_friction_angle=None if residual is None else angle(residual),
             cohesion=law.cohesion / self.cohesion, residual_cohesion=law.residual_cohesion / self.cohesion,
             tensile_strength=law.tensile_strength / self.tension, dilation_angle=min(law.dilation_angle, friction),
         )  # fmt: skip

@@ -22,6 +22,7 @@ import logging
 import math
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 from ...model import Blocks, DdaSettings, JointLaw, Loads, Material, State
 from ...model.former_names import renamed_argument
@@ -333,7 +334,7 @@ class _Bracket:
         self, search: _Search, counted: Counted, watch: Callable[[Trial], None] | None, aim: float = 0.0
     ) -> None:
         self._search, self._counted, self._watch, self._aim = search, counted, watch, aim
-        self._limit: DisplacementLimit | None = None
+        self._limit: Any = None  # DisplacementLimit of the last relaxation
         self._state = search.rest
         self.trials: list[Trial] = []
         # For each trial, the factor from whose equilibrium it started.

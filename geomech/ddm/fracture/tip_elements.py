@@ -16,12 +16,12 @@ def tip_elements(cracks: Cracks, faces: ElementSet) -> tuple[np.ndarray, ...]:
     rows, element, last = np.zeros(n, TIP), np.zeros(n, int), np.zeros(n, int)
     lead, touching = np.zeros((n, faces.per)), np.zeros(n, bool)
     at_tip: dict[int, tuple[int, bool]] = {}
-    for e in np.flatnonzero(faces.kind != shape_functions.ORDINARY):
+    for e in np.flatnonzero(faces.kind != shape_functions.ORDINARY).tolist():
         i, j = cracks.segments[faces.source[e]]
         if faces.kind[e] in (shape_functions.TIP_START, shape_functions.TIP_BOTH):
-            at_tip[int(i)] = int(e), False
+            at_tip[int(i)] = e, False
         if faces.kind[e] in (shape_functions.TIP_END, shape_functions.TIP_BOTH):
-            at_tip[int(j)] = int(e), True
+            at_tip[int(j)] = e, True
     for k, (row, node) in enumerate(zip(rows, cracks.tips)):
         e, at_end = at_tip[int(node)]
         segment = faces.source[e]

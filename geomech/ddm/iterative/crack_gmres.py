@@ -139,7 +139,7 @@ class IterativeCrackSystem:
         """As in `schur_complement.CrackSystem.constrained`. Raises NotSolved."""
         if right.ndim == 2:
             columns = [self.constrained(r, closed, f) for r, f in zip(right.T, fixed.T)]
-            return tuple(np.column_stack(part) for part in zip(*columns))
+            return np.column_stack([w for w, _ in columns]), np.column_stack([reaction for _, reaction in columns])
         given = np.where(closed, fixed, 0.0)
         rest = right - self.matrix @ given if given.any() else right
         w = given + self.solve(rest, self._holding(closed))
@@ -272,6 +272,7 @@ def compressed(
     and ``on_cracks`` is A_CΓ; ``boundary`` replaces the boundary's factors where it is solved iteratively too.
     """
     following = BoundaryResponse(solve, on_boundary)
+    own: Compressed | BelowSurface
     if cracks.half_plane is None:
         own = Compressed(cracks, cracks, nu, tol)
     else:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
@@ -65,7 +66,7 @@ class MelanLoad(KelvinLoad):
 
     half_plane: HalfPlane = field(kw_only=True)
 
-    def _image(self, points: np.ndarray) -> tuple[np.ndarray, ...]:
+    def _image(self, points: np.ndarray) -> tuple[Any, ...]:
         """κ, strength q of the force, distance w from its image, height of the image times −2i, y, φ₁' at
         ``points``."""
         rock, nu = self.half_plane, self.material.effective_poissons_ratio

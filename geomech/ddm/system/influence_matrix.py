@@ -8,7 +8,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from itertools import pairwise
-from typing import NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
@@ -94,7 +94,7 @@ class ElementSet:
         return (1 - s) * self.start[:, None] + s * self.end[:, None]
 
     @cached_property
-    def keys(self) -> list[bytes]:
+    def keys(self) -> list[Any]:
         """Keys that are equal for bitwise identical elements."""
         rows = np.column_stack([self.start, self.end, self.kind])
         return rows.view(np.dtype((np.void, 8 * rows.shape[1]))).ravel().tolist()
@@ -215,7 +215,7 @@ def influence(targets: ElementSet, sources: ElementSet, nu: float, tol: float) -
 def image_influence(targets: ElementSet, sources: ElementSet, nu: float, tol: float) -> np.ndarray:
     """Contribution of the free surface of the half-plane to `influence`."""
     nodal, out = _to_nodal(sources.family, sources.order), np.zeros((sources.n_unknowns, targets.n_unknowns))
-    if out.size:
+    if out.size and targets.half_plane is not None:
         points, elements = _Points.of(targets.nodes, targets.tangent), elements_of(*_ends(sources))
         work = _images(targets.half_plane, points, elements, sources.order, Kernel(nu, tol, 1.0, False), nodal, out)
         _spread(len(points.at), len(points.at) * sources.n, work)
@@ -411,16 +411,22 @@ def add_fields(
     images = full_plane.lanes_of(_mirrored(half_plane.frame(points)))
     framed, out = _framed(half_plane, elements), np.zeros((5, len(points)))
 
-    def work(first, last):
+    def add_images(first, last):
         half_plane_images.fields(images, first, last, framed, order, density, kernel, table, out)
 
-    _spread(len(points), len(points) * len(elements.start), work)
+    _spread(len(points), len(points) * len(elements.start), add_images)
     stress += half_plane.stress_of(out[:3].T)
     shift += out[3:].T @ half_plane.turn
 
 
 def reuse(
-    old: np.ndarray | None, rows: np.ndarray, columns: np.ndarray, row_set, column_set, compute, order: str = "F"
+    old: np.ndarray | None,
+    rows: np.ndarray,
+    columns: np.ndarray,
+    row_set,
+    column_set,
+    compute,
+    order: Literal["C", "F"] = "F",
 ) -> np.ndarray:
     """A matrix, parts of which are copied from ``old``: ``rows`` and ``columns`` (per element of ``row_set`` and
     ``column_set``) are the old element numbers or −1; ``compute(row_elements, column_elements)`` computes new blocks.

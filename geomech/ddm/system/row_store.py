@@ -67,13 +67,13 @@ class KeptRows:
         stay = elements.kind[come] == ORDINARY
         come = np.concatenate([come[stay], come[~stay]])
         k, m = width * int(stay.sum()), self._loose.shape[1]
-        rows = np.empty((len(come), width, m))
+        blocks = np.empty((len(come), width, m))
         old = at[come] >= 0
-        rows[old] = self._loose.reshape(len(self._loose) // width, width, m)[at[come[old]] - n]
+        blocks[old] = self._loose.reshape(len(self._loose) // width, width, m)[at[come[old]] - n]
         if len(new):
-            rows[~old] = compute(come[~old]).reshape(len(new), width, m)
+            blocks[~old] = compute(come[~old]).reshape(len(new), width, m)
         at[come] = n + np.arange(len(come))
-        rows = rows.reshape(width * len(come), m)
+        rows = blocks.reshape(width * len(come), m)
         firm = self._firm.extended(self._n, rows[:k]) if k else self._firm
         out = KeptRows(firm, self._n + k, rows[k:], at, width)
         return out if out._total < CARRIED * len(out._places) else KeptRows.whole(out.dense, elements)

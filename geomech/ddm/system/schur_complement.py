@@ -13,7 +13,7 @@ from functools import cached_property
 import numpy as np
 
 from ..counters import Work
-from .bordered_factor import LOSS, SINGULAR, Bordered, BorderedFactor
+from .bordered_factor import LOSS, SINGULAR, Bordered, BorderedFactor, WholeMatrix
 from .closed_face_factor import ClosedFaceFactor
 from .contact_rows import Rows
 from .dense_lu import Factor
@@ -37,14 +37,15 @@ class CrackSystem:
 
     def __init__(
         self,
-        matrix: Bordered,
+        matrix: Bordered | WholeMatrix,
         work: Work | None = None,
         before: CrackSystem | None = None,
         was: np.ndarray | None = None,
     ):
-        self.matrix, self._work = matrix, Work() if work is None else work
+        self.matrix: Bordered | WholeMatrix = matrix
+        self._work = Work() if work is None else work
         self.n = matrix.n
-        grown = [] if before is None else [base.grown(matrix, was) for base in before.bases]
+        grown = [] if before is None or was is None else [base.grown(matrix, was) for base in before.bases]
         #: Factors that contact states are based on, most recently used last.
         self.bases: list[BaseOf] = [base for base in grown if base is not None]
         self._factors: dict[bytes, tuple[np.ndarray, Factor]] = {}
@@ -130,7 +131,7 @@ class CrackSystem:
     @cached_property
     def open_factor(self) -> Factor | BorderedFactor | None:
         """Factors of S with all faces open; None if a part of the body is supported by closed faces alone."""
-        if not self.matrix.is_whole:
+        if isinstance(self.matrix, Bordered):
             try:
                 self._work.crack_borderings += 1
                 self._work.crack_factorisations += self.matrix.unfactored
@@ -143,10 +144,10 @@ class CrackSystem:
             self.matrix = Bordered.whole(self.matrix.elements, self.matrix.dense)
         try:
             self._work.crack_factorisations += 1
-            factor = self.matrix.factored()
+            whole = self.matrix.factored()
         except np.linalg.LinAlgError:
             return None
-        return factor if factor.rcond > _SAFE else None
+        return whole if whole.rcond > _SAFE else None
 
     def _free_factor(self, closed: np.ndarray) -> tuple[np.ndarray, Factor]:
         """Free unknowns (indices) and factors of S restricted to them."""

@@ -23,8 +23,26 @@ def _known_kind(kind: str, what: str) -> None:
         raise ValueError(f'{what} is given as "displacement" or "velocity", not {kind!r}')
 
 
+class _Prescribed:
+    """Values that follow a ``history``: the values themselves, or their rates if ``kind`` is "velocity"."""
+
+    history: History
+    kind: Kind
+
+    def total(self, time: float) -> np.ndarray:
+        """(k,) prescribed values at ``time`` s."""
+        return self.history.at(time) if self.kind == "displacement" else self.history.integral(time)
+
+    def rate(self, start: float, end: float) -> np.ndarray:
+        """(k,) prescribed rates at ``end`` s; of a displacement history, their mean from ``start`` to ``end``."""
+        h = self.history
+        if self.kind == "velocity":
+            return h.at(end)
+        return (h.at(end) - h.at(start)) / (end - start) if end > start else np.zeros_like(h.values[0])
+
+
 @dataclass(frozen=True, eq=False)
-class BlockMotion:
+class BlockMotion(_Prescribed):
     """Prescribed motion of some unknowns of ``block``: u0, v0 (m) of its centroid, r0 (rad), strains ex, ey, gxy.
 
     ``history`` has a column for each of ``unknowns``: their values since time 0, or their rates. The other unknowns of
@@ -47,23 +65,9 @@ class BlockMotion:
                 f"{np.shape(self.history.values)[1]} columns"
             )
 
-    def total(self, time: float) -> np.ndarray:
-        """(k,) prescribed values at ``time`` s."""
-        return self.history.at(time) if self.kind == "displacement" else self.history.integral(time)
-
-    def rate(self, start: float, end: float) -> np.ndarray:
-        """(k,) prescribed rates at ``end`` s; of a displacement history, their mean from ``start`` to ``end``."""
-        return _rate(self.history, self.kind, start, end)
-
-
-def _rate(history: History, kind: str, start: float, end: float) -> np.ndarray:
-    if kind == "velocity":
-        return history.at(end)
-    return (history.at(end) - history.at(start)) / (end - start) if end > start else np.zeros_like(history.values[0])
-
 
 @dataclass(frozen=True, eq=False)
-class PointMotion:
+class PointMotion(_Prescribed):
     """Prescribed motion of the material point ``at`` (reference coordinates, m) of ``block``.
 
     ``history``: its displacement since time 0 (m), or its velocity (m/s): two columns, x and y, or one along
@@ -90,14 +94,6 @@ class PointMotion:
             raise ValueError(f"the motion of a point of block {self.block} has no direction: {self.direction}")
         if self.stiffness is not None and not (math.isfinite(self.stiffness) and self.stiffness > 0):
             raise ValueError(f"the stiffness that moves a point must be positive, got {self.stiffness!r} N/m")
-
-    def total(self, time: float) -> np.ndarray:
-        """(k,) prescribed displacement at ``time`` s, m."""
-        return self.history.at(time) if self.kind == "displacement" else self.history.integral(time)
-
-    def rate(self, start: float, end: float) -> np.ndarray:
-        """(k,) prescribed velocity at ``end`` s, m/s; of a displacement history, its mean from ``start`` to ``end``."""
-        return _rate(self.history, self.kind, start, end)
 
     @property
     def axes(self) -> np.ndarray:

@@ -171,10 +171,10 @@ def table(entries: Sequence[dict[str, Any]]) -> list[str]:
     for entry in entries:
         wanted = entry.get("asked")
         if wanted is not None:
-            rows.append(f"{entry['name']:{wide}}  asked" + _row(wanted, wanted))
+            rows.append(f"{entry['name']:{wide}}  asked" + _row(wanted))
         rows.append(
             f"{'' if wanted is not None else entry['name']:{wide}}  got  "
-            + _row(entry, wanted)
+            + _row(entry)
             + f"{entry['traces']:8d}{entry['cutting_traces']:9d}{entry['cut_length_m']:9.4g}"
         )
         if entry.get("ends_on"):
@@ -182,7 +182,7 @@ def table(entries: Sequence[dict[str, Any]]) -> list[str]:
     return [row.rstrip() for row in rows]
 
 
-def _row(values: dict[str, Any], wanted: dict[str, Any] | None) -> str:
+def _row(values: dict[str, Any]) -> str:
     cells = []
     for _, key, spread in _COLUMNS:
         value, off = values.get(key), values.get(spread) if spread else None

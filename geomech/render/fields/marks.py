@@ -130,7 +130,7 @@ class Marks:
         # A monitor moves with the nearest vertex: the difference is below the width of a line.
         near = np.argmin(((reference(blocks)[None] - at[:, None]) ** 2).sum(axis=2), axis=1)
         at = at + self.scale * np.asarray(blocks["displacement"])[near, :2]
-        style = {"marker": "o", "ms": 4.5, "mfc": "white", "mec": INK, "mew": 1.1, "lw": 0}
+        style: dict[str, Any] = {"marker": "o", "ms": 4.5, "mfc": "white", "mec": INK, "mew": 1.1, "lw": 0}
         axes.plot(*at.T, zorder=9, **style)
         return [Line2D([], [], label="monitors", **style)]
 

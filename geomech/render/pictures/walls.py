@@ -9,6 +9,8 @@ import numpy as np
 
 from geomech.output.reading import Run
 
+from ..fields.frame import reference
+
 if TYPE_CHECKING:
     import pyvista as pv
 
@@ -16,12 +18,6 @@ if TYPE_CHECKING:
 _ON = 1e-9
 #: Number of points compared with all lines at a time.
 _BATCH = 512
-
-
-def reference(grid: pv.DataSet) -> np.ndarray:
-    """(n, 2) m: points of a grid in the reference configuration."""
-    points = np.asarray(grid.points)[:, :2]
-    return points if int(grid.field_data["REFERENCE"][0]) else points - np.asarray(grid["displacement"])[:, :2]
 
 
 @dataclass(frozen=True, eq=False)

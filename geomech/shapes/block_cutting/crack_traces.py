@@ -40,7 +40,7 @@ def crack_network(
             block = _block_of(k, names[k], line, zone_names, tree, tolerance, flaws)
             if block < 0:
                 continue
-            line, mouth, ok = _mouths(k, names[k], line, zone_names[block], loops[block], branches, tolerance, flaws)
+            line, mouth, ok = _mouths(k, names[k], line, zone_names[block], loops[block], tolerance, flaws)
             if ok:
                 placed.append((k, block, line, mouth))
     for k, block, line, mouth in placed:
@@ -148,7 +148,7 @@ def _block_of(k, name, line, zone_names, tree, tolerance, flaws) -> int:
     return -1
 
 
-def _mouths(k, name, line, zone, loops, branches, tolerance, flaws):
+def _mouths(k, name, line, zone, loops, tolerance, flaws):
     """``line`` with ends near the outline moved onto it, the two flags that mark these, and whether the rest is
     clear."""
     line = line.copy()

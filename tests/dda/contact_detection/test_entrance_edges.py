@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from block_problems import rectangle
 
 from geomech import dda
 from geomech.dda.contact_detection.entrance_edges import (
@@ -16,10 +17,6 @@ from geomech.dda.contact_detection.entrance_edges import (
 )
 from geomech.dda.contact_detection.neighbour_search import boxes, near_pairs
 from geomech.model import Blocks, DdaSettings, JointLaw, Loads, Material, State, corner_lengths
-
-
-def rectangle(x0: float, y0: float, x1: float, y1: float) -> np.ndarray:
-    return np.array([[x0, y0], [x1, y0], [x1, y1], [x0, y1]], dtype=float)
 
 
 def search(polygons, window=0.05, turn=0.0, fixed=None, rounding=0.01):

@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-import numpy as np
 import pytest
+from block_problems import rectangle
 
 from geomech.dda.contact_detection.initial_overlap import refuse_overlap
 from geomech.dda.kinematics.simplex_integration import block_moments
 from geomech.model import Blocks
-
-
-def rectangle(x0: float, y0: float, x1: float, y1: float) -> np.ndarray:
-    return np.array([[x0, y0], [x1, y0], [x1, y1], [x0, y1]], dtype=float)
 
 
 def look(*polygons):

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from block_problems import rectangle, turned
 
 from geomech import dda
 from geomech.compiled import kept
@@ -47,15 +48,6 @@ def on_arc(n: np.ndarray, share: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     radius = LENGTH / np.tan(0.5 * phi)
     m = (np.sin((1 - share) * phi)[:, None] * n[0] + np.sin(share * phi)[:, None] * n[1]) / np.sin(phi)
     return radius * (m - (n[0] + n[1]) / (1 + np.cos(phi))), m
-
-
-def rectangle(x0: float, y0: float, x1: float, y1: float) -> np.ndarray:
-    return np.array([[x0, y0], [x1, y0], [x1, y1], [x0, y1]], dtype=float)
-
-
-def turned(polygon: np.ndarray, angle: float) -> np.ndarray:
-    c, s = np.cos(angle), np.sin(angle)
-    return polygon @ np.array([[c, s], [-s, c]])
 
 
 def system_of(polygons, fixed, friction_deg=0.0, law=None, constrained=None, **settings) -> dda.BlockSystem:

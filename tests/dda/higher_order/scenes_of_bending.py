@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+from block_problems import turned
 
 from geomech import dda
 from geomech.dda.higher_order.bent_body import bent_bodies
@@ -15,11 +16,6 @@ ROCK = Material("rock", 2e10, 0.25, 2500.0)
 
 def rectangle(x0: float, y0: float, x1: float, y1: float) -> np.ndarray:
     return np.array([[x0, y0], [x1, y0], [x1, y1], [x0, y1]], float)
-
-
-def turned(polygon: np.ndarray, angle: float) -> np.ndarray:
-    c, s = np.cos(angle), np.sin(angle)
-    return polygon @ np.array([[c, s], [-s, c]])
 
 
 def system_of(polygons, fixed, order, *, joint=None, rock=ROCK, angle=0.0, loaded=None, **settings) -> dda.BlockSystem:

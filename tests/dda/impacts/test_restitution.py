@@ -10,6 +10,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from block_problems import rectangle, turned
 
 from geomech import dda
 from geomech.model import Blocks, DdaSettings, History, JointLaw, Loads, Material, State
@@ -18,15 +19,6 @@ from geomech.reference.blocks import impact as exact
 GRAVITY, DENSITY = 9.81, 2600.0
 ROCK = Material("rock", 5e9, 0.25, density=DENSITY)
 STEPS = (8e-3, 4e-3, 1e-3, 2.5e-4)
-
-
-def rectangle(x0: float, y0: float, x1: float, y1: float) -> np.ndarray:
-    return np.array([[x0, y0], [x1, y0], [x1, y1], [x0, y1]], dtype=float)
-
-
-def turned(polygon: np.ndarray, angle: float) -> np.ndarray:
-    c, s = np.cos(angle), np.sin(angle)
-    return polygon @ np.array([[c, s], [-s, c]])
 
 
 class Fall:

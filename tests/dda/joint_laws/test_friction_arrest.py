@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from block_problems import rectangle
 
 from geomech import dda
 from geomech.bench.cost import block_scenes
@@ -17,10 +18,6 @@ from geomech.model import Blocks, DdaSettings, History, JointLaw, Loads, Materia
 
 GRAVITY, FRICTION = 9.81, 0.5
 WEIGHT = Loads(gravity=History.constant([0.0, -GRAVITY]))
-
-
-def rectangle(x0: float, y0: float, x1: float, y1: float) -> np.ndarray:
-    return np.array([[x0, y0], [x1, y0], [x1, y1], [x0, y1]], dtype=float)
 
 
 def stacked(polygons, speeds, frictions=(FRICTION,), **settings) -> tuple[dda.BlockSystem, State]:

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from block_problems import rectangle
 
 from geomech import dda
 from geomech.model import (
@@ -25,10 +26,6 @@ from geomech.model import (
 ROCK = Material("rock", 10e9, 0.25, density=2600.0)
 GRAVITY = History.constant([0.0, -9.81])
 NAMES = ["base", "rock", "platen"]
-
-
-def rectangle(x0, y0, x1, y1):
-    return np.array([[x0, y0], [x1, y0], [x1, y1], [x0, y1]], dtype=float)
 
 
 def press(platen_fixed, penalty=1e14):

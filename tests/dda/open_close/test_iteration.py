@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from block_problems import rectangle
 
 from geomech import dda
 from geomech.bench.cost import block_scenes
@@ -15,10 +16,6 @@ from geomech.dda.open_close import equations, iteration
 from geomech.model import Blocks, ContactSolver, DdaSettings, History, JointLaw, Loads, Material, State
 
 WEIGHT = Loads(gravity=History.constant([0.0, -9.81]))
-
-
-def rectangle(x0: float, y0: float, x1: float, y1: float) -> np.ndarray:
-    return np.array([[x0, y0], [x1, y0], [x1, y1], [x0, y1]], dtype=float)
 
 
 def brick_wall(rows: int, columns: int, friction_deg: float, dt: float, **law) -> dda.BlockSystem:

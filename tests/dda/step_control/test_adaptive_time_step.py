@@ -7,6 +7,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from block_problems import rectangle
 
 from geomech import dda
 from geomech.coupling.cycle import cycles
@@ -25,10 +26,6 @@ from geomech.model import (
 
 WEIGHT = Loads(gravity=History.constant([0.0, -9.81]))
 ROCK = Material("rock", 10e9, 0.25, density=2600.0)
-
-
-def rectangle(x0: float, y0: float, x1: float, y1: float) -> np.ndarray:
-    return np.array([[x0, y0], [x1, y0], [x1, y1], [x0, y1]], dtype=float)
 
 
 def finished(dt, iterations=1, cuts=0, share=0.0):

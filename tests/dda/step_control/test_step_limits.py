@@ -4,21 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from block_problems import rectangle, turned
 
 from geomech import dda
 from geomech.model import Blocks, DdaSettings, History, JointLaw, Loads, Material, State
 
 ROCK = Material("rock", 10e9, 0.25, density=2600.0)
 WEIGHT = Loads(gravity=History.constant([0.0, -9.81]))
-
-
-def rectangle(x0, y0, x1, y1):
-    return np.array([[x0, y0], [x1, y0], [x1, y1], [x0, y1]], dtype=float)
-
-
-def turned(polygon, angle):
-    c, s = np.cos(angle), np.sin(angle)
-    return polygon @ np.array([[c, s], [-s, c]])
 
 
 def steps(polygons, fixed, end, velocity, loads=WEIGHT, dt=0.05, friction=0.0, **settings):

@@ -4,16 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from block_problems import rectangle
 
 from geomech import dda
 from geomech.model import Blocks, DdaSettings, History, JointLaw, Loads, Material, PointLoad, State
 from geomech.model.joints.joint_sums import joint_names, joint_sums, reactions
 
 GRAVITY = 9.81
-
-
-def rectangle(x0, y0, x1, y1) -> np.ndarray:
-    return np.array([[x0, y0], [x1, y0], [x1, y1], [x0, y1]], dtype=float)
 
 
 @pytest.fixture
