@@ -12,8 +12,8 @@ from collections.abc import Callable
 
 from ..growth.crack_network import Network, Obstacle, Point, Row
 
-#: A mouth lies on an edge if its distance is below this part of the edge's length.
-_ON_EDGE = 1e-9
+#: A mouth lies on an edge if its distance is below this part of the edge's length, as in `elements`.
+_ON_EDGE = 1e-7
 #: Distances are compared with a relative margin of a thousandth, so that round-off does not decide.
 _LESS = 1 - 1e-3
 
