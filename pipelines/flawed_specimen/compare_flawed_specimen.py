@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
-from specimen import FLAW, FRICTION_DEG, K_IC, Course
+from specimen import FLAW, FRICTION_DEG, HEIGHT, K_IC, WIDTH, Course
 
 LENGTH = math.sqrt(math.pi * 0.5 * FLAW)
 #: A specimen as wide as six flaws lowers the first load of one by 1 to 2 %; wings are judged on the flaw as it is.
@@ -21,7 +21,8 @@ What this does and does not say
   - Loads are in units of K_Ic / √(πa), a half a flaw's length.
   - Wong, Chau, Tang & Lin (2001, Int. J. Rock Mech. Min. Sci. 38, 909) pressed rock-like specimens with three parallel
     frictional flaws and found that their strength depends not on how many flaws there are in them but on how many take part
-    in coalescence. Strengths here scatter accordingly: among specimens with as many flaws by as much as between numbers."""
+    in coalescence. Here strength falls with the number of flaws, by more than it scatters among specimens with as many; two
+    or three of them have joined when the peak has passed."""
 
 
 def ashby_hallam(friction_deg: float) -> float:
@@ -75,6 +76,7 @@ def report(alone: Course, runs: Mapping[tuple[bool, int], list[Course]]) -> str:
 
 def draw(path: Path, runs: Mapping[tuple[bool, int], list[Course]]) -> None:
     from matplotlib.figure import Figure
+    from matplotlib.patches import Rectangle
 
     figure = Figure(figsize=(3.2 * len(runs) + 1, 6.4), layout="constrained")
     axes = figure.subplots(2, len(runs), squeeze=False)
@@ -83,6 +85,9 @@ def draw(path: Path, runs: Mapping[tuple[bool, int], list[Course]]) -> None:
             upper.plot(1e3 * course.strain, 1e-6 * course.load, lw=1)
         upper.set(
             title=f"{number} {'closed' if closed else 'open'} flaws", xlabel="axial strain, 10⁻³", ylabel="load, MPa"
+        )
+        lower.add_patch(
+            Rectangle((-500 * WIDTH, -500 * HEIGHT), 1e3 * WIDTH, 1e3 * HEIGHT, facecolor="0.93", edgecolor="0.3")
         )
         for start, end in 1e3 * courses[0].segments:
             lower.plot(*zip(start, end), color="firebrick", lw=1.2, solid_capstyle="round")

@@ -41,8 +41,6 @@ guided = "y"
 [joints.platens]                       # greased: no friction
 edges = ["contact:*"]
 friction_angle_deg = 0.0
-[joints.flaws]
-friction_angle_deg = {friction}
 [joints.default]
 friction_angle_deg = 30.0
 [cracks.default]
@@ -105,11 +103,13 @@ def flaws(number: int, seed: int) -> list[np.ndarray]:
 def scene(ends: Sequence[np.ndarray], closed: bool, increment: float, end: float) -> str:
     """The scene (TOML) of a specimen with flaws between these ``ends``."""
     x, y, steel = 0.5 * WIDTH, 0.5 * HEIGHT, 0.010
-    faces = 'aperture = "closed"\njoint = "flaws"' if closed else 'aperture = "slot"'
+    faces = 'aperture = "slot"'
+    if closed:
+        faces = f'aperture = "closed"\njoint = "flaws"\n[joints.flaws]\nfriction_angle_deg = {FRICTION_DEG}'
     out = [
         HEAD.format(
-            title=f"{len(ends)} {'closed' if closed else 'open'} flaws", young=YOUNG, k_ic=K_IC, friction=FRICTION_DEG,
-            faces=faces, increment=increment, end=end, bottom=-y, top=y,
+            title=f"{len(ends)} {'closed' if closed else 'open'} flaws", young=YOUNG, k_ic=K_IC, faces=faces,
+            increment=increment, end=end, bottom=-y, top=y,
         )
     ]  # fmt: skip
     for name, box in {

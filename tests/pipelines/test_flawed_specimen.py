@@ -60,3 +60,8 @@ def test_twenty_flaws_are_pressed_through_their_peak(tmp_path):
     assert found.passed and found.joined >= 2
     assert found.first == pytest.approx(20.8e6, rel=0.01)
     assert 20e6 < found.peak < 40e6
+
+
+def test_open_flaws_run_too(tmp_path):
+    found = specimen.course(tmp_path, specimen.flaws(2, 1), False, most=4)
+    assert found.first > 0.0 and len(found.load) == 5

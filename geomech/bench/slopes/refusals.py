@@ -61,6 +61,12 @@ REASONS = (
         "blocks and the cracks in them agree on no strain at any length of the step: the blocks are named",
     ),
     Reason(
+        "energy by overlap",
+        dda.NotConverged,
+        r"overlapping blocks have created \S+ of all energy turned over",
+        "blocks that move where nothing holds them have closed a contact while they overlapped: the pair is named",
+    ),
+    Reason(
         "crack faces not found",
         ddm.NotConverged,
         r"crack faces did not settle|have no contact state that satisfies",
