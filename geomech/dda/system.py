@@ -1,4 +1,4 @@
-"""A system of blocks in contact, and the step that moves it."""
+"""A system of blocks in contact and its time step."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ log = logging.getLogger(__name__)
 
 #: Half the diagonal of the domain: no limit for what blocks that hold together move.
 _ANYWHERE = 1.0
-#: Multipliers are not asked to close gaps below this many times that round-off.
+#: Smallest penetration tolerance of multipliers, in units of that round-off.
 _FINEST = 10.0
 
 
@@ -97,7 +97,7 @@ class BlockSystem:
             blocks, self.joints, joint_index, self.settings, modulus, rigid, self.mass, self.work
         )
         self.deflected: DeflectedBlocks | None = None
-        #: What finds orders as the run goes; None where all are given.
+        #: Choice of orders during the run; None if all are given.
         self.order_choice: OrderChoice | None = None
         self._take_out(None, None)
         #: Faces of cells that are glued; None where no blocks are cells.
@@ -106,7 +106,7 @@ class BlockSystem:
         if ordered or blocks.glued is not None:
             refuse_unsupported(blocks, self.materials, self.joints, self.settings)
             self._choose_orders()
-        #: What glue bears; None where none can part.
+        #: Strength of the glue; None if it cannot fail.
         self.glue_strength: GlueStrength | None = None
         if blocks.glued is not None and (strength := self._glue_strength()).any:
             self.glue_strength = strength
@@ -132,14 +132,14 @@ class BlockSystem:
         self.allowed_penetration = self._allowed_penetration(float(np.sqrt(areas.min())))
 
     def _allowed_penetration(self, size: float) -> float:
-        """m, of the multipliers' mode; 0 where only penalty springs act."""
+        """m: tolerance of multipliers; 0 with penalty springs only."""
         share = self.settings.penetration_tolerance
         if self.settings.contact == "penalty":
             return 0.0
         return max(share * size, _FINEST * self.rounding)
 
     def _refuse_massless(self) -> None:
-        """In dynamics a block without mass has no equation of motion."""
+        """Refuse moving blocks without mass in dynamics."""
         massless = ~self.fixed & (self.density == 0.0)
         if not self.scheme.static and massless.any():
             block = int(massless.argmax())
@@ -150,7 +150,7 @@ class BlockSystem:
             )
 
     def _choose_orders(self) -> None:
-        """Blocks have the orders they are given, or those that their choice begins with."""
+        """Set the orders of blocks: those given, or the first of their choice."""
         choice = OrderChoice(
             self.blocks, self.fixed, self.density, self.stiffness, self.compliance, self.settings.order_target
         )
@@ -159,7 +159,7 @@ class BlockSystem:
         self._take_orders(choice, choice.first)
 
     def _take_orders(self, choice: OrderChoice, order: np.ndarray) -> None:
-        """Go on with blocks of these ``order`` (n_blocks,)."""
+        """Continue with blocks of these orders (n_blocks,)."""
         if np.array_equal(order, self.order):
             return
         self.order, self.deflected, self._sparse = order, choice.deflected(order), None
@@ -169,7 +169,7 @@ class BlockSystem:
             self._part(np.zeros(len(self.blocks.glued), bool))
 
     def _glue_strength(self) -> GlueStrength:
-        """What glued faces bear: those whose edges have names, as their joint law says."""
+        """Strength of glued faces: those whose edges have names, by their joint law."""
         edge, mate = np.asarray(self.blocks.glued).T
         law, named = (
             self.finder.laws_of(edge, mate),
@@ -180,7 +180,7 @@ class BlockSystem:
         )
 
     def _part(self, parted: np.ndarray) -> None:
-        """Go on with cells whose glued faces have ``parted`` (n_faces,)."""
+        """Continue with cells whose glued faces have ``parted`` (n_faces,)."""
         if self._parted is not None and np.array_equal(parted, self._parted):
             return
         self._parted, self._sparse, self.glued = parted, None, self._all_glued.kept(~parted)
@@ -190,31 +190,30 @@ class BlockSystem:
 
     @property
     def step_limit(self) -> float:
-        """The largest displacement of a vertex that a step may bring, m."""
+        """Largest displacement of a vertex allowed in a step, m."""
         return self.limits.displacement
 
     def in_statics(self) -> BlockSystem:
-        """The same blocks with a dynamic factor of zero: steps that carry no velocity."""
+        """The same blocks with a dynamic factor of zero: no velocity is carried over."""
         settings = replace(self.settings, dynamic_factor=0.0)
         out = BlockSystem(self.blocks, self.materials, self.joints, self._joint_index, settings, self.work)
         out.finder.toes, out.finder.whole_faces = self.finder.toes, self.finder.whole_faces
         return out
 
     def with_joints(self, joints: Sequence[JointLaw]) -> BlockSystem:
-        """The same blocks with other laws in the places of those that its joints have, in steps as long as they are asked
-        for."""
+        """The same blocks with other joint laws, in the order of ``joints``, whose steps have no displacement limit."""
         settings = replace(self.settings, max_displacement_ratio=_ANYWHERE)
         out = BlockSystem(self.blocks, self.materials, joints, self._joint_index, settings, self.work)
         out.finder.toes, out.finder.whole_faces = self.finder.toes, self.finder.whole_faces
         return out
 
     def removed(self, loads: Loads, time: float) -> np.ndarray | None:
-        """(n_blocks,) True for blocks that ``loads`` have taken out by ``time``; None before any is."""
+        """(n_blocks,) bool: blocks excavated by ``loads`` until ``time``; None if there are none."""
         return self._excavations.removed(loads, time)
 
     def _take_out(self, removed: np.ndarray | None, drained: np.ndarray | None) -> None:
-        """Go on without the blocks ``removed`` (n_blocks,): they keep their place in all arrays, fixed and touching
-        nothing; ``drained`` ones took the water with them."""
+        """Continue without the blocks ``removed`` (n_blocks,): they keep their rows in all arrays, fixed and without
+        contacts; around ``drained`` ones there is no water."""
         self.taken_out = removed
         fixed = self.blocks.fixed if removed is None else self.blocks.fixed | removed
         self.fixed = np.ascontiguousarray(fixed, dtype=np.bool_)
@@ -276,7 +275,7 @@ class BlockSystem:
         self, state: State, loads: Loads, dt: float | None, crack: CrackResponse | None, load_time: float | None,
         like: StepResult | None, pseudo_inertia: bool,
     ) -> tuple[Attempt, StepResult]:  # fmt: skip
-        """As `step`, with blocks of the orders that they have."""
+        """As `step`, with the present orders of blocks."""
         dt = self.settings.time_step if dt is None else float(dt)
         if not 0 < dt < np.inf:
             raise ValueError(f"a time step must be positive, got {dt!r} s")
@@ -303,20 +302,20 @@ class BlockSystem:
         return StepCutting(self, start, dt, like, pseudo_inertia).until_it_holds()
 
     def contacts_near(self, state: State) -> ContactSet:
-        """The contacts that a step from ``state`` would begin with, as CONTACT rows describe them."""
+        """The contacts at the start of a step from ``state``."""
         state = state.writable()
         vertices = np.ascontiguousarray(state.vertices)
         return self.finder.find(state, vertices, self._standing(state, vertices), lumped=True)
 
     def _standing(self, state: State, vertices: np.ndarray) -> Windows:
-        """Where blocks at rest look for contacts."""
+        """Windows of the contact search for blocks at rest."""
         moments = block_moments(vertices, self.next, self.vertex_start)
         start = StepStart(state, vertices, np.zeros_like(state.velocity), moments, np.zeros(2))
         return windows_of(self, start, 0.0)
 
     def inherited_contacts(self, state: State, found: ContactSet, forces: InheritedContacts) -> np.ndarray:
-        """CONTACT rows of ``found``, the contacts near ``state``, with the inherited ``forces`` where there are any: for a
-        `State` whose next step begins so."""
+        """CONTACT rows of ``found``, the contacts near ``state``, with the inherited ``forces``, for a `State` from
+        which the next step starts."""
 
         def on_multiplier(contacts: ContactSet) -> np.ndarray:
             has_multipliers = bool(self.allowed_penetration)
@@ -330,7 +329,7 @@ class BlockSystem:
         return at_their_springs(rows, placed, forces.which, self.finder.closure, on_multiplier(placed))
 
     def _refuse_unsupported(self, loads: Loads, time: float) -> None:
-        """In statics weight needs something to rest on: what falls for ever has no equilibrium."""
+        """Refuse a static run under gravity without any fixed block."""
         holds = (
             self.fixed.any() or self.blocks.constrained is not None or loads.edge_tractions or loads.point_loads
             or loads.block_motions or loads.point_motions or loads.bolts or loads.viscous_boundaries or loads.water
@@ -344,8 +343,8 @@ class BlockSystem:
     def pattern_of(
         self, block: np.ndarray, other: np.ndarray, moments: np.ndarray, linked: tuple[np.ndarray, np.ndarray] | None
     ) -> assembly.Pattern:
-        """Where the matrix of blocks that touch, ``block`` with ``other`` (n,), or are ``linked`` by bolts has entries,
-        and its solver: kept from step to step while the same blocks do."""
+        """Sparsity pattern of the matrix for contacts between ``block`` and ``other`` (n,) and blocks ``linked`` by
+        bolts, with its solver; reused while the pairs of blocks are the same."""
         if linked is not None:
             block, other = np.concatenate([block, linked[0]]), np.concatenate([other, linked[1]])
         if self.glued is not None:

@@ -118,6 +118,19 @@ def _meets(order, at, mine, pointer, neighbour, place):
     return out
 
 
+@part(fastmath=False, error_model="numpy", nogil=True)
+def _partition(order, side, counts, room):
+    """Sort the blocks of ``order`` (m,), in place and stably, by their ``side`` 0, 1 or 2, of which there are ``counts``
+    (3,); ``room`` (≥ m,) is work space."""
+    at = np.array([0, counts[0], counts[0] + counts[1]])
+    for q in range(len(order)):
+        room[q] = order[q]
+    for q in range(len(order)):
+        b = room[q]
+        order[at[side[b]]] = b
+        at[side[b]] += 1
+
+
 @kept(fastmath=False, error_model="numpy", nogil=True)
 def _dissected(orders, pointer, neighbour, leaf, large, least_part, across):
     """The blocks (n,) front by front, where each front begins among them (n_fronts + 1,), and its parent. ``orders``
@@ -161,23 +174,10 @@ def _dissected(orders, pointer, neighbour, leaf, large, least_part, across):
             side[order[q]] = 2 if cut[q] else (0 if q < at else 1)
             halves[side[order[q]]] += 1
         one, two = first + halves[0], first + halves[0] + halves[1]
-        # Every order goes on in each of the three by itself.
+        # Each order is continued within the two halves and the separator.
         for d in range(k):
             if m >= large or across[d]:
-                to_first, to_second, to_cut = first, one, two
-                for q in range(m):
-                    room[q] = orders[d, first + q]
-                for q in range(m):
-                    b = room[q]
-                    if side[b] == 0:
-                        orders[d, to_first] = b
-                        to_first += 1
-                    elif side[b] == 1:
-                        orders[d, to_second] = b
-                        to_second += 1
-                    else:
-                        orders[d, to_cut] = b
-                        to_cut += 1
+                _partition(orders[d, first:last], side, halves, room)
         # A separator is eliminated from one end to the other.
         turned = best + k // 2 >= k
         along = best - k // 2 if turned else best + k // 2

@@ -26,6 +26,7 @@ import numpy as np
 
 from ...conventions import normal_of, traction
 from ...model import Cracks, GrowthSettings, Material
+from ...model.former_names import renamed_exports
 from ..kernels import shape_functions
 from ..mesh.point_location import inside
 from ..solution import Solution
@@ -394,3 +395,8 @@ def _has_room(network: Network, birth: NewCrack, settings: GrowthSettings, block
         if network.first_contact(start, birth.start, birth.end, obstacle, clearance) is not None:
             return False
     return True
+
+
+__getattr__ = renamed_exports(
+    __name__, {"births": "new_cracks", "bear": "add_new_cracks", "Birth": "NewCrack"}, globals()
+)

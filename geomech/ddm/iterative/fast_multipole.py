@@ -7,8 +7,8 @@ The stress of displacement jumps derives from two analytic functions (Kolosov–
 with Ψ relative to the centre z0. An element of half length c, tangent e and midpoint z0, with jumps p along and q
 normal to it, times 2μ, and with A_k the Cauchy moments of `full_plane`, has
 
-    Φ = f/c Σ (q_k − i p_k) A_k'(ζ),   Ψ = e⁻² [½ (z − z0) Φ' − i f/c Σ p_k A_k'(ζ)],   f = 1/(4π(1−ν)), ζ = (z − z0)/(c
-                                       e),
+    Φ = f/c Σ (q_k − i p_k) A_k'(ζ),   Ψ = e⁻² [½ (z − z0) Φ' − i f/c Σ p_k A_k'(ζ)],   f = 1/(4π(1−ν)),
+    ζ = (z − z0)/(c e).
 
 Both have Laurent series in c/(z − z0) whose coefficients are exactly the moments of the shape functions. The fast
 multipole method (Greengard & Rokhlin 1987; for plane elasticity Greengard, Kropinski & Mayo 1996) therefore needs no

@@ -15,8 +15,8 @@ mirror image of the field point in the frame of the element. The depth of the so
 needs one order more, and the stress of a jump needs A'''. With E the conjugate of the element's tangent, s its slope, η
 the depth of its midpoint in half lengths c and W = η A_k + s A_{k+1},
 
-    slip       conj φ₁' = f/c (i/2 A' + E W''),            conj φ₁'' = f/c² (i/2 E A'' + E² W'''),   conj φ̄₀' = i f/2c
-    A' opening    i times that, + f/c E² A',                  the same + f/c² E³ A'',                   i times that
+    slip       conj φ₁' = f/c (i/2 A' + E W''),            conj φ₁'' = f/c² (i/2 E A'' + E² W'''),   conj φ̄₀' = i f/2c A'
+    opening    i times that, + f/c E² A',                  the same + f/c² E³ A'',                   i times that
     force      f/2 (2i E W' − κ E² A)                      f/2c (2i E² W'' − κ E³ A')                −f/2 A
 
 along the element, and (iκE²A − 2EW') f/2, (iκE³A' − 2E²W'') f/2c, −i A f/2 across it; f = 1/4π(1−ν). No term exceeds

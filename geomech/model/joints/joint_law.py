@@ -89,9 +89,8 @@ class JointLaw:
                                 rotation as an elastic bed without tension does
     max_closure                 m: hyperbolic closure σ = kₙ δ/(1 − δ/Vm) of Bandis, Lumsden & Barton (1983), Int. J.
                                 Rock Mech. 20, 249-268, with ``normal_stiffness`` the initial one; None: straight
-    restitution                 e of Newton's impact law v′ = −e v across the faces of blocks that strike each other, 0
-                                to
-                                1; None: what springs and time integration leave of the speed
+    restitution                 e of Newton's impact law v′ = −e v across the faces of blocks that strike each other, from
+                                0 to 1; None: what springs and time integration leave of the speed
 
     Raises ValueError that names the joint.
 

@@ -1,1 +1,1 @@
-"""Contact states along the central path of the complementarity problem."""
+"""Interior-point method for contact states: the central path of the complementarity problem."""

@@ -1,19 +1,20 @@
-"""Contact states found along the central path: what to try when switching contact by contact leads nowhere.
+"""Contact states along the central path, for steps in which switching contact states does not converge.
 
-Where many contacts open, close and slide at once, as in a wall on which its weight is put suddenly, each set of states
-moves the blocks so far that most of the next set is wrong too. The interior-point method never decides: every contact
-keeps a force N > 0 and a gap w > 0, and sliding contacts slip rates α, β > 0 beside the strengths S has left on either
-side,
+Where many contacts open, close and slide at once, as in a wall under sudden weight, each set of states moves the blocks
+so far that most of the next set is inconsistent too. The interior-point method decides no states on the way: each
+contact keeps a force N > 0 and a gap w > 0, and rough contacts keep slips α, β > 0 and remaining strengths on either
+side of S,
 
     w = g + N/kₙ,   N w = ε,       (μN + c ∓ S) (α, β) = ε,   Δs + (S − S₀)/kₛ = β − α,
 
 and ε is driven to zero by Newton's method with Mehrotra's (1992) predictor and corrector and Gondzio's (1996) further
 correctors, which bring products far from ε back towards it, for the linear complementarity problem of Coulomb friction
-in an implicit step (Klarbring 1986; Stewart & Trinkle 1996). Eliminated, a contact is a spring between stiff and none,
-so that each iteration is one factorisation of the matrix of the open–close iterations. Where steps become short the
-contacts are centred again about the motion at hand, with a larger ε. Bonds hold, as springs: whether they break is
-asked when all else is right. Friction on the present normal force is no gradient of an energy and nothing guarantees
-the end; what comes out is only a proposal, and the open–close iterations go on from it.
+in an implicit step (Klarbring 1986; Stewart & Trinkle 1996). After elimination a contact is a spring with a stiffness
+between zero and that of the contact, so that each iteration takes one factorisation of the matrix of the open–close
+iteration. Where steps become short the contacts are centred again about the present motion, with a larger ε. Bonds are
+springs that do not break; their strength is checked once everything else is consistent. Friction that depends on the
+present normal force is not the gradient of an energy, so convergence is not guaranteed; the result is only a proposal,
+from which the open–close iteration continues.
 """
 
 from __future__ import annotations
@@ -32,22 +33,24 @@ from ...linear_solver import assembly
 from .contact_terms import LEAST_LEFT, SHORT_OF
 from .newton_steps import THREADED, PathSteps
 
-#: The bond of a contact that has slipped and not lost all cohesion: it may slide.
+#: Bond state of a contact that has slipped but kept some cohesion: it may slide.
 SLIPPED = 2
-#: Further correctors of a step are sought while it goes less far than this, …
+#: Further correctors are computed while the step length is less than this, …
 _FAR = 0.9
-#: … for steps longer by a factor and an amount, and that are worth while where a step gets so much of this (Gondzio 1996).
+#: … aiming at a length larger by a factor and an amount, and accepted if a step gains this fraction of it (Gondzio
+#: 1996).
 _FARTHER, _FURTHER, _GAIN = 1.2, 0.1, 0.1
-#: Contacts that alone stop a step before so much of the way are centred again alone, about the motion that the others
-#: allow, where they are no more than this part of all, or so few, …
+#: Contacts that limit a step to less than this length are centred again about the motion that the others allow, if they
+#: are no more than this fraction of all contacts, or this number, …
 _ALONE_FAR, _ALONE, _ALONE_FEW = 0.3, 0.005, 8
-#: … with so much larger an ε, so often at most. (Friction on two neighbours' corners may leave no way along the path.)
+#: … with ε larger by this factor, and at most this many times. (Friction at the corners of two neighbours may block the
+#: path.)
 _ALONE_LARGER, _ALONE_AGAIN = 1000.0, 40
-#: ε, in the units of the start, below which only round-off is left to decide; steps shorter than this lead nowhere.
+#: ε, relative to its initial value, at which only round-off is left; and step length below which the path is blocked.
 _END, _STUCK = 1e-14, 1e-3
-#: Residual of a step, relative to its right side: what is left, the next step finds in the balance of forces. The
-#: predictor needs it too: a slope of 976 blocks under sudden weight takes 27 to 144 iterations with 1e-4 of that one
-#: alone, as the last digits fall, and 27 with 1e-5. (Walls ask for no more than 1e-4.)
+#: Residual of a step, relative to its right-hand side; the next step includes the remainder in the balance of forces. A
+#: slope of 976 blocks under sudden weight takes 27 to 144 iterations with 1e-4 in the predictor, depending on the last
+#: digits, and 27 with 1e-5. (For walls 1e-4 suffices.)
 WITHIN = 1e-5
 
 
@@ -61,7 +64,7 @@ def add_forces(right, block, other, order, vectors, normal, shear):
             if i < 0:
                 continue
             here = right[6 * i : 6 * i + 6]
-            # All six before any is stored: only so they become vectors.
+            # All six are computed before any is stored, so that they are vectorised.
             r0, r1 = here[0] + push * n[k] + drag * t[k], here[1] + push * n[k + 1] + drag * t[k + 1]
             r2, r3 = here[2] + push * n[k + 2] + drag * t[k + 2], here[3] + push * n[k + 3] + drag * t[k + 3]
             r4, r5 = here[4] + push * n[k + 4] + drag * t[k + 4], here[5] + push * n[k + 5] + drag * t[k + 5]
@@ -69,8 +72,8 @@ def add_forces(right, block, other, order, vectors, normal, shear):
 
 
 def solution_of(pattern: assembly.Pattern, data: np.ndarray) -> Callable[..., np.ndarray]:
-    """What solves with the matrix of ``data`` for one right side after the other, to a residual ``within`` that part of
-    it. Raises numpy.linalg.LinAlgError."""
+    """A function that solves with the matrix ``data`` for a right-hand side, to a relative residual ``within``. Raises
+    numpy.linalg.LinAlgError."""
     pattern.add_links(data)
     if pattern.solver is not None:
         return pattern.solver.rough_solution(data)
@@ -83,13 +86,12 @@ def solution_of(pattern: assembly.Pattern, data: np.ndarray) -> Callable[..., np
 
 
 class CentralPath:
-    """The path of one step's contacts, from no motion on; arguments as for `settle`, ``bonded`` (n,) the bonds, which
-    hold, ``forces`` (n,) N normal forces of the size to be expected, ``room`` gives each iteration the flat
-    matrix to fill; without, it takes its own. ``expected`` (6 n,) is the motion to begin with, that of the velocities,
-    None for none.
+    """The path of one step's contacts. Arguments as for `settle`; ``bonded`` (n,): bonds, which do not break here;
+    ``forces`` (n,) N: expected size of normal forces; ``room``: provides the flat matrix of each iteration (None: its
+    own). ``expected`` (6 n,): initial motion, that of the velocities; None: no motion.
 
-    ``missed``: what is left out of balance, over the largest load; ``epsilon``: ε, in units of the squared loads over their
-    stiffness; ``taken``: iterations so far.
+    ``missed``: unbalanced force relative to the largest load; ``epsilon``: ε in units of the squared loads over their
+    stiffness; ``taken``: number of iterations so far.
     """
 
     def __init__(
@@ -114,7 +116,7 @@ class CentralPath:
         some, bonded_rows = (np.flatnonzero(which) for which in ((bonded == 0) | slipped, (bonded > 0) & ~slipped))
         order = pattern.order
         if pattern.n >= THREADED:
-            # Beyond what caches hold, in the order of their blocks: what contacts need of one another then lies near.
+            # If they exceed the cache, contacts are sorted by their blocks, so that shared data are close in memory.
             one, two = order[found.block[some]], order[found.other[some]]
             some = some[np.argsort(np.maximum(one, two) * pattern.n + np.minimum(one, two), kind="stable")]
         self._some, self._bonded = some, bonded_rows
@@ -130,7 +132,7 @@ class CentralPath:
         self._upper, self._lower, self._all_lift = (
             np.concatenate([array[some], array[bonded_rows]]) for array in (pattern.upper, pattern.lower, springs.lift)
         )
-        # Bonds are springs either way.
+        # Bonds are springs in tension and compression.
         self._bonds = (
             springs.normal[bonded_rows],
             springs.shear[bonded_rows],
@@ -147,24 +149,24 @@ class CentralPath:
         self._mu, self._base = np.where(self._rough, friction, 1.0), np.where(self._rough, firm, 0.0)
 
         start = np.zeros(right.size) if expected is None else expected
-        # What moves on by itself is no load.
+        # Forces balanced by the initial motion are not loads.
         left = right - pattern.without_contacts(matrix, start)
         load = np.append(np.abs(left).max(axis=1, initial=0.0), 0.0)
         mine, others = order[self._at[0]], order[self._at[1]]
-        # Small blocks pass on what large ones press them with: contacts in units of a small block's own load would have
-        # forces that are nothing beside what they must balance, and no step of the path would get anywhere.
+        # Small blocks transmit the forces of large ones. In units of a small block's own load, contact forces would be
+        # negligible compared with those to be balanced, and all steps would be short.
         for _ in range(self._solver.path_load_rings):
             known = load.copy()
             np.maximum.at(load, mine, known[others])
             np.maximum.at(load, others, known[mine])
             load[-1] = 0.0
         load = np.maximum(load[mine], load[others])
-        # Blocks without load share a little of the others'; without any, any unit will do.
+        # Blocks without load get a small fraction of the mean; without any loads the unit is arbitrary.
         load = np.maximum(load, 1e-3 * load.mean()) if load.any() else np.ones(len(some))
         self._unit = load * load / self._kn
         self._room = room
         self._unknowns = start.copy()
-        # Motions: what makes the gap and the motion along the edge 0 where no force acts.
+        # Gap and motion along the edge without contact forces.
         apart, along = moved(start, *self._at).T
         self._g = gap[some] + apart - springs.lift[some] * along
         self._s = along - found.shear[some] / self._ks
@@ -175,41 +177,42 @@ class CentralPath:
 
     @property
     def blocked(self) -> bool:
-        """Whether the last iterations hardly got ahead."""
+        """Whether the last steps were all short."""
         return self._blocked >= self._solver.path_blocked
 
     @property
     def stopped(self) -> bool:
-        """Whether contacts had to be centred again for the path to go on."""
+        """Whether contacts had to be centred again."""
         return self._lone + self._again > 0
 
     @property
     def arrived(self) -> bool:
-        """Whether the path ended where only round-off is left to decide."""
+        """Whether ε has reached round-off."""
         return self.ended and not self.epsilon > _END
 
     @property
     def unknowns(self) -> np.ndarray:
-        """(6 n,) the motion at hand."""
+        """(6 n,) the present motion."""
         return self._unknowns
 
     def _begin(self, epsilon: float) -> None:
-        """Begin with ``epsilon``, centred about the motion at hand."""
+        """Start with ``epsilon``, centred about the present motion."""
         self.epsilon, self.missed, self.ended = epsilon, 1.0, not len(self._some)
         self._blocked, self._again, self._lone = 0, 0, 0
         self._centre(epsilon * self._unit)
 
     def _centre(self, epsilon: np.ndarray) -> None:
-        """Forces, gaps and slips (n,) that fit the motion at hand and have all products at ``epsilon`` (n,) J."""
-        # The roots of w² − g w = ε/kₙ and of its like for N/kₙ, of which the smaller would cancel: their product is
-        # ε/kₙ.
+        """Set forces, gaps and slips (n,) consistent with the present motion and with all products equal to ``epsilon``
+        (n,) J."""
+        # Roots of w² − g w = ε/kₙ and of the equation for N/kₙ; the smaller one follows from their product ε/kₙ,
+        # without cancellation.
         larger = 0.5 * (np.sqrt(self._g**2 + 4.0 * epsilon / self._kn) + np.abs(self._g))
         smaller = epsilon / self._kn / larger
         self._width = np.where(self._g > 0.0, larger, smaller)
         self._normal = self._kn * np.where(self._g > 0.0, smaller, larger)
         strength = self._mu * self._normal + self._base
         low, high = -strength, strength
-        # Nearer to the strength than its round-off S is not known, and nothing would be left to divide by.
+        # S cannot be closer to the strength than its round-off, and the difference is a divisor.
         least = LEAST_LEFT * strength
         for _ in range(50):
             shear = 0.5 * (low + high)
@@ -220,13 +223,13 @@ class CentralPath:
         self._slip = epsilon / np.stack(self._left())
 
     def _left(self) -> tuple[np.ndarray, np.ndarray]:
-        """The strength left against sliding either way, N: above and below S."""
+        """Remaining strength against sliding in either direction, N: above and below S."""
         strength = self._mu * self._normal + self._base
         least = LEAST_LEFT * strength
         return np.maximum(strength - self._shear, least), np.maximum(strength + self._shear, least)
 
     def advance(self) -> int:
-        """Go on by one iteration; the number of contacts still undecided. Raises numpy.linalg.LinAlgError."""
+        """Make one iteration; returns the number of undecided contacts. Raises numpy.linalg.LinAlgError."""
         if self.ended:
             return 0
         self.taken += 1
@@ -295,8 +298,8 @@ class CentralPath:
         return undecided
 
     def _without_few(self, numbers: np.ndarray, changed: np.ndarray, far: float) -> tuple[float, np.ndarray | None]:
-        """How far the changes (6, n) may go but for few contacts, and these, (n,) True; ``far`` and None where they
-        are many."""
+        """Step length of the changes (6, n) without a few limiting contacts, and these (n,) bool; ``far`` and None if
+        there are many."""
         falling = changed < 0.0
         falling[2:] &= self._rough
         reach = np.where(falling, -numbers / np.where(falling, changed, -1.0), np.inf).min(axis=0)
@@ -306,7 +309,7 @@ class CentralPath:
         return min(1.0, SHORT_OF * float(reach[~few].min(initial=np.inf))), few
 
     def _centre_alone(self, which: np.ndarray, epsilon: float) -> None:
-        """`_centre` those contacts only. What that leaves out of balance is for the next step to find."""
+        """`_centre` for the contacts ``which`` only. The next step removes the resulting imbalance."""
         known = self._normal, self._width, self._shear, self._slip
         self._centre(epsilon * self._unit)
         again = self._normal, self._width, self._shear, self._slip

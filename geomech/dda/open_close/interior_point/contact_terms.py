@@ -1,9 +1,9 @@
-"""The contacts of one iteration of the central path, in compiled loops; see `central_path` for what the numbers are.
+"""Contact terms of one iteration of the central path, in compiled loops; variables as in `central_path`.
 
-Arrays of six columns (n, 6) are N, w, α, β and the strengths left above and below S; the products are those of N and w, of
-α and the strength above, of β and the one below. Of divisions, which take most of the time, there are as few as can be.
-Functions go through contacts from ``first`` to before ``last``, and what they sum is theirs. (Numbers without a sign,
-for with one every index is asked whether it counts from the end.)
+Arrays of six columns (n, 6) are N, w, α, β and the remaining strengths above and below S; the products are N w, α times
+the strength above, β times that below. Divisions, which take most of the time, are kept to a minimum. Functions process
+the contacts from ``first`` to before ``last`` and return the sums over these. (Indices are unsigned: signed ones would
+be tested for negative values.)
 """
 
 from __future__ import annotations
@@ -12,14 +12,12 @@ from numba import uintp
 
 from ....compiled import kept
 
-# Sums in their order: told that they may be taken in another, LLVM makes vectors of several contacts' records, at three
-# times the time.
+# Sums may not be reordered: otherwise LLVM vectorises across contact records, which takes three times as long.
 _jit = kept(fastmath={"contract"}, error_model="numpy", nogil=True)
 
-#: No step goes farther than this part of the way to where a force or a gap vanishes.
+#: Largest step length, relative to that at which a force or gap vanishes.
 SHORT_OF = 0.99
-#: The part of a contact's strength that is left at least, however hard it is sheared: the round-off of their
-#: difference.
+#: Lower limit of the remaining strength, relative to the strength: round-off of the difference.
 LEAST_LEFT = 1e-14
 
 
@@ -28,10 +26,10 @@ def linearise(
     first, last, normals, widths, slip, shear, gap, along, kn, ks, mu, base, rough, unit, numbers, missed, laws,
     pulled,
 ):  # fmt: skip
-    """The ``numbers`` (n, 6) of what is at hand, N ``normals`` (n,), w ``widths`` (n,), α and β ``slip`` (2, n) and S
-    ``shear`` (n,); what is ``missed`` (n, 2) m of gap and slip, and ``laws`` by which contacts answer motions (n, 4):
-    N m by which the product of N and w goes with N, −∂N/∂g, −∂S/∂s and ∂S/∂N; returns the sum of the products, each in
-    its ``unit`` (n,) J. What is ``pulled`` then, see `pull`, are the forces at hand."""
+    """Linearise at N ``normals`` (n,), w ``widths`` (n,), α and β ``slip`` (2, n) and S ``shear`` (n,). Fills
+    ``numbers`` (n, 6); ``missed`` (n, 2) m, residuals of gap and slip; ``laws`` (n, 4): derivative of N w by N, −∂N/∂g,
+    −∂S/∂s and ∂S/∂N; and ``pulled`` (see `pull`) with the present forces. Returns the sum of the products, each in its
+    ``unit`` (n,) J."""
     total = 0.0
     for c in range(uintp(first), uintp(last)):
         normal, width, back, ahead = normals[c], widths[c], slip[0, c], slip[1, c]
@@ -58,8 +56,8 @@ def linearise(
 
 @_jit
 def pull(first, last, goals, numbers, missed, laws, pulled):
-    """``pulled`` (n, 3) N of a Newton step where blocks stand still: normal forces, shear forces without what answers
-    these, and with it. ``goals`` (n, 3) J for the products."""
+    """``pulled`` (n, 3) N: contact forces of a Newton step without motion of the blocks: normal force, shear force
+    without and with its dependence on the normal force. ``goals`` (n, 3) J: targets of the products."""
     for c in range(uintp(first), uintp(last)):
         normal, width, above, below = numbers[c, 0], numbers[c, 1], numbers[c, 4], numbers[c, 5]
         # One division for both.
@@ -76,15 +74,15 @@ def change(
     first, last, unknowns, mine, theirs, vectors, lift, goals, numbers, missed, pulled, laws, kn, mu, rough,
     motion, changed, sheared,
 ):  # fmt: skip
-    """The ``motion`` (n, 2) m of contacts that a step of the ``unknowns`` (6 n_blocks,) makes, gaps without what
-    sliding lifts, and what follows of it: how the numbers have ``changed`` (n, 6), S has ``sheared`` (n,), and how far
-    along that positive numbers stay so, at most 1. ``mine`` and ``theirs`` (n,) are the places of a contact's blocks,
-    −1 for fixed ones, ``pulled`` what `pull` gives."""
+    """Contact quantities of a step of the ``unknowns`` (6 n_blocks,): ``motion`` (n, 2) m (gaps without dilation);
+    changes of the numbers (``changed`` (n, 6)) and of S (``sheared`` (n,)). Returns the largest step length up to 1 for
+    which positive numbers stay positive. ``mine`` and ``theirs`` (n,): positions of a contact's blocks, −1 if fixed;
+    ``pulled``: from `pull`."""
     far = 1.0
     for c in range(uintp(first), uintp(last)):
         apart = along = 0.0
         n, t = vectors[c, 0], vectors[c, 1]
-        # Six at once: only so they become vectors.
+        # All six at once, so that they are vectorised.
         if mine[c] >= 0:
             u = unknowns[6 * mine[c] : 6 * mine[c] + 6]
             apart += n[0] * u[0] + n[1] * u[1] + n[2] * u[2] + n[3] * u[3] + n[4] * u[4] + n[5] * u[5]
@@ -126,8 +124,8 @@ def products(numbers, changed, far, rough, unit):
 
 @_jit
 def second_order(first, last, epsilon, unit, changed, goals):
-    """``goals`` (n, 3) J: what products are to be at first for ``epsilon`` units each, after what their factors'
-    changes make."""
+    """``goals`` (n, 3) J: targets of the linearised products so that the products are ``epsilon`` units each, including
+    the second-order terms of ``changed``."""
     for c in range(uintp(first), uintp(last)):
         target = epsilon * unit[c]
         goals[c, 0] = target - changed[c, 0] * changed[c, 1]
@@ -137,8 +135,8 @@ def second_order(first, last, epsilon, unit, changed, goals):
 
 @_jit
 def nearer(first, last, epsilon, unit, wanted, spread, numbers, changed, goals, better):
-    """``better`` (n, 3) J: ``goals`` corrected so that products which the step, taken as far as ``wanted``, would leave
-    beyond a factor ``spread`` of ``epsilon`` units come back to there, by no more than that above it (Gondzio 1996)."""
+    """``better`` (n, 3) J: ``goals`` corrected so that products which a step of length ``wanted`` would leave outside a
+    factor ``spread`` of ``epsilon`` units return to that range; corrections from above are limited (Gondzio 1996)."""
     for c in range(uintp(first), uintp(last)):
         target = epsilon * unit[c]
         low, high = target / spread, target * spread
@@ -150,7 +148,7 @@ def nearer(first, last, epsilon, unit, wanted, spread, numbers, changed, goals, 
 
 @_jit
 def go(first, last, far, motion, changed, sheared, normals, widths, slip, shear, gap, along):
-    """Go ``far`` along the changes of what is at hand, see `linearise`."""
+    """Update the variables (see `linearise`) by a step of length ``far``, in place."""
     for c in range(uintp(first), uintp(last)):
         normals[c] += far * changed[c, 0]
         widths[c] += far * changed[c, 1]
@@ -163,8 +161,8 @@ def go(first, last, far, motion, changed, sheared, normals, widths, slip, shear,
 
 @_jit
 def undecided(first, last, normals, widths, slip, shear, kn, ks, mu, base, rough, clear):
-    """How many contacts have a force and a gap, or slip and strength left, that differ by less than a factor ``clear``
-    in units of the stiffness."""
+    """Number of contacts whose force and gap, or slip and remaining strength, differ by less than a factor ``clear`` in
+    units of the stiffness."""
     number = 0
     for c in range(uintp(first), uintp(last)):
         normal, apart = normals[c], kn[c] * widths[c]

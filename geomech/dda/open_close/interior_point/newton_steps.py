@@ -1,8 +1,8 @@
-"""Newton's steps of the central path on all contacts: arrays that serve from iteration to iteration, and the work on
-them, shared between threads where contacts are many.
+"""Newton steps of the central path on all contacts: persistent arrays, and the work on them, divided among threads if
+there are many contacts.
 
-What is done for a share of contacts or blocks is its own, and sums are those of shares: what comes out is the same to
-the bit however many threads do it.
+Each chunk of contacts or blocks is processed independently, and sums are taken chunk by chunk, so that results are
+bitwise independent of the number of threads.
 """
 
 from __future__ import annotations
@@ -16,12 +16,12 @@ from ...linear_solver.assembly import sides_of
 from ...linear_solver.task_pool import add_at_once, await_value, crew
 from .contact_terms import balance, change, go, linearise, nearer, products, pull, second_order, undecided
 
-#: What is to be done.
+#: Tasks.
 _LINEARISE, _PREDICT, _CORRECT, _CENTRE, _CHANGE, _GO = range(6)
-#: Blocks from which it is done on all cores; contacts, and blocks, of a share.
+#: Number of blocks from which all cores are used; contacts, and blocks, per chunk.
 THREADED, SHARE, SHARE_BLOCKS = 4000, 2048, 512
-#: Products are brought to within this factor of their target, contacts are undecided while their force and their gap, in
-#: units of their stiffness, differ by less than this factor.
+#: Factor within which products are brought to their target; factor below which force and gap of a contact, in units of
+#: its stiffness, differ if it is undecided.
 _SPREAD, _CLEAR = 10.0, 3.0
 _NONE = np.empty(0)
 
@@ -32,11 +32,10 @@ def _work(
     unit, start, side, normal, width, slip, shear, gap, along, numbers, missed, laws, pulled, given, out,
     unknowns, goals, changed, better, motion, further, sheared,
 ):  # fmt: skip
-    """Do the ``task`` by turns with other threads: first for contacts, whose sums are ``parts`` (n_shares,), then for
-    blocks, so many to a ``share``; ``claimed`` (1,) and ``told`` (2,) as for the elimination of
-    fronts. ``epsilon`` and ``far``: the target in
-    units, and the length of a step, of the task; ``goals`` and ``changed`` are those of the step at hand, ``better``
-    and ``further`` of the one that is made."""
+    """Carry out the ``task`` together with other threads: first for contacts, with sums ``parts`` (n_shares,), then for
+    blocks, ``share`` and ``share_blocks`` per chunk; ``claimed`` (1,) and ``told`` (2,) as for the elimination of
+    fronts. ``epsilon``: target in units; ``far``: step length. ``goals`` and ``changed`` belong to the present step,
+    ``better`` and ``further`` to the new one."""
     n, blocks = len(kn), len(start) - 1
     shares = (n + share - 1) // share
     whole = shares + (0 if task >= _CHANGE else (blocks + share_blocks - 1) // share_blocks)
@@ -70,7 +69,7 @@ def _work(
                     nearer(first, last, epsilon, unit, far, _SPREAD, numbers, changed, goals, better)
                 pull(first, last, better, numbers, missed, laws, pulled)
         else:
-            # The forces on a block are known when those of all contacts are.
+            # The forces on blocks need those of all contacts.
             await_value(told, 0, shares)
             first, last = (q - shares) * share_blocks, min(blocks, (q - shares + 1) * share_blocks)
             balance(first, last, start, side, vectors, pulled, 0, 2, given, out)
@@ -80,8 +79,8 @@ def _work(
 
 
 class _Step:
-    """Room for one step: the ``goals`` (n, 3) J of its products, the ``motion`` (n, 2) m of contacts, how the numbers
-    have ``changed`` (n, 6) and S has ``sheared`` (n,), how ``far`` it may be taken, and its ``unknowns``."""
+    """Arrays of one step: ``goals`` (n, 3) J of its products, ``motion`` (n, 2) m of contacts, changes of the numbers
+    (``changed`` (n, 6)) and of S (``sheared`` (n,)), its largest length ``far``, and its ``unknowns``."""
 
     def __init__(self, n: int) -> None:
         self.goals, self.motion = np.empty((n, 3)), np.empty((n, 2))
@@ -93,7 +92,7 @@ class PathSteps:
     """Steps of contacts between blocks whose unknowns have the numbers ``mine`` and ``theirs`` (n,), −1 for those
     without, of ``n_blocks``, with ``vectors`` (n, 2, 12) as from `assembly.contact_vectors` and ``lift`` (n,).
 
-    ``numbers`` (n, 6), ``laws`` (n, 4): see `contact_terms`. ``step`` is the step at hand, ``tried`` the last one made.
+    ``numbers`` (n, 6), ``laws`` (n, 4): see `contact_terms`. ``step``: present step; ``tried``: last one computed.
     """
 
     def __init__(
@@ -105,41 +104,44 @@ class PathSteps:
         self._parts = np.empty((n + SHARE - 1) // SHARE)
         self.numbers, self.laws = np.empty((n, 6)), np.empty((n, 4))
         self._missed, self._pulled = np.empty((n, 2)), np.empty((n, 3))
-        #: (6 n_blocks,) N that blocks are out of balance by, and the right side of a step.
+        #: (6 n_blocks,) N: unbalanced forces on blocks, and the right-hand side of a step.
         self.residual, self._side = np.empty(6 * n_blocks), np.empty(6 * n_blocks)
         self.step, self.tried = _Step(n), _Step(n)
 
     def linearise(self, at_hand: tuple[np.ndarray, ...], springs: tuple[np.ndarray, ...], given: np.ndarray) -> float:
-        """Make ready for steps from N, w, slip, S, gap and motion along the edge ``at_hand`` on, contacts (n,) with
-        ``springs`` kn, ks, μ, base, rough and unit; ``given`` (6 n_blocks,) N are the forces on blocks without
-        those of contacts. The sum of the products."""
+        """Prepare steps from ``at_hand``: N, w, slip, S, gap and motion along the edge of contacts (n,) with
+        ``springs`` kn, ks, μ, base, rough and unit; ``given`` (6 n_blocks,) N: forces on blocks without contact forces.
+        Returns the sum of the products."""
         self._at_hand, self._springs = at_hand, springs
         self._do(_LINEARISE, given=given, out=self.residual)
         return float(self._parts.sum())
 
     def predict(self, solve: Callable[[np.ndarray], np.ndarray]) -> float:
-        """Make the step, solved by ``solve``, that has all products vanish; how far it may be taken."""
+        """Compute the predictor (all products zero) with ``solve``; returns its largest length."""
         return self._made(solve, _PREDICT)
 
     def correct(self, solve: Callable[[np.ndarray], np.ndarray], epsilon: float) -> float:
-        """The step that makes all products ``epsilon`` units, after what the present one makes of second order."""
+        """Compute the step with all products equal to ``epsilon`` units, including second-order terms of the present
+        step."""
         return self._made(solve, _CORRECT, epsilon)
 
     def centre(self, solve: Callable[[np.ndarray], np.ndarray], epsilon: float, wanted: float) -> float:
-        """The present step corrected by what it would leave far from ``epsilon``, taken as far as ``wanted``."""
+        """Compute the present step with corrections of products that would be far from ``epsilon`` at the length
+        ``wanted``."""
         return self._made(solve, _CENTRE, epsilon, wanted)
 
     def accept(self) -> None:
-        """The step that was tried is the one to take."""
+        """Make the step tried the present one."""
         self.step, self.tried = self.tried, self.step
 
     def products(self) -> float:
-        """Their sum where the present step ends."""
+        """Sum of the products at the end of the present step."""
         *_, rough, unit = self._springs
         return products(self.numbers, self.step.changed, self.step.far, rough, unit)
 
     def go(self, far: float) -> int:
-        """Take what is at hand so ``far`` along the present step, in place; how many contacts are undecided there."""
+        """Update the variables by the present step with length ``far``, in place; returns the number of undecided
+        contacts."""
         self.accept()
         self._do(_GO, far=far)
         return int(self._parts.sum())
