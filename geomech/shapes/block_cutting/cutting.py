@@ -26,8 +26,9 @@ from .planar_arrangement import Arrangement, arrange, following_in, gathered
 _STRAIGHT_ON = 0.9962
 #: Sides that turn by less than this, rad, are straight if rounding explains the turn.
 _NO_TURN = 1e-5
-#: A corner this many steps of the grid beside a straight side is on it: up to 40 were found in turned models.
-_BESIDE = 1000
+#: A corner this many steps of the grid beside a side is on it. In turned models up to 40 were found; but where lines are
+#: drawn at the finest angles, 56 steps are a bend.
+_BESIDE = 20
 
 
 @dataclass(frozen=True, eq=False)
@@ -352,12 +353,12 @@ def _blocks(
     arrangement: Arrangement, drawn: Drawn, source: np.ndarray, inside: np.ndarray, zone_names: list[str], grid: float
 ) -> Blocks:
     block_loop, loops = gathered(arrangement.face_loop, inside)
-    start, flat = gathered(arrangement.loop_start, loops)
+    start, whole = gathered(arrangement.loop_start, loops)
     count = np.diff(start)
     known = sorted(set(drawn.names) | {""})
     number = {name: k for k, name in enumerate(known)}
-    label = np.array([number[name] for name in drawn.names], dtype=int)[source[arrangement.loop_edge[flat]]]
-    points = arrangement.nodes[arrangement.loop_node[flat]]
+    label = np.array([number[name] for name in drawn.names], dtype=int)[source[arrangement.loop_edge[whole]]]
+    points = arrangement.nodes[arrangement.loop_node[whole]]
     following = following_in(start)
     before = np.empty(len(points), int)
     before[following] = np.arange(len(points))
