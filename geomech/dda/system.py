@@ -242,7 +242,7 @@ class BlockSystem:
         A step whose contact states do not settle, or that moves a vertex too far, is halved or shortened and begun
         again from ``state``, which is never changed; ``result.dt`` says what was done, and the log why contacts wanted a
         shorter one. Raises `NotConverged` after ``settings.max_step_cuts`` cuts, and ValueError when blocks overlap
-        before they have moved, or when nothing holds them up in statics.
+        before they have moved, when nothing holds them up in statics, or if ``state`` is one of other blocks.
         """
         choice, strength = self.order_choice, self.glue_strength
         if choice is None and strength is None:
@@ -271,6 +271,22 @@ class BlockSystem:
             log.info("t = %g s: %d faces of cells part", attempt.time, int(parted.sum() - self._parted.sum()))
             self._part(parted)
 
+    def _refuse_state_of_others(self, state: State) -> None:
+        blocks = self.blocks
+        for name, rows in (
+            ("vertices", len(blocks.vertices)),
+            ("velocity", blocks.n_blocks),
+            ("stress", blocks.n_blocks),
+        ):
+            found = len(getattr(state, name))
+            if found != rows:
+                raise ValueError(
+                    f"the state is not one of these blocks: its {name} have {found} rows, the blocks ask for {rows}"
+                )
+        contacts = state.contacts
+        if len(contacts) and max(contacts["vertex"].max(), contacts["edge"].max()) >= len(blocks.vertices):
+            raise ValueError("the state is not one of these blocks: its contacts are between vertices that they lack")
+
     def _step(
         self, state: State, loads: Loads, dt: float | None, crack: CrackResponse | None, load_time: float | None,
         like: StepResult | None, pseudo_inertia: bool,
@@ -279,6 +295,7 @@ class BlockSystem:
         dt = self.settings.time_step if dt is None else float(dt)
         if not 0 < dt < np.inf:
             raise ValueError(f"a time step must be positive, got {dt!r} s")
+        self._refuse_state_of_others(state)
         # (Kernels are compiled for writable arrays.)
         state = state.writable()
         self._stray_loads.refuse(loads)

@@ -269,3 +269,17 @@ def test_a_step_of_no_length_is_refused(dt):
 def test_a_run_to_no_time_is_refused(end):
     with pytest.raises(ValueError, match="end_time must not be negative"):
         next(dda.run(two_blocks(), [ROCK], [], Loads(), DdaSettings(), end))
+
+
+def test_a_state_of_other_blocks():
+    """It ended the process: kernels read and write past the ends of its arrays."""
+    blocks, others = two_blocks(), Blocks.from_polygons([3 * SQUARE - [1, 3]], fixed=[True])
+    system = dda.BlockSystem(blocks, (ROCK,), (JointLaw("joint"),), None, DdaSettings())
+    with pytest.raises(ValueError, match="not one of these blocks: its vertices have 4 rows, the blocks ask for 8"):
+        system.step(State.at_rest(others), Loads())
+    moved = system.step(State.at_rest(blocks), Loads(gravity=History.constant([0.0, -9.81]))).state
+    assert len(moved.contacts)
+    contacts = moved.contacts.copy()
+    contacts["edge"] += 8
+    with pytest.raises(ValueError, match="its contacts are between vertices that they lack"):
+        system.step(replace(moved, contacts=contacts), Loads())
