@@ -39,7 +39,7 @@ def apart(n, seed, spacing):
 def violation(sol, largest=None):
     """How far the worst node is from its law, in units of the ``largest`` stress, by default that on the faces (and the
     opening that goes with it)."""
-    laws, w, t = sol.body.laws, sol.jumps, sol._traction
+    laws, w, t = sol.body.laws, sol.jumps, sol.face_traction
     largest = largest or np.abs(t).max()
     length = sol.body.faces.length.max()
     gap = (w[laws.across] + laws.aperture) / (largest * length)
