@@ -265,9 +265,7 @@ def test_faces_that_find_no_state_over_a_good_part_of_their_crack_are_refused_by
 
     monkeypatch.setattr(face_contact, "UNDECIDED", 0.0)
     body = blade(-0.5974489, (-2.28365, 3.879603), order=3, elements_per_crack=2, elements_per_side=2)
-    with pytest.raises(
-        ddm.NotConverged, match=r"'crack 0' near \(-0.597449, 4\) .* over .* m .*: give it an aperture"
-    ):
+    with pytest.raises(ddm.NotConverged, match=r"'crack 0' near \(-0.597449, 4\) .* over .* m .*: give it an aperture"):
         body.solve(pressed((-366683.0, 652447.0), (652447.0, -957072.0)))
 
 
