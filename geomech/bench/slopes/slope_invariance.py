@@ -293,10 +293,10 @@ class _Compared:
     def _take(self, name: str, value: float, where: str, *runs: _Run) -> None:
         self.scatter[name] = max(self.scatter.get(name, 0.0), value)
         if not value <= BOUNDS[name].bound:
-            self._fault(f"{name} {value:.2g}{f' ({where})' if where else ''}", *runs)
+            what = f"{name} {value:.2g}{f' ({where})' if where else ''}"
+            self._fault(what, *runs, of_steps=name.endswith(", dt"))
 
-    def _fault(self, what: str, *runs: _Run) -> None:
-        of_steps = what.partition(" ")[0] in ("share,", "work,")
+    def _fault(self, what: str, *runs: _Run, of_steps: bool = False) -> None:
         (self.reported if any(run.warned(of_steps) for run in runs) else self.faults).append(what)
 
 

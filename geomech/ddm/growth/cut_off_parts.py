@@ -11,6 +11,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..mesh.elements import distance_to_segments
+
 if TYPE_CHECKING:
     from ..interfaces import CrackedBody
 
@@ -35,7 +37,5 @@ def cutting_segments(body: CrackedBody) -> np.ndarray:
 
 def _loop(edges: np.ndarray, loop: np.ndarray, point: np.ndarray) -> int:
     """The loop on which ``point`` lies; −1 if it is on none."""
-    a, d = edges[:, 0], edges[:, 1] - edges[:, 0]
-    along = np.clip(np.sum((point - a) * d, axis=1) / np.sum(d * d, axis=1), 0.0, 1.0)
-    off = np.hypot(*(a + along[:, None] * d - point).T)
+    off = distance_to_segments(point, edges)
     return int(loop[off.argmin()]) if off.min() <= 1e-6 * np.ptp(edges.reshape(-1, 2), axis=0).max() else -1

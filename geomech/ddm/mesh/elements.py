@@ -190,7 +190,7 @@ def _corners_near_cracks(cracks: Cracks, loops: list[np.ndarray], settings: DdmS
     for loop, span in zip(loops, _spans(loops)):
         angles = interior_angles(loop)
         for k in np.flatnonzero(angles > np.pi + KINK):
-            off = _distance(loop[k], ends)
+            off = distance_to_segments(loop[k], ends)
             # A crack that begins at the corner has its mouth there.
             near = off.min() < NEAR_CORNER * span / settings.elements_per_side and off.min() > 1e-7 * span
             if near:
@@ -198,7 +198,7 @@ def _corners_near_cracks(cracks: Cracks, loops: list[np.ndarray], settings: DdmS
     return found
 
 
-def _distance(point: np.ndarray, ends: np.ndarray) -> np.ndarray:
+def distance_to_segments(point: np.ndarray, ends: np.ndarray) -> np.ndarray:
     """(n,) distance, m, from ``point`` (2,) to segments with the ends ``ends`` (n, 2, 2)."""
     along, to = ends[:, 1] - ends[:, 0], point - ends[:, 0]
     part = np.clip((to * along).sum(axis=1) / np.maximum((along**2).sum(axis=1), 1e-300), 0.0, 1.0)
