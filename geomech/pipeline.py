@@ -16,6 +16,7 @@ from .model import Cycle, Problem
 if TYPE_CHECKING:
     from . import dda
     from .coupling import Coupling
+    from .output import Observer
     from .report.safety_page import SafetyReport
     from .scene import Scene
 
@@ -126,7 +127,7 @@ class CoupledRun:
         from .output.observer import Group
 
         self.problem, self.folder, self.stored = problem, Path(folder), stored
-        self.group = Group(observers)
+        self.group = Group([*self._repeats(), *observers])
         self.checkpoints = next((each for each in self.group.observers if isinstance(each, Checkpoints)), None)
         self.interruption = Interruption()
         self.stops_at = (*problem.ends_at, "collapse", *(("out of sight",) if problem.endless is not None else ()))
@@ -160,6 +161,15 @@ class CoupledRun:
             summary["wall_s"] = self._wall_time
             self.group.on_end(summary, error)
         return summary
+
+    def _repeats(self) -> list[Observer]:
+        """The observer that repeats the run at its end, before the summary is written."""
+        if not self.problem.run.repeat:
+            return []
+        from .coupling import cycles as run_problem
+        from .repeats import Repeats
+
+        return [Repeats(run_problem)]
 
     @property
     def _wall_time(self) -> float:

@@ -19,7 +19,7 @@ log = logging.getLogger(__name__)
 
 #: Keys of a scene that may be changed when a run is resumed: they do not affect the part that has been computed.
 ALLOWED = (
-    "title", "run.end_time_s", "run.stop_at", "output.every", "output.interior", "output.interior_every",
+    "title", "run.end_time_s", "run.stop_at", "run.repeat", "output.every", "output.interior", "output.interior_every",
     "output.checkpoint_every", "output.checkpoint_kept_mb", "render",
 )  # fmt: skip
 #: Reasons that do not count as the end of a run.

@@ -1,6 +1,6 @@
 """Scenes that take no time, as texts: what tests of several folders run where it matters little what is run."""
 
-from geomech.doctor import TORN_PLATE
+from geomech.installing.doctor import TORN_PLATE
 
 #: A plate that is pulled until its crack has cut it in two: the one that `geomech doctor --warm` runs.
 PLATE = TORN_PLATE

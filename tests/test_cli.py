@@ -13,9 +13,10 @@ from pathlib import Path
 
 import pytest
 
-from geomech import __version__, doctor
+from geomech import __version__
 from geomech.cli import BAD_INPUT, DONE, FAILED, default_folder, main
 from geomech.cli.verb import check_folder, check_writable
+from geomech.installing import doctor
 
 VERBS = ("check", "run", "safety", "render", "report", "doctor")
 SPECIMEN = """

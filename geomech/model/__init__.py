@@ -25,6 +25,7 @@ from .material import Material
 from .problem import (
     CHANGES,
     LARGEST_CORNER,
+    REPEATS,
     STOPS,
     WEIGHT,
     DdaSettings,
@@ -46,6 +47,7 @@ __all__ = [
     "GROUND",
     "LARGEST_CORNER",
     "OPEN",
+    "REPEATS",
     "SLIP",
     "STICK",
     "STOPS",

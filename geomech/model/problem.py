@@ -235,6 +235,13 @@ class GrowthSettings:
 CHANGES = ("opening", "parting", "closure", "slip", "sliding", "stick", "debonding")
 #: Kinds of events that `RunSettings.stop_at` may name.
 STOPS = ("initiation", "birth", "coalescence", "self", "daylighting", "split", "mechanism", *CHANGES)
+#: What `RunSettings.repeat` may name, and its words in messages.
+REPEATS = {
+    "noise": "round-off of coordinates",
+    "steps": "steps half as large",
+    "increment": "growth increments half as long",
+    "elements": "twice as many boundary elements",
+}
 
 
 @dataclass(frozen=True)
@@ -254,6 +261,8 @@ class RunSettings:
                      on fixed and guided blocks as on a rigid base; "springs" as point forces; "kelvin-springs" as point
                      forces of the infinite plane
     skip             False: every body and solution is recomputed in every pass, for comparison; results are the same
+    repeat           kinds of `REPEATS`: the finished run is repeated with each of these changes, and states by how much
+                     its results differ
     """
 
     end_time: float = 1.0
@@ -264,6 +273,12 @@ class RunSettings:
     longest_step: float | None = None
     control: str = "load"
     skip: bool = True
+    repeat: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        unknown = [kind for kind in self.repeat if kind not in REPEATS]
+        if unknown:
+            raise ValueError(f"repeat is any of {', '.join(map(repr, REPEATS))}, not {unknown[0]!r}")
 
 
 #: The ``load_edge`` of a problem whose leading load is the weight.

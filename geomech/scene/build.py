@@ -97,6 +97,7 @@ def build_problem(tables: SceneTables, drawing: Drawing, check: Check) -> Proble
             longest_step=tables.run.longest_step_s,
             control=tables.run.control,
             skip=tables.run.skip,
+            repeat=tables.run.repeat,
         ),
         load_edge=_leading_edge(tables),
         gauge=None if carriers is None else ((carriers[0], tables.gauge.start), (carriers[1], tables.gauge.to)),

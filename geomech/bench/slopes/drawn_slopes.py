@@ -12,7 +12,7 @@ import math
 import tempfile
 import tomllib
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -158,13 +158,6 @@ def problem_of(scene: Scene) -> Problem:
     """The problem of a scene. Raises SceneError for an invalid one."""
     with tempfile.TemporaryDirectory() as folder:
         return _load(scene, Path(folder)).problem()
-
-
-def with_noise(problem: Problem, size: float, rng: np.random.Generator) -> Problem:
-    """``problem`` with each vertex of each block moved by up to ``size`` of the blocks' extent."""
-    vertices = problem.blocks.vertices
-    off = size * float(np.ptp(vertices, axis=0).max()) * rng.uniform(-1, 1, vertices.shape)
-    return replace(problem, blocks=problem.blocks.with_vertices(vertices + off))
 
 
 def _load(scene: Scene, folder: Path):

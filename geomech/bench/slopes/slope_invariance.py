@@ -22,6 +22,7 @@ import numpy as np
 
 from ...model import Problem
 from ...output.tables.summary import write_json
+from ...repeats import NOISE, with_noise
 from ..figures import Measured
 from .drawn_slopes import (
     Isometry,
@@ -32,7 +33,6 @@ from .drawn_slopes import (
     moved,
     problem_of,
     reordered,
-    with_noise,
 )
 from .limited_runs import LONG, REFUSED, REPORTED, RIGHT, VERDICTS, WRONG, Ended, Heard, limited
 from .moved_mass import BlockDisplacements, moving_from
@@ -52,8 +52,6 @@ FIRST, FRICTIONLESS_STEP = 3, 3e-3
 #: Works are compared relative to the larger of gravity's work, and its work on this fraction of the rock over the
 #: displacement from which rock counts as moving: negligible motion is not magnified.
 LEAST_SHARE = 0.01
-#: Noise of a vertex, relative to the extent of the blocks: round-off of coordinates.
-NOISE = 1e-12
 #: Differences of displacement below this multiple of the noise are those of the vertices themselves.
 ABOVE_NOISE = 10.0
 #: Centroids of a block in two variants are closer to each other than this part of the extent: parts of a block cut by
@@ -128,6 +126,10 @@ class Invariance:
     left_out: tuple[str, ...] = ()
     reason: str = ""
     seconds: float = 0.0
+
+    @property
+    def scatters_under_noise(self) -> bool:
+        return any(name.startswith("noise") and not value <= BOUNDS[name].bound for name, value in self.scatter.items())
 
     @property
     def worst(self) -> dict[str, float]:
@@ -395,6 +397,10 @@ def table(every: Sequence[Invariance]) -> Measured:
         )
     counts = Counter(each.verdict for each in every)
     lines += ["", f"{len(every)} slopes: " + "  ".join(f"{counts[verdict]} {verdict}" for verdict in VERDICTS)]
+    unsure = sum(each.verdict == WRONG and each.scatters_under_noise for each in every)
+    lines.append(
+        f"{unsure} of the wrong ones are not the same under noise either: `geomech run --repeat noise` says so"
+    )
     lines.append("what must not change, worst of the slopes that are right, of all, beyond the bound in, and the bound")
     for name, each in BOUNDS.items():
         values = [one.scatter[name] for one in every if name in one.scatter]

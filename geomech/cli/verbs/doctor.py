@@ -17,10 +17,10 @@ def declare(verbs: Verbs) -> None:
 
 
 def _doctor(options: argparse.Namespace) -> int:
-    from ...doctor import examine
+    from ...installing.doctor import examine
 
     if options.warm:
-        from ...doctor import warm
+        from ...installing.doctor import warm
         from ..messages import report_compiling
 
         report_compiling()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import json
 from pathlib import Path
 from typing import Any
 
@@ -25,11 +26,20 @@ def declare(verbs: Verbs) -> None:
         action="store_true",
         help="replace the results of an earlier run in the run folder (otherwise refused)",
     )
+    run.add_argument(
+        "--repeat",
+        metavar="KIND,…",
+        help="repeat the finished run with one change at a time, any of noise, steps, increment, elements, and state by "
+        "how much its results differ",
+    )
     run.add_argument("--quiet", action="store_true", help="print nothing but errors")
 
 
 def _run(options: argparse.Namespace) -> int:
     check_folder("--out", options.out)
+    if options.repeat is not None:
+        kinds = [kind.strip() for kind in options.repeat.split(",")]
+        options.overrides.append(f"run.repeat={json.dumps(kinds)}")
     prepare_for_a_run()
     if not options.quiet:
         report_compiling()

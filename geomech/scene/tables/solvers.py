@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field, Strict, field_validator, model_validator
 
-from ...model import LARGEST_CORNER, STOPS, rayleigh_coefficients
+from ...model import LARGEST_CORNER, REPEATS, STOPS, rayleigh_coefficients
 from .entries import NotNegative, Pair, Positive, Table
 
 
@@ -248,4 +248,10 @@ class RunTable(Table):
         True,
         description="reuse everything that has not changed since the last pass (false: recompute it, for comparison; "
         "the results are the same)",
+    )
+    repeat: Annotated[tuple[Literal[tuple(REPEATS)], ...], Strict(False)] = Field(
+        (),
+        description='repeat the finished run with one change at a time, and state by how much the results differ: "noise" of '
+        '1e-12 of the model on all coordinates; "steps" half as large; growth "increment" half as long; twice as many '
+        '"elements". Each costs another run or more',
     )

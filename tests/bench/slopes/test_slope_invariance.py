@@ -16,7 +16,6 @@ from geomech.bench.slopes.drawn_slopes import (
     moved,
     problem_of,
     reordered,
-    with_noise,
 )
 from geomech.bench.slopes.limited_runs import REPORTED, RIGHT, VERDICTS, WRONG
 from geomech.bench.slopes.moved_mass import BlockDisplacements, moving_from
@@ -32,6 +31,7 @@ from geomech.bench.slopes.slope_invariance import (
 from geomech.cli import main
 from geomech.cli.verb import BAD_INPUT
 from geomech.model import State
+from geomech.repeats import with_noise
 
 #: One block 2 × 1 m on a plane that falls by 40° to the right, friction 10°.
 SLIDES = """

@@ -123,7 +123,7 @@ def _also_missing(package: str) -> list[str]:
 
 
 def _numba() -> Check:
-    from .kernel_folder import VARIABLE, kernel_place
+    from ..kernel_folder import VARIABLE, kernel_place
 
     place = kernel_place()
     code = (
@@ -212,9 +212,9 @@ def warm() -> None:
     kept of them but the kernels."""
     import tempfile
 
-    from .output import standard_observers
-    from .pipeline import run
-    from .scene import load_scene
+    from ..output import standard_observers
+    from ..pipeline import run
+    from ..scene import load_scene
 
     with tempfile.TemporaryDirectory() as folder:
         for k, text in enumerate((SLIDING_BLOCKS, TORN_PLATE)):
