@@ -50,7 +50,7 @@ from .loads.viscous_boundary import ViscousEdges
 from .open_close.augmented_lagrangian import settle_augmented
 from .open_close.contact_set import ContactSet
 from .open_close.equations import Equations, Unsettled
-from .open_close.iteration import is_large, settle
+from .open_close.iteration import settle
 from .open_close.settled_states import Settled
 from .out_of_balance import imbalance
 from .results import CrackResponse, StepResult
@@ -224,8 +224,8 @@ class Attempt:
         self.pattern = system.pattern_of(found.block, found.other, self.moments, linked) if self.n_free else None
         self.order = system.free if self.pattern is None else self.pattern.order
         if self.pattern is not None and self.pattern.solver is not None:
-            # Steps that are cut at the first difficulty need no double-precision factors, 1.6 GB more for 100 000 blocks.
-            self.pattern.solver.single_only = is_large(self.n_free, scheme.static, system.settings.contact_solver)
+            many = self.n_free >= system.settings.contact_solver.single_precision_only
+            self.pattern.solver.single_only = many and not scheme.static
         self.matrix, self.right, self.tangent, self.stress0 = assemble_blocks(
             self.order, self.n_free, tuple(self._mass),
             tuple(BlockStart(self.begun, self.stress, system.stiffness, system.compliance)), tuple(self.cracks),

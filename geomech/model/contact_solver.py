@@ -66,6 +66,9 @@ class ContactSolver:
     large_system            number of free blocks from which a dynamic step is halved as soon as its path is stopped: on a
                             slope of 20 000 blocks under sudden weight no states were found in 126 s, in half the step
                             after 43 iterations
+    single_precision_only   number of free blocks from which a dynamic step whose equations are beyond single precision is
+                            halved, instead of factored in double, which takes 1.6 GB more for 100 000 blocks. (A slope of
+                            10 000 moved in steps of a third to a quarter of those with double factors.)
     """
 
     newton_reduction: float = 0.55
@@ -101,3 +104,4 @@ class ContactSolver:
     path_blocked: int = 5
     path_short: float = 0.05
     large_system: int = 3000
+    single_precision_only: int = 30_000

@@ -22,7 +22,7 @@ def alive(monkeypatch):
     ):  # fmt: skip
         monkeypatch.setattr(module, name, value)
     # Of 100 000 blocks, factors of a patch are none beside the others.
-    large, settings = ContactSolver(large_system=0, patch_blocks=0), block_scenes.settings
+    large, settings = ContactSolver(large_system=0, single_precision_only=0, patch_blocks=0), block_scenes.settings
     monkeypatch.setattr(
         block_scenes, "settings", lambda *given, **named: replace(settings(*given, **named), contact_solver=large)
     )

@@ -33,8 +33,9 @@ SPACINGS = {300: 2.6, 1000: 1.35, 3000: 0.76, 10_000: 0.41}
 ASPECT = 1.15
 #: s: time steps, the shortest last, and the duration of the motion.
 STEPS, END = (10e-3, 5e-3, 2.5e-3, 1.25e-3), 0.1
-#: Processor time, s, for all steps of one length, in a quick and in a full run: of a run that takes longer, the cost is
-#: reported without an error. Steps that would take longer, judging by earlier ones, are left out. That of a wall.
+#: Processor time, s, for all steps of one length of up to a thousand blocks, in a quick and in a full run; more blocks get
+#: more in proportion. Of a run that takes longer, the cost is reported without an error. Steps that would take longer,
+#: judging by earlier ones, are left out. That of a wall.
 LONGEST, WALL = (3.0, 12.0), (0.5, 3.0)
 
 
@@ -175,7 +176,10 @@ def measure(quick: bool = False, blocks: int | None = None) -> Measured:
     measured(100, STEPS[:1], 600.0, 0.0)
     sizes = list(SPACINGS)[:2] if quick else list(SPACINGS)
     steps = STEPS[:-1] if quick else STEPS
-    every = [measured(n, steps, LONGEST[not quick], WALL[not quick]) for n in (*sizes, *([blocks] if blocks else []))]
+    every = [
+        measured(n, steps, LONGEST[not quick] * max(1.0, n / 1000), WALL[not quick])
+        for n in (*sizes, *([blocks] if blocks else []))
+    ]
     FOLDER.mkdir(parents=True, exist_ok=True)
     write_json(FOLDER / "motion.json", {"quick": quick, "slopes": [asdict(sized) for sized in every]})
     draw(every, FOLDER / "motion.png")

@@ -71,6 +71,22 @@ def _against(vertices, next_vertex, previous_vertex, vertex, edge):
 
 
 @part(fastmath=False, error_model="numpy", nogil=True, **UNCOUNTED)
+def _lies_behind(vertices, next_vertex, previous_vertex, vertex, nx, ny):
+    """Whether the rock at corner ``vertex`` lies behind an edge with the outward normal (nx, ny), not in front of it.
+
+    A flat corner on the tip of a needle leans by the needle's angle into the edge on the needle's other side, which may be
+    less than `_ANGLE`; its rock is behind that edge.
+    """
+    a, b = previous_vertex[vertex], next_vertex[vertex]
+    ax, ay = vertices[a, 0] - vertices[vertex, 0], vertices[a, 1] - vertices[vertex, 1]
+    bx, by = vertices[b, 0] - vertices[vertex, 0], vertices[b, 1] - vertices[vertex, 1]
+    first, second = np.sqrt(ax * ax + ay * ay), np.sqrt(bx * bx + by * by)
+    tx, ty = bx / second - ax / first, by / second - ay / first
+    # The rock is to the left of the outline.
+    return tx * ny - ty * nx < 0.0
+
+
+@part(fastmath=False, error_model="numpy", nogil=True, **UNCOUNTED)
 def _may_turn_to(vertices, next_vertex, previous_vertex, vertex, nx, ny, gap, window):
     """Whether ``vertex`` may rotate against an edge in a step although a neighbour is nearer to it.
 
@@ -328,7 +344,7 @@ def _entrance_lines(lines, outlines, old_keys, v, w):
         else:
             vertex, edge, sign = v, (w if c == 2 else previous_vertex[w]), 1.0
         away, nx, ny, gap, along, length = _against(vertices, next_vertex, previous_vertex, vertex, edge)
-        if away < -_ANGLE:
+        if away < -_ANGLE or (away < 0.0 and _lies_behind(vertices, next_vertex, previous_vertex, vertex, nx, ny)):
             continue
         nx, ny = sign * nx, sign * ny
         outside = max(0.0, -along, along - length)

@@ -13,6 +13,9 @@ FIRST = 1 / 32
 EASY, GROWTH = 6, 1.5
 #: … and shrinks by that factor after one that needed more than this, or was cut: such changes happen within the step.
 HARD, SHRINKAGE = 18, 0.5
+#: A step of given length that was cut is followed by one of at most so many times what it was cut to, until it has its
+#: length again: a slope of 10 000 blocks whose contacts settle in steps of 1 ms need not be tried at 10 ms each time.
+REGROWTH = 2.0
 #: Share of the allowed displacement that a step is planned to use; the rest allows for growing loads.
 USE = 0.8
 #: Shortest step that is planned, relative to the longest; steps that still fail are cut by the step itself.
@@ -23,8 +26,9 @@ SHORTEST = 1e-4
 class StepLength:
     """Length of the next step of a run, s.
 
-    It is ``settings.time_step``; with ``settings.automatic_time_step``, between that and a ten-thousandth of it,
-    depending on the last step's open–close iterations, cuts and displacement.
+    It is ``settings.time_step``; in motion, after a step that was cut, at most `REGROWTH` times what it was cut to. With
+    ``settings.automatic_time_step`` it is between ``time_step`` and a ten-thousandth of it, depending on the last step's
+    open–close iterations, cuts and displacement.
     """
 
     settings: DdaSettings
@@ -35,10 +39,14 @@ class StepLength:
 
     def after(self, result: StepResult, asked: float) -> None:
         """Take account of a step that was planned to last ``asked`` s."""
-        if not self.settings.automatic_time_step:
-            return
         facts = result.statistics
         cut, iterations = facts["step_cuts"] > 0, facts["open_close_iterations"]
+        if not self.settings.automatic_time_step:
+            if self.settings.dynamic_factor == 0.0:
+                return  # steps of static loads stay
+            grown = REGROWTH * (result.dt if cut else max(asked, self.dt))
+            self.dt = min(self.settings.time_step, grown)
+            return
         if asked < self.dt or (result.dt < asked and not cut):
             # The run or a stage ended in this step, or speed alone shortened it: it says nothing about a full step.
             return

@@ -16,7 +16,7 @@ from geomech.dda.contact_detection.entrance_edges import (
     find_contacts,
 )
 from geomech.dda.contact_detection.neighbour_search import boxes, near_pairs
-from geomech.model import Blocks, DdaSettings, JointLaw, Loads, Material, State, corner_lengths
+from geomech.model import Blocks, DdaSettings, History, JointLaw, Loads, Material, State, corner_lengths
 
 
 def search(polygons, window=0.05, turn=0.0, fixed=None, rounding=0.01):
@@ -221,3 +221,42 @@ def test_two_squares_that_turn_to_each_other_within_a_step_do_not_overlap():
         after = sum(result.statistics[name] for name in ("kinetic_energy", "elastic_energy", "contact_energy"))
         assert after < energy * (1 + 1e-9)
         energy = after
+
+
+#: A needle of 1.1° between a block with a flat corner (178.9°) at its tip and what lies on its other side: as cross joints of
+#: a slope cut them that meet at a shallow angle.
+NEEDLE = np.array(
+    [[4.558000269154, 2.990049766305], [4.645896210674, 3.233735866807], [4.553782714671, 2.993002929747]]
+)
+FLAT = np.array([
+    [6.420925462199, 1.685615503026], [6.553808610733, 2.093087302111], [4.704830113225, 3.387755984045],
+    [4.645896210674, 3.233735866807], [4.558000269154, 2.990049766305],
+])  # fmt: skip
+
+
+@pytest.mark.parametrize("turn", [0.0, 0.7, 2.2, 4.0])
+@pytest.mark.parametrize("mirrored", [False, True])
+def test_a_needle_is_held_at_its_tip_by_the_flat_corner_beside_it(turn, mirrored):
+    polygons = [FLAT, NEEDLE]
+    if mirrored:
+        polygons = [polygon[::-1] * [-1.0, 1.0] for polygon in polygons]
+    table, geometry, _ = search(polygons, turn=turn, fixed=[True, False])
+    tip = np.argmax(np.hypot(*(polygons[1] - polygons[1].mean(axis=0)).T))
+    c, s = np.cos(turn), np.sin(turn)
+    tip = polygons[1][tip] @ np.array([[c, s], [-s, c]])
+    at = np.hypot(*(geometry[:, 5:7] - tip).T)
+    # Both ends of the common face bear, with normals across it, and its length is shared.
+    assert len(table) == 2 and at.min() < 1e-9 and at.max() > 0.25
+    assert np.abs(geometry[0, 1:3] @ geometry[1, 1:3]) == pytest.approx(1.0, abs=1e-3)
+    assert geometry[:, 4] == pytest.approx([0.1295, 0.1295], abs=2e-3)
+
+
+def test_a_needle_that_is_pressed_on_a_flat_corner_does_not_sink_in():
+    """A body force of 10 g across its face, for 20 ms: rigid, it would turn into the block by 8 mm at its tip."""
+    rock, joint = Material("rock", 1e9, 0.25, density=2600.0), JointLaw("joint", friction_angle=0.5)
+    blocks = Blocks.from_polygons([FLAT, NEEDLE], fixed=[True, False])
+    settings = DdaSettings(time_step=1e-3, dynamic_factor=1.0, max_displacement_ratio=0.05)
+    across = 98.1 * np.array([0.9407, -0.3393])
+    states = list(dda.run(blocks, [rock], [joint], Loads(gravity=History.constant(across)), settings, end_time=0.02))
+    off = states[-1].vertices[-3:] - blocks.vertices[-3:]
+    assert np.hypot(*off.T).max() < 1e-6

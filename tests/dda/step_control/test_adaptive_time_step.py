@@ -57,9 +57,26 @@ def test_steps_grow_and_shrink_by_what_is_stated_and_stay_bounded():
     assert length.dt == adaptive_time_step.SHORTEST
 
 
-def test_without_it_every_step_is_the_one_asked_for():
+def test_without_it_every_static_step_is_the_one_asked_for():
     length = dda.StepLength(DdaSettings(time_step=0.5))
     length.after(finished(0.1, iterations=99, cuts=3), 0.5)
+    assert length.dt == 0.5
+
+
+def test_without_it_a_step_in_motion_that_was_cut_grows_back_by_doubling():
+    length = dda.StepLength(DdaSettings(time_step=0.5, dynamic_factor=1.0))
+    length.after(finished(0.5, iterations=99), 0.5)
+    assert length.dt == 0.5
+    length.after(finished(0.0625, cuts=3), 0.5)
+    assert length.dt == 0.125
+    # A step that is short for another reason, as the end of a stage, does not count.
+    length.after(finished(1e-3), 1e-3)
+    assert length.dt == 0.25
+    for _ in range(3):
+        length.after(finished(length.dt), length.dt)
+    assert length.dt == 0.5
+    # What was cut once is tried in its whole length.
+    length.after(finished(0.25, cuts=1), 0.5)
     assert length.dt == 0.5
 
 
