@@ -8,6 +8,7 @@ first. In statics, where a load does not shrink with the step, what a shorter st
 from __future__ import annotations
 
 import logging
+import math
 from dataclasses import dataclass, field, replace
 from typing import NoReturn, Protocol
 
@@ -35,6 +36,9 @@ _FARTHER = 6
 _REDIRECTED = 3
 #: … by more than this angle (cosine).
 _OTHER_DIRECTION = 0.95
+#: Corners are searched for this much farther, in units of √area of the smallest block, than their weight may bring them: what
+#: elastic blocks move in a step that they bear at rest.
+_BESIDES = 1e-6
 
 
 class Deflection(Protocol):
@@ -252,10 +256,12 @@ class StepCutting:
         """How a step of the present length looks for contacts. Two corners may come nearer by their weight than their
         velocities say; what comes nearer still is searched for once the motion of the step is known."""
         system, start, dt = self.system, self.start, self.dt
+        margin = np.inf
+        if not system.scheme.static:
+            margin = dt * dt * float(np.hypot(*start.gravity)) + _BESIDES * math.sqrt(start.moments[:, 0].min())
         return _Search(
-            system.finder, start.state, start.vertices, windows_of(system, start, dt), self._expected_motion(),
-            np.inf if system.scheme.static else dt * dt * float(np.hypot(*start.gravity)),
-        )  # fmt: skip
+            system.finder, start.state, start.vertices, windows_of(system, start, dt), self._expected_motion(), margin
+        )
 
     def _expected_motion(self) -> np.ndarray | None:
         """(n_vertices, 2) m: motion of the step by the velocities with which it begins; None where there are none."""

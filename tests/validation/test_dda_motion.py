@@ -181,7 +181,7 @@ def test_damping_is_the_fraction_of_critical_that_it_says(verified):
     # Well resolved, successive peaks of a free vibration fall by exp(−2πξ/√(1−ξ²)), the step's own dissipation aside.
     blocks = Blocks.from_polygons([rectangle(0, 0, 1, 1)])
     omega = exact.square_block_frequency(1.0, 10e9, 2600.0)
-    n = 1000
+    n = 500
     fall = {}
     for damping in (0.0, 0.05):
         settings = DdaSettings(dynamic_factor=1.0, damping=damping, max_displacement_ratio=1.0)
