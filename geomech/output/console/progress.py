@@ -8,7 +8,6 @@ import os
 import sys
 import textwrap
 import time
-from collections import deque
 from contextlib import suppress
 from pathlib import Path
 from typing import Any, TextIO
@@ -22,6 +21,7 @@ from ..tables.deepest_penetration import limits_line
 from ..tables.motion_state import closing, state_text
 from ..units import length_text, stress_text
 from .at_work import spoken
+from .pace import Compiled, Course, Pace
 
 #: Number of warnings shown at the end of a run, and the largest length of each.
 SHOWN_WARNINGS, WIDTH = 3, 400
@@ -58,47 +58,12 @@ class Warned(logging.Handler):
                 *(f"    {text}" for text in shown)]  # fmt: skip
 
 
-class Pace:
-    """Rate at which a run proceeds through its scene, from the later half of the elapsed wall time.
-
-    It is meaningful after `LEAST` s, if the rates in the two halves of that time differ by less than a factor `UNEVEN`:
-    while rock cracks, the scene's clock stands still.
-    """
-
-    LEAST, UNEVEN = 3.0, 2.5
-
-    def __init__(self) -> None:
-        self._began: float | None = None
-        self._seen: deque[tuple[float, float]] = deque()
-
-    def add(self, wall: float, time: float) -> None:
-        """Record that the scene has reached ``time`` (s) at ``wall`` (s)."""
-        self._began = wall if self._began is None else self._began
-        self._seen.append((wall, time))
-        half = 0.5 * (self._began + wall)
-        while len(self._seen) > 2 and self._seen[1][0] <= half:
-            self._seen.popleft()
-
-    def time_for(self, rest: float) -> float:
-        """Wall time, s, for another ``rest`` s of the scene; inf if unknown."""
-        if self._began is None or len(self._seen) < 5 or self._seen[-1][0] - self._began < self.LEAST:
-            return math.inf
-        first, last = self._seen[0], self._seen[-1]
-        middle = min(self._seen, key=lambda seen: abs(seen[0] - 0.5 * (first[0] + last[0])))
-        early, late = (
-            (b[1] - a[1]) / (b[0] - a[0]) if b[0] > a[0] else 0.0 for a, b in ((first, middle), (middle, last))
-        )
-        if not 0.0 < early <= self.UNEVEN * late <= self.UNEVEN**2 * early:
-            return math.inf
-        return max(0.0, rest) * (last[0] - first[0]) / (last[1] - first[1])
-
-
 class Progress:
     """Observer that reports progress.
 
     On a terminal it draws a tqdm bar over the scene's time, elsewhere a line from time to time. The time left follows
-    from the recent `Pace`, once it is steady; if cracks may end the run by an event there is no estimate. ``quiet``
-    reports only where a failed run stopped. ``stream`` is stderr by default; ``interval`` s is the least time between
+    from the `Course` of an earlier run of the scene, else from the recent `Pace`: a range where that is uneven. If
+    cracks may end a first run by an event there is no estimate. ``quiet`` reports only where a failed run stopped. ``stream`` is stderr by default; ``interval`` s is the least time between
     two lines when not on a terminal, twice that between two with the same percentage.
     """
 
@@ -110,10 +75,12 @@ class Progress:
         self._out = self.stream or sys.stderr
         self._folder, self._end = Path(folder), problem.run.end_time
         self._stops = problem.run.stop_at
-        self._said = time.perf_counter()
+        self._said = self._began = time.perf_counter()
         self._percent = -1
         self._last: Cycle | None = None
-        self._pace = Pace()
+        self._pace, self._course, self._problem = Pace(), Course(), problem
+        self._earlier, self._compiled = Course.found(problem), Compiled()
+        self._whole = True  # from the first cycle on: not resumed
         self._bar = None
         if not self.quiet and self._out is not None and self._out.isatty():
             from tqdm import tqdm
@@ -135,6 +102,7 @@ class Progress:
 
     def on_resume(self, problem: Problem, folder: Path, memory: tuple[int, float] | None) -> None:
         self.on_start(problem, folder)
+        self._whole = False
         if memory is not None and self._bar is not None:
             self._bar.update(memory[1])
         elif memory is not None and not self.quiet:
@@ -147,6 +115,7 @@ class Progress:
         now = time.perf_counter()
         if cycle.state.time > 0:  # from the first load step on: that step may have compiled kernels and does not count
             self._pace.add(now, float(cycle.state.time))
+        self._course.add(cycle.number, now - self._began, float(cycle.state.time))
         if self._bar is not None:
             # The text is made only when the bar is drawn.
             if now - self._said >= self._bar.mininterval:
@@ -166,6 +135,9 @@ class Progress:
 
     def on_end(self, summary: dict[str, Any], error: BaseException | None = None) -> None:
         self._warnings.end()
+        self._compiled.end()
+        if error is None and self._whole and not self._compiled.any:
+            self._course.keep(self._problem)
         if self._bar is not None:
             with suppress(OSError):
                 self._bar.close()
@@ -185,15 +157,23 @@ class Progress:
         return round(100 * min(cycle.state.time, self._end) / self._end)
 
     def _left(self, cycle: Cycle) -> str:
-        """Wall time that the rest of the scene takes; empty if the rate is not steady.
+        """Wall time that the rest of the run takes; empty if it is not known.
 
-        A run of cracks that an event ends stops long before the end of the scene, at an unknown time: the text names
-        the event.
+        A run of cracks that an event ends stops long before the end of the scene, at a time that only an earlier run
+        knows: the text names the event.
         """
-        if self._stops and cycle.cracks.n_cracks:
-            return f", until {' or '.join(self._stops)}"
-        seconds = self._pace.time_for(self._end - float(cycle.state.time))
-        return f", about {_duration(seconds)} left" if 0.5 <= seconds < math.inf else ""
+        seconds = math.inf if self._earlier is None else self._course.left_as(self._earlier)
+        event = f", until {' or '.join(self._stops)}" if self._stops and cycle.cracks.n_cracks else ""
+        if 0.5 <= seconds < math.inf:
+            return f", about {_duration(seconds)} left, as in an earlier run{event}"
+        if event:
+            return event
+        least, most = self._pace.time_for(self._end - float(cycle.state.time))
+        if not 0.5 <= most < math.inf:
+            return ""
+        if least == most:
+            return f", about {_duration(most)} left"
+        return f", {_duration(least)} to {_duration(most)} left"
 
     def _say(self, text: str) -> None:
         if self._out is None:

@@ -219,17 +219,17 @@ def test_cracks_that_end_a_run_by_an_event_have_no_time_left(tmp_path, monkeypat
 
 def test_the_pace_is_the_recent_one():
     """A second a step, then ten: after as long at the new pace as at the old one, it is the new one."""
-    from geomech.output.console.progress import Pace
+    from geomech.output.console.pace import Pace
 
     pace, wall = Pace(), 0.0
     for step in range(60):
         wall += 1.0 if step < 40 else 10.0
         pace.add(wall, float(step))
         if step == 39:
-            assert pace.time_for(10.0) == pytest.approx(10.0)
+            assert pace.time_for(10.0) == pytest.approx((10.0, 10.0))
         if step == 42:
-            assert pace.time_for(10.0) == math.inf
-    assert pace.time_for(10.0) == pytest.approx(100.0)
+            assert pace.time_for(10.0) == (math.inf, math.inf)
+    assert pace.time_for(10.0) == pytest.approx((100.0, 100.0))
 
 
 def test_a_percentage_is_not_said_again_at_once(tmp_path, monkeypatch):

@@ -1,0 +1,153 @@
+"""Time that a run has left: from the rate at which it proceeds through its scene, or from an earlier run of that scene.
+
+The rate of a run that shakes, or whose cracks grow, changes by a factor of five on its way, and one that an event ends
+stops at an unknown time. The cost of a cycle by its number, which an earlier run has left, knows both: this run's share
+of it tells how much faster or slower the machine is now.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import logging
+import math
+import os
+from bisect import bisect_left
+from collections import deque
+from contextlib import suppress
+from pathlib import Path
+from typing import Self
+
+import numpy as np
+
+from geomech.model import Problem
+
+#: Most courses that are kept below ~/.cache (or $XDG_CACHE_HOME).
+KEPT = 500
+
+
+class Pace:
+    """Rate at which a run proceeds through its scene, from the later half of the elapsed wall time.
+
+    It is meaningful after `LEAST` s, if the rates in the two halves of that time differ by less than a factor `UNEVEN`:
+    while rock cracks, the scene's clock stands still. Rates that differ by more than `STEADY` give a range.
+    """
+
+    LEAST, STEADY, UNEVEN = 1.0, 1.3, 2.5
+
+    def __init__(self) -> None:
+        self._began: float | None = None
+        self._seen: deque[tuple[float, float]] = deque()
+
+    def add(self, wall: float, time: float) -> None:
+        """Record that the scene has reached ``time`` (s) at ``wall`` (s)."""
+        self._began = wall if self._began is None else self._began
+        self._seen.append((wall, time))
+        half = 0.5 * (self._began + wall)
+        while len(self._seen) > 2 and self._seen[1][0] <= half:
+            self._seen.popleft()
+
+    def time_for(self, rest: float) -> tuple[float, float]:
+        """Least and greatest wall time, s, for another ``rest`` s of the scene; inf if unknown. Both are the same
+        where the rate is steady."""
+        if self._began is None or len(self._seen) < 5 or self._seen[-1][0] - self._began < self.LEAST:
+            return math.inf, math.inf
+        first, last = self._seen[0], self._seen[-1]
+        middle = min(self._seen, key=lambda seen: abs(seen[0] - 0.5 * (first[0] + last[0])))
+        early, late = (
+            (b[1] - a[1]) / (b[0] - a[0]) if b[0] > a[0] else 0.0 for a, b in ((first, middle), (middle, last))
+        )
+        if not 0.0 < early <= self.UNEVEN * late <= self.UNEVEN**2 * early:
+            return math.inf, math.inf
+        rest = max(0.0, rest)
+        if max(early, late) > self.STEADY * min(early, late):
+            return rest / max(early, late), rest / min(early, late)
+        mean = rest * (last[0] - first[0]) / (last[1] - first[1])
+        return mean, mean
+
+
+class Course:
+    """Wall time (s, from the start of the run) and scene time (s) by cycle."""
+
+    #: Most cycles that are kept, every second one dropped beyond it. Runs shorter than `LEAST` s are not remembered;
+    #: an earlier run counts from a `SHARE` of its wall time on, while this one's scene time is as then to `SAME` of it.
+    MOST, LEAST, SHARE, SAME = 400, 2.0, 0.02, 0.1
+
+    def __init__(self) -> None:
+        self.cycle: list[int] = []
+        self.wall: list[float] = []
+        self.time: list[float] = []
+
+    def add(self, cycle: int, wall: float, time: float) -> None:
+        """Record that ``cycle`` has ended at ``wall``, the scene at ``time``."""
+        if len(self.cycle) > self.MOST:
+            for row in (self.cycle, self.wall, self.time):
+                del row[1:-1:2]
+        self.cycle.append(cycle)
+        self.wall.append(wall)
+        self.time.append(time)
+
+    def left_as(self, earlier: Course) -> float:
+        """Wall time left, s, if this run goes on as ``earlier`` did; inf if it does not, or too little of it is known."""
+        if len(self.cycle) < 3 or not earlier.cycle or self.cycle[-1] > earlier.cycle[-1]:
+            return math.inf
+        spent = np.interp(self.cycle, earlier.cycle, earlier.wall)
+        time = np.interp(self.cycle[-1], earlier.cycle, earlier.time)
+        if abs(time - self.time[-1]) > self.SAME * earlier.time[-1]:
+            return math.inf
+        # Of the later half of this run: the machine may have become busier.
+        since = max(0, bisect_left(self.wall, 0.5 * (self.wall[0] + self.wall[-1])) - 1)
+        if not spent[-1] - spent[0] > self.SHARE * earlier.wall[-1] or not spent[-1] > spent[since]:
+            return math.inf
+        slower = (self.wall[-1] - self.wall[since]) / (spent[-1] - spent[since])
+        return float(slower * (earlier.wall[-1] - spent[-1]))
+
+    @classmethod
+    def found(cls, problem: Problem) -> Self | None:
+        """That of an earlier run of ``problem`` on this machine; None if there is none."""
+        out = cls()
+        with suppress(OSError, ValueError, TypeError, KeyError):
+            stored = json.loads(_file(problem).read_text(encoding="utf-8"))
+            out.cycle = [int(c) for c in stored["cycle"]]
+            out.wall, out.time = ([float(v) for v in stored[name]] for name in ("wall", "time"))
+            if len(out.cycle) == len(out.wall) == len(out.time) > 0:
+                return out
+        return None
+
+    def keep(self, problem: Problem) -> None:
+        """Store it for the next run of ``problem``, if it took longer than `LEAST` s. A folder that cannot be written
+        keeps nothing."""
+        if not self.wall or self.wall[-1] - self.wall[0] < self.LEAST:
+            return
+        with suppress(OSError):
+            file = _file(problem)
+            file.parent.mkdir(parents=True, exist_ok=True)
+            partial = file.with_suffix(f".{os.getpid()}")
+            text = json.dumps({"cycle": self.cycle, "wall": self.wall, "time": self.time})
+            partial.write_text(text, encoding="utf-8")
+            partial.replace(file)
+            kept = sorted(file.parent.glob("*.json"), key=lambda path: path.stat().st_mtime)
+            for oldest in kept[:-KEPT]:
+                oldest.unlink()
+
+
+class Compiled(logging.Handler):
+    """Whether kernels have been compiled since its construction (as far as the log of `geomech.compiled` says so)."""
+
+    def __init__(self) -> None:
+        super().__init__(logging.DEBUG)
+        self.any = False
+        logging.getLogger("geomech.compiled").addHandler(self)
+
+    def emit(self, record: logging.LogRecord) -> None:
+        self.any |= record.levelno <= logging.DEBUG
+
+    def end(self) -> None:
+        logging.getLogger("geomech.compiled").removeHandler(self)
+
+
+def _file(problem: Problem) -> Path:
+    """Where the course of ``problem`` is kept: by what it is called and holds, and its settings of time."""
+    told = (problem.title, problem.inventory, problem.run.end_time, problem.run.stop_at, problem.dda.time_step)
+    caches = os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")
+    return Path(caches) / "geomech" / "paces" / f"{hashlib.sha256(repr(told).encode()).hexdigest()[:24]}.json"
