@@ -46,7 +46,7 @@ class MovingBlock:
         text = f"{self.name}: {self.part:.2f} of the fastest, towards {round(self.towards) + 0}°: {self.kind}"
         if abs(self.turn) > SLIDES:
             side = "left" if self.turn > 0 else "right"
-            text += f", turning {side} by {math.degrees(abs(self.turn)):.0f}° while it goes its own size, √area"
+            text += f", turning {side} by {math.degrees(abs(self.turn)):.0f}° while it moves by its own size (√area)"
         return text
 
 
@@ -190,8 +190,8 @@ class SafetyReport:
         cracks = f"{counted(len(self.cracks), 'crack')} left out, " if self.cracks else ""
         return (
             f"search: {cracks}{len(found.trials)} trials; at the factor blocks have moved by "
-            f"{1e3 * found.moved[far]:.3g} mm at most ({blocks.names[far]}) and are strained by {strain:.2g} ({strained}); blocks that move by more than "
-            f"{MOVED:g} of its size √area and what elasticity explains has failed"
+            f"{1e3 * found.moved[far]:.3g} mm at most ({blocks.names[far]}) and are strained by {strain:.2g} ({strained}); a block that moves by more than "
+            f"{MOVED:g} of its size (√area) beyond what elasticity explains has failed"
         )
 
     def draw(self, path: Path, title: str = "factor of safety") -> Path:

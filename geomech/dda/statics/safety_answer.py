@@ -140,7 +140,7 @@ def mechanism_of(blocks: Blocks, trial: Trial, moving: tuple[int, ...]) -> tuple
         text = f"{name}: {far / fastest:.2f} of the fastest, towards {round(math.degrees(math.atan2(y, x))) + 0}°"
         size = math.sqrt(abs(float(blocks.areas()[block])))
         if abs(turn) * size > _TURNS * far:
-            turned = f"{math.degrees(abs(turn)) * size / far:.0f}° while it goes its own size, √area"
+            turned = f"{math.degrees(abs(turn)) * size / far:.0f}° while it moves by its own size (√area)"
             text += f", turning {'left' if turn > 0 else 'right'} by {turned}"
         lines.append(text)
     if len(moving) > _LISTED:
