@@ -52,6 +52,9 @@ def test_a_scene_begun_anew_has_no_errors(kind, tmp_path):
     assert main(["new", kind, str(tmp_path / "mine")]) == DONE
     assert load_scene(tmp_path / "mine").problem().blocks.n_blocks > 1
     assert main(["new", kind, str(tmp_path / "mine")]) == BAD_INPUT
+    # Nothing to wonder at, but slivers that are merged as the scene asks for.
+    faults = load_scene(tmp_path / "mine").warnings
+    assert all("sliver" in fault.message for fault in faults), [fault.message for fault in faults]
 
 
 def test_the_slope_begun_anew_slides_on_its_beds(tmp_path):

@@ -1,8 +1,8 @@
 // A circular tunnel in jointed rock, inside a frame that holds the rock around it. Metres; the origin is its centre.
 //
 // Open this file in Gmsh (gmsh tunnel.geo): the parameters stand in the side panel and the drawing follows them.
-// What geomech reads: physical surfaces are zones; "tunnel:wall" names the wall; lines called "bolt:roof" are bolts,
-// whose properties the scene gives; points called "monitor:…" are recorded. Joint sets come from the scene.
+// What geomech reads: physical surfaces are zones; lines called "bolt:roof" are bolts, whose properties the scene gives;
+// points called "monitor:…" are recorded. Joint sets come from the scene.
 
 DefineConstant[
   radius_m = {3, Min 0.1, Max 50, Step 0.5, Name "Parameters/radius_m", Label "Radius [m]"},
@@ -25,7 +25,8 @@ Circle(2) = {3, 1, 4};
 Circle(3) = {4, 1, 5};
 Circle(4) = {5, 1, 2};
 Curve Loop(1) = {1, 2, 3, 4};
-Physical Curve("tunnel:wall") = {1, 2, 3, 4};
+// A name for the wall, for loads on it or a joint law of its own:
+// Physical Curve("tunnel:wall") = {1, 2, 3, 4};
 
 Point(11) = {-b, -b, 0, size};
 Point(12) = {b, -b, 0, size};
