@@ -184,6 +184,7 @@ def test_progress_tells_the_time_left_at_a_steady_pace(tmp_path, monkeypatch):
     until there is a pace again."""
     from geomech.output.console import progress as module
 
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))  # no earlier run
     clock = [0.0]
     monkeypatch.setattr(module.time, "perf_counter", lambda: clock[0])
     out = io.StringIO()
@@ -205,6 +206,7 @@ def test_cracks_that_end_a_run_by_an_event_have_no_time_left(tmp_path, monkeypat
     """The scene's end means nothing where coalescence comes at a sixth of it."""
     from geomech.output.console import progress as module
 
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))  # no earlier run
     clock = [0.0]
     monkeypatch.setattr(module.time, "perf_counter", lambda: clock[0])
     out = io.StringIO()
