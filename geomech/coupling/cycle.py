@@ -433,9 +433,8 @@ class Coupling:
         now.crack_energy.after(now.state, state, now.blocks, now.strain_solutions(), now.by_mean_stress, set_free, cut)
 
     def _strain_solutions(self) -> tuple:
-        """The solutions that gave the crack strains, the blocks with mean-stress response, and whether the step began
-        under stress."""
-        return self.now.strain_solutions(), self.now.by_mean_stress, bool(self.now.state.stress.any())
+        """The solutions that gave the crack strains, and the blocks with mean-stress response."""
+        return self.now.strain_solutions(), self.now.by_mean_stress
 
     def _excavated(self) -> tuple[Event, ...]:
         """Remove the blocks that are excavated at the present time; one event for each."""

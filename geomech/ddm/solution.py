@@ -17,6 +17,7 @@ from .kernels import shape_functions
 from .kernels.full_plane import Elements, Kernel
 from .loads.load_vectors import Applied, apply
 from .loads.reactions import Reactions, reactions
+from .loads.uniform_stress_response import work_at_cracks
 from .mesh.edge_location import OFF, onto_boundary, sides_for
 from .mesh.field_points import ElementEnds
 from .mesh.point_location import onto_rock
@@ -225,11 +226,7 @@ class Solution:
     def work_at_cracks(self, closed: np.ndarray) -> float:
         """J/m, ∫ t₀·[u] ds with t₀ = ``closed`` (n_crack_unknowns,), the traction of some load on closed faces: by
         reciprocity the work of that load on the displacement that the cracks of this solution add to the body."""
-        c = self.body.faces
-        if not self.jumps.size:
-            return 0.0
-        done = (closed * self.jumps).reshape(c.n, 2, c.per).sum(axis=1)
-        return float(np.sum(c.quadrature * done)) / (2 * self.body.material.shear_modulus)
+        return work_at_cracks(self.body, closed, self.jumps) if self.jumps.size else 0.0
 
     @cached_property
     def residual(self) -> float:

@@ -4,10 +4,16 @@ Tractions t displace the outline of a cracked body by u_c more than that of the 
 work on it is ∫ t·u_c ds = ∫ t₀·[u] ds, where t₀ are the tractions that the same loads would cause on closed crack
 faces; half of it is stored by open cracks (Clapeyron). The mean stress does the part A σ : ε_c. The rest is the work of
 loads that bend, shear or press the block unevenly, which a block of uniform strain does not know.
+
+Cracks that grow while loads change release what a body does that goes from its first state straight to its last:
+½ ∫ (τ_a·[u_b] − τ_b·[u_a]) ds with τ = t₀ − t, t the traction on crack faces, each load on each geometry (the area
+between the two loading lines; Betti). It is nothing where no crack has grown. Where a step takes several increments,
+each at its own loads, the release along these is the sum over them, and differs from that of the straight line.
 """
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -16,6 +22,7 @@ from .added_compliance import stress_rotation
 
 if TYPE_CHECKING:
     from ...ddm import Solution
+    from .mean_stress_response import ByMeanStress
 
 
 def work_on_cracks(before: Solution, after: Solution) -> float:
@@ -39,3 +46,64 @@ def first_work_on_cracks(stress: np.ndarray, rotation: float, after: Solution) -
 
         load = load + after.body.closed_traction(ddm.BodyLoad(remote_stress=stress_rotation(-rotation) @ stress))
     return 0.5 * after.work_at_cracks(load)
+
+
+@dataclass(frozen=True, eq=False)
+class Loaded:
+    """A block with the ``solution`` of its cracks. ``mean``, where it responds to its mean stress alone: that stress in
+    its own axes, Pa, and its `ByMeanStress.limit`."""
+
+    solution: Solution
+    mean: tuple[np.ndarray, np.ndarray] | None = None
+
+    @classmethod
+    def of(cls, block: int, solution: Solution, by_mean_stress: ByMeanStress) -> Loaded:
+        return cls(solution, by_mean_stress.stress[block] if block in by_mean_stress else None)
+
+    def same_geometry(self, other: Loaded) -> bool:
+        """Whether no crack has grown between the two, and both respond to the same forces."""
+        return self.solution.body.crack_system is other.solution.body.crack_system
+
+
+def release_between(before: Loaded, after: Loaded) -> float:
+    """Release by growth on the straight line between two states of the cracks, J/m, from the loads of the crack solver:
+    those that remain of the mean stress where it is limited."""
+    a, b = before.solution, after.solution
+    if before.mean is None or after.mean is None:
+        a_on_b = b.body.closed_traction(a.load) if b.jumps.size else np.zeros(0)
+        b_on_a = a.body.closed_traction(b.load) if a.jumps.size else np.zeros(0)
+        loads = b.work_at_cracks(a_on_b) - a.work_at_cracks(b_on_a)
+    else:
+        (stress_a, limit_a), (stress_b, limit_b) = before.mean, after.mean
+        loads = float((limit_a @ stress_a) @ b.crack_strain - (limit_b @ stress_b) @ a.crack_strain) * b.body.area
+    return 0.5 * (loads - _at_faces(a, b))
+
+
+def release_of_mean_stress(before: Loaded | None, after: Loaded) -> float:
+    """The same for a block with mean-stress response, as the block knows it: with what it does as the limit of its
+    softness changes. ``before`` is None where nothing was loaded."""
+    if before is None or before.mean is None or after.mean is None:
+        return 0.0
+    (stress_a, limit_a), (stress_b, limit_b) = before.mean, after.mean
+    a, b = before.solution, after.solution
+    blocks = float(stress_a @ limit_b.T @ b.crack_strain - stress_b @ limit_a.T @ a.crack_strain) * b.body.area
+    return 0.5 * (blocks - _at_faces(a, b))
+
+
+def work_along(before: Solution, after: Solution, released: float) -> float:
+    """`work_on_cracks` where the cracks have grown in between and ``released`` J/m on their way."""
+    loads = after.work_at_cracks(after.closed_traction) - before.work_at_cracks(before.closed_traction)
+    return released + 0.5 * (loads + _at_faces(before, after))
+
+
+def _at_faces(before: Solution, after: Solution) -> float:
+    """J/m, ∫ t_a·[u_b] ds − ∫ t_b·[u_a] ds of the tractions on the faces that both have."""
+    from ...ddm.crack_contact.face_laws import traction_carried_over
+
+    def work(of: Solution, on: Solution) -> float:
+        traction = of.face_traction
+        if not traction.any() or not on.jumps.size:
+            return 0.0
+        return on.work_at_cracks(traction_carried_over(traction, of.body.faces, on.body.faces))
+
+    return work(before, after) - work(after, before)

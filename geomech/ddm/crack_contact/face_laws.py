@@ -154,20 +154,24 @@ class FaceLaws:
         return np.where(broken, 0.0, self.cohesion)
 
 
-def carried_over(memory: FaceMemory, now: ElementSet) -> FaceMemory:
-    """``memory`` on the elements ``now``: unchanged where an element is unchanged; slip interpolated, and states taken
-    from the nearest node, where elements were divided or joined; none on new faces."""
-    was = memory.elements
-    if now is was:
-        return memory
+class _Places(NamedTuple):
+    """Where nodes of elements lie on former ones, (n_elements, p+1) each: number of the former ``element`` (−1: none),
+    its ``nearest`` node, and the position on it (``along``, −1 to 1)."""
+
+    element: np.ndarray
+    nearest: np.ndarray
+    along: np.ndarray
+
+
+def _places(was: ElementSet, now: ElementSet) -> _Places:
+    """Where the nodes of the elements ``now`` lie on the elements ``was``."""
     nodes = shape_functions.nodes(was.family, was.order)
     same = now.found_in(was)
-    source, marks = np.full((now.n, now.per), -1), np.zeros((now.n, now.per), int)
-    rest = np.zeros((now.n, now.per))
-    old = memory.rest.reshape(was.n, was.per)
+    element, nearest = np.full((now.n, now.per), -1), np.zeros((now.n, now.per), int)
+    place = np.zeros((now.n, now.per))
     kept = same >= 0
     if kept.any():  # none if the order has changed, and with it the number of nodes
-        rest[kept], source[kept], marks[kept] = old[same[kept]], same[kept, None], np.arange(now.per)
+        element[kept], nearest[kept], place[kept] = same[kept, None], np.arange(now.per), nodes
     for e in np.flatnonzero(~kept):
         rel = now.nodes[e][:, None] - was.start
         along = np.einsum("jec,ec->je", rel, was.tangent) / was.length
@@ -176,18 +180,50 @@ def carried_over(memory: FaceMemory, now: ElementSet) -> FaceMemory:
         for j in np.flatnonzero(inside.any(axis=1)):
             k = int(inside[j].argmax())
             t = 2 * along[j, k] - 1
-            sign = np.sign(was.tangent[k] @ now.tangent[e])
-            shape = shape_functions.at(was.family, was.order, int(was.kind[k]), np.array([np.clip(t, -1, 1)]))[0]
-            rest[e, j], source[e, j], marks[e, j] = sign * (shape @ old[k]), k, np.abs(nodes - t).argmin()
-    known = source >= 0
+            element[e, j], nearest[e, j], place[e, j] = k, np.abs(nodes - t).argmin(), np.clip(t, -1, 1)
+    return _Places(element, nearest, place)
+
+
+def carried_over(memory: FaceMemory, now: ElementSet) -> FaceMemory:
+    """``memory`` on the elements ``now``: unchanged where an element is unchanged; slip interpolated, and states taken
+    from the nearest node, where elements were divided or joined; none on new faces."""
+    was = memory.elements
+    if now is was:
+        return memory
+    at = _places(was, now)
+    rest = np.zeros((now.n, now.per))
+    old = memory.rest.reshape(was.n, was.per)
+    same = now.found_in(was)
+    kept, known = same >= 0, at.element >= 0
+    if kept.any():
+        rest[kept] = old[same[kept]]
+    for e, j in np.argwhere(known & ~kept[:, None]).tolist():
+        k, t = int(at.element[e, j]), at.along[e, j]
+        sign = np.sign(was.tangent[k] @ now.tangent[e])
+        shape = shape_functions.at(was.family, was.order, int(was.kind[k]), np.array([t]))[0]
+        rest[e, j] = sign * (shape @ old[k])
 
     def taken(values: np.ndarray) -> np.ndarray:
         rows = values.reshape(was.n, was.per)
         out = np.zeros((now.n, now.per), values.dtype)
-        out[known] = rows[source[known], marks[known]]
+        out[known] = rows[at.element[known], at.nearest[known]]
         return out.ravel()
 
     states = memory.states
     moved = FaceStates(taken(states.closed), taken(states.way), taken(states.pulled))
     pressure, shear = taken(memory.pressure), taken(memory.shear)
     return FaceMemory(now, rest.ravel(), taken(memory.broken), memory.work, moved, pressure, shear, memory.released)
+
+
+def traction_carried_over(traction: np.ndarray, was: ElementSet, now: ElementSet) -> np.ndarray:
+    """(n_unknowns,) ``traction`` on faces of the elements ``was``, Pa, on the elements ``now``, from the nearest node;
+    none on new faces."""
+    if now is was:
+        return traction
+    at = _places(was, now)
+    known = at.element >= 0
+    out = np.zeros((now.n, 2, now.per))
+    rows = traction.reshape(was.n, 2, was.per)
+    for part in range(2):
+        out[:, part][known] = rows[:, part][at.element[known], at.nearest[known]]
+    return out.ravel()

@@ -67,6 +67,18 @@ class UniformStressSolution:
         """(n_unknowns,) slip and opening at the nodes, times 2μ."""
         return self._response.jumps @ self._stress
 
+    @property
+    def face_traction(self) -> np.ndarray:
+        """(n_unknowns,) as in a `Solution`."""
+        if not self.closed.any():
+            return np.zeros(len(self.closed))
+        traction = on_elements(self.body.faces, self._stress[:3]) + self.body.crack_system.matrix @ self.jumps
+        return np.where(self.closed, traction, 0.0)
+
+    def work_at_cracks(self, closed: np.ndarray) -> float:
+        """J/m, as in a `Solution`."""
+        return work_at_cracks(self.body, closed, self.jumps)
+
     @cached_property
     def crack_strain(self) -> np.ndarray:
         """(3,) as in a `Solution`."""
@@ -122,6 +134,13 @@ class UniformStressSolution:
         if name not in known:
             known[name] = found()
         return known[name]
+
+
+def work_at_cracks(body: CrackedBody, closed: np.ndarray, jumps: np.ndarray) -> float:
+    """J/m, ∫ t₀·[u] ds of the traction ``closed`` (n_unknowns,), Pa, on the ``jumps`` (n_unknowns,), times 2μ."""
+    c = body.faces
+    done = (closed * jumps).reshape(c.n, 2, c.per).sum(axis=1)
+    return float(np.sum(c.quadrature * done)) / (2 * body.material.shear_modulus)
 
 
 def scales(body: CrackedBody) -> bool:
