@@ -493,10 +493,30 @@ class Body:
         """See `jumps.closing`."""
         return closing(self.faces, self.cracks, 2 * self.material.shear_modulus)
 
+    def mean_stress_load(self, stress: np.ndarray) -> BodyLoad:
+        """Uniform tractions on the outline under which the mean stress (3,) of the rock, Pa, is ``stress``: more than
+        that of the outline where there are holes, which are free of it."""
+        holes = sum(area for area, _ in self.hole_moments)
+        return BodyLoad(remote_stress=np.asarray(stress) * (self.area / (self.area + holes)))
+
+    @cached_property
+    def mean_stress_traction(self) -> np.ndarray:
+        """(n_crack_unknowns, 3): traction on closed crack faces per mean stress (xx, yy, xy), of `mean_stress_load`."""
+        if len(self.loops) == 1 or self.supports:
+            return np.column_stack([on_elements(self.faces, unit) for unit in np.eye(3)])
+        return np.column_stack([self.closed_traction(self.mean_stress_load(unit)) for unit in np.eye(3)])
+
     @cached_property
     def strain_weights(self) -> np.ndarray:
-        """(3, n_unknowns) mean strain of the cracks from nodal slip and opening (times 2μ)."""
-        return strain_weights(self.faces) / (self.area * 2 * self.material.shear_modulus)
+        """(3, n_unknowns) mean strain of the cracks from nodal slip and opening (times 2μ): strain on which the mean
+        stress does the work that it does at the cracks. Without holes it is that of the faces alone; holes give way
+        to the cracks, and the strain is that of the outline."""
+        if len(self.loops) == 1 or self.supports:
+            weights = strain_weights(self.faces)
+        else:
+            c = self.faces
+            weights = self.mean_stress_traction.T * np.broadcast_to(c.quadrature[:, None], (c.n, 2, c.per)).ravel()
+        return weights / (self.area * 2 * self.material.shear_modulus)
 
     def compliance(self, sol: Solution | None = None) -> np.ndarray:
         """(3, 3) added compliance due to cracks, 1/Pa: mean crack strain (xx, yy, xy; engineering shear) per uniform
@@ -512,7 +532,7 @@ class Body:
             closed = np.zeros(self.faces.n_unknowns, bool) if sol is None else sol.closed
             response = self.strain_weights @ uniform_stress_response_of(self, closed).jumps[:, :3]
             return 0.5 * (response + response.T)
-        right = np.column_stack([-on_elements(self.faces, unit) for unit in np.eye(3)])
+        right = -self.mean_stress_traction
         try:
             jumps = self._jumps_of(right, sol)
         except NotSolved as failure:

@@ -42,9 +42,7 @@ def first_work_on_cracks(stress: np.ndarray, rotation: float, after: Solution) -
     is rotated by ``rotation`` rad."""
     load = after.closed_traction
     if np.any(stress):
-        from ... import ddm
-
-        load = load + after.body.closed_traction(ddm.BodyLoad(remote_stress=stress_rotation(-rotation) @ stress))
+        load = load + after.body.mean_stress_traction @ (stress_rotation(-rotation) @ stress)
     return 0.5 * after.work_at_cracks(load)
 
 
@@ -60,50 +58,70 @@ class Loaded:
     def of(cls, block: int, solution: Solution, by_mean_stress: ByMeanStress) -> Loaded:
         return cls(solution, by_mean_stress.stress[block] if block in by_mean_stress else None)
 
+    @property
+    def limited(self) -> bool:
+        """Whether the softness of the block is limited."""
+        return self.mean is not None and not np.array_equal(self.mean[1], np.eye(3))
+
     def same_geometry(self, other: Loaded) -> bool:
-        """Whether no crack has grown between the two, and both respond to the same forces."""
+        """Whether no crack has grown between the two."""
         return self.solution.body.crack_system is other.solution.body.crack_system
 
+    def responds_as(self, other: Loaded) -> bool:
+        """Whether both respond to their mean stress alone, or both to all forces."""
+        return (self.mean is None) == (other.mean is None)
 
-def release_between(before: Loaded, after: Loaded) -> float:
-    """Release by growth on the straight line between two states of the cracks, J/m, from the loads of the crack solver:
-    those that remain of the mean stress where it is limited."""
+
+@dataclass(frozen=True)
+class Exchange:
+    """Works of the loads of two states on the cracks of both, J/m, with τ = t₀ − t: ``own`` τ_a·[u_a] and τ_b·[u_b],
+    ``forward`` τ_a·[u_b], ``back`` τ_b·[u_a], each integrated over the faces."""
+
+    own: tuple[float, float]
+    forward: float
+    back: float
+
+    @property
+    def release(self) -> float:
+        """By growth on the straight line between the two, J/m."""
+        return 0.5 * (self.forward - self.back)
+
+    @property
+    def factors(self) -> tuple[float, float]:
+        """The other load over the own one, on the cracks before and after: 1 where the load has not changed."""
+        (before, after), forward, back = self.own, self.forward, self.back
+        return max(0.0, back / before) if before > 0.0 else 1.0, max(0.0, forward / after) if after > 0.0 else 1.0
+
+
+def exchange(before: Loaded, after: Loaded) -> Exchange:
+    """Works between two states of a block, under the loads of the crack solver: those that remain of the mean stress
+    where it is limited."""
     a, b = before.solution, after.solution
     if before.mean is None or after.mean is None:
-        a_on_b = b.body.closed_traction(a.load) if b.jumps.size else np.zeros(0)
-        b_on_a = a.body.closed_traction(b.load) if a.jumps.size else np.zeros(0)
-        loads = b.work_at_cracks(a_on_b) - a.work_at_cracks(b_on_a)
+        forward = b.work_at_cracks(b.body.closed_traction(a.load)) if b.jumps.size else 0.0
+        back = a.work_at_cracks(a.body.closed_traction(b.load)) if a.jumps.size else 0.0
     else:
         (stress_a, limit_a), (stress_b, limit_b) = before.mean, after.mean
-        loads = float((limit_a @ stress_a) @ b.crack_strain - (limit_b @ stress_b) @ a.crack_strain) * b.body.area
-    return 0.5 * (loads - _at_faces(a, b))
+        forward = float(limit_a @ stress_a @ b.crack_strain) * b.body.area
+        back = float(limit_b @ stress_b @ a.crack_strain) * a.body.area
+    own = 2.0 * a.crack_energy, 2.0 * b.crack_energy
+    return Exchange(own, forward - _at_faces(a, b), back - _at_faces(b, a))
 
 
-def release_of_mean_stress(before: Loaded | None, after: Loaded) -> float:
-    """The same for a block with mean-stress response, as the block knows it: with what it does as the limit of its
-    softness changes. ``before`` is None where nothing was loaded."""
-    if before is None or before.mean is None or after.mean is None:
-        return 0.0
+def release_of_mean_stress(before: Loaded, after: Loaded) -> float:
+    """`Exchange.release` as a block with mean-stress response knows it: with what it does as the limit of its softness
+    changes."""
     (stress_a, limit_a), (stress_b, limit_b) = before.mean, after.mean
     a, b = before.solution, after.solution
     blocks = float(stress_a @ limit_b.T @ b.crack_strain - stress_b @ limit_a.T @ a.crack_strain) * b.body.area
-    return 0.5 * (blocks - _at_faces(a, b))
+    return 0.5 * (blocks - _at_faces(a, b) + _at_faces(b, a))
 
 
-def work_along(before: Solution, after: Solution, released: float) -> float:
-    """`work_on_cracks` where the cracks have grown in between and ``released`` J/m on their way."""
-    loads = after.work_at_cracks(after.closed_traction) - before.work_at_cracks(before.closed_traction)
-    return released + 0.5 * (loads + _at_faces(before, after))
-
-
-def _at_faces(before: Solution, after: Solution) -> float:
-    """J/m, ∫ t_a·[u_b] ds − ∫ t_b·[u_a] ds of the tractions on the faces that both have."""
+def _at_faces(of: Solution, on: Solution) -> float:
+    """J/m, ∫ t·[u] ds of the traction on faces ``of`` one solution on the jumps of the other."""
     from ...ddm.crack_contact.face_laws import traction_carried_over
 
-    def work(of: Solution, on: Solution) -> float:
-        traction = of.face_traction
-        if not traction.any() or not on.jumps.size:
-            return 0.0
-        return on.work_at_cracks(traction_carried_over(traction, of.body.faces, on.body.faces))
-
-    return work(before, after) - work(after, before)
+    traction = of.face_traction
+    if not traction.any() or not on.jumps.size:
+        return 0.0
+    return on.work_at_cracks(traction_carried_over(traction, of.body.faces, on.body.faces))

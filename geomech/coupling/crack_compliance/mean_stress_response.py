@@ -99,7 +99,6 @@ class ByMeanStress:
         """Solution of ``body``, rotated by ``rotation`` rad, under its mean ``stress`` (3,), Pa, current axes, times
         its `limit`. With ``skip``, scaled from solutions under unit stresses where that is exact. Faces start with
         their memory of such solutions, or with ``began`` where there is none. Raises `ddm.NotConverged`."""
-        from ... import ddm
         from ...ddm.loads.uniform_stress_response import scaled
 
         own = stress_rotation(-rotation) @ stress
@@ -107,7 +106,7 @@ class ByMeanStress:
         before, even = self.solutions.get(block), limit @ own
         known = scaled(body, even, before) if skip else None
         if known is None:
-            load = ddm.BodyLoad(remote_stress=even)
+            load = body.mean_stress_load(even)
             known = body.solve(load, warm=before, history=self._memory.get(block, began), meet_target=False)
         self.solutions[block], self.stress[block] = known, (own, limit)
         return known

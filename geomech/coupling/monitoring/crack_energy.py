@@ -10,12 +10,11 @@ by breaking cement and at growing tips, or released where blocks split.
 These are computed independently and must add up; the residual is reported. K is taken under the forces that strain the
 block: under its mean stress where it responds to that alone (`mean_stress_response`).
 
-Passes of a step follow each other at loads of their own, from increment to increment, while the work of blocks and of
-friction goes from the step's beginning straight to its end. What cracks release on both ways differs by what the loads
-change in between (`crack_opening_work`); it is found from the loads on them, without K. In statics it is added to the
-work, which so follows the passes. Moving blocks have done the work of the straight line: there it is taken from the
-release. (With one factor on G for the whole step, found in its first pass, two in a hundred random slopes missed 2 to
-14 % of their energy.)
+Passes of a step follow each other at loads of their own, from increment to increment, while work and friction are those
+of the straight line from the step's beginning to its end. What cracks release on both ways is found from the loads on
+them, without K (`exchange`), and the integral of G is taken over from the one to the other (`_on_the_line`).
+(With one factor on G for all of the step, found in its first pass, two in a hundred random slopes missed 2 to 14 % of
+their energy.)
 
 In statics all forces count, since they open cracks by more than their mean stress does (`crack_opening_work`), also
 where faces hold until the forces reach their strength (`Released`). The work beyond A σ : dε_c has a column of its own,
@@ -39,10 +38,9 @@ import numpy as np
 from ...model import Blocks, Material, State
 from ..crack_compliance.crack_opening_work import (
     Loaded,
+    exchange,
     first_work_on_cracks,
-    release_between,
     release_of_mean_stress,
-    work_along,
     work_on_cracks,
 )
 from ..growth.energy_release import kink_release, mean_release, straining_tips
@@ -132,7 +130,7 @@ class CrackEnergy:
         """A pass of the present step has ended with ``tips``, of which some may be about to grow. ``solutions``: block
         → the `ddm.Solution` that gives its crack strain; ``by_mean_stress``: blocks that respond to their mean stress
         alone."""
-        self._follow(solutions, by_mean_stress)
+        factors = self._follow(solutions, by_mean_stress)
         if not len(tips):
             self._parted |= bool(self._growing)
             self._growing = {}
@@ -149,7 +147,7 @@ class CrackEnergy:
             taken = of.way * of.cost
             _add(self._taken, of.block, taken)
             if key in now:
-                released = of.way * mean_release(of.before, now[key])
+                released = of.way * mean_release(of.before, now[key], factors.get(of.block, (1.0, 1.0)))
                 _add(self._released, of.block, released)
                 _add(self._lost, of.block, max(0.0, released - taken) if self.static else 0.0)
             else:
@@ -161,18 +159,25 @@ class CrackEnergy:
         grows = np.flatnonzero(tips["grown"] > 0)
         cost = np.array([m.k_ic for m in materials])[rock] ** 2 / modulus
         self._growing = {
-            keys[row]: _Growing(float(tips["grown"][row]), float(turned[row]), int(tips["block"][row]), float(cost[row]))
+            keys[row]: _Growing(
+                float(tips["grown"][row]), float(turned[row]), int(tips["block"][row]), float(cost[row])
+            )
             for row in grows.tolist()
         }
         self._asked += float(tips["grown"][grows] @ cost[grows])
 
-    def _follow(self, solutions: dict[int, Solution], by_mean_stress: ByMeanStress) -> None:
-        """Add what cracks have released since the last pass, from the loads on them (`release_between`)."""
+    def _follow(self, solutions: dict[int, Solution], by_mean_stress: ByMeanStress) -> dict[int, tuple[float, float]]:
+        """Add what cracks have released since the last pass, from the loads on them. Returns how these have changed
+        (block → `Exchange.factors`)."""
+        factors = {}
         for block, of in solutions.items():
             now, last = Loaded.of(block, of, by_mean_stress), self._last.get(block)
-            if last is not None and (last.mean is None) == (now.mean is None) and not now.same_geometry(last):
-                _add(self._along, block, release_between(last, now))
+            if last is not None and now.responds_as(last) and not now.same_geometry(last):
+                between = exchange(last, now)
+                factors[block] = between.factors
+                _add(self._along, block, between.release)
             self._last[block] = now
+        return factors
 
     def parts(self, parent: np.ndarray) -> None:
         """Blocks split in the present step; ``parent`` (n_blocks,): number of each block before."""
@@ -266,7 +271,7 @@ class CrackEnergy:
         new = [block for block, of in solutions.items() if block not in self._by_mean_response and of.jumps.size]
         self._parted |= bool(np.any(before.stress[new]))
         self._by_mean_response = by_mean_response
-        self._release_straight(by_mean_response)
+        self._on_the_line(before, by_mean_response)
         released, lost = sum(self._released.values()), sum(self._lost.values())
         rest = done + set_free - (stored - self.stored) - friction - bond - released
         self.work += work
@@ -286,16 +291,30 @@ class CrackEnergy:
         self._rested = {block: Loaded.of(block, of, by_mean_stress) for block, of in solutions.items()}
         self._last, self._along = dict(self._rested), {}
 
-    def _release_straight(self, by_mean_response: dict[int, bool]) -> None:
-        """Blocks with mean-stress response have done the work of the straight line from the beginning of the step to
-        its end: what is released by G follows the passes, and differs by what both ways do."""
+    def _on_the_line(self, before: State, by_mean_response: dict[int, bool]) -> None:
+        """Take the release of the present step, integrated over G from pass to pass, to the straight line from the
+        beginning of the step, ``before``, to its end.
+
+        From the loads the passes release ``along`` J/m and the line ``straight`` ones. What K tells otherwise than the
+        loads, ∫ G da − ``along``, remains as the error of the increments: in proportion where the line releases less,
+        as under a load that rises from nothing, and as it is where it releases more. Blocks of limited softness
+        (`ByMeanStress.limit`) release what lies between their loading lines: K under limited stress drives nothing."""
         for block, along in self._along.items():
-            if not by_mean_response.get(block, False):
+            began, now = self._rested.get(block), self._last[block]
+            if began is None:
+                straight = shown = along if before.stress[block].any() else 0.0
+            elif not began.responds_as(now):
                 continue
-            straight = release_of_mean_stress(self._rested.get(block), self._last[block])
-            _add(self._released, block, straight - along)
-            lost = self._released[block] - self._taken.get(block, 0.0)
-            self._lost[block] = max(0.0, lost) if self.static else 0.0
+            elif by_mean_response.get(block, False):
+                straight, shown = exchange(began, now).release, release_of_mean_stress(began, now)
+            else:
+                straight = shown = exchange(began, now).release
+            share = min(1.0, max(0.0, straight / along)) if along > 0.0 else 1.0
+            if now.limited:
+                share = 0.0
+            released = shown + share * (self._released.get(block, 0.0) - along)
+            self._released[block] = released
+            self._lost[block] = max(0.0, released - self._taken.get(block, 0.0)) if self.static else 0.0
 
     def _work_at_rest(
         self, before: State, solutions: dict[int, Solution], by_mean_response: dict[int, bool], by_mean: np.ndarray
@@ -307,10 +326,7 @@ class CrackEnergy:
             if by_mean_response[block] or self._by_mean_response.get(block, False):
                 yield float(by_mean[block])
             elif began is None:
-                first = first_work_on_cracks(before.stress[block], float(before.rotation[block]), of)
-                yield first + self._along.get(block, 0.0)
-            elif block in self._along:
-                yield work_along(began.solution, of, self._along[block])
+                yield first_work_on_cracks(before.stress[block], float(before.rotation[block]), of)
             else:
                 yield work_on_cracks(began.solution, of)
         yield float(sum(by_mean[block] for block in range(len(by_mean)) if block not in solutions))
