@@ -72,30 +72,9 @@ class Loaded:
         return (self.mean is None) == (other.mean is None)
 
 
-@dataclass(frozen=True)
-class Exchange:
-    """Works of the loads of two states on the cracks of both, J/m, with τ = t₀ − t: ``own`` τ_a·[u_a] and τ_b·[u_b],
-    ``forward`` τ_a·[u_b], ``back`` τ_b·[u_a], each integrated over the faces."""
-
-    own: tuple[float, float]
-    forward: float
-    back: float
-
-    @property
-    def release(self) -> float:
-        """By growth on the straight line between the two, J/m."""
-        return 0.5 * (self.forward - self.back)
-
-    @property
-    def factors(self) -> tuple[float, float]:
-        """The other load over the own one, on the cracks before and after: 1 where the load has not changed."""
-        (before, after), forward, back = self.own, self.forward, self.back
-        return max(0.0, back / before) if before > 0.0 else 1.0, max(0.0, forward / after) if after > 0.0 else 1.0
-
-
-def exchange(before: Loaded, after: Loaded) -> Exchange:
-    """Works between two states of a block, under the loads of the crack solver: those that remain of the mean stress
-    where it is limited."""
+def release_between(before: Loaded, after: Loaded) -> float:
+    """Release by growth on the straight line between two states of a block, J/m, under the loads of the crack solver:
+    those that remain of the mean stress where it is limited."""
     a, b = before.solution, after.solution
     if before.mean is None or after.mean is None:
         forward = b.work_at_cracks(b.body.closed_traction(a.load)) if b.jumps.size else 0.0
@@ -104,12 +83,11 @@ def exchange(before: Loaded, after: Loaded) -> Exchange:
         (stress_a, limit_a), (stress_b, limit_b) = before.mean, after.mean
         forward = float(limit_a @ stress_a @ b.crack_strain) * b.body.area
         back = float(limit_b @ stress_b @ a.crack_strain) * a.body.area
-    own = 2.0 * a.crack_energy, 2.0 * b.crack_energy
-    return Exchange(own, forward - _at_faces(a, b), back - _at_faces(b, a))
+    return 0.5 * (forward - back - _at_faces(a, b) + _at_faces(b, a))
 
 
 def release_of_mean_stress(before: Loaded, after: Loaded) -> float:
-    """`Exchange.release` as a block with mean-stress response knows it: with what it does as the limit of its softness
+    """`release_between` as a block with mean-stress response knows it: with what it does as the limit of its softness
     changes."""
     (stress_a, limit_a), (stress_b, limit_b) = before.mean, after.mean
     a, b = before.solution, after.solution

@@ -46,11 +46,7 @@ def kink_release(tips: np.ndarray) -> np.ndarray:
     return np.maximum(k[:, 0], 0.0) ** 2 + k[:, 1] ** 2
 
 
-def mean_release(before: float, after: float, factors: tuple[float, float] = (1.0, 1.0)) -> float:
-    """Mean G over an increment from G ``before`` and ``after`` it, while the load changes on a straight line.
-
-    That is the mean of K_a·K_b/E' under the first and the last load (Betti), with K under each linear along the
-    increment. ``factors``: the other load over the own one, before and after. Without change: ⅓ (G₀ + √(G₀ G₁) + G₁).
-    """
-    first, last = factors
-    return (first * before + 0.5 * (1.0 + first * last) * math.sqrt(before * after) + last * after) / 3.0
+def mean_release(before: float, after: float) -> float:
+    """Mean G over an increment along which K changes linearly, from G ``before`` and ``after`` it:
+    ⅓ (G₀ + √(G₀ G₁) + G₁)."""
+    return (before + math.sqrt(before * after) + after) / 3.0

@@ -12,7 +12,7 @@ block: under its mean stress where it responds to that alone (`mean_stress_respo
 
 Passes of a step follow each other at loads of their own, from increment to increment, while work and friction are those
 of the straight line from the step's beginning to its end. What cracks release on both ways is found from the loads on
-them, without K (`exchange`), and the integral of G is taken over from the one to the other (`_on_the_line`).
+them, without K (`release_between`), and the integral of G is taken over from the one to the other (`_on_the_line`).
 (With one factor on G for all of the step, found in its first pass, two in a hundred random slopes missed 2 to 14 % of
 their energy.)
 
@@ -38,8 +38,8 @@ import numpy as np
 from ...model import Blocks, Material, State
 from ..crack_compliance.crack_opening_work import (
     Loaded,
-    exchange,
     first_work_on_cracks,
+    release_between,
     release_of_mean_stress,
     work_on_cracks,
 )
@@ -130,7 +130,7 @@ class CrackEnergy:
         """A pass of the present step has ended with ``tips``, of which some may be about to grow. ``solutions``: block
         → the `ddm.Solution` that gives its crack strain; ``by_mean_stress``: blocks that respond to their mean stress
         alone."""
-        factors = self._follow(solutions, by_mean_stress)
+        self._follow(solutions, by_mean_stress)
         if not len(tips):
             self._parted |= bool(self._growing)
             self._growing = {}
@@ -147,7 +147,7 @@ class CrackEnergy:
             taken = of.way * of.cost
             _add(self._taken, of.block, taken)
             if key in now:
-                released = of.way * mean_release(of.before, now[key], factors.get(of.block, (1.0, 1.0)))
+                released = of.way * mean_release(of.before, now[key])
                 _add(self._released, of.block, released)
                 _add(self._lost, of.block, max(0.0, released - taken) if self.static else 0.0)
             else:
@@ -166,18 +166,13 @@ class CrackEnergy:
         }
         self._asked += float(tips["grown"][grows] @ cost[grows])
 
-    def _follow(self, solutions: dict[int, Solution], by_mean_stress: ByMeanStress) -> dict[int, tuple[float, float]]:
-        """Add what cracks have released since the last pass, from the loads on them. Returns how these have changed
-        (block → `Exchange.factors`)."""
-        factors = {}
+    def _follow(self, solutions: dict[int, Solution], by_mean_stress: ByMeanStress) -> None:
+        """Add what cracks have released since the last pass, from the loads on them."""
         for block, of in solutions.items():
             now, last = Loaded.of(block, of, by_mean_stress), self._last.get(block)
             if last is not None and now.responds_as(last) and not now.same_geometry(last):
-                between = exchange(last, now)
-                factors[block] = between.factors
-                _add(self._along, block, between.release)
+                _add(self._along, block, release_between(last, now))
             self._last[block] = now
-        return factors
 
     def parts(self, parent: np.ndarray) -> None:
         """Blocks split in the present step; ``parent`` (n_blocks,): number of each block before."""
@@ -306,9 +301,9 @@ class CrackEnergy:
             elif not began.responds_as(now):
                 continue
             elif by_mean_response.get(block, False):
-                straight, shown = exchange(began, now).release, release_of_mean_stress(began, now)
+                straight, shown = release_between(began, now), release_of_mean_stress(began, now)
             else:
-                straight = shown = exchange(began, now).release
+                straight = shown = release_between(began, now)
             share = min(1.0, max(0.0, straight / along)) if along > 0.0 else 1.0
             if now.limited:
                 share = 0.0

@@ -7,7 +7,8 @@ import pytest
 
 from geomech import ddm
 from geomech.coupling import cycles
-from geomech.coupling.crack_compliance.crack_opening_work import work_on_cracks
+from geomech.coupling.crack_compliance.crack_opening_work import Loaded, release_between, work_on_cracks
+from geomech.coupling.growth.energy_release import mean_release
 from geomech.model import (
     Blocks,
     Cracks,
@@ -113,3 +114,46 @@ def test_work_at_rest_is_what_is_stored_and_released():
     first, second = 2 * bent.crack_energy, longer.crack_energy / 2
     assert work == pytest.approx(1.5 * (2 * second - first), rel=1e-6)
     assert work > longer.crack_energy - bent.crack_energy
+
+
+def test_release_between_two_loads_and_lengths_is_that_of_both_k():
+    """From one load and length straight to others, what a crack releases by its loads is ∫ K_a·K_b/E' da with K under
+    each of both loads on every length between (three Gauss points): 1e-3. The rule over the increment, which knows only
+    K_a before it and K_b after it, is 2 % off."""
+    beam = np.array([[-2.0, 0.0], [2.0, 0.0], [2.0, 1.0], [-2.0, 1.0]])
+    ends = np.array([beam[1:3], beam[[3, 0]]])
+    bend = np.array([[[-1e6, 0.0], [1e6, 0.0]], [[-1e6, 0.0], [1e6, 0.0]]])
+    pull = np.array([[[2e5, 0.0], [2e5, 0.0]], [[-2e5, 0.0], [-2e5, 0.0]]])
+    loads = [ddm.BodyLoad(segments=ends, tractions=of) for of in (bend, 0.4 * bend + pull)]
+
+    def solved(ratio: float, load) -> ddm.Solution:
+        line = np.array([[0.3, 1.0], [0.3, 1.0 - ratio]])
+        cracks = Cracks.from_polylines([line], aperture=np.inf, surface=[(True, False)])
+        return ddm.Body([beam], cracks, ROCK).solve(load)
+
+    def k(ratio: float, load) -> np.ndarray:
+        tip = solved(ratio, load).tips[0]
+        return np.array([tip["k_i"], tip["k_ii"]])
+
+    first, last = 0.25, 0.33
+    released = release_between(Loaded(solved(first, loads[0])), Loaded(solved(last, loads[1])))
+    place, weight = np.polynomial.legendre.leggauss(3)
+    lengths = 0.5 * (first + last) + 0.5 * (last - first) * place
+    mutual = [float(k(a, loads[0]) @ k(a, loads[1])) for a in lengths]
+    exact = 0.5 * (last - first) * float(weight @ mutual) / ROCK.plane_modulus
+    assert released == pytest.approx(exact, rel=1e-3)
+    ends_of_it = [float(of @ of) / ROCK.plane_modulus for of in (k(first, loads[0]), k(last, loads[1]))]
+    assert (last - first) * mean_release(*ends_of_it) == pytest.approx(exact, rel=0.03)
+
+
+def test_nothing_is_released_where_faces_rub_and_nothing_grows():
+    """A closed crack under two pressures, of which the second makes it slide: what the loads do on the jumps of each
+    other differs by what the faces do there, and nothing is released, to 1e-2 of that."""
+    plate = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
+    cracks = Cracks.from_polylines([np.array([[-0.3, -0.3], [0.3, 0.3]])])
+    body = ddm.Body([plate], cracks, ROCK, face_laws=(JointLaw("rough", friction_angle=np.radians(20.0)),))
+    a = body.solve(body.mean_stress_load(np.array([0.0, -2e6, 0.0])))
+    b = body.solve(body.mean_stress_load(np.array([-0.3e6, -3e6, 0.0])), history=a)
+    by_faces = b.work_at_cracks(a.face_traction) - a.work_at_cracks(b.face_traction)
+    assert abs(by_faces) > 0.05 * b.crack_energy
+    assert abs(release_between(Loaded(a), Loaded(b))) < 1e-2 * abs(by_faces)
