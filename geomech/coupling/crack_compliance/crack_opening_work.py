@@ -89,6 +89,8 @@ def release_between(before: Loaded, after: Loaded) -> float:
 def release_of_mean_stress(before: Loaded, after: Loaded) -> float:
     """`release_between` as a block with mean-stress response knows it: with what it does as the limit of its softness
     changes."""
+    if before.mean is None or after.mean is None:
+        raise ValueError("the block does not respond to its mean stress alone")
     (stress_a, limit_a), (stress_b, limit_b) = before.mean, after.mean
     a, b = before.solution, after.solution
     blocks = float(stress_a @ limit_b.T @ b.crack_strain - stress_b @ limit_a.T @ a.crack_strain) * b.body.area

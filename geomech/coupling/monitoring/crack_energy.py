@@ -183,10 +183,10 @@ class CrackEnergy:
         if self.static:
             for block in [block for block in self._rested if block not in now]:
                 self._runs_through(block)
-        self._rested, self._last, self._along = (
-            {now[block]: of for block, of in each.items() if block in now}
-            for each in (self._rested, self._last, self._along)
+        self._rested, self._last = (
+            {now[block]: of for block, of in each.items() if block in now} for each in (self._rested, self._last)
         )
+        self._along = {now[block]: energy for block, energy in self._along.items() if block in now}
         if not self.static:
             return
         self._taken, self._released, self._lost = (
