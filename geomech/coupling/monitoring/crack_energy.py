@@ -13,8 +13,8 @@ block: under its mean stress where it responds to that alone (`mean_stress_respo
 Passes of a step follow each other at loads of their own, from increment to increment, while work and friction are those
 of the straight line from the step's beginning to its end. What cracks release on both ways is found from the loads on
 them, without K (`release_between`), and the integral of G is taken over from the one to the other (`_on_the_line`).
-(With one factor on G for all of the step, found in its first pass, two in a hundred random slopes missed 2 to 14 % of
-their energy.)
+(With one factor on G for all of the step, found in its first pass, three of 300 random slopes missed 3 to 14 % of their
+energy.)
 
 In statics all forces count, since they open cracks by more than their mean stress does (`crack_opening_work`), also
 where faces hold until the forces reach their strength (`Released`). The work beyond A σ : dε_c has a column of its own,
