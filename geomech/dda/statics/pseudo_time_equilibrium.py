@@ -47,6 +47,9 @@ _GROWTH, _NEARLY = 4.0, 0.3
 _GONE, _IN_VAIN, _FLYING = 0.05, 25, 0.99
 #: Inertia stays above this fraction of the contact stiffness, so that unloaded blocks stay in place.
 _LEAST_INERTIA = 1e-10
+#: Most steps in which blocks without equilibrium are followed, and the unbalanced force over the mean force below which
+#: they are at rest.
+_FOLLOWED, _AT_REST = 100, 1e-6
 #: Penalty over E', for that comparison.
 _PENALTY = 40.0
 
@@ -110,6 +113,29 @@ def equilibrium(
         nothing = np.zeros(blocks.n_blocks)
         return Equilibrium(state, True, False, (), "nothing moves", np.empty(0, RELAXATION_STEP), nothing, None)
     return _Relaxation(static, state, loads, time, reach, crack, limit).run(tolerance, max_steps, watch, follow)
+
+
+@dataclass(frozen=True, eq=False)
+class Travel:
+    """How far blocks without equilibrium go in static steps, which carry no velocity.
+
+    moved    (n_blocks,) m, largest displacement of each block's vertices
+    rests    whether they come to rest
+    reason   one sentence where they neither come to rest nor go beyond the reach of the search; otherwise empty
+    """
+
+    moved: np.ndarray
+    rests: bool
+    reason: str
+
+
+def travel(system: BlockSystem, state: State, loads: Loads, load_time: float, reach: float) -> Travel:
+    """Follow the blocks of ``system`` from ``state`` under the loads at ``load_time`` s until they come to rest or one
+    has moved by ``reach`` m."""
+    end = equilibrium(system, state, loads, load_time=load_time, tolerance=_AT_REST, max_steps=_FOLLOWED, reach=reach)
+    way = np.hypot(*(end.state.vertices - state.vertices).T)
+    moved = np.maximum.reduceat(way, system.vertex_start[:-1])
+    return Travel(moved, end.converged, "" if end.converged or end.collapsed else end.reason)
 
 
 class _Relaxation:
