@@ -49,7 +49,7 @@ _GONE, _IN_VAIN, _FLYING = 0.05, 25, 0.99
 _LEAST_INERTIA = 1e-10
 #: Most steps in which blocks without equilibrium are followed, and the unbalanced force over the mean force below which
 #: they are at rest.
-_FOLLOWED, _AT_REST = 100, 1e-6
+_FOLLOWED, _AT_REST = 60, 1e-6
 #: Penalty over E', for that comparison.
 _PENALTY = 40.0
 
@@ -130,8 +130,9 @@ class Travel:
 
 
 def travel(system: BlockSystem, state: State, loads: Loads, load_time: float, reach: float) -> Travel:
-    """Follow the blocks of ``system`` from ``state`` under the loads at ``load_time`` s until they come to rest or one
-    has moved by ``reach`` m."""
+    """Follow the blocks of a static ``system`` from ``state`` under the loads at ``load_time`` s until they come to rest
+    or one has moved by ``reach`` m."""
+    system.limits.warns = False
     end = equilibrium(system, state, loads, load_time=load_time, tolerance=_AT_REST, max_steps=_FOLLOWED, reach=reach)
     way = np.hypot(*(end.state.vertices - state.vertices).T)
     moved = np.maximum.reduceat(way, system.vertex_start[:-1])

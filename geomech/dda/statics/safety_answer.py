@@ -85,7 +85,7 @@ class FactorOfSafety:
         far = f"{float(self.travel.moved.max()):.3g} m"
         at = f"at F = {self.travels_at:.4g}, without inertia: "
         if self.travel.reason:
-            return f"{at}followed for {far} ({self.travel.reason})"
+            return f"{at}followed for {far}, where the search ends"
         if not self.travel.rests:
             return f"{at}followed for {far}, and they go on"
         on = ""

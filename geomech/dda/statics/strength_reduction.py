@@ -62,6 +62,8 @@ _BEYOND = 1e-2
 _NEARBY, _BELOW = 0.85, 0.95
 #: Start of the search for the bound: Newton's method approaches from above, and most slopes fail below this.
 _FIRST = 2.0
+#: Most cuts of a step in which failed blocks are followed: where contacts find no states, following them ends.
+_CUTS = 3
 #: Number of blocks that an error names.
 _NAMED = 5
 #: Distance of trials from an expected factor, in tolerances; and relative distance of a second failing trial above a
@@ -210,8 +212,10 @@ class _Search:
             return found
         reach = math.sqrt(abs(float(self.blocks.areas()[found.moving[0]])))
 
+        coarse = replace(self, settings=replace(self.settings, max_step_cuts=min(self.settings.max_step_cuts, _CUTS)))
+
         def followed(toes: str) -> Travel:
-            system = self.system(found.travels_at, replace(counted, toes=toes))
+            system = coarse.system(found.travels_at, replace(counted, toes=toes))
             return travel(system, found.state, self.under.loads, self.under.time, reach)
 
         way = followed(counted.toes)
