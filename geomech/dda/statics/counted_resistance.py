@@ -248,7 +248,7 @@ def with_rigid_blocks(
         what = (
             "blocks of uniform strain touch at few points of faces with cohesion, where real blocks would touch at more"
         )
-    line = f"{what}; rigid blocks have the factor {rigid.factor:.4f}"
+    line = f"{what}; rigid blocks have the factor {rigid.factor:.4f}, as in limit equilibrium"
     return replace(found, factor_if_rigid=rigid.factor, warnings=(*found.warnings, line))
 
 

@@ -62,8 +62,8 @@ _BEYOND = 1e-2
 _NEARBY, _BELOW = 0.85, 0.95
 #: Start of the search for the bound: Newton's method approaches from above, and most slopes fail below this.
 _FIRST = 2.0
-#: Most cuts of a step in which failed blocks are followed: where contacts find no states, following them ends.
-_CUTS = 3
+#: Most cuts of one step in which failed blocks are followed: where contacts find no states, following them ends.
+_CUTS = 2
 #: Number of blocks that an error names.
 _NAMED = 5
 #: Distance of trials from an expected factor, in tolerances; and relative distance of a second failing trial above a
