@@ -116,7 +116,7 @@ def test_a_block_on_a_soft_bolt_goes_on_at_any_step_and_is_told_to_be_out_of_bal
 
 
 @pytest.mark.parametrize(("stiffness", "dt"), [(1e6, 1e-2), (1e7, 1e-2), (1e8, 1e-3)])
-def test_a_static_run_takes_a_block_to_where_a_soft_bolt_holds_it(stiffness, dt):
+def test_a_static_run_takes_a_block_to_where_a_soft_bolt_holds_it(verified, stiffness, dt):
     """On a plane at 40° at 30° of friction the bolt along it comes to bear W (sin 40° − cos 40° tan 30°): in a few steps
     in which inertia alone would let it take a thousandth of that, and not more, which friction would keep."""
     slope = math.radians(40)
@@ -134,5 +134,9 @@ def test_a_static_run_takes_a_block_to_where_a_soft_bolt_holds_it(stiffness, dt)
         state = result.state
     needed = 2600.0 * 9.81 * 2.0 * (math.sin(slope) - math.cos(slope) * math.tan(math.radians(30)))
     print(f"{stiffness:g} N/m, {dt:g} s: {state.bolts['force'][0] / needed - 1:.1e} off")
+    verified(
+        f"block that a bolt of {stiffness:g} N/m holds on an incline, static steps of {1e3 * dt:g} ms: force of the bolt", None,
+        "W (sin β − cos β tan φ)", found=float(state.bolts["force"][0]), exact=needed, unit="N/m",
+    )  # fmt: skip
     assert state.bolts["force"][0] == pytest.approx(needed, rel=2e-3)
     assert result.statistics["unbalanced_ratio"] < 1e-6
