@@ -221,6 +221,8 @@ class Coupling:
             stopped = yield from self._load_step()
             if stopped:
                 break
+        else:
+            self.mechanism.warn_at_the_end(self.now.state.time)
         if not self.endless:
             check_dissipation(self.now.budget, self.now.state.time, self.static)
 

@@ -9,7 +9,9 @@ from __future__ import annotations
 
 import logging
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import NoReturn, Protocol
 
 import numpy as np
@@ -39,6 +41,8 @@ _OTHER_DIRECTION = 0.95
 #: Corners are searched for this much farther, in units of √area of the smallest block, than their weight may bring them: what
 #: elastic blocks move in a step that they bear at rest.
 _BESIDES = 1e-6
+#: Part of the largest displacement of a step by which a static step takes blocks to where bolts hold them.
+_REACH = 0.25
 
 
 class Deflection(Protocol):
@@ -120,7 +124,10 @@ class StepCutting:
     def _attempt(self) -> tuple[Attempt, StepResult] | None:
         """One attempt and its result; None where the step begins again."""
         system, found = self.system, self.found
-        begun = balanced_attempt if self.balances else Attempt if system.deflected is None else BendingAttempt
+        begun: Callable[..., Attempt] = Attempt if system.deflected is None else BendingAttempt
+        if self.balances:
+            reach = _REACH * system.limits.displacement * self.dt / self.asked
+            begun = partial(balanced_attempt, reach=reach)
         try:
             attempt = begun(system, self.start, self.dt, found, self.cuts)
             result = attempt.result()

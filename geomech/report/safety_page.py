@@ -15,6 +15,7 @@ from ..dda.statics.displacement_limit import MOVED
 from ..dda.statics.mobilised_strength import MobilisedJoint, mobilised_joints
 from ..dda.statics.partial_factors import PartialFactors
 from ..dda.statics.safety_answer import FactorOfSafety
+from ..dda.statics.sharp_toes import place
 from ..model import OPEN, SLIP, Problem, counted
 
 #: A block slides if it rotates by less than the first value (rad) while it moves by its own size √area; it topples if
@@ -33,6 +34,7 @@ class MovingBlock:
     turn           rotation, rad (positive counter-clockwise), while it moves by its own size
     kind           "slides", "topples" or "slides and topples"
     displacement   (x, y), relative to the farthest block's
+    travel         m that it goes when it has failed; None if that was not followed
     """
 
     name: str
@@ -41,13 +43,14 @@ class MovingBlock:
     turn: float
     kind: str
     displacement: tuple[float, float]
+    travel: float | None = None
 
     def __str__(self) -> str:
         text = f"{self.name}: {self.part:.2f} of the fastest, towards {round(self.towards) + 0}°: {self.kind}"
         if abs(self.turn) > SLIDES:
             side = "left" if self.turn > 0 else "right"
             text += f", turning {side} by {math.degrees(abs(self.turn)):.0f}° while it moves by its own size (√area)"
-        return text
+        return text if self.travel is None else f"{text}; goes {self.travel:.3g} m"
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,7 +85,8 @@ class SafetyReport:
             own = math.hypot(x, y)
             turn = float(failed.rotation[b]) * float(size[b]) / (own * far)
             kind = "slides" if abs(turn) < SLIDES else "topples" if abs(turn) > TOPPLES else "slides and topples"
-            out.append(MovingBlock(blocks.names[b], own, math.degrees(math.atan2(y, x)), turn, kind, (x, y)))
+            goes = None if self.found.travel is None else float(self.found.travel.moved[b])
+            out.append(MovingBlock(blocks.names[b], own, math.degrees(math.atan2(y, x)), turn, kind, (x, y), goes))
         return out
 
     @property
@@ -138,6 +142,7 @@ class SafetyReport:
         if moving:
             lines.append(f"mechanism: {self.mechanism}, moving at failure:")
             lines += [f"  {each}" for each in moving[:_LISTED]] + _more(len(moving), f"of {len(names)} blocks")
+            lines += [f"  {found.travel_text()}"] if found.travel is not None else []
         lines += self._joint_lines()
         if found.anchors:
             lines.append("anchors at the factor:")
@@ -156,7 +161,7 @@ class SafetyReport:
             )
             lines.append(f"toes that {'hold' if found.toes_hold else 'touch when rounded, and do not hold'}{other}:")
             lines += [
-                f"  of {names[t.block]} on {names[t.other]} at x = {t.at[0]:.4g}, y = {t.at[1]:.4g} m"
+                f"  of {names[t.block]} on {names[t.other]} at {place(*t.at)}"
                 + (f": {t.force / 1e3:.4g} kN/m" if found.toes_hold else "")
                 for t in found.toes
             ]

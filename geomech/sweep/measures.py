@@ -158,6 +158,7 @@ def _safety(job: Job) -> dict[str, Any]:
     report = safety_report(
         scene, settings["at_s"], along=settings["along"], divide=settings["divide"] or None,
         tolerance=settings["tolerance"], without_cracks=settings["without_cracks"],
+        follow=job.folder is not None,
     )  # fmt: skip
     found, problem = report.found, report.problem
     moving = np.array(found.moving, dtype=int)

@@ -4,6 +4,7 @@ other and anchors have to be stretched: against limit equilibrium, mirrored and 
 from __future__ import annotations
 
 import math
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -49,7 +50,7 @@ DIP = math.radians(35)
 
 def above_a_floor(drop: float, **way) -> tuple[Blocks, Loads]:
     crest, floor = 50.0 / math.tan(DIP), [(0.0, -drop)] if drop else []
-    base = [(-30, -drop), (-30, -15), (90, -15), (90, 50), (crest, 50), (0, 0), *floor]
+    base = [(-30, -drop), (-30, -15 - drop), (90, -15 - drop), (90, 50), (crest, 50), (0, 0), *floor]
     return drawn([base, [(0, 0), (crest, 50), (36.87, 50), (22.43, 25), (14.43, 25)]], **way)
 
 
@@ -88,6 +89,32 @@ def test_sharp_toes_hold_where_corners_are_not_rounded_and_are_named():
     assert found.other_factor == pytest.approx(math.tan(math.radians(30)) / math.tan(DIP), rel=1e-6)
     assert "x = 0, y = 0 m and holds" in found.warnings[0] and "without it the factor is 0.8245" in found.warnings[0]
     assert found.as_dict(blocks)["factor_without_toes"] == found.other_factor
+
+
+@pytest.mark.parametrize(("drop", "friction_deg"), [(0.5, 30), (0.5, 40), (60.0, 30), (0.0, 30)])
+def test_how_far_a_failed_block_goes_is_told(drop, friction_deg):
+    """Down a plane at 35° to a floor: drop/sin 35° with a sharp tip; farther by its rounding, by which the toe stands off;
+    on, with no floor within the block's size."""
+    blocks, loads = above_a_floor(drop)
+    law = JointLaw("plane", math.radians(friction_deg))
+    found = dda.factor_of_safety(blocks, [ROCK], [law], loads)
+    # At its strength if it does not stand with that, else at 5 % less than it needs.
+    assert found.travels_at == pytest.approx(max(1.0, 1.05 * found.upper))
+    way, size = found.travel, math.sqrt(blocks.areas()[1])
+    print(found.travel_text())
+    if drop > 1.0:
+        assert not way.rests and size < way.moved[1] < 1.5 * size and "they go on" in found.table()
+        return
+    # The toe of 25° is rounded over a hundredth of the block's size; its bisector is 47.5° from the floor's normal.
+    half, off = math.radians(12.5), 0.01 * size
+    off *= math.cos(math.radians(90 - 47.5)) / math.cos(half) - math.tan(half)
+    assert way.rests and way.moved[1] == pytest.approx((drop + off) / math.sin(DIP), rel=5e-3) and way.moved[0] < 1e-9
+    assert "on a rounded corner" in found.travel_text()
+    if drop:
+        assert found.sharp_travel == pytest.approx(drop / math.sin(DIP), rel=5e-3)
+    told = found.as_dict(blocks)
+    assert told["travel"]["comes_to_rest"] and told["moving"]["block 1"]["travel_m"] == way.moved[1]
+    assert dda.factor_of_safety(blocks, [ROCK], [law], loads, follow=False).travel is None
 
 
 def test_what_lands_on_a_floor_is_no_equilibrium():
@@ -300,6 +327,39 @@ def test_an_anchor_that_never_yields_counts_with_what_it_takes_while_blocks_stay
     # Of √2 m a two-thousandth, at 45° to the bolt.
     assert found.anchors[0].force == pytest.approx(10e3 + 1e6 * 0.7e-3 * math.cos(math.radians(45)), rel=1e-2)
     assert "no yield force" in found.warnings[0]
+
+
+def test_a_bolt_too_soft_to_reach_its_yield_force_is_named():
+    """At 1e4 N/m and 15 kN the block of √2 m would have to go 0.7 m; a tenth of its size is allowed."""
+    slope = math.radians(40)
+    blocks = Blocks.from_polygons(
+        [turned(rectangle(-6, -3, 8, 0), slope), turned(rectangle(0, 0, 2, 1), slope)], fixed=[True, False]
+    )
+    bolt = Bolt(1, (0.4447, 1.0258), GROUND, (3.967, 0.7177), 1e4, pretension=10e3, yield_force=15e3)
+    found = dda.factor_of_safety(
+        blocks, [ROCK], [JointLaw("plane", math.radians(30))], Loads(gravity=WEIGHT.gravity, bolts=(bolt,))
+    )
+    assert found.anchors[0].moved == pytest.approx(0.1 * math.sqrt(2), rel=2e-2)
+    assert "does not reach its yield force of 15 kN/m" in found.warnings[0]
+
+
+def test_what_holds_blocks_that_no_strength_moves_is_named_and_blocks_that_none_holds():
+    """A key that widens upwards is borne by its sides, W/2 sin 11.3° each; one that widens downwards falls."""
+    slant = np.array([[-1.2, 0], [1.2, 0], [1.5, 1.5], [-1.5, 1.5]], float)
+    for key in (slant, slant * [1, -1] + [0, 1.5]):
+        (a, b), (c, d) = sorted(key[key[:, 1] == 0, 0]), sorted(key[key[:, 1] == 1.5, 0])
+        roof = [(-8, 0), (a, 0), (c, 1.5), (d, 1.5), (b, 0), (8, 0), (8, 8), (-8, 8)]
+        polygons = [np.array(roof), key if key is slant else key[::-1]]
+        blocks = Blocks.from_polygons(polygons, fixed=[True, False])
+        if key is slant:
+            found = dda.factor_of_safety(blocks, [ROCK], [JointLaw("joint", 0.5)], WEIGHT)
+            side = 0.5 * 2600.0 * GRAVITY * blocks.areas()[1] / math.sin(math.atan(0.2))
+            assert math.isinf(found.upper) and found.travel is None
+            forces = [1e3 * float(text) for text in re.findall(r"([\d.]+) kN/m at x = -?1\.", found.warnings[0])]
+            assert forces == pytest.approx([side, side], rel=0.05)
+        else:
+            with pytest.raises(dda.NotConverged, match="'block 1': keeps moving"):
+                dda.factor_of_safety(blocks, [ROCK], [JointLaw("joint", 0.5)], WEIGHT)
 
 
 @pytest.mark.parametrize("mirror", [False, True])

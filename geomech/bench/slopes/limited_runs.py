@@ -6,6 +6,7 @@ Times are processor times, so that an outcome does not depend on other programs.
 from __future__ import annotations
 
 import logging
+import math
 import signal
 import threading
 import time
@@ -82,8 +83,13 @@ def time_up(error: BaseException | None) -> TimeUp | None:
 
 @contextmanager
 def at_most(seconds: float) -> Iterator[None]:
-    """Raises `TimeUp`, with the place, after ``seconds`` processor seconds; on systems without timers, never."""
-    if not hasattr(signal, "setitimer") or threading.current_thread() is not threading.main_thread():
+    """Raises `TimeUp`, with the place, after ``seconds`` processor seconds (inf: never); on systems without timers,
+    never."""
+    if (
+        math.isinf(seconds)
+        or not hasattr(signal, "setitimer")
+        or threading.current_thread() is not threading.main_thread()
+    ):
         yield
         return
 

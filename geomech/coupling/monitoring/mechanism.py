@@ -65,6 +65,18 @@ class Mechanism:
             "a block are left over, step after step"
         )
 
+    def warn_at_the_end(self, time: float) -> None:
+        """Warn if the last load step of a run, which ends at ``time`` s, has left blocks out of balance that no mechanism
+        has been reported of."""
+        if self.reported or not self.ratios:
+            return
+        log.warning(
+            "t = %g s: the static run ends out of balance: %.2g %% of the forces on a block are left over, and inertia takes "
+            "them (unbalanced_ratio in history.csv). The block has not reached the place where bolts, joints or other "
+            'blocks hold it: set dda.equilibrium = "loads", or take longer steps',
+            time, 100 * self.ratios[-1],
+        )  # fmt: skip
+
     def _stretches(self, result: dda.StepResult, blocks: Blocks, block: int) -> bool:
         """Whether a bolt that is being stretched will stop the ``block``: its force, extrapolated along the present
         motion, balances the rest before the block has moved `MOVED` of its size."""

@@ -17,16 +17,16 @@ from ..loads.bolts import labels
 from ..open_close.contact_set import ContactSet
 from ..results import CrackResponse
 from ..system import BlockSystem
-from .displacement_limit import MOVED
+from .displacement_limit import FARTHEST, MOVED
 from .pseudo_time_equilibrium import equilibrium
 from .safety_answer import Anchor, FactorOfSafety
-from .sharp_toes import FREE, ROUNDED, Toe
+from .sharp_toes import FREE, ROUNDED, Toe, place
 from .stability_trial import Trial
 
 log = logging.getLogger(__name__)
 
-#: Number of blocks with toes that are named.
-_LISTED = 8
+#: Number of blocks with toes that are named, and of contacts that carry most where nothing fails.
+_LISTED, _CARRYING = 8, 3
 #: A toe is an obstacle if its block approaches what it touches by more than this fraction of the fastest block's
 #: displacement, and bears load if its force is more than this fraction of its block's weight.
 _OBSTACLE, _BEARS = 1e-3, 1e-3
@@ -34,6 +34,8 @@ _OBSTACLE, _BEARS = 1e-3, 1e-3
 _AS_RIGID = 1e-2
 #: Relative distance from the yield force within which a bolt yields.
 _AT_YIELD = 1e-6
+#: Part of the largest displacement allowed from which on it is that which keeps a bolt from its yield force.
+_NEARLY = 0.9
 #: Relative increase over the pretension from which a bolt without yield force counts as loaded.
 _TAKEN = 1e-3
 
@@ -135,20 +137,12 @@ def _where(blocks: Blocks, toes: tuple[Toe, ...]) -> str:
         return repr(blocks.names[block] if blocks.names else f"block {block}")
 
     first = toes[0]
-    where = (
-        f"the toe of {name(first.block)} touches {name(first.other)} at x = {_metres(first.at[0])}, "
-        f"y = {_metres(first.at[1])} m"
-    )
+    where = f"the toe of {name(first.block)} touches {name(first.other)} at {place(*first.at)}"
     rest = list(dict.fromkeys(name(toe.block) for toe in toes if toe.block != first.block))
     if not rest:
         return where
     more = f" and {len(rest) - _LISTED} others" if len(rest) > _LISTED else ""
     return f"{where} (so do those of {', '.join(rest[:_LISTED])}{more})"
-
-
-def _metres(value: float) -> str:
-    """Text to the millimetre; adding zero turns −0 into 0."""
-    return f"{round(value, 3) + 0.0:.7g}"
 
 
 def _anchors(loads: Loads, state: State, moved: np.ndarray) -> tuple[Anchor, ...]:
@@ -178,9 +172,15 @@ def with_anchors(blocks: Blocks, loads: Loads, found: FactorOfSafety) -> FactorO
                 f"takes while its block moves {1e3 * anchor.moved:.3g} mm"
             )
         elif anchor.moved > MOVED * least and anchor.stretch > 0.0:
+            short = ""
+            if not anchor.yields and anchor.moved > _NEARLY * FARTHEST * least:
+                short = (
+                    f"; so soft a bolt does not reach its yield force of {bolt.yield_force / 1e3:.4g} kN/m within the "
+                    f"displacement that is allowed, {100 * FARTHEST:g} % of the block's size"
+                )
             lines.append(
                 f"bolt {anchor.name} takes its {anchor.force / 1e3:.4g} kN/m only once its block has moved "
-                f"{1e3 * anchor.moved:.3g} mm, {100 * anchor.moved / least:.2g} % of the block's size"
+                f"{1e3 * anchor.moved:.3g} mm, {100 * anchor.moved / least:.2g} % of the block's size{short}"
             )
     return replace(found, anchors=anchors, warnings=(*found.warnings, *lines))
 
@@ -248,7 +248,7 @@ def with_rigid_blocks(
         what = (
             "blocks of uniform strain touch at few points of faces with cohesion, where real blocks would touch at more"
         )
-    line = f"{what}; rigid blocks have the factor {rigid.factor:.4f}"
+    line = f"{what}; rigid blocks have the factor {rigid.factor:.4f}, as in limit equilibrium"
     return replace(found, factor_if_rigid=rigid.factor, warnings=(*found.warnings, line))
 
 
@@ -286,10 +286,27 @@ def with_admissible_forces(found: FactorOfSafety, largest: float | None) -> Fact
     return replace(found, admissible=largest, warnings=(*found.warnings, line))
 
 
-def with_no_mechanism(found: FactorOfSafety) -> FactorOfSafety:
-    """The answer ``found`` of blocks that no reduction of strength sets in motion."""
+def with_no_mechanism(blocks: Blocks, found: FactorOfSafety) -> FactorOfSafety:
+    """The answer ``found`` of blocks that no reduction of strength sets in motion, with the contacts that carry most."""
+    most = _largest_forces(blocks, found.state)
+    carry = f" (most is carried where {'; '.join(most)})" if most else ""
     line = (
         f"blocks stand even with joint strength divided by {found.lower:g}: their shape or anchors hold them, not the "
-        "strength of joints. Check that every block which could fail is free to move"
+        f"strength of joints{carry}. Check that every block which could fail is free to move"
     )
     return replace(found, warnings=(*found.warnings, line))
+
+
+def _largest_forces(blocks: Blocks, state: State) -> list[str]:
+    """Texts of the edges with the largest normal forces in ``state``, and where these act."""
+    rows = state.contacts[(state.contacts["state"] != OPEN) & (state.contacts["normal_force"] > 0.0)]
+    found = []
+    for other, edge, block in sorted({(int(r["other"]), int(r["edge"]), int(r["block"])) for r in rows}):
+        own = rows[(rows["edge"] == edge) & (rows["block"] == block)]
+        force = float(own["normal_force"].sum())
+        found.append((force, block, other, own["normal_force"] @ own["point"] / force))
+    out = []
+    for force, block, other, (x, y) in sorted(found, key=lambda each: -each[0])[:_CARRYING]:
+        a, b = (repr(blocks.names[k] if blocks.names else f"block {k}") for k in (block, other))
+        out.append(f"{a} presses on {b}, {force / 1e3:.4g} kN/m at {place(x, y)}")
+    return out

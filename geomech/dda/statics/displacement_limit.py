@@ -34,7 +34,7 @@ MOVED = 5e-4
 #: stretches it by a third of its displacement. The second number is for blocks wedged in above the bolted one.
 _STRETCHED, _WEDGED = 3.0, 10.0
 #: Largest displacement allowed by bolts, relative to the block's size.
-_FARTHEST = 0.1
+FARTHEST = 0.1
 #: The strength of joints that do not fail, Pa.
 _UNBREAKABLE = 1e15
 #: Unbalanced force, relative to all forces, below which joints that cannot fail bear the loads.
@@ -114,7 +114,7 @@ class DisplacementLimit:
         """(n_blocks,) m: upper bound of the limit in any state."""
         own = MOVED * self._size + self.elastic
         stretched = any(not math.isinf(bolt.yield_force) for bolt in self._loads.bolts)
-        return own + _FARTHEST * self._size if stretched else own
+        return own + FARTHEST * self._size if stretched else own
 
     def beyond(self, state: State) -> np.ndarray:
         """Indices of the blocks beyond their limit, the largest excess first."""
@@ -134,7 +134,7 @@ class DisplacementLimit:
                 most = np.full(len(moved), _WEDGED * elastic)
                 most[[b for b in (bolt.block, bolt.other) if b != GROUND]] = _STRETCHED * elastic
                 longest = np.maximum(longest, np.minimum(most, moved * elastic / (elastic + yielded)))
-        return np.minimum(longest, _FARTHEST * self._size)
+        return np.minimum(longest, FARTHEST * self._size)
 
     def bending(self, state: State) -> float:
         """m: displacement due to the deflection of blocks of higher order: a beam sags by its deflection, blocks on it

@@ -47,6 +47,10 @@ _GROWTH, _NEARLY = 4.0, 0.3
 _GONE, _IN_VAIN, _FLYING = 0.05, 25, 0.99
 #: Inertia stays above this fraction of the contact stiffness, so that unloaded blocks stay in place.
 _LEAST_INERTIA = 1e-10
+#: Most steps in which blocks without equilibrium are followed, most cuts of them and most open–close iterations beyond one
+#: a step, so that this takes about as long as the search for the factor (a single block that slides by its size: 57 steps
+#: and 1; 200 blocks: 5 and 60); and the unbalanced force over the mean force below which they are at rest.
+_FOLLOWED, _CUTS, _ITERATIONS, _AT_REST = 60, 2, 50, 1e-6
 #: Penalty over E', for that comparison.
 _PENALTY = 40.0
 
@@ -112,6 +116,32 @@ def equilibrium(
     return _Relaxation(static, state, loads, time, reach, crack, limit).run(tolerance, max_steps, watch, follow)
 
 
+@dataclass(frozen=True, eq=False)
+class Travel:
+    """How far blocks without equilibrium go in static steps, which carry no velocity.
+
+    moved    (n_blocks,) m, largest displacement of each block's vertices
+    rests    whether they come to rest
+    reason   one sentence where they neither come to rest nor go beyond the reach of the search; otherwise empty
+    """
+
+    moved: np.ndarray
+    rests: bool
+    reason: str
+
+
+def travel(system: BlockSystem, state: State, loads: Loads, load_time: float, reach: float) -> Travel:
+    """Follow the blocks of a static ``system`` from ``state`` under the loads at ``load_time`` s until they come to rest
+    or one has moved by ``reach`` m."""
+    system.limits.warns = False
+    relaxation = _Relaxation(system, state, loads, load_time, reach, None, None)
+    relaxation.most_cuts, relaxation.most_iterations = _CUTS, _ITERATIONS
+    end = relaxation.run(_AT_REST, _FOLLOWED, None, True)
+    way = np.hypot(*(end.state.vertices - state.vertices).T)
+    moved = np.maximum.reduceat(way, system.vertex_start[:-1])
+    return Travel(moved, end.converged, "" if end.converged or end.collapsed else end.reason)
+
+
 class _Relaxation:
     """Static steps of ``system`` from ``state`` under the loads at ``time``; arguments as for `equilibrium`."""
 
@@ -133,6 +163,8 @@ class _Relaxation:
         #: Blocks that have moved beyond the limit, and the last step in which a block was in free flight.
         self.beyond_limit: tuple[int, ...] = ()
         self.last_flight = 0
+        #: Numbers of step cuts, and of open–close iterations beyond one a step, after which the relaxation ends.
+        self.most_cuts, self.most_iterations = np.inf, np.inf
 
     def run(
         self, tolerance: float, max_steps: int, watch: Callable[[StepResult, np.void], None] | None, follow: bool
@@ -157,6 +189,8 @@ class _Relaxation:
             if self.beyond_limit and not follow:
                 break
             self.travelled += moved
+            if self._labours():
+                return self._ended(False, False, "contacts find their states too slowly to go on")
             statistics = result.statistics
             collapse = self._collapse(statistics["unbalanced_ratio"])
             if collapse:
@@ -168,6 +202,10 @@ class _Relaxation:
             return self._ended(False, True, f"no equilibrium: blocks have moved {farthest:.3g} m and go on")
         unbalanced = self.history[-1]["unbalanced"]
         return self._ended(False, False, f"unbalanced force {unbalanced:.2g} after {max_steps} steps")
+
+    def _labours(self) -> bool:
+        cuts, iterations = (sum(int(row[name]) for row in self.history) for name in ("cuts", "iterations"))
+        return cuts > self.most_cuts or iterations - len(self.history) > self.most_iterations
 
     def _take(self, result: StepResult) -> tuple[np.void, np.ndarray]:
         """Accept ``result``; returns its RELAXATION_STEP and the displacements (n_blocks,) of the centroids, m."""

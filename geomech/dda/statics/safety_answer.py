@@ -8,9 +8,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...model import Blocks, State
+from .pseudo_time_equilibrium import Travel
 from .sharp_toes import Toe
 from .stability_trial import Trial
 
+#: Part by which strength falls short while failed blocks are followed. Directly at the factor, where least is missing,
+#: millimetres of an anchor would stop them.
+_SHORT = 0.05
 #: Number of blocks of a mechanism that are described, and rotation (rad) per displacement of one block size above which
 #: a block is said to turn.
 _LISTED, _TURNS = 8, 0.05
@@ -38,7 +42,9 @@ class FactorOfSafety:
     ``toes``: obstacles to the mechanism. If they are rounded and carry nothing, ``other_factor`` is the factor with
     sharp tips; if they carry load (``toes_hold``), it is the factor without them; None if unknown.
     ``factor_if_parted``: factor if open ends of faces lose their cohesion, if that differs; ``factor_if_rigid``: factor
-    of rigid blocks, if faces of elastic blocks carry nothing because they are barely open. ``admissible``: largest
+    of rigid blocks, if faces of elastic blocks carry nothing because they are barely open. ``travel``: how far the
+    blocks go at the factor ``travels_at`` (None: not followed), and ``sharp_travel``:
+    displacement of the farthest if the corner that stops it had a sharp tip (None: no corner does). ``admissible``: largest
     factor with admissible contact forces (`admissible_forces`), if it exceeds the factor by more than one per cent,
     otherwise None. ``warnings``: texts."""
 
@@ -56,6 +62,8 @@ class FactorOfSafety:
     other_factor: float | None = None
     factor_if_parted: float | None = None
     factor_if_rigid: float | None = None
+    travel: Travel | None = None
+    sharp_travel: float | None = None
     admissible: float | None = None
     warnings: tuple[str, ...] = ()
 
@@ -63,6 +71,29 @@ class FactorOfSafety:
     def failed(self) -> Trial | None:
         """The trial at ``upper``; None if there is none."""
         return next((t for t in reversed(self.trials) if t.factor == self.upper), None)
+
+    @property
+    def travels_at(self) -> float:
+        """The factor at which failed blocks are followed: where their strength falls short by `_SHORT`, or with the
+        strength that they have, if that falls short by more."""
+        return max(self.upper * (1.0 + _SHORT), 1.0)
+
+    def travel_text(self) -> str:
+        """How far the blocks go, in words; empty if they were not followed."""
+        if self.travel is None:
+            return ""
+        far = f"{float(self.travel.moved.max()):.3g} m"
+        at = f"at F = {self.travels_at:.4g}, without inertia: "
+        if self.travel.reason:
+            return f"{at}followed for {far}, where the search ends"
+        if not self.travel.rests:
+            return f"{at}followed for {far}, and they go on"
+        on = ""
+        if self.sharp_travel is not None:
+            on = f" on a rounded corner ({self.sharp_travel:.3g} m on its sharp tip)"
+        elif self.toes and not self.toes_hold:
+            on = " on a rounded corner"
+        return f"{at}they come to rest {far} farther{on}"
 
     def table(self, title: str = "factor of safety") -> str:
         """Text: the trials by F, the factor with the ``title``, and the mechanism."""
@@ -75,6 +106,7 @@ class FactorOfSafety:
         found = f"{self.factor:.4f}" if math.isfinite(self.upper) else f"above {self.lower:g}"
         lines.append(f"{title} {found}" + (", moving at failure:" if self.mechanism else ""))
         lines += [f"  {line}" for line in self.mechanism]
+        lines += [f"  {self.travel_text()}"] if self.travel is not None else []
         for a in self.anchors:
             state = "at its yield force" if a.yields else "not at its yield force"
             lines.append(
@@ -93,12 +125,15 @@ class FactorOfSafety:
             for b in self.moving:
                 way, turn = (failed.displacement[b] / far).tolist(), float(failed.rotation[b] / far)
                 moving[blocks.names[b]] = {"displacement": way, "rotation_per_m": turn}
+                if self.travel is not None:
+                    moving[blocks.names[b]]["travel_m"] = float(self.travel.moved[b])
         plain = ("factor", "stable", "steps", "unbalanced", "drift", "reason")
         return {
             "factor_of_safety": self.factor,
             "lower": self.lower,
             "upper": self.upper if math.isfinite(self.upper) else None,
             "moving": moving,
+            "travel": self._travel_as_dict(),
             "moved_m": dict(zip(blocks.names, self.moved.tolist(), strict=True)),
             "anchors": [vars(a) for a in self.anchors],
             "toes": [
@@ -119,6 +154,15 @@ class FactorOfSafety:
             "warnings": list(self.warnings),
             "trials": [{name: getattr(t, name) for name in plain} for t in self.trials],
         }
+
+    def _travel_as_dict(self) -> dict[str, object] | None:
+        if self.travel is None:
+            return None
+        return {
+            "factor": self.travels_at, "comes_to_rest": self.travel.rests,
+            "farthest_m": float(self.travel.moved.max()), "farthest_with_sharp_corners_m": self.sharp_travel,
+            "reason": self.travel.reason,
+        }  # fmt: skip
 
 
 def moving_in(trial: Trial) -> tuple[int, ...]:

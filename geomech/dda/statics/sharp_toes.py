@@ -56,6 +56,11 @@ class Toe:
     force: float
 
 
+def place(x: float, y: float) -> str:
+    """Text of a point to the millimetre; adding zero turns −0 into 0."""
+    return f"x = {round(x, 3) + 0.0:.7g}, y = {round(y, 3) + 0.0:.7g} m"
+
+
 @dataclass(frozen=True, eq=False)
 class ToeCorners:
     """Arrays (n_vertices,): next and previous vertex on the outline, block (``owner``), rounding length m, size √area

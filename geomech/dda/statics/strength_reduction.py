@@ -43,7 +43,7 @@ from .counted_resistance import (
     with_toes,
 )
 from .displacement_limit import DisplacementLimit, without_failure
-from .pseudo_time_equilibrium import equilibrium
+from .pseudo_time_equilibrium import Travel, equilibrium, travel
 from .safety_answer import FactorOfSafety, mechanism_of, moving_in
 from .sharp_toes import FREE, ROUNDED, SHARP
 from .stability_trial import Trial, TrialLoads, stability_trial
@@ -62,6 +62,10 @@ _BEYOND = 1e-2
 _NEARBY, _BELOW = 0.85, 0.95
 #: Start of the search for the bound: Newton's method approaches from above, and most slopes fail below this.
 _FIRST = 2.0
+#: Most cuts of one step in which failed blocks are followed: where contacts find no states, following them ends.
+_CUTS = 2
+#: Number of blocks that an error names.
+_NAMED = 5
 #: Distance of trials from an expected factor, in tolerances; and relative distance of a second failing trial above a
 #: bound, so that the drifts of both predict the factor.
 _BESIDE, _SECOND = 0.4, 0.01
@@ -92,6 +96,7 @@ def factor_of_safety(
     toes: str = ROUNDED,
     whole_faces: bool = True,
     compare: bool = True,
+    follow: bool = True,
 ) -> FactorOfSafety:
     """The factor F by which the strength of the joints can be divided before no static equilibrium is left.
 
@@ -101,7 +106,8 @@ def factor_of_safety(
     the forces on it. Static steps are ``time_step`` s long (default: free fall over a hundredth of the smallest block).
     ``watch`` is called with every trial. ``toes``: "rounded", "sharp" or "free", see `sharp_toes`; ``whole_faces``: a
     face keeps its whole cohesion while any part is in contact. With ``compare``, the answer reports the factors without
-    rounding of toes whose tips would hold, without toes that hold, and without faces that have parted at one end.
+    rounding of toes whose tips would hold, without toes that hold, and without faces that have parted at one end. With
+    ``follow``, it also tells how far the blocks go that fail.
 
     With Coulomb friction the forces of a system are not unique: strengths are reduced step by step from an equilibrium,
     and another path may give a factor that differs by some thousandths where contacts slide and stick again.
@@ -145,7 +151,8 @@ def factor_of_safety(
     settings = replace(settings or DdaSettings(), dynamic_factor=0.0)
     search = _Search(blocks, materials, joints, joint_index, settings, chosen, under, rest, tolerance)
     counted = Counted(toes, whole_faces)
-    return search.answer(counted, watch) if compare else search.run(counted, watch=watch)
+    found, counted = search.answer(counted, watch) if compare else (search.run(counted, watch=watch), counted)
+    return search.with_travel(found, counted) if follow else found
 
 
 @dataclass(frozen=True)
@@ -178,8 +185,9 @@ class _Search:
         system.finder.toes, system.finder.whole_faces = counted.toes, counted.whole_faces
         return system
 
-    def answer(self, counted: Counted, watch: Callable[[Trial], None] | None) -> FactorOfSafety:
-        """The factor with its bolt forces, and the factors with other assumptions about toes and partly open faces."""
+    def answer(self, counted: Counted, watch: Callable[[Trial], None] | None) -> tuple[FactorOfSafety, Counted]:
+        """The factor with its bolt forces, and the factors with other assumptions about toes and partly open faces; and
+        its own assumptions."""
         try:
             found, counted = self._found(counted, watch)
         except NotConverged:
@@ -187,16 +195,36 @@ class _Search:
                 raise
             sharp = replace(counted, toes=SHARP)
             found = self.run(sharp)
-            return with_toes(self.blocks, found, self._bearing(found, sharp), None, True)
+            return with_toes(self.blocks, found, self._bearing(found, sharp), None, True), sharp
         found = with_anchors(self.blocks, self.under.loads, found)
         if counted.toes != FREE:
             found = self._with_toes(found, counted)
         if not math.isfinite(found.upper):
-            return with_no_mechanism(found)
+            return with_no_mechanism(self.blocks, found), counted
         largest = self._admissible_beyond(found, counted)
         if self._cohesive:
             found = self._with_parted_faces(found, counted, largest is not None)
-        return with_admissible_forces(found, largest)
+        return with_admissible_forces(found, largest), counted
+
+    def with_travel(self, found: FactorOfSafety, counted: Counted) -> FactorOfSafety:
+        """The answer ``found`` with the distance that its blocks go, up to the size √area of the fastest."""
+        if not found.moving:
+            return found
+        reach = math.sqrt(abs(float(self.blocks.areas()[found.moving[0]])))
+
+        coarse = replace(self, settings=replace(self.settings, max_step_cuts=min(self.settings.max_step_cuts, _CUTS)))
+
+        def followed(toes: str) -> Travel:
+            system = coarse.system(found.travels_at, replace(counted, toes=toes))
+            return travel(system, found.state, self.under.loads, self.under.time, reach)
+
+        way = followed(counted.toes)
+        sharp = None
+        if way.rests and counted.toes != SHARP and not found.toes:
+            other = followed(SHARP)
+            far, short = float(way.moved.max()), float(other.moved.max())
+            sharp = short if other.rests and short < far * (1.0 - _BEYOND) else None
+        return replace(found, travel=way, sharp_travel=sharp)
 
     def _found(self, counted: Counted, watch: Callable[[Trial], None] | None) -> tuple[FactorOfSafety, Counted]:
         """The factor and its assumptions: the larger of the factors with cohesion on whole faces and on closed contacts
@@ -314,13 +342,22 @@ class _Search:
                 raise _NoOther
             if trial.factor <= 1.0 / _FARTHEST:
                 raise NotConverged(
-                    f"the blocks do not stand even with joints {_FARTHEST:g} times as strong: {trial.reason}; "
-                    "the moving blocks do not depend on joint strength, or no contact states were found"
+                    f"the blocks do not stand even with joints {_FARTHEST:g} times as strong: "
+                    f"{self._moving(trial)}{trial.reason}; the moving blocks do not depend on joint strength, or no "
+                    "contact states were found"
                 )
             trial = bracket.begin((_NEARBY if known else 0.5) * trial.factor)
         if first < above < math.inf and not bracket.tried(above).stable:
             raise _NoOther
         return bracket.closed(self.tolerance)
+
+    def _moving(self, failed: Trial) -> str:
+        """Text that names the blocks that move in a ``failed`` trial, the fastest first."""
+        moving = moving_in(failed)
+        if not moving:
+            return ""
+        names = ", ".join(repr(self.blocks.names[b] if self.blocks.names else f"block {b}") for b in moving[:_NAMED])
+        return f"{names}{' and others' if len(moving) > _NAMED else ''}: "
 
 
 class _NoOther(Exception):

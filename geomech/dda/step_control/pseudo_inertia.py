@@ -6,13 +6,14 @@ pressed by 2 M v tan ψ/dt). Solved again about the displacement d_k found befor
 
     2M/dt² (d_{k+1} − d_k) + K d_{k+1} = F,
 
-what inertia takes falls by M/(M + K dt²/2) each time, to nothing on blocks that are held. On others it stays, and these
-keep their first displacement.
+what inertia takes falls by q = M/(M + K dt²/2) each time, to nothing on blocks that are held. On others it stays, and these
+keep their first displacement. Bolts are soft: on blocks that they hold, q is little below 1. Their displacement is
+extrapolated to the sum of the geometric series, d_k + (d_{k+1} − d_k)/(1 − q) (Aitken 1926), and solved again from there.
 """
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -28,29 +29,108 @@ _NOTHING = 1e-6
 _FALLS, _SOLUTIONS = 0.5, 12
 
 
-def balanced_attempt(system: SteppedSystem, start: StepStart, dt: float, found: ContactSet, cuts: int) -> Attempt:
+#: A bolt holds a block if it would stop it within this part of the block's size √area, and what inertia takes falls by
+#: more than rounding, relative to it. Of a shortfall that is extrapolated, this share must be gone, and less than the last
+#: part may be left in the opposite direction: friction would hold a block that has gone too far.
+_WITHIN, _ROUNDED, _GONE, _BACK = 0.1, 1e-9, 0.5, 1e-3
+
+
+def balanced_attempt(
+    system: SteppedSystem, start: StepStart, dt: float, found: ContactSet, cuts: int, reach: float = 0.0
+) -> Attempt:
     """A static step of ``dt`` from ``start`` in which the blocks that are held bear their loads without inertia;
-    arguments as for `Attempt`. Raises `Unsettled`."""
-    attempt = Attempt(system, start, dt, found, cuts)
+    arguments as for `Attempt`. Blocks on bolts go by ``reach`` m at most to where these hold them. Raises
+    `Unsettled`."""
+    attempt = short = Attempt(system, start, dt, found, cuts)
     left, size = attempt.inertia_and_size()
-    nothing = _NOTHING * size
-    held = left > nothing
+    begun, nothing, ahead = left, _NOTHING * size, None
+    held, bolted = left > nothing, reach > 0.0 and _bolts_hold(start)
     for _ in range(_SOLUTIONS):
         if not (held & (left > nothing)).any():
             break
-        rest = np.where(held[:, None], attempt.increment, 0.0)
-        same = attempt.found.trying(attempt.found.rows(attempt.settled), without_lost=True)
-        try:
-            again = Attempt(system, replace(start, rest=rest), dt, same, cuts)
-        except Unsettled:
+        again = _again(system, start, attempt, np.where(held[:, None], attempt.increment, 0.0))
+        if again is None:
             break
-        again.iterations += attempt.iterations
         after = again.inertia_and_size()[0]
         falls = after <= np.maximum(_FALLS * left, nothing)
         if falls[held].all():
             attempt, left = again, after
-        elif attempt.rest is None:
-            held &= falls
-        else:
+            continue
+        drawn = _Drawn.of(attempt, again, left, after, held & ~falls, reach) if bolted else None
+        there = None if drawn is None else _again(system, start, again, drawn.rest(again, held & falls))
+        if drawn is not None and there is not None and drawn.bears(there, left, held & falls, nothing):
+            attempt, left, held = there, there.inertia_and_size()[0], (held & falls) | drawn.blocks
+            ahead = drawn.ahead if ahead is None else ahead
+            if drawn.share < 1.0:
+                break
+            continue
+        if attempt.rest is not None:
             break
-    return attempt
+        held &= falls
+    return (
+        short if ahead is not None and _too_far(attempt, ahead, left > np.maximum(_BACK * begun, nothing)) else attempt
+    )
+
+
+def _again(system: SteppedSystem, start: StepStart, attempt: Attempt, rest: np.ndarray) -> Attempt | None:
+    """The step of ``attempt`` solved again about the displacements ``rest`` (n_blocks, 6); None where contacts find no
+    states."""
+    same = attempt.found.trying(attempt.found.rows(attempt.settled), without_lost=True)
+    try:
+        again = Attempt(system, replace(start, rest=rest), attempt.dt, same, attempt.cuts)
+    except Unsettled:
+        return None
+    again.iterations += attempt.iterations
+    return again
+
+
+def _bolts_hold(start: StepStart) -> bool:
+    """Whether bolts are installed that can take more load."""
+    rows = start.state.bolts
+    most = np.array([bolt.yield_force for bolt in start.loads.bolts])[: len(rows)]
+    return bool((rows["installed"] & ~rows["broken"] & (rows["force"] < most)).any())
+
+
+def _too_far(attempt: Attempt, ahead: np.ndarray, unbalanced: np.ndarray) -> bool:
+    """Whether an ``unbalanced`` block has gone farther ``ahead``, (n_blocks, 6), than to where its bolt holds it."""
+    if attempt.rest is None:
+        return False
+    back = np.einsum("na,na->n", attempt.increment - attempt.rest, ahead) < 0.0
+    return bool((back & unbalanced).any())
+
+
+@dataclass(frozen=True, eq=False)
+class _Drawn:
+    """Blocks that bolts will hold: ``blocks`` (n_blocks,) bool, the displacement ``ahead`` (n_blocks, 6) of them after
+    that of an attempt, and the ``share`` of it that a step may make."""
+
+    blocks: np.ndarray
+    ahead: np.ndarray
+    share: float
+
+    @classmethod
+    def of(
+        cls, attempt: Attempt, again: Attempt, left: np.ndarray, after: np.ndarray, slow: np.ndarray, reach: float
+    ) -> _Drawn | None:
+        """From two attempts and what inertia takes in each, (n_blocks,) N; of the blocks ``slow``. None for none."""
+        size = np.sqrt(attempt.moments[:, 0])
+        gain = 1.0 - after / np.maximum(left, 1e-300)
+        slow = slow & (gain > _ROUNDED)
+        ahead = np.where(slow[:, None], again.increment - attempt.increment, 0.0)
+        ahead /= np.where(slow, gain, 1.0)[:, None]
+        far = np.hypot(ahead[:, 0], ahead[:, 1]) + size * np.abs(ahead[:, 2])
+        slow &= far <= _WITHIN * size
+        if not slow.any():
+            return None
+        return cls(slow, ahead * slow[:, None], min(1.0, reach / max(float(far[slow].max()), 1e-300)))
+
+    def bears(self, there: Attempt, left: np.ndarray, held: np.ndarray, nothing: np.ndarray) -> bool:
+        """Whether in the attempt ``there``, solved about `rest`, inertia takes as much less than what was ``left``,
+        (n_blocks,) N, as it should. ``held``: other blocks; ``nothing``: what counts as none."""
+        least = np.where(self.blocks, 1.0 - _GONE * self.share, _FALLS)
+        after = there.inertia_and_size()[0]
+        return bool((after <= np.maximum(least * left, nothing))[held | self.blocks].all())
+
+    def rest(self, again: Attempt, held: np.ndarray) -> np.ndarray:
+        """(n_blocks, 6) displacement to solve about, with that of ``again`` for the blocks ``held``."""
+        return np.where((held | self.blocks)[:, None], again.increment + self.share * self.ahead, 0.0)

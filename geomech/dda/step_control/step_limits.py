@@ -99,6 +99,8 @@ class StepLimits:
         self.displacement = settings.max_displacement_ratio * half_diagonal
         self._work = work
         self._warned_of: set[tuple[int, int]] = set()
+        #: False where blocks are followed only to see how far they go.
+        self.warns = True
 
     def predicted(
         self, vertices: np.ndarray, carried: np.ndarray, moments: np.ndarray, dt: float, gravity: np.ndarray
@@ -250,7 +252,7 @@ class StepLimits:
         rows = result.contacts
         least = np.minimum(self._size[rows["block"]], self._size[rows["other"]])
         rows = rows[(rows["state"] != OPEN) & (-(rows["gap"] + rows["lift"]) > _DEEP * least)]
-        if not len(rows):
+        if not (len(rows) and self.warns):
             return
         vertices = np.ascontiguousarray(result.state.vertices)
         vertex, edge = (np.ascontiguousarray(rows[name]) for name in ("vertex", "edge"))

@@ -63,6 +63,15 @@ def test_a_sliding_block_is_named_once(caplog):
     assert f"cycle {found[0].cycle}, t = {found[0].time:g} s" in warning and "dda.dynamic_factor" in warning
 
 
+@pytest.mark.parametrize(("friction_deg", "warns"), [(20.0, True), (40.0, False)])
+def test_a_run_that_ends_out_of_balance_says_so(caplog, friction_deg, warns):
+    """Three steps are too few to call what slides a mechanism."""
+    problem = on_a_slope(30.0, friction_deg)
+    with caplog.at_level(logging.WARNING, "geomech"):
+        assert not [e for c in cycles(replace(problem, run=RunSettings(end_time=0.03))) for e in c.events]
+    assert ("ends out of balance: 9" in caplog.text) == warns
+
+
 def test_a_run_may_end_at_a_mechanism():
     seen = list(cycles(on_a_slope(30.0, 20.0, stop_at=("mechanism",))))
     assert seen[-1].number < 10 and seen[-1].events[-1].kind == "mechanism"

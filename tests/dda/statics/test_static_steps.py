@@ -113,3 +113,30 @@ def test_a_block_on_a_soft_bolt_goes_on_at_any_step_and_is_told_to_be_out_of_bal
     assert result.dt == dt and result.statistics["unbalanced_ratio"] > 0.9
     # Each step falls as far as inertia and bolt allow: d = m g/(2m/dt² + k).
     assert blocks.vertices[4, 1] - state.vertices[4, 1] == pytest.approx(3 * 9.81 * dt**2 / 2, rel=2e-2)
+
+
+@pytest.mark.parametrize(("stiffness", "dt"), [(1e6, 1e-2), (1e7, 1e-2), (1e8, 1e-3)])
+def test_a_static_run_takes_a_block_to_where_a_soft_bolt_holds_it(verified, stiffness, dt):
+    """On a plane at 40° at 30° of friction the bolt along it comes to bear W (sin 40° − cos 40° tan 30°): in a few steps
+    in which inertia alone would let it take a thousandth of that, and not more, which friction would keep."""
+    slope = math.radians(40)
+    turn = np.array([[math.cos(slope), math.sin(slope)], [-math.sin(slope), math.cos(slope)]])
+    outlines = [np.array([[-6, -3], [8, -3], [8, 0], [-6, 0]]), np.array([[0, 0], [2, 0], [2, 1], [0, 1]])]
+    blocks = Blocks.from_polygons([outline @ turn for outline in outlines], fixed=[True, False])
+    bolt = Bolt(1, tuple([1.0, 0.5] @ turn), GROUND, tuple([6.0, 0.5] @ turn), stiffness)
+    system = dda.BlockSystem(
+        blocks, [Material("rock", 20e9, 0.25, density=2600.0)], [JointLaw("joint", math.radians(30))],
+        settings=DdaSettings(dynamic_factor=0.0),
+    )  # fmt: skip
+    state, loads = State.at_rest(blocks), Loads(gravity=History.constant([0.0, -9.81]), bolts=(bolt,))
+    for _ in range(20):
+        result = system.step(state, loads, dt)
+        state = result.state
+    needed = 2600.0 * 9.81 * 2.0 * (math.sin(slope) - math.cos(slope) * math.tan(math.radians(30)))
+    print(f"{stiffness:g} N/m, {dt:g} s: {state.bolts['force'][0] / needed - 1:.1e} off")
+    verified(
+        f"block that a bolt of {stiffness:g} N/m holds on an incline, static steps of {1e3 * dt:g} ms: force of the bolt", None,
+        "W (sin β − cos β tan φ)", found=float(state.bolts["force"][0]), exact=needed, unit="N/m",
+    )  # fmt: skip
+    assert state.bolts["force"][0] == pytest.approx(needed, rel=2e-3)
+    assert result.statistics["unbalanced_ratio"] < 1e-6
