@@ -225,6 +225,8 @@ class Coupling:
             self.mechanism.warn_at_the_end(self.now.state.time)
         if not self.endless:
             check_dissipation(self.now.budget, self.now.state.time, self.static)
+            if not self.problem.dda.equilibrium:
+                dda.warn_of_toes_at_rest(self.now.system, self.now.state, self.problem.loads)
 
     def _load_step(self):
         """All passes at one load. Returns True when a stop event has occurred."""

@@ -19,7 +19,7 @@ from .kinematics.strain_limits import ElasticRange
 from .loads.force_records import EDGE_FORCE, POINT_FORCE
 from .loads.load_vectors import AppliedForces
 from .results import CrackResponse, NotConverged, StepResult, contact_resultants
-from .statics.counted_resistance import warn_of_toes
+from .statics.counted_resistance import warn_of_toes, warn_of_toes_at_rest
 from .statics.in_situ_stress import InSituState, NoInSituEquilibrium, in_situ_state
 from .statics.mobilised_strength import MobilisedJoint, mobilised_joints
 from .statics.partial_factors import PartialFactors, design_problem
@@ -64,6 +64,7 @@ __all__ = [
     "mobilised_joints",
     "run",
     "warn_of_toes",
+    "warn_of_toes_at_rest",
 ]
 
 __getattr__ = renamed_exports(__name__, {"ToldContacts": "InheritedContacts"}, globals())

@@ -11,7 +11,7 @@ from .energy_balance import EnergyBudget
 from .excavation import until_next_event
 from .kinematics.strain_limits import ElasticRange
 from .results import NotConverged, StepResult
-from .statics.counted_resistance import warn_of_toes
+from .statics.counted_resistance import warn_of_toes, warn_of_toes_at_rest
 from .statics.pseudo_time_equilibrium import equilibrium
 from .step_control.adaptive_time_step import StepLength
 from .step_control.overlap_energy import Overlap, OverlapWatch
@@ -101,6 +101,8 @@ def run(
         if watch is not None:
             watch(replace(result, state=seen))
         yield seen
+    if not settings.equilibrium:
+        warn_of_toes_at_rest(system, state, loads)
 
 
 def _at_rest(system: BlockSystem, state: State, loads: Loads, load_time: float) -> State:

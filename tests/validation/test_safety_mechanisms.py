@@ -91,6 +91,25 @@ def test_sharp_toes_hold_where_corners_are_not_rounded_and_are_named():
     assert found.as_dict(blocks)["factor_without_toes"] == found.other_factor
 
 
+@pytest.mark.parametrize("dynamic", [False, True])
+def test_runs_name_sharp_toes_that_hold(caplog, dynamic):
+    """tan 30°/tan 35°: the block should slide. Its tip in the corner of plane and floor holds it; a floor lower down does not."""
+    settings = DdaSettings(time_step=0.01, dynamic_factor=float(dynamic))
+
+    def warned(drop, end):
+        blocks, loads = above_a_floor(drop)
+        caplog.clear()
+        law = JointLaw("plane", math.radians(30))
+        *_, last = dda.run(blocks, [ROCK], [law], loads, settings, end)
+        moved = np.hypot(*(last.vertices - blocks.vertices).T).max()
+        return moved, [text for text in caplog.messages if "as sharp as drawn" in text]
+
+    moved, (line,) = warned(0.0, 0.3)
+    assert moved < 1e-3 and "the toe of 'block 1' touches 'block 0' at x = 0, y = 0 m" in line
+    moved, lines = warned(0.5, 0.3)
+    assert moved > 1e-3 and not lines
+
+
 @pytest.mark.parametrize(("drop", "friction_deg"), [(0.5, 30), (0.5, 40), (60.0, 30), (0.0, 30)])
 def test_how_far_a_failed_block_goes_is_told(drop, friction_deg):
     """Down a plane at 35° to a floor: drop/sin 35° with a sharp tip; farther by its rounding, by which the toe stands off;

@@ -30,6 +30,9 @@ _LISTED, _CARRYING = 8, 3
 #: A toe is an obstacle if its block approaches what it touches by more than this fraction of the fastest block's
 #: displacement, and bears load if its force is more than this fraction of its block's weight.
 _OBSTACLE, _BEARS = 1e-3, 1e-3
+#: In runs, a toe may hold its block if it bears more than this fraction of its weight, and the block has moved by less than
+#: this part of its size √area.
+_HOLDS, _UNMOVED = 1e-2, 1e-3
 #: Relative difference below which the bound of admissible forces equals the factor of rigid blocks.
 _AS_RIGID = 1e-2
 #: Relative distance from the yield force within which a bolt yields.
@@ -95,6 +98,30 @@ def warn_of_toes(
             "`geomech safety`",
             load_time, _where(system.blocks, toes), "s" if one else "", sum(toe.force for toe in toes) / 1e3,
             "its" if one else "their", "" if one else "s",
+        )  # fmt: skip
+
+
+def warn_of_toes_at_rest(system: BlockSystem, state: State, loads: Loads) -> None:
+    """Log the sharp toes that bear load at the end of a run, in ``state``, under blocks that have hardly moved: runs take
+    toes as sharp as drawn, and where they hold, nothing else tells whether the blocks would stand without."""
+    finder = system.finder
+    before = finder.toes
+    try:
+        finder.toes = ROUNDED
+        toes = toes_in_the_way(system, state)
+    finally:
+        finder.toes = before
+    blocks = system.blocks
+    weight = system.mass * float(np.hypot(*loads.gravity.at(state.time)))
+    moved = np.hypot(*(blocks.mean_vertices(state.vertices) - blocks.mean_vertices(blocks.vertices)).T)
+    still = moved <= _UNMOVED * np.sqrt(np.abs(blocks.areas()))
+    held = tuple(toe for toe in toes if still[toe.block] and toe.force > _HOLDS * weight[toe.block])
+    if held:
+        log.warning(
+            "t = %g s: %s, as sharp as drawn, and bear%s %.4g kN/m. Sharp tips can hold what rounded ones would let go: "
+            '`geomech safety` tells the factor with and without, dda.equilibrium = "start" whether the blocks stand',
+            state.time, _where(blocks, held), "s" if len({toe.block for toe in held}) == 1 else "",
+            sum(toe.force for toe in held) / 1e3,
         )  # fmt: skip
 
 
