@@ -16,6 +16,7 @@ from ..kinematics.simplex_integration import block_moments
 from ..loads.bolts import labels
 from ..open_close.contact_set import ContactSet
 from ..results import CrackResponse
+from ..step_control.relative_motion import Windows
 from ..system import BlockSystem
 from .displacement_limit import FARTHEST, MOVED
 from .pseudo_time_equilibrium import equilibrium
@@ -43,9 +44,12 @@ _NEARLY = 0.9
 _TAKEN = 1e-3
 
 
-def toes_in_the_way(system: BlockSystem, state: State, failed: Trial | None = None) -> tuple[Toe, ...]:
-    """The toes in ``state`` that are obstacles to the mechanism of the trial ``failed``; all toes if None."""
-    found = system.contacts_near(state)
+def toes_in_the_way(
+    system: BlockSystem, state: State, failed: Trial | None = None, found: ContactSet | None = None
+) -> tuple[Toe, ...]:
+    """The toes in ``state`` that are obstacles to the mechanism of the trial ``failed``; all toes if None. ``found``: the
+    contacts near ``state``, searched for if None."""
+    found = system.contacts_near(state) if found is None else found
     off = system.finder.toes_among(found, state.vertices)
     borne = {(int(row["vertex"]), int(row["edge"])): row for row in state.contacts[state.contacts["state"] != OPEN]}
     centre = block_moments(state.vertices, system.next, system.vertex_start)[:, 1:3]
@@ -104,17 +108,24 @@ def warn_of_toes(
 def warn_of_toes_at_rest(system: BlockSystem, state: State, loads: Loads) -> None:
     """Log the sharp toes that bear load at the end of a run, in ``state``, under blocks that have hardly moved: runs take
     toes as sharp as drawn, and where they hold, nothing else tells whether the blocks would stand without."""
-    finder = system.finder
+    finder, blocks = system.finder, system.blocks
+    rows = state.contacts[state.contacts["state"] != OPEN]
+    if not len(rows):
+        return
+    # Only blocks that press on one another are looked at, so that no list of neighbours changes by what a run asks at its end.
+    pairs = np.unique(np.sort(np.stack([rows["block"], rows["other"]], axis=1), axis=1), axis=0).astype(np.int64)
+    size = np.sqrt(np.abs(blocks.areas()))
+    near = Windows(pairs, 2.0 * system.settings.corner_rounding * size[pairs].min(axis=1))
+    found = finder.find(state.writable(), np.ascontiguousarray(state.vertices), near, lumped=True)
     before = finder.toes
     try:
         finder.toes = ROUNDED
-        toes = toes_in_the_way(system, state)
+        toes = toes_in_the_way(system, state, found=found)
     finally:
         finder.toes = before
-    blocks = system.blocks
     weight = system.mass * float(np.hypot(*loads.gravity.at(state.time)))
     moved = np.hypot(*(blocks.mean_vertices(state.vertices) - blocks.mean_vertices(blocks.vertices)).T)
-    still = moved <= _UNMOVED * np.sqrt(np.abs(blocks.areas()))
+    still = moved <= _UNMOVED * size
     held = tuple(toe for toe in toes if still[toe.block] and toe.force > _HOLDS * weight[toe.block])
     if held:
         log.warning(
