@@ -67,7 +67,7 @@ class Outcome:
         area, free = np.abs(blocks.areas()), ~np.asarray(blocks.fixed, bool)
         density = np.array([material.density for material in problem.materials])[blocks.material]
         mass = np.where(free, density * area, 0.0)
-        moved = np.hypot(*(blocks.mean_vertices(state.vertices) - blocks.mean_vertices(blocks.vertices)).T)
+        moved = np.hypot(*blocks.displacements(state.vertices).T)
         moving = moved > MOVES * np.sqrt(area)
         found = {
             "moving_share": float(mass[moving].sum() / mass.sum()) if mass.any() else 0.0,
@@ -118,8 +118,8 @@ class Repeats:
             except KeyboardInterrupt:
                 log.warning("interrupted while the run was repeated: its scatter is not complete")
                 return
-            except Exception as error:
-                failure = f"{type(error).__name__}: {error}"
+            except Exception as raised:
+                failure = f"{type(raised).__name__}: {raised}"
             told[kind] = scatter = _scatter(base, outcome.values(self.problem))
             if failure is not None:
                 told[kind] = {"failed": failure}

@@ -280,7 +280,7 @@ def _motion(job: Job, problem: Problem, last: Any) -> dict[str, Any]:
     from ..model.blocks.key_blocks import FALLS, SLIDES, key_blocks
 
     blocks, state = last.blocks, last.state
-    moved = blocks.mean_vertices(state.vertices) - blocks.mean_vertices(blocks.vertices)
+    moved = blocks.displacements(state.vertices)
     far = np.hypot(moved[:, 0], moved[:, 1])
     size = np.sqrt(np.abs(blocks.areas()))
     moving = np.flatnonzero(~np.asarray(blocks.fixed, bool) & (far > job.settings["moved_share"] * size))

@@ -124,7 +124,7 @@ def warn_of_toes_at_rest(system: BlockSystem, state: State, loads: Loads) -> Non
     finally:
         finder.toes = before
     weight = system.mass * float(np.hypot(*loads.gravity.at(state.time)))
-    moved = np.hypot(*(blocks.mean_vertices(state.vertices) - blocks.mean_vertices(blocks.vertices)).T)
+    moved = np.hypot(*blocks.displacements(state.vertices).T)
     still = moved <= _UNMOVED * size
     held = tuple(toe for toe in toes if still[toe.block] and toe.force > _HOLDS * weight[toe.block])
     if held:

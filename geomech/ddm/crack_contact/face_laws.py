@@ -156,8 +156,10 @@ class FaceLaws:
 
 class _Places(NamedTuple):
     """Where nodes of elements lie on former ones, (n_elements, p+1) each: number of the former ``element`` (−1: none),
-    its ``nearest`` node, and the position on it (``along``, −1 to 1)."""
+    its ``nearest`` node, and the position on it (``along``, −1 to 1). ``kept`` (n_elements,): whether an element is a
+    former one, unchanged."""
 
+    kept: np.ndarray
     element: np.ndarray
     nearest: np.ndarray
     along: np.ndarray
@@ -181,7 +183,7 @@ def _places(was: ElementSet, now: ElementSet) -> _Places:
             k = int(inside[j].argmax())
             t = 2 * along[j, k] - 1
             element[e, j], nearest[e, j], place[e, j] = k, np.abs(nodes - t).argmin(), np.clip(t, -1, 1)
-    return _Places(element, nearest, place)
+    return _Places(kept, element, nearest, place)
 
 
 def carried_over(memory: FaceMemory, now: ElementSet) -> FaceMemory:
@@ -193,11 +195,10 @@ def carried_over(memory: FaceMemory, now: ElementSet) -> FaceMemory:
     at = _places(was, now)
     rest = np.zeros((now.n, now.per))
     old = memory.rest.reshape(was.n, was.per)
-    same = now.found_in(was)
-    kept, known = same >= 0, at.element >= 0
-    if kept.any():
-        rest[kept] = old[same[kept]]
-    for e, j in np.argwhere(known & ~kept[:, None]).tolist():
+    known = at.element >= 0
+    if at.kept.any():
+        rest[at.kept] = old[at.element[at.kept, 0]]
+    for e, j in np.argwhere(known & ~at.kept[:, None]).tolist():
         k, t = int(at.element[e, j]), at.along[e, j]
         sign = np.sign(was.tangent[k] @ now.tangent[e])
         shape = shape_functions.at(was.family, was.order, int(was.kind[k]), np.array([t]))[0]

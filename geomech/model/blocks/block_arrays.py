@@ -218,6 +218,11 @@ class Blocks:
         first = vertices[start]
         return first + np.add.reduceat(vertices - first[self.vertex_block], start, axis=0) / self._vertex_count
 
+    def displacements(self, vertices: np.ndarray) -> np.ndarray:
+        """(n_blocks, 2) m, displacement of the mean of each block's vertices from the reference coordinates to
+        ``vertices``."""
+        return self.mean_vertices(vertices) - self.mean_vertices(self.vertices)
+
     @cached_property
     def _vertex_count(self) -> np.ndarray:
         return np.diff(self.vertex_start)[:, None]

@@ -125,7 +125,7 @@ def _spares(owner: np.ndarray, angle: np.ndarray) -> Iterator[tuple[int, float, 
 
 
 def _rank(out: np.ndarray, blocks: Blocks, state: State, fixed: np.ndarray) -> None:
-    moved = blocks.mean_vertices(state.vertices) - blocks.mean_vertices(blocks.vertices)
+    moved = blocks.displacements(state.vertices)
     speed = state.velocity[:, :2]
     base = np.asarray(blocks.fixed, dtype=bool)
     if base.any():

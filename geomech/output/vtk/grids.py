@@ -80,7 +80,7 @@ def blocks_grid(
 
 def _rank(blocks: Blocks, state: State) -> np.ndarray:
     """(n_blocks,) 0 for the block that has moved farthest, and so on."""
-    moved = blocks.mean_vertices(state.vertices) - blocks.mean_vertices(blocks.vertices)
+    moved = blocks.displacements(state.vertices)
     rank = np.empty(blocks.n_blocks, int)
     rank[np.argsort(-np.einsum("ij,ij->i", moved, moved), kind="stable")] = np.arange(blocks.n_blocks)
     return rank

@@ -217,7 +217,7 @@ def draw_moved(blocks: Blocks, vertices: np.ndarray, title: str, path: Path) -> 
     """Blocks at their final ``vertices``, coloured by displacement, m."""
     from matplotlib.collections import PolyCollection
 
-    moved = blocks.mean_vertices(vertices) - blocks.mean_vertices(blocks.vertices)
+    moved = blocks.displacements(vertices)
     far = np.hypot(moved[:, 0], moved[:, 1])
     own = [vertices[blocks.vertex_start[b] : blocks.vertex_start[b + 1]] for b in range(blocks.n_blocks)]
     fixed = np.asarray(blocks.fixed, bool)
