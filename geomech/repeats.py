@@ -176,12 +176,12 @@ def _relative(one: float, other: float) -> float:
 
 
 def _in_words(rows: dict[str, Any]) -> str:
-    """Quantities that scatter by more than `LARGEST_SCATTER`, the largest scatter first: "peak load 5.1e+06 for 5e+06 Pa"."""
+    """Quantities that scatter by more than `LARGEST_SCATTER`, the largest scatter first: "peak load 5.1e+06 instead of 5e+06 Pa"."""
     worst = sorted(
         (key for key in rows if rows[key]["scatter"] > LARGEST_SCATTER), key=lambda key: -rows[key]["scatter"]
     )
     told = []
     for key in worst:
         words, unit = QUANTITIES[key]
-        told.append(f"{words} {rows[key]['repeated']:.4g} for {rows[key]['run']:.4g}{unit}")
+        told.append(f"{words} {rows[key]['repeated']:.4g} instead of {rows[key]['run']:.4g}{unit}")
     return ", ".join(told)

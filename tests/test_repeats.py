@@ -91,7 +91,7 @@ def test_what_differs_is_warned_of_with_both_values(scene, tmp_path, caplog):
     assert summary["scatter"]["steps"]["quantities"]["largest_displacement_m"]["scatter"] == pytest.approx(0.5)
     (line,) = [text for text in caplog.messages if "repeated" in text]
     assert line.startswith("repeated with steps half as large, the run differs: work of gravity")
-    assert "largest displacement 0.002207 for 0.004415 m" in line
+    assert "largest displacement 0.002207 instead of 0.004415 m" in line
 
 
 def test_a_repetition_that_fails_or_is_interrupted_leaves_the_run_as_it_is(scene, tmp_path, caplog):

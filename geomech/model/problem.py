@@ -237,7 +237,7 @@ CHANGES = ("opening", "parting", "closure", "slip", "sliding", "stick", "debondi
 STOPS = ("initiation", "birth", "coalescence", "self", "daylighting", "split", "mechanism", *CHANGES)
 #: What `RunSettings.repeat` may name, and its words in messages.
 REPEATS = {
-    "noise": "round-off of coordinates",
+    "noise": "coordinates changed by round-off",
     "steps": "steps half as large",
     "increment": "growth increments half as long",
     "elements": "twice as many boundary elements",
