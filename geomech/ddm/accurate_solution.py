@@ -13,6 +13,7 @@ from .fracture.chord_error import chord_errors
 from .fracture.sif_error_estimate import floor, warn
 from .fracture.target_error import TargetMissed
 from .fracture.tip_factors import factors, largest, negligible
+from .iterative.gmres import NotSolved
 from .kernels import shape_functions
 from .loads.body_loads import BodyLoad
 from .solution import Solution
@@ -31,7 +32,7 @@ def solve_to(
 
     Solves on meshes of increasing order, at least two, until K of the last two differ by no more than the target. The
     result is the last solution; its ``tip_errors`` are the differences from the one before, usually ten times the true
-    error. Raises `TargetMissed`, with the last solution, if the highest order does not reach the target. ``body``:
+    error. Raises `TargetMissed`, with the last solution, if the highest order that can be solved does not reach the target. ``body``:
     further arguments of `Body`.
 
     >>> rock = Material("rock", 17e9, 0.21)
@@ -47,7 +48,11 @@ def solve_to(
     before = Body(loops, cracks, material, settings, **body).solve(load)
     while settings.order < shape_functions.MAX_ORDER:
         settings = finer(settings)
-        solution = before.body.remeshed(settings).solve(load)
+        try:
+            solution = before.body.remeshed(settings).solve(load)
+        except NotSolved as failure:
+            # Too many unknowns to factor, and round-off beyond what the iteration needs.
+            raise TargetMissed(before, target_error) from failure
         k = factors(solution)
         errors = np.abs(k - factors(before)) + floor(solution.body) * largest(k)
         if errors.max(initial=0.0) <= target_error * largest(k) + negligible(solution):

@@ -61,13 +61,24 @@ def of_order(settings: DdmSettings, order: int, target: float) -> DdmSettings:
 
 
 def finer(settings: DdmSettings) -> DdmSettings:
-    """The next even order, graded one step deeper; at the highest order the even one below, since the difference
-    between the two is all that is needed."""
-    up = settings.order < shape_functions.MAX_ORDER
+    """The next even order, graded one step deeper; at the highest order `coarser`, since the difference between the two
+    is all that is needed."""
+    if settings.order >= shape_functions.MAX_ORDER:
+        return coarser(settings)
     error = settings.grading_error
     return replace(
         settings,
-        order=settings.order + (2 if settings.order % 2 == 0 else 1) * (1 if up else -1),
-        grading_layers=settings.grading_layers + 2 if up else settings.grading_layers,
-        grading_error=None if error is None else error / 10 if up else min(10 * error, 0.5),
+        order=settings.order + (2 if settings.order % 2 == 0 else 1),
+        grading_layers=settings.grading_layers + 2,
+        grading_error=None if error is None else error / 10,
+    )
+
+
+def coarser(settings: DdmSettings) -> DdmSettings:
+    """The next lower even order, graded one step less."""
+    error = settings.grading_error
+    return replace(
+        settings,
+        order=max(settings.order - (2 if settings.order % 2 == 0 else 1), 0),
+        grading_error=None if error is None else min(10 * error, 0.5),
     )

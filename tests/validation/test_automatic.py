@@ -14,6 +14,7 @@ import pytest
 from geomech import ddm
 from geomech.ddm.adaptivity import for_target
 from geomech.ddm.fracture.tip_factors import factors, largest
+from geomech.ddm.iterative.gmres import NotSolved
 from geomech.model import Cracks, DdmSettings, Material
 from geomech.reference.cracks import fracture
 from geomech.reference.specimens import two_cracks
@@ -222,6 +223,25 @@ def test_a_target_that_no_mesh_meets_is_refused():
         ddm.solve_to([], cracks, ROCK, bending, 1e-11)
     for missed in (one.value, other.value):
         assert 1e-11 < missed.reached == said(missed.solution)
+
+
+def test_a_mesh_that_cannot_be_solved_misses_the_target(monkeypatch):
+    """Too many unknowns to factor, and round-off beyond what the iteration needs: the coarser solution is reported with
+    its difference to a coarser one, as where no finer mesh is left."""
+    angle = np.linspace(0.25, 0.75, 8) * math.pi
+    arc = Cracks.from_polylines([np.column_stack([np.cos(angle), np.sin(angle)])], aperture=math.inf)
+
+    def stopped(*_, **__):
+        raise NotSolved("round-off")
+
+    monkeypatch.setattr("geomech.ddm.body.FACTORABLE", 100)
+    body = ddm.Body([], arc, ROCK, DdmSettings(target_error=1e-6))
+    monkeypatch.setattr("geomech.ddm.body.is_compressed", lambda _, n, *__: n > body.faces.n_unknowns)
+    monkeypatch.setattr("geomech.ddm.iterative.crack_gmres.gmres", stopped)
+    with pytest.raises(ddm.TargetMissed) as missed:
+        body.solve(MIXED)
+    assert missed.value.solution.body is body
+    assert missed.value.reached == said(missed.value.solution) > 1e-6
 
 
 @pytest.mark.parametrize("nodes", ["chebyshev", "gauss", "equal"])

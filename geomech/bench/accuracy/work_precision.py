@@ -16,6 +16,7 @@ from functools import partial
 from pathlib import Path
 from typing import TypeVar
 
+from ...ddm.fracture.target_error import TargetMissed
 from ...model import DdmSettings
 from ...output.tables.summary import write_json
 from ..cost import growth_cost
@@ -223,10 +224,13 @@ def _constant_elements(
 
 
 def _until(name: str, method: str, sizes: Iterable[int], solve: Callable) -> Iterator[Point]:
-    """Points for growing sizes until the next one would take longer than `LONGEST`."""
+    """Points for growing sizes until the next one would take longer than `LONGEST` or misses its target."""
     for size in sizes:
         problem, settings = solve(size)
-        solution, seconds = timed(partial(problem.solve, settings))
+        try:
+            solution, seconds = timed(partial(problem.solve, settings))
+        except TargetMissed:
+            return
         unknowns = solution.body.boundary.n_unknowns + solution.body.faces.n_unknowns
         yield Point(name, method, int(size), unknowns, max(problem.error(factors(solution)), LEAST), seconds)
         if 4 * seconds > LONGEST:

@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..adaptivity import coarser
+from ..iterative.gmres import NotSolved
 from ..kernels import shape_functions
 from .chord_error import chord_errors
 from .sif_error_estimate import SAFETY, floor
@@ -36,15 +38,20 @@ class TargetMissed(ValueError):
 
 
 def refined_to_target(solution: SolvedBody, target: float, again: Callable[[CrackedBody], SolvedBody]) -> SolvedBody:
-    """``solution``, or one on a finer mesh, whose K agrees to ``target`` with that of the next finer mesh. ``again``
-    solves for the same load on another body. Raises `TargetMissed` if the finest mesh does not suffice."""
+    """``solution``, or one on a finer mesh, whose K agrees to ``target`` with that of the next finer mesh, or of the
+    next coarser one where that cannot be solved. ``again`` solves for the same load on another body. Raises
+    `TargetMissed` if the finest mesh that can be solved does not suffice."""
 
     while True:
         k = factors(solution)
         if not len(k):
             return solution
         up = solution.body.settings.order < shape_functions.MAX_ORDER
-        other = again(solution.body.refined)
+        try:
+            other = again(solution.body.refined)
+        except NotSolved:
+            # Too many unknowns to factor, and round-off beyond what the iteration needs.
+            up, other = False, again(solution.body.remeshed(coarser(solution.body.settings)))
         better = factors(other)
         by_chords = SAFETY * chord_errors(solution)
         solution.tip_errors = SAFETY * np.abs(better - k) + floor(solution.body) * largest(k) + by_chords
