@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from contextlib import nullcontext
 from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -27,6 +28,9 @@ from .crack_compliance.quasi_newton import QuasiNewton
 from .load_path import loads_at
 from .load_transfer.elastic_bodies import boundary_loads, threads_for, tip_rows
 from .parallel_map import parallel_map
+
+if TYPE_CHECKING:
+    from ..ddm.crack_contact.face_laws import FaceMemory
 
 #: Relative tolerance of the crack strain in statics, of the block's strain.
 COMPLIANCE_TOLERANCE = 1e-6
@@ -80,10 +84,15 @@ def balanced(now: CrackedBlocks, dt: float, load_time: float | None) -> Balance:
     statistics. Raises `dda.NotConverged`, also where blocks and cracks agree at no step length.
     """
     begun, static = now.response, now.system.scheme.static
+    memories = now.history, now.by_mean_stress.memory
     # In statics the mean-stress response is used only where the iteration fails without it.
     for soft_by_mean_stress in (False, True) if static else (True,) * (1 + HALVINGS):
         now.response = begun
-        found, differences = _passes(now, dt, load_time, soft_by_mean_stress)
+        try:
+            found, differences = _passes(now, dt, load_time, soft_by_mean_stress)
+        finally:
+            # Cement that has broken in the iteration is lost only once the step is accepted.
+            now.history, now.by_mean_stress.memory = memories
         lost = np.flatnonzero(differences > FAILED)
         if not len(lost):
             return found
@@ -98,15 +107,19 @@ def balanced(now: CrackedBlocks, dt: float, load_time: float | None) -> Balance:
 
 @dataclass
 class _OscillatingBlocks:
-    """Blocks whose forces and crack strain oscillate in the iteration, for a step of ``asked`` s.
+    """Blocks whose forces and crack strain oscillate in the iteration, for a step of ``asked`` s. Where these break
+    cement, they take the mean-stress response only if ``soft_by_mean_stress`` blocks do.
 
-    ``blocks``: since the full step was last tried (``tried_whole``); ``lately``: in the last iterations; ``doubt``:
-    largest mismatch of the assumed strain in an iteration that cut the step."""
+    ``blocks``: since the full step was last tried (``tried_whole``); ``lately``: in the last iterations, with the face
+    memory of the one in which most cement had broken (``broken``, block →); ``doubt``: largest mismatch of the assumed
+    strain in an iteration that cut the step."""
 
     static: bool
     asked: float
+    soft_by_mean_stress: bool
     blocks: set[int] = field(default_factory=set)
     lately: set[int] = field(default_factory=set)
+    broken: dict[int, FaceMemory] = field(default_factory=dict)
     tried_whole: bool = False
     doubt: float = 0.0
 
@@ -121,13 +134,48 @@ class _OscillatingBlocks:
         self.tried_whole, self.blocks = True, set()
         return False, give_way
 
-    def after_iteration(self, now: CrackedBlocks, attempt: int, differences: np.ndarray) -> set[int]:
+    def after_iteration(self, now: CrackedBlocks, attempt: int, differences: np.ndarray) -> tuple[set[int], bool]:
         """Blocks that take the mean-stress response after iteration ``attempt``, in which assumed and found crack
-        strain differ by ``differences`` (n_cracked,)."""
+        strain differ by ``differences`` (n_cracked,); and whether any block responds differently from now on."""
         oscillating = set(np.array(list(now.bodies), int)[differences > FAILED].tolist())
         self.blocks |= oscillating
-        self.lately = self.lately | oscillating if attempt >= PATIENCE // 2 else set()
-        return _softest(now, self.lately) if attempt + 1 == PATIENCE else set()
+        if attempt < PATIENCE // 2:
+            self.lately = set()
+            return set(), False
+        self.lately = self.lately | oscillating
+        if self.static:
+            self._note_broken(now)
+        if attempt + 1 != PATIENCE:
+            return set(), False
+        broke = self._cement_breaks(now)
+        softest = _softest(now, self.lately) if self.soft_by_mean_stress or not broke else set()
+        return softest, broke or bool(softest)
+
+    def _note_broken(self, now: CrackedBlocks) -> None:
+        """Record the most broken cement of the oscillating blocks."""
+        for block, solution in now.strain_solutions().items():
+            memory, most = solution.memory, self.broken.get(block)
+            if (
+                block in self.lately
+                and memory is not None
+                and (most is None or memory.broken.sum() > most.broken.sum())
+            ):
+                self.broken[block] = memory
+
+    def _cement_breaks(self, now: CrackedBlocks) -> bool:
+        """Whether the oscillating blocks have cement that breaks while they are stiff, and would hold once they have
+        given way: no state with intact cement is in equilibrium. It stays broken in the following iterations."""
+        from ..ddm.crack_contact.face_laws import breaking_as
+
+        own, forces, mean = now.by_mean_stress, {}, {}
+        for block, memory in self.broken.items():
+            began = now.history.get(block)
+            breaks = breaking_as(own.memory.get(block, began) if block in own else began, memory)
+            if breaks is not None:
+                (mean if block in own else forces)[block] = breaks
+        if forces or mean:
+            now.history, own.memory = now.history | forces, own.memory | mean
+        return bool(forces or mean)
 
 
 def _passes(
@@ -142,7 +190,7 @@ def _passes(
         quasi_newton.forget()  # in motion, contact changes of the last step need not recur
     tolerance = COMPLIANCE_TOLERANCE if static else DYNAMIC_TOLERANCE
     response = _expected(now, now.state.time + dt if load_time is None else load_time) if static else now.response
-    result, iterations, oscillating = None, 0, _OscillatingBlocks(static, dt)
+    result, iterations, oscillating = None, 0, _OscillatingBlocks(static, dt, soft_by_mean_stress)
     left: list[float] = []
     for attempt in range(MOST_CONVERGING if static else COMPLIANCE_PASSES):
         result = _step(now, dt, load_time, response, result)
@@ -170,14 +218,14 @@ def _passes(
             done, give_way = oscillating.agreed(now, dt)
             if done:
                 break
-            dt = oscillating.asked
+            dt, changed = oscillating.asked, bool(give_way)
         else:
-            give_way = oscillating.after_iteration(now, attempt, differences)
+            give_way, changed = oscillating.after_iteration(now, attempt, differences)
         if attempt + 1 >= COMPLIANCE_PASSES and not left[-1] < 0.5 * left[-3]:
             break
         for block in sorted(give_way):
             now.by_mean_stress.add(block)
-        if give_way:
+        if changed:
             # The oscillation may have caused the cut of the step.
             dt = oscillating.asked
             quasi_newton.forget()

@@ -229,7 +229,12 @@ class StepCutting:
         system = self.system
         self.cuts += 1
         if self.cuts > system.settings.max_step_cuts:
-            self._refuse()
+            if not (
+                system.scheme.static and why == UNSETTLED and not self.start.bonds_give and self.found.bonded.any()
+            ):
+                self._refuse()
+            # No step is short enough for contacts whose bonds are all to hold until the others are consistent.
+            self.start, self.cuts, shorter = replace(self.start, bonds_give=True), 0, self.asked
         system.limits.shortens(why, *blocks)
         log.debug("step at t = %g s cut from %.4g to %.4g s: %s", self.start.state.time, self.dt, shorter, self.reason)
         self.dt = shorter

@@ -111,6 +111,7 @@ class StepStart:
     loads, crack               that act, None for none
     load_time                  at which loads are taken, s; None: as the time scheme weights them
     rest      (n_blocks, 6)    displacement in a static step that inertia does not count (`pseudo_inertia`); None for none
+    bonds_give                 whether overloaded bonds break where contacts find no states with them
     """
 
     state: State
@@ -122,6 +123,7 @@ class StepStart:
     crack: CrackResponse | None = None
     load_time: float | None = None
     rest: np.ndarray | None = None
+    bonds_give: bool = False
 
 
 class Attempt:
@@ -132,7 +134,7 @@ class Attempt:
     def __init__(self, system: SteppedSystem, start: StepStart, dt: float, found: ContactSet, cuts: int) -> None:
         self.system, self.state, self.vertices = system, start.state, start.vertices
         self.carried, self.moments, self.rest = start.carried, start.moments, start.rest
-        self.dt, self.found, self.cuts, scheme = dt, found, cuts, system.scheme
+        self.dt, self.found, self.cuts, self.bonds_give, scheme = dt, found, cuts, start.bonds_give, system.scheme
         state, moments, crack = start.state, start.moments, start.crack
         self.time = state.time + dt
         # Mass stays, whatever the strain does to the area.
@@ -446,7 +448,10 @@ class Attempt:
         def solve(contacts: ContactSet, stiff: Springs, start: np.ndarray, stretch: np.ndarray) -> Settled:
             def settled(contacts: ContactSet) -> Settled:
                 equations = self._equations(pattern, matrix, right, contacts, vectors, stiff, start, slack, curved)
-                return settle(equations, system.settings.max_open_close_iterations, system.settings.contact_solver)
+                limits = system.settings
+                return settle(
+                    equations, limits.max_open_close_iterations, limits.contact_solver, self.bonds_give
+                )  # fmt: skip
 
             return (
                 settle_sheared_sticks(settled, contacts, stiff, start, stretch, curved)

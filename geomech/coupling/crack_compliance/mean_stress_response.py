@@ -49,7 +49,7 @@ class ByMeanStress:
 
     solutions: dict[int, Solution | UniformStressSolution] = field(default_factory=dict)
     #: Memory of frictional crack faces in these solutions at the end of the last step.
-    _memory: dict[int, FaceMemory] = field(default_factory=dict)
+    memory: dict[int, FaceMemory] = field(default_factory=dict)
     #: Mean stress of the last pass in the block's own axes, Pa, and `limit` at that time.
     stress: dict[int, tuple[np.ndarray, np.ndarray]] = field(default_factory=dict)
     #: Crack system, softness, limit.
@@ -107,7 +107,7 @@ class ByMeanStress:
         known = scaled(body, even, before) if skip else None
         if known is None:
             load = body.mean_stress_load(even)
-            known = body.solve(load, warm=before, history=self._memory.get(block, began), meet_target=False)
+            known = body.solve(load, warm=before, history=self.memory.get(block, began), meet_target=False)
         self.solutions[block], self.stress[block] = known, (own, limit)
         return known
 
@@ -123,7 +123,7 @@ class ByMeanStress:
 
     def take_step(self) -> None:
         """Accept the step."""
-        self._memory = {b: known.memory for b, known in self.solutions.items() if known.memory is not None}
+        self.memory = {b: known.memory for b, known in self.solutions.items() if known.memory is not None}
 
     def inherited(self, parent: np.ndarray, whole: np.ndarray) -> ByMeanStress:
         """The response of new blocks: of ``whole`` (k,) new numbers, the data of their ``parent`` (n_blocks,) are
@@ -133,7 +133,7 @@ class ByMeanStress:
             return {child: known[parent[child]] for child in whole.tolist() if parent[child] in known}
 
         own = {b for b in whole.tolist() if parent[b] in self._blocks}
-        return ByMeanStress(kept(self.solutions), kept(self._memory), kept(self.stress), kept(self._softness), own)
+        return ByMeanStress(kept(self.solutions), kept(self.memory), kept(self.stress), kept(self._softness), own)
 
     def soft(self, block: int, body: Body, elastic: np.ndarray) -> bool:
         """Whether open cracks make ``block`` more than `SOFT` times as soft as its rock in some direction."""

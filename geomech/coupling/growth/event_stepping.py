@@ -18,6 +18,7 @@ from functools import partial
 
 import numpy as np
 
+from ... import dda
 from ...dda.excavation import until_next_event
 from ...model import Problem
 from ..coupled_state import CrackedBlocks
@@ -45,6 +46,8 @@ NEAR_ROUGH = 1e-3
 FURTHER_BACK = 0.75
 #: Steps between events aim at this fraction of the allowed displacement.
 USE = 0.8
+#: Most times the way of a step whose end has no state is halved.
+NEARER = 6
 #: Most solutions of one search, and most of them before the event is enclosed.
 MOST, OPEN = 40, 5
 #: Relative difference below which two times are the same, of times beyond the fraction SOON of a time step. An event
@@ -125,8 +128,11 @@ class EventSteps:
         if self.changes.expected is not None:
             aim = min(aim, max(self.changes.expected * (1 + FOUND), start + FOUND * limit))
             self.changes.expected = None
+        found, excess, nearer = self._first(now, aim, limit - start)
+        whole = whole and not nearer
         for k in range(MOST):
-            found, excess = self._at(now, aim, limit - start, free=k == 0)
+            if k:
+                found, excess = self._at(now, aim, limit - start)
             at = found.result.state.time
             search.add(at, excess)
             same = JUMP * max(abs(at), SOON * self.time_step)
@@ -147,6 +153,18 @@ class EventSteps:
         else:
             self.reached = excess > 0
         return found, excess
+
+    def _first(self, now: CrackedBlocks, aim: float, most: float) -> tuple[Balance, float, bool]:
+        """A pass at the loads of the time ``aim`` as in `_at`, or where blocks and cracks find no state there, as far
+        beyond the breaking of much cement, nearer by halves; and whether it is nearer. Raises `dda.NotConverged`."""
+        start = now.state.time
+        for nearer in range(NEARER + 1):
+            try:
+                return *self._at(now, start + 0.5**nearer * (aim - start), most, free=True), nearer > 0
+            except dda.NotConverged:
+                if nearer == NEARER:
+                    raise
+        raise AssertionError("unreachable: the last pass returns or raises")
 
     def _back(self, now: CrackedBlocks, search: Crossing) -> tuple[Balance, float]:
         """Reduce the load to that at which K_eq = K_Ic for the most highly loaded tip; to zero if K_eq stays above."""

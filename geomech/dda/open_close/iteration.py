@@ -34,12 +34,13 @@ log = logging.getLogger(__name__)
 class Effort:
     """Limits of the search for states: ``max_iterations`` of Newton's method and the methods of ``solver``.
     ``in_order``: bonds break one by one under a growing load, otherwise several at once; ``within_patch``: the search
-    is itself on a patch."""
+    is itself on a patch; ``bonds_give``: overloaded bonds break where other contacts find no states with them."""
 
     max_iterations: int
     solver: ContactSolver
     in_order: bool
     within_patch: bool = False
+    bonds_give: bool = False
 
 
 def is_large(n_free: int, statics: bool, solver: ContactSolver) -> bool:
@@ -48,19 +49,19 @@ def is_large(n_free: int, statics: bool, solver: ContactSolver) -> bool:
     return not statics and n_free >= solver.large_system
 
 
-def settle(equations: Equations, max_iterations: int, solver: ContactSolver) -> Settled:
+def settle(equations: Equations, max_iterations: int, solver: ContactSolver, bonds_give: bool = False) -> Settled:
     """Iterate from the states of the contacts of ``equations`` to consistent ones. Each solution of the step's
     equations counts as an iteration, also along the central path.
 
     Bonds break when everything else is consistent, in the order in which a load growing from the start of the step
     breaks them. With many contacts this takes too long: then contacts that open lose their bonds at once, all bonds
     overloaded by at least half as much as the worst break together, and contacts that are closed in the end get their
-    bonds back.
+    bonds back. With ``bonds_give`` overloaded bonds break also where the other contacts find no states with them.
 
     Raises `Unsettled` if no consistent states are found within ``max_iterations`` of Newton's method.
     """
     in_order = len(equations.found) <= solver.bonds_in_order
-    effort = Effort(max_iterations, solver, in_order)
+    effort = Effort(max_iterations, solver, in_order, bonds_give=bonds_give)
     settled = _Search(equations, effort).settled()
     return settled if in_order else _with_bonds_restored(equations, effort, settled)
 
@@ -127,7 +128,8 @@ class _Search:
             if not wrong.any() and (answer.missed is None or not answer.missed.any()):
                 return self._found(answer)
             if self.newton >= self.most:
-                raise self._unsettled(answer)
+                self._break_or_fail(answer)
+                continue
             if not wrong.any():
                 continue
             if not self.effort.in_order:
@@ -177,6 +179,15 @@ class _Search:
         self.states = self.states.switched(first, answer.called)
         self.most = max(self.most, self.newton + self.effort.max_iterations)
         self._restart()
+
+    def _break_or_fail(self, answer: Answer) -> None:
+        """Break overloaded bonds although other contacts are inconsistent, where bonds give. Raises `Unsettled` if none
+        is overloaded."""
+        bonds = (answer.violation > 0) & (self.states.bonded != answer.called.bonded)
+        if not self.effort.bonds_give or not bonds.any():
+            raise self._unsettled(answer)
+        self.seen.clear()
+        self._break_bonds(answer, bonds)
 
     def _called(self, answer: Answer, wrong: np.ndarray) -> States:
         """The states that the ``answer`` requires."""
@@ -273,7 +284,7 @@ class _Search:
         self.states = self.states.switched(some, called)
 
     def _by_path(self, answer: Answer) -> None:
-        """Continue with states proposed by the central path. Raises `Unsettled` if it has none."""
+        """Continue with states proposed by the central path, or with fewer bonds if it has none. Raises `Unsettled`."""
         equations, bonded = self.equations, self._bonds_on_path()
         if self.path is None or not np.array_equal(self.path.bonded, bonded):
             self.path = CentralPath(
@@ -282,7 +293,8 @@ class _Search:
             )  # fmt: skip
         proposal = self._proposed(self.path) if self.solver.central_path else None
         if proposal is None:
-            raise self._unsettled(answer)
+            self._break_or_fail(answer)
+            return
         self.seen.clear()
         self.states, self.most = proposal, max(self.most, self.newton + self.solver.newton_to_finish)
         self._restart(proposed=True)

@@ -11,7 +11,7 @@ cohesion, cement or filling.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -62,7 +62,7 @@ class Released(NamedTuple):
 class FaceMemory:
     """State of the crack ``elements`` carried from load to load. ``rest`` (n,): slip (times 2μ) at zero shear;
     ``broken`` (n,) bool: lost cement; ``work``: J/m of friction since the beginning; ``states``; ``pressure`` and
-    ``shear`` (n,) Pa; ``released``."""
+    ``shear`` (n,) Pa; ``released``; ``breaking`` (n,) bool: cement that breaks under the next load, whatever it is."""
 
     elements: ElementSet
     rest: np.ndarray
@@ -72,11 +72,26 @@ class FaceMemory:
     pressure: np.ndarray
     shear: np.ndarray
     released: Released = field(default_factory=Released)
+    breaking: np.ndarray | None = None
+
+    @property
+    def lost(self) -> np.ndarray:
+        """(n,) bool: cement that is broken, or breaks under any next load."""
+        return self.broken if self.breaking is None else self.broken | self.breaking
 
     @classmethod
     def none(cls, elements: ElementSet) -> FaceMemory:
         n = elements.n * elements.per
         return cls(elements, np.zeros(n), np.zeros(n, bool), 0.0, FaceStates.open(n), np.zeros(n), np.zeros(n))
+
+
+def breaking_as(memory: FaceMemory | None, after: FaceMemory) -> FaceMemory | None:
+    """``memory`` (None: of faces never loaded), on the elements of ``after``, whose cement breaks under the next load
+    where it is broken ``after``; None where that breaks nothing more."""
+    before = FaceMemory.none(after.elements) if memory is None else carried_over(memory, after.elements)
+    known = before.lost
+    more = after.broken & ~known
+    return replace(before, breaking=known | more) if more.any() else None
 
 
 def all_smooth(laws: Sequence[JointLaw]) -> bool:
@@ -213,7 +228,10 @@ def carried_over(memory: FaceMemory, now: ElementSet) -> FaceMemory:
     states = memory.states
     moved = FaceStates(taken(states.closed), taken(states.way), taken(states.pulled))
     pressure, shear = taken(memory.pressure), taken(memory.shear)
-    return FaceMemory(now, rest.ravel(), taken(memory.broken), memory.work, moved, pressure, shear, memory.released)
+    breaking = None if memory.breaking is None else taken(memory.breaking)
+    return FaceMemory(
+        now, rest.ravel(), taken(memory.broken), memory.work, moved, pressure, shear, memory.released, breaking
+    )
 
 
 def traction_carried_over(traction: np.ndarray, was: ElementSet, now: ElementSet) -> np.ndarray:

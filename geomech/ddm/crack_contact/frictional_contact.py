@@ -129,7 +129,7 @@ def settle_rough(
     − S w, the new memory, the number of solves, and the remaining violations.
     """
     laws, solved = equations.laws, equations.solved
-    problem = FaceProblem(equations, right, memory)
+    problem = FaceProblem(equations, right, replace(memory, broken=memory.lost))
     states = first_guess(problem) if guess is None else admissible(problem, guess)
     while True:
         found = settle(problem, states)
