@@ -22,6 +22,9 @@ import numpy as np
 
 from geomech.model import Problem
 
+#: Courses of geomech's own studies, by the name of the file in which a machine keeps its own (`python -m
+#: docs.generate.courses`).
+STUDIES = Path(__file__).with_name("courses.json")
 #: Most courses that are kept below ~/.cache (or $XDG_CACHE_HOME).
 KEPT = 500
 
@@ -69,8 +72,9 @@ class Pace:
 class Course:
     """Wall time (s, from the start of the run) and scene time (s) by cycle."""
 
-    #: Most cycles that are kept, every second one dropped beyond it. Runs shorter than `LEAST` s are not remembered;
-    #: an earlier run counts from a `SHARE` of its wall time on, while this one's scene time is as then to `SAME` of it.
+    #: Most cycles that are kept, every second one dropped beyond it. Runs shorter than `LEAST` s are not remembered; an
+    #: earlier run counts while this one's scene time is as then to `SAME` of it. Until a `SHARE` of its wall time has been
+    #: run through, the rest of that share is taken as fast as then.
     MOST, LEAST, SHARE, SAME = 400, 2.0, 0.02, 0.1
 
     def __init__(self) -> None:
@@ -89,7 +93,7 @@ class Course:
 
     def left_as(self, earlier: Course) -> float:
         """Wall time left, s, if this run goes on as ``earlier`` did; inf if it does not, or too little of it is known."""
-        if len(self.cycle) < 3 or not earlier.cycle or self.cycle[-1] > earlier.cycle[-1]:
+        if not self.cycle or not earlier.cycle or self.cycle[-1] > earlier.cycle[-1]:
             return math.inf
         spent = np.interp(self.cycle, earlier.cycle, earlier.wall)
         time = np.interp(self.cycle[-1], earlier.cycle, earlier.time)
@@ -97,22 +101,29 @@ class Course:
             return math.inf
         # Of the later half of this run: the machine may have become busier.
         since = max(0, bisect_left(self.wall, 0.5 * (self.wall[0] + self.wall[-1])) - 1)
-        if not spent[-1] - spent[0] > self.SHARE * earlier.wall[-1] or not spent[-1] > spent[since]:
-            return math.inf
-        slower = (self.wall[-1] - self.wall[since]) / (spent[-1] - spent[since])
-        return float(slower * (earlier.wall[-1] - spent[-1]))
+        as_then = max(0.0, self.SHARE * earlier.wall[-1] - float(spent[-1] - spent[0]))
+        gone, then = self.wall[-1] - self.wall[since] + as_then, spent[-1] - spent[since] + as_then
+        return float(gone / then * (earlier.wall[-1] - spent[-1])) if then > 0.0 else math.inf
 
     @classmethod
     def found(cls, problem: Problem) -> Self | None:
-        """That of an earlier run of ``problem`` on this machine; None if there is none."""
-        out = cls()
+        """That of an earlier run of ``problem`` on this machine, else the one that comes with geomech's own studies; None
+        if there is neither."""
         with suppress(OSError, ValueError, TypeError, KeyError):
-            stored = json.loads(_file(problem).read_text(encoding="utf-8"))
-            out.cycle = [int(c) for c in stored["cycle"]]
-            out.wall, out.time = ([float(v) for v in stored[name]] for name in ("wall", "time"))
-            if len(out.cycle) == len(out.wall) == len(out.time) > 0:
-                return out
+            return cls._of(json.loads(_file(problem).read_text(encoding="utf-8")))
+        with suppress(OSError, ValueError, TypeError, KeyError):
+            return cls._of(json.loads(STUDIES.read_text(encoding="utf-8"))[_file(problem).stem])
         return None
+
+    @classmethod
+    def _of(cls, stored: dict[str, list]) -> Self:
+        """As it was stored. Raises ValueError, TypeError or KeyError."""
+        out = cls()
+        out.cycle = [int(c) for c in stored["cycle"]]
+        out.wall, out.time = ([float(v) for v in stored[name]] for name in ("wall", "time"))
+        if not len(out.cycle) == len(out.wall) == len(out.time) > 0:
+            raise ValueError("a course has as many cycles as times")
+        return out
 
     def keep(self, problem: Problem) -> None:
         """Store it for the next run of ``problem``, if it took longer than `LEAST` s. A folder that cannot be written

@@ -1,6 +1,7 @@
 """The time left: of an earlier run of the scene, of a steady pace, or a range."""
 
 import io
+import json
 import math
 import re
 from dataclasses import replace
@@ -57,7 +58,28 @@ def test_a_run_that_takes_another_course_has_no_earlier_one():
     earlier = course(shaken(cycle), cycle / 100.0)
     assert math.isinf(course(shaken(cycle[:100]), cycle[:100] / 50.0).left_as(earlier))
     assert math.isinf(course(shaken(np.arange(500)), np.arange(500) / 100.0).left_as(earlier))
-    assert math.isinf(course(shaken(cycle[:2]), cycle[:2] / 100.0).left_as(earlier))
+
+
+def test_the_first_cycles_are_taken_as_fast_as_in_an_earlier_run():
+    """Two cycles say little of the machine; they count for their part of the share that is asked for."""
+    cycle = np.arange(401)
+    earlier = course(shaken(cycle), cycle / 100.0)
+    left = earlier.wall[-1] - earlier.wall[1]
+    assert course(shaken(cycle[:1]), cycle[:1] / 100.0).left_as(earlier) == pytest.approx(left, rel=0.01)
+    assert course(3 * shaken(cycle[:2]), cycle[:2] / 100.0).left_as(earlier) == pytest.approx(left, rel=0.15)
+
+
+def test_studies_come_with_their_course(folder, monkeypatch, tmp_path):
+    """A first run knows the course of geomech's own studies, until it has one of its own."""
+    problem = made.problem()
+    monkeypatch.setattr(module, "STUDIES", tmp_path / "courses.json")
+    module.STUDIES.write_text(
+        json.dumps({module._file(problem).stem: {"cycle": [0, 9], "wall": [1, 5], "time": [0, 1]}})
+    )
+    assert Course.found(problem).wall == [1.0, 5.0]
+    course(np.arange(10.0), np.arange(10.0)).keep(problem)
+    assert Course.found(problem).wall == list(range(10))
+    assert Course.found(replace(problem, title="another")) is None
 
 
 def told(problem, tmp_path, monkeypatch, cost: float, error: BaseException | None = None, resumed=False) -> list[str]:
