@@ -14,7 +14,7 @@ from __future__ import annotations
 
 from contextlib import nullcontext
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -85,11 +85,12 @@ def balanced(now: CrackedBlocks, dt: float, load_time: float | None) -> Balance:
     """
     begun, static = now.response, now.system.scheme.static
     memories = now.history, now.by_mean_stress.memory
-    # In statics the mean-stress response is used only where the iteration fails without it.
-    for soft_by_mean_stress in (False, True) if static else (True,) * (1 + HALVINGS):
+    # In statics the mean-stress response is used only where the iteration fails without it, and cement breaks in the
+    # passes only where both fail.
+    for ways in _AT_REST if static else (_Ways(soft_by_mean_stress=True),) * (1 + HALVINGS):
         now.response = begun
         try:
-            found, differences = _passes(now, dt, load_time, soft_by_mean_stress)
+            found, differences = _passes(now, dt, load_time, ways)
         finally:
             # Cement that has broken in the iteration is lost only once the step is accepted.
             now.history, now.by_mean_stress.memory = memories
@@ -105,10 +106,20 @@ def balanced(now: CrackedBlocks, dt: float, load_time: float | None) -> Balance:
     )
 
 
+class _Ways(NamedTuple):
+    """How a pass finds its state: whether soft blocks take the mean-stress response, and whether cement of oscillating
+    blocks stays broken once it has broken in an iteration."""
+
+    soft_by_mean_stress: bool = False
+    cement_breaks: bool = False
+
+
+_AT_REST = _Ways(), _Ways(soft_by_mean_stress=True), _Ways(True, True)
+
+
 @dataclass
 class _OscillatingBlocks:
-    """Blocks whose forces and crack strain oscillate in the iteration, for a step of ``asked`` s. Where these break
-    cement, they take the mean-stress response only if ``soft_by_mean_stress`` blocks do.
+    """Blocks whose forces and crack strain oscillate in the iteration, for a step of ``asked`` s.
 
     ``blocks``: since the full step was last tried (``tried_whole``); ``lately``: in the last iterations, with the face
     memory of the one in which most cement had broken (``broken``, block →); ``doubt``: largest mismatch of the assumed
@@ -116,7 +127,7 @@ class _OscillatingBlocks:
 
     static: bool
     asked: float
-    soft_by_mean_stress: bool
+    cement_breaks: bool
     blocks: set[int] = field(default_factory=set)
     lately: set[int] = field(default_factory=set)
     broken: dict[int, FaceMemory] = field(default_factory=dict)
@@ -143,12 +154,11 @@ class _OscillatingBlocks:
             self.lately = set()
             return set(), False
         self.lately = self.lately | oscillating
-        if self.static:
+        if self.cement_breaks:
             self._note_broken(now)
         if attempt + 1 != PATIENCE:
             return set(), False
-        broke = self._cement_breaks(now)
-        softest = _softest(now, self.lately) if self.soft_by_mean_stress or not broke else set()
+        broke, softest = self.cement_breaks and self._break_cement(now), _softest(now, self.lately)
         return softest, broke or bool(softest)
 
     def _note_broken(self, now: CrackedBlocks) -> None:
@@ -162,7 +172,7 @@ class _OscillatingBlocks:
             ):
                 self.broken[block] = memory
 
-    def _cement_breaks(self, now: CrackedBlocks) -> bool:
+    def _break_cement(self, now: CrackedBlocks) -> bool:
         """Whether the oscillating blocks have cement that breaks while they are stiff, and would hold once they have
         given way: no state with intact cement is in equilibrium. It stays broken in the following iterations."""
         from ..ddm.crack_contact.face_laws import breaking_as
@@ -178,9 +188,7 @@ class _OscillatingBlocks:
         return bool(forces or mean)
 
 
-def _passes(
-    now: CrackedBlocks, dt: float, load_time: float | None, soft_by_mean_stress: bool
-) -> tuple[Balance, np.ndarray]:
+def _passes(now: CrackedBlocks, dt: float, load_time: float | None, ways: _Ways) -> tuple[Balance, np.ndarray]:
     """The iterations of a step of at most ``dt`` s; returns the result and the remaining relative mismatch of crack
     strain (n_cracked,)."""
     static, quasi_newton = now.system.scheme.static, now.quasi_newton
@@ -190,7 +198,7 @@ def _passes(
         quasi_newton.forget()  # in motion, contact changes of the last step need not recur
     tolerance = COMPLIANCE_TOLERANCE if static else DYNAMIC_TOLERANCE
     response = _expected(now, now.state.time + dt if load_time is None else load_time) if static else now.response
-    result, iterations, oscillating = None, 0, _OscillatingBlocks(static, dt, soft_by_mean_stress)
+    result, iterations, oscillating = None, 0, _OscillatingBlocks(static, dt, ways.cement_breaks)
     left: list[float] = []
     for attempt in range(MOST_CONVERGING if static else COMPLIANCE_PASSES):
         result = _step(now, dt, load_time, response, result)
@@ -203,7 +211,7 @@ def _passes(
             return Balance(result, {}, np.empty(0, TIP)), np.zeros(0)
         if not static:
             now.by_mean_stress.take_all(now.bodies)
-        elif soft_by_mean_stress:
+        elif ways.soft_by_mean_stress:
             now.by_mean_stress.find(now.bodies, now.system.compliance, result.contacts)
         # A block with the mean-stress response needs no contact forces until the iteration has converged.
         solved = not all(block in now.by_mean_stress for block in now.bodies)

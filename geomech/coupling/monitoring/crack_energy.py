@@ -322,6 +322,9 @@ class CrackEnergy:
                 yield float(by_mean[block])
             elif began is None:
                 yield first_work_on_cracks(before.stress[block], float(before.rotation[block]), of)
+            elif of.memory is None and of.body.crack_system is began.solution.body.crack_system:
+                # Without friction and growth the loads have a potential, also where faces close or open on the way.
+                yield of.crack_energy - began.solution.crack_energy
             else:
                 yield work_on_cracks(began.solution, of)
         yield float(sum(by_mean[block] for block in range(len(by_mean)) if block not in solutions))
