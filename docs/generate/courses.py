@@ -31,7 +31,7 @@ def courses_of(pipeline: Path) -> dict[str, dict[str, list]]:
         command = [sys.executable, "-m", "geomech", "run", str(pipeline), "--out", f"{folder}/run"]
         around = os.environ | {"XDG_CACHE_HOME": folder, "NUMBA_CACHE_DIR": KERNELS}
         subprocess.run(command, cwd=ROOT, env=around, check=True)
-        files = sorted(Path(folder).glob("geomech/paces/*.json"))
+        files = sorted((Path(folder) / "geomech" / "paces").glob("*.json"))
         return {file.stem: thinned(json.loads(file.read_text(encoding="utf-8"))) for file in files}
 
 

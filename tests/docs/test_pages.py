@@ -48,7 +48,7 @@ def test_the_scene_of_the_readme_is_that_of_the_manual_and_loads(tmp_path):
     assert text == (DOCS / "start" / "my_slope.toml").read_text(encoding="utf-8")
     assert len(text.splitlines()) <= 20
     scene = load_scene(DOCS / "start" / "my_slope.toml")
-    assert scene.problem().blocks.n_blocks == 78
+    assert scene.problem().blocks.n_blocks == 76
 
 
 @pytest.mark.slow

@@ -208,10 +208,10 @@ class Geometry(Table):
         "their ends (traces that vanish are reported)",
     )
     shortest_crack_m: NotNegative = Field(0.0, description="dead ends shorter than this are trimmed, m")
-    smallest_block_m2: NotNegative = Field(
-        0.0,
+    smallest_block_m2: NotNegative | None = Field(
+        None,
         description="smaller blocks are merged with a neighbour across the latest joint set, never across a drawn "
-        "joint, m²",
+        "joint, m² (unset: a thousandth of the median block; 0: none)",
     )
     tolerance_m: Positive | None = Field(
         None,

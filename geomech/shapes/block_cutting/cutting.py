@@ -56,6 +56,7 @@ class _Rules(NamedTuple):
     dead_ends: str
     shortest_crack: float
     smallest_area: float
+    smallest_share: float
     lasting: int
 
 
@@ -67,13 +68,14 @@ def cut(
     dead_ends: str = "cracks",
     shortest_crack: float = 0.0,
     smallest_area: float = 0.0,
+    smallest_share: float = 0.0,
     lasting: int = 0,
 ) -> Cutting:
     """Cut ``zones`` along ``joints``.
 
     Joint ends in rock become cracks ("cracks") or are removed ("trim"); those shorter than ``shortest_crack`` (m) are
-    always removed. Blocks smaller than ``smallest_area`` (m²) are merged with a neighbour: of those with at least half
-    the longest common side, the one across the least important joint; ``joints`` are listed by importance, and the
+    always removed. Blocks smaller than ``smallest_area`` (m²), or than the ``smallest_share`` of the median block, are
+    merged with a neighbour: of those with at least half the longest common side, the one across the least important joint; ``joints`` are listed by importance, and the
     first ``lasting`` ones are never removed for a small block. Only pieces thinner than the tolerance are merged across
     any of them. ``tolerance`` in m, default `TOLERANCE` of the largest side. Block edges have their zone's edge names
     and the joints' names. Raises ShapeError if a joint or zone has no length or area or is not finite, or if no
@@ -89,7 +91,7 @@ def cut(
     # Crossings have two digits more than the drawing: corners of blocks stay on the lines of their neighbours.
     decimals += 2
     mends: list[Mend] = []
-    rules = _Rules(tolerance, dead_ends, shortest_crack, smallest_area, lasting)
+    rules = _Rules(tolerance, dead_ends, shortest_crack, smallest_area, smallest_share, lasting)
     grid = 10.0**-decimals
     graph = noded(drawn, tolerance, decimals, mends)
     reach = None
@@ -216,7 +218,9 @@ def _kept(
         keep[_short_dead_ends(arrangement, dead, shortest, reported)] = False
     area, rim = arrangement.areas_and_rims()
     thin = 2 * area < rules.tolerance * rim
-    small = np.flatnonzero((zone >= 0) & ((area < rules.smallest_area) | thin))
+    rock = zone >= 0
+    smallest = max(rules.smallest_area, rules.smallest_share * float(np.median(area[rock])) if rock.any() else 0.0)
+    small = np.flatnonzero(rock & ((area < smallest) | thin))
     if not len(small):
         return keep, []
     return keep, _join_small(

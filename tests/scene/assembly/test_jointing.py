@@ -147,6 +147,24 @@ def test_small_blocks_spare_the_drawn_fault_and_are_told(tmp_path):
     assert any(text.startswith(f"{number} × sliver, up to ") and " m², at (" in text for text in said)
 
 
+def test_slivers_are_merged_unless_the_scene_says_otherwise(tmp_path):
+    """Three sets cross all over: triangles of any size, some below a thousandth of the median block. 0 keeps them."""
+    cross = SCENE[SCENE.index('[[geometry.joint_sets]]\nname = "cross"') : SCENE.index("[materials")]
+    sets = "".join(
+        f'[[geometry.joint_sets]]\nname = "set {k}"\nangle_deg = {angle}\nspacing_m = 0.5\nzones = ["rock"]\n'
+        for k, angle in enumerate((80, 130))
+    )
+    areas = {}
+    for value in ("", "smallest_block_m2 = 0"):
+        text = SCENE.replace(cross, sets).replace("seed = 3", f'seed = 3\ndead_ends = "trim"\n{value}')
+        scene = load(tmp_path, text.replace("joint:cross", "joint:set 0"))
+        blocks = scene.problem().blocks
+        areas[value] = blocks.areas()[~blocks.fixed]
+    kept, merged = areas["smallest_block_m2 = 0"], areas[""]
+    assert kept.min() < 1e-3 * np.median(kept) and merged.min() >= 1e-3 * np.median(merged)
+    assert len(merged) < len(kept) and merged.sum() == pytest.approx(kept.sum(), rel=1e-12)
+
+
 def test_poles_spread_by_fishers_law_turn_the_traces_of_any_set(tmp_path):
     """Beds that dip along the section: their traces spread by 1/√κ."""
     spread = "dip_deg = 10\ndip_direction_deg = 90\nfisher = 400"

@@ -140,6 +140,18 @@ def test_slivers_join_their_neighbour():
     sound(cutting, [rock()])
 
 
+def test_slivers_are_a_share_of_the_usual_block():
+    """Three blocks of about 50 and one of 0.15 m²: below a hundredth of the median, above a thousandth."""
+    joints = [Joint("joint:a", (line([-1, 5], [11, 5]), line([-1, 5], [11, 5.03]), line([5, -1], [5, 11])))]
+    whole = cut([rock()], joints)
+    slivers = whole.blocks.areas() < 0.01 * np.median(whole.blocks.areas())
+    assert slivers.any()
+    assert cut([rock()], joints, smallest_share=1e-3).blocks.n_blocks == whole.blocks.n_blocks
+    merged = cut([rock()], joints, smallest_share=0.01)
+    assert merged.blocks.n_blocks == whole.blocks.n_blocks - slivers.sum() == 4
+    sound(merged, [rock()])
+
+
 def test_bad_input_is_named():
     with pytest.raises(ShapeError, match="joint 'joint:a' has a trace without length"):
         cut([rock()], [Joint("joint:a", (line([1, 1], [1, 1]),))])
