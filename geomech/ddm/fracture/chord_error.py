@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ...model import Cracks
+from ...model.cracks.curved_tips import LEAST_BEND, LIKE, MOST_BEND, tip_deviations
 from .tip_factors import factors
 
 if TYPE_CHECKING:
@@ -24,10 +25,6 @@ if TYPE_CHECKING:
 
 _log = logging.getLogger(__name__)
 
-#: Angles (rad) between sides that may represent a curve; a circle of twelve sides has 30°.
-LEAST_BEND, MOST_BEND = np.radians(0.1), np.radians(31.0)
-#: Largest ratio of the lengths of neighbouring chords of a curve, and of neighbouring angles.
-LIKE = 2.0
 #: A crack mouth within this fraction of a chord from its midpoint becomes the point where the arc is halved.
 NEAR_MIDDLE = 0.2
 
@@ -48,6 +45,12 @@ def chord_errors(solution: SolvedBody) -> np.ndarray:
         )
         return np.zeros_like(k)
     return np.abs(factors(other) - k)
+
+
+def chord_errors_at_tips(solution: SolvedBody) -> np.ndarray:
+    """(n_tips, 2) Pa √m: error of K_I and K_II because the last chord of a curved crack deviates from the curve."""
+    deviation = tip_deviations(solution.body.cracks)[:, None]
+    return np.abs(factors(solution))[:, ::-1] * deviation * [1.5, 0.5]
 
 
 def with_halved_chords(body: CrackedBody) -> tuple[list[np.ndarray], Cracks, list[Support]] | None:

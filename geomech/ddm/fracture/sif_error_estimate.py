@@ -16,7 +16,7 @@ import numpy as np
 from .. import adaptivity
 from ..mesh.elements import interior_angles, wedges
 from ..mesh.grading import Grading, ungraded
-from .chord_error import chord_errors
+from .chord_error import chord_errors, chord_errors_at_tips
 from .tip_factors import factors, largest
 
 if TYPE_CHECKING:
@@ -42,18 +42,22 @@ def tip_errors(solution: SolvedBody) -> np.ndarray:
         solution.load, equilibrium_tolerance=np.inf, history=solution.began
     )
     errors = SAFETY * (np.abs(factors(other) - k) + chord_errors(solution)) + floor(body) * largest(k)
-    warn(errors, k)
-    return errors
+    chords = chord_errors_at_tips(solution)
+    warn(errors + chords, k, chords)
+    return errors + chords
 
 
-def warn(errors: np.ndarray, k: np.ndarray) -> None:
-    """Log a warning when ``errors`` exceed 1 % of the largest of ``k``, both (n_tips, 2)."""
+def warn(errors: np.ndarray, k: np.ndarray, chords: np.ndarray | float = 0.0) -> None:
+    """Log a warning when ``errors``, of which ``chords`` is that of curved cracks drawn as polygons, exceed 1 % of the
+    largest of ``k``, all (n_tips, 2)."""
     if errors.max(initial=0.0) > WORTH_A_WARNING * largest(k):
         at = int(np.argmax(errors.max(axis=1)))
+        drawn = np.max(chords) > 0.5 * errors.max()
         _log.warning(
-            "stress intensity factors are uncertain by %.1f %% at tip %d: set a smaller target_error",
+            "stress intensity factors are uncertain by %.1f %% at tip %d: %s",
             100 * errors.max() / max(largest(k), np.finfo(float).tiny),
             at,
+            "draw the curved crack with shorter chords at its tips" if drawn else "set a smaller target_error",
         )
 
 

@@ -9,6 +9,7 @@ from ...conventions import outward_normal_of
 from ...model import counted
 from ...model.blocks.corners import LARGEST_SHARE, corner_lengths
 from ...model.blocks.polygon import distance_to_edges
+from ...model.cracks.curved_tips import tip_deviations
 from ...shapes.block_cutting.rock_outline import ground_of
 from ..assembly.fixed_blocks import constrained_unknowns, fixed_blocks
 from ..assembly.load_functions import traction_history
@@ -38,6 +39,8 @@ SLIVER = 1e-2
 #: A section is a slope if the ground at one end is higher than at the other by this part of its height; its back is
 #: free if that much of the higher side is.
 SLOPES = 0.25
+#: Deviation of a curved crack's last chord from its curve, rad, above which its error of K is reported (3 % of K_II).
+COARSE_CHORDS = 0.02
 #: Largest plausible elastic strain: rock fails at strains of 0.1 to 1 %, and elements and blocks here are linear
 #: elastic.
 LARGEST_STRAIN = 0.05
@@ -48,6 +51,7 @@ def check_plausible(c: Check) -> None:
     _materials(c)
     _size(c)
     _near_misses(c)
+    _chords(c)
     _strain(c)
     _gravity(c)
     _weightless(c)
@@ -289,6 +293,27 @@ def _near_misses(c: Check) -> None:
                 f"{blocks.names[block]!r}, without touching it",
                 "end it on the outline if it reaches the surface; the bridge left is very thin",
             )
+
+
+def _chords(c: Check) -> None:
+    """Curved cracks drawn with so few chords that the direction of the last one matters."""
+    cracks = c.cracks
+    deviation = tip_deviations(cracks)
+    coarse = np.flatnonzero(deviation > COARSE_CHORDS)
+    if not len(coarse):
+        return
+    worst = int(coarse[np.argmax(deviation[coarse])])
+    tip = int(cracks.tips[worst])
+    crack = int(cracks.crack[np.flatnonzero((cracks.segments == tip).any(axis=1))[0]])
+    x, y = cracks.nodes[tip]
+    more = f", and {counted(len(coarse) - 1, 'more tip')} likewise" if len(coarse) > 1 else ""
+    c.warn(
+        c.drawn.path_of_crack(cracks.names[crack]),
+        f"crack {cracks.names[crack]!r} is a polygon whose last side, at ({x:g}, {y:g}), deviates by "
+        f"{np.degrees(deviation[worst]):.2g}° from the curve through its points{more}: K_I there is uncertain by "
+        f"{150 * deviation[worst]:.2g} % of K_II, K_II by {50 * deviation[worst]:.2g} % of K_I",
+        "draw curved cracks with shorter chords at their tips",
+    )
 
 
 def _strain(c: Check) -> None:

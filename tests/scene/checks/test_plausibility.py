@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 
 import numpy as np
@@ -91,6 +92,42 @@ def test_a_rounding_that_edges_are_too_short_for_is_told(scene_file):
     assert "dda.corner_rounding" in warning.place
     assert "corners have edges too short for a rounding length of 0.25 √area" in warning.message
     assert "12 of 16" in warning.message and "over 0.25 m instead of 0.61 m" in warning.message
+
+
+CURVED = """
+title = "a curved flaw"
+[geometry]
+[[geometry.zones]]
+name = "rock"
+rectangle = [-2, -2, 2, 2]
+[[geometry.cracks]]
+name = "flaw"
+points = [[-0.707, 0.707], [-0.383, 0.924], [0, 1], [0.383, 0.924], [0.707, 0.707]]
+[materials.rock]
+youngs_modulus_pa = 20e9
+poissons_ratio = 0.25
+density_kg_m3 = 2600
+k_ic_pa_sqrt_m = 1e6
+[cracks.default]
+aperture = "slot"
+[run]
+end_time_s = 1.0
+"""
+
+
+def test_a_curved_crack_of_few_chords_is_told(scene_file):
+    """Sides that turn by 22.5°: the last one is 11° off the arc. A straight crack, or one of many sides, is not told."""
+
+    def told(text):
+        return [w for w in load_scene(scene_file(text)).warnings if "last side" in w.message]
+
+    (warning,) = told(CURVED)
+    assert "'flaw'" in warning.message and "11° from the curve" in warning.message and "1 more tip" in warning.message
+    assert "30 % of K_II" in warning.message and "shorter chords" in warning.way_out
+    points = CURVED[CURVED.index("points =") : CURVED.index("[materials")]
+    assert not told(CURVED.replace(points, "points = [[-0.7, 0.7], [0.7, 0.7]]\n"))
+    fine = [[round(math.sin(q), 6), round(math.cos(q), 6)] for q in np.linspace(-0.7, 0.7, 60)]
+    assert not told(CURVED.replace(points, f"points = {fine}\n"))
 
 
 BRIDGES = """
