@@ -79,8 +79,16 @@ def meaning(name: str, text: str) -> str:
         for node in ast.walk(tree):
             if isinstance(node, (ast.Module, ast.ClassDef, ast.FunctionDef)) and ast.get_docstring(node) is not None:
                 node.body = node.body[1:]
-        return ast.dump(tree)
+        return json.dumps(_plain(tree))
     return "\n".join(line for raw in text.splitlines() if (line := re.sub(r"//.*", "", raw).strip()))
+
+
+def _plain(node: object) -> object:
+    """A syntax tree as lists and texts, without empty fields, which differ between versions of Python."""
+    if isinstance(node, ast.AST):
+        fields = [[name, _plain(value)] for name, value in ast.iter_fields(node) if value is not None and value != []]
+        return [type(node).__name__, *fields]
+    return [_plain(each) for each in node] if isinstance(node, list) else repr(node)
 
 
 def make(picture: Picture) -> None:
