@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ...model import Cracks
-from ...model.cracks.curved_tips import LEAST_BEND, LIKE, MOST_BEND, tip_deviations
+from ...model.cracks.curved_tips import ERRORS, LEAST_BEND, LIKE, MOST_BEND, tip_deviations
 from .tip_factors import factors
 
 if TYPE_CHECKING:
@@ -50,7 +50,7 @@ def chord_errors(solution: SolvedBody) -> np.ndarray:
 def chord_errors_at_tips(solution: SolvedBody) -> np.ndarray:
     """(n_tips, 2) Pa √m: error of K_I and K_II because the last chord of a curved crack deviates from the curve."""
     deviation = tip_deviations(solution.body.cracks)[:, None]
-    return np.abs(factors(solution))[:, ::-1] * deviation * [1.5, 0.5]
+    return np.abs(factors(solution))[:, ::-1] * deviation * ERRORS
 
 
 def with_halved_chords(body: CrackedBody) -> tuple[list[np.ndarray], Cracks, list[Support]] | None:

@@ -16,6 +16,8 @@ from .crack_arrays import Cracks
 LEAST_BEND, MOST_BEND = np.radians(0.1), np.radians(31.0)
 #: Largest ratio of the lengths of neighbouring chords of a curve, and of neighbouring angles.
 LIKE = 2.0
+#: Error of K_I over K_II, and of K_II over K_I, per rad of deviation.
+ERRORS = 1.5, 0.5
 
 
 def tip_deviations(cracks: Cracks) -> np.ndarray:

@@ -9,7 +9,7 @@ from ...conventions import outward_normal_of
 from ...model import counted
 from ...model.blocks.corners import LARGEST_SHARE, corner_lengths
 from ...model.blocks.polygon import distance_to_edges
-from ...model.cracks.curved_tips import tip_deviations
+from ...model.cracks.curved_tips import ERRORS, tip_deviations
 from ...shapes.block_cutting.rock_outline import ground_of
 from ..assembly.fixed_blocks import constrained_unknowns, fixed_blocks
 from ..assembly.load_functions import traction_history
@@ -306,12 +306,13 @@ def _chords(c: Check) -> None:
     tip = int(cracks.tips[worst])
     crack = int(cracks.crack[np.flatnonzero((cracks.segments == tip).any(axis=1))[0]])
     x, y = cracks.nodes[tip]
+    of_k_ii, of_k_i = (100 * each * deviation[worst] for each in ERRORS)
     more = f", and {counted(len(coarse) - 1, 'more tip')} likewise" if len(coarse) > 1 else ""
     c.warn(
         c.drawn.path_of_crack(cracks.names[crack]),
         f"crack {cracks.names[crack]!r} is a polygon whose last side, at ({x:g}, {y:g}), deviates by "
         f"{np.degrees(deviation[worst]):.2g}° from the curve through its points{more}: K_I there is uncertain by "
-        f"{150 * deviation[worst]:.2g} % of K_II, K_II by {50 * deviation[worst]:.2g} % of K_I",
+        f"{of_k_ii:.2g} % of K_II, K_II by {of_k_i:.2g} % of K_I",
         "draw curved cracks with shorter chords at their tips",
     )
 

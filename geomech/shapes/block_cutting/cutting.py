@@ -75,8 +75,8 @@ def cut(
 
     Joint ends in rock become cracks ("cracks") or are removed ("trim"); those shorter than ``shortest_crack`` (m) are
     always removed. Blocks smaller than ``smallest_area`` (m²), or than the ``smallest_share`` of the median block, are
-    merged with a neighbour: of those with at least half the longest common side, the one across the least important joint; ``joints`` are listed by importance, and the
-    first ``lasting`` ones are never removed for a small block. Only pieces thinner than the tolerance are merged across
+    merged with a neighbour: of those with at least half the longest common side, the one across the least important
+    joint; ``joints`` are listed by importance, and the first ``lasting`` ones are never removed for a small block. Only pieces thinner than the tolerance are merged across
     any of them. ``tolerance`` in m, default `TOLERANCE` of the largest side. Block edges have their zone's edge names
     and the joints' names. Raises ShapeError if a joint or zone has no length or area or is not finite, or if no
     position satisfies ``tolerance``.
