@@ -107,9 +107,12 @@ class DdaSettings:
 
 #: Largest corner rounding, in units of the block's size √area.
 LARGEST_CORNER = 0.25
+#: Shortest time step that can be asked for, s: a hundred thousandth of the time that a wave takes to cross a grain of sand.
+#: Squares of steps and their fractions stay far above the smallest number of double precision.
+SHORTEST_STEP = 1e-12
 #: Admissible numbers of `DdaSettings`.
 _DDA_NUMBERS = {
-    "time_step": Number(closed=False, unit="s"),
+    "time_step": Number(least=SHORTEST_STEP, unit="s"),
     "dynamic_factor": Number(most=1.0),
     "spectral_radius": Number(most=1.0, optional=True),
     "unbalanced_tolerance": Number(closed=False),

@@ -270,6 +270,7 @@ ADDED = [
     ("[growth]\ntrial_kink_m = 1e-3\n", "growth.trial_kink_m", "used by the criterion", "leave it out"),
     ('[growth]\ncriterion = "sif"\n', "growth.criterion", '"sif" is not one of', '"mts"'),
     ("[dda]\ntime_step_s = 1000.0\n", "dda.time_step_s", "longer than the whole run", "shorten"),
+    ("[dda]\ntime_step_s = 5e-324\n", "dda.time_step_s", "1e-12", "time step"),
     ('[dda]\ncontact = "lagrange"\n', "dda.contact", "is not one of", "augmented"),
     ("[dda]\npenetration_tolerance = 0.0\n", "dda.penetration_tolerance", "greater than 0", "size"),
     ("[dda]\ndynamic_factor = 2\n", "dda.dynamic_factor", "at most 1", "dynamic"),

@@ -6,14 +6,16 @@ from typing import Annotated, Literal
 
 from pydantic import Field, Strict, field_validator, model_validator
 
-from ...model import LARGEST_CORNER, REPEATS, STOPS, rayleigh_coefficients
+from ...model import LARGEST_CORNER, REPEATS, SHORTEST_STEP, STOPS, rayleigh_coefficients
 from .entries import NotNegative, Pair, Positive, Table
 
 
 class DdaTable(Table):
     """[dda]: settings of the block solver."""
 
-    time_step_s: Positive = Field(1.0, description="longest time step, s")
+    time_step_s: Annotated[float, Field(ge=SHORTEST_STEP, allow_inf_nan=False)] = Field(
+        1.0, description="longest time step, s"
+    )
     automatic_time_step: bool = Field(
         False,
         description="steps grow and shrink below `time_step_s` by displacement and open–close iterations",
