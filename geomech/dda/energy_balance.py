@@ -195,8 +195,8 @@ _FRICTION, _DAMPING, _BOND, _SCHEME, _CARRIED, _OVERLAP, _RESIDUAL = range(7, 14
 @part(fastmath=False, error_model="numpy", nogil=True, **UNCOUNTED)
 def _strain_energies(b, strain, stress, weight, now):
     """Of block ``b``, per area (J/m³): ½ σ·C⁻¹σ before and after the step, the work done on its cracks, σ̄·Δε, and
-    Δε·tangent Δε; ``strain`` (3,) is Δε, ``now`` (3,) room for σ′."""
-    u0 = u1 = cracked = mean = quadratic = 0.0
+    Δσ·Δε; ``strain`` (3,) is Δε, ``now`` (3,) room for σ′."""
+    u0 = u1 = cracked = mean = quadratic = changed = 0.0
     for k in range(3):
         now[k] = stress.stress0[b, k]
         for m in range(3):
@@ -205,13 +205,14 @@ def _strain_energies(b, strain, stress, weight, now):
         mean += ((1.0 - weight) * stress.old_stress[b, k] + weight * stress.stress0[b, k]) * strain[k]
     mean += weight * quadratic
     for k in range(3):
+        changed += (now[k] - stress.old_stress[b, k]) * strain[k]
         opened = strain[k]
         for m in range(3):
             u0 += 0.5 * stress.old_stress[b, k] * stress.compliance[b, k, m] * stress.old_stress[b, m]
             u1 += 0.5 * now[k] * stress.compliance[b, k, m] * now[m]
             opened -= stress.compliance[b, k, m] * (now[m] - stress.old_stress[b, m])
         cracked += 0.5 * (stress.old_stress[b, k] + now[k]) * opened
-    return u0, u1, cracked, mean, quadratic
+    return u0, u1, cracked, mean, changed
 
 
 @part(fastmath=False, error_model="numpy", nogil=True, **UNCOUNTED)
@@ -248,7 +249,7 @@ def _add_blocks(out, motion, stress, mass, scheme, gravity, room):
     kinetic = elastic = before = fallen = loads = cracks = viscous = scheme_loss = lost = 0.0
     for b in range(increment.shape[0]):
         area, rho, strain = mass.moments[b, 0], mass.density[b], increment[b, 3:]
-        u0, u1, cracked, mean, quadratic = _strain_energies(b, strain, stress, scheme.weight, room)
+        u0, u1, cracked, mean, changed = _strain_energies(b, strain, stress, scheme.weight, room)
         elastic += area * u1
         before += area * u0
         # A fixed block may be made to move: what drives it works.
@@ -270,7 +271,7 @@ def _add_blocks(out, motion, stress, mass, scheme, gravity, room):
         viscous += scheme.mass_damping / scheme.dt * moved
         drag = scheme.stiffness_damping
         drag += 2.0 * scheme.block_damping * np.sqrt(rho * area / (12.0 * stress.stiffness[b, 0, 0]))
-        viscous += drag / scheme.dt * area * quadratic
+        viscous += drag / scheme.dt * area * changed
     out[_KINETIC], out[_ELASTIC], out[_BEFORE] = kinetic, elastic, before
     out[_GRAVITY_WORK], out[_LOAD_WORK], out[_CRACK_WORK] = fallen, loads, cracks
     out[_DAMPING], out[_SCHEME], out[_CARRIED] = viscous, scheme_loss, lost

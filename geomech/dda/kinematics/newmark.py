@@ -26,7 +26,7 @@ dissipates what the step does not resolve and leaves the rest alone. With the co
 (ϱ−1)/(ϱ+1), γ = ½−α, β = ¼(1−α)², it is of second order, and every |λ| tends to the spectral radius ϱ as ω dt → ∞. It
 is the step above with (ā − c a₀)/w in place of ā and θ = 1, w = 1/(1+ϱ), c = 1−w. Contact forces are part of a₀: a
 bounce may gain some energy. Damping forces follow the mean velocity d/dt of the step and dissipate dᵀD d/dt > 0 for any
-step.
+step; in a cracked block the rate of its stress, and dissipate Δσ·Δε.
 """
 
 from __future__ import annotations
@@ -175,7 +175,7 @@ class TimeScheme:
         (n_blocks,), kg/m; ``dt`` s."""
         drag = self.stiffness_damping + 2.0 * self.block_damping * np.sqrt(mass / (12.0 * stiffness[:, 0, 0]))
         by_strain = (tangent @ strain[..., None])[..., 0]
-        return (drag / dt)[:, None] * by_strain - (1.0 - self.weight) * (change + by_strain)
+        return ((drag / dt)[:, None] - (1.0 - self.weight)) * (change + by_strain)
 
     def begun(self, carried: np.ndarray, before: np.ndarray | None, dt: float) -> tuple[np.ndarray, float]:
         """Velocity (n_blocks, 6) at the start of a step, and the factor 1/w on inertia.
@@ -283,8 +283,10 @@ def assemble_blocks(order, n, mass, start, cracks, loads, scheme):
       the step with weight θ;
     - body force ∫ Tᵀρg, and for the strain unknowns the centrifugal terms ρω²∫xx, ρω²∫yy, ρω²∫xy;
     - generalised forces of all other loads;
-    - damping: a viscous stress ∝ C Δε/dt that gives a block's lowest vibration (taken as that of a square, ω² =
-      12 C₁₁/(ρ h²)) the fraction ``block_damping`` of critical damping, and Rayleigh damping.
+    - damping: a viscous stress ∝ Δσ/dt that gives a block's lowest vibration (taken as that of a square, ω² =
+      12 C₁₁/(ρ h²)) the fraction ``block_damping`` of critical damping, and Rayleigh damping. Δσ is the change of the
+      stress itself: with the tangent times Δε, where crack faces open or close, the force would hang on the side
+      from which the step is sought, and steps whose states agree with their tangent need not exist.
     """
     density, moments, _ = mass
     carried, stress, stiffness, compliance = start
@@ -328,7 +330,7 @@ def assemble_blocks(order, n, mass, start, cracks, loads, scheme):
         for k in range(3):
             for m in range(3):
                 matrix[row, 3 + k, 3 + m] += elastic * tangent[b, k, m]
-            right[row, 3 + k] -= area * ((1.0 - weight) * stress[b, k] + weight * stress0[b, k]) / h
+            right[row, 3 + k] -= area * ((1.0 - elastic) * stress[b, k] + elastic * stress0[b, k]) / h
         right[row, 0] += rho * area * gravity[0] + load[b, 0]
         right[row, 1] += rho * area * gravity[1] + load[b, 1]
         spin = rho * carried[b, 2] * carried[b, 2]
