@@ -132,9 +132,10 @@ class AdmissibleForces:
         """Whether admissible forces exist at the ``factor``. Raises `Unsolved`."""
         return self.unbalanced(factor)[0] <= _BALANCED
 
-    def largest_factor(self, first: float = 1.0) -> float:
-        """The largest factor with admissible forces, searched from ``first``; 0 if there are none down to 1/64, inf if
-        there are some at 64. Raises `Unsolved`."""
+    def largest_factor(self, first: float = 1.0, stride: float = 1.0) -> float:
+        """The largest factor with admissible forces, searched from ``first``, and upwards from there in steps of the
+        relative length ``stride`` and four times as long each; 0 if there are none down to 1/64, inf if there are some
+        at 64. Raises `Unsolved`."""
         low, high, factor, step = 0.0, math.inf, first, _PRECISE
         while True:
             left, slope = self.unbalanced(factor)
@@ -142,15 +143,21 @@ class AdmissibleForces:
                 low = factor
                 if low >= _FARTHEST:
                     return math.inf
+                if math.isinf(high):
+                    factor, stride = low * (1.0 + stride), 4.0 * stride
+                    continue
                 # An admissible iterate of Newton's method is only slightly below the bound.
-                factor = 2.0 * low if math.isinf(high) else min(low * (1.0 + step), 0.5 * (low + high))
-                step *= 4.0
+                factor, step = min(low * (1.0 + step), 0.5 * (low + high)), 4.0 * step
                 continue
             high = factor
             if high <= 1.0 / _FARTHEST:
                 return 0.0
-            factor = max(1.0 / (1.0 / high - left / slope), low) if slope < 0.0 else 0.0
-            if high - factor <= _PRECISE * high or high - low <= 2.0 * _PRECISE * high:
+            # U is convex: the factor sought is between the last admissible one and Newton's.
+            falls = slope < 0.0
+            factor = max(1.0 / (1.0 / high - left / slope), low) if falls else low
+            if (falls and high - factor <= _PRECISE * high) or (
+                factor if falls else high
+            ) - low <= 2.0 * _PRECISE * high:
                 return factor
             factor = factor if factor > low else 0.5 * (low + high)
 

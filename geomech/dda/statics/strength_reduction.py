@@ -21,7 +21,7 @@ from __future__ import annotations
 import logging
 import math
 from collections.abc import Callable, Collection, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from ...model import Blocks, DdaSettings, JointLaw, Loads, Material, State
@@ -177,6 +177,8 @@ class _Search:
     under: TrialLoads
     rest: State
     tolerance: float
+    #: What `aim` has found.
+    aims: dict[Counted, float] = field(default_factory=dict, init=False)
 
     def system(self, factor: float, counted: Counted) -> BlockSystem:
         """The blocks with joints whose strength is divided by the ``factor``."""
@@ -250,6 +252,11 @@ class _Search:
 
     def aim(self, counted: Counted) -> float:
         """The largest factor with admissible contact forces as drawn, bolts at any force up to yield; 0 if unknown."""
+        if counted not in self.aims:
+            self.aims[counted] = self._aim(counted)
+        return self.aims[counted]
+
+    def _aim(self, counted: Counted) -> float:
         if self.under.loads.excavations:
             return 0.0
         system = self.system(1.0, counted)
@@ -275,6 +282,9 @@ class _Search:
         try:
             if forces is None or not forces.balance(beyond):
                 return None
+            aim = self.aims.get(counted, 0.0)
+            if beyond < aim < math.inf:
+                return forces.largest_factor(aim, self.tolerance)
             return forces.largest_factor(beyond / _NEARBY)
         except Unsolved as failure:
             log.info("whether contact forces are admissible beyond the factor is not known: %s", failure)
