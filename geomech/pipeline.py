@@ -105,11 +105,14 @@ def run_problem(
     overwrite: bool | None = None,
 ) -> dict[str, Any]:
     """The same for a problem built in Python; ``warnings`` about it are logged once the run's log is open."""
+    from .output.console.at_work import run_ended
     from .output.run_lock import RunLock
 
     with overwriting(_OVERWRITE.get() if overwrite is None else overwrite), RunLock(folder) as lock:
         refuse_results([folder])
-        return CoupledRun(problem, folder, observers).go([*warnings, *([lock.stale] if lock.stale else [])])
+        summary = CoupledRun(problem, folder, observers).go([*warnings, *([lock.stale] if lock.stale else [])])
+    run_ended()
+    return summary
 
 
 class CoupledRun:

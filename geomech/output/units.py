@@ -50,3 +50,11 @@ def _unit(units: tuple[tuple[float, str, float], ...], largest: float) -> tuple[
     if not (math.isfinite(size) and size > 0):
         return units[0][1:]
     return next((name, unit) for least, name, unit in units if size >= least)
+
+
+def duration_text(seconds: float) -> str:
+    """Wall time as people say it: 45 s, 12 min, 2 h 5 min."""
+    minutes = round(seconds / 60)
+    if seconds < 99.5:
+        return f"{seconds:.0f} s"
+    return f"{minutes} min" if minutes < 100 else f"{minutes // 60} h {minutes % 60} min"

@@ -19,6 +19,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any, Self
 
+from ..output.console.at_work import run_ended
 from .measures import DONE, TIMES, kind_of_reason
 
 JOURNAL, TABLE, PARQUET, TOOK, PLAN = "runs.jsonl", "runs.csv", "runs.parquet", "times.csv", "sweep.json"
@@ -58,6 +59,7 @@ class Journal:
         self._file.write(json.dumps(row, default=str) + "\n")
         self._file.flush()
         self.rows[row["run"]] = row
+        run_ended()
         return True
 
 

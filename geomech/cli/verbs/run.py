@@ -85,10 +85,12 @@ def _run_script(place: Path, options: argparse.Namespace) -> int:
     elif "all" in variants:
         raise BadInput(f"{place} holds no scene.toml with variants: name them")
     from ...output.console.at_work import AtWork
+    from ...output.console.pace import name_of_study
 
     script = _load_script(place / "run.py")
     out = options.out or default_folder(place)
-    with AtWork(place.resolve().name, quiet=options.quiet):
+    course = name_of_study(place, (list(options.overrides), list(variants)))
+    with AtWork(place.resolve().name, course=course, quiet=options.quiet):
         result = script.main(place, out, overrides=options.overrides, variants=variants, quiet=options.quiet)
     return DONE if result is None else int(result)
 

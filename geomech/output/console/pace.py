@@ -70,7 +70,8 @@ class Pace:
 
 
 class Course:
-    """Wall time (s, from the start of the run) and scene time (s) by cycle."""
+    """Wall time (s, from the start of the run) and scene time (s) by cycle; of a study, wall time by the runs that have
+    ended, which also stand for the time."""
 
     #: Most cycles that are kept, every second one dropped beyond it. Runs shorter than `LEAST` s are not remembered; an
     #: earlier run counts while this one's scene time is as then to `SAME` of it. Until a `SHARE` of its wall time has been
@@ -106,13 +107,13 @@ class Course:
         return float(gone / then * (earlier.wall[-1] - spent[-1])) if then > 0.0 else math.inf
 
     @classmethod
-    def found(cls, problem: Problem) -> Self | None:
-        """That of an earlier run of ``problem`` on this machine, else the one that comes with geomech's own studies; None
-        if there is neither."""
+    def found(cls, name: str) -> Self | None:
+        """That of an earlier run of this ``name`` on this machine, else the one that comes with geomech's own studies;
+        None if there is neither."""
         with suppress(OSError, ValueError, TypeError, KeyError):
-            return cls._of(json.loads(_file(problem).read_text(encoding="utf-8")))
+            return cls._of(json.loads(_file(name).read_text(encoding="utf-8")))
         with suppress(OSError, ValueError, TypeError, KeyError):
-            return cls._of(json.loads(STUDIES.read_text(encoding="utf-8"))[_file(problem).stem])
+            return cls._of(json.loads(STUDIES.read_text(encoding="utf-8"))[name])
         return None
 
     @classmethod
@@ -125,13 +126,13 @@ class Course:
             raise ValueError("a course has as many cycles as times")
         return out
 
-    def keep(self, problem: Problem) -> None:
-        """Store it for the next run of ``problem``, if it took longer than `LEAST` s. A folder that cannot be written
+    def keep(self, name: str) -> None:
+        """Store it for the next run of this ``name``, if it took longer than `LEAST` s. A folder that cannot be written
         keeps nothing."""
         if not self.wall or self.wall[-1] - self.wall[0] < self.LEAST:
             return
         with suppress(OSError):
-            file = _file(problem)
+            file = _file(name)
             file.parent.mkdir(parents=True, exist_ok=True)
             partial = file.with_suffix(f".{os.getpid()}")
             text = json.dumps({"cycle": self.cycle, "wall": self.wall, "time": self.time})
@@ -157,8 +158,21 @@ class Compiled(logging.Handler):
         logging.getLogger("geomech.compiled").removeHandler(self)
 
 
-def _file(problem: Problem) -> Path:
-    """Where the course of ``problem`` is kept: by what it is called and holds, and its settings of time."""
-    told = (problem.title, problem.inventory, problem.run.end_time, problem.run.stop_at, problem.dda.time_step)
+def name_of_run(problem: Problem) -> str:
+    """Name of the course of ``problem``: by what it is called and holds, and its settings of time."""
+    return _digest((problem.title, problem.inventory, problem.run.end_time, problem.run.stop_at, problem.dda.time_step))
+
+
+def name_of_study(folder: Path, asked: object) -> str:
+    """Name of the course of the study in ``folder``: by its scripts and scenes, and what is ``asked`` of it."""
+    files = sorted(path for path in Path(folder).iterdir() if path.suffix in (".py", ".toml", ".geo"))
+    return _digest(([(path.name, path.read_bytes()) for path in files], asked))
+
+
+def _digest(told: object) -> str:
+    return hashlib.sha256(repr(told).encode()).hexdigest()[:24]
+
+
+def _file(name: str) -> Path:
     caches = os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")
-    return Path(caches) / "geomech" / "paces" / f"{hashlib.sha256(repr(told).encode()).hexdigest()[:24]}.json"
+    return Path(caches) / "geomech" / "paces" / f"{name}.json"

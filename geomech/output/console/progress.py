@@ -19,9 +19,9 @@ from geomech.model import STOPS, Cycle, Problem, counted
 from ..checkpoints import checkpoint_file
 from ..tables.deepest_penetration import limits_line
 from ..tables.motion_state import closing, state_text
-from ..units import length_text, stress_text
+from ..units import duration_text, length_text, stress_text
 from .at_work import spoken
-from .pace import Compiled, Course, Pace
+from .pace import Compiled, Course, Pace, name_of_run
 
 #: Number of warnings shown at the end of a run, and the largest length of each.
 SHOWN_WARNINGS, WIDTH = 3, 400
@@ -79,7 +79,7 @@ class Progress:
         self._percent = -1
         self._last: Cycle | None = None
         self._pace, self._course, self._problem = Pace(), Course(), problem
-        self._earlier, self._compiled = Course.found(problem), Compiled()
+        self._earlier, self._compiled = Course.found(name_of_run(problem)), Compiled()
         self._whole = True  # from the first cycle on: not resumed
         self._bar = None
         if not self.quiet and self._out is not None and self._out.isatty():
@@ -137,7 +137,7 @@ class Progress:
         self._warnings.end()
         self._compiled.end()
         if error is None and self._whole and not self._compiled.any:
-            self._course.keep(self._problem)
+            self._course.keep(name_of_run(self._problem))
         if self._bar is not None:
             with suppress(OSError):
                 self._bar.close()
@@ -165,15 +165,15 @@ class Progress:
         seconds = math.inf if self._earlier is None else self._course.left_as(self._earlier)
         event = f", until {' or '.join(self._stops)}" if self._stops and cycle.cracks.n_cracks else ""
         if 0.5 <= seconds < math.inf:
-            return f", about {_duration(seconds)} left, as in an earlier run{event}"
+            return f", about {duration_text(seconds)} left, as in an earlier run{event}"
         if event:
             return event
         least, most = self._pace.time_for(self._end - float(cycle.state.time))
         if not 0.5 <= most < math.inf:
             return ""
         if least == most:
-            return f", about {_duration(most)} left"
-        return f", {_duration(least)} to {_duration(most)} left"
+            return f", about {duration_text(most)} left"
+        return f", {duration_text(least)} to {duration_text(most)} left"
 
     def _say(self, text: str) -> None:
         if self._out is None:
@@ -238,10 +238,3 @@ def _cycle_text(cycle: Cycle) -> str:
     drive = f"load {stress_text(cycle.load, 3)}{pulled}" if cycle.load else f"t = {cycle.state.time:.4g} s"
     text = f"{drive}, cycle {cycle.number}"
     return text + (f", {growing} of {len(cycle.tips)} tips growing" if len(cycle.tips) else "")
-
-
-def _duration(seconds: float) -> str:
-    minutes = round(seconds / 60)
-    if seconds < 99.5:
-        return f"{seconds:.0f} s"
-    return f"{minutes} min" if minutes < 100 else f"{minutes // 60} h {minutes % 60} min"

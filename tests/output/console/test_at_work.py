@@ -10,7 +10,9 @@ import synthetic_run as made
 
 from geomech.model import RunSettings
 from geomech.output import Progress
-from geomech.output.console.at_work import AtWork, spoken
+from geomech.output.console import at_work
+from geomech.output.console.at_work import AtWork, run_ended, spoken
+from geomech.output.console.pace import name_of_study
 
 
 def test_a_silent_study_is_said_to_be_at_work():
@@ -30,6 +32,33 @@ def test_nothing_is_said_beside_what_is_shown_nor_when_quiet():
     with AtWork("study", stream=out, silence=0.01, quiet=True):
         time.sleep(0.05)
     assert out.getvalue() == ""
+
+
+def test_a_study_knows_from_an_earlier_one_how_long_it_takes(tmp_path, monkeypatch):
+    """Six runs, of which the third takes half of the time; the second study is twice as slow."""
+    clock = [0.0]
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    monkeypatch.setattr(at_work.time, "monotonic", lambda: clock[0])
+
+    def left_after_runs(slower: float) -> list[str]:
+        clock[0], told = 0.0, []
+        with AtWork("study", course=name, quiet=True) as study:
+            for took in (2.0, 2.0, 10.0, 2.0, 2.0):
+                clock[0] += slower * took
+                run_ended()
+                clock[0] += slower
+                told.append(study._left(clock[0]))
+                clock[0] -= slower
+            clock[0] += slower * 2.0
+        return told
+
+    (tmp_path / "run.py").write_text("runs = 5")
+    name = name_of_study(tmp_path, ())
+    assert left_after_runs(1.0) == [""] * 5
+    assert left_after_runs(2.0) == [f", about {s} s left, as in an earlier run" for s in (34, 30, 10, 6, 2)]
+    (tmp_path / "run.py").write_text("runs = 6")
+    assert name_of_study(tmp_path, ()) != name != name_of_study(tmp_path, "a variant")
+    run_ended()  # outside studies
 
 
 def test_the_time_left_is_in_sight_at_80_columns(tmp_path, monkeypatch):

@@ -14,7 +14,7 @@ from geomech.model import Cracks, RunSettings
 from geomech.output import Progress
 from geomech.output.console import pace as module
 from geomech.output.console import progress
-from geomech.output.console.pace import Course, Pace
+from geomech.output.console.pace import Course, Pace, name_of_run
 
 
 @pytest.fixture(autouse=True)
@@ -73,13 +73,11 @@ def test_studies_come_with_their_course(folder, monkeypatch, tmp_path):
     """A first run knows the course of geomech's own studies, until it has one of its own."""
     problem = made.problem()
     monkeypatch.setattr(module, "STUDIES", tmp_path / "courses.json")
-    module.STUDIES.write_text(
-        json.dumps({module._file(problem).stem: {"cycle": [0, 9], "wall": [1, 5], "time": [0, 1]}})
-    )
-    assert Course.found(problem).wall == [1.0, 5.0]
-    course(np.arange(10.0), np.arange(10.0)).keep(problem)
-    assert Course.found(problem).wall == list(range(10))
-    assert Course.found(replace(problem, title="another")) is None
+    module.STUDIES.write_text(json.dumps({name_of_run(problem): {"cycle": [0, 9], "wall": [1, 5], "time": [0, 1]}}))
+    assert Course.found(name_of_run(problem)).wall == [1.0, 5.0]
+    course(np.arange(10.0), np.arange(10.0)).keep(name_of_run(problem))
+    assert Course.found(name_of_run(problem)).wall == list(range(10))
+    assert Course.found(name_of_run(replace(problem, title="another"))) is None
 
 
 def told(problem, tmp_path, monkeypatch, cost: float, error: BaseException | None = None, resumed=False) -> list[str]:
@@ -126,17 +124,17 @@ def test_runs_that_fail_go_on_compile_or_end_at_once_are_not_remembered(tmp_path
 def test_what_cannot_be_read_is_no_earlier_run(text, folder):
     problem = made.problem()
     folder.mkdir(parents=True)
-    module._file(problem).write_text(text)
-    assert Course.found(problem) is None
+    module._file(name_of_run(problem)).write_text(text)
+    assert Course.found(name_of_run(problem)) is None
 
 
 def test_only_the_newest_are_kept(monkeypatch, folder):
     monkeypatch.setattr(module, "KEPT", 3)
     long = course(np.arange(10.0), np.arange(10.0))
     for k in range(5):
-        long.keep(replace(made.problem(), title=f"run {k}"))
+        long.keep(name_of_run(replace(made.problem(), title=f"run {k}")))
     assert len(list(folder.iterdir())) == 3
-    assert Course.found(replace(made.problem(), title="run 4")).wall == long.wall
+    assert Course.found(name_of_run(replace(made.problem(), title="run 4"))).wall == long.wall
 
 
 def test_an_uneven_pace_is_told_as_a_range(tmp_path, monkeypatch):
