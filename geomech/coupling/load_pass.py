@@ -177,7 +177,9 @@ class _OscillatingBlocks:
         given way: no state with intact cement is in equilibrium. It stays broken in the following iterations."""
         from ..ddm.crack_contact.face_laws import breaking_as
 
-        own, forces, mean = now.by_mean_stress, {}, {}
+        own = now.by_mean_stress
+        forces: dict[int, FaceMemory] = {}
+        mean: dict[int, FaceMemory] = {}
         for block, memory in self.broken.items():
             began = now.history.get(block)
             breaks = breaking_as(own.memory.get(block, began) if block in own else began, memory)
@@ -198,7 +200,9 @@ def _passes(now: CrackedBlocks, dt: float, load_time: float | None, ways: _Ways)
         quasi_newton.forget()  # in motion, contact changes of the last step need not recur
     tolerance = COMPLIANCE_TOLERANCE if static else DYNAMIC_TOLERANCE
     response = _expected(now, now.state.time + dt if load_time is None else load_time) if static else now.response
-    result, iterations, oscillating = None, 0, _OscillatingBlocks(static, dt, ways.cement_breaks)
+    result: StepResult | None = None
+    iterations: float = 0
+    oscillating = _OscillatingBlocks(static, dt, ways.cement_breaks)
     left: list[float] = []
     for attempt in range(MOST_CONVERGING if static else COMPLIANCE_PASSES):
         result = _step(now, dt, load_time, response, result)
@@ -237,6 +241,7 @@ def _passes(now: CrackedBlocks, dt: float, load_time: float | None, ways: _Ways)
             # The oscillation may have caused the cut of the step.
             dt = oscillating.asked
             quasi_newton.forget()
+    assert result is not None
     left_out = {} if solved else _solve_what_may_grow(now, result)
     statistics = {
         "open_close_iterations": iterations,
@@ -317,7 +322,7 @@ def _expected(now: CrackedBlocks, time: float) -> dda.CrackResponse:
     response.compliance[own], response.offset[own] = crack_responses(
         s[known], beyond[known], np.zeros_like(beyond[known]), began[known]
     )
-    if grown.any():
+    if last is not None and grown.any():
         grown = times(stress_rotations(-began).transpose(0, 2, 1), grown)
         size = _strained(now.system.compliance[numbers], last.stress, last.strain + grown)
         if known.all():

@@ -73,11 +73,11 @@ def names_in(text: str) -> set[str]:
         if isinstance(node, (ast.Attribute, ast.Name)):
             found.add(_dotted(node))
         elif isinstance(node, ast.Call):
-            for each in node.args:
-                walk(each)
+            for argument in node.args:
+                walk(argument)
         else:
-            for each in ast.iter_child_nodes(node):
-                walk(each)
+            for child in ast.iter_child_nodes(node):
+                walk(child)
 
     walk(parsed(text))
     return {name for name in found if name not in CONSTANTS}
@@ -157,10 +157,10 @@ def _dotted(node: ast.AST) -> str:
 
 def _value(node: ast.AST, names: Mapping[str, Any]) -> Any:
     if isinstance(node, ast.Constant):
-        return node.value if isinstance(node.value, (str, bool)) else float(node.value)
+        return node.value if isinstance(node.value, (str, bool)) else _number(node.value)
     if isinstance(node, (ast.Name, ast.Attribute)):
         return _looked_up(_dotted(node), names)
-    if isinstance(node, ast.Call):
+    if isinstance(node, ast.Call) and isinstance(node.func, ast.Name):
         return FUNCTIONS[node.func.id](*(_value(each, names) for each in node.args))
     if isinstance(node, ast.BinOp):
         left, right = (_number(_value(each, names)) for each in (node.left, node.right))
@@ -177,6 +177,7 @@ def _value(node: ast.AST, names: Mapping[str, Any]) -> Any:
         return all(values) if wanted else any(values)
     if isinstance(node, ast.IfExp):
         return _value(node.body if _value(node.test, names) else node.orelse, names)
+    assert isinstance(node, ast.Compare)  # nothing else has passed `_check`
     left = _value(node.left, names)
     for each, other in zip(node.ops, node.comparators, strict=True):
         right = _value(other, names)

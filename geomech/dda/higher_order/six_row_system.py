@@ -12,7 +12,7 @@ motion across and along the face per unit of all unknowns of both blocks (`fill`
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -35,10 +35,10 @@ class SixRowPattern(assembly.Pattern):
     own       (n_blocks,)  start of each block's own entries in ``where``
     """
 
-    rows: np.ndarray = None
-    more: np.ndarray = None
-    where: np.ndarray = None
-    own: np.ndarray = None
+    rows: np.ndarray = field(default_factory=lambda: np.empty(0, np.int64))
+    more: np.ndarray = field(default_factory=lambda: np.empty(0, np.int64))
+    where: np.ndarray = field(default_factory=lambda: np.empty(0, np.int64))
+    own: np.ndarray = field(default_factory=lambda: np.empty(0, np.int64))
     step: int = 6
 
     @property

@@ -236,7 +236,9 @@ class BlockSolver:
                 return x
             # Not solvable in single precision, as for many contact states that are far from the right ones.
             self._go_on_in_double()
-        return self._solved(data, right, within, target, near)
+        x = self._solved(data, right, within, target, near)
+        assert x is not None  # in double precision there is always an answer, or an error
+        return x
 
     def _go_on_in_double(self) -> None:
         """Raises numpy.linalg.LinAlgError if that is not wanted."""

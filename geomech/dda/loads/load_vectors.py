@@ -115,7 +115,7 @@ class LoadMap:
     def point(self, block: int, at: tuple[float, float], vertices: np.ndarray) -> np.ndarray:
         """(2,) current position of the material point ``at`` (reference coordinates) of ``block``, m."""
         first, last = self.blocks.vertex_start[block], self.blocks.vertex_start[block + 1]
-        key = (block, tuple(at))
+        key = (block, (at[0], at[1]))
         if key not in self._points:
             self._points[key] = material_weights(self.blocks.vertices[first:last], np.asarray(at, dtype=float))
         return self._points[key] @ vertices[first:last]
@@ -133,21 +133,21 @@ class LoadMap:
             row["force"] = _turned(force, rotation[load.block]) if load.follower else force
             row["point"] = self.point(load.block, load.at, vertices)
         pieces = []
-        for load in loads.edge_tractions:
-            edges, length, rows = self.edges(load)
+        for traction in loads.edge_tractions:
+            on, length, rows = self.edges(traction)
             piece = rows.copy()
-            piece["start"], piece["end"] = vertices[edges], vertices[self.blocks.next_vertex[edges]]
-            value = load.history.at(time)
-            value = _turned(value, rotation[piece["block"]]) if load.follower else value[None]
+            piece["start"], piece["end"] = vertices[on], vertices[self.blocks.next_vertex[on]]
+            value = traction.history.at(time)
+            value = _turned(value, rotation[piece["block"]]) if traction.follower else value[None]
             total = length[:, :, None] * value[:, None, :]
             along = piece["end"] - piece["start"]
             piece["traction"] = total / np.hypot(along[:, 0], along[:, 1])[:, None, None]
             piece["force"] = 0.5 * (total[:, 0] + total[:, 1])
             pieces.append(piece)
         if loads.water is not None:
-            edges = self._wet_edges(loads.water)
+            wet = self._wet_edges(loads.water)
             pieces.append(
-                pressed_edges(loads.water, time, edges, self.blocks.vertex_block, vertices, self.blocks.next_vertex)
+                pressed_edges(loads.water, time, wet, self.blocks.vertex_block, vertices, self.blocks.next_vertex)
             )
         edges = np.concatenate(pieces) if pieces else np.empty(0, EDGE_FORCE)
         if self._removed is not None:

@@ -62,13 +62,14 @@ def settled_in_patch(
     holds = np.where(bonded > 0, np.inf, 0.0)
     springs = replace(springs, cohesion=springs.cohesion + holds, tension=springs.tension + holds)
     gap = answer.gap[rows] + apart - springs.lift * along
-    if inside.sum() <= assembly.DENSE_BLOCKS:
+    if pattern.solver is None or inside.sum() <= assembly.DENSE_BLOCKS:
         own = assembly.dense_pattern(within, part.block, part.other)
     else:
         points = np.zeros((len(order), 2))
         points[order >= 0] = pattern.solver.points[order[order >= 0]]
         own = assembly.sparse_pattern(within, part.block, part.other, points)
-        own.solver.work = pattern.solver.work
+        if own.solver is not None:
+            own.solver.work = pattern.solver.work
     try:
         settled = settle(
             Equations(

@@ -125,7 +125,7 @@ class Equations:
         if self._held is not None:
             answer = self._answered(states, springs, gap, slip, symmetric, _ROUGHLY)
             forces = max(self._force, float(np.abs(self._side).max(initial=0.0)))
-            if (answer.violation > 0).any() or pattern.solver.left <= RESIDUAL * forces:
+            if (answer.violation > 0).any() or pattern.solver is None or pattern.solver.left <= RESIDUAL * forces:
                 return answer
         return self._answered(states, springs, gap, slip, symmetric, RESIDUAL)
 

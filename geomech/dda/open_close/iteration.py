@@ -233,6 +233,7 @@ class _Search:
             return False
         if (self.falls and not self.proposed) or self.fewest > solver.patch_wrong * len(self.found):
             return False
+        assert self.best is not None
         states, of, which = self.best
         within = replace(effort, within_patch=True, in_order=True)
         proposal, spent = settled_in_patch(
@@ -313,8 +314,9 @@ class _Search:
     def _without_pull(self, bonded: np.ndarray) -> np.ndarray:
         """(n,) bool: ``bonded`` contacts (n,) of whole faces without tensile strength that keep their cohesion when
         they slide."""
-        springs = self.equations.springs
-        return (self.found.whole.face >= 0) & (bonded > 0) & (springs.tension <= 0.0) & (springs.keeps > 0)
+        springs, whole = self.equations.springs, self.found.whole
+        assert whole is not None
+        return (whole.face >= 0) & (bonded > 0) & (springs.tension <= 0.0) & (springs.keeps > 0)
 
     def _bonds_after_path(self, state: np.ndarray, bonded: np.ndarray) -> np.ndarray:
         """(n,) bonds for the iterations after the path has proposed ``state`` (n,) with ``bonded`` (n,): faces that
@@ -353,7 +355,8 @@ class _Search:
         return None
 
     def _unsettled(self, answer: Answer) -> Unsettled:
-        worst = int((answer.violation if answer.violation.any() else answer.missed).argmax())
+        wrong = answer.violation if answer.missed is None or answer.violation.any() else answer.missed
+        worst = int(wrong.argmax())
         name = ("open", "sticking", "sliding")[self.states.state[worst]]
         return Unsettled(
             f"contact states did not settle in {self.newton + round(self.spent)} open-close iterations; a contact that "

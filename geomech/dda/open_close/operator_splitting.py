@@ -124,6 +124,7 @@ class _Springs:
         stiffness = ContactStiffness(rho[0], rho[1], none, none)
         assembly.assemble(pattern, data, equations.matrix, self._contacts, stiffness, sides=equations.sides)
         pattern.add_links(data)
+        assert pattern.solver is not None  # `split` is for large systems
         self.correction = pattern.solver.corrections(data)
 
     def follow(self, state: np.ndarray, at_hand: np.ndarray) -> bool:
@@ -152,6 +153,7 @@ def split(equations: Equations, bonded: np.ndarray, solver: ContactSolver) -> Pr
     law = np.stack([equations.gap, springs.normal, springs.shear, found.shear, friction, firm], axis=1)
 
     # Before the first iteration z is unknown: ζ starts as q − F/ρ.
+    assert equations.expected is not None  # `split` is for motion
     unknowns, at_hand = equations.expected.copy(), np.zeros((len(found), 6))
     strength = np.where(held, np.inf, friction * np.maximum(found.normal, 0.0) + firm)
     forces = np.stack([found.normal, np.clip(found.shear, -strength, strength)], axis=1)

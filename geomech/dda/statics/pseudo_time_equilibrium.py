@@ -13,6 +13,7 @@ from __future__ import annotations
 import logging
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -207,13 +208,13 @@ class _Relaxation:
         cuts, iterations = (sum(int(row[name]) for row in self.history) for name in ("cuts", "iterations"))
         return cuts > self.most_cuts or iterations - len(self.history) > self.most_iterations
 
-    def _take(self, result: StepResult) -> tuple[np.void, np.ndarray]:
+    def _take(self, result: StepResult) -> tuple[Any, np.ndarray]:
         """Accept ``result``; returns its RELAXATION_STEP and the displacements (n_blocks,) of the centroids, m."""
         # Pseudo-time is not the time of the loads, which do not change here.
         self.state = replace(result.state, time=self.start)
         moved = np.hypot(*(result.forces.centroid - _centroids(self.system, self.state)).T)
         statistics = result.statistics
-        row = np.array(
+        row: Any = np.array(
             (
                 result.dt,
                 unbalanced_force(self.system, result),

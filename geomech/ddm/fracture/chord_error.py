@@ -59,7 +59,7 @@ def with_halved_chords(body: CrackedBody) -> tuple[list[np.ndarray], Cracks, lis
     if not any(sagittas(loop).any() for loop in body.loops):
         return None
     loops, cracks = with_arcs_halved(body.loops, body.cracks)
-    supports = [replace(one, on=tuple(map(tuple, at))) for one, at in zip(body.supports, _supported(body))]
+    supports = [replace(one, on=((a[0], a[1]), (b[0], b[1]))) for one, (a, b) in zip(body.supports, _supported(body))]
     return loops, cracks, supports
 
 
@@ -141,5 +141,5 @@ def _halved_load(body: CrackedBody, where, value) -> list[tuple]:
     return [(first, np.array([value[0], middle])), (first + 1, np.array([middle, value[1]]))]
 
 
-def _supported(body: CrackedBody) -> np.ndarray:
+def _supported(body: CrackedBody) -> list:
     return body.support_segments.tolist() if body.supports else []

@@ -79,6 +79,7 @@ class CoarseLevel:
         """Transpose of `split`: (n,) from the multipliers of its two results."""
         if not self.n:
             return rest
+        assert self._prescribed is not None
         smooth, out = np.where(self._prescribed, 0.0, smooth), np.where(self._prescribed, 0.0, rest)
         density = np.concatenate([(smooth[part.unknowns] @ part.density).ravel() for part in self._parts])
         own = np.zeros_like(density)

@@ -117,4 +117,6 @@ def approximate(
         a, b, before = start[~good], end[~good], off[~good]
         middle = 0.5 * (a + b)
         start, end = np.concatenate([a, middle]), np.concatenate([middle, b])
-    return LineForces.join(done)
+    joined = LineForces.join([*done])
+    assert joined is not None
+    return joined

@@ -275,7 +275,7 @@ class BorderedFactor:
         self.n, self._places, self._firm, self._n_firm = of.n, of.places, of.firm, of.n_firm
         firm, n = of.firm, of.n_firm
         border, m = of.together or (None, 0)
-        if m and firm.is_next(n - m, m):
+        if border is not None and m and firm.is_next(n - m, m):
             # Both in one solution: forty columns take hardly more time than twenty.
             self._lower, self._upper, t = firm.eliminate_next(n - m, border, m, SINGULAR)
             self.rcond, self.growth = firm.eliminate(n, SINGULAR)

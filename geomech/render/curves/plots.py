@@ -76,9 +76,9 @@ def _energy_curves(run: Run) -> dict[str, np.ndarray]:
     history = to_the_end(run)
     # At rest, forces do more work on cracks than blocks with uniform strain account for.
     done = ("load_work", "gravity_work", "uneven_work")
-    work = [history[name] for name in done if name in history.dtype.names]
+    work = [history[name] for name in done if name in (history.dtype.names or ())]
     curves = {"work done": np.nansum(work, axis=0)} if work else {}
-    curves |= {told: history[name] for name, told in _ENERGIES.items() if name in history.dtype.names}
+    curves |= {told: history[name] for name, told in _ENERGIES.items() if name in (history.dtype.names or ())}
     largest = max((float(np.nanmax(np.abs(curve), initial=0.0)) for curve in curves.values()), default=0.0)
     return {
         name: curve
@@ -99,9 +99,8 @@ def monitors(axes: Axes, run: Run) -> None:
 
 def _monitor_curves(run: Run) -> dict[str, np.ndarray]:
     history = to_the_end(run)
-    names = [
-        name[:-3] for name in history.dtype.names if name.endswith("_ux") and f"{name[:-3]}_uy" in history.dtype.names
-    ]
+    columns = history.dtype.names or ()
+    names = [name[:-3] for name in columns if name.endswith("_ux") and f"{name[:-3]}_uy" in columns]
     return {name: np.hypot(history[f"{name}_ux"], history[f"{name}_uy"]) for name in names[: len(COLOURS)]}
 
 
