@@ -166,6 +166,7 @@ class _Writer:
 
     def _rare(self) -> None:
         rare = self.found.rare
+        assert rare is not None  # asked for by the caller
         self.page.section("Rare failure")
         self.page.text(f"{rare}.")
         if rare.levels:
@@ -288,7 +289,8 @@ class _Writer:
         )
 
     def _pictures(self) -> None:
-        shown, names = [], {}
+        shown = []
+        names: dict[int, list[str]] = {}
         for name, number in picked(self.rows, self.result, self.found.plan.settings["measure"] == "safety").items():
             names.setdefault(number, []).append(name)
         for number, called in names.items():

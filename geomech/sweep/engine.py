@@ -44,6 +44,7 @@ class Engine(Protocol):
     """Carries out jobs; `results` yields their rows in the order in which they end."""
 
     workers: int
+    notes: list[str]
 
     def __enter__(self) -> Self: ...
 

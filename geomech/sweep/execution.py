@@ -108,9 +108,10 @@ def read_sweep(folder: Path | str) -> Sweep:
     rows = read_journal(folder / JOURNAL)
     rare = stored.get("rare")
     if rare:
-        rare = RareProbability(
-            **{k: tuple(v) if isinstance(v, list) else math.nan if v is None else v for k, v in rare.items()}
-        )
+        values: dict[str, Any] = {
+            k: tuple(v) if isinstance(v, list) else math.nan if v is None else v for k, v in rare.items()
+        }
+        rare = RareProbability(**values)
     return Sweep(
         folder, plan, tuple(rows[n] for n in sorted(rows)), bool(stored.get("complete")), rare or None,
         stored.get("seconds", 0.0), stored.get("workers", 1), stored.get("pictures", {}),

@@ -45,7 +45,7 @@ class _Known:
     crack_system: object
     solved: int = 0
     bound: TipBound | None = None
-    per_factor: float = 0.0
+    per_factor: Any = 0.0
     never: bool = False
 
 
@@ -84,7 +84,9 @@ class GrowthScreening:
     def renumber(self, parent: np.ndarray | None, whole: np.ndarray) -> None:
         """Renumber the blocks: of ``whole`` (k,) new numbers, the data of their ``parent`` (n_blocks,) are kept."""
         known = self._known
-        self._known = {child: known[parent[child]] for child in whole.tolist() if parent[child] in known}
+        # Without parents nothing is kept.
+        kept = [] if parent is None else [(child, parent[child]) for child in whole.tolist()]
+        self._known = {child: known[was] for child, was in kept if was in known}
 
     def _bound(self, now: CoupledBlocks, block: int, known: _Known) -> None:
         from ...ddm.fracture.sif_bound import TipBound, is_bounded, largest_k_eq_per_k

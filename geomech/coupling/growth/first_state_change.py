@@ -92,7 +92,8 @@ class FirstChange:
             if not low:
                 return solve(high.time)
             return found if low[-1] in (self._seen, self._older) else solve(high.time)
-        base, last = low[-1], found
+        base = low[-1]
+        last: Balance | None = found
         within = (FOUND if len(high.key) <= MANY else ROUGHLY) * max(abs(start), abs(high.time))
         search = _Search(1 if high.time > start else -1, within, max(self._near, within), approach)
         way = search.way
@@ -178,7 +179,7 @@ class FirstChange:
         kept = (
             before is not None and not self.reached and before.numbering == seen.numbering and before.same_faces(seen)
         )
-        self._older = before if kept and not seen.changes(now, before) else None
+        self._older = before if before is not None and kept and not seen.changes(now, before) else None
         self._seen = seen
 
     def grown(self) -> None:

@@ -389,7 +389,7 @@ def _loads_on(load: BoundaryLoad, a: np.ndarray, b: np.ndarray) -> tuple[np.ndar
         share = 0.5 * weight * (last - first) * (s1 - s0) * length
         places.append(s0 + t * (s1 - s0))
         forces.append(np.abs(share)[:, None] * ((1 - t)[:, None] * ends[0] + t[:, None] * ends[1]))
-    if load.points is not None and len(load.points):
+    if load.points is not None and load.forces is not None and len(load.points):
         place, here = _along(load.points, a, b)
         places.append(place[here])
         forces.append(load.forces[here])

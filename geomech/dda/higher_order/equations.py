@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -20,8 +20,8 @@ class HigherOrderEquations(Equations):
     unknowns.
     """
 
-    base: np.ndarray = None
-    rows: np.ndarray = None
+    base: np.ndarray = field(default_factory=lambda: np.empty(0))
+    rows: np.ndarray = field(default_factory=lambda: np.empty((0, 2, 2, 6)))
     first_order = False
 
     def __post_init__(self) -> None:
@@ -49,6 +49,7 @@ class HigherOrderEquations(Equations):
         self, unknowns: np.ndarray, state: np.ndarray, direction: np.ndarray, springs: Springs, gap: np.ndarray
     ) -> np.ndarray:
         pattern, found = self.pattern, self.found
+        assert isinstance(pattern, SixRowPattern)
         blocks = found.block, found.other, pattern.order
         across, along = moved(unknowns, blocks, (pattern.more, pattern.rows), self.rows).T
         out = np.zeros((len(found), 4))

@@ -123,6 +123,7 @@ class UnitLoads:
             return unit
 
         for name, before in old._on_edges.items():
+            assert before.densities is not None  # of edges
             self._on_edges[name] = grown(before, self._on_faces(name, added, before.densities))
         keys = [key for key in old._recent if key in old._segments]
         if not keys:
@@ -212,7 +213,8 @@ class UnitLoads:
         self._eliminate(units, boundary)
         # The ends of a segment given against the boundary's direction are swapped.
         order = [[2, 3, 0, 1] if unit.against else [0, 1, 2, 3] for unit in units]
-        y = np.hstack([unit.eliminated[:, columns] for unit, columns in zip(units, order)])
+        eliminated = [unit.eliminated for unit in units if unit.eliminated is not None]
+        y = np.hstack([part[:, columns] for part, columns in zip(eliminated, order, strict=True)])
         direct = [unit.applied[self.boundary.n_unknowns :, columns] for unit, columns in zip(units, order)]
         return y, np.hstack(direct) - cg @ y
 

@@ -124,7 +124,7 @@ def _draw_cracks(axes: Axes, problem: Problem, thin: float, size: float) -> list
     keys: list[Any] = []
     segments = cracks.nodes[cracks.segments]
     axes.add_collection(
-        LineCollection(segments, colors=CRACK, linewidths=1.5 * max(thin, 0.8), capstyle="round", zorder=4)
+        LineCollection([*segments], colors=CRACK, linewidths=1.5 * max(thin, 0.8), capstyle="round", zorder=4)
     )
     keys.append(Line2D([], [], color=CRACK, lw=2.6, label=f"cracks ({cracks.n_cracks})"))
     bridges = rock_bridges(blocks, cracks)
@@ -132,7 +132,9 @@ def _draw_cracks(axes: Axes, problem: Problem, thin: float, size: float) -> list
     short = bridges[np.hypot(*(bridges[:, 1] - bridges[:, 0]).T) < 0.25 * size] if len(bridges) else bridges
     if len(short):
         axes.add_collection(
-            LineCollection(short, colors=BRIDGE, linewidths=max(0.8 * thin, 0.7), linestyles=(0, (1.2, 1.6)), zorder=3)
+            LineCollection(
+                [*short], colors=BRIDGE, linewidths=max(0.8 * thin, 0.7), linestyles=(0, (1.2, 1.6)), zorder=3
+            )
         )
         keys.append(Line2D([], [], color=BRIDGE, lw=1.6, ls=(0, (1.2, 1.6)), label=f"rock bridges ({len(bridges)})"))
     return keys
@@ -198,7 +200,9 @@ def _water(axes: Any, scene: Any, problem: Problem) -> list[Any]:
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch
 
-    water, blocks, keys = problem.loads.water, problem.blocks, []
+    water, blocks = problem.loads.water, problem.blocks
+    keys: list[Any] = []
+    assert water is not None  # asked for by the caller
     low, high = blocks.vertices[:, 0].min(), blocks.vertices[:, 0].max()
     times = [0.0] if water.level is None else [0.0, problem.run.end_time]
     for k, time in enumerate(times):
@@ -249,7 +253,8 @@ def _path(loops: list[np.ndarray]) -> Any:
 
 
 def _rgb(colour: str) -> tuple[float, float, float]:
-    return tuple(int(colour[k : k + 2], 16) / 255 for k in (1, 3, 5))
+    red, green, blue = (int(colour[k : k + 2], 16) / 255 for k in (1, 3, 5))
+    return red, green, blue
 
 
 def _said(statistics: dict[str, Any]) -> str:
