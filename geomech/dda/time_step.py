@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from functools import partial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -130,6 +130,9 @@ class Attempt:
     """A step of ``system`` by ``dt`` from ``start`` with the contacts ``found``, after ``cuts`` attempts at longer ones.
     Raises `Unsettled` where contacts find no states.
     """
+
+    #: What the states of contacts are found from.
+    equations: type[Equations] = Equations
 
     def __init__(self, system: SteppedSystem, start: StepStart, dt: float, found: ContactSet, cuts: int) -> None:
         self.system, self.state, self.vertices = system, start.state, start.vertices
@@ -447,7 +450,11 @@ class Attempt:
 
         def solve(contacts: ContactSet, stiff: Springs, start: np.ndarray, stretch: np.ndarray) -> Settled:
             def settled(contacts: ContactSet) -> Settled:
-                equations = self._equations(pattern, matrix, right, contacts, vectors, stiff, start, slack, curved)
+                further = self._further_equations(pattern, matrix, right, contacts, vectors)
+                equations = self.equations(
+                    pattern=pattern, matrix=matrix, found=contacts, vectors=vectors, springs=stiff, gap=start,
+                    slack=slack, curved=curved, statics=system.scheme.static, **further,
+                )  # fmt: skip
                 limits = system.settings
                 return settle(
                     equations, limits.max_open_close_iterations, limits.contact_solver, self.bonds_give
@@ -464,12 +471,9 @@ class Attempt:
             return solve(found, springs, gap, found.stretch)
         return settle_augmented(solve, found, springs, gap, system.finder.on_penalty(found), system.allowed_penetration)
 
-    def _equations(self, pattern, matrix, right, contacts, vectors, springs, gap, slack, curved) -> Equations:
-        """The equations of the step but for the states of ``contacts``."""
-        return Equations(
-            pattern, matrix, right, contacts, vectors, springs, gap, slack, curved, self.system.scheme.static,
-            self._expected_unknowns(),
-        )  # fmt: skip
+    def _further_equations(self, pattern, matrix, right, contacts, vectors) -> dict[str, Any]:
+        """Fields of `equations` that other unknowns change; ``right`` (n_free, 6) is that of the first six."""
+        return {"right": right, "expected": self._expected_unknowns()}
 
     def _expected_unknowns(self) -> np.ndarray | None:
         """(6 n_free,) displacement of this step at the velocity carried into it, in the unknowns of `assembly`; None in

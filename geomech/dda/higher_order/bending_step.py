@@ -12,6 +12,7 @@ where c is the damping of the block's mean strain. Contacts along faces are inte
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -32,6 +33,8 @@ from .six_row_system import fill_own, moved
 
 class BendingAttempt(Attempt):
     """As `Attempt`, for a system with ``deflected`` blocks; ``found`` are the contacts at corners."""
+
+    equations = HigherOrderEquations
 
     def __init__(self, system, start: StepStart, dt: float, found: ContactSet, cuts: int) -> None:
         state = start.state
@@ -124,7 +127,7 @@ class BendingAttempt(Attempt):
                 raise
             raise Unsettled(str(failure), found.points.corner_of(failure.contact)) from failure
 
-    def _equations(self, pattern, matrix, right, contacts, vectors, springs, gap, slack, curved):
+    def _further_equations(self, pattern, matrix, right, contacts, vectors) -> dict[str, Any]:
         blocks, moving, own = self.blocks, self.system.moving, self.own
         full = np.zeros((pattern.n, 6))
         full[: self.n_free] = right
@@ -143,10 +146,7 @@ class BendingAttempt(Attempt):
         if self.glue is not None:
             self.glue.push(full.ravel(), pattern)
             self.glue.stiffen(base, pattern, len(contacts), self.system.scheme.weight)
-        return HigherOrderEquations(
-            pattern, matrix, full, contacts, vectors, springs, gap, slack, curved,
-            self.system.scheme.static, base=base, rows=self._rows(contacts, vectors),
-        )  # fmt: skip
+        return {"right": full, "base": base, "rows": self._rows(contacts, vectors)}
 
     def _deflection_at(self, pattern) -> np.ndarray:
         """(k,) positions of the unknowns of deflection among all unknowns."""

@@ -288,10 +288,8 @@ class _Search:
         """Continue with states proposed by the central path, or with fewer bonds if it has none. Raises `Unsettled`."""
         equations, bonded = self.equations, self._bonds_on_path()
         if self.path is None or not np.array_equal(self.path.bonded, bonded):
-            self.path = CentralPath(
-                equations.pattern, equations.matrix, equations.right, self.found, equations.vectors, answer.springs,
-                answer.gap, bonded, self.normal_force, equations.room, equations.expected, self.solver,
-            )  # fmt: skip
+            laws = answer.springs, answer.gap
+            self.path = CentralPath(equations, laws, bonded, self.normal_force, self.solver)
         proposal = self._proposed(self.path) if self.solver.central_path else None
         if proposal is None:
             self._break_or_fail(answer)

@@ -25,11 +25,11 @@ import numpy as np
 
 from ....compiled import kept
 from ....model import OPEN, SLIP, STICK, ContactSolver
-from ...contact_detection.contact_finder import ContactSet
 from ...equation_records import ContactMotion, ContactStiffness
 from ...joint_laws.coulomb_return import moved
 from ...joint_laws.penalty_springs import Springs
 from ...linear_solver import assembly
+from ..equations import Equations
 from .contact_terms import LEAST_LEFT, SHORT_OF
 from .newton_steps import THREADED, PathSteps
 
@@ -86,9 +86,9 @@ def solution_of(pattern: assembly.Pattern, data: np.ndarray) -> Callable[..., np
 
 
 class CentralPath:
-    """The path of one step's contacts. Arguments as for `settle`; ``bonded`` (n,): bonds, which do not break here;
-    ``forces`` (n,) N: expected size of normal forces; ``room``: provides the flat matrix of each iteration (None: its
-    own). ``expected`` (6 n,): initial motion, that of the velocities; None: no motion.
+    """The path of the contacts of one step's ``equations``, with the linear ``laws`` (springs and starting gaps (n,)
+    m). ``bonded`` (n,): bonds, which do not break here; ``forces`` (n,) N: expected size of normal forces. It begins
+    with the motion that the equations expect, if any.
 
     ``missed``: unbalanced force relative to the largest load; ``epsilon``: ε in units of the squared loads over their
     stiffness; ``taken``: number of iterations so far.
@@ -96,19 +96,14 @@ class CentralPath:
 
     def __init__(
         self,
-        pattern: assembly.Pattern,
-        matrix: np.ndarray,
-        right: np.ndarray,
-        found: ContactSet,
-        vectors: np.ndarray,
-        springs: Springs,
-        gap: np.ndarray,
+        equations: Equations,
+        laws: tuple[Springs, np.ndarray],
         bonded: np.ndarray,
         forces: np.ndarray,
-        room: Callable[[], np.ndarray] | None = None,
-        expected: np.ndarray | None = None,
         solver: ContactSolver | None = None,
     ) -> None:
+        pattern, matrix, right = equations.pattern, equations.matrix, equations.right
+        found, vectors, expected, (springs, gap) = equations.found, equations.vectors, equations.expected, laws
         self._solver, self.taken = solver or ContactSolver(), 0
         self._pattern, self._matrix, self._right = pattern, matrix, right
         self._n, self.bonded = len(found), bonded
@@ -164,7 +159,7 @@ class CentralPath:
         # Blocks without load get a small fraction of the mean; without any loads the unit is arbitrary.
         load = np.maximum(load, 1e-3 * load.mean()) if load.any() else np.ones(len(some))
         self._unit = load * load / self._kn
-        self._room = room
+        self._room = equations.room
         self._unknowns = start.copy()
         # Gap and motion along the edge without contact forces.
         apart, along = moved(start, *self._at).T
@@ -255,7 +250,7 @@ class CentralPath:
                 for pair in zip(springs, (kn_bonded, ks_bonded, np.zeros(len(kn_bonded))), strict=True)
             ]
         stiff, stiff_along, slope = springs
-        data = np.empty(pattern.size) if self._room is None else self._room()
+        data = self._room()
         assembly.assemble(
             pattern, data, self._matrix, ContactMotion(*self._all_at),
             ContactStiffness(stiff, stiff_along, slope, self._all_lift), (self._upper, self._lower), self._sides,
