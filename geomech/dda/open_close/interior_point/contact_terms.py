@@ -3,11 +3,14 @@
 Arrays of six columns (n, 6) are N, w, α, β and the remaining strengths above and below S; the products are N w, α times
 the strength above, β times that below. Divisions, which take most of the time, are kept to a minimum. Functions process
 the contacts from ``first`` to before ``last`` and return the sums over these. (Indices are unsigned: signed ones would
-be tested for negative values.)
+be tested for negative values.) They take plain tuples of the records below.
 """
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
+import numpy as np
 from numba import uintp
 
 from ....compiled import kept
@@ -21,15 +24,65 @@ SHORT_OF = 0.99
 LEAST_LEFT = 1e-14
 
 
+class Variables(NamedTuple):
+    """N ``normal`` and w ``width`` (n,), α and β ``slip`` (2, n), S ``shear`` (n,); ``gap`` and motion ``along`` the edge
+    (n,) m."""
+
+    normal: np.ndarray
+    width: np.ndarray
+    slip: np.ndarray
+    shear: np.ndarray
+    gap: np.ndarray
+    along: np.ndarray
+
+
+class PathSprings(NamedTuple):
+    """Stiffnesses ``kn`` and ``ks`` (n,) N/m, strength ``mu`` N + ``base`` (n,), whether it is ``rough`` (n,), and the
+    ``unit`` (n,) J of its products."""
+
+    kn: np.ndarray
+    ks: np.ndarray
+    mu: np.ndarray
+    base: np.ndarray
+    rough: np.ndarray
+    unit: np.ndarray
+
+
+class Linearised(NamedTuple):
+    """``numbers`` (n, 6); ``missed`` (n, 2) m, residuals of gap and slip; ``laws`` (n, 4): derivative of N w by N, −∂N/∂g,
+    −∂S/∂s and ∂S/∂N; ``pulled`` (n, 3) N, see `pull`."""
+
+    numbers: np.ndarray
+    missed: np.ndarray
+    laws: np.ndarray
+    pulled: np.ndarray
+
+
+class Between(NamedTuple):
+    """Positions ``mine`` and ``theirs`` (n,) of a contact's blocks, −1 if fixed; its ``vectors`` (n, 2, 12) and ``lift``
+    (n,)."""
+
+    mine: np.ndarray
+    theirs: np.ndarray
+    vectors: np.ndarray
+    lift: np.ndarray
+
+
+class Changes(NamedTuple):
+    """``motion`` (n, 2) m (gaps without dilation); changes of the numbers (``changed`` (n, 6)) and of S (``sheared`` (n,))."""
+
+    motion: np.ndarray
+    changed: np.ndarray
+    sheared: np.ndarray
+
+
 @_jit
-def linearise(
-    first, last, normals, widths, slip, shear, gap, along, kn, ks, mu, base, rough, unit, numbers, missed, laws,
-    pulled,
-):  # fmt: skip
-    """Linearise at N ``normals`` (n,), w ``widths`` (n,), α and β ``slip`` (2, n) and S ``shear`` (n,). Fills
-    ``numbers`` (n, 6); ``missed`` (n, 2) m, residuals of gap and slip; ``laws`` (n, 4): derivative of N w by N, −∂N/∂g,
-    −∂S/∂s and ∂S/∂N; and ``pulled`` (see `pull`) with the present forces. Returns the sum of the products, each in its
-    ``unit`` (n,) J."""
+def linearise(first, last, variables, springs, linearised):
+    """Linearise at the `Variables` with `PathSprings`. Fills the `Linearised`, ``pulled`` with the present forces. Returns
+    the sum of the products, each in its unit."""
+    normals, widths, slip, shear, gap, along = variables
+    kn, ks, mu, base, rough, unit = springs
+    numbers, missed, laws, pulled = linearised
     total = 0.0
     for c in range(uintp(first), uintp(last)):
         normal, width, back, ahead = normals[c], widths[c], slip[0, c], slip[1, c]
@@ -55,9 +108,10 @@ def linearise(
 
 
 @_jit
-def pull(first, last, goals, numbers, missed, laws, pulled):
+def pull(first, last, goals, linearised):
     """``pulled`` (n, 3) N: contact forces of a Newton step without motion of the blocks: normal force, shear force
     without and with its dependence on the normal force. ``goals`` (n, 3) J: targets of the products."""
+    numbers, missed, laws, pulled = linearised
     for c in range(uintp(first), uintp(last)):
         normal, width, above, below = numbers[c, 0], numbers[c, 1], numbers[c, 4], numbers[c, 5]
         # One division for both.
@@ -70,14 +124,13 @@ def pull(first, last, goals, numbers, missed, laws, pulled):
 
 
 @_jit
-def change(
-    first, last, unknowns, mine, theirs, vectors, lift, goals, numbers, missed, pulled, laws, kn, mu, rough,
-    motion, changed, sheared,
-):  # fmt: skip
-    """Contact quantities of a step of the ``unknowns`` (6 n_blocks,): ``motion`` (n, 2) m (gaps without dilation);
-    changes of the numbers (``changed`` (n, 6)) and of S (``sheared`` (n,)). Returns the largest step length up to 1 for
-    which positive numbers stay positive. ``mine`` and ``theirs`` (n,): positions of a contact's blocks, −1 if fixed;
-    ``pulled``: from `pull`."""
+def change(first, last, unknowns, between, springs, linearised, goals, changes):
+    """`Changes` of contacts (`Between`) in a step of the ``unknowns`` (6 n_blocks,). Returns the largest step length up to
+    1 for which positive numbers stay positive. ``pulled`` is that of `pull`."""
+    mine, theirs, vectors, lift = between
+    kn, _, mu, _, rough, _ = springs
+    numbers, missed, laws, pulled = linearised
+    motion, changed, sheared = changes
     far = 1.0
     for c in range(uintp(first), uintp(last)):
         apart = along = 0.0
@@ -147,8 +200,10 @@ def nearer(first, last, epsilon, unit, wanted, spread, numbers, changed, goals, 
 
 
 @_jit
-def go(first, last, far, motion, changed, sheared, normals, widths, slip, shear, gap, along):
-    """Update the variables (see `linearise`) by a step of length ``far``, in place."""
+def go(first, last, far, changes, variables):
+    """Update the `Variables` by `Changes` of length ``far``, in place."""
+    motion, changed, sheared = changes
+    normals, widths, slip, shear, gap, along = variables
     for c in range(uintp(first), uintp(last)):
         normals[c] += far * changed[c, 0]
         widths[c] += far * changed[c, 1]
@@ -160,9 +215,11 @@ def go(first, last, far, motion, changed, sheared, normals, widths, slip, shear,
 
 
 @_jit
-def undecided(first, last, normals, widths, slip, shear, kn, ks, mu, base, rough, clear):
+def undecided(first, last, variables, springs, clear):
     """Number of contacts whose force and gap, or slip and remaining strength, differ by less than a factor ``clear`` in
     units of the stiffness."""
+    normals, widths, slip, shear, _, _ = variables
+    kn, ks, mu, base, rough, _ = springs
     number = 0
     for c in range(uintp(first), uintp(last)):
         normal, apart = normals[c], kn[c] * widths[c]

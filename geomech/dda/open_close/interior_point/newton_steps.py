@@ -28,17 +28,25 @@ _NONE = np.empty(0)
 
 @kept(fastmath=False, error_model="numpy", nogil=True)
 def _work(
-    claimed, told, share, share_blocks, task, epsilon, far, parts, mine, theirs, vectors, lift, kn, ks, mu, base, rough,
-    unit, start, side, normal, width, slip, shear, gap, along, numbers, missed, laws, pulled, given, out,
-    unknowns, goals, changed, better, motion, further, sheared,
+    chunks, task, target, parts, between, springs, sides, variables, linearised, blocks, step, tried
 ):  # fmt: skip
     """Carry out the ``task`` together with other threads: first for contacts, with sums ``parts`` (n_shares,), then for
-    blocks, ``share`` and ``share_blocks`` per chunk; ``claimed`` (1,) and ``told`` (2,) as for the elimination of
-    fronts. ``epsilon``: target in units; ``far``: step length. ``goals`` and ``changed`` belong to the present step,
-    ``better`` and ``further`` to the new one."""
-    n, blocks = len(kn), len(start) - 1
+    blocks. ``chunks``: claimed (1,) and told (2,) as for the elimination of fronts, and the numbers of contacts and of
+    blocks per chunk; ``target``: ε in units, and the step length; ``sides`` as from `assembly.sides_of`; ``blocks``:
+    forces on blocks, given and found, and unknowns. ``step`` (goals, `Changes`) is the present one, ``tried`` the new one.
+    """
+    claimed, told, share, share_blocks = chunks
+    epsilon, far = target
+    kn, _, _, _, _, unit = springs
+    start, side = sides
+    numbers, _, _, pulled = linearised
+    given, out, unknowns = blocks
+    goals, changes = step
+    better, further = tried
+    changed = changes[1]
+    n, n_blocks = len(kn), len(start) - 1
     shares = (n + share - 1) // share
-    whole = shares + (0 if task >= _CHANGE else (blocks + share_blocks - 1) // share_blocks)
+    whole = shares + (0 if task >= _CHANGE else (n_blocks + share_blocks - 1) // share_blocks)
     while True:
         q = add_at_once(claimed, 0, 1)
         if q >= whole:
@@ -46,18 +54,12 @@ def _work(
         if q < shares:
             first, last = q * share, min(n, (q + 1) * share)
             if task == _LINEARISE:
-                parts[q] = linearise(
-                    first, last, normal, width, slip, shear, gap, along, kn, ks, mu, base, rough, unit, numbers,
-                    missed, laws, pulled,
-                )  # fmt: skip
+                parts[q] = linearise(first, last, variables, springs, linearised)
             elif task == _CHANGE:
-                parts[q] = change(
-                    first, last, unknowns, mine, theirs, vectors, lift, better, numbers, missed, pulled, laws, kn, mu,
-                    rough, motion, further, sheared,
-                )  # fmt: skip
+                parts[q] = change(first, last, unknowns, between, springs, linearised, better, further)
             elif task == _GO:
-                go(first, last, far, motion, further, sheared, normal, width, slip, shear, gap, along)
-                parts[q] = undecided(first, last, normal, width, slip, shear, kn, ks, mu, base, rough, _CLEAR)
+                go(first, last, far, further, variables)
+                parts[q] = undecided(first, last, variables, springs, _CLEAR)
             else:
                 if task == _PREDICT:
                     for c in range(first, last):
@@ -67,12 +69,12 @@ def _work(
                     second_order(first, last, epsilon, unit, changed, better)
                 else:
                     nearer(first, last, epsilon, unit, far, _SPREAD, numbers, changed, goals, better)
-                pull(first, last, better, numbers, missed, laws, pulled)
+                pull(first, last, better, linearised)
         else:
             # The forces on blocks need those of all contacts.
             await_value(told, 0, shares)
-            first, last = (q - shares) * share_blocks, min(blocks, (q - shares + 1) * share_blocks)
-            balance(first, last, start, side, vectors, pulled, 0, 2, given, out)
+            first, last = (q - shares) * share_blocks, min(n_blocks, (q - shares + 1) * share_blocks)
+            balance(first, last, start, side, between[2], pulled, 0, 2, given, out)
         add_at_once(told, 0 if q < shares else 1, 1)
     await_value(told, 0, shares)
     await_value(told, 1, whole - shares)
@@ -85,6 +87,8 @@ class _Step:
     def __init__(self, n: int) -> None:
         self.goals, self.motion = np.empty((n, 3)), np.empty((n, 2))
         self.changed, self.sheared = np.empty((n, 6)), np.empty(n)
+        #: As `contact_terms.Changes`.
+        self.changes = self.motion, self.changed, self.sheared
         self.far, self.unknowns = 0.0, np.empty(0)
 
 
@@ -100,7 +104,7 @@ class PathSteps:
     ) -> None:
         n, each = len(mine), np.arange(n_blocks)
         self._fixed = mine, theirs, vectors, lift
-        self._sides = sides_of(n_blocks, np.append(each, -1), mine, theirs)
+        self._sides = tuple(sides_of(n_blocks, np.append(each, -1), mine, theirs))
         self._parts = np.empty((n + SHARE - 1) // SHARE)
         self.numbers, self.laws = np.empty((n, 6)), np.empty((n, 4))
         self._missed, self._pulled = np.empty((n, 2)), np.empty((n, 3))
@@ -162,11 +166,11 @@ class PathSteps:
         out: np.ndarray = _NONE,
     ) -> None:
         step, tried = self.step, self.tried
+        chunks = np.zeros(1, np.int64), np.zeros(2, np.int64), SHARE, SHARE_BLOCKS
+        linearised = self.numbers, self._missed, self.laws, self._pulled
         work = (
-            np.zeros(1, np.int64), np.zeros(2, np.int64), SHARE, SHARE_BLOCKS, task, epsilon, far, self._parts,
-            *self._fixed, *self._springs, *self._sides, *self._at_hand, self.numbers, self._missed, self.laws,
-            self._pulled, given, out, tried.unknowns, step.goals, step.changed, tried.goals, tried.motion,
-            tried.changed, tried.sheared,
+            chunks, task, (epsilon, far), self._parts, self._fixed, self._springs, self._sides, self._at_hand, linearised,
+            (given, out, tried.unknowns), (step.goals, step.changes), (tried.goals, tried.changes),
         )  # fmt: skip
         if len(self.residual) < 6 * THREADED:
             _work(*work)
