@@ -208,30 +208,108 @@ def _add_runs(into, at, added, begin, met, begins, first, last, width):
 
 
 @_part
-def eliminate(
-    first,
-    last,
-    touched,
-    data,
-    pivots,
-    reach,
-    seat,
-    entries,
-    entry,
-    row,
-    column,
-    stack,
-    at,
-    back,
-    child,
-    sibling,
-    room,
-    factors,
-    units,
-    space,
-):
+def _fill(front, f, own, p, m, matrix):
+    """Add the entries of the ``matrix`` that belong to front ``f``: rows of m of its ``own`` blocks, then rows of p."""
+    data, entries, entry, row, column = matrix
+    for k in range(entries[f], entries[f + 1]):
+        i, j = row[k], column[k]
+        block = data[36 * entry[k] : 36 * entry[k] + 36]
+        to, apart = (6 * i * m + 6 * j, m) if i < own else (p * m + 6 * (i - own) * p + 6 * j, p)
+        for a in range(6):
+            into = front[to + a * apart : to + a * apart + 6]
+            for c in range(6):
+                into[c] = block[6 * a + c]
+
+
+@_part
+def _gather(here, further, f, own, p, m, fronts, stack, begins, width):
+    """Add what children contribute to the rows and columns that are eliminated in front ``f``."""
+    _, reach, seat, child, sibling = fronts
+    g = child[f]
+    while g >= 0:
+        met, n = seat[reach[g] : reach[g + 1]], 6 * (reach[g + 1] - reach[g])
+        runs, mine = _runs(met, own, begins)
+        for u in range(len(met)):
+            i, left = met[u], stack[g] + 6 * u * n
+            for a in range(6):
+                if i < own:
+                    _add_runs(here, (6 * i + a) * m, further, left + a * n, met, begins, 0, runs, width)
+                else:
+                    to = p * m + (6 * (i - own) + a) * p
+                    _add_runs(here, to, further, left + a * n, met, begins, 0, mine, width)
+        g = sibling[g]
+
+
+@_part
+def _pass_on(further, f, own, p, b, fronts, stack, begins, width):
+    """Add what children contribute to what is left of front ``f`` behind its own blocks."""
+    _, reach, seat, child, sibling = fronts
+    g = child[f]
+    while g >= 0:
+        met, n = seat[reach[g] : reach[g + 1]], 6 * (reach[g + 1] - reach[g])
+        runs, mine = _runs(met, own, begins)
+        for u in range(begins[mine], len(met)):
+            i, left = 6 * (met[u] - own), stack[g] + 6 * u * n
+            for a in range(6):
+                to = stack[f] + (i + a) * b - p
+                _add_runs(further, to, further, left + a * n, met, begins, mine, runs, width)
+        g = sibling[g]
+
+
+@_part
+def _factor(front, p, b, space, units, width):
+    """Factor the p own unknowns of a ``front``, of which b others remain; False if it is singular."""
+    panel, cell, others, swapped = space
+    here, m = numbers(front), p + b
+    lower = p * m
+    for begin in range(0, p, STRIP):
+        stop = min(begin + STRIP, p)
+        for start in range(begin, stop, PANEL):
+            end = min(start + PANEL, stop)
+            h, k, known = end - start, start - begin, begin * m + start
+            if k > 0:
+                # Effect of this strip's earlier panels on the rows of this one, and on the columns below.
+                small_product(
+                    here, start * m + start, m, here, start * m + begin, m, here, known, m, h, k, m - start, width, True
+                )
+                small_product(
+                    here, end * m + start, m, here, end * m + begin, m, here, known, m, p - end, k, h, width, True
+                )
+                small_product(here, lower + start, p, here, lower + begin, p, here, known, m, b, k, h, width, True)
+            if not _invert(front, start * m + start, m, h, cell, others, swapped, width):
+                return False
+            for i in range(h):
+                copied = panel[i * (m - end) : (i + 1) * (m - end)]
+                given = front[(start + i) * m + end : (start + i + 1) * m]
+                for j in range(len(copied)):
+                    copied[j] = -given[j]
+            small_product(
+                here, start * m + end, m, here, start * m + start, m, numbers(panel), 0, m - end, h, h, m - end, width,
+                False,
+            )  # fmt: skip
+        k, known = stop - begin, begin * m + stop
+        if stop < p:
+            _add_product(
+                front, stop * m + begin, m, front, known, m, front, stop * m + stop, m, p - stop, k, m - stop, True,
+                width, units,
+            )  # fmt: skip
+            _add_product(
+                front, lower + begin, p, front, known, m, front, lower + stop, p, b, k, p - stop, True, width, units
+            )
+    # Keeps the arrays alive, which are addressed by pointers above.
+    return len(front) + len(panel) > 0
+
+
+@_part
+def eliminate(first, last, touched, fronts, matrix, stored, memory, space):
     """Eliminate the ``touched`` (n_fronts,) fronts from ``first`` to before ``last``; False if one is singular.
-    ``stack`` (n_fronts,): places of S in the ``room``; ``units`` are 1 and 0; ``space`` as from `working_space`."""
+
+    ``fronts``: pivots, reach, seat, child and sibling; ``matrix``: data, entries, entry, row and column; ``stored``:
+    places of S in the room (n_fronts,), and ``at`` and ``back`` of factors; ``memory``: room, factors, and the numbers 1
+    and 0; ``space`` as from `working_space`."""
+    pivots, reach, _, _, _ = fronts
+    stack, at, back = stored
+    room, factors, units = memory
     front, panel, begins, cell, others, swapped = space
     width = BYTES // front.itemsize
     here, further = numbers(front), numbers(room)
@@ -241,83 +319,20 @@ def eliminate(
         own, far = pivots[f + 1] - pivots[f], reach[f + 1] - reach[f]
         p, b = 6 * own, 6 * far
         m = p + b
-        # Rows of m of the own unknowns, then rows of p of the others; where F_BB is stored.
-        lower, rest = p * m, stack[f]
+        # Rows of m of the own unknowns, then rows of p of the others; F_BB is in the room.
         _clear(front[: p * m + b * p])
-        for k in range(entries[f], entries[f + 1]):
-            i, j = row[k], column[k]
-            block = data[36 * entry[k] : 36 * entry[k] + 36]
-            to, apart = (6 * i * m + 6 * j, m) if i < own else (lower + 6 * (i - own) * p + 6 * j, p)
-            for a in range(6):
-                into = front[to + a * apart : to + a * apart + 6]
-                for c in range(6):
-                    into[c] = block[6 * a + c]
-        # Contributions of children to the rows and columns eliminated here; the rest follows below.
-        g = child[f]
-        while g >= 0:
-            met, n = seat[reach[g] : reach[g + 1]], 6 * (reach[g + 1] - reach[g])
-            runs, mine = _runs(met, own, begins)
-            for u in range(len(met)):
-                i, left = met[u], stack[g] + 6 * u * n
-                for a in range(6):
-                    if i < own:
-                        _add_runs(here, (6 * i + a) * m, further, left + a * n, met, begins, 0, runs, width)
-                    else:
-                        to = lower + (6 * (i - own) + a) * p
-                        _add_runs(here, to, further, left + a * n, met, begins, 0, mine, width)
-            g = sibling[g]
-        for begin in range(0, p, STRIP):
-            stop = min(begin + STRIP, p)
-            for start in range(begin, stop, PANEL):
-                end = min(start + PANEL, stop)
-                h, k, known = end - start, start - begin, begin * m + start
-                if k > 0:
-                    # Effect of this strip's earlier panels on the rows of this one, and on the columns below.
-                    small_product(
-                        here, start * m + start, m, here, start * m + begin, m, here, known, m, h, k, m - start, width,
-                        True,
-                    )  # fmt: skip
-                    small_product(
-                        here, end * m + start, m, here, end * m + begin, m, here, known, m, p - end, k, h, width, True
-                    )
-                    small_product(here, lower + start, p, here, lower + begin, p, here, known, m, b, k, h, width, True)
-                if not _invert(front, start * m + start, m, h, cell, others, swapped, width):
-                    return False
-                for i in range(h):
-                    copied = panel[i * (m - end) : (i + 1) * (m - end)]
-                    given = front[(start + i) * m + end : (start + i + 1) * m]
-                    for j in range(len(copied)):
-                        copied[j] = -given[j]
-                small_product(
-                    here, start * m + end, m, here, start * m + start, m, numbers(panel), 0, m - end, h, h, m - end,
-                    width, False,
-                )  # fmt: skip
-            k, known = stop - begin, begin * m + stop
-            if stop < p:
-                _add_product(
-                    front, stop * m + begin, m, front, known, m, front, stop * m + stop, m, p - stop, k, m - stop, True,
-                    width, units,
-                )  # fmt: skip
-                _add_product(
-                    front, lower + begin, p, front, known, m, front, lower + stop, p, b, k, p - stop, True, width, units
-                )
+        _fill(front, f, own, p, m, matrix)
+        _gather(here, further, f, own, p, m, fronts, stack, begins, width)
+        if not _factor(front, p, b, (panel, cell, others, swapped), units, width):
+            return False
         if p > 0:
-            _add_product(front, lower, p, front, p, m, room, rest, b, b, p, b, False, width, units)
+            _add_product(front, p * m, p, front, p, m, room, stack[f], b, b, p, b, False, width, units)
         else:
-            _clear(room[rest : rest + b * b])
+            _clear(room[stack[f] : stack[f] + b * b])
         _leave(front, p, m, factors, at[f], back[f])
-        g = child[f]
-        while g >= 0:
-            met, n = seat[reach[g] : reach[g + 1]], 6 * (reach[g + 1] - reach[g])
-            runs, mine = _runs(met, own, begins)
-            for u in range(begins[mine], len(met)):
-                i, left = 6 * (met[u] - own), stack[g] + 6 * u * n
-                for a in range(6):
-                    to = rest + (i + a) * b - p
-                    _add_runs(further, to, further, left + a * n, met, begins, mine, runs, width)
-            g = sibling[g]
+        _pass_on(further, f, own, p, b, fronts, stack, begins, width)
     # Keeps the arrays alive, which are addressed by pointers above.
-    return len(room) + len(front) + len(panel) > 0
+    return len(room) + len(front) > 0
 
 
 @part(error_model="numpy", nogil=True)

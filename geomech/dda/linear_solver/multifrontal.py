@@ -26,44 +26,20 @@ THREADED, THREADED_SOLUTION = 500, 4000
 
 
 @kept(fastmath=False, error_model="numpy", nogil=True)
-def _eliminate_shared(
-    claimed,
-    awaited,
-    done,
-    tasks,
-    above,
-    touched,
-    data,
-    pivots,
-    reach,
-    seat,
-    entries,
-    entry,
-    row,
-    column,
-    stack,
-    at,
-    back,
-    child,
-    sibling,
-    room,
-    factors,
-    units,
-):
-    """Claim ``tasks`` by ``claimed`` (1,) until none are left, and wait until all are done. ``awaited`` (k,): number of
-    contributions each task still waits for; ``done`` (2,): number of finished and of failed tasks."""
+def _eliminate_shared(work, touched, fronts, matrix, stored, memory):
+    """Claim tasks until none are left, and wait until all are done; for the other arguments see `eliminate`. ``work``:
+    claimed (1,); awaited (k,), number of contributions each task still waits for; done (2,), number of finished and of
+    failed tasks; tasks (k, 2); and the task above each (k,)."""
+    claimed, awaited, done, tasks, above = work
     space = None
     while True:
         q = add_at_once(claimed, 0, 1)
         if q >= len(tasks):
             break
         if space is None:
-            space = working_space(pivots, reach, factors)
+            space = working_space(fronts[0], fronts[1], memory[1])
         await_value(awaited, q, 0)
-        if not eliminate(
-            tasks[q, 0], tasks[q, 1], touched, data, pivots, reach, seat, entries, entry, row, column, stack, at, back,
-            child, sibling, room, factors, units, space,
-        ):  # fmt: skip
+        if not eliminate(tasks[q, 0], tasks[q, 1], touched, fronts, matrix, stored, memory, space):
             add_at_once(done, 1, 1)
         if above[q] >= 0:
             add_at_once(awaited, above[q], -1)
@@ -96,26 +72,12 @@ def _mark_above(touched, parent):
 
 
 @kept(fastmath=False, error_model="numpy", nogil=True)
-def _substitute_shared(
-    claimed,
-    awaited,
-    done,
-    tasks,
-    above,
-    out,
-    pivots,
-    reach,
-    seat,
-    boundary,
-    at,
-    back,
-    child,
-    sibling,
-    factors,
-    passed,
-):
+def _substitute_shared(work, out, fronts, boundary, stored, factors, passed):
     """As `_eliminate_shared`: forward through the tasks in their order, then backward in reverse order, each after its
-    parent."""
+    parent. ``stored``: ``at`` and ``back`` of factors."""
+    claimed, awaited, done, tasks, above = work
+    pivots, reach, seat, child, sibling = fronts
+    at, back = stored
     k = len(tasks)
     while True:
         q = add_at_once(claimed, 0, 1)
@@ -179,6 +141,11 @@ class Factors:
         self._units: np.ndarray = np.array([1.0, 0.0], dtype)
 
     @property
+    def _fronts(self) -> tuple[np.ndarray, ...]:
+        """As `eliminate` takes them."""
+        return self.tree.pivots, self.tree.reach, self.tree.seat, self._child, self._sibling
+
+    @property
     def single(self) -> bool:
         """Whether the factors are in single precision."""
         return self._factors.dtype == np.float32
@@ -205,9 +172,9 @@ class Factors:
         self._left = self._again and (again or not touched.all())
         with blas_threads(1):
             done = self._shared(
-                _eliminate_shared, THREADED, touched, data, t.pivots, t.reach, t.seat, t.entries, t.entry, t.row,
-                t.column, t.own_room if self._left else t.stack, self._at, self._back, self._child, self._sibling,
-                self._room, self._factors, self._units,
+                _eliminate_shared, THREADED, touched, self._fronts, (data, t.entries, t.entry, t.row, t.column),
+                (t.own_room if self._left else t.stack, self._at, self._back),
+                (self._room, self._factors, self._units),
             )  # fmt: skip
         if done[1]:
             raise np.linalg.LinAlgError("the block system is singular")
@@ -221,8 +188,8 @@ class Factors:
         out, x = np.empty(len(right), self._factors.dtype), np.empty(len(right))
         _take(right, self._order, size, out)
         self._shared(
-            _substitute_shared, THREADED_SOLUTION, out, t.pivots, t.reach, t.seat, t.boundary, self._at, self._back,
-            self._child, self._sibling, self._factors, self._passed,
+            _substitute_shared, THREADED_SOLUTION, out, self._fronts, t.boundary, (self._at, self._back),
+            self._factors, self._passed,
         )  # fmt: skip
         _give(out, self._order, size, x)
         return x
@@ -234,7 +201,7 @@ class Factors:
         done = np.zeros(2, np.int64)
         task = np.zeros(1, np.int64), self._awaited.copy(), done, t.tasks, t.above
         if len(t.rank) < least:
-            work(*task, *given)
+            work(task, *given)
         else:
-            crew().share(work, *task, *given)
+            crew().share(work, task, *given)
         return done
