@@ -79,6 +79,27 @@ def _add_product(a, at_a, row_a, b, at_b, row_b, c, at_c, row_c, rows, k, n, kee
 
 
 @_part
+def _pivot(cell, k, n):
+    """The row, from ``k`` on, whose number in column ``k`` is largest; −1 if there is none but zero, or none finite."""
+    pivot, largest = k, abs(cell[SIDE * k + k])
+    for i in range(k + 1, n):
+        size = abs(cell[SIDE * i + k])
+        if size > largest:
+            pivot, largest = i, size
+    return pivot if largest > 0.0 and largest < np.inf else -1
+
+
+@_part
+def _swap_back(cell, n, swapped):
+    """Exchange the columns of an inverse as the rows of its matrix were ``swapped``, the last first."""
+    for k in range(n - 1, -1, -1):
+        pivot = swapped[k]
+        if pivot != k:
+            for i in range(n):
+                cell[SIDE * i + k], cell[SIDE * i + pivot] = cell[SIDE * i + pivot], cell[SIDE * i + k]
+
+
+@_part
 def _invert(front, at, m, n, cell, others, swapped, width):
     """Invert n × n numbers of a ``front`` with rows of m, from ``at`` on, in place, by Gauss–Jordan elimination with
     row exchanges; False if they are singular. ``cell`` (`SIDE`² + 1,): working space; ``others`` (`SIDE`²,): ones with
@@ -88,12 +109,8 @@ def _invert(front, at, m, n, cell, others, swapped, width):
         for q in range(0, SIDE, width):
             store(here, SIDE * i + q, load_first(whole, at + i * m + q, min(max(n - q, 0), width)))
     for k in range(n):
-        pivot, largest = k, abs(cell[SIDE * k + k])
-        for i in range(k + 1, n):
-            size = abs(cell[SIDE * i + k])
-            if size > largest:
-                pivot, largest = i, size
-        if not (largest > 0.0 and largest < np.inf):
+        pivot = _pivot(cell, k, n)
+        if pivot < 0:
             return False
         swapped[k] = pivot
         if pivot != k:
@@ -112,11 +129,7 @@ def _invert(front, at, m, n, cell, others, swapped, width):
                 for q in range(0, SIDE, width):
                     rest = plus_product(zeros(here), load(here, SIDE * i + q), load(but, SIDE * k + q))
                     store(here, SIDE * i + q, minus_product(rest, share, load(here, SIDE * k + q)))
-    for k in range(n - 1, -1, -1):
-        pivot = swapped[k]
-        if pivot != k:
-            for i in range(n):
-                cell[SIDE * i + k], cell[SIDE * i + pivot] = cell[SIDE * i + pivot], cell[SIDE * i + k]
+    _swap_back(cell, n, swapped)
     for i in range(n):
         for q in range(0, n, width):
             store_first(whole, at + i * m + q, load(here, SIDE * i + q), min(n - q, width))
