@@ -1,10 +1,18 @@
-"""The runs of a study: one scene in several variants, each run into a folder of its own and seen by a watcher."""
+"""The runs of a study: one scene in several variants, each run into a folder of its own and seen by a watcher.
+
+A study tells the time left by the runs that have ended: those of `geomech.run`, `watched_runs` and sweeps count by
+themselves, others by `run_ended`.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
+
+from .output.console.at_work import run_ended
+
+__all__ = ["Watched", "run_ended", "watched_runs"]
 
 
 class Watched(NamedTuple):

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 import geomech
+from geomech.study import run_ended
 
 #: Of each kind specimens with so many flaws, and of each number so many specimens.
 NUMBERS, SEEDS = (5, 10, 20), (1, 2, 3)
@@ -148,5 +149,6 @@ def course(
             break
         if cycle.number >= most:
             break
+    run_ended()
     segments = cycle.cracks.nodes[cycle.cracks.segments]
     return Course(np.array(load), np.array(strain), first, max(load), len(joined), passed, segments)
