@@ -95,7 +95,6 @@ BOUNDS = {
 #: Words of warnings in which a run says that its result is unreliable.
 WARNED = (
     "nothing holds",
-    "is known no better",
     *sorted({words for invariant in INVARIANTS.values() for words in invariant.reported}),
 )
 #: The same of results that depend on the time step, not on the place.

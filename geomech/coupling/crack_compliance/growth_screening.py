@@ -45,7 +45,7 @@ class _Known:
     crack_system: object
     solved: int = 0
     bound: TipBound | None = None
-    per_factor: Any = 0.0
+    per_factor: np.ndarray | float = 0.0
     never: bool = False
 
 

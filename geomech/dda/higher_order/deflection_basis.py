@@ -21,7 +21,7 @@ their Gram matrix, applied twice, keep the basis orthonormal to round-off up to 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import TypeVar
 
 import numpy as np
 
@@ -33,7 +33,11 @@ from .polygon_quadrature import polygon_points
 HIGHEST, _HIGHEST_BASIS = 8, 10
 
 
-def n_deflections(order: Any) -> Any:
+#: A number, or many.
+Orders = TypeVar("Orders", int, np.ndarray)
+
+
+def n_deflections(order: Orders) -> Orders:
     """Number of unknowns of deflection of a block of this ``order``."""
     return (order + 1) * (order + 2) - 6
 

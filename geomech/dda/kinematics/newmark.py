@@ -26,7 +26,7 @@ dissipates what the step does not resolve and leaves the rest alone. With the co
 (ϱ−1)/(ϱ+1), γ = ½−α, β = ¼(1−α)², it is of second order, and every |λ| tends to the spectral radius ϱ as ω dt → ∞. It
 is the step above with (ā − c a₀)/w in place of ā and θ = 1, w = 1/(1+ϱ), c = 1−w. Contact forces are part of a₀: a
 bounce may gain some energy. Damping forces follow the mean velocity d/dt of the step and dissipate dᵀD d/dt > 0 for any
-step; in a cracked block the rate of its stress, and dissipate Δσ·Δε.
+step; that of a block follows the rate of its stress, and dissipates Δσ·Δε per area.
 """
 
 from __future__ import annotations
@@ -285,8 +285,8 @@ def assemble_blocks(order, n, mass, start, cracks, loads, scheme):
     - generalised forces of all other loads;
     - damping: a viscous stress ∝ Δσ/dt that gives a block's lowest vibration (taken as that of a square, ω² =
       12 C₁₁/(ρ h²)) the fraction ``block_damping`` of critical damping, and Rayleigh damping. Δσ is the change of the
-      stress itself: with the tangent times Δε, where crack faces open or close, the force would hang on the side
-      from which the step is sought, and steps whose states agree with their tangent need not exist.
+      stress itself: with the tangent times Δε, where crack faces open or close, the force would depend on the side
+      from which the step is sought, and there might be no step whose faces agree with its tangent.
     """
     density, moments, _ = mass
     carried, stress, stiffness, compliance = start

@@ -152,10 +152,8 @@ class AdmissibleForces:
             high = factor
             if high <= 1.0 / _FARTHEST:
                 return 0.0
-            # U is convex: the factor sought is between the last admissible one and Newton's.
-            falls = slope < 0.0
-            factor = max(1.0 / (1.0 / high - left / slope), low) if falls else low
-            if (falls and high - factor <= _PRECISE * high) or high - low <= 2.0 * _PRECISE * high:
+            factor = max(1.0 / (1.0 / high - left / slope), low) if slope < 0.0 else low
+            if high - factor <= _PRECISE * high or high - low <= 2.0 * _PRECISE * high:
                 return factor
             factor = factor if factor > low else 0.5 * (low + high)
 

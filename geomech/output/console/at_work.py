@@ -42,6 +42,8 @@ class AtWork:
     ) -> None:
         self.name, self.course, self.quiet, self.stream, self.silence = name, course, quiet, stream, silence
         self._done = threading.Event()
+        #: Runs end in the main thread while the other one reads their course.
+        self._counting = threading.Lock()
         self._ended, self._course = 0, Course()
         self._earlier = Course.found(course) if course else None
 
@@ -68,14 +70,16 @@ class AtWork:
 
     def count_run(self) -> None:
         """Record that a run of this study has ended."""
-        self._ended += 1
-        self._course.add(self._ended, time.monotonic() - self._began, self._ended)
+        with self._counting:
+            self._ended += 1
+            self._course.add(self._ended, time.monotonic() - self._began, self._ended)
 
     def _left(self, now: float) -> str:
         """For messages: the time left after ``now`` s; "" if it is not known."""
         if self._earlier is None:
             return ""
-        seconds = self._course.left_as(self._earlier) - (now - self._course.wall[-1])
+        with self._counting:
+            seconds = self._course.left_as(self._earlier) - (now - self._course.wall[-1])
         return f", about {duration_text(seconds)} left, as in an earlier run" if 0.5 <= seconds < math.inf else ""
 
     def _watch(self) -> None:

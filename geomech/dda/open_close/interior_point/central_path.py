@@ -30,7 +30,7 @@ from ...joint_laws.coulomb_return import moved
 from ...joint_laws.penalty_springs import Springs
 from ...linear_solver import assembly
 from ..equations import Equations
-from .contact_terms import LEAST_LEFT, SHORT_OF
+from .contact_terms import LEAST_LEFT, SHORT_OF, PathSprings, Variables
 from .newton_steps import THREADED, PathSteps
 
 #: Bond state of a contact that has slipped but kept some cohesion: it may slide.
@@ -230,8 +230,8 @@ class CentralPath:
         self.taken += 1
         pattern, steps, unit, solver = self._pattern, self._steps, self._unit, self._solver
         total = steps.linearise(
-            (self._normal, self._width, self._slip, self._shear, self._g, self._s),
-            (self._kn, self._ks, self._mu, self._base, self._rough, unit),
+            Variables(self._normal, self._width, self._slip, self._shear, self._g, self._s),
+            PathSprings(self._kn, self._ks, self._mu, self._base, self._rough, unit),
             (self._right - pattern.without_contacts(self._matrix, self._unknowns)).ravel(),
         )
         epsilon = total / float((1 + 2 * self._rough).sum())

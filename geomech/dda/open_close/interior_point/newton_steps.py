@@ -14,7 +14,22 @@ import numpy as np
 from ....compiled import kept
 from ...linear_solver.assembly import sides_of
 from ...linear_solver.task_pool import add_at_once, await_value, crew
-from .contact_terms import balance, change, go, linearise, nearer, products, pull, second_order, undecided
+from .contact_terms import (
+    Between,
+    Changes,
+    Linearised,
+    PathSprings,
+    Variables,
+    balance,
+    change,
+    go,
+    linearise,
+    nearer,
+    products,
+    pull,
+    second_order,
+    undecided,
+)
 
 #: Tasks.
 _LINEARISE, _PREDICT, _CORRECT, _CENTRE, _CHANGE, _GO = range(6)
@@ -38,12 +53,12 @@ def _work(
     claimed, told, share, share_blocks = chunks
     epsilon, far = target
     kn, _, _, _, _, unit = springs
+    _, _, vectors, _ = between
     start, side = sides
     numbers, _, _, pulled = linearised
     given, out, unknowns = blocks
-    goals, changes = step
+    goals, (_, changed, _) = step
     better, further = tried
-    changed = changes[1]
     n, n_blocks = len(kn), len(start) - 1
     shares = (n + share - 1) // share
     whole = shares + (0 if task >= _CHANGE else (n_blocks + share_blocks - 1) // share_blocks)
@@ -74,7 +89,7 @@ def _work(
             # The forces on blocks need those of all contacts.
             await_value(told, 0, shares)
             first, last = (q - shares) * share_blocks, min(n_blocks, (q - shares + 1) * share_blocks)
-            balance(first, last, start, side, between[2], pulled, 0, 2, given, out)
+            balance(first, last, start, side, vectors, pulled, 0, 2, given, out)
         add_at_once(told, 0 if q < shares else 1, 1)
     await_value(told, 0, shares)
     await_value(told, 1, whole - shares)
@@ -87,8 +102,8 @@ class _Step:
     def __init__(self, n: int) -> None:
         self.goals, self.motion = np.empty((n, 3)), np.empty((n, 2))
         self.changed, self.sheared = np.empty((n, 6)), np.empty(n)
-        #: As `contact_terms.Changes`.
-        self.changes = self.motion, self.changed, self.sheared
+        #: As kernels take them.
+        self.changes = tuple(Changes(self.motion, self.changed, self.sheared))
         self.far, self.unknowns = 0.0, np.empty(0)
 
 
@@ -103,7 +118,7 @@ class PathSteps:
         self, n_blocks: int, mine: np.ndarray, theirs: np.ndarray, vectors: np.ndarray, lift: np.ndarray
     ) -> None:
         n, each = len(mine), np.arange(n_blocks)
-        self._fixed = mine, theirs, vectors, lift
+        self._fixed = tuple(Between(mine, theirs, vectors, lift))
         self._sides = tuple(sides_of(n_blocks, np.append(each, -1), mine, theirs))
         self._parts = np.empty((n + SHARE - 1) // SHARE)
         self.numbers, self.laws = np.empty((n, 6)), np.empty((n, 4))
@@ -112,11 +127,11 @@ class PathSteps:
         self.residual, self._side = np.empty(6 * n_blocks), np.empty(6 * n_blocks)
         self.step, self.tried = _Step(n), _Step(n)
 
-    def linearise(self, at_hand: tuple[np.ndarray, ...], springs: tuple[np.ndarray, ...], given: np.ndarray) -> float:
+    def linearise(self, at_hand: Variables, springs: PathSprings, given: np.ndarray) -> float:
         """Prepare steps from ``at_hand``: N, w, slip, S, gap and motion along the edge of contacts (n,) with
         ``springs`` kn, ks, μ, base, rough and unit; ``given`` (6 n_blocks,) N: forces on blocks without contact forces.
         Returns the sum of the products."""
-        self._at_hand, self._springs = at_hand, springs
+        self._at_hand, self._springs = tuple(at_hand), tuple(springs)
         self._do(_LINEARISE, given=given, out=self.residual)
         return float(self._parts.sum())
 
@@ -167,7 +182,7 @@ class PathSteps:
     ) -> None:
         step, tried = self.step, self.tried
         chunks = np.zeros(1, np.int64), np.zeros(2, np.int64), SHARE, SHARE_BLOCKS
-        linearised = self.numbers, self._missed, self.laws, self._pulled
+        linearised = tuple(Linearised(self.numbers, self._missed, self.laws, self._pulled))
         work = (
             chunks, task, (epsilon, far), self._parts, self._fixed, self._springs, self._sides, self._at_hand, linearised,
             (given, out, tried.unknowns), (step.goals, step.changes), (tried.goals, tried.changes),
