@@ -2,11 +2,11 @@
 A jointed slope, from an empty folder
 =====================================
 
-A slope 20 m high with two joint sets: drawn in Gmsh from nothing, checked, built, run, and its factor of safety found.
-It takes a quarter of an hour, most of it reading. You need geomech :doc:`installed </start/install>`, a terminal and a
-text editor. The second half makes the mistakes that most people make first, and shows what the program says to each.
+We draw a slope 20 m high with two joint sets in Gmsh, check it, build it, run it and find its factor of safety.
+This takes a quarter of an hour, most of it reading. You need geomech :doc:`installed </start/install>`, a terminal and a
+text editor. The second half shows common beginners' mistakes and how the program reports each of them.
 
-Begin in an empty folder, with the environment active in which geomech is installed:
+Start in an empty folder, with geomech's environment activated:
 
 .. code-block:: sh
 
@@ -16,14 +16,15 @@ Begin in an empty folder, with the environment active in which geomech is instal
 # %%
 # 1. Draw the slope
 # -----------------
-# A Gmsh model is a text file. Save these lines as ``my_slope.geo`` in your folder (a button in the corner of the box copies them):
+# A Gmsh model is a text file. Save these lines as ``my_slope.geo`` in your folder (the button in the corner of the box
+# copies them):
 #
 # .. literalinclude:: /tutorials/my_slope.geo
 #    :language: c
 #
-# To see it, open it in Gmsh, which came with geomech: ``gmsh my_slope.geo``. The drawing follows every change of the
-# file (press ``0`` in Gmsh to reload it). Values in ``DefineConstant`` stand in the panel on the left. You can also draw
-# by mouse there (*Geometry → Elementary entities → Add*): Gmsh appends what you draw to the file.
+# To see it, open it in Gmsh, which was installed with geomech: ``gmsh my_slope.geo``. After a change of the file, press
+# ``0`` in Gmsh to reload it. Values in ``DefineConstant`` appear in the panel on the left. You can also draw with the
+# mouse (*Geometry → Elementary entities → Add*): Gmsh appends what you draw to the file.
 #
 # .. image:: /pictures/gmsh_my_slope.png
 #    :alt: The slope in Gmsh's window, with its two parameters in the panel on the left
@@ -33,20 +34,20 @@ Begin in an empty folder, with the environment active in which geomech is instal
 # - A *physical surface* is a zone of rock, called by its name.
 # - A *physical curve* called ``joint:NAME`` cuts the rock, and one called ``crack:NAME`` is a crack. Any other name marks
 #   edges, for loads and joint laws.
-# - What is in no physical group is not read.
-# - ``base`` will be fixed. It supports the rock from below and from behind, and it goes on in front of the toe, because
-#   blocks that come down need a floor to land on. The face of the slope is free: nothing is drawn there.
+# - Anything outside all physical groups is ignored.
+# - ``base`` will be fixed. It supports the rock from below and from behind, and it extends in front of the toe, because
+#   falling blocks need a floor to land on. The face of the slope is free: nothing is drawn there.
 #
 # 2. Write the scene
 # ------------------
-# The scene says what the drawing does not: joints, materials, loads, time. Save it as ``my_slope.toml`` beside the
-# model. All values are in SI units and the unit stands in the name of the key.
+# The scene adds what the drawing does not contain: joints, materials, loads, time. Save it as ``my_slope.toml`` beside
+# the model. All values are in SI units, and the unit is part of the key's name.
 #
 # .. literalinclude:: /tutorials/my_slope.toml
 #    :language: toml
 #
-# The code below is only there to make this page: it copies both files into a temporary folder and types the commands
-# for you. In your terminal, type what stands in ``terminal("…")``.
+# The code below is only needed to make this page: it copies both files into a temporary folder and runs the commands
+# there. In your terminal, type the text inside ``terminal("…")``.
 
 import contextlib
 import shlex
@@ -78,19 +79,19 @@ def terminal(command: str) -> None:
 # %%
 # 3. Check and build
 # ------------------
-# ``check`` reads the scene and its drawing and reports every error at once, with its line and the way out. Nothing runs
-# before it is content.
+# ``check`` reads the scene and its drawing and reports all errors at once, each with its line and a remedy. Nothing can
+# run until it finds no more errors.
 
 terminal("geomech check my_slope.toml")
 
 # %%
-# It also warns of four slivers that it merged with their neighbours, because ``smallest_block_m2`` asked for it.
-# ``build`` cuts the rock into blocks and draws them. It prints for each joint set what was asked for and what came out.
+# It also warns that it merged four slivers with their neighbours, as ``smallest_block_m2`` asks.
+# ``build`` cuts the rock into blocks and draws them. For each joint set it prints the requested and the obtained values.
 
 terminal("geomech build my_slope.toml --picture shown/blocks.png")
 
 # %%
-# Look at this picture before every first run. Hatched is what is fixed. Are the joints the ones you meant? Do the beds
+# Look at this picture before every first run. Fixed blocks are hatched. Are the joints the ones you meant? Do the beds
 # dip out of the slope? Is the face free?
 #
 # 4. Run
@@ -100,14 +101,14 @@ terminal("geomech build my_slope.toml --picture shown/blocks.png")
 terminal("geomech run my_slope.toml")
 
 # %%
-# The beds dip at 30° and have 24° of friction, so the slope slides. ``geomech render outputs/my_slope`` draws the end
-# and a film of the motion; ``outputs/my_slope/blocks.pvd`` opens in :doc:`ParaView </start/paraview>`.
+# The beds dip at 30° and have a friction angle of 24°, so the slope slides. ``geomech render outputs/my_slope`` draws the
+# final state and a film of the motion; ``outputs/my_slope/blocks.pvd`` opens in :doc:`ParaView </start/paraview>`.
 
 terminal("geomech render outputs/my_slope --no-gif")
 (work / "outputs/my_slope/pictures/displacement.png").rename(work / "shown/end.png")
 
 # %%
-# Is it right? On a plane at 30° with 24° of friction a rigid slab moves by
+# Is this correct? On a plane at 30° with 24° of friction, a rigid slab moves by
 # :math:`\tfrac12 g (\sin 30° - \cos 30° \tan 24°)\,t^2`. Most of the rock should move like that. Blocks at the face
 # move farther, because they also topple.
 
@@ -121,23 +122,23 @@ print(
 # %%
 # 5. How safe is it?
 # ------------------
-# ``safety`` divides the strength of all joints by a factor until no equilibrium is left.
+# ``safety`` divides the strength of all joints by an increasing factor until no equilibrium exists.
 
 terminal("geomech safety my_slope.toml")
 
 # %%
-# A slab on its bed alone would have :math:`\tan 24°/\tan 30° = 0.77`. The blocks at the face topple over the cross
-# joints, and that makes it lower. With 35° on the beds as well:
+# A single slab on its bed would have :math:`\tan 24°/\tan 30° = 0.77`. The blocks at the face topple over the cross
+# joints, which lowers the factor. With 35° on the beds as well:
 
 terminal("geomech safety my_slope.toml --set joints.beds.friction_angle_deg=35 --picture shown/mechanism.png")
 
 # %%
-# That is the whole way: draw, check, build, run, look, find the factor. Any key can be changed for one run with
-# ``--set``, and ``geomech check my_slope.toml --keys`` lists all of them.
+# That is the complete procedure: draw, check, build, run, look at the results, find the factor. Any key can be changed
+# for one run with ``--set``, and ``geomech check my_slope.toml --keys`` lists all keys.
 #
-# The mistakes of the first day
-# -----------------------------
-# We make them one by one and let ``check`` answer:
+# Beginners' mistakes
+# -------------------
+# We make them one by one and let ``check`` report them:
 
 
 def attempt(old: str, new: str, geo=("", "")) -> None:
@@ -161,7 +162,7 @@ def attempt(old: str, new: str, geo=("", "")) -> None:
 attempt("[zones.base]\nfixed = true\n", "")
 
 # %%
-# **The base is drawn, but is no physical surface.** Then it is not read, and the rock hangs in the air.
+# **The base is drawn, but is not a physical surface.** Then it is not read, and the rock has no support.
 
 attempt("[zones.base]\nfixed = true\n", "", geo=('Physical Surface("base") = {2};', ""))
 
@@ -177,39 +178,39 @@ attempt('edges = ["joint:beds"]', 'edges = ["beds"]')
 attempt("friction_angle_deg = 24", "friction_angle = 24")
 
 # %%
-# **GPa instead of Pa**, and tonnes instead of kilograms. These are warnings, since such rock may be meant.
+# **GPa instead of Pa**, and tonnes instead of kilograms. These give warnings only, since such values may be intended.
 
 attempt("20e9", "20")
 attempt("density_kg_m3 = 2600", "density_kg_m3 = 2.6")
 
 # %%
-# **Gravity that points up:**
+# **Gravity pointing upwards:**
 
 attempt("[0, -9.81]", "[0, 9.81]")
 
 # %%
-# **A line of the model that refers to one that does not exist.** Gmsh says what it could not read.
+# **A line loop of the model that refers to a missing line.** Gmsh reports what it could not read.
 
 attempt("title", "title", geo=("Line(7) = {6, 7};", ""))
 
 # %%
-# **Joint sets that cut the base too**, because they name no zone. That is no error, but it is hardly meant: the base
-# falls into blocks that are fixed one by one and cost time.
+# **Joint sets that also cut the base**, because they name no zone. This is not an error, but rarely intended: the base
+# is divided into many fixed blocks, which cost time.
 
 (work / "cut_too.toml").write_text(SCENE.replace('zones = ["rock"]', ""))
 print(load_scene(work / "my_slope.toml").problem().inventory)
 print(load_scene(work / "cut_too.toml").problem().inventory)
 
 # %%
-# Mistakes that no check can see
-# ------------------------------
-# - **A wall in front of the face.** If ``base`` goes up there, nothing comes down.
-# - **No floor in front of the toe.** Blocks that come down fall out of the picture and go on falling.
-# - **Friction at the back.** Rock that lies against a fixed back leans on it with the default joint law. If the back
+# Mistakes that no check can detect
+# ---------------------------------
+# - **A wall in front of the face.** If ``base`` extends upwards there, nothing can come down.
+# - **No floor in front of the toe.** Falling blocks leave the picture and keep falling.
+# - **Friction at the back.** The contact between the rock and a fixed back has the default joint law. If the back
 #   should be smooth, name its edges in the model (``Physical Curve("back") = {2};``) and give them a law:
 #   ``edges = ["back"]``.
-# - **Beds that dip the wrong way.** Angles count counter-clockwise from x. In this drawing, whose face looks to the
-#   left, beds at +30° dip out of the slope and beds at −30° dip into it:
+# - **Beds that dip the wrong way.** Angles are measured counter-clockwise from x. In this drawing, whose face looks to
+#   the left, beds at +30° dip out of the slope and beds at −30° dip into it:
 
 (work / "into.toml").write_text(SCENE.replace("angle_deg = 30", "angle_deg = -30").replace("112", "68"))
 figure, (left, right) = plt.subplots(1, 2, figsize=(11, 3.6), layout="constrained")
@@ -217,4 +218,4 @@ sketch(load_scene(work / "my_slope.toml"), left).set_title("angle_deg = 30: out 
 sketch(load_scene(work / "into.toml"), right).set_title("angle_deg = −30: into the slope")
 
 # %%
-# Next: :ref:`rock bridges <sphx_glr_gallery_plot_02_rock_bridges.py>`, where joints do not run through.
+# Next: :ref:`rock bridges <sphx_glr_gallery_plot_02_rock_bridges.py>`, where joints are not persistent.

@@ -9,17 +9,17 @@ centrifuge, until the bridge breaks. At what load does it break, and what does l
 # %%
 # The scene
 # ---------
-# The plane is drawn as a *crack* with a joint's law on its faces, in two pieces: the gap between them is the bridge.
-# Before it breaks, slope and ground are one cracked block; afterwards there are two, of which the upper one slides.
-# The model is ``geometry/bridged_slope.geo``: a slope of 30 m by Hoek & Bray (1981) with a tension crack behind the
-# brink.
+# The plane is drawn as a *crack* in two pieces, with a joint law on its faces; the gap between the pieces is the bridge.
+# Before the bridge breaks, slope and ground are one cracked block. Afterwards there are two, and the upper one slides.
+# The model is ``geometry/bridged_slope.geo``: a slope of 30 m after Hoek & Bray (1981) with a tension crack behind the
+# crest.
 #
 # Three choices matter:
 #
 # - ``criterion = "f"``: the bridge is sheared, so it may break in shear, against its own toughness
 #   ``k_iic_pa_sqrt_m``;
 # - ``stepping = "events"``: a step ends at exactly the load at which a tip reaches its toughness;
-# - gravity grows by one g a second, so that time is the multiple of gravity.
+# - gravity increases by one g per second, so that time equals the multiple of gravity.
 
 import tempfile
 from pathlib import Path
@@ -101,9 +101,9 @@ failure = cycle.state.time
 # Limit equilibrium with a bridge
 # -------------------------------
 # A block of weight :math:`W` on a plane at angle :math:`d` slides when :math:`W\sin d` exceeds :math:`W\cos
-# d\tan\varphi + c\,\ell` plus what the bridge holds. Two deep cracks with a ligament of width :math:`2b` between them,
-# sheared by a force :math:`Q`, have :math:`K_{II} = Q/\sqrt{\pi b}` (Tada, Paris & Irwin). So the bridge holds
-# :math:`K_{IIc}\sqrt{\pi b}`. ``geomech/reference/slopes/rock_bridges.py`` has this formula with its sources.
+# d\tan\varphi + c\,\ell` plus the resistance of the bridge. Two deep cracks with a ligament of width :math:`2b` between
+# them, sheared by a force :math:`Q`, have :math:`K_{II} = Q/\sqrt{\pi b}` (Tada, Paris & Irwin). The bridge therefore
+# resists :math:`K_{IIc}\sqrt{\pi b}`. ``geomech/reference/slopes/rock_bridges.py`` has this formula with its sources.
 
 height, dip, crest = 30.0, np.radians(35), 6.0
 brink = height / np.tan(np.radians(60))
@@ -117,13 +117,13 @@ limit = holds / drive
 print(f"failure at {failure:.3f} g, limit equilibrium with the bridge {limit:.3f} g ({failure / limit - 1:+.1%})")
 
 # %%
-# The same slope without the bridge would slide at
+# Without the bridge, the same slope would slide at
 
-print(f"{10e3 * plane / drive:.2f} g: the bridge of 0.6 m does the rest.")
+print(f"{10e3 * plane / drive:.2f} g: the bridge of 0.6 m carries the rest.")
 
 # %%
-# What drives the tips, and what is left
-# --------------------------------------
+# Stress intensity factors, and the final state
+# ---------------------------------------------
 
 time, k_i, k_ii = np.array(history).T
 figure, (left, right) = plt.subplots(1, 2, figsize=(10, 3.6), layout="constrained")
@@ -136,5 +136,5 @@ sketch(cycle, right)
 right.set(ylim=(-12, 33), title="two blocks now")
 
 # %%
-# ``pipelines/planar_slope`` does this for bridges of 0.15 to 1.2 m, and for one that may only tear.
+# ``pipelines/planar_slope`` does this for bridges of 0.15 to 1.2 m, and for one that can fail in tension only.
 # ``pipelines/step_path_slope`` follows ten en-échelon joints while the load drops, with ``control = "toughness"``.

@@ -2,16 +2,16 @@
 A rising water table
 ====================
 
-A block on a plane, a tension crack behind it, and water that rises in both. The factor of safety falls: at which level
-does it reach 1? In a second run the water rises with time until the block slides.
+A block rests on a plane, with a tension crack behind it. As the water level in both rises, the factor of safety falls:
+at which level does it reach 1? In a second run the water rises with time until the block slides.
 """
 
 # %%
 # The scene
 # ---------
-# Water presses on the faces of all joints below the water table, ``[loads.water]``. Here the table is level in the
-# crack; the plane drains at the toe. The plane goes on below the toe, so that nothing blocks the slide there. A table
-# above the ground would be a lake; ``follows_ground`` cuts it off at the ground.
+# Water pressure acts on the faces of all joints below the water table, ``[loads.water]``. Here the table is horizontal
+# behind the crack, and the plane drains at the toe. The plane continues below the toe, so that nothing blocks sliding
+# there. A table above the ground would be a lake; ``follows_ground`` cuts it off at the ground.
 
 import tempfile
 from pathlib import Path
@@ -74,10 +74,10 @@ end_time_s = 3.0
 (work / "water.toml").write_text(SCENE)
 
 # %%
-# The factor by level
-# -------------------
-# The table is a line from the toe to the level in the crack. ``geomech safety water.toml --set …`` does this on the
-# command line.
+# Factor of safety and water level
+# --------------------------------
+# The table is a line from the toe to the level in the crack. On the command line, ``geomech safety water.toml --set …``
+# does the same.
 
 
 def table(level: float) -> dict:
@@ -88,9 +88,9 @@ levels = np.array([0.0, 4.0, 8.0, 11.0])
 found = [geomech.factor_of_safety(load_scene(work / "water.toml", table(level))).factor for level in levels]
 
 # %%
-# Against limit equilibrium (Hoek & Bray 1981, chapter 7): the water's thrust :math:`V = \tfrac12\gamma_w z^2` in the
-# crack and the uplift :math:`U` on the plane. The table is a straight line here, so pressure along the plane is linear
-# from the toe to :math:`\gamma_w z`.
+# We compare with limit equilibrium (Hoek & Bray 1981, chapter 7): water thrust :math:`V = \tfrac12\gamma_w z^2` in the
+# crack and uplift :math:`U` on the plane. The table is a straight line here, so the pressure along the plane increases
+# linearly from the toe to :math:`\gamma_w z`.
 
 dip, length = np.arctan2(10, 20), np.hypot(20, 10)
 weight = (
@@ -113,9 +113,9 @@ axes.set(xlabel="water in the crack, m", ylabel="factor of safety")
 axes.legend(frameon=False)
 
 # %%
-# It rises while the run goes on
-# ------------------------------
-# ``levels_m`` raises the whole table in time. The block begins at rest (``equilibrium = "start"``) and starts to slide
+# Water that rises during the run
+# -------------------------------
+# ``levels_m`` raises the whole table with time. The block begins at rest (``equilibrium = "start"``) and starts to slide
 # when its factor reaches 1.
 
 rising = load_scene(
@@ -139,6 +139,6 @@ sketch(cycle, right)
 right.set_title(f"t = {cycle.state.time:g} s")
 
 # %%
-# One thing to watch: water presses on every edge below the table. A table drawn through the air in front of the face
-# is therefore a lake that presses *on* the slope and holds it. ``geomech check`` warns of it, and ``geomech build``
-# draws it.
+# Note that water presses on every edge below the table. A table drawn through the air in front of the face
+# is therefore a lake that presses *on* the slope and supports it. ``geomech check`` warns of this, and ``geomech build``
+# draws the lake.

@@ -2,16 +2,16 @@
 Bolts and an excavated tunnel
 =============================
 
-Rock with three joint sets is at rest under its weight. A tunnel is excavated during the run. Without support a key
-block falls from the roof; with bolts it stays.
+Rock with three joint sets is at rest under its own weight. A tunnel is excavated during the run. Without support, a key
+block falls from the roof; with bolts it stays in place.
 """
 
 # %%
 # The scene
 # ---------
-# The rock inside the tunnel is a zone of its own, ``core``, which is removed at 0.02 s: ``[[loads.excavations]]``.
-# Bolts are lines; grouted bolts work at every joint they cross. Excavations and bolts act from a given time on,
-# ``time_s`` and ``start_s``.
+# The rock inside the tunnel is a separate zone, ``core``, which is removed at 0.02 s: ``[[loads.excavations]]``.
+# Bolts are lines; grouted bolts act at every joint they cross. ``time_s`` is the time of an excavation, ``start_s`` the
+# time of installation of a bolt.
 
 import tempfile
 from pathlib import Path
@@ -121,15 +121,15 @@ for axes, name in zip(both, ("tunnel", "bolted")):
         axes.plot([x0, x1], [y0, y1], color="#0072b2", lw=2)
 
 # %%
-# What the bolts carry
-# --------------------
-# ``history.csv`` in the run folder has their forces, one column for each bolt and joint. From Python they are rows of
-# the state:
+# Bolt forces
+# -----------
+# ``history.csv`` in the run folder has one column of forces for each bolt and joint. In Python they are rows of the
+# state:
 
 carried = cycle.state.bolts["force"] / 1e3
 print(f"{len(carried)} pieces of bolts between joints carry up to {carried.max():.1f} kN/m; they yield at 160")
 
 # %%
 # ``geometry/tunnel.geo`` is a horseshoe tunnel with a fault, whose roof bolts are drawn in the model as lines called
-# ``bolt:roof``; the scene beside it runs as it is. A liner is a zone of its own between rock and air.
-# ``[loads.in_situ]`` starts from a given stress and K0 instead of the weight alone.
+# ``bolt:roof``; the scene in the same folder runs as it is. A liner is a separate zone between rock and air.
+# ``[loads.in_situ]`` starts from a given stress with K0 instead of from the weight alone.

@@ -3,15 +3,15 @@ The two-crack specimen of the paper
 ===================================
 
 Khanizadeh Bahabadi et al. (2023) compute the specimens of Haeri et al. (2014): two slots of 10 mm in a plate of 60 ×
-120 mm between platens, crack 2 turned from crack 1 by φ. This page runs φ = 0 and shows what it takes to say whether a
+120 mm between platens, crack 2 rotated from crack 1 by φ. This page runs φ = 0 and shows how to decide whether a
 result agrees with a published figure.
 """
 
 # %%
 # Run
 # ---
-# ``geomech run pipelines/two_cracks`` runs all four and writes a page that compares every table. From Python, one of
-# them, in about two seconds:
+# ``geomech run pipelines/two_cracks`` runs all four specimens and writes a page that compares every table. Here one of
+# them is run from Python, in about two seconds:
 
 from pathlib import Path
 
@@ -36,10 +36,10 @@ for event in events:
     print(f"{event.load / 1e6:7.2f} MPa  {event.kind}: {event.detail}")
 
 # %%
-# The cracks, and the load they need
-# ----------------------------------
+# Crack paths and loads
+# ---------------------
 # Steps end at exactly the load at which the next tip reaches its toughness (``run.stepping = "events"``), so K exceeds
-# 2 MPa √m by no more than one increment of growth adds.
+# 2 MPa √m by no more than the change over one growth increment.
 
 figure, (left, right) = plt.subplots(1, 2, figsize=(10, 4.8), layout="constrained", width_ratios=(1.3, 1))
 left.plot(loads, factors, ".-")
@@ -50,11 +50,11 @@ sketch(cycle, right)
 right.set(title="after coalescence", xlim=(-0.03, 0.03), ylim=(-0.06, 0.06))
 
 # %%
-# Against the paper
-# -----------------
-# Loads scale with the toughness, so :math:`\sigma\sqrt{\pi b}/K_{Ic}` is what can be compared. With the printed
-# toughness no such slot can grow below 44.6 MPa, above the strength of the intact material (28 MPa), so the printed
-# stresses (2 to 5 MPa) do not follow from it. What can be compared is *where* cracks go:
+# Comparison with the paper
+# -------------------------
+# Loads scale with the toughness, so :math:`\sigma\sqrt{\pi b}/K_{Ic}` is the quantity to compare. With the printed
+# toughness no such slot can grow below 44.6 MPa, which exceeds the strength of the intact material (28 MPa). The printed
+# stresses (2 to 5 MPa) therefore do not follow from it. The crack *paths* can be compared:
 
 first = next(event for event in events if event.kind == "initiation")
 last = next(event for event in events if event.kind == "coalescence")
@@ -65,9 +65,9 @@ for source, angles in published.COALESCENCE_ANGLE_DEG.items():
     print(f"line of coalescence, φ = 0, {source}: {angles[0]:.1f}°")
 
 # %%
-# Is K right before anything grows?
-# ---------------------------------
-# The crack solver alone, under an even load, in three orders. The coupled specimen at 0.2 MPa agrees with it to 3e-9.
+# K before growth
+# ---------------
+# The crack solver alone, under a uniform load, with three orders. The coupled specimen at 0.2 MPa agrees to 3e-9.
 
 from geomech import ddm
 from geomech.model import DdmSettings
@@ -82,5 +82,5 @@ for order in (2, 4, 6):
 
 # %%
 # Other variants: ``--variant closed_0`` has closed faces, ``paper_0`` the paper's elements and Kelvin's solution,
-# ``increment_…`` and ``order_…`` other settings. ``geomech report outputs/two_cracks`` puts all of them on one page.
-# Where the paper's figures agree with each other, and where they do not: :doc:`/verification/two_cracks`.
+# ``increment_…`` and ``order_…`` other settings. ``geomech report outputs/two_cracks`` shows all of them on one page.
+# :doc:`/verification/two_cracks` discusses where the paper's figures are consistent and where they are not.

@@ -1,14 +1,14 @@
 """
-A specimen with flaws of one's own
-==================================
+A specimen with flaws of your own
+=================================
 
-Three flaws where you want them, drawn in TOML without Gmsh. One is a slot, one is closed with friction, one is
-cemented.
+Three flaws at positions of your choice, drawn in TOML without Gmsh. One is a slot, one is closed with friction, and one
+is cemented.
 """
 
 # %%
-# Each crack can have faces of its own: ``[cracks.NAME]`` with an ``aperture`` and a joint law. The specimen stands on
-# one frictionless platen and is pressed by another, ``guided`` to run along y alone.
+# ``[cracks.NAME]`` gives each crack its own ``aperture`` and joint law. The specimen stands on
+# one frictionless platen and is loaded by another, which is ``guided`` along y.
 
 import tempfile
 from pathlib import Path
@@ -126,8 +126,8 @@ interior_every = 1000
 # %%
 # Run into a folder, as ``geomech run flaws.toml`` does, and read it back
 # ------------------------------------------------------------------------
-# An observer watches a run, cycle by cycle. ``standard_observers`` returns those that write files; ours keeps the last
-# cycle so that we can draw it.
+# An observer is called after every cycle of a run. ``standard_observers`` returns those that write files; ours keeps the
+# last cycle so that we can draw it.
 
 
 class Last(Observer):
@@ -145,8 +145,8 @@ for _, event in run.events.head(6).iterrows():
     print(f"{event['load'] / 1e6:6.2f} MPa  {event['kind']}: {event['detail']}")
 
 # %%
-# ``tips.csv`` has one row per tip and cycle. The slot has a negative K_I and grows wings all the same; the closed flaw
-# has K_I = 0 until its wings open.
+# ``tips.csv`` has one row per tip and cycle. The slot has a negative K_I, but wing cracks grow from it nevertheless. The
+# closed flaw has K_I = 0 until its wings open.
 
 figure, (left, right) = plt.subplots(1, 2, figsize=(10, 4.8), layout="constrained", width_ratios=(1.3, 1))
 for crack, name in enumerate(("slot", "closed", "cemented")):
@@ -168,7 +168,7 @@ right.set(xlim=(-0.031, 0.031), ylim=(-0.061, 0.061), title=f"{last.cycle.load /
 # %%
 # Stress and strain
 # -----------------
-# The gauge gives axial strain between its two points. Cracks that slide and open soften the specimen.
+# The gauge gives the axial strain between its two points. Sliding and opening cracks make the specimen more compliant.
 
 history = run.history
 figure, axes = plt.subplots(figsize=(5, 3.4), layout="constrained")
@@ -178,5 +178,5 @@ strain = history["load"].iloc[-1] * (1 - 0.21**2) / 17e9
 print(f"strain at the end {history['strain'].iloc[-1]:.3e}; whole rock would have {strain:.3e}")
 
 # %%
-# To change the scene: ``--set geometry.cracks.1.angle_deg=60`` turns the second flaw (items count from 0); a crack
-# with ``aperture = 0.0002`` closes once its faces have approached each other by 0.2 mm.
+# To change the scene: ``--set geometry.cracks.1.angle_deg=60`` rotates the second flaw (items are numbered from 0); a
+# crack with ``aperture = 0.0002`` closes once its faces have approached each other by 0.2 mm.

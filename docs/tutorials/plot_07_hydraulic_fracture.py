@@ -2,12 +2,12 @@
 A hydraulic fracture beside a fault
 ===================================
 
-Fluid opens a crack in rock under in-situ stress. A closed, rough fault lies beside it. Does the fracture make the
-fault slip, and does the fault turn the fracture?
+Fluid opens a crack in rock under in-situ stress, close to a closed fault with friction. Does the fracture make the
+fault slip, and does the fault deflect the fracture?
 """
 
 # %%
-# This uses the crack solver alone: an infinite plane, stress far away, fluid in one crack, friction on the other. No
+# This uses the crack solver alone: an infinite plane, far-field stress, fluid in one crack, friction on the other. No
 # scene is needed.
 
 import matplotlib.pyplot as plt
@@ -24,9 +24,9 @@ laws = [JointLaw("fracture", friction_angle=np.radians(30)), JointLaw("fault", f
 settings, growth = DdmSettings(order=4, elements_per_crack=8), GrowthSettings(increment=0.4)
 
 # %%
-# In-situ stress: 10 MPa from above, 22 MPa from the side (tension is positive). The fracture opens against the smaller
-# one once the fluid passes 10 MPa. The fault at 45° carries nearly the shear that friction allows: it is at rest, but
-# only just.
+# The in-situ compressive stress is 10 MPa vertically and 22 MPa horizontally (in the code, tension is positive). The
+# fracture opens against the smaller one once the fluid pressure exceeds 10 MPa. The fault at 45° carries almost the
+# shear stress that friction allows: it is only just stable.
 
 stress = np.array([-22e6, -10e6, 0.0])
 along = (fault[1] - fault[0]) / np.linalg.norm(fault[1] - fault[0])
@@ -37,9 +37,9 @@ holds = -normal * np.tan(np.radians(21))
 print(f"on the fault, MPa: {normal / 1e6:.2f} across, {shear / 1e6:.2f} along; friction holds {holds / 1e6:.2f}")
 
 # %%
-# Pumped, not grown
-# -----------------
-# A load consists of the stress far away, which stays constant, and the fluid's pressure in the segments of the first
+# Pressure without growth
+# -----------------------
+# A load consists of the far-field stress, which stays constant, and the fluid pressure in the segments of the first
 # crack.
 
 
@@ -67,8 +67,8 @@ print(
 print("estimated errors", np.round(solution.tip_errors[:2, 0] / alone, 9), "of it")
 
 # %%
-# The stress beside the fracture shows why: the fluid compresses the rock above and below; ahead of the tip it relieves
-# the fault.
+# The stress field shows why: the fluid pressure compresses the rock above and below the fracture, and reduces the
+# compression of the fault ahead of the tip.
 
 x, y = np.meshgrid(np.linspace(-4, 9, 130), np.linspace(-4, 5, 90))
 field = solution.stress(np.column_stack([x.ravel(), y.ravel()])).reshape(*x.shape, 3)
@@ -80,14 +80,14 @@ right.set_aspect("equal")
 figure.colorbar(shades, ax=right, label="σyy, MPa")
 
 # %%
-# It grows
-# --------
-# ``control="toughness"`` finds, step by step, the pressure that just drives the fracture. When the load is a function
-# of the factor, the stress in the rock stays constant while the fluid's pressure changes.
+# Growth
+# ------
+# ``control="toughness"`` finds in each step the pressure at which the fracture just grows. Because the load is given as
+# a function of the load factor, the stress in the rock stays constant while the fluid pressure changes.
 
 
 def grow(network: Cracks, **options) -> list:
-    """Eight steps, each at the pressure that just drives the most driven tip."""
+    """Eight steps, each at the pressure at which the most heavily loaded tip just grows."""
     return list(ddm.propagate([], network, rock, load, growth, settings, control="toughness", max_steps=8, **options))
 
 
@@ -113,5 +113,5 @@ for step in beside:
         print(event.kind, event.detail, np.round(event.point, 2))
 
 # %%
-# ``pipelines/pressurised_crack`` grows a fracture to a free surface. Scenes take fluids too (``[[loads.fluids]]``), in
-# cracks that you name and in all that are connected with them.
+# ``pipelines/pressurised_crack`` grows a fracture to a free surface. Scenes can contain fluids too (``[[loads.fluids]]``),
+# in the cracks that you name and in all cracks connected with them.

@@ -10,8 +10,8 @@ mass on the same plane.
 # The scene
 # ---------
 # ``[loads.base]`` shakes the fixed blocks with a record: time and acceleration in a text file. ``frame = "base"``
-# holds the base still and applies minus its acceleration to the blocks, which is equivalent and easier to look at.
-# Joints with a given stiffness settle more quickly than penalty springs.
+# keeps the base at rest and applies minus its acceleration to the blocks, which is equivalent and easier to look at.
+# Joints with a given stiffness settle faster than penalty springs.
 
 import tempfile
 from pathlib import Path
@@ -86,9 +86,9 @@ zone = "mass"
 # %%
 # Newmark's block
 # ---------------
-# The block slides down the plane of 20° while the base's acceleration demands more than its friction of 28° provides.
-# The plain integration below follows that rule exactly, without elasticity. The yield acceleration is :math:`g\tan(28°
-# - 20°) = 0.14\,g`.
+# The block slides down the plane of 20° while the base acceleration requires more shear resistance than its friction
+# angle of 28° provides. The integration below follows that rule exactly, without elasticity. The yield acceleration is
+# :math:`g\tan(28° - 20°) = 0.14\,g`.
 
 shaking = History.from_file(record)
 times = np.arange(0, 6.0, 1e-4)
@@ -98,7 +98,7 @@ dip, friction = np.radians(20), np.tan(np.radians(28))
 speed = way = 0.0
 newmark = np.zeros(len(times))
 for k, a in enumerate(ground):
-    # Down the plane (to the left), as the block feels it
+    # Down the plane (to the left), effective gravity in the frame of the base
     press = 9.81 * np.cos(dip) - a * np.sin(dip)
     drive = 9.81 * np.sin(dip) + a * np.cos(dip)
     rate = drive - friction * press
@@ -108,7 +108,7 @@ for k, a in enumerate(ground):
 
 
 def slide(scene) -> tuple[np.ndarray, np.ndarray, object]:
-    """Times, and the way of the monitor down the plane."""
+    """Times, and the displacement of the monitor down the plane."""
     found = []
     for cycle in geomech.cycles(scene):
         found.append((cycle.state.time, -np.dot(cycle.monitors["mass"], [np.cos(dip), np.sin(dip)])))
@@ -119,8 +119,8 @@ time, block, _ = slide(load_scene(work / "quake.toml"))
 print(f"the block slides {1e3 * block[-1]:.1f} mm, Newmark's {1e3 * newmark[-1]:.1f} mm")
 
 # %%
-# A mass of blocks
-# ----------------
+# A jointed mass
+# --------------
 # The mass has two joint sets. It slides as a whole, and its joints open as well.
 
 JOINTS = """
@@ -158,9 +158,9 @@ sketch(last, right, magnify=5)
 right.set_title("displacements five times")
 
 # %%
-# The warning comes before the mass has begun to slide: 1.5 J/m, where friction takes 57 000 J/m until the end. It comes
-# at half the step as well, and there the mass slides as far to 0.2 %.
+# The warning appears before the mass has begun to slide. It concerns 1.5 J/m, whereas friction dissipates 57 000 J/m by
+# the end. It also appears at half the step, where the mass slides as far to within 0.2 %.
 #
 # ``pipelines/jointed_slope`` has a thousand blocks with a hundred cracks on such a plane.
-# ``[[loads.viscous_boundaries]]`` lets waves leave through edges; ``baseline = "linear"`` corrects a record so that it
-# ends at rest.
+# ``[[loads.viscous_boundaries]]`` lets waves leave through edges; ``baseline = "linear"`` corrects a record so that its
+# motion ends at rest.

@@ -3,14 +3,14 @@ A section traced in DXF or GeoJSON
 ==================================
 
 A road cut was mapped: joints as lines on layers, in world coordinates, with ends that fall short or overshoot. We read
-it, look at what was mended, run it, and export the blocks to a GIS.
+the drawing, look at the repairs, run it, and export the blocks to a GIS.
 """
 
 # %%
-# Layers say what lines are
-# -------------------------
+# What the layers mean
+# --------------------
 # ``geometry/traced_slope.toml`` names the layers of ``traced_slope.dxf``: zones, joints, bolts, the water table,
-# measuring points. Arcs, splines, blocks and the units of the drawing are understood. Coordinates are easting and
+# monitoring points. Arcs, splines, blocks and the units of the drawing are supported. Coordinates are easting and
 # height; the run itself uses an origin near the rock.
 
 import json
@@ -57,7 +57,7 @@ axes.set_title(f"after {cycle.state.time:g} s")
 # %%
 # The same from GeoJSON or CSV
 # ----------------------------
-# Each line has a property that names its set; ``set_property`` says which property that is. A polygon called
+# One property of each line names its set; ``set_property`` tells which property that is. A polygon called
 # ``zone:rock`` is the rock.
 
 features = [
@@ -103,5 +103,5 @@ for warning in cut.warnings:
 sketch(cut)
 
 # %%
-# Ends that miss each other by less than ``tolerance_m`` are joined and reported with their place. Read that list
-# before you trust the blocks: it shows where the tracing was not what it was meant to be.
+# Ends that miss each other by less than ``tolerance_m`` are joined and reported with their position. Read that list
+# before you trust the blocks: it shows where the tracing was faulty.

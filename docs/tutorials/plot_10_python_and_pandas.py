@@ -8,8 +8,8 @@ We drive a set of runs of one scene from Python and read their tables into data 
 # %%
 # A scene as text, and what varies
 # --------------------------------
-# ``load_scene(path, changes)`` takes the keys of ``--set`` with Python values. Here: the friction of a plane at 30°,
-# in steps, for a block that slides in real time.
+# ``load_scene(path, changes)`` takes the same keys as ``--set``, with Python values. Here we vary the friction angle of a
+# plane at 30°, on which a block slides in real time.
 
 import tempfile
 from pathlib import Path
@@ -55,7 +55,7 @@ end_time_s = 0.5
 
 rows = []
 for friction in (0, 10, 20, 28, 32):
-    # At 32° it stands; "start" would find no equilibrium for the others, and a run says so.
+    # At 32° the block is stable; for the others "start" would find no equilibrium, and the run would say so.
     changes = {
         "joints.default.friction_angle_deg": friction,
         "dda.equilibrium": "start" if friction > 30 else "",
@@ -93,8 +93,8 @@ axes.legend(frameon=False, title="friction")
 # %%
 # The set as one array
 # --------------------
-# With `xarray <https://xarray.dev>`_ (``pip install xarray``) the tables of all runs become one data set, whose axes are
-# called by what varies: friction and time.
+# With `xarray <https://xarray.dev>`_ (``pip install xarray``) the tables of all runs become one data set with named
+# axes: friction and time.
 
 moved = xr.concat(
     [frame.set_index("time")[["block_ux", "block_uy", "kinetic_energy"]].to_xarray() for frame in frames.values()],
@@ -106,8 +106,8 @@ print(moved.kinetic_energy.sel(time=[0.1, 0.3, 0.5], method="nearest").to_pandas
 # %%
 # More than tables
 # ----------------
-# The same object has the summary, the scene as it was run, and the series as PyVista meshes at any cycle or time. In a
-# notebook it shows a summary, and ``run.view()`` plays the run.
+# The same object gives access to the summary, the scene as it was run, and the series as PyVista meshes at any cycle or
+# time. In a notebook it displays a summary, and ``run.view()`` plays the run.
 
 run = geomech.open_run(work / "friction_20")
 print(run, "·", run.summary["end"], "·", run.series)
@@ -120,8 +120,8 @@ print(run.joints.tail(1).T.to_string())
 # %%
 # Without files
 # -------------
-# ``geomech.cycles(scene)`` yields each cycle as it comes: arrays of blocks, contacts, tips. An observer is any object
-# with ``on_cycle``; see ``geomech.output.Observer``. Without an observer that writes files, nothing is written.
+# ``geomech.cycles(scene)`` yields each cycle as it is computed: arrays of blocks, contacts, tips. An observer is any
+# object with ``on_cycle``; see ``geomech.output.Observer``. Unless an observer writes files, nothing is written.
 
 for cycle in geomech.cycles(load_scene(work / "block.toml", {"dda.equilibrium": ""})):
     pass

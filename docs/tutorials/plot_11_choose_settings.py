@@ -7,10 +7,10 @@ yours: halve the step and look at what changes.
 """
 
 # %%
-# The time step of a slope that slides
-# ------------------------------------
-# The scene of the :doc:`first run </start/first_run>`, 0.4 s of it. The work of gravity is a good measure: it is one
-# number for how far all that moves has come down. The reference is the finest step.
+# The time step of a sliding slope
+# --------------------------------
+# We run 0.4 s of the scene of the :doc:`first run </start/first_run>`. The work of gravity is a good measure: it sums up
+# in one number how far the moving rock has descended. The reference is the finest step.
 
 import time as clock
 from pathlib import Path
@@ -29,7 +29,7 @@ slope = project / "docs" / "start" / "my_slope.toml"
 
 
 def fall(**dda) -> tuple[float, float]:
-    """What the weight has done in 0.4 s, J/m, and the processor time of the run, s."""
+    """Work of the weight in 0.4 s, J/m, and processor time of the run, s."""
     scene = load_scene(slope, {"run.end_time_s": 0.4} | {f"dda.{key}": value for key, value in dda.items()})
     began = clock.process_time()
     for cycle in geomech.cycles(scene):
@@ -56,7 +56,7 @@ axes.legend(frameon=False)
 # %%
 # The order of crack elements
 # ---------------------------
-# A slanted crack in a plate; the reference is order 10. Each order costs little and gains most of a digit.
+# An inclined crack in a plate; the reference is order 10. Each additional order costs little and gains almost a digit.
 
 rock = Material("rock", 17e9, 0.21, k_ic=2e6)
 plate = np.array([[-0.03, -0.06], [0.03, -0.06], [0.03, 0.06], [-0.03, 0.06]])
@@ -91,7 +91,7 @@ print(f"asked for 1e-7: order {solution.body.settings.order}, estimated error {l
 # %%
 # The increment of growth
 # -----------------------
-# The same crack grows wing cracks 12 mm long, by increments of 4 to 1 mm. We compare where the tip ends up.
+# The same crack grows wing cracks 12 mm long, with increments of 4 to 1 mm. We compare the final positions of the tip.
 
 ends, figure = {}, plt.figure(figsize=(5, 3.6), layout="constrained")
 axes = figure.subplots()
@@ -117,5 +117,5 @@ axes.set_aspect("equal")
 axes.set(xlabel="mm", ylabel="mm", title="paths by increments of 4, 2 and 1 mm")
 
 # %%
-# Rules of thumb stand in :doc:`/howto/settings`; error against time of many problems, for this solver and others, in
-# :doc:`/verification/speed`.
+# Rules of thumb are given in :doc:`/howto/settings`, and error against run time for many problems, for this solver and
+# others, in :doc:`/verification/speed`.

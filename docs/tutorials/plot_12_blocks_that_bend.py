@@ -2,15 +2,15 @@
 Blocks that bend
 ================
 
-A lintel on two piers, under a wall. A block of first order strains uniformly and cannot bend; of a higher order it does. Which
-order is enough, and what is done with rock of any shape? (`Theory <../theory/higher_order.html>`_.)
+A lintel on two piers carries a wall. A first-order block strains uniformly and cannot bend; a higher-order block can.
+Which order is enough, and how is rock of arbitrary shape modelled? (`Theory <../theory/higher_order.html>`_.)
 """
 
 # %%
 # A lintel of one block
 # ---------------------
-# ``order`` says of which order the polynomial is that each block of the zone moves by. ``"auto"`` begins with 1 and raises the
-# blocks whose next orders would take up more than a hundredth of the energy (``dda.order_target``).
+# ``order`` is the order of the displacement polynomial of each block of the zone. ``"auto"`` begins with 1 and raises the
+# order of those blocks whose next orders would contain more than a hundredth of the energy (``dda.order_target``).
 
 import tempfile
 from itertools import pairwise
@@ -77,8 +77,8 @@ end_time_s = 2.0
 (work / "lintel.toml").write_text(SCENE)
 
 # %%
-# Against beam theory: on its inner edges, with overhangs of half a metre that lift off, it sags by
-# :math:`q\,l^2\,(5 l^2 - 24 c^2)/384 E I` and, by shear, :math:`q\,l^2/8\kappa G A`.
+# In beam theory, a lintel that bears on the inner edges of the piers, with overhangs of half a metre that lift off, sags
+# by :math:`q\,l^2\,(5 l^2 - 24 c^2)/384 E I` plus, due to shear, :math:`q\,l^2/8\kappa G A`.
 
 load, span, over, depth, modulus = 50e3 + 2500 * 9.81 * 0.5, 4.0, 0.5, 0.5, 20e9
 inertia, shear = depth**3 / 12, modulus / 2.4
@@ -109,9 +109,9 @@ print(f"beam theory: {1e3 * beam:.3f} mm")
 # %%
 # Rock of any shape: cells
 # ------------------------
-# Polynomials follow stress poorly about corners and holes, and ``"auto"`` says so. ``mesh_size_m`` divides the blocks of a zone
-# into cells. They are glued so that displacement and stress pass through them: smaller cells and higher orders both come
-# nearer to the solution. Here the lintel has a notch below.
+# Polynomials represent the stress near corners and holes poorly, and ``"auto"`` warns of this. ``mesh_size_m`` divides the
+# blocks of a zone into cells. These are bonded so that displacements and stresses are transmitted: both smaller cells and
+# higher orders converge to the solution. Here the lintel has a notch in its lower face.
 
 NOTCHED = SCENE.replace(
     "rectangle = [-0.5, 0.0, 4.5, 0.5]",
@@ -125,8 +125,8 @@ print(f"{cycle.blocks.n_blocks - 2} cells, sags by {-1e3 * cycle.monitors['mid-s
 # %%
 # Cells that part
 # ---------------
-# With ``cell_joint`` the faces between cells part where they bear more than the strength of that joint. A load that grows finds
-# where, and at which load, the stone breaks.
+# With ``cell_joint``, faces between cells separate where the stress exceeds the strength of that joint. An increasing load
+# shows where, and at which load, the stone breaks.
 
 BREAKING = (
     NOTCHED.replace("value_pa = [0, -50e3]", "times_s = [0, 10]\nvalues_pa = [[0, 0], [0, -200e3]]")
@@ -143,7 +143,7 @@ at = 0.5 * (cycle.blocks.vertices[edges] + cycle.blocks.vertices[cycle.blocks.ne
 print(f"whole under {20 * whole.state.time:.0f} kPa; {len(edges)} faces part under {20 * cycle.state.time:.0f} kPa")
 
 # %%
-# Stress in the last step in which the lintel was whole, and the faces that part in the next, from the notch upwards.
+# Stress in the last step in which the lintel was intact, and the faces that separate in the next, from the notch upwards.
 
 start, vertices = whole.blocks.vertex_start, whole.state.vertices
 polygons = [vertices[a:b] for a, b in pairwise(start)]
