@@ -16,13 +16,13 @@ import json
 import math
 import types
 from collections.abc import Callable, Iterable, Sequence
-from typing import Any, BinaryIO
+from typing import Any, BinaryIO, Literal, cast
 
 import numpy as np
 
 #: Built-in containers, which are created empty and filled later.
-_EMPTY = {"l": list, "d": dict, "S": set, "C": collections.Counter, "q": collections.deque}
-_KINDS = {kind: letter for letter, kind in _EMPTY.items()}
+_EMPTY: dict[str, type] = {"l": list, "d": dict, "S": set, "C": collections.Counter, "q": collections.deque}
+_KINDS: dict[type, str] = {kind: letter for letter, kind in _EMPTY.items()} | {tuple: "t", frozenset: "F"}
 
 
 class NotPlain(TypeError):
@@ -103,7 +103,7 @@ def _exactly(file: BinaryIO, length: int) -> bytes:
 def _memory(array: np.ndarray) -> memoryview:
     """The bytes of a contiguous array in memory order."""
     flat = array.reshape(-1, order="A")
-    return memoryview(flat.view(np.uint8) if flat.size and flat.dtype.itemsize else np.empty(0, np.uint8))
+    return (flat.view(np.uint8) if flat.size and flat.dtype.itemsize else np.empty(0, np.uint8)).data
 
 
 class _Table:
@@ -153,9 +153,8 @@ class _Table:
         if kind is np.ndarray:
             return self._array(value)
         if kind in (list, set, tuple, frozenset, collections.deque):
-            letter = {tuple: "t", frozenset: "F"}.get(kind) or _KINDS[kind]
             head = [value.maxlen] if kind is collections.deque else []
-            return [letter, *head, *(self.written(item) for item in value)]
+            return [_KINDS[kind], *head, *(self.written(item) for item in value)]
         if kind in (dict, collections.Counter):
             return [_KINDS[kind], *(self.written(part) for pair in value.items() for part in pair)]
         if kind in (bytes, complex):
@@ -192,7 +191,7 @@ class _Table:
                 start = value.__array_interface__["data"][0] - first
                 described, layout = _described(value.dtype), [list(value.shape), list(value.strides), start]
                 return ["v", self._place(base), described, *layout, value.flags.writeable]
-        order = "F" if value.flags.f_contiguous and not value.flags.c_contiguous else "C"
+        order: Literal["F", "C"] = "F" if value.flags.f_contiguous and not value.flags.c_contiguous else "C"
         stored = np.asarray(value, order=order)
         self.arrays.append(stored)
         return ["a", len(self.arrays) - 1, _described(value.dtype), list(value.shape), order, value.flags.writeable]
@@ -261,7 +260,8 @@ class _Reader:
             array = np.empty(tuple(shape), dtype, order)
             left -= array.nbytes
             memory = _memory(array)
-            if file.readinto(memory) != memory.nbytes:
+            # By `readinto`: every binary file has it, although BinaryIO does not promise it.
+            if cast(io.BufferedIOBase, file).readinto(memory) != memory.nbytes:
                 raise Broken("the file ends within an array")
             array.flags.writeable = writeable
             self.made[k] = array
@@ -294,8 +294,10 @@ class _Reader:
         }
         return made[letter]()
 
-    def _view(self, base: int, described: Any, shape, strides, start: int, writeable: bool) -> np.ndarray:
-        base = self._object(base)
+    def _view(
+        self, owner: int, described: Any, shape: Sequence[int], strides: Sequence[int], start: int, writeable: bool
+    ) -> np.ndarray:
+        base: np.ndarray = self._object(owner)
         memory = base.reshape(-1, order="A").view(np.uint8) if base.size else np.empty(0, np.uint8)
         dtype = _dtype(described)
         spans = [(n - 1) * step for n, step in zip(shape, strides, strict=True)]

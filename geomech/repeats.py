@@ -24,6 +24,7 @@ from typing import Any
 import numpy as np
 
 from .model import REPEATS, Cycle, Problem
+from .model.problem import Repeat
 
 log = logging.getLogger(__name__)
 
@@ -130,7 +131,7 @@ class Repeats:
                 log.info("repeated with %s, the run differs by %.1g at most", REPEATS[kind], scatter["largest"])
 
 
-def changed(problem: Problem, kind: str) -> Problem:
+def changed(problem: Problem, kind: Repeat) -> Problem:
     """``problem`` as it is repeated for a ``kind`` of `REPEATS`."""
     if kind == "noise":
         return with_noise(problem, NOISE, np.random.default_rng(0))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
+from typing import Literal, get_args
 
 import numpy as np
 
@@ -235,11 +236,14 @@ class GrowthSettings:
 
 #: Kinds of events of contacts and crack faces: one opens, the last one opens, one closes, one slips, the last sticking
 #: one slips, one sticks again, one loses its bond.
-CHANGES = ("opening", "parting", "closure", "slip", "sliding", "stick", "debonding")
+Change = Literal["opening", "parting", "closure", "slip", "sliding", "stick", "debonding"]
+CHANGES: tuple[str, ...] = get_args(Change)
 #: Kinds of events that `RunSettings.stop_at` may name.
-STOPS = ("initiation", "birth", "coalescence", "self", "daylighting", "split", "mechanism", *CHANGES)
+Stop = Literal["initiation", "birth", "coalescence", "self", "daylighting", "split", "mechanism", Change]
+STOPS: tuple[str, ...] = get_args(Stop)
 #: What `RunSettings.repeat` may name, and its words in messages.
-REPEATS = {
+Repeat = Literal["noise", "steps", "increment", "elements"]
+REPEATS: dict[Repeat, str] = {
     "noise": "coordinates changed by round-off",
     "steps": "steps half as large",
     "increment": "growth increments half as long",
@@ -276,7 +280,7 @@ class RunSettings:
     longest_step: float | None = None
     control: str = "load"
     skip: bool = True
-    repeat: tuple[str, ...] = ()
+    repeat: tuple[Repeat, ...] = ()
 
     def __post_init__(self) -> None:
         unknown = [kind for kind in self.repeat if kind not in REPEATS]

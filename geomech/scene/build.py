@@ -35,6 +35,7 @@ from .checks.cross_checks import carrier, gauge_carriers, material_of
 from .checks.edges import contact_names, joint_names
 from .drawing import Drawing
 from .tables import SceneTables
+from .tables.entries import given
 from .tables.rock import MaterialTable
 from .unbounded_rock import endless_of
 
@@ -45,8 +46,9 @@ MOST_WATCHED = 30
 def build_problem(tables: SceneTables, drawing: Drawing, check: Check) -> Problem:
     """The `Problem` of a scene without faults."""
     names = list(tables.materials)
+    drawn_blocks, drawn_cracks = drawing.assembled()
     blocks = replace(
-        drawing.blocks,
+        drawn_blocks,
         material=np.array([names.index(material_of(tables, zone)) for zone in drawing.zones]),
         fixed=fixed_blocks(tables, drawing),
         constrained=constrained_unknowns(tables, drawing),
@@ -54,9 +56,9 @@ def build_problem(tables: SceneTables, drawing: Drawing, check: Check) -> Proble
     )
     joints, joint_of = _joints(tables, drawing)
     edge_laws = {name: joints[law] for (other, name), law in joint_of.items() if other == ""}
-    face_laws, law = _face_laws(tables, drawing.cracks, joints, edge_laws)
-    cracks = replace(drawing.cracks, aperture=_apertures(tables, drawing.cracks), law=law)
-    carriers = gauge_carriers(check)
+    face_laws, law = _face_laws(tables, drawn_cracks, joints, edge_laws)
+    cracks = replace(drawn_cracks, aperture=_apertures(tables, drawn_cracks), law=law)
+    gauge, carriers = tables.gauge, gauge_carriers(check)
     return Problem(
         title=tables.title,
         origin=drawing.origin,
@@ -100,9 +102,9 @@ def build_problem(tables: SceneTables, drawing: Drawing, check: Check) -> Proble
             repeat=tables.run.repeat,
         ),
         load_edge=_leading_edge(tables),
-        gauge=None if carriers is None else ((carriers[0], tables.gauge.start), (carriers[1], tables.gauge.to)),
+        gauge=None if gauge is None or carriers is None else ((carriers[0], gauge.start), (carriers[1], gauge.to)),
         monitors={
-            m.name: (carrier(check, ("monitors", k, "at"), "monitor", m.at, m.zone), m.at)
+            m.name: (carrier(check, ("monitors", k, "at"), "monitor", m.at, m.zone), given(m.at))
             for k, m in enumerate(tables.monitors)
         },
     )
@@ -171,10 +173,10 @@ def _joints(tables: SceneTables, drawing: Drawing) -> tuple[tuple[JointLaw, ...]
     known = contact_names(drawing)
     for name in order:
         joint = tables.joints[name]
-        for pair in [("", found) for found in joint_names(joint.edges, known)] + [
-            tuple(sorted(pair)) for pair in joint.between
-        ]:
-            joint_of[pair] = len(laws)
+        for edge in joint_names(joint.edges, known):
+            joint_of["", edge] = len(laws)
+        for one, other in joint.between:
+            joint_of[min(one, other), max(one, other)] = len(laws)
         laws.append(joint_law(name, joint))
     for zone, table in tables.zones.items():
         if table.cell_joint is not None:
@@ -195,7 +197,10 @@ def _loads(tables: SceneTables, check: Check) -> Loads:
         ),
         point_loads=tuple(
             PointLoad(
-                carrier(check, ("loads", "forces", k, "at"), "force", f.at, f.zone), f.at, force_history(f), f.follower
+                carrier(check, ("loads", "forces", k, "at"), "force", f.at, f.zone),
+                given(f.at),
+                force_history(f),
+                f.follower,
             )
             for k, f in enumerate(tables.loads.forces)
         ),
@@ -219,7 +224,7 @@ def _dda(tables: SceneTables) -> DdaSettings:
     shaken = d.dynamic_factor == 1.0 and (tables.loads.base is not None or tables.loads.viscous_boundaries)
     mass, stiffness = 0.0, 0.0
     if d.rayleigh_fractions is not None:
-        mass, stiffness = rayleigh_coefficients(d.rayleigh_fractions, d.rayleigh_frequencies_hz)
+        mass, stiffness = rayleigh_coefficients(d.rayleigh_fractions, given(d.rayleigh_frequencies_hz))
     return DdaSettings(
         time_step=d.time_step_s,
         automatic_time_step=d.automatic_time_step,

@@ -17,7 +17,8 @@ from ..shapes.parts import JOINT
 from .assembly.field_files import read_traces
 from .errors import Fault
 from .locator import Path
-from .tables.geometry import CrackShape, Geometry
+from .tables.entries import given
+from .tables.geometry import CrackShape, Geometry, ZoneShape
 from .validation import nearest
 from .world import local_origin, moved_section
 
@@ -273,7 +274,7 @@ def _assembled(
         zones=names,
         cracks_drawn=tuple(trace.name for trace in parts.traces),
         marks=tuple(parts.marks),
-        mark_places={name: source for (part, name), source in parts.sources.items() if part == "marks"},
+        mark_places={str(name): source for (part, name), source in parts.sources.items() if part == "marks"},
         origin=tuple(origin.tolist()),
         crack_paths={
             trace.name: parts.sources.get(("cracks", k), (("geometry", "cracks", k), ""))[0]
@@ -330,12 +331,12 @@ def _warn_outside(geometry: Geometry, parts: _Parts, place: Callable[[Path], str
     """Warn of joints, drawn in the scene or from files, that lie outside the rock: wrong units or origin."""
     import shapely
 
-    found = [
+    found: list[tuple[str, Sequence[np.ndarray], Path, str]] = [
         (JOINT + joint.name, [np.array(joint.points, dtype=float).reshape(-1, 2)], ("geometry", "joints", k), "")
         for k, joint in enumerate(geometry.joints)
     ]
     found += [(joint.name, joint.lines, *parts.sources["joints", joint.name]) for joint in parts.joints]
-    found = [(*joint, path, at) for *joint, path, at in found if path != ("geometry", "model")]
+    found = [joint for joint in found if joint[2] != ("geometry", "model")]
     if not found:
         return
     rock = [shapely.Polygon(zone.loops[0], zone.loops[1:]) for zone in parts.zones]
@@ -348,12 +349,12 @@ def _warn_outside(geometry: Geometry, parts: _Parts, place: Callable[[Path], str
             warnings.append(Fault(place(path), f"{at}: {message}" if at else message, "is its unit or place wrong?"))
 
 
-def _loops(zone) -> tuple[np.ndarray, ...]:
-    outline = rectangle(*zone.rectangle) if zone.rectangle is not None else np.array(zone.polygon, dtype=float)
+def _loops(zone: ZoneShape) -> tuple[np.ndarray, ...]:
+    outline = rectangle(*zone.rectangle) if zone.rectangle is not None else np.array(given(zone.polygon), dtype=float)
     return tuple(loop.reshape(-1, 2) for loop in (outline, *(np.array(hole, dtype=float) for hole in zone.holes)))
 
 
 def _line(crack: CrackShape) -> np.ndarray:
     if crack.points is not None:
         return np.array(crack.points, dtype=float).reshape(-1, 2)
-    return straight_crack(crack.centre, crack.length_m, math.radians(crack.angle_deg))
+    return straight_crack(given(crack.centre), given(crack.length_m), math.radians(given(crack.angle_deg)))

@@ -13,7 +13,8 @@ from .assembly.load_functions import deepest_pond, force_history, said_of_pond, 
 from .checks.cross_checks import material_of
 from .drawing import Drawing
 from .tables import SceneTables
-from .tables.loads import Rising
+from .tables.entries import given
+from .tables.loads import FluidTable, RemoteTable
 from .unbounded_rock import rising_history
 
 #: Longer lists are cut after this many lines.
@@ -22,15 +23,16 @@ SHOWN = 8
 
 def overview(tables: SceneTables, drawing: Drawing) -> list[str]:
     """Size, zones, materials, cracks, loads and time of a scene, one line each."""
-    rows = [("size", _box(drawing.blocks.vertices) + f", {counted(len(set(drawing.zones)), 'zone')}")]
+    blocks, cracks = drawing.assembled()
+    rows = [("size", _box(blocks.vertices) + f", {counted(len(set(drawing.zones)), 'zone')}")]
     rows += _cut("zones", _zones(tables, drawing))
-    guided = [name for name in drawing.blocks.edge_names if holds(name)]
+    guided = [name for name in blocks.edge_names if holds(name)]
     if guided:
-        edges = np.concatenate([drawing.blocks.edges_named(name) for name in guided])
-        count = counted(len(np.unique(drawing.blocks.vertex_block[edges])), "block")
+        edges = np.concatenate([blocks.edges_named(name) for name in guided])
+        count = counted(len(np.unique(blocks.vertex_block[edges])), "block")
         rows.append(("constrained", f"{count} by edges called {', '.join(map(repr, guided))}"))
     rows += _cut("materials", _materials(tables))
-    rows += _cut("cracks", _cracks(drawing.cracks))
+    rows += _cut("cracks", _cracks(cracks))
     rows += _cut("loads", _loads(tables, drawing))
     stops = f" or the first of {', '.join(tables.run.stop_at)}" if tables.run.stop_at else ""
     rows.append(("run", f"to {tables.run.end_time_s:g} s{stops}, {_steps(tables)}"))
@@ -61,12 +63,13 @@ def _box(points: np.ndarray) -> str:
 
 
 def _zones(tables: SceneTables, drawing: Drawing) -> list[str]:
-    count, lines = Counter(drawing.zones), []
-    for name, blocks in count.items():
-        own = np.isin(drawing.blocks.vertex_block, [b for b, zone in enumerate(drawing.zones) if zone == name])
+    blocks, _ = drawing.assembled()
+    lines = []
+    for name, count in Counter(drawing.zones).items():
+        own = np.isin(blocks.vertex_block, [b for b, zone in enumerate(drawing.zones) if zone == name])
         entry = tables.zones.get(name)
-        text = f"{name}: {_box(drawing.blocks.vertices[own])}, {material_of(tables, name)}"
-        text += f", {blocks} blocks" if blocks > 1 else ""
+        text = f"{name}: {_box(blocks.vertices[own])}, {material_of(tables, name)}"
+        text += f", {count} blocks" if count > 1 else ""
         if entry is not None and (entry.fixed or entry.guided):
             text += ", fixed" if entry.fixed else f", guided along {entry.guided}"
         if entry is not None and entry.order != 1:
@@ -104,21 +107,22 @@ def _cracks(cracks: Cracks) -> list[str]:
 
 
 def _loads(tables: SceneTables, drawing: Drawing) -> list[str]:
-    end, lines, blocks = tables.run.end_time_s, [], drawing.blocks
+    end, lines, (blocks, _) = tables.run.end_time_s, [], drawing.assembled()
     for traction in tables.loads.tractions:
         history = traction_history(traction)
         lines.append(f"{traction.edge}: " + _course(history, end, "Pa", _sense(blocks, traction.edge, history.at(end))))
     for force in tables.loads.forces:
-        lines.append(f"force at ({force.at[0]:g}, {force.at[1]:g}): " + _course(force_history(force), end, "N/m", ""))
+        x, y = given(force.at)
+        lines.append(f"force at ({x:g}, {y:g}): " + _course(force_history(force), end, "N/m", ""))
     if any(tables.loads.gravity_m_s2):
         x, y = tables.loads.gravity_m_s2
         lines.append(f"gravity ({x:g}, {y:g}) m/s²")
-    for table in tables.loads.remote:
-        lines.append("far away, [xx, yy, xy]: " + _rising(table, end))
-    for table in tables.loads.fluids:
-        where = " and ".join(table.fills)
-        where += f" ({', '.join(table.cracks)})" if table.cracks else ""
-        lines.append(f"fluid in {where}: " + _rising(table, end))
+    for remote in tables.loads.remote:
+        lines.append("far away, [xx, yy, xy]: " + _rising(remote, end))
+    for fluid in tables.loads.fluids:
+        where = " and ".join(fluid.fills)
+        where += f" ({', '.join(fluid.cracks)})" if fluid.cracks else ""
+        lines.append(f"fluid in {where}: " + _rising(fluid, end))
     for text, count in (
         ("motions of blocks", len(tables.loads.motions)),
         ("motions of points", len(tables.loads.point_motions)),
@@ -127,8 +131,8 @@ def _loads(tables: SceneTables, drawing: Drawing) -> list[str]:
     ):
         lines += [f"{text}: {count}"] if count else []
     if tables.loads.water is not None:
-        text = f"water table over {counted(len(tables.loads.water.points), 'point')}"
-        pond = deepest_pond(tables, drawing.blocks)
+        text = f"water table over {counted(len(given(tables.loads.water.points)), 'point')}"
+        pond = deepest_pond(tables, blocks)
         text += ", following the ground" if tables.loads.water.follows_ground else ""
         lines.append(text if pond is None else f"{text}, {said_of_pond(*pond, drawing.origin)}")
     if tables.loads.base is not None:
@@ -138,7 +142,7 @@ def _loads(tables: SceneTables, drawing: Drawing) -> list[str]:
     return lines or ["none"]
 
 
-def _rising(table: Rising, end: float) -> str:
+def _rising(table: RemoteTable | FluidTable, end: float) -> str:
     value = ", ".join(_scaled(part, "Pa") for part in rising_history(table).at(end).tolist())
     return value if table.value_pa is not None else f"{value} at {end:g} s"
 

@@ -13,7 +13,8 @@ from ..model.unbounded_rock import connected_cracks
 from .checks.check import Check
 from .drawing import Drawing
 from .tables import SceneTables
-from .tables.loads import FluidTable, Rising
+from .tables.entries import given
+from .tables.loads import FluidTable, RemoteTable
 from .validation import nearest
 
 #: Edges lie on the free surface to within this part of the drawing's size; a stress counts as parallel to it to within
@@ -34,8 +35,9 @@ def endless_of(tables: SceneTables, drawing: Drawing) -> EndlessRock | None:
     if name is None:
         return None
     loads = tables.loads
+    surface = tables.zones[name].surface
     return EndlessRock(
-        _surface(drawing, tables.zones[name].surface),
+        None if surface is None else _surface(drawing, surface),
         tuple(rising_history(table) for table in loads.remote),
         tuple(_fluid(table, drawing) for table in loads.fluids),
     )
@@ -43,28 +45,29 @@ def endless_of(tables: SceneTables, drawing: Drawing) -> EndlessRock | None:
 
 def _fluid(table: FluidTable, drawing: Drawing) -> Fluid:
     connected = bool(table.cracks) if table.connected is None else table.connected
-    names = tuple(name for pattern in table.cracks for name in drawing.cracks.names if fnmatchcase(name, pattern))
+    names = tuple(
+        name for pattern in table.cracks for name in drawing.assembled()[1].names if fnmatchcase(name, pattern)
+    )
     return Fluid(rising_history(table), "cracks" in table.fills, "holes" in table.fills, names, connected)
 
 
-def rising_history(table: Rising) -> History:
+def rising_history(table: RemoteTable | FluidTable) -> History:
     """The history of ``table``, (3,) for a stress or (1,) for a pressure."""
     if table.value_pa is not None:
         return History.constant(np.atleast_1d(table.value_pa))
     if table.rate_pa_per_s is not None:
         return History.ramp(np.atleast_1d(table.rate_pa_per_s), table.start_s)
-    values = np.array(table.values_pa, dtype=float)
-    return History(np.array(table.times_s, dtype=float), values.reshape(len(values), -1))
+    values = np.array(given(table.values_pa), dtype=float)
+    return History(np.array(given(table.times_s), dtype=float), values.reshape(len(values), -1))
 
 
-def _surface(drawing: Drawing, name: str | None) -> tuple[tuple[float, float], tuple[float, float]] | None:
-    if name is None:
-        return None
-    blocks = drawing.blocks
+def _surface(drawing: Drawing, name: str) -> tuple[tuple[float, float], tuple[float, float]]:
+    """A point of the free surface, the edges called ``name``, and its outward normal."""
+    blocks, _ = drawing.assembled()
     first = int(blocks.edges_named(name)[0])
     a, b = blocks.vertices[first], blocks.vertices[blocks.next_vertex[first]]
-    outward = outward_normal_of((b - a) / np.hypot(*(b - a)))
-    return tuple(a.tolist()), tuple((outward + 0.0).tolist())
+    outward = outward_normal_of((b - a) / np.hypot(*(b - a))) + 0.0
+    return (float(a[0]), float(a[1])), (float(outward[0]), float(outward[1]))
 
 
 def check_endless(c: Check) -> None:
@@ -161,9 +164,10 @@ def _surface_is_straight(c: Check, zone: str) -> bool:
 
 def _surface_is_free(c: Check, zone: str) -> None:
     """Remote stress must leave the free surface free of traction."""
-    if c.tables.zones[zone].surface is None:
+    surface = c.tables.zones[zone].surface
+    if surface is None:
         return
-    _, outward = _surface(c.drawn, c.tables.zones[zone].surface)
+    _, outward = _surface(c.drawn, surface)
     histories = [rising_history(table) for table in c.tables.loads.remote]
     end = c.tables.run.end_time_s if c.tables.run is not None else 1.0
     for k, table in enumerate(c.tables.loads.remote):

@@ -22,7 +22,7 @@ from .vtu import Grid, nothing, world_origin
 from .vtu_store import VtuStore
 
 #: Values of `output.format`.
-FORMATS = {"vtu": VtuStore, "vtkhdf": HdfStore}
+FORMATS: dict[str, type[VtuStore] | type[HdfStore]] = {"vtu": VtuStore, "vtkhdf": HdfStore}
 
 #: Growth passes share the time of their load step; each is written this fraction of a step later than the one before.
 PASS_OFFSET = 1e-6
@@ -178,6 +178,7 @@ class Series:
 
     def _write_last_interior(self) -> None:
         """The interior of the last cycle, unless it is written or there is none."""
+        assert self._pending is not None  # written after the first cycle
         cycle, at, _ = self._pending
         begun = bool(cycle.inside) or self._last_interior >= 0
         if self.interior_every and begun and cycle.number != self._last_interior:
@@ -211,7 +212,7 @@ class Series:
             self._put(name, cycle, at, grid)
 
     def _put(self, name: str, cycle: Cycle, at: float, grid: Grid) -> None:
-        numbers = {
+        numbers: dict[str, float | int | bytes] = {
             "CYCLE": cycle.number,
             "TIME": float(cycle.state.time),
             "LOAD": float(cycle.load),

@@ -53,7 +53,7 @@ class VtuStore:
         """Number of written cycles of the series ``name``; 0 if it is not written."""
         return len(self._collections[name].entries) if name in self._collections else 0
 
-    def put(self, name: str, cycle: int, at: float, grid: Grid, numbers: Mapping[str, float | int]) -> None:
+    def put(self, name: str, cycle: int, at: float, grid: Grid, numbers: Mapping[str, float | int | bytes]) -> None:
         """Write ``grid`` as the series ``name`` at ``cycle``, listed at the time ``at`` (s), with ``numbers`` as field
         data."""
         file = f"{name}_{cycle:06d}.vtu"

@@ -51,7 +51,7 @@ def draw(
     down = math.ceil(len(slopes) / ACROSS)
     heights = [0.3 * down + 0.9, 0.28 * len(bounds) + 1.0]
     figure = Figure(figsize=(11.5, sum(heights) + 0.4), dpi=120, layout="constrained")
-    top, bottom = figure.subfigures(2, 1, height_ratios=heights)
+    top, bottom = figure.subfigures(2, 1, height_ratios=heights, squeeze=False)[:, 0]
     _squares(top, slopes, verdicts, down, title or f"Outcome of {len(slopes)} random slopes (by seed)", meaning)
     quantities, times = bottom.subplots(1, 2, width_ratios=[3, 1.3])
     _quantities(quantities, slopes, bounds)

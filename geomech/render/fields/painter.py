@@ -20,6 +20,7 @@ from .quantity import Quantity, limits, readable
 if TYPE_CHECKING:
     import pyvista as pv
     from matplotlib.axes import Axes
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
 ROCK, STANDS, INK, SOFT = "#efe9dd", "#dcdcd8", "#33363b", "#5a5f66"
@@ -77,6 +78,7 @@ def suitable_scale(run: Run) -> float:
     frames = Frames(run)
     end = frames.cycle_time(final_cycle(run))
     blocks, interior = frames.grid("blocks", end), frames.grid("interior", end)
+    assert blocks is not None  # every run writes its blocks
     if not int(blocks.field_data["REFERENCE"][0]):
         return 1.0
     shown = [grid for grid in (blocks, interior) if grid is not None and grid.n_cells]
@@ -98,18 +100,22 @@ class FieldPainter:
         self.marks = Marks(self.frames, fixed.scale, self.size)
         unit, self.unit_size = readable(what.unit, max(abs(end) for end in fixed.limits))
         self.unit = unit
-        self.figure: Figure | None = None
+
+    #: The page of the last drawing.
+    figure: Figure
+    canvas: FigureCanvasAgg
 
     # -- frames --------------------------------------------------------------------------------------------------
 
     def draw(self, time: float) -> None:
         """Draw the run at ``time`` (s) of its series, interpolated between written cycles."""
-        self.figure, axes, bar, strip = self._page()
+        axes, bar, strip = self._page()
         self.cycle = self._last_cycle(time)
         blocks, interior = self.frames.grid("blocks", time), self.frames.grid("interior", time)
         interior = interior if interior is not None and interior.n_cells else None
-        shown = self._rock(axes, blocks, interior)
-        shown = self._field(axes, blocks, interior, time) or shown
+        assert blocks is not None  # every run writes its blocks
+        self._rock(axes, blocks, interior)
+        shown = self._field(axes, blocks, interior, time)
         self._lines(axes, blocks, interior, time)
         keys = self.marks.draw(axes, time)
         self._bars(bar, shown)
@@ -117,8 +123,8 @@ class FieldPainter:
 
     def image(self) -> np.ndarray:
         """(height, width, 3) of 8 bits."""
-        self.figure.canvas.draw()
-        return np.asarray(self.figure.canvas.buffer_rgba())[..., :3].copy()
+        self.canvas.draw()
+        return np.asarray(self.canvas.buffer_rgba())[..., :3].copy()
 
     def save(self, path: Path) -> Path:
         """Write the last drawing; the suffix gives the format: .png, .pdf or .svg."""
@@ -127,7 +133,8 @@ class FieldPainter:
 
     # -- page ----------------------------------------------------------------------------------------------------
 
-    def _page(self) -> tuple[Figure, Axes, Axes, Axes]:
+    def _page(self) -> tuple[Axes, Axes, Axes]:
+        """A new page: axes of the model, of its legend, and of the strip below them."""
         from matplotlib.backends.backend_agg import FigureCanvasAgg
         from matplotlib.figure import Figure
 
@@ -143,7 +150,7 @@ class FieldPainter:
         page = up + TOP + BOTTOM + strip
         page = round(page * self.view.width / PAGE) * PAGE / self.view.width  # whole pixels
         figure = Figure(figsize=(PAGE, page), dpi=self.view.width / PAGE, facecolor="white")
-        FigureCanvasAgg(figure)
+        self.figure, self.canvas = figure, FigureCanvasAgg(figure)
         axes = figure.add_axes((LEFT / PAGE, (BOTTOM + strip) / page, across / PAGE, up / page))
         bar = figure.add_axes(((PAGE - RIGHT + 0.14) / PAGE, (BOTTOM + strip) / page, 0.13 / PAGE, up / page))
         legend = figure.add_axes((0, 0, 1, strip / page))
@@ -158,7 +165,7 @@ class FieldPainter:
             spine.set_visible(side in ("left", "bottom"))
             spine.set_color("#b9bcc2")
             spine.set_linewidth(0.6)
-        return figure, axes, bar, legend
+        return axes, bar, legend
 
     def _bars(self, axes: Axes, shown: Any) -> None:
         """Legend of the field and, below it, of the cracks if they have several colours."""
@@ -167,7 +174,7 @@ class FieldPainter:
         left, low, wide, tall = axes.get_position().bounds
         inches = tall * self.figure.get_size_inches()[1]
         share = 1.0
-        if self.cracks.legend:
+        if self.cracks.legend and self.cracks.colour is not None:
             share = 0.62
             below = self.figure.add_axes((left, low, wide, 0.3 * tall))
             bar = self.figure.colorbar(ScalarMappable(**self.cracks.style()), cax=below)
@@ -317,7 +324,7 @@ class FieldPainter:
             arm = arm * np.stack([np.cos(angle), np.sin(angle)], axis=1)
             lines = np.stack([middle[rows] - arm, middle[rows] + arm], axis=1)
             colours = np.where(value > 0, "#c1121f", "#15161a")
-            axes.add_collection(LineCollection(lines, colors=colours, linewidths=0.8, zorder=4))
+            axes.add_collection(LineCollection([*lines], colors=colours, linewidths=0.8, zorder=4))
 
     def _arrows(self, axes: Axes, grid: pv.UnstructuredGrid, values: np.ndarray) -> Any:
         """Forces at contacts as lines, their width and colour by magnitude."""
@@ -335,7 +342,7 @@ class FieldPainter:
             * force[acts]
         )
         order = np.argsort(share)
-        lines = LineCollection(np.stack([middle - arm, middle + arm], axis=1)[order], array=values[acts][order],
+        lines = LineCollection([*np.stack([middle - arm, middle + arm], axis=1)[order]], array=values[acts][order],
                                linewidths=0.7 + 1.6 * share[order], zorder=4, capstyle="round", **self._style())  # fmt: skip
         return axes.add_collection(lines)
 
@@ -344,7 +351,7 @@ class FieldPainter:
 
         ends = grid.cells.reshape(-1, 3)[:, 1:]
         lines = drawn(grid, self.view.scale)[ends]
-        axes.add_collection(LineCollection(lines, colors="white", linewidths=4.2, zorder=5.8, capstyle="round"))
+        axes.add_collection(LineCollection([*lines], colors="white", linewidths=4.2, zorder=5.8, capstyle="round"))
         values = values[ends].mean(axis=1) if at_points else values
         drawn_lines = LineCollection(lines, array=values, linewidths=2.6, zorder=6.2, capstyle="round", **self._style())
         return axes.add_collection(drawn_lines)
@@ -358,7 +365,8 @@ class FieldPainter:
         if self.what.name == "K":
             self._label(axes, drawn(grid, self.view.scale), values, order[::-1])
         size = 34 if name == "tips" else float(np.clip(2e4 / max(len(values), 1), 3, 22))
-        return axes.scatter(*drawn(grid, self.view.scale)[order].T, c=values[order], s=size, zorder=6.5,
+        x, y = drawn(grid, self.view.scale)[order].T
+        return axes.scatter(x, y, c=values[order], s=size, zorder=6.5,
                             edgecolors=INK if name == "tips" else "none", linewidths=0.6, **self._style())  # fmt: skip
 
     def _label(self, axes: Axes, at: np.ndarray, values: np.ndarray, order: np.ndarray) -> None:

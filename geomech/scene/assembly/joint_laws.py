@@ -6,6 +6,7 @@ import math
 
 from ...model import JointLaw, Roughness
 from ..checks.check import Check
+from ..tables.entries import given
 from ..tables.rock import JointTable
 
 #: Keys of a rough joint that need its roughness.
@@ -40,7 +41,7 @@ def joint_law(name: str, joint: JointTable) -> JointLaw:
     if joint.jrc is not None:
         rough = Roughness(
             joint.jrc,
-            joint.jcs_pa,
+            given(joint.jcs_pa),
             length=joint.joint_length_m,
             sample_length=joint.sample_length_m,
             from_peak_slip=joint.stiffness_from_peak_slip,
@@ -69,9 +70,9 @@ def check_joints(c: Check) -> None:
     laws: dict[str, JointLaw] = {}
     for name, joint in (c.tables.joints or {}).items():
         missing = {"jrc": "jcs_pa", "jcs_pa": "jrc"}
-        for given, other in missing.items():
-            if getattr(joint, given) is not None and getattr(joint, other) is None:
-                c.refuse(("joints", name, given), f"joint {name!r} has {given} but no {other}", f"add {other}")
+        for key, other in missing.items():
+            if getattr(joint, key) is not None and getattr(joint, other) is None:
+                c.refuse(("joints", name, key), f"joint {name!r} has {key} but no {other}", f"add {other}")
         # A scene written out with all its defaults is valid as well.
         usual = JointTable()
         idle = [key for key in _OF_ROUGHNESS if joint.jrc is None and getattr(joint, key) != getattr(usual, key)]

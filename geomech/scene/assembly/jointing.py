@@ -26,6 +26,7 @@ from ...shapes.joint_networks.joint_sets import (
     voronoi,
 )
 from ...shapes.parts import JOINT, Flaw, ShapeError, extent_of, grid_decimals
+from ..tables.entries import given
 from ..tables.geometry import Geometry, JointSetShape
 
 #: Blocks below this share of the median one are slivers that joint sets leave at crossings: merged unless
@@ -200,15 +201,16 @@ def _set(shape: JointSetShape, geometry: Geometry, box: np.ndarray, rng: np.rand
     name = JOINT + shape.name
     region = box if shape.region is None else np.array(shape.region, dtype=float).reshape(-1, 2)
     turn, spacing, length, gap = _laws(shape, geometry)
-    if shape.kind == "parallel":
-        return parallel_set(name, region, turn, spacing, length, gap, rng)
-    if shape.kind == "poisson":
-        return poisson_traces(name, region, turn, length, shape.p20_per_m2, rng)
     if shape.kind == "lines":
-        return poisson_lines(name, region, turn, shape.p21_per_m, rng)
+        return poisson_lines(name, region, turn, given(shape.p21_per_m), rng)
     if shape.kind == "voronoi":
-        return voronoi(name, region, shape.cell_area_m2, rng)
-    return discs(name, region, _poles(shape, geometry), length, shape.p32_per_m, rng)
+        return voronoi(name, region, given(shape.cell_area_m2), rng)
+    if shape.kind == "discs":
+        return discs(name, region, _poles(shape, geometry), given(length), given(shape.p32_per_m), rng)
+    assert turn is not None  # `JointSetShape`
+    if shape.kind == "parallel":
+        return parallel_set(name, region, turn, given(spacing), length, gap, rng)
+    return poisson_traces(name, region, turn, given(length), given(shape.p20_per_m2), rng)
 
 
 def asked(shape: JointSetShape, geometry: Geometry) -> dict[str, float]:
@@ -216,15 +218,16 @@ def asked(shape: JointSetShape, geometry: Geometry) -> dict[str, float]:
     from ...shapes.joint_networks import expected_statistics as expected
 
     turn, spacing, length, gap = _laws(shape, geometry)
-    if shape.kind == "parallel":
-        return expected.of_parallel(turn, spacing, length, gap)
-    if shape.kind == "poisson":
-        return expected.of_poisson_traces(turn, length, shape.p20_per_m2)
     if shape.kind == "lines":
-        return expected.of_poisson_lines(turn, shape.p21_per_m)
+        return expected.of_poisson_lines(turn, given(shape.p21_per_m))
     if shape.kind == "voronoi":
-        return expected.of_voronoi(shape.cell_area_m2)
-    return expected.of_discs(_poles(shape, geometry), length, shape.p32_per_m)
+        return expected.of_voronoi(given(shape.cell_area_m2))
+    if shape.kind == "discs":
+        return expected.of_discs(_poles(shape, geometry), given(length), given(shape.p32_per_m))
+    assert turn is not None  # `JointSetShape`
+    if shape.kind == "parallel":
+        return expected.of_parallel(turn, given(spacing), length, gap)
+    return expected.of_poisson_traces(turn, given(length), given(shape.p20_per_m2))
 
 
 def _laws(
@@ -234,12 +237,13 @@ def _laws(
     have."""
     angle, section = shape.angle_deg, math.radians(geometry.section_azimuth_deg)
     if shape.dip_deg is not None:
-        angle = math.degrees(apparent_dip(math.radians(shape.dip_deg), math.radians(shape.dip_direction_deg), section))
+        dip, direction = math.radians(shape.dip_deg), math.radians(given(shape.dip_direction_deg))
+        angle = math.degrees(apparent_dip(dip, direction, section))
     turn: Law | FisherAngle | None = None
     if angle is not None:
         turn = Law(math.radians(angle), math.radians(shape.angle_deviation_deg), shape.angle_law)
     if shape.fisher > 0 and shape.dip_deg is not None:
-        turn = FisherAngle(math.radians(shape.dip_deg), math.radians(shape.dip_direction_deg), section, shape.fisher)
+        turn = FisherAngle(dip, direction, section, shape.fisher)
     spacing = None if shape.spacing_m is None else Law(shape.spacing_m, shape.spacing_deviation_m, shape.spacing_law)
     length = None if shape.length_m is None else Law(shape.length_m, shape.length_deviation_m, shape.length_law)
     gap = None if shape.gap_m == 0 else Law(shape.gap_m, shape.gap_deviation_m, shape.gap_law)
@@ -248,8 +252,8 @@ def _laws(
 
 def _poles(shape: JointSetShape, geometry: Geometry) -> Poles:
     return Poles(
-        math.radians(shape.dip_deg),
-        math.radians(shape.dip_direction_deg),
+        math.radians(given(shape.dip_deg)),
+        math.radians(given(shape.dip_direction_deg)),
         shape.fisher,
         math.radians(geometry.section_azimuth_deg),
     )

@@ -28,6 +28,7 @@ from ...shapes.block_cutting.rock_outline import ground_of
 from ..checks.check import Check
 from ..checks.cross_checks import carrier
 from ..tables import SceneTables
+from ..tables.entries import given
 from ..tables.loads import BaseTable, BoltTable, ForceTable, Timed, TractionTable
 
 
@@ -67,7 +68,7 @@ def profile_of(table: TractionTable) -> LinearProfile | None:
 
 def actions_of(tables: SceneTables, check: Check) -> dict[str, Any]:
     """The parts of `Loads` other than forces, by name."""
-    loads, zones = tables.loads, check.drawing.zones
+    loads, zones = tables.loads, check.drawn.zones
     in_zone: dict[str, list[int]] = {}
     for b, name in enumerate(zones):
         in_zone.setdefault(name, []).append(b)
@@ -88,7 +89,7 @@ def actions_of(tables: SceneTables, check: Check) -> dict[str, Any]:
         for e in loads.excavations
     )
     return {
-        "water": _water(tables, check.drawing.blocks),
+        "water": _water(tables, check.blocks),
         "base": None if loads.base is None else BaseMotion(_shaking(loads.base), loads.base.frame),
         "block_motions": motions,
         "point_motions": tuple(points),
@@ -140,7 +141,7 @@ def _water(tables: SceneTables, blocks: Blocks) -> WaterTable | None:
     w = tables.loads.water
     if w is None:
         return None
-    level = None if w.levels_m is None else History.table(w.level_times_s, w.levels_m)
+    level = None if w.levels_m is None else History.table(given(w.level_times_s), w.levels_m)
     ground = ground_of(blocks) if w.follows_ground else None
     return WaterTable(np.array(w.points), w.unit_weight_n_per_m3, level, w.dry_edges, ground)
 
@@ -149,10 +150,11 @@ def deepest_pond(tables: SceneTables, blocks: Blocks) -> tuple[Pond, float] | No
     """The largest height of a scene's water table above the ground during the run, and its time, s; None if it never is
     above."""
     water = _water(tables, blocks)
-    if water is None or water.ground is not None:
+    table = tables.loads.water
+    if table is None or water is None or water.ground is not None:
         return None
     end, ground = tables.run.end_time_s, lowest_over(ground_of(blocks))
-    times = {0.0, end, *(t for t in (tables.loads.water.level_times_s or ()) if 0.0 <= t <= end)}
+    times = {0.0, end, *(t for t in (table.level_times_s or ()) if 0.0 <= t <= end)}
     found = [(pond, time) for time in sorted(times) for pond in ponds(water.line_at(time), ground)]
     return max(found, key=lambda pair: pair[0].depth) if found else None
 
@@ -168,8 +170,8 @@ def said_of_pond(pond: Pond, time: float, origin: tuple[float, float]) -> str:
 def bolts_of(check: Check, number: int, table: BoltTable) -> tuple[Bolt, ...]:
     """The bolts of one table; none, with an error, if an end is in no block. Raises ValueError for what `Bolt`
     refuses."""
-    compression = {} if table.compression is None else {"compression": table.compression}
-    properties = {
+    compression: dict[str, Any] = {} if table.compression is None else {"compression": table.compression}
+    properties: dict[str, Any] = {
         "name": table.name,
         "pretension": table.pretension_n_per_m,
         "yield_force": math.inf if table.yield_force_n_per_m is None else table.yield_force_n_per_m,
@@ -182,8 +184,8 @@ def bolts_of(check: Check, number: int, table: BoltTable) -> tuple[Bolt, ...]:
     if table.axial_stiffness_n is not None:
         try:
             return grouted_bolt(
-                check.drawing.blocks, table.start, table.end, axial_stiffness=table.axial_stiffness_n,
-                active_length=table.active_length_m, **properties,
+                check.blocks, given(table.start), given(table.end), axial_stiffness=table.axial_stiffness_n,
+                active_length=given(table.active_length_m), **properties,
             )  # fmt: skip
         except CrossesNoJoint as error:
             if not table.lines:
@@ -198,7 +200,7 @@ def bolts_of(check: Check, number: int, table: BoltTable) -> tuple[Bolt, ...]:
         other = carrier(check, (*place, "end"), "the bolt's other end", table.end, table.end_zone)
     if block < 0 or (other < 0 and not table.end_in_ground):
         return ()
-    return (Bolt(block, table.start, other, table.end, table.stiffness_n_per_m, **properties),)
+    return (Bolt(block, given(table.start), other, given(table.end), given(table.stiffness_n_per_m), **properties),)
 
 
 def in_situ_of(tables: SceneTables) -> InSituStress | None:
@@ -207,6 +209,8 @@ def in_situ_of(tables: SceneTables) -> InSituStress | None:
     if t is None:
         return None
     if t.stress_pa is None:
-        return InSituStress.geostatic(t.surface_m, t.unit_weight_n_per_m3, t.k0, surcharge=t.surcharge_pa)
+        return InSituStress.geostatic(
+            given(t.surface_m), given(t.unit_weight_n_per_m3), given(t.k0), surcharge=t.surcharge_pa
+        )
     gradient = np.stack([t.gradient_x_pa_per_m, t.gradient_y_pa_per_m], axis=1)
     return InSituStress(np.array(t.stress_pa), gradient, t.about)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, TypeVar
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, Strict
 
@@ -14,6 +14,16 @@ Pair = Annotated[tuple[Finite, Finite], Strict(False)]
 Four = Annotated[tuple[Finite, Finite, Finite, Finite], Strict(False)]
 Points = Annotated[tuple[Pair, ...], Strict(False)]
 Names = Annotated[tuple[str, ...], Strict(False)]
+
+_Value = TypeVar("_Value")
+
+
+def given(value: _Value | None) -> _Value:
+    """``value`` of a key that may be unset in general, but not here, as the scene's checks ensure."""
+    if value is None:
+        raise TypeError("a key is unset that the checks of the scene ask for")
+    return value
+
 
 #: Bytes: file systems allow names up to 255, and files written next to a folder may extend its name.
 LONGEST_FOLDER = 200

@@ -6,7 +6,8 @@ from typing import Annotated, Literal
 
 from pydantic import Field, Strict, field_validator, model_validator
 
-from ...model import LARGEST_CORNER, REPEATS, SHORTEST_STEP, STOPS, rayleigh_coefficients
+from ...model import LARGEST_CORNER, SHORTEST_STEP, rayleigh_coefficients
+from ...model.problem import Repeat, Stop
 from .entries import NotNegative, Pair, Positive, Table
 
 
@@ -207,7 +208,7 @@ class RunTable(Table):
     """[run]: duration of a run, and its stop events."""
 
     end_time_s: Positive = Field(description="end time of the run, s")
-    stop_at: Annotated[tuple[Literal[STOPS], ...], Strict(False)] = Field(
+    stop_at: Annotated[tuple[Stop, ...], Strict(False)] = Field(
         ("coalescence", "split"),
         description="the run ends at the first event of these kinds; a mechanism occurs when blocks of a static run "
         'slide or rotate without limit, and always ends stepping "events". Of the contacts of two '
@@ -251,7 +252,7 @@ class RunTable(Table):
         description="reuse everything that has not changed since the last pass (false: recompute it, for comparison; "
         "the results are the same)",
     )
-    repeat: Annotated[tuple[Literal[tuple(REPEATS)], ...], Strict(False)] = Field(
+    repeat: Annotated[tuple[Repeat, ...], Strict(False)] = Field(
         (),
         description='repeat the finished run with one change at a time, and state by how much the results differ: "noise" of '
         '1e-12 of the model on all coordinates; "steps" half as large; growth "increment" half as long; twice as many '

@@ -15,7 +15,7 @@ def crack_network(
     names: Sequence[str],
     lines: Sequence[Sequence[np.ndarray]],
     zone_names: Sequence[str],
-    polygons: Sequence,
+    polygons: Sequence | np.ndarray,
     loops: Sequence[Sequence[np.ndarray]],
     tolerance: float,
     decimals: int,
