@@ -12,6 +12,7 @@ extrapolation in the loads (`load_extrapolation`).
 
 from __future__ import annotations
 
+import logging
 from contextlib import nullcontext
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, NamedTuple
@@ -31,6 +32,8 @@ from .parallel_map import parallel_map
 
 if TYPE_CHECKING:
     from ..ddm.crack_contact.face_laws import FaceMemory
+
+log = logging.getLogger(__name__)
 
 #: Relative tolerance of the crack strain in statics, of the block's strain.
 COMPLIANCE_TOLERANCE = 1e-6
@@ -104,6 +107,40 @@ def balanced(now: CrackedBlocks, dt: float, load_time: float | None) -> Balance:
         f"{COMPLIANCE_PASSES} passes (they differ by {differences.max():.2g} of it): try a shorter time step, or finer "
         "elements in [ddm]"
     )
+
+
+def at_rest(now: CrackedBlocks, load_time: float) -> dda.Equilibrium:
+    """Equilibrium of the blocks under the loads of ``load_time``. In motion their cracks open and slide on the way there,
+    so that the first step begins with nothing to release; in statics the first step does this.
+
+    Sets ``now.state`` and ``now.response``.
+    """
+    begun, response = now.state, now.response
+    moving = not now.system.scheme.static and bool(now.bodies)
+    now.quasi_newton.forget()
+    for _ in range(COMPLIANCE_PASSES):
+        with now.timed("dda"):
+            found = dda.equilibrium(
+                now.system, begun, now.problem.loads, load_time=load_time, crack=response,
+                tolerance=now.problem.dda.unbalanced_tolerance,
+            )  # fmt: skip
+        # The last of the steps to equilibrium begins in the axes of its end.
+        now.state = found.state
+        if not moving or found.result is None or found.collapsed:
+            return found
+        now.by_mean_stress.take_all(now.bodies)
+        response, differences, _ = _take_response(now, found.state, now.quasi_newton, DYNAMIC_TOLERANCE)
+        if differences.max() < DYNAMIC_TOLERANCE:
+            break
+    else:
+        log.warning(
+            "t = %g s: blocks at rest and the cracks in them find no common strain in %d passes (they differ by %.2g of "
+            "it); the first step releases the difference",
+            load_time, COMPLIANCE_PASSES, differences.max(),
+        )  # fmt: skip
+    now.by_mean_stress.take_step()
+    now.crack_energy.begin(now.strain_solutions(), now.by_mean_stress)
+    return found
 
 
 class _Ways(NamedTuple):

@@ -27,7 +27,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .added_compliance import stress_rotation
+from .added_compliance import passive, stress_rotation
 
 if TYPE_CHECKING:
     from ...ddm import Body, FaceMemory, Solution
@@ -43,6 +43,21 @@ SOFT = 4.0
 SOFTEST = 30.0
 
 
+#: Relative change of the softness or of the limit below which they have not changed.
+_SAME = 1e-6
+
+
+@dataclass(eq=False)
+class _Softness:
+    """Softness of a block with this ``crack_system``: with all cracks ``open``; the present ``limit``; the face
+    ``states`` last looked at (None: not solved since the cracks have grown)."""
+
+    crack_system: object
+    open: float
+    limit: np.ndarray
+    states: object = None
+
+
 @dataclass(eq=False)
 class ByMeanStress:
     """The blocks with this response, and the solutions under their mean stress in the last pass (block →)."""
@@ -52,8 +67,7 @@ class ByMeanStress:
     memory: dict[int, FaceMemory] = field(default_factory=dict)
     #: Mean stress of the last pass in the block's own axes, Pa, and `limit` at that time.
     stress: dict[int, tuple[np.ndarray, np.ndarray]] = field(default_factory=dict)
-    #: Crack system, softness, limit.
-    _softness: dict[int, tuple[object, float, np.ndarray]] = field(default_factory=dict)
+    _softness: dict[int, _Softness] = field(default_factory=dict)
     _blocks: set[int] = field(default_factory=set)
 
     def __contains__(self, block: int) -> bool:
@@ -81,10 +95,12 @@ class ByMeanStress:
         """P (3, 3) of ``block``, which limits its softness: its cracks respond as W(P σ), with the strain Pᵀ ε_c(P σ),
         which still has a potential.
 
-        With S v = s C v and vᵀ C v = 1, s and v the softness and direction of open cracks and C the ``elastic``
+        With S v = s C v and vᵀ C v = 1, s and v the softness and direction of the cracks and C the ``elastic``
         compliance (3, 3), P = Σ √min(1, `SOFTEST`/s) v vᵀ C limits each direction by itself. (One factor for all
-        directions would make growing cracks stiffen others.)"""
-        return self._known(block, body, elastic)[2]
+        directions would make growing cracks stiffen others.) S is that of the softest face states under which the
+        block has been solved since its cracks last grew; all cracks are open before it is solved. (With S of open
+        cracks, a block whose cracks are closed in part would stiffen as a tip nears the surface: to a fifth.)"""
+        return self._known(block, body, elastic).limit
 
     def answer(
         self,
@@ -99,17 +115,46 @@ class ByMeanStress:
         """Solution of ``body``, rotated by ``rotation`` rad, under its mean ``stress`` (3,), Pa, current axes, times
         its `limit`. With ``skip``, scaled from solutions under unit stresses where that is exact. Faces start with
         their memory of such solutions, or with ``began`` where there is none. Raises `ddm.NotConverged`."""
-        from ...ddm.loads.uniform_stress_response import scaled
-
         own = stress_rotation(-rotation) @ stress
         limit = self.limit(block, body, elastic)
-        before, even = self.solutions.get(block), limit @ own
-        known = scaled(body, even, before) if skip else None
-        if known is None:
-            load = body.mean_stress_load(even)
-            known = body.solve(load, warm=before, history=self.memory.get(block, began), meet_target=False)
+        known = self._solved(block, body, limit @ own, began, skip)
+        if self._changes_limit(block, body, elastic, known):
+            limit = self.limit(block, body, elastic)
+            known = self._solved(block, body, limit @ own, began, skip)
         self.solutions[block], self.stress[block] = known, (own, limit)
         return known
+
+    def _solved(
+        self, block: int, body: Body, stress: np.ndarray, began: FaceMemory | None, skip: bool
+    ) -> Solution | UniformStressSolution:
+        """Solution of ``body`` under ``stress`` (3,), Pa, as in `answer`."""
+        from ...ddm.loads.uniform_stress_response import scaled
+
+        before = self.solutions.get(block)
+        known = scaled(body, stress, before) if skip else None
+        if known is not None:
+            return known
+        load = body.mean_stress_load(stress)
+        return body.solve(load, warm=before, history=self.memory.get(block, began), meet_target=False)
+
+    def _changes_limit(
+        self, block: int, body: Body, elastic: np.ndarray, solution: Solution | UniformStressSolution
+    ) -> bool:
+        """Whether the limit of ``block`` changes with the face states of ``solution``: because they are the first since its
+        cracks have grown, or softer than `SOFTEST` under the present limit."""
+        known = self._known(block, body, elastic)
+        if known.open <= SOFTEST:
+            return False
+        states = solution.closed.tobytes() if solution.memory is None else solution.face_states.key
+        if states == known.states:
+            return False
+        first, known.states = known.states is None, states
+        compliance = passive(body.compliance(solution))
+        felt, _ = _limited(elastic, known.limit.T @ compliance @ known.limit)
+        if not first and felt <= SOFTEST * (1.0 + _SAME):
+            return False
+        before, (_, known.limit) = known.limit, _limited(elastic, compliance)
+        return not np.allclose(before, known.limit, rtol=0.0, atol=_SAME)
 
     def limits(self, block: int) -> bool:
         """Whether the softness of ``block`` was limited in the last pass."""
@@ -141,16 +186,25 @@ class ByMeanStress:
 
     def _soft(self, block: int, body: Body, elastic: np.ndarray) -> float:
         """Largest ratio, over all directions, of the compliance of open cracks to the ``elastic`` one (3, 3)."""
-        return self._known(block, body, elastic)[1]
+        return self._known(block, body, elastic).open
 
-    def _known(self, block: int, body: Body, elastic: np.ndarray) -> tuple[object, float, np.ndarray]:
+    def _known(self, block: int, body: Body, elastic: np.ndarray) -> _Softness:
         known = self._softness.get(block)
-        if known is None or known[0] is not body.crack_system:
-            # C = L Lᵀ, L⁻¹ S L⁻ᵀ w = s w, v = L⁻ᵀ w.
-            back = np.linalg.inv(np.linalg.cholesky(elastic))
-            times, ways = np.linalg.eigh(back @ body.compliance() @ back.T)
-            ways = back.T @ ways
-            part = np.sqrt(SOFTEST / np.maximum(times, SOFTEST))
-            limit = (ways * part) @ ways.T @ elastic if part[0] < 1 or part[-1] < 1 else np.eye(3)
-            known = self._softness[block] = body.crack_system, float(times[-1]), limit
+        if known is None or known.crack_system is not body.crack_system:
+            before = None if known is None or known.states is None else known.limit
+            softness, limit = _limited(elastic, body.compliance())
+            # Cracks that have grown begin with the limit of before: most of their faces stay as they are.
+            known = _Softness(body.crack_system, softness, limit if before is None or softness <= SOFTEST else before)
+            self._softness[block] = known
         return known
+
+
+def _limited(elastic: np.ndarray, compliance: np.ndarray) -> tuple[float, np.ndarray]:
+    """Largest softness of cracks of this ``compliance`` (3, 3) in rock of the ``elastic`` one (3, 3), and the `limit` P."""
+    # C = L Lᵀ, L⁻¹ S L⁻ᵀ w = s w, v = L⁻ᵀ w.
+    back = np.linalg.inv(np.linalg.cholesky(elastic))
+    times, ways = np.linalg.eigh(back @ compliance @ back.T)
+    ways = back.T @ ways
+    part = np.sqrt(SOFTEST / np.maximum(times, SOFTEST))
+    limit = (ways * part) @ ways.T @ elastic if part[0] < 1 or part[-1] < 1 else np.eye(3)
+    return float(times[-1]), limit

@@ -10,6 +10,7 @@ from ... import dda
 from ...model import Event, State
 from ..coupled_state import CrackedBlocks
 from ..cycle_record import event
+from ..load_pass import at_rest
 from .mechanism import Mechanism
 
 log = logging.getLogger(__name__)
@@ -18,13 +19,9 @@ log = logging.getLogger(__name__)
 def relax(now: CrackedBlocks, load_time: float) -> tuple[Event, ...]:
     """Bring the blocks to equilibrium under the loads of ``load_time``; a collapse event if there is none."""
     begun = now.state
-    with now.timed("dda"):
-        found = dda.equilibrium(
-            now.system, now.state, now.problem.loads, load_time=load_time, crack=now.response,
-            tolerance=now.problem.dda.unbalanced_tolerance,
-        )  # fmt: skip
+    found = at_rest(now, load_time)
     # The energy budget covers recorded steps only.
-    now.state, now.budget = found.state, now.budget.cut()
+    now.budget = now.budget.cut()
     if not found.collapsed:
         if not found.converged:
             log.warning("t = %g s: %s; continuing from there", load_time, found.reason)

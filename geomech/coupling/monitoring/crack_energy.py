@@ -119,6 +119,14 @@ class CrackEnergy:
     _along: dict[int, float] = field(default_factory=dict)
     _taken: dict[int, float] = field(default_factory=dict)
 
+    def begin(self, solutions: dict[int, Solution], by_mean_stress: ByMeanStress) -> None:
+        """The run begins with the cracks of ``solutions`` (block → `ddm.Solution`) at rest under load. What opening them
+        took belongs to the state from which the sums are counted."""
+        self.stored = sum(solution.crack_energy + solution.filling_energy for solution in solutions.values())
+        self._by_mean_response = {block: block in by_mean_stress for block in solutions}
+        self._rested = {block: Loaded.of(block, of, by_mean_stress) for block, of in solutions.items()}
+        self._last = dict(self._rested)
+
     def passed(
         self,
         tips: np.ndarray,

@@ -7,7 +7,7 @@ collapsed, wherever they end, once a vertex has moved farther than
 
     h / 2000  +  five times the largest displacement without joint failure  +  the displacement that makes a bolt yield
 
-plus twice the deflection of blocks of higher order, and farther than any block that has not collapsed. The term for
+plus twice the deflection of blocks of higher order and the displacement by the strain of cracks, and farther than any block that has not collapsed. The term for
 bolts is at most h / 10, and zero for a bolt without yield force, whose load depends on the displacement allowed. Blocks
 drawn apart from their supports first fall onto them; their displacement counts from there.
 """
@@ -106,7 +106,7 @@ class DisplacementLimit:
         moved = self.moved(state.vertices)
         if not (moved > own)[~self._system.fixed].any():
             return own
-        own = own + self.elastic + self.stretching(state, moved) + self.bending(state)
+        own = own + self.elastic + self.stretching(state, moved) + self.bending(state) + self.cracking(state)
         within = moved <= own
         return own + float(moved[within].max(initial=0.0))
 
@@ -141,6 +141,12 @@ class DisplacementLimit:
         by up to twice that."""
         deflected = self._system.deflected
         return 0.0 if deflected is None else 2.0 * float(deflected.deflection_of(state)[0].max())
+
+    def cracking(self, state: State) -> float:
+        """m: displacement due to the strain of the cracks in blocks: that of a block's farthest vertex from its centre,
+        and of blocks that rest on it by up to five times as much."""
+        strain = np.abs(state.crack_strain).max(axis=1)
+        return _OPENING * float((strain * self._size).max(initial=0.0))
 
     @property
     def elastic(self) -> float:

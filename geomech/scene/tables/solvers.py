@@ -42,8 +42,8 @@ class DdaTable(Table):
     )
     equilibrium: Literal["", "start", "loads"] = Field(
         "",
-        description='when static equilibrium is computed, independent of the time step: "" never, "start" before the run begins, '
-        '"loads" at every load of a static run too; a run ends if there is none, or only one after blocks have moved by '
+        description='when static equilibrium is computed, independent of the time step: "" never, "start" before the run begins (in '
+        'motion with its cracks open and at rest), "loads" at every load of a static run too; a run ends if there is none, or only one after blocks have moved by '
         "more than a two-thousandth of their size in addition to elastic displacements",
     )
     unbalanced_tolerance: Positive = Field(
