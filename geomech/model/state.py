@@ -108,6 +108,8 @@ class State:
     removed       (n_blocks,)       True: excavated; None: no block is
     deflection    (k, 2)            m and m/s, of blocks of higher order (`Blocks.order`): the unknowns of deflection and
                                     their rates, block by block; None: no block has any. ``vertices`` are without it
+    deflection_origin (k, 2)        m, as in-situ stress leaves it: the deflection at which blocks of higher order bear
+                                    their mean stress alone, and that from which displacements count; None: zero
     face_points   FACE_POINT rows   what points of the faces of such blocks remember
     parted        (n_faces,)        True: the glue of that face of `Blocks.glued` has parted; None: all holds
     order         (n_blocks,)       order that each block has come to, where orders are found as the run goes; None: they
@@ -129,6 +131,7 @@ class State:
     face_points: np.ndarray | None = None
     order: np.ndarray | None = None
     parted: np.ndarray | None = None
+    deflection_origin: np.ndarray | None = None
 
     @classmethod
     def at_rest(cls, blocks: Blocks) -> State:

@@ -41,6 +41,10 @@ class BendingAttempt(Attempt):
         self.blocks: DeflectedBlocks = system.deflected
         known = self.blocks.at_rest() if state.deflection is None else state.deflection
         self.deflection = np.ascontiguousarray(known[:, 0])
+        #: (k,) m, deflection that strains the blocks beyond their mean stress.
+        self.strained = self.deflection
+        if state.deflection_origin is not None:
+            self.strained = self.deflection - state.deflection_origin[:, 0]
         #: (k,) m/s, rates of deflection at the start of the step.
         self.rates = system.settings.dynamic_factor * known[:, 1]
         super().__init__(system, start, dt, self._on_faces(system, state, start.vertices, found), cuts)
@@ -75,7 +79,7 @@ class BendingAttempt(Attempt):
         # Strains, unknowns on the axes of the start of the step, and deflection are coupled by inertia.
         self.shared = self.density[:, None, None] * blocks.coupling(self.state.rotation) / size[:, None, None]
         self.bending_load = blocks.loads(self.points, self.edges, self.midpoint.vertices, self.angle)
-        stored, rates = blocks.stiffness_times(self.deflection), blocks.padded(self.rates)
+        stored, rates = blocks.stiffness_times(self.strained), blocks.padded(self.rates)
         spin = self.density * self.carried[:, 2] ** 2
         own = self.bending_load - stored
         own += spin[:, None] * (blocks.basis.coupling[:, 0] + blocks.basis.coupling[:, 1])
@@ -88,7 +92,7 @@ class BendingAttempt(Attempt):
         self.glue = (
             None
             if faces is None
-            else Glue.of(faces, self.state, self.vertices, self.deflection, self.midpoint, self.turn)
+            else Glue.of(faces, self.state, self.vertices, (self.deflection, self.strained), self.midpoint, self.turn)
         )
         bending = (scheme.weight + drag / dt)[:, None, None] * blocks.stiffness
         self._own_matrices(bending, inertia * self.shared, inertia * self.density * blocks.basis.area)
@@ -265,7 +269,7 @@ class BendingAttempt(Attempt):
         after = blocks.kinetic(self.new_rates, self.velocity[:, 3:], end, density)
         had = blocks.kinetic(begun[:, 1], state.velocity[:, 3:], angle, density)
         kept = blocks.kinetic(self.rates, self.carried[:, 3:], angle, density)
-        u0, u1 = blocks.elastic_energy(self.deflection), blocks.elastic_energy(self.deflection + change)
+        u0, u1 = blocks.elastic_energy(self.strained), blocks.elastic_energy(self.strained + change)
         padded = blocks.padded(change)
         worked = float((self.bending_load * padded).sum())
         # Work of inertia with the mean acceleration of the step: of deflection alone, and of its coupling with strains.
@@ -281,7 +285,7 @@ class BendingAttempt(Attempt):
         inertia -= float(
             np.einsum("b,bj,bj->", spun, blocks.basis.coupling[:, 0] + blocks.basis.coupling[:, 1], padded)
         )
-        strained = float((padded * blocks.stiffness_times(self.deflection + scheme.weight * change)).sum())
+        strained = float((padded * blocks.stiffness_times(self.strained + scheme.weight * change)).sum())
         drag = scheme.stiffness_damping + 2.0 * scheme.block_damping * np.sqrt(
             self.density * self.moments[:, 0] / (12.0 * self.system.stiffness[:, 0, 0])
         )
@@ -315,7 +319,9 @@ class BendingAttempt(Attempt):
         result = super().result()
         deflection = np.stack([self.deflection + self.bent_by, self.new_rates], axis=1)
         memory = self.found.memory(self.settled, self._end_shear(), self._points_at_the_end())
-        return replace(result, state=replace(result.state, deflection=deflection, face_points=memory))
+        origin = self.state.deflection_origin
+        state = replace(result.state, deflection=deflection, face_points=memory, deflection_origin=origin)
+        return replace(result, state=state)
 
     def _points_at_the_end(self) -> np.ndarray:
         """(n, 2) m: contact points on the vertices' blocks at the end of the step."""

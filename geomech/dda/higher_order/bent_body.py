@@ -15,7 +15,8 @@ from .deflected_blocks import DeflectedBlocks, rotation_of
 class BentBody:
     """A ``block`` of the ``deflected`` blocks.
 
-    q       (m,) deflection
+    q       (m,) deflection since displacements count
+    strained (m,) deflection beyond that at which the block bears its mean stress alone
     strain  (3,) mean strain, in the block's frame
     stress  (3,) mean stress, Pa, in the block's frame
     angle   rotation of that frame, rad
@@ -24,6 +25,7 @@ class BentBody:
     deflected: DeflectedBlocks
     block: int
     q: np.ndarray
+    strained: np.ndarray
     strain: np.ndarray
     stress: np.ndarray
     angle: float
@@ -35,7 +37,7 @@ class BentBody:
         """
         basis = self.deflected.basis
         m = len(self.q)
-        bent = basis.strain(points, self.block)[..., :m] @ self.q
+        bent = basis.strain(points, self.block)[..., :m] @ self.strained
         arm = points - basis.centroid[self.block]
         x, y, (ex, ey, gamma) = arm[:, 0], arm[:, 1], self.strain
         own = np.stack([ex * x + 0.5 * gamma * y, ey * y + 0.5 * gamma * x], axis=1)
@@ -54,11 +56,13 @@ def bent_bodies(deflected: DeflectedBlocks | None, state: State, motion: Motion)
     if deflected is None:
         return {}
     known = deflected.at_rest() if state.deflection is None else state.deflection
+    beyond, since = known[:, :1].T - deflected.origin(state).T
     out = {}
     for b in deflected.bending.tolist():
         angle = float(state.rotation[b])
         stretch = rotation_of(np.array(-angle)) @ motion.gradient[b] - np.eye(2)
         strain = np.array([stretch[0, 0], stretch[1, 1], stretch[0, 1] + stretch[1, 0]])
         stress = rotate_stress(state.stress[b], -angle)
-        out[b] = BentBody(deflected, b, known[deflected.basis.of_block(b), 0], strain, stress, angle)
+        own = deflected.basis.of_block(b)
+        out[b] = BentBody(deflected, b, since[own], beyond[own], strain, stress, angle)
     return out

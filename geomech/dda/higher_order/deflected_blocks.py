@@ -16,11 +16,11 @@ from functools import cached_property
 
 import numpy as np
 
-from ...model import Blocks, State
+from ...model import Blocks, InSituStress, State
 from ..open_close.contact_set import ContactSet
 from ..results import NotConverged
 from .deflection_basis import HIGHEST, DeflectionBasis, n_deflections
-from .polygon_quadrature import gauss_points
+from .polygon_quadrature import gauss_points, polygon_points
 
 log = logging.getLogger(__name__)
 
@@ -91,6 +91,12 @@ class DeflectedBlocks:
     def at_rest(self) -> np.ndarray:
         """(k, 2) zero deflection and rate."""
         return np.zeros((self.n_unknowns, 2))
+
+    def origin(self, state: State) -> np.ndarray:
+        """(k, 2) m: deflections of ``state`` at which blocks bear their mean stress alone, and from which displacements
+        count."""
+        known = state.deflection_origin
+        return self.at_rest() if known is None else np.asarray(known)
 
     def padded(self, values: np.ndarray) -> np.ndarray:
         """(n_blocks, m) the unknowns ``values`` (k,) of all blocks, padded with zeros."""
@@ -225,6 +231,49 @@ class DeflectedBlocks:
             undeformed = self.material_points(vertices, where.reshape(-1, 2), owner)
             matrix = self.directions(undeformed, owner, angle)
             np.add.at(out, owner, np.einsum("na,naj->nj", force.reshape(-1, 2), matrix))
+        return out
+
+    def under(self, stress: InSituStress) -> np.ndarray:
+        """(k,) m: deflections that give unrotated blocks the ``stress`` that is left of its mean.
+
+        They solve K q = ∫ ε(P)ᵀ σ dA. The strain of a stress linear in the coordinates is linear and therefore
+        compatible: from order 2 on the stress is exact.
+        """
+        blocks, out = self.blocks, np.zeros(self.n_unknowns)
+        end = blocks.vertices[blocks.next_vertex]
+        for b in self.bending.tolist():
+            some, m = slice(blocks.vertex_start[b], blocks.vertex_start[b + 1]), n_deflections(int(self.order[b]))
+            points, weights = polygon_points(
+                blocks.vertices[some], end[some], self.basis.centroid[b], int(self.order[b])
+            )
+            strain = self.basis.strain(points, b)[..., :m]
+            beyond = stress.at(points) - stress.at(self.basis.centroid[b])
+            force = np.einsum("n,nsj,ns->j", weights, strain, beyond)
+            out[self.basis.of_block(b)] = np.linalg.solve(self.stiffness[b, :m, :m], force)
+        return out
+
+    def stress_of(self, q: np.ndarray) -> np.ndarray:
+        """(n, 3) Pa at the corners of bending blocks due to the deflections ``q`` (k,), in their frames."""
+        slope, owner = self._slopes
+        corners = len(owner) // 2
+        slope, owner = slope[:corners], owner[:corners]
+        strain = np.stack([slope[:, 0], slope[:, 3], slope[:, 1] + slope[:, 2]], axis=1)
+        return np.einsum("nst,ntj,nj->ns", self.elastic[owner], strain, self.padded(q)[owner])
+
+    def on_basis_of(self, moved: Blocks, q: np.ndarray) -> np.ndarray:
+        """(k, …) the deflections ``q`` (k, …) on the basis of the same blocks with other vertices, ``moved``."""
+        if not q.any():
+            return q
+        basis = DeflectionBasis.of(moved.vertices, moved.next_vertex, moved.vertex_start, self.order)
+        end, out = moved.vertices[moved.next_vertex], np.zeros_like(q)
+        for b in self.bending.tolist():
+            some, own = slice(moved.vertex_start[b], moved.vertex_start[b + 1]), basis.of_block(b)
+            m = n_deflections(int(self.order[b]))
+            points, weights = polygon_points(moved.vertices[some], end[some], basis.centroid[b], 2 * int(self.order[b]))
+            was = self.material_points(moved.vertices, points, np.full(len(points), b))
+            field = self.basis.displacement(was, b)[..., :m] @ q[own]
+            mine = basis.displacement(points, b)[..., :m]
+            out[own] = np.einsum("n,naj,na...->j...", weights, mine, field) / basis.area[b]
         return out
 
     def kinetic(self, rates: np.ndarray, strain_rates: np.ndarray, angle: np.ndarray, density: np.ndarray) -> float:

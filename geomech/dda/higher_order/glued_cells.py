@@ -63,7 +63,7 @@ class GluedFaces:
 
     block, other  (m,)    the cells a and b
     face          (n,)    of each point
-    points        (n, 2)  undeformed, m
+    points        (n, 2) twice  undeformed, on a and on b, m
     normal        (n, 2)  undeformed, out of a
     weight        (n,)    m
     penalty       (n,)    τ, Pa/m
@@ -73,7 +73,7 @@ class GluedFaces:
     block: np.ndarray
     other: np.ndarray
     face: np.ndarray
-    points: np.ndarray
+    points: tuple[np.ndarray, np.ndarray]
     normal: np.ndarray
     weight: np.ndarray
     penalty: np.ndarray
@@ -92,8 +92,11 @@ class GluedFaces:
         place = np.concatenate([rules[n][0] for n in count.tolist()])
         length = np.hypot(*along.T)
         normal = np.stack([along[:, 1], -along[:, 0]], axis=1) / length[:, None]
+        # The corners of both cells coincide, unless in-situ stress has moved the cells to rest.
+        far = blocks.vertices[blocks.next_vertex[mate]]
+        opposite = far[face] + place[:, None] * (blocks.vertices[mate] - far)[face]
         faces = cls(
-            cells, block, other, face, start[face] + place[:, None] * along[face], normal[face],
+            cells, block, other, face, (start[face] + place[:, None] * along[face], opposite), normal[face],
             np.concatenate([rules[n][1] for n in count.tolist()]) * length[face], np.zeros(len(face)),
         )  # fmt: skip
         steepest = faces._steepest()
@@ -105,7 +108,7 @@ class GluedFaces:
         number, some = np.cumsum(keep) - 1, keep[self.face]
         return replace(
             self, block=self.block[keep], other=self.other[keep], face=number[self.face[some]],
-            points=self.points[some], normal=self.normal[some], weight=self.weight[some], penalty=self.penalty[some],
+            points=(self.points[0][some], self.points[1][some]), normal=self.normal[some], weight=self.weight[some], penalty=self.penalty[some],
         )  # fmt: skip
 
     @property
@@ -127,7 +130,7 @@ class GluedFaces:
             m = int(n_deflections(int(cells.order[b])))
             strain = np.zeros((len(some), 3, 3 + m))
             strain[:, :, :3] = np.eye(3)
-            strain[:, :, 3:] = cells.basis.strain(self.points[some], b)[..., :m]
+            strain[:, :, 3:] = cells.basis.strain(self.points[0][some], b)[..., :m]
             traction = across[some] @ cells.elastic[b] @ strain
             on_faces = np.einsum("n,nwi,nwj->ij", self.weight[some], traction, traction)
             inside = np.zeros((3 + m, 3 + m))
@@ -147,9 +150,9 @@ class GluedFaces:
         arm = vertices - mean[blocks.vertex_block]
         gradient = np.add.reduceat(arm[:, :, None] * weights[:, None, :], blocks.vertex_start[:-1], axis=0)
         out = []
-        for owner in self.owners:
-            at = mean[owner] + np.einsum("nab,nb->na", gradient[owner], self.points - reference[owner])
-            bent = self.cells.directions(self.points, owner, angle)
+        for owner, points in zip(self.owners, self.points, strict=True):
+            at = mean[owner] + np.einsum("nab,nb->na", gradient[owner], points - reference[owner])
+            bent = self.cells.directions(points, owner, angle)
             out.append(at + np.einsum("naj,nj->na", bent, padded[owner]))
         return out[0], out[1]
 
@@ -171,16 +174,17 @@ class Glue:
 
     @classmethod
     def of(
-        cls, faces: GluedFaces, state: State, vertices: np.ndarray, q: np.ndarray, midpoint: MidpointConfiguration,
-        turn: np.ndarray,
+        cls, faces: GluedFaces, state: State, vertices: np.ndarray, deflections: tuple[np.ndarray, np.ndarray],
+        midpoint: MidpointConfiguration, turn: np.ndarray,
     ) -> Glue:  # fmt: skip
-        """The bonds of cells with deflections ``q`` (k,) in ``state``.
+        """The bonds of cells in ``state`` with these ``deflections``: (k,) all, and (k,) those that strain the cells.
 
         Forces act at the ``midpoint`` configuration, to which cells have rotated by ``turn`` (n_blocks,).
         """
         cells, owners, n = faces.cells, faces.owners, len(faces.face)
         start, angle = state.rotation, state.rotation + turn
-        size, padded = np.sqrt(midpoint.moments[:, 0]), cells.padded(q)
+        q, strained = deflections
+        size, padded = np.sqrt(midpoint.moments[:, 0]), cells.padded(strained)
 
         def normal(at: np.ndarray) -> np.ndarray:
             return np.einsum("nab,nb->na", rotation_of(0.5 * (at[owners[0]] + at[owners[1]])), faces.normal)
@@ -193,13 +197,13 @@ class Glue:
         for side, (owner, sign) in enumerate(zip(owners, (1.0, -1.0), strict=True)):
             matrix = midpoint.displacement(middle, owner)
             matrix[..., 2:] /= size[owner, None, None]
-            bent = cells.directions(faces.points, owner, angle)
+            bent = cells.directions(faces.points[side], owner, angle)
             m = bent.shape[2]
             jump[:, :, side, :6] = sign * acting @ matrix
             jump[:, :, side, 6 : 6 + m] = sign * acting @ bent
             elastic, across = cells.elastic[owner], traction_of(begun)
             turned = np.einsum("nba,nb->na", rotation_of(start[owner]), begun)
-            own = traction_of(turned) @ elastic @ cells.basis.strain(faces.points, owner)
+            own = traction_of(turned) @ elastic @ cells.basis.strain(faces.points[side], owner)
             mean[:, :, side, 3:6] = 0.5 * across @ elastic / size[owner, None, None]
             mean[:, :, side, 6 : 6 + m] = 0.5 * own
             bears += 0.5 * (

@@ -4,6 +4,9 @@ A first-order block carries the mean of a linear stress field, its value at the 
 by relaxation: blocks with the stress, and contacts without force, relax; the contacts close by the penalty penetration,
 and the blocks lose the corresponding stress. The lost stress is added again and the blocks relax again, by a smaller
 amount, and so on. The positions reached become the reference configuration, from which displacements count.
+
+A block of higher order also bears what the field has beyond its mean, as an initial stress: its deflection is counted
+from one at which it bears the mean alone (`State.deflection_origin`).
 """
 
 from __future__ import annotations
@@ -14,6 +17,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ...model import Blocks, InSituStress, Loads, State
+from ..higher_order.deflected_blocks import DeflectedBlocks
 from ..system import BlockSystem
 from .pseudo_time_equilibrium import Equilibrium, equilibrium
 
@@ -40,8 +44,8 @@ class InSituState:
     blocks      with the positions at rest as their reference
     state       at time 0, without velocity and displacement, with stress and contact forces
     settled     m, the largest displacement from the blocks as drawn
-    deviation   largest difference between a free block's stress and the in-situ stress, relative to the largest in-situ
-                stress: the part that is inconsistent with supports and weights
+    deviation   largest difference between a free block's stress (of higher order: also at its corners) and the in-situ
+                stress, relative to the largest in-situ stress: the part that is inconsistent with supports and weights
     """
 
     blocks: Blocks
@@ -58,27 +62,71 @@ def in_situ_state(
     ``tolerance`` of the unbalanced force as in `equilibrium`; the stress is corrected until its relative change is
     below ``stress_tolerance``. If ``stress`` is inconsistent with weight and supports, the blocks end with a consistent
     stress, and ``deviation`` gives the difference; consistent components (such as horizontal stress between walls) are
-    kept. Raises `NoInSituEquilibrium` when the blocks do not come to rest, and ValueError for blocks of higher order.
+    kept. Raises `NoInSituEquilibrium` when the blocks do not come to rest, and ValueError for blocks whose order is
+    found during the run.
     """
     blocks = system.blocks
-    if system.deflected is not None or system.order_choice is not None:
-        raise ValueError("in-situ stress is not supported in blocks of an order above 1 yet")
+    if system.order_choice is not None:
+        raise ValueError('in-situ stress is not supported in blocks of order "auto" yet: give the order by number')
+    bent = None if system.deflected is None else _Bent(system.deflected, stress)
     centres = np.array([blocks.area_moments(b)[1] for b in range(blocks.n_blocks)])
     given = stress.at(centres)
     given[blocks.fixed] = 0.0
     size = float(np.abs(given).max(initial=0.0))
+    if bent is not None:
+        size = max(size, float(np.abs(bent.given).max(initial=0.0)))
     state, before = State.at_rest(blocks), None
     for _ in range(_PASSES):
-        found: Equilibrium = equilibrium(system, replace(state, stress=given.copy()), loads, tolerance=tolerance)
+        start = replace(state, stress=given.copy())
+        if bent is not None:
+            start = bent.stressed(start)
+        found: Equilibrium = equilibrium(system, start, loads, tolerance=tolerance)
         if not found.converged:
             raise NoInSituEquilibrium(f"the blocks do not come to rest under the in-situ stress: {found.reason}", found)
         state = found.state
-        if before is None or np.abs(state.stress - before).max() > stress_tolerance * max(size, 1e-300):
-            before = state.stress
+        reached = state.stress if bent is None else np.concatenate([state.stress, bent.beyond_mean(state)])
+        if before is None or np.abs(reached - before).max() > stress_tolerance * max(size, 1e-300):
+            before = reached
         else:
             break
     moved = float(np.hypot(*(state.vertices - blocks.vertices).T).max())
-    off = float(np.abs(state.stress - given)[~blocks.fixed].max(initial=0.0)) / size if size else 0.0
+    off = float(np.abs(state.stress - given)[~blocks.fixed].max(initial=0.0))
+    if bent is not None:
+        off = max(off, float(np.abs(bent.beyond_mean(state) - bent.given).max(initial=0.0)))
+    off = off / size if size else 0.0
     log.info("in-situ stress: blocks as drawn settle by %.3g m, stress is off by %.2g of the largest", moved, off)
     rest = replace(state, time=0.0, rotation=np.zeros(blocks.n_blocks), imposed=np.empty(0))
-    return InSituState(blocks.with_vertices(state.vertices), rest, moved, off)
+    settled = blocks.with_vertices(state.vertices)
+    if bent is not None:
+        rest = bent.on(settled, rest)
+    return InSituState(settled, rest, moved, off)
+
+
+class _Bent:
+    """Blocks of higher order under the part of the in-situ ``stress`` beyond the mean of each; ``given`` (n, 3) Pa: that
+    part at their corners."""
+
+    def __init__(self, deflected: DeflectedBlocks, stress: InSituStress) -> None:
+        self._blocks, self._under = deflected, deflected.under(stress)
+        self.given = deflected.stress_of(self._under)
+
+    def stressed(self, state: State) -> State:
+        """``state`` with this part of the stress in blocks that do not deflect any further by it."""
+        known = self._blocks.at_rest() if state.deflection is None else state.deflection
+        origin = np.stack([known[:, 0] - self._under, np.zeros(len(known))], axis=1)
+        return replace(state, rotation=np.zeros_like(state.rotation), deflection=known, deflection_origin=origin)
+
+    def beyond_mean(self, state: State) -> np.ndarray:
+        """(n, 3) Pa at the corners, beyond the mean stress of each block."""
+        return self._blocks.stress_of(self._deflections(state)[1])
+
+    def _deflections(self, state: State) -> tuple[np.ndarray, np.ndarray]:
+        """(k,) m twice: deflections, and those beyond that without stress."""
+        known = self._blocks.at_rest() if state.deflection is None else state.deflection
+        return known[:, 0], known[:, 0] - self._blocks.origin(state)[:, 0]
+
+    def on(self, settled: Blocks, state: State) -> State:
+        """``state`` with deflections on the basis of the ``settled`` blocks, whose displacements count from there."""
+        now, stressed = (self._blocks.on_basis_of(settled, each) for each in self._deflections(state))
+        rest = np.stack([now, np.zeros(len(now))], axis=1)
+        return replace(state, deflection=rest, deflection_origin=np.stack([now - stressed, now], axis=1))

@@ -9,7 +9,6 @@ from .check import Check
 _LOADS = {
     "bolts": "bolts", "motions": "prescribed motion", "point_motions": "prescribed motion of points",
     "viscous_boundaries": "viscous boundaries", "excavations": "excavations",
-    "in_situ": "in-situ stress",
 }  # fmt: skip
 
 
@@ -43,6 +42,11 @@ def check_orders(c: Check) -> None:
                     f"{what} ([loads] {key}) together with blocks of higher order are not supported yet",
                     "leave out one",
                 )
+        if t.loads is not None and t.loads.in_situ is not None and zone.order == "auto":
+            refuse(
+                "in-situ stress ([loads] in_situ) with an order that is found is not supported yet",
+                "give the order by number, 2 to 8",
+            )
         if t.loads is not None and t.loads.base is not None and t.loads.base.frame == "ground":
             refuse('a base that shakes in the frame "ground" is not supported yet', 'set frame = "base"')
 

@@ -27,7 +27,6 @@ def scene(tmp_path, *more: str, text: str = BENDING):
         ("[joints.default]\nfriction_angle_deg = 30\nrestitution = 0.4\n", r"\[joints.default\] restitution"),
         ("[joints.default]\nfriction_angle_deg = 30\njrc = 8\njcs_pa = 1e8\n", "softens, dilates or closes"),
         ('[[loads.viscous_boundaries]]\nedge = "x"\n', r"viscous boundaries \(\[loads\] viscous_boundaries\)"),
-        ("[loads.in_situ]\nsurface_m = 1.0\nunit_weight_n_per_m3 = 2e4\nk0 = 1.0\n", "in-situ stress"),
         ('[[loads.motions]]\nzone = "block"\nvelocity_m_per_s = [0, -1]\n', r"prescribed motion"),
     ],
 )
@@ -124,6 +123,24 @@ def test_a_zone_of_cells_runs_and_resumes(tmp_path, shape):
     run(load_scene(scene(tmp_path, more, text=text), ("run.end_time_s=0.05",)), whole)
     for name in ("history.csv", "contacts.pvd"):
         assert (folder / name).read_bytes() == (whole / name).read_bytes()
+
+
+@pytest.mark.parametrize("zone", ["order = 3", "order = 2\nmesh_size_m = 0.4"])
+def test_a_scene_begins_under_in_situ_stress(tmp_path, zone):
+    """Under the stress of its weight the block stands where it is drawn, and has the stress of its depth inside."""
+    more = '[[monitors]]\nname = "top"\nat = [1.5, 1.0]\n'
+    field = "[loads.in_situ]\nsurface_m = 1.0\nunit_weight_n_per_m3 = 26487\nk0 = 0.0\n"
+    text = BENDING.replace("order = 4", zone)
+    loaded = load_scene(scene(tmp_path, more, field, text=text))
+    density = loaded.problem().materials[0].density
+    loaded = load_scene(scene(tmp_path, more, field.replace("26487", repr(9.81 * density)), text=text))
+    run(loaded, tmp_path / "run")
+    run(load_scene(scene(tmp_path, more, text=text)), tmp_path / "dropped")
+    moved, fallen = (abs(Run(tmp_path / name).history["top_uy"][-1]) for name in ("run", "dropped"))
+    assert moved < 1e-3 * fallen
+    inside = Run(tmp_path / "run").grid("interior", 3)
+    stress = np.asarray(inside["stress"])[:, 1]
+    assert stress.min() == pytest.approx(-9.81 * density, rel=1e-2) and abs(stress.max()) < 1e-2 * 9.81 * density
 
 
 def test_cells_have_the_joint_by_which_they_part(tmp_path):
