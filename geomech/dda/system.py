@@ -97,11 +97,11 @@ class BlockSystem:
             blocks, self.joints, joint_index, self.settings, modulus, rigid, self.mass, self.work
         )
         self.deflected: DeflectedBlocks | None = None
+        #: Faces of cells that are glued; None where no blocks are cells. ``bonded`` (m,): their numbers in `Blocks.glued`.
+        self.glued: GluedFaces | None = None
         #: Choice of orders during the run; None if all are given.
         self.order_choice: OrderChoice | None = None
         self._take_out(None, None)
-        #: Faces of cells that are glued; None where no blocks are cells.
-        self.glued: GluedFaces | None = None
         ordered = blocks.order is not None and (np.asarray(blocks.order) != 1)[~self.fixed].any()
         if ordered or blocks.glued is not None:
             refuse_unsupported(blocks, self.materials, self.joints, self.settings)
@@ -163,6 +163,8 @@ class BlockSystem:
         if np.array_equal(order, self.order):
             return
         self.order, self.deflected, self._sparse = order, choice.deflected(order), None
+        if self.deflected is not None:
+            self.deflected.take_out(self.taken_out)
         self.finder.at_corners = self.deflected is not None
         if self.blocks.glued is not None:
             self._all_glued, self._parted = GluedFaces.of(self.deflected), None
@@ -183,10 +185,18 @@ class BlockSystem:
         """Continue with cells whose glued faces have ``parted`` (n_faces,)."""
         if self._parted is not None and np.array_equal(parted, self._parted):
             return
-        self._parted, self._sparse, self.glued = parted, None, self._all_glued.kept(~parted)
+        self._parted = parted
+        self._bond()
         self.finder.part(self.blocks, parted)
         self.finder.kept_corners = KeptCorners(self.deflected, self.finder.joined)
         self.finder.deflection, self.finder.sag = np.zeros((2, self.blocks.n_blocks))
+
+    def _bond(self) -> None:
+        """Continue with the glue of cells that have neither parted nor been taken out."""
+        holds, every = ~self._parted, self._all_glued
+        if self.taken_out is not None:
+            holds = holds & ~self.taken_out[every.block] & ~self.taken_out[every.other]
+        self._sparse, self.bonded, self.glued = None, np.flatnonzero(holds), every.kept(holds)
 
     @property
     def step_limit(self) -> float:
@@ -223,6 +233,10 @@ class BlockSystem:
         self._sparse: tuple[np.ndarray, assembly.Pattern] | None = None
         self.finder.take_out(removed)
         self.load_map.take_out(removed, drained)
+        if self.deflected is not None:
+            self.deflected.take_out(removed)
+        if self.glued is not None:
+            self._bond()
 
     def step(
         self,
@@ -262,7 +276,7 @@ class BlockSystem:
                 continue
             parted = None
             if strength is not None and len(self.glued.block):
-                parted = strength.parting(self._parted, attempt.glue.mean_traction(attempt.glue_change))
+                parted = strength.parting(self._parted, self.bonded, attempt.glue.mean_traction(attempt.glue_change))
             if parted is None:
                 known = None if strength is None else self._parted
                 return replace(

@@ -47,6 +47,10 @@ class BendingAttempt(Attempt):
             self.strained = self.deflection - state.deflection_origin[:, 0]
         #: (k,) m/s, rates of deflection at the start of the step.
         self.rates = system.settings.dynamic_factor * known[:, 1]
+        if system.taken_out is not None:
+            gone = system.taken_out[self.blocks.owner]
+            self.deflection = np.where(gone, self.deflection - self.strained, self.deflection)
+            self.strained, self.rates = np.where(gone, 0.0, self.strained), np.where(gone, 0.0, self.rates)
         super().__init__(system, start, dt, self._on_faces(system, state, start.vertices, found), cuts)
 
     def _on_faces(self, system, state, vertices: np.ndarray, corners: ContactSet) -> FaceContacts:
@@ -136,7 +140,8 @@ class BendingAttempt(Attempt):
         full = np.zeros((pattern.n, 6))
         full[: self.n_free] = right
         full[self.order[moving], 3:6] += self.coupled_right[moving]
-        full.ravel()[self._deflection_at(pattern)] = self.own_right[blocks.owner, blocks.which]
+        there = blocks.present
+        full.ravel()[self._deflection_at(pattern)] = self.own_right[blocks.owner[there], blocks.which[there]]
         if self._constrained() is not None:
             # Constraints have changed the first six rows and columns.
             own = own.copy()
@@ -153,8 +158,9 @@ class BendingAttempt(Attempt):
         return {"right": full, "base": base, "rows": self._rows(contacts, vectors)}
 
     def _deflection_at(self, pattern) -> np.ndarray:
-        """(k,) positions of the unknowns of deflection among all unknowns."""
-        return 6 * pattern.more[self.blocks.owner] + self.blocks.which
+        """(k,) positions of the unknowns of deflection of blocks that are there among all unknowns."""
+        there = self.blocks.present
+        return 6 * pattern.more[self.blocks.owner[there]] + self.blocks.which[there]
 
     def _rows(self, found: ContactSet, vectors: np.ndarray) -> np.ndarray:
         """(n, 2, 2, w): direction, side, relative motion per unit of the unknowns of the side's block."""
@@ -210,7 +216,9 @@ class BendingAttempt(Attempt):
 
     def _deflected_by(self) -> np.ndarray:
         """(k,) m: increment of deflection in the last solution of the step."""
-        return self.unknowns.ravel()[self._deflection_at(self.pattern)]
+        change = np.zeros(self.blocks.n_unknowns)
+        change[self.blocks.present] = self.unknowns.ravel()[self._deflection_at(self.pattern)]
+        return change
 
     def _move(self) -> None:
         super()._move()

@@ -52,13 +52,16 @@ class BentBody:
 
 
 def bent_bodies(deflected: DeflectedBlocks | None, state: State, motion: Motion) -> dict[int, BentBody]:
-    """{block: body} of all blocks of higher order in ``state`` with known affine ``motion``."""
+    """{block: body} of all blocks of higher order in ``state`` with known affine ``motion``, without excavated ones."""
     if deflected is None:
         return {}
     known = deflected.at_rest() if state.deflection is None else state.deflection
     beyond, since = known[:, :1].T - deflected.origin(state).T
     out = {}
-    for b in deflected.bending.tolist():
+    bending = deflected.bending
+    if state.removed is not None:
+        bending = bending[~state.removed[bending]]
+    for b in bending.tolist():
         angle = float(state.rotation[b])
         stretch = rotation_of(np.array(-angle)) @ motion.gradient[b] - np.eye(2)
         strain = np.array([stretch[0, 0], stretch[1, 1], stretch[0, 1] + stretch[1, 0]])

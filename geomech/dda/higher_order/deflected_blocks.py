@@ -83,10 +83,19 @@ class DeflectedBlocks:
         #: (k,) the block of each unknown, and its number within the block.
         self.owner = np.repeat(np.arange(blocks.n_blocks), np.diff(self.basis.start))
         self.which = np.arange(self.n_unknowns) - self.basis.start[self.owner]
+        self._rows = self.rows
+        self.take_out(None)
 
     @property
     def n_unknowns(self) -> int:
         return self.basis.n_unknowns
+
+    def take_out(self, removed: np.ndarray | None) -> None:
+        """Continue without the blocks ``removed`` (n_blocks,): they keep their unknowns in all arrays, but have no
+        equations."""
+        self.rows = self._rows if removed is None else np.where(removed, 0, self._rows)
+        #: The unknowns of blocks that are there.
+        self.present = np.arange(self.n_unknowns) if removed is None else np.flatnonzero(~removed[self.owner])
 
     def at_rest(self) -> np.ndarray:
         """(k, 2) zero deflection and rate."""

@@ -301,12 +301,12 @@ class GlueStrength:
         """Whether any face can separate."""
         return bool(np.isfinite(self.tension).any())
 
-    def parting(self, parted: np.ndarray, mean: np.ndarray) -> np.ndarray | None:
-        """(m,) faces that have ``parted`` or do so under the ``mean`` traction (n, 2); None if no further one does.
+    def parting(self, parted: np.ndarray, left: np.ndarray, mean: np.ndarray) -> np.ndarray | None:
+        """(m,) faces that have ``parted`` or do so under the ``mean`` traction (n, 2) of those ``left`` (n,); None if no
+        further one does.
 
         Of the others, those separate whose stress exceeds their strength and is nearly the highest relative to it.
         """
-        left = np.flatnonzero(~parted)
         pull, shear = mean[:, 0], np.abs(mean[:, 1])
         shear_strength = self.cohesion[left] - np.minimum(pull, self.tension[left]) * self.friction[left]
         share = np.maximum(pull / self.tension[left], shear / np.maximum(shear_strength, 1e-300))

@@ -52,7 +52,6 @@ def refuse_unsupported_loads(loads: Loads) -> None:
     for name, what in (
         ("bolts", "bolts"), ("block_motions", "prescribed motion of blocks"),
         ("point_motions", "prescribed motion of points"), ("viscous_boundaries", "viscous boundaries"),
-        ("excavations", "excavations"),
     ):  # fmt: skip
         if getattr(loads, name):
             raise ValueError(f"{what} are not supported with blocks of an order above 1 yet")

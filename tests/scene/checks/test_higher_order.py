@@ -143,6 +143,26 @@ def test_a_scene_begins_under_in_situ_stress(tmp_path, zone):
     assert stress.min() == pytest.approx(-9.81 * density, rel=1e-2) and abs(stress.max()) < 1e-2 * 9.81 * density
 
 
+def test_cells_of_a_scene_are_excavated(tmp_path):
+    """A polygon takes whole cells by their centroids, and they bear nothing from then on; the run resumes after it."""
+    more = "[[loads.excavations]]\ntime_s = 0.02\npolygon = [[0.9, 0.45], [2.1, 0.45], [2.1, 1.1], [0.9, 1.1]]\n"
+    text = BENDING.replace("order = 4", 'order = 2\nmesh_size_m = 0.5\ncells = "quads"')
+    folder, whole = tmp_path / "run", tmp_path / "whole"
+    more += "[output]\ncheckpoint_every = 1\n"
+    run(load_scene(scene(tmp_path, more, text=text)), folder)
+    resume(folder, ("run.end_time_s=0.05",), quiet=True)
+    run(load_scene(scene(tmp_path, more, text=text), ("run.end_time_s=0.05",)), whole)
+    assert (folder / "history.csv").read_bytes() == (whole / "history.csv").read_bytes()
+    blocks = Run(whole).grid("blocks", 5)
+    assert len(np.unique(np.asarray(blocks["block_id"])[np.asarray(blocks["removed"]) == 1])) == 2
+    gone = np.unique(np.asarray(blocks["block_id"])[np.asarray(blocks["removed"]) == 1])
+    inside = Run(whole).grid("interior", 5)
+    taken = np.isin(np.asarray(inside["block_id"]), gone)
+    corners = inside.cells.reshape(-1, 4)[:, 1:]
+    assert taken.any() and not np.asarray(inside["stress"])[corners[taken]].any()
+    assert np.asarray(inside["stress"])[corners[~taken]].any()
+
+
 def test_cells_have_the_joint_by_which_they_part(tmp_path):
     text = BENDING.replace("order = 4", 'order = 2\nmesh_size_m = 0.6\ncell_joint = "grain"')
     more = "[joints.grain]\nfriction_angle_deg = 30\ntensile_strength_pa = 1e6\ncohesion_pa = 2e6\n"
