@@ -25,6 +25,7 @@ import zlib
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from types import CodeType
+from typing import Any
 
 import numpy as np
 from llvmlite import binding as llvm
@@ -44,10 +45,11 @@ try:
     from numba.core.targetconfig import ConfigStack, TargetConfig
     from numba.core.types.functions import BaseFunction
     from numba.core.typing.templates import _OverloadFunctionTemplate
-except ImportError:  # logged below
+except ImportError:  # logged below; classes that stand in for those that this version lacks
     IndexDataCacheFile = UserProvidedCacheLocator = JITCodeLibrary = Compiler = object
-    ConfigStack = TargetConfig = BaseFunction = DefaultOptions = _OverloadFunctionTemplate = object
-    Dispatcher = type(njit(lambda: None))
+    ConfigStack = TargetConfig = DefaultOptions = _OverloadFunctionTemplate = object
+    BaseFunction = object  # type: ignore[misc, assignment]
+    Dispatcher = type(njit(lambda: None))  # type: ignore[misc]
 
 #: Internals of Numba that are used here; they may change in any version.
 _INNER = (
@@ -103,7 +105,7 @@ def kept(**options) -> Callable:
         finally:
             config.CACHE_LOCATOR_CLASSES, config.CACHE_DIR = before
         if isinstance(made, Dispatcher):  # False if compilation is switched off
-            file = made._cache._cache_file
+            file = vars(made)["_cache"]._cache_file
             file.__class__ = _CacheFile
             # Differs from Numba's own name: those files have no checksums.
             file._index_path = str(Path(file._index_path).with_suffix(".summed.nbi"))
@@ -172,7 +174,7 @@ def _quick_inference() -> Iterator[None]:
             gc.enable()
 
 
-_call_type = getattr(BaseFunction, "get_call_type", None)
+_call_type: Callable = getattr(BaseFunction, "get_call_type", _refuse)
 _signatures: dict[tuple, list[tuple]] = {}
 
 
@@ -199,7 +201,7 @@ def _settings_for_kernels() -> TargetConfig:
     return settings
 
 
-_implementation = getattr(_OverloadFunctionTemplate, "_get_impl", None)
+_implementation: Callable = getattr(_OverloadFunctionTemplate, "_get_impl", _refuse)
 
 
 def _implementation_for_kernels(self: _OverloadFunctionTemplate, args: tuple, kws: dict):
@@ -293,7 +295,7 @@ def _for_linking(module: llvm.ModuleRef) -> llvm.ModuleRef:
 
 def _environments(library: JITCodeLibrary) -> dict:
     """Environments of the parts that a ``library`` was linked with, by name."""
-    found = {}
+    found: dict[str, Any] = {}
     for linked in library._linking_libraries:
         found |= _environments(linked)
         if isinstance(linked, _Part):
@@ -392,14 +394,15 @@ class WithCalled(UserProvidedCacheLocator):
 def compiled_in(function: Callable) -> tuple[set[str], dict[str, object]]:
     """Sources of the compiled code of ``function``: the files of its package that define the functions it calls,
     recursively, and the global numbers and arrays that these use (module.name → value, or an array's bytes)."""
-    package, files, constants, seen, rest = function.__module__.partition(".")[0], set(), {}, set(), [function]
+    package, files, seen, rest = function.__module__.partition(".")[0], set[str](), set[Callable](), [function]
+    constants: dict[str, object] = {}
     while rest:
         this = rest.pop()
         if this in seen:
             continue
         seen.add(this)
         for name in _names(this.__code__):
-            value = this.__globals__.get(name)
+            value: Any = this.__globals__.get(name)
             value = value.py_func if isinstance(value, Dispatcher) else value
             module = getattr(value, "__module__", None) or ""
             if isinstance(value, (bool, int, float, complex, str, tuple)):
@@ -407,7 +410,9 @@ def compiled_in(function: Callable) -> tuple[set[str], dict[str, object]]:
             elif isinstance(value, np.ndarray):
                 constants[f"{this.__module__}.{name}"] = value.tobytes()
             elif module.partition(".")[0] == package:
-                files.add(sys.modules[module].__file__)
+                source = sys.modules[module].__file__
+                if source is not None:
+                    files.add(source)
                 if hasattr(value, "__code__"):
                     rest.append(value)
     return files, constants

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -23,6 +24,7 @@ from .timing import Phases
 
 if TYPE_CHECKING:
     from ..ddm.growth.path_correction import Memory
+    from .splitting.block_splitting import Split
 
 
 class CrackedBlocks:
@@ -64,6 +66,7 @@ class CrackedBlocks:
         self.acted: dict[str, float] = {}
         self.removed: np.ndarray | None = None
         self._motion: tuple[State, Motion] | None = None
+        self.response: dda.CrackResponse
         self._take_blocks()
         #: Result of the search for in-situ equilibrium where that ended in a collapse.
         self.collapsed: dda.Equilibrium | None = None
@@ -127,16 +130,18 @@ class CrackedBlocks:
         n = self.blocks.n_blocks
         self.nodes_of = {}
         response = dda.CrackResponse(np.zeros((n, 3, 3)), np.zeros((n, 3)))
-        whole = np.zeros(0, int) if parent is None else np.flatnonzero(np.bincount(parent)[parent] == 1)
+        whole, before = np.zeros(0, int), np.zeros(0, int)
+        if parent is not None:
+            whole, before = np.flatnonzero(np.bincount(parent)[parent] == 1), parent
         if len(whole):
-            response.compliance[whole] = self.response.compliance[parent[whole]]
-            response.offset[whole] = self.response.offset[parent[whole]]
+            response.compliance[whole] = self.response.compliance[before[whole]]
+            response.offset[whole] = self.response.offset[before[whole]]
         self.response = response
         self.bodies, self.solutions, self.compliances, self.solved_from = (
-            {child: known[parent[child]] for child in whole.tolist() if parent[child] in known}
+            {child: known[before[child]] for child in whole.tolist() if before[child] in known}
             for known in (self.bodies, self.solutions, self.compliances, self.solved_from)
         )
-        self.by_mean_stress = self.by_mean_stress.inherited(parent, whole) if len(whole) else ByMeanStress()
+        self.by_mean_stress = self.by_mean_stress.inherited(before, whole) if len(whole) else ByMeanStress()
         self.growth_screening.renumber(parent, whole)
         self.quasi_newton, self.extrapolation = QuasiNewton(), LoadExtrapolation()
         self._take_bodies()
@@ -147,19 +152,20 @@ class CrackedBlocks:
         self.history = {b: s.memory for b, s in self.solutions.items() if s.memory is not None}
         self.by_mean_stress.take_step()
 
-    def take_split(self, split) -> None:
+    def take_split(self, split: Split) -> None:
         """Take blocks, state and cracks of the `Split`; gauges and monitors go to the part that contains their
         point."""
 
-        def child(block: int, point) -> int:
-            parts = np.flatnonzero(split.parent == block)
+        def child(block: int, point: Sequence[float]) -> int:
+            parts = np.flatnonzero(split.parent == block).tolist()
             if len(parts) == 1:
-                return int(parts[0])
+                return parts[0]
             inside = [winding_number(split.blocks.loops(p), np.asarray(point, dtype=float)) for p in parts]
-            return int(parts[int(np.argmax(np.abs(inside)))])
+            return parts[int(np.argmax(np.abs(inside)))]
 
         if self.gauge is not None:
-            self.gauge = tuple((child(b, p), p) for b, p in self.gauge)
+            (a, p), (b, q) = self.gauge
+            self.gauge = (child(a, p), p), (child(b, q), q)
         self.monitors = {name: (child(b, p), p) for name, (b, p) in self.monitors.items()}
         self.problem = replace(self.problem, loads=on_children(self.problem.loads, split.parent, child))
         if self.removed is not None:
@@ -175,15 +181,17 @@ class CrackedBlocks:
         removed = self.system.removed(self.problem.loads, self.state.time)
         if removed is self.removed:
             return []
-        new = removed if self.removed is None else removed & ~self.removed
-        self.removed = removed
+        before, self.removed = self.removed, removed
         self._take_bodies()
-        return np.flatnonzero(new).tolist()
+        if removed is None:  # loads that follow the cracks go back to before the excavation
+            return []
+        return np.flatnonzero(removed if before is None else removed & ~before).tolist()
 
     def _settle_in_situ(self) -> None:
         """Start from equilibrium under the in-situ stress, which becomes the reference configuration. Cracks are cut
         into the stressed rock: they open and slide from the first step on. Where blocks are unsupported the run starts
         collapsed; raises `dda.NoInSituEquilibrium` where equilibrium is not found for another reason."""
+        assert self.problem.in_situ is not None
         with self.timed("dda"):
             try:
                 found = dda.in_situ_state(self.system, self.problem.in_situ, self.problem.loads)
@@ -194,8 +202,9 @@ class CrackedBlocks:
                 return
         motion = Motion.of(self.blocks, found.state.vertices)
 
-        def moved(block: int, point) -> tuple[float, float]:
-            return tuple(motion.current(block, np.asarray(point, dtype=float)).tolist())
+        def moved(block: int, point: Sequence[float]) -> tuple[float, float]:
+            x, y = motion.current(block, np.asarray(point, dtype=float)).tolist()
+            return x, y
 
         # Crack ends on both sides of a joint may share a node; their blocks move it to two different places.
         ends = np.column_stack([self.cracks.segments.ravel(), np.repeat(self.cracks.block, 2)])
@@ -210,7 +219,8 @@ class CrackedBlocks:
         )
         self.problem = replace(self.problem, loads=on_moved(self.problem.loads, moved))
         if self.gauge is not None:
-            self.gauge = tuple((b, moved(b, p)) for b, p in self.gauge)
+            (a, p), (b, q) = self.gauge
+            self.gauge = (a, moved(a, p)), (b, moved(b, q))
         self.monitors = {name: (b, moved(b, p)) for name, (b, p) in self.monitors.items()}
         self.blocks, self.state = found.blocks, found.state
         self._take_blocks()

@@ -289,8 +289,7 @@ class StepCutting:
         ``attempt``, which left its contacts in ``state`` (n,); None where all met as expected."""
         system, search = self.system, self.search
         found, moved = attempt.found, attempt.new_vertices - attempt.vertices
-        if found.lumped is not None:
-            found = found.lumped
+        found = found.on_corners
         pressed = (found.corner >= 0) & (state != OPEN)
         off = np.abs(moved if search.motion is None else moved - search.motion).max(axis=1)
         strayed = np.zeros(system.blocks.n_blocks, bool)
@@ -312,8 +311,7 @@ class StepCutting:
     def _meets_otherwise(self, attempt: Attempt, found: ContactSet, again: ContactSet, state: np.ndarray) -> bool:
         """Whether corners meet differently in ``again``, contacts searched for with the motion of the ``attempt``, than in
         ``found``, which the attempt left in ``state`` (n,): pressed ones in another direction, or some that ``found`` lacks."""
-        if again.lumped is not None:
-            again = again.lumped
+        again = again.on_corners
         if self._redirected(found, again, state):
             return True
         finder, n = self.system.finder, len(attempt.vertices)

@@ -14,10 +14,11 @@ from .contact_detection.inherited_contacts import InheritedContacts, at_their_sp
 from .contact_detection.initial_overlap import refuse_overlap
 from .counters import Work
 from .excavation import Excavations, until_next_event
+from .higher_order.bending_step import BendingAttempt
 from .higher_order.deflected_blocks import DeflectedBlocks
 from .higher_order.glued_cells import GluedFaces, GlueStrength, KeptCorners
 from .higher_order.order_choice import OrderChoice, extended_deflection
-from .higher_order.six_row_system import six_row_pattern
+from .higher_order.six_row_system import SixRowPattern, six_row_pattern
 from .higher_order.unsupported import refuse_unsupported, refuse_unsupported_loads
 from .kinematics.newmark import TimeScheme
 from .kinematics.rigid_blocks import with_rigid
@@ -101,6 +102,10 @@ class BlockSystem:
         self.glued: GluedFaces | None = None
         #: Choice of orders during the run; None if all are given.
         self.order_choice: OrderChoice | None = None
+        #: Pairs of blocks (2, n) and the pattern of the last sparse equations; None before.
+        self._sparse: tuple[np.ndarray, assembly.Pattern] | None = None
+        #: Glued faces that have parted (n_faces,); None without cells.
+        self._parted: np.ndarray | None = None
         self._take_out(None, None)
         ordered = blocks.order is not None and (np.asarray(blocks.order) != 1)[~self.fixed].any()
         if ordered or blocks.glued is not None:
@@ -167,6 +172,7 @@ class BlockSystem:
             self.deflected.take_out(self.taken_out)
         self.finder.at_corners = self.deflected is not None
         if self.blocks.glued is not None:
+            assert self.deflected is not None  # cells are blocks of higher order
             self._all_glued, self._parted = GluedFaces.of(self.deflected), None
             self._part(np.zeros(len(self.blocks.glued), bool))
 
@@ -185,6 +191,7 @@ class BlockSystem:
         """Continue with cells whose glued faces have ``parted`` (n_faces,)."""
         if self._parted is not None and np.array_equal(parted, self._parted):
             return
+        assert self.deflected is not None
         self._parted = parted
         self._bond()
         self.finder.part(self.blocks, parted)
@@ -193,6 +200,7 @@ class BlockSystem:
 
     def _bond(self) -> None:
         """Continue with the glue of cells that have neither parted nor been taken out."""
+        assert self._parted is not None  # of a system with cells
         holds, every = ~self._parted, self._all_glued
         if self.taken_out is not None:
             holds = holds & ~self.taken_out[every.block] & ~self.taken_out[every.other]
@@ -230,7 +238,7 @@ class BlockSystem:
         self.free = np.where(self.fixed, -1, np.cumsum(~self.fixed) - 1).astype(np.int64)
         self.moving = np.flatnonzero(~self.fixed)
         self.turns = ~self.fixed if self.blocks.constrained is None else ~(self.fixed | self.blocks.constrained[:, 2])
-        self._sparse: tuple[np.ndarray, assembly.Pattern] | None = None
+        self._sparse = None
         self.finder.take_out(removed)
         self.load_map.take_out(removed, drained)
         if self.deflected is not None:
@@ -269,20 +277,21 @@ class BlockSystem:
         while True:
             attempt, result = self._step(state, loads, dt, crack, load_time, like, pseudo_inertia)
             order = None if choice is None else choice.raised(self.order, self.deflected, attempt)
-            if order is not None:
+            if choice is not None and order is not None:
                 if state.deflection is not None:
                     state = replace(state, deflection=extended_deflection(state.deflection, self.order, order))
                 self._take_orders(choice, order)
                 continue
-            parted = None
-            if strength is not None and len(self.glued.block):
-                parted = strength.parting(self._parted, self.bonded, attempt.glue.mean_traction(attempt.glue_change))
-            if parted is None:
+            parted, before = None, self._parted
+            mean = attempt.glue_traction() if isinstance(attempt, BendingAttempt) else None
+            if strength is not None and before is not None and mean is not None:
+                parted = strength.parting(before, self.bonded, mean)
+            if parted is None or before is None:
                 known = None if strength is None else self._parted
                 return replace(
                     result, state=replace(result.state, order=None if choice is None else self.order, parted=known)
                 )
-            log.info("t = %g s: %d faces of cells part", attempt.time, int(parted.sum() - self._parted.sum()))
+            log.info("t = %g s: %d faces of cells part", attempt.time, int(parted.sum() - before.sum()))
             self._part(parted)
 
     def _refuse_state_of_others(self, state: State) -> None:
@@ -382,20 +391,22 @@ class BlockSystem:
             block, other = np.concatenate([block, self.glued.block]), np.concatenate([other, self.glued.other])
         if self.deflected is not None:
             known = None if self._sparse is None else self._sparse[1]
-            pattern = six_row_pattern(self.free, self.deflected.rows, block, other, moments[:, 1:3], known)
-            if pattern.solver is not None:
-                pattern.solver.work = self.work
-            self._sparse = np.zeros((2, 0)), pattern
-            return pattern
+            assert known is None or isinstance(known, SixRowPattern)
+            rows = six_row_pattern(self.free, self.deflected.rows, block, other, moments[:, 1:3], known)
+            if rows.solver is not None:
+                rows.solver.work = self.work
+            self._sparse = np.zeros((2, 0)), rows
+            return rows
         if int(self.free.max()) + 1 <= assembly.DENSE_BLOCKS:
             return assembly.dense_pattern(self.free, block, other)
-        pairs, pattern = np.stack([block, other]), None
+        pairs, kept = np.stack([block, other]), None
         if self._sparse is not None:
-            known, pattern = self._sparse
-            if pattern.order is self.free and np.array_equal(known, pairs):
-                return pattern
-        kept = None if pattern is None else pattern.solver
+            before, last = self._sparse
+            if last.order is self.free and np.array_equal(before, pairs):
+                return last
+            kept = last.solver
         pattern = assembly.sparse_pattern(self.free, block, other, moments[:, 1:3], kept)
+        assert pattern.solver is not None
         pattern.solver.work = self.work
         self._sparse = pairs, pattern
         return pattern

@@ -14,6 +14,7 @@ import numpy as np
 from ..conventions import rotate_stress
 from ..model import OPEN, SLIP, STICK, Loads, State
 from .contact_detection.contact_records import copied, largest_of_blocks
+from .contact_detection.face_quadrature import FacePoints
 from .energy_balance import (
     ContactStep,
     StepEnergy,
@@ -57,6 +58,7 @@ from .results import CrackResponse, StepResult
 
 if TYPE_CHECKING:
     from .interfaces import SteppedSystem
+    from .joint_laws.nonlinear_laws import CurvedJoints
 
 #: A step in motion whose faces have not found the part on which they touch after this many times the iterations that
 #: contact states may take is cut, this many times at most: two half steps take a tenth of them (a thousand blocks that slide: 400 for 24 000).
@@ -284,9 +286,10 @@ class Attempt:
         """(n_blocks, 6) bool: which unknowns of blocks are constrained in this step; None without."""
         system, actions, constrained = self.system, self.actions, self.system.constrained
         alone = system.scheme.static and system.blocks.n_blocks == 1 and self.n_free and actions is None
-        weight = system.mass[0] * self.gravity if alone else None
-        if alone and balanced(self.load[0], self.points, self.edges, weight, self.moments[0]):
-            constrained = with_rigid_motion(constrained)
+        if alone:
+            weight = system.mass[0] * self.gravity
+            if balanced(self.load[0], self.points, self.edges, weight, self.moments[0]):
+                constrained = with_rigid_motion(constrained)
         return constrained if actions is None else actions.constrained(constrained)
 
     def _settle(self) -> None:
@@ -318,6 +321,7 @@ class Attempt:
                 settled = self._settled(self.pattern, self.matrix, self.right, found, gap, vectors, springs, curved)
                 unknowns = settled.unknowns
             else:
+                assert self.pattern is not None  # blocks are free
                 solve = partial(self._settled, vectors=vectors, springs=springs, curved=curved)
                 settled, unknowns = actions.settle(
                     self.pattern, self.matrix, self.right, vectors, geometry, found, gap, solve
@@ -373,10 +377,10 @@ class Attempt:
             return False
         vertices = self._advanced(increment)[0]
         straight = settled.gap + settled.lifted + found.lift - found.arc
-        if found.points is not None:
+        if isinstance(found.points, FacePoints):
             straight = found.points.gap_at_corners(straight)
-        gap = system.finder.gaps(vertices, self.vertices, found if found.lumped is None else found.lumped)
-        arc, before = gap - straight, found.arc if found.lumped is None else found.lumped.arc
+        gap = system.finder.gaps(vertices, self.vertices, found.on_corners)
+        arc, before = gap - straight, found.on_corners.arc
         some = (settled.state != OPEN) | (gap < 0.0)
         if not (np.abs(arc - before) > known)[some].any():
             return False
@@ -392,9 +396,7 @@ class Attempt:
     def _follow(self, increment: np.ndarray, vertices: np.ndarray) -> None:
         """Let the contacts follow the arcs of ``increment`` (n_blocks, 6), which leads to ``vertices``: by what these
         go beyond what the equations of this middle make of it."""
-        system, found, scaled = self.system, self.found, increment.copy()
-        if found.lumped is not None:
-            found = found.lumped
+        system, found, scaled = self.system, self.found.on_corners, increment.copy()
         if not len(found):
             return
         blocks, all_blocks = (found.block, found.other), np.arange(len(increment))
@@ -417,17 +419,18 @@ class Attempt:
             self._edges_along = found.edge, along
         return along
 
-    def _over_the_step(self, found: ContactSet):
+    def _over_the_step(self, found: ContactSet) -> tuple[Springs, np.ndarray, float | np.ndarray, CurvedJoints | None]:
         """What acts over the step of the contacts ``found``: springs, starting gaps (n,), how the step's end weighs,
         curved laws."""
         system = self.system
         curved = system.finder.curved(found)
         # Multipliers are forces at the end of the step.
-        weight = 1.0 if system.allowed_penetration else system.scheme.weight
-        if weight != 1.0 and curved is not None:
+        weight: float | np.ndarray = 1.0 if system.allowed_penetration else system.scheme.weight
+        if curved is not None and weight != 1.0:
             # The lines of a law that is curved are those of the end of the step.
-            weight = np.full(len(found), weight)
-            weight[curved.rows] = 1.0
+            each = np.full(len(found), weight)
+            each[curved.rows] = 1.0
+            weight = each
         mass = np.where(system.fixed, np.inf, system.mass)
         springs, gap = over_a_step(
             found.springs, np.ascontiguousarray(found.gap_before), (found.state != OPEN) & (found.bonded > 0),
@@ -572,6 +575,7 @@ class Attempt:
         unresolved = Unresolved.of(found, self.settled, self.slid, speeds, mass, self.dt)
         if stopped is None and unresolved is None:
             return
+        assert self.pattern is not None  # blocks that touch are free, or nothing is stopped
         try:
             change, rubbed = stop(
                 stopped, unresolved, self.pattern, self.matrix, self.vectors, found, self.settled, self.dt
@@ -591,6 +595,7 @@ class Attempt:
     def _rebound(self, imposed) -> None:
         """Apply the impacts of blocks that strike each other in the step (`impacts`)."""
         found, striking = self.found, self.striking
+        assert striking is not None
         gap = self._gaps_now()
         struck = striking.closed(gap)
         if not struck.any():
@@ -609,7 +614,7 @@ class Attempt:
 
     def _gaps_now(self) -> np.ndarray:
         """(n,) m of the contacts at the end of the step, from where faces meet."""
-        found = self.found if self.found.lumped is None else self.found.lumped
+        found = self.found.on_corners
         return self.system.finder.gaps(self.new_vertices, self.vertices, found) - found.lift
 
     def _strike(self, impact: Impact, rebound: Rebound) -> None:
@@ -644,10 +649,11 @@ class Attempt:
         actions, gravity, midpoint = self.actions, self.gravity, self.midpoint
         acting = self.acting
         if found.points is not None:
-            corners = found.lumped
+            corners = found.on_corners
             acting = midpoint.contacts(found.points.corners, corners.block, corners.other, self.along_edges(corners))
         rows = found.rows(settled, acting)
-        reaction, acting_right, largest_force, acted = None, self.right, 0.0, {}
+        reaction, acting_right, largest_force = None, self.right, 0.0
+        acted: dict[str, float] = {}
         points, load = self.points, self.load
         if actions is not None:
             points, reaction, acted = actions.acted(settled, self.unknowns, rows, points, self.new_vertices)

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ...model import CONTACT, OPEN, SLIP, STICK
+from .face_quadrature import FacePoints
 
 if TYPE_CHECKING:
     from ..open_close.contact_set import ContactSet
@@ -85,7 +86,7 @@ def at_their_springs(
     order = np.argsort(keys)
     here = order[np.minimum(np.searchsorted(keys[order], theirs), len(keys) - 1)]
     points = placed.points
-    assert points is not None
+    assert isinstance(points, FacePoints)  # contacts of blocks of higher order are found at corners
     inherited = np.zeros(len(rows), bool)
     inherited[which] = True
     # Where only one end is prescribed, the other keeps its gap.

@@ -12,11 +12,12 @@ where c is the damping of the block's mean strain. Contacts along faces are inte
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
-from ...model import OPEN
+from ...model import OPEN, State
+from ..interfaces import SteppedSystem
 from ..kinematics.midpoint_configuration import MidpointConfiguration
 from ..open_close.contact_set import ContactSet
 from ..open_close.equations import Unsettled
@@ -27,16 +28,25 @@ from .deflected_blocks import DeflectedBlocks
 from .deflection_basis import n_deflections
 from .equations import HigherOrderEquations
 from .face_points import FaceContacts
-from .glued_cells import Glue
-from .six_row_system import fill_own, moved
+from .glued_cells import Glue, GluedFaces
+from .six_row_system import SixRowPattern, fill_own, moved
+
+
+class BendingSystem(SteppedSystem, Protocol):
+    """A system with ``deflected`` blocks; ``glued`` are the faces of its cells, None without."""
+
+    deflected: DeflectedBlocks
+    glued: GluedFaces | None
 
 
 class BendingAttempt(Attempt):
     """As `Attempt`, for a system with ``deflected`` blocks; ``found`` are the contacts at corners."""
 
     equations = HigherOrderEquations
+    system: BendingSystem
+    found: FaceContacts
 
-    def __init__(self, system, start: StepStart, dt: float, found: ContactSet, cuts: int) -> None:
+    def __init__(self, system: BendingSystem, start: StepStart, dt: float, found: ContactSet, cuts: int) -> None:
         state = start.state
         self.blocks: DeflectedBlocks = system.deflected
         known = self.blocks.at_rest() if state.deflection is None else state.deflection
@@ -53,7 +63,7 @@ class BendingAttempt(Attempt):
             self.strained, self.rates = np.where(gone, 0.0, self.strained), np.where(gone, 0.0, self.rates)
         super().__init__(system, start, dt, self._on_faces(system, state, start.vertices, found), cuts)
 
-    def _on_faces(self, system, state, vertices: np.ndarray, corners: ContactSet) -> FaceContacts:
+    def _on_faces(self, system: BendingSystem, state: State, vertices: np.ndarray, corners: ContactSet) -> FaceContacts:
         """Contacts at ``corners`` and at points along faces, with the contribution of deflection to their gaps."""
         finder = system.finder
         by_length = finder.stiff_laws[corners.law], finder.stiff_along_laws[corners.law]
@@ -133,7 +143,7 @@ class BendingAttempt(Attempt):
             # Everything outside this step knows contacts by their corners.
             if failure.contact < 0:
                 raise
-            raise Unsettled(str(failure), found.points.corner_of(failure.contact)) from failure
+            raise Unsettled(str(failure), found.on_faces.corner_of(failure.contact)) from failure
 
     def _further_equations(self, pattern, matrix, right, contacts, vectors) -> dict[str, Any]:
         blocks, moving, own = self.blocks, self.system.moving, self.own
@@ -214,6 +224,18 @@ class BendingAttempt(Attempt):
             extra.append(gap_change - self._gaps(turned(acting), found, start + self.turn, change))
         self.found = replace(found, arc=found.arc + extra[0], swing=found.swing + extra[1])
 
+    def glue_traction(self) -> np.ndarray | None:
+        """(n, 2) Pa: mean traction of the glued faces at the end of the step; None without any."""
+        if self.glue is None or not len(self.glue.faces.block):
+            return None
+        return self.glue.mean_traction(self.glue_change)
+
+    @property
+    def _six_rows(self) -> SixRowPattern:
+        """The pattern of the equations, of a step with free blocks."""
+        assert isinstance(self.pattern, SixRowPattern)
+        return self.pattern
+
     def _deflected_by(self) -> np.ndarray:
         """(k,) m: increment of deflection in the last solution of the step."""
         change = np.zeros(self.blocks.n_unknowns)
@@ -230,11 +252,11 @@ class BendingAttempt(Attempt):
         blocks.acceleration = np.sqrt((mean * mean).sum(axis=1))
         self.largest = max(self.largest, float(blocks.largest(change)[0].max()))
         if self.glue is not None:
-            self.glue_change = self.glue.change(self.unknowns.ravel(), self.pattern)
+            self.glue_change = self.glue.change(self.unknowns.ravel(), self._six_rows)
         if self.n_free:
             found = self.found
             rows = self._rows(found, self.vectors)
-            pattern = self.pattern
+            pattern = self._six_rows
             self.slid = moved(
                 self.unknowns.ravel(), (found.block, found.other, pattern.order), (pattern.more, pattern.rows), rows
             )[:, 1]

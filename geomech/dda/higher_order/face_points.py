@@ -18,11 +18,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
 from ...model import CONTACT, FACE_POINT, OPEN, SLIP, STICK
 from ..contact_detection.contact_records import ContactShape, Pairing, SlipBefore, StepEnd, fill
+from ..contact_detection.face_quadrature import FacePoints
 from ..joint_laws.bonds import WITHOUT_GAPS, on_lines
 from ..joint_laws.penalty_springs import Springs
 from ..open_close.contact_set import ContactSet
@@ -246,7 +248,7 @@ class FaceContacts(ContactSet):
         ``by_length`` as in `Faces.springs`.
         """
         faces = Faces.of(corners, order)
-        own = {}
+        own: dict[str, Any] = {}
         for field in fields(ContactSet):
             value = getattr(corners, field.name)
             if isinstance(value, np.ndarray) and field.name not in ("geometry", "cohesive"):
@@ -262,10 +264,16 @@ class FaceContacts(ContactSet):
         out = cls(**own)
         return out._states_of_ends()._with_history(memory)
 
+    @property
+    def on_faces(self) -> Faces:
+        """The faces and their points."""
+        assert isinstance(self.points, Faces)
+        return self.points
+
     def _states_of_ends(self) -> FaceContacts:
         """Initial state of points without history: closed or bonded where both ends of their face are, with the linear
         stress of the ends' forces."""
-        faces, corners, inside = self.points, self.lumped, self.points.inside
+        faces, corners, inside = self.on_faces, self.on_corners, self.on_faces.inside
         state, bonded = self.state.copy(), self.bonded.copy()
         first, second = faces._both(corners.state)
         both = (first != OPEN) & (second != OPEN)
@@ -291,7 +299,7 @@ class FaceContacts(ContactSet):
         for name, column in _MEMORY.items():
             own[name][known] = rows[column]
         # Points of another part of the face carry the stress that was there.
-        inside = self.points.face[known] >= 0
+        inside = self.on_faces.face[known] >= 0
         ratio = np.where(inside & (rows["length"] > 0), length[known] / np.maximum(rows["length"], 1e-300), 1.0)
         for name in ("normal", "shear"):
             own[name][known] *= ratio
@@ -310,12 +318,12 @@ class FaceContacts(ContactSet):
     def gap_before(self) -> np.ndarray:
         return self.geometry[:, 3] + self.deflected - self.lift
 
-    def placed(self, points) -> FaceContacts:
+    def placed(self, points: FacePoints | None) -> FaceContacts:
         raise TypeError("points of faces do not move along their face")
 
     def along(self, arc: np.ndarray, swing: np.ndarray) -> FaceContacts:
-        faces = self.points
-        corners = replace(self.lumped, arc=arc, swing=swing)
+        faces = self.on_faces
+        corners = replace(self.on_corners, arc=arc, swing=swing)
         return replace(self, lumped=corners, arc=faces.between(arc), swing=faces.between(swing))
 
     def misplaced(self, settled: Settled) -> None:
@@ -331,14 +339,14 @@ class FaceContacts(ContactSet):
         return self
 
     def of_rows(self, value: np.ndarray) -> np.ndarray:
-        return self.points.least(value)
+        return self.on_faces.least(value)
 
     def shear_of_rows(self, shear: np.ndarray) -> np.ndarray:
-        return self.points.at_corners(shear)
+        return self.on_faces.at_corners(shear)
 
     def rows(self, settled: Settled, acting: np.ndarray | None = None) -> np.ndarray:
         """CONTACT rows at the corners, with the resultant and moment of the points of their faces."""
-        faces, corners = self.points, self.lumped
+        faces, corners = self.on_faces, self.on_corners
         closed = settled.state != OPEN
         state = np.where(closed, np.where(settled.state == SLIP, 1.0, 0.0), 2.0)
         kind = np.array([STICK, SLIP, OPEN])[faces.least(state).astype(int)]
@@ -365,10 +373,10 @@ class FaceContacts(ContactSet):
         ``shear`` (n,) N is the shear force and ``points`` (n, 2) m the position of the contacts at that time.
         """
         rows = np.zeros(len(self), FACE_POINT)
-        faces = self.points
+        faces = self.on_faces
         rows["block"], rows["other"] = self.block, self.other
         rows["vertex"], rows["edge"] = self.vertex, self.edge
-        rows["far_vertex"], rows["far_edge"] = faces.far_ends(self.lumped).T
+        rows["far_vertex"], rows["far_edge"] = faces.far_ends(self.on_corners).T
         rows["place"], rows["length"], rows["point"] = faces.place, self.geometry[:, 4], points
         rows["state"], rows["bonded"] = settled.state, settled.bonded
         rows["normal_force"], rows["shear_force"], rows["gap"] = settled.normal_force, shear, settled.gap
@@ -385,7 +393,9 @@ def _whole_sides(
     ``start`` (m + 1,) is the first contact of each face, ``along`` (k,) m the coordinate. Returns rows of the sides'
     ends (m, 2), lengths (m,), and rows, faces and coordinates (0 to 1) of corners between the ends (n, 3).
     """
-    ends, length, inner = [], [], []
+    ends: list[tuple[int, int]] = []
+    length: list[float] = []
+    inner: list[tuple[int, int, float]] = []
     for first, last in zip(start[:-1].tolist(), start[1:].tolist(), strict=True):
         if last - first < 2:
             continue
@@ -409,8 +419,8 @@ def _whole_sides(
 def _matching(found: FaceContacts, memory: np.ndarray) -> np.ndarray:
     """(n,) row of ``memory`` for each contact of ``found``, −1 for none: the same point, a corner that was the end of a
     face, or the nearest point between the same two sides."""
-    faces, n = found.points, len(found)
-    far = faces.far_ends(found.lumped)
+    faces, n = found.on_faces, len(found)
+    far = faces.far_ends(found.on_corners)
     # Coordinates along a face, in millionths, identify points.
     mine = np.column_stack([found.vertex, found.edge, far, np.round(faces.place * _NAMED)]).astype(np.int64)
     names = [memory[name] for name in ("vertex", "edge", "far_vertex", "far_edge")]
@@ -435,7 +445,7 @@ def _nearest(
     ``mine`` (n, 5) and ``theirs`` identify contacts: corners by their vertex and edge, other points by their position.
     """
     alone, place = theirs[:, 2] < 0, theirs[:, 4]
-    corner = {}
+    corner: dict[tuple[int, ...], int] = {}
     for rows, ends in ((alone | (place == 0), theirs[:, :2]), (~alone & (place == _NAMED), theirs[:, 2:4])):
         corner |= dict(zip(map(tuple, ends[rows].tolist()), np.flatnonzero(rows).tolist(), strict=True))
     low, high = np.minimum(memory["block"], memory["other"]), np.maximum(memory["block"], memory["other"])

@@ -240,7 +240,7 @@ class _FaceForces:
             normal, shear = settled.normal_force, settled.shear_force
             if found.points is not None:
                 normal, shear = found.points.at_corners(normal), found.points.at_corners(shear)
-                found = found.lumped
+                found = found.on_corners
             corners = replace(found, normal=normal, shear=shear, state=settled.state, points=None, lumped=None)
             by_length = laws.stiff_laws[found.law], laws.stiff_along_laws[found.law]
             found = FaceContacts.along_faces(corners, trial.order, None, by_length)

@@ -102,20 +102,20 @@ class PrescribedMotion:
         self._rows = np.zeros(len(loads.point_motions), POINT_FORCE)
         removed = np.zeros(n, bool) if removed is None else removed
         base = [loads.base] if loads.base is not None and loads.base.frame == "ground" else []
-        given = [*base, *loads.block_motions, *loads.point_motions]
+        given: list[BaseMotion | BlockMotion | PointMotion] = [*base, *loads.block_motions, *loads.point_motions]
         totals = [motion.total(end) for motion in given]
         self.totals = np.concatenate(totals)
         if len(before) != len(self.totals):
             before = np.concatenate([motion.total(start) for motion in given])
         by = np.split(self.totals - before, np.cumsum([len(total) for total in totals])[:-1])
-        for motion, change in zip(base, by):
-            self._base(motion, removed, change, end)
+        for shaking, change in zip(base, by):
+            self._base(shaking, removed, change, end)
         for motion, change in zip(loads.block_motions, by[len(base) :]):
             if not removed[motion.block]:
                 self._block(motion, change, start, end)
-        for k, (motion, change) in enumerate(zip(loads.point_motions, by[len(base) + len(loads.block_motions) :])):
-            if not removed[motion.block]:
-                self._point(k, motion, change, point_at(motion.block, motion.at), start, end)
+        for k, (point, change) in enumerate(zip(loads.point_motions, by[len(base) + len(loads.block_motions) :])):
+            if not removed[point.block]:
+                self._point(k, point, change, point_at(point.block, point.at), start, end)
         self.moving_base = bool(self.increment.any())
 
     def _base(self, base: BaseMotion, removed: np.ndarray, by: np.ndarray, end: float) -> None:

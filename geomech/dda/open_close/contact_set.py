@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
+from typing import Protocol, Self
 
 import numpy as np
 
@@ -14,6 +15,17 @@ from ..joint_laws.bonds import BondedFaces
 from ..joint_laws.penalty_springs import Springs
 from ..joint_laws.whole_faces import WholeFaces
 from .settled_states import Settled
+
+
+class SpringPoints(Protocol):
+    """Points of faces at which springs act; ``corners`` (n_corners, 7) is the geometry of the contacts at corners."""
+
+    @property
+    def corners(self) -> np.ndarray: ...
+
+    def at_corners(self, force: np.ndarray) -> np.ndarray: ...
+
+    def share_shear(self, vectors: np.ndarray, block: np.ndarray) -> None: ...
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,7 +90,7 @@ class ContactSet:
     relies_on_glue: bool = False
     faces: BondedFaces | None = None
     by_length: np.ndarray | None = None
-    points: FacePoints | None = None
+    points: SpringPoints | None = None
     lumped: ContactSet | None = None
     cohesive: np.ndarray | None = None
     whole: WholeFaces | None = None
@@ -124,7 +136,7 @@ class ContactSet:
             return self
         return replace(self, tried=(state, direction, self.bonded))
 
-    def trying_again(self, settled: Settled) -> ContactSet:
+    def trying_again(self, settled: Settled) -> Self:
         """The same contacts, with open–close iterations starting from the states ``settled`` with springs at other
         positions. (The direction of sliding is that of each spring; forces at the corners of a face may have
         another.)"""
@@ -136,16 +148,17 @@ class ContactSet:
 
     def like(self, rows: np.ndarray) -> ContactSet:
         """The same contacts `trying` the states of ``rows``, with the springs of faces on the parts closed in these."""
-        again = self.trying(rows)
-        if again is self or self.points is None:
+        again, points = self.trying(rows), self.points
+        if again is self or not isinstance(points, FacePoints):
             return again
-        return replace(self.lumped.placed(self.points.pressed_by(rows["normal_force"])), tried=again.tried)
+        return replace(self.on_corners.placed(points.pressed_by(rows["normal_force"])), tried=again.tried)
 
     def placed(self, points: FacePoints | None) -> ContactSet:
         """These contacts, found at the corners, with the springs of faces at ``points``. Where a face opens, its shear
         stress is released; where it closes, there is none yet."""
         if points is None:
             return self
+        assert self.by_length is not None  # `ContactFinder.find` sets it before faces have points
         was, springs = points.before(self.bare, self.by_length), points.springs(self.springs, self.by_length)
         if self.whole is not None:
             springs = replace(springs, cohesion=self.springs.cohesion)
@@ -169,10 +182,10 @@ class ContactSet:
     def misplaced(self, settled: Settled) -> ContactSet | None:
         """The contacts with the springs of faces on the parts that are closed in the result ``settled``; None if they
         are there already."""
-        if self.points is None:
+        if not isinstance(self.points, FacePoints):
             return None
         better = self.points.better(settled.gap, settled.state, (settled.bonded == 1) & (self.springs.tension > 0))
-        return None if better is None else self.lumped.placed(better)
+        return None if better is None else self.on_corners.placed(better)
 
     def sharing_cohesion(self, state: np.ndarray, bonded: np.ndarray) -> ContactSet:
         """The contacts, with the cohesion of whole faces assigned to those closed in ``state`` with ``bonded`` (n,);
@@ -182,27 +195,39 @@ class ContactSet:
         cohesive = self.whole.cohesive(state, bonded)
         if self.cohesive is not None and np.array_equal(cohesive, self.cohesive):
             return self
-        found = self if self.lumped is None else self.lumped
+        found = self.on_corners
         springs = replace(found.springs, cohesion=self.whole.cohesion * cohesive)
-        return replace(found, cohesive=cohesive, springs=springs).placed(self.points)
+        return replace(found, cohesive=cohesive, springs=springs).placed(self._on_parts())
 
     def along(self, arc: np.ndarray, swing: np.ndarray) -> ContactSet:
         """The contacts with the contributions ``arc`` to gaps and ``swing`` to motion along the edges, (n,) m at their
         corners."""
         if self.points is None:
             return replace(self, arc=arc, swing=swing)
-        return replace(self.lumped, arc=arc, swing=swing).placed(self.points)
+        return replace(self.on_corners, arc=arc, swing=swing).placed(self._on_parts())
+
+    @property
+    def on_corners(self) -> ContactSet:
+        """The contacts as they were found, with all springs at corners."""
+        return self if self.lumped is None else self.lumped
+
+    def _on_parts(self) -> FacePoints | None:
+        """The springs on parts of faces in contact; None without."""
+        assert self.points is None or isinstance(self.points, FacePoints)
+        return self.points
 
     @property
     def arcs(self) -> tuple[np.ndarray, np.ndarray]:
         """(n,) m each: the arc and the swing of the contacts at their corners."""
-        found = self if self.lumped is None else self.lumped
+        found = self.on_corners
         return found.arc + np.zeros(len(found)), found.swing + np.zeros(len(found))
 
     def cornered(self, better: ContactSet) -> ContactSet:
         """The contacts, with springs at the corners of those faces whose springs `misplaced` has moved in
         ``better``."""
-        return self.lumped.placed(self.points.but(better.points))
+        here, there = self._on_parts(), better._on_parts()
+        assert here is not None and there is not None  # `misplaced`
+        return self.on_corners.placed(here.but(there))
 
     @cached_property
     def gap_before(self) -> np.ndarray:
@@ -232,16 +257,16 @@ class ContactSet:
     def rows(self, settled: Settled, acting: np.ndarray | None = None) -> np.ndarray:
         """CONTACT rows of the finished step, in the geometry in which the forces acted: ``acting`` (n, 7) at the
         corners, None for that at the start of the step."""
-        geometry, lift, points = self.geometry, self.lift, self.points
+        geometry, lift, points = self.geometry, self.lift, self._on_parts()
         gap, normal, shear = settled.gap, settled.normal_force, settled.shear_force
         if points is not None:
-            geometry, lift = points.corners, self.lumped.lift
+            geometry, lift = points.corners, self.on_corners.lift
             normal, shear = points.at_corners(normal), points.at_corners(shear)
             gap = points.gap_at_corners(gap)
         rows = np.empty(len(self), CONTACT)
         pairing = Pairing(self.vertex, self.edge, self.block, self.other, self.law, self.inset)
         end = StepEnd(settled.state, settled.bonded, gap, normal, shear, settled.slip, settled.lifted)
-        stiffness = (self if self.lumped is None else self.lumped).springs.normal
+        stiffness = self.on_corners.springs.normal
         shape = ContactShape(
             geometry if acting is None else acting, np.ascontiguousarray(geometry[:, 4]), self.tilt, stiffness
         )  # fmt: skip

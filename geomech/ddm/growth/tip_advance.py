@@ -73,6 +73,8 @@ class Growth:
 
 #: A possible end of a step: obstacle, node on it (None: between its nodes), point.
 _Way = tuple[Obstacle, int | None, Point]
+#: The same, after its score, m.
+_Scored = tuple[float, Obstacle, int | None, Point]
 
 
 @dataclass(frozen=True)
@@ -154,9 +156,8 @@ class _Work:
 
     def __init__(self, network: Network, settings: GrowthSettings):
         self.network = network
-        self.reach = settings.join_length
-        if self.reach is None:
-            self.reach = settings.join_distance * settings.increment
+        by_increment = settings.join_distance * settings.increment
+        self.reach = by_increment if settings.join_length is None else settings.join_length
         self.sliver = SLIVER * settings.min_increment
         self.clearance = CLEARANCE * self.sliver
         self.joins: list[Join] = []
@@ -194,7 +195,8 @@ def _meet_half_way(work: _Work, steps: list[_Step], grown: np.ndarray) -> set[in
             at = (a.start[0] + t * a.length * a.direction[0], a.start[1] + t * a.length * a.direction[1])
         else:
             share = a.length / (a.length + b.length)
-            at = tuple(p + share * (q - p) for p, q in zip(a.start, b.start))
+            (x0, y0), (x1, y1) = a.start, b.start
+            at = (x0 + share * (x1 - x0), y0 + share * (y1 - y0))
         if work.nearer(min(math.dist(a.start, at), math.dist(b.start, at)), work.sliver):
             continue
         if not (_clear(work, a, at, set(), None) and _clear(work, b, at, set(), None)):
@@ -283,7 +285,7 @@ def _blocked(work: _Work, step: _Step) -> list[_Way] | None:
     t, obstacle = met[in_order([t for t, _ in met], work.clearance / step.length)[0]]
     hit = (step.start[0] + t * (step.end[0] - step.start[0]), step.start[1] + t * (step.end[1] - step.start[1]))
     _, at = nearest_on(hit, obstacle.a, obstacle.b)
-    ways = []
+    scored: list[_Scored] = []
     for node, point in network.nodes_on(obstacle, step.block):
         snap = SNAP_TO_TIP if network.is_tip(node) else SNAP_TO_NODE
         distance = math.dist(point, at)
@@ -291,8 +293,8 @@ def _blocked(work: _Work, step: _Step) -> list[_Way] | None:
         ahead = _dot(_towards(step.start, point), step.direction) >= AHEAD or distance <= work.sliver
         near = work.nearer(distance, max(work.sliver, snap * work.reach))
         if ahead and near and not network.connected(step.node, node):
-            ways.append((distance, obstacle, node, point))
-    ways = _best_first(work, ways)
+            scored.append((distance, obstacle, node, point))
+    ways = _best_first(work, scored)
     if obstacle.row is None:
         corners = [corner for corner in (obstacle.a, obstacle.b) if work.nearer(math.dist(corner, at), work.sliver)]
         ways += [(obstacle, None, corner) for corner in corners]
@@ -301,7 +303,8 @@ def _blocked(work: _Work, step: _Step) -> list[_Way] | None:
 
 def _attracted(work: _Work, step: _Step) -> list[_Way]:
     """Possible joins of a step whose free end comes close to something, best first."""
-    network, ways, seen = work.network, [], set()
+    network, seen = work.network, set[int]()
+    ways: list[_Scored] = []
     own = network.crack_at(step.node)
     # The crack's own neighbourhood is always close, and never joined.
     tail = network.within(step.node, 2 * (step.length + work.reach) + work.clearance)
@@ -313,12 +316,12 @@ def _attracted(work: _Work, step: _Step) -> list[_Way]:
         if not work.nearer(distance, min(work.reach, nearest_on(step.start, obstacle.a, obstacle.b)[0])):
             continue
         is_own = obstacle.row is not None and obstacle.row.crack == own
-        candidates = [(distance, None, at)]
-        for node, point in network.nodes_on(obstacle, step.block):
+        candidates: list[tuple[float, int | None, Point]] = [(distance, None, at)]
+        for there, point in network.nodes_on(obstacle, step.block):
             away = math.dist(step.end, point)
-            if node not in seen and work.nearer(away, work.reach):
-                seen.add(node)
-                candidates.append((away * (PREFER_TIP if network.is_tip(node) else PREFER_NODE), node, point))
+            if there not in seen and work.nearer(away, work.reach):
+                seen.add(there)
+                candidates.append((away * (PREFER_TIP if network.is_tip(there) else PREFER_NODE), there, point))
         for score, node, point in candidates:
             origin = step.end if is_own else step.start
             if _dot(_towards(origin, point), step.direction) < AHEAD:
@@ -332,7 +335,7 @@ def _attracted(work: _Work, step: _Step) -> list[_Way]:
     return _best_first(work, ways)
 
 
-def _best_first(work: _Work, ways: list[tuple[float, Obstacle, int | None, Point]]) -> list[_Way]:
+def _best_first(work: _Work, ways: list[_Scored]) -> list[_Way]:
     """``ways`` in order of their scores, m."""
     return [ways[k][1:] for k in in_order([way[0] for way in ways], work.clearance)]
 

@@ -82,11 +82,11 @@ class Tree:
             else:
                 child.append((-1, -1))
             k += 1
-        first, last, child, level = np.array(first), np.array(last), np.array(child), np.array(level)
-        leaves = np.flatnonzero(child[:, 0] < 0)
+        firsts, children, levels = np.array(first), np.array(child), np.array(level)
+        leaves = np.flatnonzero(children[:, 0] < 0)
         return cls(
-            order, first, last, child, [np.flatnonzero(level == i) for i in range(level.max() + 1)],
-            np.array(centre), np.array(radius), leaves[np.argsort(first[leaves])],
+            order, firsts, np.array(last), children, [np.flatnonzero(levels == i) for i in range(levels.max() + 1)],
+            np.array(centre), np.array(radius), leaves[np.argsort(firsts[leaves])],
         )  # fmt: skip
 
     def elements(self, cluster: int) -> np.ndarray:
@@ -112,8 +112,12 @@ def pairs_of(targets: Tree, sources: Tree) -> tuple[np.ndarray, np.ndarray]:
             np.concatenate([targets.child[t[split_t]].ravel(), np.repeat(t[split_s], 2)]),
             np.concatenate([np.repeat(s[split_t], 2), sources.child[s[split_s]].ravel()]),
         )
-    far, near = np.concatenate(far), np.concatenate(near)
-    return far[np.argsort(far[:, 0], kind="stable")], near[np.argsort(near[:, 0], kind="stable")]
+    return _by_target(np.concatenate(far)), _by_target(np.concatenate(near))
+
+
+def _by_target(pairs: np.ndarray) -> np.ndarray:
+    """``pairs`` (k, 2) in the order of their targets."""
+    return pairs[np.argsort(pairs[:, 0], kind="stable")]
 
 
 @lru_cache
@@ -179,9 +183,9 @@ class Compressed:
 
     def _near_blocks(self, nu: float, tol: float) -> None:
         """``blocks``: rows, columns (unknowns) and the dense matrix of every target leaf against all near leaves."""
-        self.blocks = []
-        starts = np.flatnonzero(np.r_[True, np.diff(self.near[:, 0]) > 0]) if len(self.near) else []
-        for group in np.split(self.near, starts[1:]) if len(self.near) else []:
+        self.blocks: list[tuple[np.ndarray, np.ndarray, np.ndarray]] = []
+        starts = np.flatnonzero(np.diff(self.near[:, 0])) + 1
+        for group in np.split(self.near, starts) if len(self.near) else []:
             rows = np.sort(self.target_tree.elements(group[0, 0]))
             columns = np.sort(np.concatenate([self.source_tree.elements(s) for s in group[:, 1]]))
             matrix = self._near(rows, columns, nu, tol)
@@ -236,7 +240,8 @@ class Compressed:
 
     def _upward(self) -> list[tuple[np.ndarray, ...]]:
         """Level by level from the leaves: parents, children, and the matrices that shift the children's series."""
-        tree, n, out = self.source_tree, self.terms, []
+        tree, n = self.source_tree, self.terms
+        out: list[tuple[np.ndarray, ...]] = []
         for level in tree.levels[-2::-1]:
             parent = level[tree.child[level, 0] >= 0]
             for k in (0, 1):
@@ -247,7 +252,8 @@ class Compressed:
         return out
 
     def _downward(self) -> list[tuple[np.ndarray, ...]]:
-        tree, n, out = self.target_tree, self.terms, []
+        tree, n = self.target_tree, self.terms
+        out: list[tuple[np.ndarray, ...]] = []
         m, k = np.arange(n)[:, None], np.arange(n)[None, :]
         choose = _binomials(n)[k, m]
         for level in tree.levels[:-1]:
