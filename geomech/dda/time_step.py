@@ -219,9 +219,13 @@ class Attempt:
         )
         self.points, self.edges = system.load_map.rows(loads, acting, midpoint.vertices, state.rotation + self.turn)
         self.load = midpoint.loads_back(generalised(self.points, self.edges, midpoint.centroid))
-        end = self.time if load_time is None else load_time
+        self.actions = self._actions(loads, self.time if load_time is None else load_time)
+
+    def _actions(self, loads: Loads, end: float) -> StepActions | None:
+        """Imposed motion and bolts of ``loads`` until ``end``, s; None where there are none."""
+        system = self.system
         moved = MovedBlocks(system.blocks, system.fixed, system.taken_out)
-        self.actions = StepActions.of(moved, loads, state, system.load_map, midpoint, system.free, end)
+        return StepActions.of(moved, loads, self.state, system.load_map, self.midpoint, system.free, end)
 
     def _assemble(self) -> None:
         """The equations of blocks without their contacts."""

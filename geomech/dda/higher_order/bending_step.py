@@ -16,9 +16,11 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from ...model import OPEN, State
+from ...model import OPEN, Loads, State
 from ..interfaces import SteppedSystem
 from ..kinematics.midpoint_configuration import MidpointConfiguration
+from ..loads.bending_actions import BendingActions, DeflectedPoints
+from ..loads.prescribed_motion import MovedBlocks
 from ..open_close.contact_set import ContactSet
 from ..open_close.equations import Unsettled
 from ..out_of_balance import imbalance
@@ -45,6 +47,7 @@ class BendingAttempt(Attempt):
     equations = HigherOrderEquations
     system: BendingSystem
     found: FaceContacts
+    actions: BendingActions | None
 
     def __init__(self, system: BendingSystem, start: StepStart, dt: float, found: ContactSet, cuts: int) -> None:
         state = start.state
@@ -80,6 +83,15 @@ class BendingAttempt(Attempt):
             matrix = self.blocks.directions(points, owner, angle)
             out += sign * np.einsum("na,naj,nj->n", normal, matrix, padded[owner], optimize=True)
         return out
+
+    def _actions(self, loads: Loads, end: float) -> BendingActions | None:
+        system, state = self.system, self.state
+        self.places = DeflectedPoints(system.load_map, self.blocks, state.rotation, self.deflection)
+        moved = MovedBlocks(system.blocks, system.fixed, system.taken_out)
+        actions = BendingActions.of(moved, loads, state, self.places, self.midpoint, system.free, end)
+        if actions is not None:
+            actions.bend(self.blocks, state.rotation + self.turn)
+        return actions
 
     def _assemble(self) -> None:
         super()._assemble()
@@ -152,8 +164,8 @@ class BendingAttempt(Attempt):
         full[self.order[moving], 3:6] += self.coupled_right[moving]
         there = blocks.present
         full.ravel()[self._deflection_at(pattern)] = self.own_right[blocks.owner[there], blocks.which[there]]
-        if self._constrained() is not None:
-            # Constraints have changed the first six rows and columns.
+        if self.actions is not None or self._constrained() is not None:
+            # Constraints, prescribed motion and bolts have changed the first six rows and columns.
             own = own.copy()
             for b in moving.tolist():
                 width = 6 * int(blocks.rows[b])
@@ -164,7 +176,10 @@ class BendingAttempt(Attempt):
         fill_own(base, pattern.places, pattern.step, (own, self.own_at), pattern.order)
         if self.glue is not None:
             self.glue.push(full.ravel(), pattern)
-            self.glue.stiffen(base, pattern, len(contacts), self.system.scheme.weight)
+            n_bolts = 0 if self.actions is None else self.actions.n_bolts
+            self.glue.stiffen(base, pattern, len(contacts) + n_bolts, self.system.scheme.weight)
+        if self.actions is not None:
+            self.actions.add(full.ravel(), base, pattern, len(contacts))
         return {"right": full, "base": base, "rows": self._rows(contacts, vectors)}
 
     def _deflection_at(self, pattern) -> np.ndarray:
@@ -258,8 +273,12 @@ class BendingAttempt(Attempt):
             rows = self._rows(found, self.vectors)
             pattern = self._six_rows
             self.slid = moved(
-                self.unknowns.ravel(), (found.block, found.other, pattern.order), (pattern.more, pattern.rows), rows
-            )[:, 1]
+                self.settled.unknowns.ravel(), (found.block, found.other, pattern.order),
+                (pattern.more, pattern.rows), rows,
+            )[:, 1]  # fmt: skip
+            if self.actions is not None:
+                self.slid += self.actions.along
+        self.places.take(self.state.rotation + self.increment[:, 2], self.deflection + change)
 
     def path(self, after: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         blocks, q, turned = self.blocks, self.deflection, self.state.rotation + self.increment[:, 2]
@@ -302,6 +321,8 @@ class BendingAttempt(Attempt):
         u0, u1 = blocks.elastic_energy(self.strained), blocks.elastic_energy(self.strained + change)
         padded = blocks.padded(change)
         worked = float((self.bending_load * padded).sum())
+        if self.actions is not None:
+            worked += self.actions.deflecting_work(padded)
         # Work of inertia with the mean acceleration of the step: of deflection alone, and of its coupling with strains.
         rate = 2.0 / dt**2 * (change - dt * self.rates)
         mean = self.acceleration[:, 3:]

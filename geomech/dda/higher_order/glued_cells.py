@@ -224,7 +224,7 @@ class Glue:
 
     def push(self, right: np.ndarray, pattern: SixRowPattern) -> None:
         """Add the bond forces at the start of the step to ``right`` (6 n,)."""
-        _push(
+        push_springs(
             right,
             self.blocks(pattern.order),
             (pattern.more, pattern.rows),
@@ -236,7 +236,7 @@ class Glue:
         """Add the bond stiffness, times ``weight``, to the flat matrix ``data``; in ``pattern`` bonded faces follow
         ``n_contacts`` contacts."""
         at = n_contacts + np.tile(self.faces.face, 2)
-        _stiffen(
+        stiffen_springs(
             data, pattern.places, pattern.step, at, self.blocks(pattern.order), self.vectors, weight * self.springs
         )
 
@@ -358,7 +358,7 @@ _jit = kept(fastmath={"contract"}, error_model="numpy", nogil=True)
 
 
 @_jit
-def _push(right, blocks, rows, vectors, force):
+def push_springs(right, blocks, rows, vectors, force):
     """Subtract the normal and shear ``force`` (n, 2) of each spring from ``right``."""
     block, other, order = blocks
     more, count = rows
@@ -370,7 +370,7 @@ def _push(right, blocks, rows, vectors, force):
 
 
 @_jit
-def _stiffen(data, places, step, at, blocks, vectors, springs):
+def stiffen_springs(data, places, step, at, blocks, vectors, springs):
     """Add ``springs`` (n,), of equal normal and shear stiffness, to the flat matrix; ``at`` (n,) are pairs of the
     pattern."""
     where, own_at, upper, lower, rows = places

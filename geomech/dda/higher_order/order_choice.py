@@ -157,7 +157,10 @@ class OrderChoice:
     def _forces(self, trial: DeflectedBlocks, faces: _FaceForces, attempt) -> np.ndarray:
         """(n_blocks, m) N: loads and contact forces on the deflections of ``trial``, less inertia."""
         angle, density = faces.angle, attempt.density
-        out = trial.loads(attempt.points, attempt.edges, attempt.midpoint.vertices, angle)
+        points = attempt.points
+        if attempt.actions is not None:
+            points = np.concatenate([points, attempt.actions.bolt_rows()])
+        out = trial.loads(points, attempt.edges, attempt.midpoint.vertices, angle)
         out -= density[:, None] * np.einsum("bej,be->bj", trial.coupling(angle), attempt.acceleration[:, 3:])
         spun = density * attempt.carried[:, 2] ** 2
         out += spun[:, None] * (trial.basis.coupling[:, 0] + trial.basis.coupling[:, 1])

@@ -50,7 +50,7 @@ def refuse_unsupported(
 def refuse_unsupported_loads(loads: Loads) -> None:
     """Raise ValueError for ``loads`` that blocks of higher order do not support yet."""
     for name, what in (
-        ("bolts", "bolts"), ("block_motions", "prescribed motion of blocks"),
+        ("block_motions", "prescribed motion of blocks"),
         ("point_motions", "prescribed motion of points"), ("viscous_boundaries", "viscous boundaries"),
     ):  # fmt: skip
         if getattr(loads, name):

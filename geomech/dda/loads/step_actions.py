@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from typing import Protocol, Self
 
 import numpy as np
 
@@ -15,11 +16,18 @@ from ..open_close.settled_states import Settled
 from ..results import contact_resultants
 from .bolts import ROUNDS, BoltSet, check_bolts, labels
 from .force_records import POINT_FORCE
-from .load_vectors import LoadMap
 from .prescribed_motion import MovedBlocks, Pairs, PrescribedMotion
 
 #: (pattern, matrix, right side, contacts, gaps) → settled contacts.
 Settle = Callable[[Pattern, np.ndarray, np.ndarray, ContactSet, np.ndarray], Settled]
+
+
+class MaterialPoints(Protocol):
+    """Where material points of blocks are."""
+
+    def point(self, block: int, at: tuple[float, float], vertices: np.ndarray) -> np.ndarray:
+        """As `LoadMap.point`."""
+        ...
 
 
 def effective_gravity(
@@ -42,15 +50,15 @@ class StepActions:
     """Prescribed motion and bolts of one attempt at a step; methods in the order in which the step calls them."""
 
     def __init__(
-        self, moved: MovedBlocks, loads: Loads, state: State, load_map: LoadMap, midpoint: MidpointConfiguration,
+        self, moved: MovedBlocks, loads: Loads, state: State, points: MaterialPoints, midpoint: MidpointConfiguration,
         order: np.ndarray, end: float,
     ) -> None:  # fmt: skip
-        self.blocks, self.order, self.loads, self.load_map = moved.blocks, order, loads, load_map
+        self.blocks, self.order, self.loads, self.points = moved.blocks, order, loads, points
         self.moments = midpoint.moments
         vertices = state.vertices
 
         def point_at(block: int, at: tuple[float, float]) -> np.ndarray:
-            return load_map.point(block, at, vertices)
+            return points.point(block, at, vertices)
 
         self.imposed: PrescribedMotion | None = None
         shaken = loads.base is not None and loads.base.frame == "ground"
@@ -69,14 +77,14 @@ class StepActions:
 
     @classmethod
     def of(
-        cls, moved: MovedBlocks, loads: Loads, state: State, load_map: LoadMap, midpoint: MidpointConfiguration,
+        cls, moved: MovedBlocks, loads: Loads, state: State, points: MaterialPoints, midpoint: MidpointConfiguration,
         order: np.ndarray, end: float,
-    ) -> StepActions | None:  # fmt: skip
+    ) -> Self | None:  # fmt: skip
         """The actions of a step; None where ``loads`` are forces only."""
         shaken = loads.base is not None and loads.base.frame == "ground"
         if not (shaken or loads.block_motions or loads.point_motions or loads.bolts):
             return None
-        return cls(moved, loads, state, load_map, midpoint, order, end)
+        return cls(moved, loads, state, points, midpoint, order, end)
 
     @property
     def linked(self) -> tuple[np.ndarray, np.ndarray] | None:
@@ -170,6 +178,10 @@ class StepActions:
         """(n, 2) forces of the acting bolts, N; with their pairs' vectors they give generalised forces."""
         return np.zeros((0, 2)) if self.bolts is None else self.bolts.forces(self._motion)
 
+    def bolt_rows(self) -> np.ndarray:
+        """POINT_FORCE rows of the acting bolts."""
+        return np.zeros(0, POINT_FORCE) if self.bolts is None else self.bolts.point_rows(self.bolt_forces())
+
     @property
     def largest_bolt_force(self) -> float:
         """Largest bolt force, N."""
@@ -209,7 +221,7 @@ class StepActions:
             rows.append(at_points)
         if self.bolts is not None:
             forces = self.bolt_forces()
-            self.bolts.remember(self.memory, self._motion, lambda b, at: self.load_map.point(b, at, new_vertices))
+            self.bolts.remember(self.memory, self._motion, lambda b, at: self.points.point(b, at, new_vertices))
             rows.append(self.bolts.point_rows(forces))
         if self.loads.bolts:
             for label, row in zip(labels(self.loads.bolts), self.memory, strict=True):

@@ -107,7 +107,7 @@ def grouted_bolt(
     A bar grouted all along is strained where joints open or slide, over a short *active length* (a few diameters to
     half a metre; local reinforcement, Lorig 1985). Each crossing becomes a `Bolt` of stiffness ``axial_stiffness`` (EA,
     N per metre of thickness) over ``active_length`` (m), its ends half that length inside the two blocks (less in a
-    thinner block). ``properties`` as for `Bolt`; ``compression`` is True by default.
+    thinner block). Faces of cells that cannot part are no joints. ``properties`` as for `Bolt`; ``compression`` is True by default.
 
     Raises CrossesNoJoint where the bar crosses no joint, and ValueError that names the bar for a stiffness or length
     that is not positive.
@@ -122,8 +122,11 @@ def grouted_bolt(
     pieces = _pieces(blocks, a, b)
     along = (b - a) / length
     bolts: list[Bolt] = []
+    whole = _inseparable(blocks)
     options: dict[str, Any] = {"compression": True, **properties}
     for (one, s0, s1), (two, s2, s3) in itertools.pairwise(pieces):
+        if (min(one, two), max(one, two)) in whole:
+            continue
         before, after = min(active_length / 2, s1 - s0), min(active_length / 2, s3 - s2)
         points = (a + (s1 - before) * along).tolist(), (a + (s2 + after) * along).tolist()
         bolts.append(
@@ -140,6 +143,15 @@ def grouted_bolt(
     if not bolts:
         raise CrossesNoJoint(f"bolt {name!r} crosses no joint on its way from {tuple(start)} to {tuple(end)}")
     return tuple(bolts)
+
+
+def _inseparable(blocks: Blocks) -> set[tuple[int, int]]:
+    """Pairs of cells of one rock whose common faces cannot part: those without a joint's name."""
+    if blocks.glued is None:
+        return set()
+    edges = np.asarray(blocks.glued, np.int64).reshape(-1, 2)
+    edges = edges[(blocks.edge_name[edges] == 0).any(axis=1)]
+    return {(a, b) for a, b in np.sort(blocks.vertex_block[edges], axis=1).tolist()}
 
 
 def _pieces(blocks: Blocks, a: np.ndarray, b: np.ndarray) -> list[tuple[int, float, float]]:

@@ -7,7 +7,7 @@ from .check import Check
 
 #: Keys of [loads] that move, constrain or strain blocks in ways not implemented for deflection.
 _LOADS = {
-    "bolts": "bolts", "motions": "prescribed motion", "point_motions": "prescribed motion of points",
+    "motions": "prescribed motion", "point_motions": "prescribed motion of points",
     "viscous_boundaries": "viscous boundaries",
 }  # fmt: skip
 
