@@ -45,11 +45,13 @@ def solve_to(
     # Begin with a tenfold target; the next mesh is graded more finely.
     order = order_for(min(10 * target_error, 0.5))
     settings = of_order(DdmSettings(nodes=nodes), min(order, HIGHEST - 2), min(2 * target_error, 0.5))
-    before = Body(loops, cracks, material, settings, **body).solve(load)
+    rock = Body([*loops], cracks, material, settings, **body)
+    before = rock.solve(load)
     while settings.order < shape_functions.MAX_ORDER:
         settings = finer(settings)
         try:
-            solution = before.body.remeshed(settings).solve(load)
+            rock = rock.remeshed(settings)
+            solution = rock.solve(load)
         except NotSolved as failure:
             # Too many unknowns to factor, and round-off beyond what the iteration needs.
             raise TargetMissed(before, target_error) from failure

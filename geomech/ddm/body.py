@@ -16,6 +16,7 @@ import logging
 from collections.abc import Sequence
 from copy import copy
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -30,8 +31,9 @@ from .fracture.chord_error import with_halved_chords
 from .fracture.target_error import refined_to_target
 from .fracture.tip_elements import tip_elements
 from .fracture.weight_functions import TipFunctionals
-from .iterative.boundary_gmres import is_iterated
-from .iterative.crack_gmres import FACTORABLE, compressed, is_compressed
+from .interfaces import CrackedBody
+from .iterative.boundary_gmres import IteratedBoundary, is_iterated
+from .iterative.crack_gmres import FACTORABLE, BoundaryResponse, IterativeCrackSystem, compressed, is_compressed
 from .iterative.gmres import NotSolved
 from .loads.body_loads import BodyLoad
 from .loads.load_vectors import Applied, apply, check_equilibrium
@@ -44,11 +46,11 @@ from .mesh.geometry_checks import check_cracks, check_outline, new_segments
 from .mesh.half_plane import HalfPlane
 from .mesh.point_location import outlined
 from .solution import Solution
-from .system.bordered_factor import SMALLEST_BORDERED, Bordered
+from .system.bordered_factor import SMALLEST_BORDERED, Bordered, WholeMatrix
 from .system.boundary_system import BoundarySystem
 from .system.displacement_jumps import closing, strain_weights
 from .system.influence_matrix import ElementSet, influence, reuse
-from .system.row_store import KeptRows
+from .system.row_store import KeptRows, TransposedRows
 from .system.schur_complement import CrackSystem
 
 _log = logging.getLogger(__name__)
@@ -72,6 +74,21 @@ class Body:
     >>> [f"{k:.4f}" for k in tips["k_i"] / (1e6 * np.sqrt(np.pi))]  # a crack in tension: σ √(πa)
     ['1.0000', '1.0000']
     """
+
+    given_loops: list[np.ndarray]
+    loops: list[np.ndarray]
+    outlined: bool
+    compressed: bool
+    area: float
+    centroid: np.ndarray
+    hole_moments: list[Any]
+    crack_system: CrackSystem | IterativeCrackSystem
+    _second: np.ndarray
+    _reach: float
+    _factored_after_all: bool
+    _outside: BoundarySystem
+    _cg: np.ndarray | KeptRows
+    _w: BoundaryResponse | TransposedRows
 
     def __init__(
         self,
@@ -109,16 +126,16 @@ class Body:
         self.counts = {"elements": 0, "elements_new": 0, "boundary_assemblies": 0, "boundary_factorisations": 0}
         self.work = Work() if work is None else work
         given = [*loops, *holes]
-        same = previous is not None and _same_loops(previous.given_loops, given)
-        if not same and self.supports:
+        same = previous if previous is not None and _same_loops(previous.given_loops, given) else None
+        if same is None and self.supports:
             previous = None
         self.given_loops = [np.array(loop, dtype=float) for loop in given]
-        self.loops = previous.loops if same else check_outline(loops, holes)
-        self.outlined = previous.outlined if same else outlined(self.loops)
-        edges = previous.mesh.edges if same else outline_edges(self.loops)[0]
+        self.loops = check_outline(loops, holes) if same is None else same.loops
+        self.outlined = outlined(self.loops) if same is None else same.outlined
+        edges = outline_edges(self.loops)[0] if same is None else same.mesh.edges
         if half_plane is not None:
-            edges = self._in_half_plane(edges)
-        check_cracks(cracks, edges, self.loops, new_segments(cracks, previous.cracks) if same else None)
+            edges = self._in_half_plane(half_plane, edges)
+        check_cracks(cracks, edges, self.loops, None if same is None else new_segments(cracks, same.cracks))
         points = self._vertices
         self._extent = float(np.ptp(points, axis=0).max()) if len(points) else 1.0
         self._tol = 8e-16 * float(np.abs(points).max()) if len(points) else 0.0
@@ -128,10 +145,10 @@ class Body:
                 raise ValueError("supports need a body with an outline")
             self.support_segments = place(self.supports, edges, self._extent)
             marked = marks(self.supports, self.support_segments, self.loops, settings.grading_layers)
-        self.mesh: Mesh = mesh(self.loops, cracks, settings, marked, previous.mesh if same else None, half_plane)
+        self.mesh: Mesh = mesh(self.loops, cracks, settings, marked, None if same is None else same.mesh, half_plane)
         self.boundary: ElementSet = self.mesh.boundary
         self.faces: ElementSet = self.mesh.cracks
-        self._measure(previous if same else None)
+        self._measure(same)
         self._factored_after_all = previous is not None and previous._factored_after_all
         solver = "dense" if self._factored_after_all else settings.solver
         holds = Holds(self.boundary, self.supports, self.support_segments, self._extent) if self.supports else None
@@ -150,7 +167,7 @@ class Body:
         #: Responses to uniform stress, by the states of the crack faces (`uniform_stress_response`).
         self.uniform_responses: dict[bytes, UniformStressResponse] = {}
         #: Where faces stand on bases, and how unit tractions move them by the states of the cracks (`rigid_bases`).
-        self.on_bases: dict[bytes, object] = {}
+        self.on_bases: dict[bytes, tuple[np.ndarray, ...]] = {}
         self._assemble(previous, holds, many)
 
     def _measure(self, same: Body | None) -> None:
@@ -216,13 +233,13 @@ class Body:
             half_plane=self.half_plane,
         )
 
-    def _in_half_plane(self, edges: np.ndarray) -> np.ndarray:
+    def _in_half_plane(self, half_plane: HalfPlane, edges: np.ndarray) -> np.ndarray:
         """``edges`` (m, 2, 2) and a piece of the free surface. Raises ValueError if anything is not below the
         surface."""
         if self.outlined:
             raise ValueError("half_plane: the body has an outline; a half-plane has none but its surface")
-        self.half_plane.check_inside(self.loops, self.cracks)
-        return np.concatenate([edges, self.half_plane.edge(self._vertices)])
+        half_plane.check_inside(self.loops, self.cracks)
+        return np.concatenate([edges, half_plane.edge(self._vertices)])
 
     @property
     def _vertices(self) -> np.ndarray:
@@ -285,22 +302,22 @@ class Body:
         self.work.elements_assembled += self.counts["elements_new"]
         self.work.bodies += 1
 
-        before = old._cg if old else None
-        if same_boundary and isinstance(before, KeptRows) and not self.compressed:
-            self._cg = before.grown(c, c_seen, lambda r: system.influence_on(c.take(r), np.arange(g.n)))
+        cg = old._cg if old else None
+        if same_boundary and isinstance(cg, KeptRows) and not self.compressed:
+            self._cg = cg.grown(c, c_seen, lambda r: system.influence_on(c.take(r), np.arange(g.n)))
         else:
-            before = before.dense if isinstance(before, KeptRows) else before
-            rows = reuse(before, c_seen, g_old, c, g, lambda r, k: system.influence_on(c.take(r), k), "C")
+            known_rows = cg.dense if isinstance(cg, KeptRows) else cg
+            rows = reuse(known_rows, c_seen, g_old, c, g, lambda r, k: system.influence_on(c.take(r), k), "C")
             self._cg = rows if self.compressed else KeptRows.whole(rows, c)
         if system.holds is not None:
             self._c_known = system.holds.known(c, nu, tol)
         self._loads = UnitLoads(
             self.mesh, self.centroid, self.material, tol, self._extent, self.outlined, system.anchors
         )
-        if same_boundary:
+        if old is not None and same_boundary:
             self._loads.inherit(old._loads, c_seen)
 
-        def gc(k):
+        def gc(k: np.ndarray) -> np.ndarray:
             rows = influence(g, c.take(k), nu, tol)
             return rows if system.anchors is None else system.anchored(rows, system.anchors.of_jumps(c.take(k)))
 
@@ -309,40 +326,48 @@ class Body:
             _log.info("solved iteratively instead of factored: %s", ", ".join(of))
         if self.compressed:
             on_boundary, crack = gc(np.arange(c.n)), self.cracks.crack[c.source]
-            on_both = system.factor if system.iterated else None
+            on_both = system.factor if isinstance(system.factor, IteratedBoundary) else None
+            assert isinstance(self._cg, np.ndarray)
             self._w, self.crack_system = compressed(c, crack, system.solve, on_boundary, self._cg, nu, tol, on_both)
             return
         # W = A_ΓΓ⁻¹ A_ΓC and S are extended by the columns and rows of new elements. A_ΓC and A_CC are not kept: they
         # are cheaper to recompute if the boundary changes than to carry along.
-        kept = same_boundary and not old.compressed
+        kept = old if old is not None and same_boundary and not old.compressed else None
 
-        def follow(k):
+        def follow(k: np.ndarray) -> np.ndarray:
             return system.solve_few(gc(k)).T
 
         every = np.arange(c.n)
-        w = old._w.rows.grown(c, c_old, follow) if kept else KeptRows.whole(system.solve(gc(every)).T, c)
-        self._w = w.T
+        if kept is not None and isinstance(kept._w, TransposedRows):
+            w = kept._w.rows.grown(c, c_old, follow)
+        else:
+            w = KeptRows.whole(system.solve(gc(every)).T, c)
+        self._w, cg = w.T, self._cg
+        assert isinstance(cg, KeptRows)
 
-        def schur(r, k):
+        def schur(r: np.ndarray, k: np.ndarray) -> np.ndarray:
             direct = influence(c.take(r), c.take(k), nu, tol)
             if not g.n:
                 return direct
             # Column-major like the first: subtracting arrays of different order takes several times as long.
             if len(r) == c.n:
-                return direct - (self._cg @ w.of(k).T if len(k) < c.n else (w.dense @ self._cg.dense.T).T)
-            return direct - ((w @ self._cg.of(r).T) if len(k) == c.n else w.of(k) @ self._cg.of(r).T).T
+                return direct - (cg @ w.of(k).T if len(k) < c.n else (w.dense @ cg.dense.T).T)
+            return direct - ((w @ cg.of(r).T) if len(k) == c.n else w.of(k) @ cg.of(r).T).T
 
-        known = old.crack_system.matrix if kept else None
+        before_growth = None if kept is None else kept.crack_system
+        assert not isinstance(before_growth, IterativeCrackSystem)
+        known = None if before_growth is None else before_growth.matrix
         if known is None or not known.n or c.n_unknowns < SMALLEST_BORDERED:
             whole = reuse(None if known is None else known.dense, c_old, c_old, c, c, schur)
-            matrix = Bordered.whole(c, whole)
+            matrix: Bordered | WholeMatrix = Bordered.whole(c, whole)
         else:
             matrix = known.grown(c, c_old, c_seen, schur)
-        self.crack_system = CrackSystem(matrix, self.work, old.crack_system if kept else None, c_old)
+        self.crack_system = CrackSystem(matrix, self.work, before_growth, c_old)
 
     def _imposed(self, applied: Applied) -> np.ndarray:
         """(h_unknowns,) 2μ times the displacement that supports prescribe, minus that of particular fields."""
         holds, load = self._outside.holds, applied.load
+        assert holds is not None  # of a body with supports
         values = () if load.displacements is None else load.displacements
         if load.displacements is not None and len(values) != len(self.supports):
             raise ValueError(f"{len(self.supports)} supports but {len(values)} imposed displacements")
@@ -386,7 +411,12 @@ class Body:
         target = self.requested.target_error
         if target is not None and meet_target and len(self.cracks.tips):
             rough = self.solve(load, warm, equilibrium_tolerance, history, False)
-            return refined_to_target(rough, target, lambda body: body.solve(load, warm, np.inf, history, False))
+
+            def again(body: CrackedBody) -> Solution:
+                assert isinstance(body, Body)
+                return body.solve(load, warm, np.inf, history, False)
+
+            return refined_to_target(rough, target, again)
         try:
             return self._solved(load, warm, equilibrium_tolerance, history)
         except NotSolved as failure:

@@ -34,6 +34,12 @@ class LoadParts(Protocol):
     tractions: np.ndarray
 
 
+class Multiplied(Protocol):
+    """A matrix of which products with a vector or matrix are asked for only."""
+
+    def __matmul__(self, x: np.ndarray) -> np.ndarray: ...
+
+
 class CrackedBody(Protocol):
     """A body with cracks: geometry, elements, matrices. Lengths in m, moduli in Pa."""
 
@@ -41,9 +47,7 @@ class CrackedBody(Protocol):
     cracks: Cracks
     material: Material
     settings: DdmSettings
-    supports: Sequence[Support]
     support_segments: np.ndarray
-    face_laws: Sequence[JointLaw]
     half_plane: HalfPlane | None
     outlined: bool
     rough: bool
@@ -55,18 +59,11 @@ class CrackedBody(Protocol):
     boundary: ElementSet
     faces: ElementSet
     crack_system: Any
-    uniform_responses: dict[bytes, Any]
+    on_bases: dict[bytes, tuple[np.ndarray, ...]]
     work: Work
-    initial_memory: FaceMemory
-    laws: FaceLaws
-    face_equations: FaceEquations
-    tip_elements: tuple[np.ndarray, ...]
-    closing: tuple[np.ndarray, np.ndarray, np.ndarray]
-    strain_weights: np.ndarray
     _outside: BoundarySystem
     _cg: Any
     _c_known: np.ndarray
-    _w: np.ndarray
     _extent: float
     _reach: float
     _second: np.ndarray
@@ -74,6 +71,36 @@ class CrackedBody(Protocol):
 
     @property
     def nu(self) -> float: ...
+
+    @property
+    def supports(self) -> Sequence[Support]: ...
+
+    @property
+    def face_laws(self) -> Sequence[JointLaw]: ...
+
+    @property
+    def uniform_responses(self) -> dict[bytes, Any]: ...
+
+    @property
+    def initial_memory(self) -> FaceMemory: ...
+
+    @property
+    def laws(self) -> FaceLaws: ...
+
+    @property
+    def face_equations(self) -> FaceEquations: ...
+
+    @property
+    def tip_elements(self) -> tuple[np.ndarray, ...]: ...
+
+    @property
+    def closing(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]: ...
+
+    @property
+    def strain_weights(self) -> np.ndarray: ...
+
+    @property
+    def _w(self) -> Multiplied: ...
 
     @property
     def limits(self) -> list[np.ndarray]: ...

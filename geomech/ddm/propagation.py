@@ -123,6 +123,12 @@ class _Run:
         #: Last load factor, solution, its history, and tips.
         self._last: tuple[float, Solution, Solution | None, np.ndarray] | None = None
 
+    @property
+    def rock(self) -> Body:
+        """The body of the present step."""
+        assert self.body is not None
+        return self.body
+
     def steps(self, cracks: Cracks, max_steps: int) -> Iterator[Step]:
         from . import NotConverged
 
@@ -140,7 +146,7 @@ class _Run:
                     raise
                 yield self._split(cracks, str(failure))
                 return
-            growth, born = self._grow(tips), ()
+            growth, born = self._grow(tips), list[NewCrack]()
             if growth is None:
                 growth, born = self._initiate(tips)
             events = self._events(cracks, tips, growth, born)
@@ -178,6 +184,7 @@ class _Run:
             load = self._load_at(factor, body.cracks)
             solution = body.solve(load, warm=self.solution, history=history)
             if body is self.body:  # it may be a finer one that reaches the target error
+                assert isinstance(solution.body, Body)
                 self.body = solution.body
             tips = solution.tips.copy()
             tips["angle"], tips["k_eq"] = apply_criterion(solution, self.growth, self.material)
@@ -200,7 +207,7 @@ class _Run:
 
     def _drives(self, factor: float) -> tuple[Solution, np.ndarray]:
         """Solution and tips at a load factor; stores the largest K_eq/K_Ic and overstress there."""
-        solution, tips = self._solve(self.body, factor)
+        solution, tips = self._solve(self.rock, factor)
         self.factor = factor
         self.tip_drive = float(np.max(tips["k_eq"], initial=0.0)) / self.material.k_ic
         self.new_cracks = new_cracks(solution, self.material, self.growth)
@@ -211,7 +218,11 @@ class _Run:
         """Find the load factor of this step; returns solution and tips there."""
         if not self.controlled:
             return self._drives(1.0)
-        found = None
+        found: tuple[Solution, np.ndarray] | None = None
+
+        def settled() -> tuple[Solution, np.ndarray]:
+            assert found is not None
+            return found
 
         def excess(factor: float) -> float:
             nonlocal found
@@ -224,12 +235,12 @@ class _Run:
             rest = excess(factor)
             low, high = (factor, high) if rest < 0 else (low, factor)
             if abs(rest) <= PRECISION:
-                return found
+                return settled()
             # Exact if everything is proportional to the factor.
             factor = min(factor / self.drive if self.drive > 0 else WIDER * factor, self.max_factor)
         if low is None:
             if excess(0.0) >= 0:
-                return found  # the constant part of the load already suffices
+                return settled()  # the constant part of the load already suffices
             low = 0.0
         for _ in range(RAISES):
             if high is not None or low >= self.max_factor:
@@ -237,12 +248,12 @@ class _Run:
             factor = min(WIDER * low, self.max_factor)
             low, high = (factor, None) if excess(factor) < 0 else (low, factor)
         if high is None:
-            return found
+            return settled()
         from scipy.optimize import brentq
 
         factor = brentq(excess, low, high, xtol=1e-15 * high, rtol=1e-13)
         excess(factor)
-        return found
+        return settled()
 
     # -- growth --------------------------------------------------------------------------------------------------
 
@@ -250,15 +261,16 @@ class _Run:
         if not reached(self.tip_drive, self.enough):
             return None
         drive = self.tip_drive
-        cracks, body, cycle = self.body.cracks, self.body, self.number + 1
+        body, cycle = self.rock, self.number + 1
+        cracks = body.cracks
         threshold = self.material.k_ic * ((1 - TOGETHER) * drive if self.controlled else 1.0)
 
         def grow() -> Growth:
             return advance(cracks, lambda block: body.limits, tips, self.growth, np.full(len(tips), threshold), cycle)
 
         def look_ahead(tried: Cracks) -> np.ndarray:
-            self.body = self._body(tried, self.body)
-            return self._solve(self.body, self.factor)[1]
+            self.body = after = self._body(tried, self.body)
+            return self._solve(after, self.factor)[1]
 
         growth = corrected(tips, grow, look_ahead, cycle, self.growth.correct, self.chords)
         if growth is None:
@@ -267,11 +279,12 @@ class _Run:
             tips["grown"] = growth.grown
         return growth
 
-    def _initiate(self, tips: np.ndarray) -> tuple[Growth | None, Sequence[NewCrack]]:
+    def _initiate(self, tips: np.ndarray) -> tuple[Growth | None, list[NewCrack]]:
         """New cracks where intact rock fails; only if no tip grows, since growth would relieve the rock."""
         if not self.new_cracks or not reached(self.new_cracks[0].overstress, self.enough):
-            return None, ()
-        cracks = add_new_cracks(self.body.cracks, lambda block: self.body.limits, self.new_cracks, self.number + 1)
+            return None, []
+        body = self.rock
+        cracks = add_new_cracks(body.cracks, lambda block: body.limits, self.new_cracks, self.number + 1)
         return Growth(cracks, np.zeros(len(tips)), ()), self.new_cracks
 
     # -- events --------------------------------------------------------------------------------------------------

@@ -14,6 +14,7 @@ from .crack_contact.face_contact import FaceSolution
 from .crack_contact.face_laws import FaceStates, Released
 from .crack_contact.frictional_contact import stored_by_fillings
 from .kernels import shape_functions
+from .kernels.body_force_fields import Particular
 from .kernels.full_plane import Elements, Kernel
 from .loads.load_vectors import Applied, apply
 from .loads.reactions import Reactions, reactions
@@ -60,6 +61,7 @@ class Solution:
         self.jumps, self.face_traction = answer.jumps, answer.traction
         self._boundary_load, self.face_load, self._imposed = boundary_load, face_load, imposed
         self._edge_density = edge_density
+        self._tip_errors: np.ndarray | None = None
 
     @property
     def scales(self) -> bool:
@@ -69,9 +71,10 @@ class Solution:
     def scaled(self, load: BodyLoad, factor: float) -> Solution:
         """The solution for ``load``, which is ``factor`` (positive) times this one; valid if it `scales`."""
         answer = FaceSolution(factor * self.jumps, factor * self.face_traction, self.closed, 0)
-        parts = (factor * x for x in (self._boundary_load, self.face_load, self._imposed))
+        on_boundary, on_faces, imposed = (factor * x for x in (self._boundary_load, self.face_load, self._imposed))
         edge_density = None if self._edge_density is None else factor * self._edge_density
-        return Solution(self.body, apply(load, self.body), factor * self._eliminated, answer, *parts, edge_density)
+        applied, eliminated = apply(load, self.body), factor * self._eliminated
+        return Solution(self.body, applied, eliminated, answer, on_boundary, on_faces, imposed, edge_density)
 
     @cached_property
     def _x(self) -> np.ndarray:
@@ -91,7 +94,9 @@ class Solution:
     @cached_property
     def reactions(self) -> Reactions:
         """Tractions along the supports and their resultants."""
-        return reactions(self.body, self._on_supports[1], self._applied.particular)
+        particular = self._applied.particular
+        assert isinstance(particular, Particular)  # a half-plane has no supports
+        return reactions(self.body, self._on_supports[1], particular)
 
     @cached_property
     def states(self) -> np.ndarray:
@@ -121,7 +126,7 @@ class Solution:
     @property
     def dissipated_in_step(self) -> tuple[float, Released]:
         """J/m of this step alone: friction loss of crack faces, and energy released by breaking cement."""
-        if self.memory is None:
+        if self.memory is None or self.began is None:
             return 0.0, Released()
         released = (now - before for now, before in zip(self.memory.released, self.began.released))
         return self.memory.work - self.began.work, Released(*released)
@@ -159,13 +164,19 @@ class Solution:
         closed = self.closed.reshape(c.n, 2, c.per)[:, 1]
         return closed & np.isinf(body.laws.normal).reshape(closed.shape) if body.rough else closed
 
-    @cached_property
+    @property
     def tip_errors(self) -> np.ndarray:
-        """(n_tips, 2) estimated errors of K_I and K_II, Pa √m, by comparison with a finer mesh (`sif_error_estimate`);
-        takes as long as the solution."""
-        from .fracture.sif_error_estimate import tip_errors
+        """(n_tips, 2) estimated errors of K_I and K_II, Pa √m: those of the target error, or by comparison with a finer
+        mesh (`sif_error_estimate`), which takes as long as the solution."""
+        if self._tip_errors is None:
+            from .fracture.sif_error_estimate import tip_errors
 
-        return tip_errors(self)
+            self._tip_errors = tip_errors(self)
+        return self._tip_errors
+
+    @tip_errors.setter
+    def tip_errors(self, errors: np.ndarray) -> None:
+        self._tip_errors = errors
 
     @cached_property
     def faces(self) -> CrackFaces:
@@ -319,6 +330,7 @@ class Solution:
                 density = elements.densities(values)
                 add(elements.start, elements.end, elements.kind, density, body._tol, False, seen_from)
         if body.supports:
+            assert body._outside.holds is not None
             sources = body._outside.holds.sources
             add(sources.start, sources.end, sources.kind, sources.densities(self._on_supports[1]), body._tol, True)
         if len(self._applied.segments):

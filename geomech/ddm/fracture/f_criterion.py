@@ -25,6 +25,7 @@ from .criteria import CRITERIA
 
 if TYPE_CHECKING:
     from ..body import Body
+    from ..interfaces import CrackedBody
     from ..loads.body_loads import BodyLoad
     from ..solution import Solution
 
@@ -96,7 +97,7 @@ def _largest(value: np.ndarray, material: Material) -> tuple[np.ndarray, np.ndar
     return DIRECTIONS[at] + shift * (DIRECTIONS[1] - DIRECTIONS[0]), np.sqrt(best) * material.k_ic
 
 
-def _fitting(body: Body, length: float) -> np.ndarray:
+def _fitting(body: CrackedBody, length: float) -> np.ndarray:
     """(n_tips,) bool: tips farther than two kink lengths from all other cracks and from the boundary."""
     network, tips = body.cracks, body.tip_elements[0]
     sides = body.sides
@@ -115,12 +116,13 @@ def _fitting(body: Body, length: float) -> np.ndarray:
     return out
 
 
-def _body(body: Body, k: int, length: float, at: np.ndarray) -> Body:
+def _body(body: CrackedBody, k: int, length: float, at: np.ndarray) -> Body:
     """``body`` with kinks in direction ``k`` at the tips ``at``; kept with it."""
+    from ..body import Body
+
+    assert isinstance(body, Body)
     kept = body.trials.setdefault(length, {})
     if k not in kept:
-        from ..body import Body
-
         n_outlines = int(body.outlined)
         kept[k] = Body(
             body.loops[:n_outlines],
@@ -143,10 +145,6 @@ def _kinked(cracks: Cracks, tips: np.ndarray, angle: float, length: float) -> Cr
     n, n_nodes = len(tips), len(cracks.nodes)
     turn = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
     owner = _owners(cracks, tips["node"])
-    inherited = {
-        name: np.concatenate([getattr(cracks, name), getattr(cracks, name)[owner]])
-        for name in ("crack", "block", "law")
-    }
     return replace(
         cracks,
         nodes=np.concatenate([cracks.nodes, tips["point"] + length * tips["direction"] @ turn]),
@@ -154,7 +152,9 @@ def _kinked(cracks: Cracks, tips: np.ndarray, angle: float, length: float) -> Cr
         birth_cycle=np.concatenate([cracks.birth_cycle, np.full(n, cracks.birth_cycle.max() + 1)]),
         aperture=np.concatenate([cracks.aperture, np.zeros(n)]),
         surface=np.concatenate([cracks.surface, np.zeros(n, bool)]),
-        **inherited,
+        crack=np.concatenate([cracks.crack, cracks.crack[owner]]),
+        block=np.concatenate([cracks.block, cracks.block[owner]]),
+        law=np.concatenate([cracks.law, cracks.law[owner]]),
     )
 
 

@@ -72,6 +72,7 @@ class TipBound:
     def at_most(self, load: BodyLoad) -> np.ndarray:
         """(n_tips,) upper bound of √(K_I² + K_II²) under ``load``, Pa √m: tractions on segments of the outline, body
         force with gradient, and uniform stress, in equilibrium."""
+        assert load.segments is not None and load.tractions is not None and load.body_force_gradient is not None
         along = load.segments[:, 1] - load.segments[:, 0]
         size = 0.5 * float(np.hypot(*along.T) @ np.hypot(load.tractions[..., 0], load.tractions[..., 1]).sum(axis=1))
         gradient = load.body_force_gradient

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 
@@ -17,13 +17,14 @@ from .tip_factors import factors, largest, negligible
 if TYPE_CHECKING:
     from ..interfaces import CrackedBody, SolvedBody
 
+_Solved = TypeVar("_Solved", bound="SolvedBody")
+
 
 class TargetMissed(ValueError):
     """No mesh reaches the ``target`` error. ``solution``: the best one, with its `tip_errors`; ``reached``: the largest
     of these, relative to the largest K."""
 
     def __init__(self, solution: SolvedBody, target: float, where: str = "") -> None:
-
         k = factors(solution)
         self.solution, self.target = solution, target
         self.reached = float(solution.tip_errors.max() / max(largest(k), np.finfo(float).tiny))
@@ -37,7 +38,7 @@ class TargetMissed(ValueError):
         )
 
 
-def refined_to_target(solution: SolvedBody, target: float, again: Callable[[CrackedBody], SolvedBody]) -> SolvedBody:
+def refined_to_target(solution: _Solved, target: float, again: Callable[[CrackedBody], _Solved]) -> _Solved:
     """``solution``, or one on a finer mesh, whose K agrees to ``target`` with that of the next finer mesh, or of the
     next coarser one where that cannot be solved. ``again`` solves for the same load on another body. Raises
     `TargetMissed` if the finest mesh that can be solved does not suffice."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -28,9 +28,9 @@ class LineForces:
     density: np.ndarray
 
     @classmethod
-    def join(cls, parts: list[LineForces | None]) -> LineForces | None:
-        """The ``parts`` as one; None if there are none."""
-        parts = [part for part in parts if part is not None]
+    def join(cls, given: Sequence[LineForces | None]) -> LineForces | None:
+        """The parts ``given`` as one; None if there are none."""
+        parts = [part for part in given if part is not None]
         if not parts:
             return None
         return cls(*(np.concatenate([getattr(p, name) for p in parts]) for name in ("start", "end", "density")))

@@ -114,58 +114,59 @@ class BodyLoad:
         are Kelvin's in only one of them."""
         if self.kelvin != other.kelvin and self.points is not None and other.points is not None:
             raise ValueError("cannot add loads of which only one has kelvin = True for point loads on the boundary")
-        joined = {
-            name: _joined(getattr(self, name), getattr(other, name))
-            for name in ("segments", "tractions", "points", "forces")
-        }
         summed = {
             name: _plus(getattr(self, name), getattr(other, name))
             for name in ("body_force", "body_force_gradient", "remote_stress", "crack_pressure")
         }
         graded = [load for load in (self, other) if load.body_force_gradient is not None]
-        if len(graded) == 2 and not np.array_equal(self.about, other.about):
+        if len(graded) == 2 and not _equal(self.about, other.about):
             raise ValueError("body forces given about different points cannot be added")
         about = graded[0].about if graded else None
         heavy = [load for load in (self, other) if load.body_force is not None]
         if len(heavy) == 2 and self.k0 != other.k0:
             raise ValueError("body forces with different k0 cannot be added")
         k0 = heavy[0].k0 if heavy else None
-        holes = self.hole_pressure, other.hole_pressure
-        lists = [isinstance(p, (Sequence, np.ndarray)) for p in holes]
-        if any(lists):
-            n = len(holes[lists.index(True)])
-            pair = [list(p) if many else [p] * n for p, many in zip(holes, lists)]
+        holes = [self.hole_pressure, other.hole_pressure]
+        lists = [list(p) for p in holes if isinstance(p, (Sequence, np.ndarray))]
+        if lists:
+            n = len(lists[0])
+            pair = [list(p) if isinstance(p, (Sequence, np.ndarray)) else [p] * n for p in holes]
             pressure = [_plus(p, q) for p, q in zip(*pair, strict=True)]
         else:
             pressure = _plus(*holes)
-        moved = self.displacements, other.displacements
-        if moved[0] is None or moved[1] is None:
-            displacements = moved[0] if moved[1] is None else moved[1]
+        mine, others = self.displacements, other.displacements
+        if mine is None or others is None:
+            displacements = mine if others is None else others
         else:
-            displacements = [_plus(a, b) for a, b in zip(*moved, strict=True)]
+            displacements = [_plus(a, b) for a, b in zip(mine, others, strict=True)]
         return BodyLoad(
-            **joined,
+            segments=_joined(self.segments, other.segments),
+            tractions=_joined(self.tractions, other.tractions),
+            points=_joined(self.points, other.points),
+            forces=_joined(self.forces, other.forces),
             **summed,
             about=about,
             k0=k0,
             hole_pressure=pressure,
             displacements=displacements,
-            sides=self.sides + other.sides,
+            sides=(*self.sides, *other.sides),
             kelvin=self.kelvin or other.kelvin,
         )
 
     def hole_pressures(self, n_holes: int) -> list[Pressure]:
         """Pressure in each hole, [] if there is none. Raises ValueError if their number does not match."""
         given = self.hole_pressure
-        if np.ndim(given) == 0 and not isinstance(given, Pressure) and given == 0:
+        if isinstance(given, Sequence) or (isinstance(given, np.ndarray) and given.ndim):
+            each = list(given)
+        elif not isinstance(given, Pressure) and given == 0:
             return []
-        if isinstance(given, Pressure) or np.ndim(given) == 0:
-            given = [given] * n_holes
-            if not n_holes:
-                raise ValueError("a pressure in holes, but the body has none")
-        if len(given) != n_holes:
-            raise ValueError(f"{n_holes} holes but {len(given)} pressures")
-        return [p if isinstance(p, Pressure) else Pressure(float(p)) for p in given]
+        elif not n_holes:
+            raise ValueError("a pressure in holes, but the body has none")
+        else:
+            each = [given] * n_holes
+        if len(each) != n_holes:
+            raise ValueError(f"{n_holes} holes but {len(each)} pressures")
+        return [p if isinstance(p, Pressure) else Pressure(float(p)) for p in each]
 
     def face_pressure(self, points: np.ndarray, segment: np.ndarray, n_segments: int) -> np.ndarray | float:
         """(n, m) Pa at ``points`` (n, m, 2) on crack elements of ``segment`` (n,), or an array that broadcasts to it.
@@ -211,8 +212,8 @@ class BodyLoad:
         for p in self.hole_pressure if isinstance(self.hole_pressure, Sequence) else [self.hole_pressure]:
             if not isinstance(p, Pressure) and not np.isfinite(p).all():
                 raise ValueError("hole_pressure: not finite")
-        p = self.crack_pressure
-        if not callable(p) and not isinstance(p, Pressure) and not np.isfinite(p).all():
+        in_cracks = self.crack_pressure
+        if not callable(in_cracks) and not isinstance(in_cracks, Pressure) and not np.isfinite(in_cracks).all():
             raise ValueError("crack_pressure: not finite")
         n = [0 if x is None else len(x) for x in (self.segments, self.tractions)]
         if n[0] != n[1]:
@@ -261,6 +262,10 @@ def _number(p) -> float:
     if np.ndim(p):
         raise ValueError("a pressure that is linear in position cannot be added to a list with one for each crack")
     return float(p)
+
+
+def _equal(a: np.ndarray | None, b: np.ndarray | None) -> bool:
+    return a is b or (a is not None and b is not None and np.array_equal(a, b))
 
 
 def _joined(a: np.ndarray | None, b: np.ndarray | None) -> np.ndarray | None:

@@ -76,7 +76,8 @@ class Applied:
 
     def stress(self, points: np.ndarray) -> np.ndarray:
         """(n, 3) stress, Pa, of all parts except line forces."""
-        return self.particular.stress(points) + sum(p.stress(points) for p in (*self.kelvin, *self.wedges))
+        points_of: list[KelvinLoad | WedgeLoad] = [*self.kelvin, *self.wedges]
+        return self.particular.stress(points) + sum(p.stress(points) for p in points_of)
 
     def displacement(self, points: np.ndarray) -> np.ndarray:
         """(n, 2) displacement, m, of all parts except line forces."""
@@ -114,12 +115,12 @@ def apply(load: BodyLoad, body: CrackedBody) -> Applied:
             value = value[::-1] if against and not callable(value) and value.ndim == 2 else value
         if callable(value):
             # A free surface has no elements that could be divided at the load.
-            parts = pieces(boundary, edge, segment) if edge < len(edges) else (segment[:1], segment[1:])
-            functions.append(approximate(value, *parts, name))
+            start, end = pieces(boundary, edge, segment) if edge < len(edges) else (segment[:1], segment[1:])
+            functions.append(approximate(value, start, end, name))
         else:
             segments.append(segment[None])
             tractions.append(np.broadcast_to(value, (2, 2))[None])
-    if load.points is not None:
+    if load.points is not None and load.forces is not None:
         for k, (point, force) in enumerate(zip(load.points, load.forces)):
             _point(out, body, k, point, force, segments, tractions)
     out.segments, out.tractions = np.concatenate(segments), np.concatenate(tractions)
@@ -217,7 +218,7 @@ def _meets(edges: np.ndarray, origin: np.ndarray, way: np.ndarray, own: set[int]
     return bool((across & (ahead.max(axis=1) > 1e-9 * extent)).any())
 
 
-def _left_over(wedge: WedgeLoad, body: CrackedBody) -> LineForces:
+def _left_over(wedge: WedgeLoad, body: CrackedBody) -> LineForces | None:
     """Minus the tractions of the ``wedge``'s field on the boundary, away from the wedge's own sides."""
     edges, parts = body.mesh.edges, []
     for edge in range(len(edges)):
@@ -259,7 +260,8 @@ def check_equilibrium(applied: Applied, body: CrackedBody, tolerance: float) -> 
         area, centre = body.hole_moments[k]
         arm = centre - body.centroid
         add(area * way, area * (arm[0] * way[1] - arm[1] * way[0]), abs(pressure.at(centre)) * np.sqrt(area))
-    for p in (*applied.kelvin, *applied.wedges):
+    at_points: list[KelvinLoad | WedgeLoad] = [*applied.kelvin, *applied.wedges]
+    for p in at_points:
         arm = p.point - body.centroid
         add(p.force, arm[0] * p.force[1] - arm[1] * p.force[0], float(np.hypot(*p.force)))
     if applied.functions is not None:

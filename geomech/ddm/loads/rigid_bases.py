@@ -22,11 +22,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..body import Body
 from ..kernels import shape_functions
 from ..system.influence_matrix import ElementSet
 
 if TYPE_CHECKING:
-    from ..body import Body
     from ..crack_contact.face_laws import FaceMemory
     from ..solution import Solution
     from .body_loads import BodyLoad
@@ -69,12 +69,15 @@ def on_bases(
 
     The load's tractions on ``bases`` are used only for their force and moment. Raises what `Body.solve` raises.
     """
+    assert load.segments is not None and load.tractions is not None  # bases are some of them
     faces = _Faces(body, load.segments, bases)
-    pressure = faces.pressures(load.tractions)
+    given = load.tractions
+    pressure = faces.pressures(given)
     right = faces.resultants @ pressure
     for _ in range(MOST):
         warm = body.solve(load, warm=warm, history=history)
         if warm.body is not body:  # a finer one meets the target error
+            assert isinstance(warm.body, Body)
             return on_bases(warm.body, load, bases, warm, history)
         gives = faces.compliance(warm)
         still = faces.moved(warm) - gives @ pressure
@@ -86,7 +89,8 @@ def on_bases(
         if change <= SETTLED * np.abs(found).max():
             return warm
         pressure = found
-        load = replace(load, tractions=faces.tractions(load.tractions, pressure))
+        given = faces.tractions(given, pressure)
+        load = replace(load, tractions=given)
     _log.debug("pressures on rigid bases have not converged: last relative change %.1e", change)
     return body.solve(load, warm=warm, history=history)
 
@@ -105,6 +109,8 @@ class _Faces:
         if self._key not in body.on_bases:
             body.on_bases.clear()
             body.on_bases[self._key] = self._geometry()
+        self.weights: np.ndarray
+        self.resultants: np.ndarray
         self.weights, self.resultants = body.on_bases[self._key]
 
     def _geometry(self) -> tuple[np.ndarray, np.ndarray]:
@@ -146,10 +152,14 @@ class _Faces:
         key = self._key + b"states" + solution.face_states.key
         if key not in body.on_bases:
             body.on_bases.clear()
-            body.on_bases[self._key], body.on_bases[key] = (self.weights, self.resultants), self._of_tractions(solution)
+            body.on_bases[self._key], body.on_bases[key] = (
+                (self.weights, self.resultants),
+                (self._of_tractions(solution),),
+            )
         n = int(self.first[-1])
         way = np.concatenate([np.tile(base.per_pressure, (len(base.rows) + 1, 1)) for base in self.bases])
-        return body.on_bases[key][:, :n] * way[:, 0] + body.on_bases[key][:, n:] * way[:, 1]
+        (gives,) = body.on_bases[key]
+        return gives[:, :n] * way[:, 0] + gives[:, n:] * way[:, 1]
 
     def _of_tractions(self, solution: Solution) -> np.ndarray:
         """(n, 2 n) the same for unit tractions at the nodes, along x and then along y: the ratio of shear to pressure

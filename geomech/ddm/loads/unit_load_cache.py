@@ -157,7 +157,7 @@ class UnitLoads:
         units: list[tuple[UnitLoad, np.ndarray]],
         rest: np.ndarray,
         boundary: BoundarySystem,
-        cg: np.ndarray,
+        cg: np.ndarray | KeptRows,
         opened: Callable[[np.ndarray], np.ndarray],
     ) -> tuple[np.ndarray, ...]:
         """g, r, y, r' and S⁻¹ r' (see `UnitLoad`) of the ``units`` and of ``rest`` (n,), tractions on boundary and
@@ -189,11 +189,12 @@ class UnitLoads:
             total += np.concatenate([rest, y, reduced, opened(reduced)])
         return total[:n_g], total[n_g:n], total[n : n + n_g], total[n + n_g : 2 * n], total[2 * n :]
 
-    def _answer(self, units: list[UnitLoad], boundary: BoundarySystem, cg: np.ndarray, opened) -> None:
+    def _answer(self, units: list[UnitLoad], boundary: BoundarySystem, cg: np.ndarray | KeptRows, opened) -> None:
         """Compute the responses to the ``units``."""
         n_g = self.boundary.n_unknowns
         self._eliminate(units, boundary)
         for unit in units:
+            assert unit.eliminated is not None
             reduced = unit.applied[n_g:] - cg @ unit.eliminated
             unit.answered = np.concatenate([unit.applied, unit.eliminated, reduced, opened(reduced)])
 

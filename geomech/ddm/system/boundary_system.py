@@ -45,6 +45,17 @@ class BoundarySystem:
     numpy.linalg.LinAlgError when they are singular.
     """
 
+    elements: ElementSet
+    holds: Holds | None
+    extent: float
+    matrix: np.ndarray | Compressed | SupportedBoundaryMatrix
+    known: np.ndarray | PrescribedJumps
+    rigid: np.ndarray
+    weights: np.ndarray
+    free_motions: FreeMotions | None
+    anchors: Anchors | None
+    factor: Factor | IteratedBoundary
+
     def __init__(
         self,
         mesh: Mesh,
@@ -61,15 +72,15 @@ class BoundarySystem:
         self.iterated = iterated
         self._nu, self._tol, self.work = nu, tol, work
         self.at_old = at_old = g.found_in(previous.elements if previous else None)
-        self.unchanged = (
+        #: Number of successive bodies that have used this boundary unchanged.
+        self.generation, self.unchanged = 0, False
+        if (
             previous is not None
             and previous.iterated == self.iterated
             and g.n == previous.elements.n
             and np.array_equal(at_old, np.arange(g.n))
-        )
-        #: Number of successive bodies that have used this boundary unchanged.
-        self.generation = previous.generation + 1 if self.unchanged else 0
-        if self.unchanged:
+        ):
+            self.generation, self.unchanged = previous.generation + 1, True
             self.elements, self.holds, self.extent = previous.elements, previous.holds, previous.extent
             self.matrix, self.known, self.factor = previous.matrix, previous.known, previous.factor
             self.rigid, self.weights, self.free_motions = previous.rigid, previous.weights, previous.free_motions
@@ -81,35 +92,34 @@ class BoundarySystem:
             self.known, self.free_motions, self.anchors = np.empty((g.n_unknowns, 0)), None, None
             self.matrix = jumps = Compressed(g, g, nu, tol)
             if holds is not None:
-                self._constrain_rigid_motions(mesh)
+                self._constrain_rigid_motions(mesh, holds)
                 self.matrix, self.known = SupportedBoundaryMatrix(jumps, holds, nu, tol), PrescribedJumps(jumps, holds)
 
-            def between(elements):
+            def between(elements: np.ndarray) -> np.ndarray:
                 return self.influence_on(g.take(elements), elements)
 
             self.factor = IteratedBoundary(g, self.matrix, self.rigid, self.weights, extent, nu, tol, between)
             return
         # With anchored holes, the old matrix contains the anchors' terms besides tractions.
-        dense = previous is not None and previous.anchors is None and not previous.iterated
-        known = previous.matrix if dense else None
-        self.matrix = reuse(known, at_old, at_old, g, g, lambda r, k: self.influence_on(g.take(r), k))
-        self.known = np.empty((g.n_unknowns, 0)) if holds is None else holds.known(g, nu, tol)
+        before = previous.matrix if previous is not None and previous.anchors is None else None
+        dense = before if isinstance(before, np.ndarray) else None
+        matrix = reuse(dense, at_old, at_old, g, g, lambda r, k: self.influence_on(g.take(r), k))
+        known = np.empty((g.n_unknowns, 0)) if holds is None else holds.known(g, nu, tol)
+        self.matrix, self.known = matrix, known
         self.rigid, self.weights = rigid_motions(g, mesh.edge_loop)
-        self.free_motions: FreeMotions | None = None
-        self.anchors: Anchors | None = None
+        self.free_motions = self.anchors = None
         if holds is not None:
-            self._constrain_rigid_motions(mesh)
-        if self.anchors is not None:
-            anchors = self.anchors
-            self.anchored(self.matrix, holds.mixed(anchors.of_jumps(g), anchors.of_shapes(holds.sources)))
-            self.anchored(self.known, anchors.of_jumps(holds.sources))
+            anchors = self._constrain_rigid_motions(mesh, holds)
+            if anchors is not None:
+                self.anchored(matrix, holds.mixed(anchors.of_jumps(g), anchors.of_shapes(holds.sources)))
+                self.anchored(known, anchors.of_jumps(holds.sources))
         # Column-major like the matrix: adding arrays of different order takes several times as long.
         regularisation = (self.weights.T @ self.rigid.T).T / extent
-        self.factor = Factor(self.matrix + regularisation, "the boundary equations are singular")
+        self.factor = Factor(matrix + regularisation, "the boundary equations are singular")
 
-    def _constrain_rigid_motions(self, mesh: Mesh) -> None:
-        """Keep the free rigid motions; anchor holes against the others."""
-        holds, g = self.holds, self.elements
+    def _constrain_rigid_motions(self, mesh: Mesh, holds: Holds) -> Anchors | None:
+        """Keep the free rigid motions; anchor holes against the others. Returns the anchors, None without any."""
+        g = self.elements
         loop_of = mesh.edge_loop[g.source]
         _, centre, radius = outline_centroid(g.take(np.flatnonzero(loop_of == 0)))
         whole, _ = rigid_motions(g, np.zeros_like(mesh.edge_loop), (centre, radius))
@@ -130,10 +140,12 @@ class BoundarySystem:
                 anchors.add(motions @ blocked / self.extent, blocked, middle, size, hole)
         self.rigid, self.weights = np.hstack(modes), np.concatenate(means)
         self.anchors = anchors if anchors.number else None
+        return self.anchors
 
     def anchored(self, rows: np.ndarray, motions: np.ndarray) -> np.ndarray:
         """Add to ``rows`` (boundary rows, k), in place, the tractions of the sources that move supported holes by
         ``motions`` (r, k)."""
+        assert self.anchors is not None
         rows += self.anchors.rows @ motions
         return rows
 
@@ -149,10 +161,11 @@ class BoundarySystem:
 
     def solve_few(self, right: np.ndarray) -> np.ndarray:
         """`solve` for the few columns (n, k) of new elements."""
-        if self.iterated or self.generation <= OFTEN or self.elements.n_unknowns > INVERTED:
+        factor = self.factor
+        if not isinstance(factor, Factor) or self.generation <= OFTEN or self.elements.n_unknowns > INVERTED:
             return self.solve(right)
         self.work.back_substitutions += right.shape[1]
-        return np.matmul(self.factor.inverse, np.asfortranarray(right), out=np.empty(right.shape, order="F"))
+        return np.matmul(factor.inverse, np.asfortranarray(right), out=np.empty(right.shape, order="F"))
 
     def times(self, u: np.ndarray, rigid_part: np.ndarray) -> np.ndarray:
         """A_ΓΓ ``u``, plus the terms that remove the rigid motions, applied to ``rigid_part``."""
