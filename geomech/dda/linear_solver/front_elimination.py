@@ -36,7 +36,7 @@ from .simd import (
     store_six,
     zeros,
 )
-from .small_products import small_product
+from .small_products import Matrix, Size, small_product
 
 #: Sums may be reordered and fused, as in BLAS products of whole fronts.
 _part = part(fastmath={"reassoc", "contract", "nsz"}, error_model="numpy", nogil=True, **UNCOUNTED)
@@ -62,12 +62,12 @@ _gemm = types.ExternalFunction(
 
 
 @_part
-def _add_product(a, at_a, row_a, b, at_b, row_b, c, at_c, row_c, rows, k, n, keep, width, units):
-    """C ← A B, or C + A B to ``keep`` C: ``rows`` × k times k × n numbers, given by the begin of each matrix in the
-    arrays a, b and c and the distance of its rows; ``units`` (2,) are 1 and 0."""
+def _add_product(c_of, a_of, b_of, size, keep, width, units):
+    """C ← A B, or C + A B to ``keep`` C: `Matrix` of arrays; ``size`` as `Size`; ``units`` (2,) are 1 and 0."""
+    (c, at_c, row_c), (a, at_a, row_a), (b, at_b, row_b), (rows, k, n) = c_of, a_of, b_of, size
     if rows * n < LARGE:
-        place = numbers(c)
-        small_product(place, at_c, row_c, numbers(a), at_a, row_a, numbers(b), at_b, row_b, rows, k, n, width, keep)
+        place = Matrix(numbers(c), at_c, row_c)
+        small_product(place, Matrix(numbers(a), at_a, row_a), Matrix(numbers(b), at_b, row_b), size, width, keep)
     elif k > 0:
         # Row-major arrays are their transposes to BLAS: cᵀ = bᵀaᵀ.
         _gemm(
@@ -282,13 +282,13 @@ def _factor(front, p, b, space, units, width):
             h, k, known = end - start, start - begin, begin * m + start
             if k > 0:
                 # Effect of this strip's earlier panels on the rows of this one, and on the columns below.
-                small_product(
-                    here, start * m + start, m, here, start * m + begin, m, here, known, m, h, k, m - start, width, True
-                )
-                small_product(
-                    here, end * m + start, m, here, end * m + begin, m, here, known, m, p - end, k, h, width, True
-                )
-                small_product(here, lower + start, p, here, lower + begin, p, here, known, m, b, k, h, width, True)
+                above = Matrix(here, known, m)
+                rows, earlier = Matrix(here, start * m + start, m), Matrix(here, start * m + begin, m)
+                small_product(rows, earlier, above, Size(h, k, m - start), width, True)
+                below, earlier = Matrix(here, end * m + start, m), Matrix(here, end * m + begin, m)
+                small_product(below, earlier, above, Size(p - end, k, h), width, True)
+                others_below, earlier = Matrix(here, lower + start, p), Matrix(here, lower + begin, p)
+                small_product(others_below, earlier, above, Size(b, k, h), width, True)
             if not _invert(front, start * m + start, m, h, cell, others, swapped, width):
                 return False
             for i in range(h):
@@ -296,19 +296,15 @@ def _factor(front, p, b, space, units, width):
                 given = front[(start + i) * m + end : (start + i + 1) * m]
                 for j in range(len(copied)):
                     copied[j] = -given[j]
-            small_product(
-                here, start * m + end, m, here, start * m + start, m, numbers(panel), 0, m - end, h, h, m - end, width,
-                False,
-            )  # fmt: skip
+            behind, inverse = Matrix(here, start * m + end, m), Matrix(here, start * m + start, m)
+            small_product(behind, inverse, Matrix(numbers(panel), 0, m - end), Size(h, h, m - end), width, False)
         k, known = stop - begin, begin * m + stop
         if stop < p:
-            _add_product(
-                front, stop * m + begin, m, front, known, m, front, stop * m + stop, m, p - stop, k, m - stop, True,
-                width, units,
-            )  # fmt: skip
-            _add_product(
-                front, lower + begin, p, front, known, m, front, lower + stop, p, b, k, p - stop, True, width, units
-            )
+            above = Matrix(front, known, m)
+            rest, earlier = Matrix(front, stop * m + stop, m), Matrix(front, stop * m + begin, m)
+            _add_product(rest, earlier, above, Size(p - stop, k, m - stop), True, width, units)
+            rest, earlier = Matrix(front, lower + stop, p), Matrix(front, lower + begin, p)
+            _add_product(rest, earlier, above, Size(b, k, p - stop), True, width, units)
     # Keeps the arrays alive, which are addressed by pointers above.
     return len(front) + len(panel) > 0
 
@@ -339,7 +335,8 @@ def eliminate(first, last, touched, fronts, matrix, stored, memory, space):
         if not _factor(front, p, b, (panel, cell, others, swapped), units, width):
             return False
         if p > 0:
-            _add_product(front, p * m, p, front, p, m, room, stack[f], b, b, p, b, False, width, units)
+            left, mine = Matrix(front, p * m, p), Matrix(front, p, m)
+            _add_product(Matrix(room, stack[f], b), left, mine, Size(b, p, b), False, width, units)
         else:
             _clear(room[stack[f] : stack[f] + b * b])
         _leave(front, p, m, factors, at[f], back[f])

@@ -18,6 +18,7 @@ from geomech.dda.linear_solver import (
     task_pool,
 )
 from geomech.dda.linear_solver.block_solver import BlockSolver
+from geomech.dda.linear_solver.small_products import Matrix, Size
 
 
 def springs_between(n, seed, islands=False):
@@ -185,8 +186,8 @@ def test_products_of_parts_of_fronts_are_those_of_numpy(dtype):
     front = rng.normal(size=(720, 700)).astype(dtype)
 
     @kept(error_model="numpy", nogil=True)
-    def add_product(a, at_a, row_a, b, at_b, row_b, c, at_c, row_c, rows, k, n, keep, width, units):  # noqa: PLR0913
-        front_elimination._add_product(a, at_a, row_a, b, at_b, row_b, c, at_c, row_c, rows, k, n, keep, width, units)
+    def add_product(c, a, b, size, keep, width, units):
+        front_elimination._add_product(c, a, b, size, keep, width, units)
 
     units, width = np.array([1, 0], dtype), simd.BYTES // front.itemsize
     # Of whole registers and not, one and more; the last one is for BLAS.
@@ -197,8 +198,8 @@ def test_products_of_parts_of_fronts_are_those_of_numpy(dtype):
             c = front.copy() if keep else np.full_like(front, np.nan)
             expected = c.astype(float)
             expected[60 : 60 + rows, 40 : 40 + n] = product + (front[60 : 60 + rows, 40 : 40 + n] if keep else 0.0)
-            given = front.ravel(), 24 * 700, 700, front.ravel(), 35, 700, c.reshape(-1), 60 * 700 + 40, 700
-            add_product(*given, rows, k, n, keep, width, units)
+            given = Matrix(c.reshape(-1), 60 * 700 + 40, 700), Matrix(front.ravel(), 24 * 700, 700)
+            add_product(*given, Matrix(front.ravel(), 35, 700), Size(rows, k, n), keep, width, units)
             # What lies beside them is as it was.
             assert np.allclose(c, expected, rtol=0.0, atol=100 * np.finfo(dtype).eps, equal_nan=True)
 
