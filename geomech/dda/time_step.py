@@ -282,9 +282,14 @@ class Attempt:
             time = state.time + 0.5 * self.dt if load_time is None else load_time
             self.quiet = ViscousEdges.of(
                 loads.viscous_boundaries, system.blocks, self.midpoint.vertices, time, system.density, system.stiffness,
-                system.fixed,
+                self._without_dashpots,
             )  # fmt: skip
             self.quiet.assemble(self.matrix, self.right, self.order, self.midpoint, self.dt)
+
+    @property
+    def _without_dashpots(self) -> np.ndarray:
+        """(n_blocks,) bool: blocks on whose edges `quiet` has no dashpots."""
+        return self.system.fixed
 
     def _constrained(self) -> np.ndarray | None:
         """(n_blocks, 6) bool: which unknowns of blocks are constrained in this step; None without."""

@@ -20,7 +20,10 @@ from ...model import OPEN, Loads, State
 from ..interfaces import SteppedSystem
 from ..kinematics.midpoint_configuration import MidpointConfiguration
 from ..loads.bending_actions import BendingActions, DeflectedPoints
+from ..loads.bending_dashpots import BendingDashpots
+from ..loads.load_vectors import generalised
 from ..loads.prescribed_motion import MovedBlocks
+from ..loads.viscous_boundary import ViscousEdges
 from ..open_close.contact_set import ContactSet
 from ..open_close.equations import Unsettled
 from ..out_of_balance import imbalance
@@ -120,8 +123,37 @@ class BendingAttempt(Attempt):
             if faces is None
             else Glue.of(faces, self.state, self.vertices, (self.deflection, self.strained), self.midpoint, self.turn)
         )
-        bending = (scheme.weight + drag / dt)[:, None, None] * blocks.stiffness
-        self._own_matrices(bending, inertia * self.shared, inertia * self.density * blocks.basis.area)
+        self._bending = (scheme.weight + drag / dt)[:, None, None] * blocks.stiffness
+        self._inertia = inertia * self.shared, inertia * self.density * blocks.basis.area
+
+    @property
+    def _without_dashpots(self) -> np.ndarray:
+        return self.system.fixed | (self.blocks.order > 1)
+
+    def _absorb(self, loads: Loads, load_time: float | None) -> None:
+        super()._absorb(loads, load_time)
+        self._own_matrices(self._bending, *self._inertia)
+        system, self.dashpots = self.system, None
+        #: block → matrix of its dashpots.
+        self.damped: dict[int, np.ndarray] = {}
+        if self.quiet is None:
+            return
+        time = self.state.time + 0.5 * self.dt if load_time is None else load_time
+        edges = ViscousEdges.of(
+            loads.viscous_boundaries, system.blocks, self.midpoint.vertices, time, system.density, system.stiffness,
+            system.fixed | (self.blocks.order < 2),
+        )  # fmt: skip
+        self.dashpots = BendingDashpots.of(edges, self.blocks, self.midpoint, self.angle)
+        if self.dashpots is None:
+            return
+        for b, (matrix, right) in self.dashpots.equations(self.dt).items():
+            m, width = n_deflections(int(self.blocks.order[b])), 6 * int(self.blocks.rows[b])
+            own = self.own[self.own_at[b] : self.own_at[b] + width * width].reshape(width, width)
+            own[: 6 + m, : 6 + m] += matrix[: 6 + m, : 6 + m]
+            self.own_right[b, :m] += right[6 : 6 + m]
+            self.matrix[self.order[b]] += matrix[:6, :6]
+            self.right[self.order[b]] += right[:6]
+            self.damped[b] = matrix
 
     def _own_matrices(self, bending: np.ndarray, shared: np.ndarray, mass: np.ndarray) -> None:
         """The blocks' own matrices, one after the other.
@@ -266,6 +298,8 @@ class BendingAttempt(Attempt):
         mean = blocks.padded(2.0 / self.dt**2 * (change - self.dt * self.rates))
         blocks.acceleration = np.sqrt((mean * mean).sum(axis=1))
         self.largest = max(self.largest, float(blocks.largest(change)[0].max()))
+        if self.dashpots is not None:
+            self._brake(self.dashpots)
         if self.glue is not None:
             self.glue_change = self.glue.change(self.unknowns.ravel(), self._six_rows)
         if self.n_free:
@@ -279,6 +313,18 @@ class BendingAttempt(Attempt):
             if self.actions is not None:
                 self.slid += self.actions.along
         self.places.take(self.state.rotation + self.increment[:, 2], self.deflection + change)
+
+    def _brake(self, dashpots: BendingDashpots) -> None:
+        """Add the forces of ``dashpots`` to the loads of the step."""
+        change = self.blocks.padded(self.bent_by)
+        unknowns, moving = np.zeros((len(change), 6 + change.shape[1])), self.system.moving
+        unknowns[moving, :6] = self.unknowns[self.order[moving]]
+        unknowns[:, 6:] = change
+        forces = dashpots.point_rows(unknowns, self.dt)
+        self.points = np.concatenate([self.points, forces])
+        acting = generalised(forces, self.edges[:0], self.midpoint.centroid)
+        self.load = self.load + self.midpoint.loads_back(acting)
+        self.braked = dashpots.deflecting_work(forces, change)
 
     def path(self, after: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         blocks, q, turned = self.blocks, self.deflection, self.state.rotation + self.increment[:, 2]
@@ -299,6 +345,9 @@ class BendingAttempt(Attempt):
         bent = inertia * np.einsum("bej,bj->be", self.shared, self.blocks.padded(self.bent_by))
         moving = self.system.moving
         right[self.order[moving], 3:6] += (self.coupled_right - bent)[moving]
+        for b, matrix in self.damped.items():
+            own = self.bent_by[self.blocks.basis.of_block(b)]
+            right[self.order[b]] -= matrix[:6, 6 : 6 + len(own)] @ own
         if self.glue is not None:
             forces = self.glue.forces(self.system.scheme.weight * self.glue_change, len(self.order))
             right[self.order[moving]] += forces[moving]
@@ -323,6 +372,8 @@ class BendingAttempt(Attempt):
         worked = float((self.bending_load * padded).sum())
         if self.actions is not None:
             worked += self.actions.deflecting_work(padded)
+        if self.dashpots is not None:
+            worked += self.braked
         # Work of inertia with the mean acceleration of the step: of deflection alone, and of its coupling with strains.
         rate = 2.0 / dt**2 * (change - dt * self.rates)
         mean = self.acceleration[:, 3:]

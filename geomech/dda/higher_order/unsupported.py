@@ -47,16 +47,9 @@ def refuse_unsupported(
         refuse(bends, 'its contacts must be penalty springs or joints with a stiffness: leave dda.contact at "penalty"')
 
 
-def refuse_unsupported_loads(loads: Loads) -> None:
-    """Raise ValueError for ``loads`` that blocks of higher order do not support yet."""
-    for name, what in (
-        ("block_motions", "prescribed motion of blocks"),
-        ("point_motions", "prescribed motion of points"), ("viscous_boundaries", "viscous boundaries"),
-    ):  # fmt: skip
-        if getattr(loads, name):
-            raise ValueError(f"{what} are not supported with blocks of an order above 1 yet")
-    if loads.base is not None and loads.base.frame == "ground":
-        raise ValueError(
-            'a base that shakes in the frame "ground" is not supported with blocks of an order above 1 yet: take the '
-            'frame "base"'
-        )
+def refuse_unsupported_loads(loads: Loads, bends: np.ndarray) -> None:
+    """Raise ValueError for ``loads`` that blocks of higher order, those that ``bends`` (n_blocks,) bool, do not support
+    yet."""
+    for motions, what in ((loads.block_motions, "blocks"), (loads.point_motions, "points")):
+        if any(bends[motion.block] for motion in motions):
+            raise ValueError(f"prescribed motion of {what} of an order above 1 is not supported yet")

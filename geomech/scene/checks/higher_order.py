@@ -5,12 +5,6 @@ from __future__ import annotations
 from ..validation import nearest
 from .check import Check
 
-#: Keys of [loads] that move, constrain or strain blocks in ways not implemented for deflection.
-_LOADS = {
-    "motions": "prescribed motion", "point_motions": "prescribed motion of points",
-    "viscous_boundaries": "viscous boundaries",
-}  # fmt: skip
-
 
 def quoted(order: int | str) -> str:
     """As written in a scene."""
@@ -36,19 +30,26 @@ def check_orders(c: Check) -> None:
         _check_cracks(c, refuse)
         _check_joints(c, refuse)
         _check_solver(c, refuse)
-        for key, what in _LOADS.items():
-            if t.loads is not None and getattr(t.loads, key):
-                refuse(
-                    f"{what} ([loads] {key}) together with blocks of higher order are not supported yet",
-                    "leave out one",
-                )
+        _check_motions(c, name, refuse)
         if t.loads is not None and t.loads.in_situ is not None and zone.order == "auto":
             refuse(
                 "in-situ stress ([loads] in_situ) with an order that is found is not supported yet",
                 "give the order by number, 2 to 8",
             )
-        if t.loads is not None and t.loads.base is not None and t.loads.base.frame == "ground":
-            refuse('a base that shakes in the frame "ground" is not supported yet', 'set frame = "base"')
+
+
+def _check_motions(c: Check, zone: str, refuse) -> None:
+    """Motion cannot be prescribed to the blocks of ``zone``, nor to points in them."""
+    loads = c.tables.loads
+    if loads is None:
+        return
+    if any(motion.zone == zone for motion in loads.motions):
+        refuse("prescribed motion ([loads] motions) of blocks of higher order is not supported yet", "leave out one")
+    if any(motion.zone in (zone, None) for motion in loads.point_motions):
+        refuse(
+            "prescribed motion of points ([loads] point_motions) of blocks of higher order is not supported yet",
+            "leave out one, or name the zone of the point if it is another one",
+        )
 
 
 def _check_cell_joint(c: Check, zone: str, joint: str | None) -> None:

@@ -9,7 +9,7 @@ import pytest
 from scenes_of_bending import ROCK, after, moved, rectangle, system_of, turned
 
 from geomech.dda import EnergyBudget
-from geomech.model import BlockMotion, EdgeTraction, History, JointLaw, Loads, Material, State
+from geomech.model import EdgeTraction, History, JointLaw, Loads, Material, State
 
 WEIGHT = Loads(gravity=History.constant((0.0, -9.81)))
 #: The trapezoidal rule, which does not dissipate, without damping.
@@ -121,12 +121,3 @@ def test_what_is_not_supported_is_refused_by_name():
         system_of(polygons, [1, 0], [1, 11])
     # What is fixed does not bend, whatever its order.
     assert after(system_of(polygons, [1, 0], [7, 1]), WEIGHT, 1).state.deflection is None
-
-
-def test_loads_that_deflection_does_not_know_are_refused_by_name():
-    system = system_of([rectangle(-1, -1, 3, 0), rectangle(0, 0, 2, 1)], [1, 0], [1, 3])
-    loads = replace(WEIGHT, block_motions=(BlockMotion(1, History.constant((0.0, 0.0, 0.0))),))
-    with pytest.raises(
-        ValueError, match="prescribed motion of blocks are not supported with blocks of an order above 1"
-    ):
-        system.step(State.at_rest(system.blocks), loads)

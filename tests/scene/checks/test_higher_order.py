@@ -26,7 +26,10 @@ def scene(tmp_path, *more: str, text: str = BENDING):
     [
         ("[joints.default]\nfriction_angle_deg = 30\nrestitution = 0.4\n", r"\[joints.default\] restitution"),
         ("[joints.default]\nfriction_angle_deg = 30\njrc = 8\njcs_pa = 1e8\n", "softens, dilates or closes"),
-        ('[[loads.viscous_boundaries]]\nedge = "x"\n', r"viscous boundaries \(\[loads\] viscous_boundaries\)"),
+        (
+            "[[loads.point_motions]]\nat = [1.5, 0.5]\nvelocity_m_per_s = [0, -1]\n",
+            r"motion of points \(\[loads\] point_motions\)",
+        ),
         ('[[loads.motions]]\nzone = "block"\nvelocity_m_per_s = [0, -1]\n', r"prescribed motion"),
     ],
 )
@@ -161,6 +164,27 @@ def test_cells_of_a_scene_are_excavated(tmp_path):
     corners = inside.cells.reshape(-1, 4)[:, 1:]
     assert taken.any() and not np.asarray(inside["stress"])[corners[taken]].any()
     assert np.asarray(inside["stress"])[corners[~taken]].any()
+
+
+def test_a_bolted_block_on_a_shaken_base_runs_and_resumes(tmp_path):
+    more = """[[loads.bolts]]
+name = "tie"
+start = [1.5, 0.8]
+end = [1.5, -0.5]
+stiffness_n_per_m = 1e7
+pretension_n_per_m = 1e4
+[loads.base]
+frame = "ground"
+acceleration_m_s2 = [1.0, 0.0]
+frequency_hz = 5.0
+[output]
+checkpoint_every = 1
+"""
+    folder, whole = tmp_path / "run", tmp_path / "whole"
+    run(load_scene(scene(tmp_path, more)), folder)
+    resume(folder, ("run.end_time_s=0.05",), quiet=True)
+    run(load_scene(scene(tmp_path, more), ("run.end_time_s=0.05",)), whole)
+    assert (folder / "history.csv").read_bytes() == (whole / "history.csv").read_bytes()
 
 
 def test_cells_have_the_joint_by_which_they_part(tmp_path):
