@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from .interruption import Interruption
 from .model import Cycle, Problem
+from .model.former_names import renamed_argument
 
 if TYPE_CHECKING:
     from . import dda
@@ -240,6 +241,7 @@ def cracked_and_free(problem: Problem) -> list[str]:
     return [cracks.names[k] for k in sorted(set(cracks.crack[free].tolist()))]
 
 
+@renamed_argument("compare_toes", "compare")
 def factor_of_safety(
     scene: Scene | str | Path,
     load_time: float | None = None,
@@ -250,7 +252,7 @@ def factor_of_safety(
     **wishes: Any,
 ) -> dda.FactorOfSafety:
     """`geomech.dda.FactorOfSafety` of the blocks of ``scene``, by strength reduction under the loads of ``load_time`` s
-    (default: the scene's end). ``wishes`` as for `geomech.dda.factor_of_safety`: tolerance, watch …
+    (default: the scene's end). ``wishes``: fields of `geomech.dda.FactorSearch`: tolerance, watch …
 
     ``along`` names the joint laws, or joints as they were drawn, whose strength is reduced (default: all). ``divide``
     are partial factors on "cohesion", "friction" (tan φ) and "tension" by which all joints are divided before, as
@@ -270,6 +272,7 @@ def factor_of_safety(
     ).found  # fmt: skip
 
 
+@renamed_argument("compare_toes", "compare")
 def safety_report(
     scene: Scene | str | Path,
     load_time: float | None = None,
@@ -302,14 +305,14 @@ def safety_report(
         )
     factors = dda.PartialFactors.of(divide)
     problem, reduced = dda.design_problem(problem, factors, along)
-    wishes.setdefault("reduce", reduced)
+    search = dda.FactorSearch(**({"reduce": reduced} | wishes))
     found = dda.factor_of_safety(
         problem.blocks, problem.materials, problem.joints, problem.loads, problem.dda, joint_index=problem.joint_index,
-        load_time=problem.run.end_time if load_time is None else load_time, **wishes,
+        load_time=problem.run.end_time if load_time is None else load_time, search=search,
     )  # fmt: skip
     return SafetyReport(
-        problem, found, wishes["reduce"], factors, None if along is None else list(along), tuple(cracks),
-        **({"tolerance": wishes["tolerance"]} if "tolerance" in wishes else {}),
+        problem, found, None if search.reduce is None else list(search.reduce), factors, None if along is None else list(along), tuple(cracks),
+        **({"tolerance": search.tolerance} if "tolerance" in wishes else {}),
     )  # fmt: skip
 
 

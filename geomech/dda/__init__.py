@@ -25,7 +25,7 @@ from .statics.mobilised_strength import MobilisedJoint, mobilised_joints
 from .statics.partial_factors import PartialFactors, design_problem
 from .statics.pseudo_time_equilibrium import RELAXATION_STEP, Equilibrium, equilibrium
 from .statics.safety_answer import FactorOfSafety
-from .statics.strength_reduction import NothingToReduce, factor_of_safety
+from .statics.strength_reduction import FactorSearch, NothingToReduce, factor_of_safety
 from .step_control.adaptive_time_step import StepLength
 from .stepping import run
 from .system import BlockSystem
@@ -41,6 +41,7 @@ __all__ = [
     "EnergyBudget",
     "Equilibrium",
     "FactorOfSafety",
+    "FactorSearch",
     "InSituState",
     "InheritedContacts",
     "MobilisedJoint",

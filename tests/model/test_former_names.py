@@ -43,6 +43,17 @@ def test_the_comparison_of_toes_is_asked_for_by_its_former_name():
         dda.factor_of_safety(blocks, [rock], [joint], loads, reduce=["none"], compare_toes=False)
 
 
+def test_arguments_that_are_gathered_in_a_record_are_taken_one_by_one_still():
+    base = np.array([[-1.0, -1.0], [2.0, -1.0], [2.0, 0.0], [-1.0, 0.0]])
+    blocks = Blocks.from_polygons([[base], SQUARE], fixed=[True, False])
+    given = blocks, [Material("rock", 1e10, 0.2, 2500.0, 1e6)], [JointLaw("joint", math.radians(30))], Loads()
+    gathered = r"reduce=….* is now factor_of_safety\(search=FactorSearch\(reduce=…\)\)"
+    with pytest.warns(DeprecationWarning, match=gathered), pytest.raises(dda.NothingToReduce, match="'none'"):
+        dda.factor_of_safety(*given, reduce=["none"])
+    with pytest.raises(TypeError, match="both 'search' and reduce"):
+        dda.factor_of_safety(*given, reduce=["none"], search=dda.FactorSearch())
+
+
 def test_a_former_name_of_a_package_gives_the_present_one():
     with pytest.warns(DeprecationWarning, match=r"geomech\.dda\.ToldContacts is now geomech\.dda\.InheritedContacts"):
         assert dda.ToldContacts is dda.InheritedContacts

@@ -43,7 +43,7 @@ SLAB = 2600 * GRAVITY * 2 * 4 * np.cos(DIP)
 def test_plane_failure_with_friction_to_round_off(verified, friction_deg, penalty, time_step):
     """tan φ / tan α, whatever the penalty and the step: what is out of balance is A − B/F exactly, and two trials give
     it."""
-    found = slab(JointLaw("plane", np.radians(friction_deg)), penalty, time_step=time_step)
+    found = slab(JointLaw("plane", np.radians(friction_deg)), penalty, search=dda.FactorSearch(time_step=time_step))
     expected = rock_slopes.plane_failure_factor(SLAB, DIP, 4.0, 0.0, np.radians(friction_deg))
     print(f"φ = {friction_deg}°: {found.factor:.10f}, should be {expected:.10f}")
     verified(
@@ -117,7 +117,7 @@ def test_two_blocks_on_a_bilinear_plane(verified, steep_deg, flat_deg, smooth):
     laws = [JointLaw("planes", friction), JointLaw("between", 0.0 if smooth else friction)]
     found = dda.factor_of_safety(
         blocks, [ROCK], laws, WEIGHT, joint_index=lambda a, b: 0 if "base" in (a, b) else 1,
-        reduce=["planes"] if smooth else None,
+        search=dda.FactorSearch(reduce=["planes"] if smooth else None),
     )  # fmt: skip
     weights = 2600 * GRAVITY * blocks.areas()[1:]
     limit = rock_slopes.two_block_friction((weights[0], steep), (weights[1], flat), 0.0 if smooth else None)
@@ -200,11 +200,11 @@ def test_what_cannot_fail_or_stand_is_told():
     with pytest.raises(ValueError, match="no friction, cohesion"):
         dda.factor_of_safety(blocks, [ROCK], [JointLaw("smooth")], WEIGHT)
     with pytest.raises(ValueError, match=r"no joint 'bed'.*'joint'"):
-        dda.factor_of_safety(blocks, [ROCK], [law], WEIGHT, reduce=["bed"])
+        dda.factor_of_safety(blocks, [ROCK], [law], WEIGHT, search=dda.FactorSearch(reduce=["bed"]))
     with pytest.raises(ValueError, match="all blocks are fixed"):
         dda.factor_of_safety(Blocks.from_polygons([rectangle(0, 0, 1, 1)], fixed=[True]), [ROCK], [law], WEIGHT)
     with pytest.raises(ValueError, match="tolerance"):
-        dda.factor_of_safety(blocks, [ROCK], [law], WEIGHT, tolerance=0.0)
+        dda.FactorSearch(tolerance=0.0)
     # A column that stands on less than its weight needs topples, whatever its friction.
     leaning = [turned(rectangle(-3, -2, 8, 0), np.radians(25)), turned(rectangle(2, 0, 3, 4), np.radians(25))]
     with pytest.raises(dda.NotConverged, match="64 times as strong"):

@@ -133,7 +133,7 @@ def test_how_far_a_failed_block_goes_is_told(drop, friction_deg):
         assert found.sharp_travel == pytest.approx(drop / math.sin(DIP), rel=5e-3)
     told = found.as_dict(blocks)
     assert told["travel"]["comes_to_rest"] and told["moving"]["block 1"]["travel_m"] == way.moved[1]
-    assert dda.factor_of_safety(blocks, [ROCK], [law], loads, follow=False).travel is None
+    assert dda.factor_of_safety(blocks, [ROCK], [law], loads, search=dda.FactorSearch(follow=False)).travel is None
 
 
 def test_what_lands_on_a_floor_is_no_equilibrium():

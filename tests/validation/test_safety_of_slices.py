@@ -48,7 +48,9 @@ def test_columns_on_a_stepped_base_topple_at_the_friction_of_limit_equilibrium(v
     base = [(-8, -8), (n * WIDTH + 8, -8), (n * WIDTH + 8, (n - 1) * STEP), *treads[::-1], (-8, 0)]
     outlines = [turned(np.asarray(points, float), DIP) for points in (base, *columns)]
     blocks = Blocks.from_polygons(outlines, fixed=[True] + n * [False])
-    found = dda.factor_of_safety(blocks, [ROCK], [JointLaw("joint", friction)], WEIGHT, tolerance=5e-4)
+    found = dda.factor_of_safety(
+        blocks, [ROCK], [JointLaw("joint", friction)], WEIGHT, search=dda.FactorSearch(tolerance=5e-4)
+    )
     low, high = 0.5, 2.0
     while high - low > 1e-9:
         middle = 0.5 * (low + high)

@@ -130,7 +130,7 @@ def factor(seed: int, solver: ContactSolver) -> None:
     problem = problem_of(factor_slope(seed).scene)
     dda.factor_of_safety(
         problem.blocks, problem.materials, problem.joints, problem.loads, replace(problem.dda, contact_solver=solver),
-        joint_index=problem.joint_index, load_time=problem.run.end_time, compare=False,
+        joint_index=problem.joint_index, load_time=problem.run.end_time, search=dda.FactorSearch(compare=False),
     )  # fmt: skip
 
 

@@ -121,7 +121,8 @@ def _search(slope: FactorSlope, variant: str, seconds: float) -> Searched:
         with at_most(seconds):
             found = dda.factor_of_safety(
                 problem.blocks, problem.materials, problem.joints, problem.loads, problem.dda,
-                joint_index=problem.joint_index, load_time=problem.run.end_time, tolerance=TOLERANCE,
+                joint_index=problem.joint_index, load_time=problem.run.end_time,
+                search=dda.FactorSearch(tolerance=TOLERANCE),
             )  # fmt: skip
         factor = found.factor if math.isfinite(found.upper) else math.inf
         said = tuple(getattr(found, "warnings", ()))

@@ -25,7 +25,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 from ...model import Blocks, DdaSettings, JointLaw, Loads, Material, State
-from ...model.former_names import renamed_argument
+from ...model.former_names import gathered_arguments, renamed_argument
 from ..joint_laws.reduced_strength import reduced
 from ..results import NotConverged
 from ..system import BlockSystem
@@ -76,7 +76,43 @@ class NothingToReduce(ValueError):
     support."""
 
 
+@dataclass(frozen=True)
+class FactorSearch:
+    """How a factor of safety is searched for.
+
+    state        start of the first trial; None: blocks at rest
+    reduce       names of the joint laws to weaken; None: all
+    tolerance    F is enclosed to this relative tolerance
+    unbalanced   a trial is stable when the unbalanced force on every block is below this fraction of the forces on it
+    time_step    s, of the static steps; None: free fall over a hundredth of the smallest block
+    max_steps    largest number of steps of a trial
+    watch        called with every trial
+    toes         "rounded", "sharp" or "free", see `sharp_toes`
+    whole_faces  a face keeps its whole cohesion while any part is in contact
+    compare      the answer reports the factors without rounding of toes whose tips would hold, without toes that hold,
+                 and without faces that have parted at one end
+    follow       the answer tells how far the blocks go that fail
+    """
+
+    state: State | None = None
+    reduce: Sequence[str] | None = None
+    tolerance: float = 2e-3
+    unbalanced: float = 1e-5
+    time_step: float | None = None
+    max_steps: int = 200
+    watch: Callable[[Trial], None] | None = None
+    toes: str = ROUNDED
+    whole_faces: bool = True
+    compare: bool = True
+    follow: bool = True
+
+    def __post_init__(self) -> None:
+        if not 0 < self.tolerance < 1:
+            raise NothingToReduce(f"the tolerance of the factor must lie between 0 and 1, got {self.tolerance!r}")
+
+
 @renamed_argument("compare_toes", "compare")
+@gathered_arguments("search", FactorSearch)
 def factor_of_safety(
     blocks: Blocks,
     materials: Sequence[Material],
@@ -85,29 +121,13 @@ def factor_of_safety(
     settings: DdaSettings | None = None,
     *,
     joint_index: Callable[[str, str], int | None] | None = None,
-    state: State | None = None,
     load_time: float = 0.0,
-    reduce: Sequence[str] | None = None,
-    tolerance: float = 2e-3,
-    unbalanced: float = 1e-5,
-    time_step: float | None = None,
-    max_steps: int = 200,
-    watch: Callable[[Trial], None] | None = None,
-    toes: str = ROUNDED,
-    whole_faces: bool = True,
-    compare: bool = True,
-    follow: bool = True,
+    search: FactorSearch | None = None,
 ) -> FactorOfSafety:
     """The factor F by which the strength of the joints can be divided before no static equilibrium is left.
 
-    Loads are those of ``load_time`` s, after excavations up to then. ``state``: start of the first trial (default:
-    blocks at rest). ``reduce``: names of the joint laws to weaken (default: all). F is enclosed to the relative
-    ``tolerance``. A trial is stable when the unbalanced force on every block is below the fraction ``unbalanced`` of
-    the forces on it. Static steps are ``time_step`` s long (default: free fall over a hundredth of the smallest block).
-    ``watch`` is called with every trial. ``toes``: "rounded", "sharp" or "free", see `sharp_toes`; ``whole_faces``: a
-    face keeps its whole cohesion while any part is in contact. With ``compare``, the answer reports the factors without
-    rounding of toes whose tips would hold, without toes that hold, and without faces that have parted at one end. With
-    ``follow``, it also tells how far the blocks go that fail.
+    Loads are those of ``load_time`` s, after excavations up to then; ``search`` says which strengths are reduced, and how
+    F is found.
 
     With Coulomb friction the forces of a system are not unique: strengths are reduced step by step from an equilibrium,
     and another path may give a factor that differs by some thousandths where contacts slide and stick again.
@@ -123,17 +143,16 @@ def factor_of_safety(
     >>> f"{found.factor:.4f}"  # g tan 30° / 2 m/s²
     '2.8319'
     """
+    how = search or FactorSearch()
     names = [law.name for law in joints]
-    unknown = [name for name in reduce or () if name not in names]
+    unknown = [name for name in how.reduce or () if name not in names]
     if unknown:
         raise NothingToReduce(
             f"no joint {', '.join(map(repr, unknown))} to reduce; there are {', '.join(map(repr, names))}"
         )
-    chosen = set(names if reduce is None else reduce)
+    chosen = set(names if how.reduce is None else how.reduce)
     if not any(_has_strength(law) for law in joints if law.name in chosen):
         raise NothingToReduce("the joints have no friction, cohesion or tensile strength that could be reduced")
-    if not 0 < tolerance < 1:
-        raise NothingToReduce(f"the tolerance of the factor must lie between 0 and 1, got {tolerance!r}")
     if blocks.glued is not None or (blocks.order is not None and (blocks.order != 1).any()):
         raise NothingToReduce(
             "blocks of higher order ([zones.NAME] order) and cells are not supported in the search for a factor of safety yet: "
@@ -146,13 +165,16 @@ def factor_of_safety(
             "a static search cannot include a moving ground: leave out the motion of the base, or give it the frame "
             '"base", in which it is a body force at the time of the search'
         )
-    under = TrialLoads(loads, load_time, unbalanced, max_steps, time_step)
-    rest = State.at_rest(blocks) if state is None else state
+    under = TrialLoads(loads, load_time, how.unbalanced, how.max_steps, how.time_step)
+    rest = State.at_rest(blocks) if how.state is None else how.state
     settings = replace(settings or DdaSettings(), dynamic_factor=0.0)
-    search = _Search(blocks, materials, joints, joint_index, settings, chosen, under, rest, tolerance)
-    counted = Counted(toes, whole_faces)
-    found, counted = search.answer(counted, watch) if compare else (search.run(counted, watch=watch), counted)
-    return search.with_travel(found, counted) if follow else found
+    trials = _Search(blocks, materials, joints, joint_index, settings, chosen, under, rest, how.tolerance)
+    counted = Counted(how.toes, how.whole_faces)
+    if how.compare:
+        found, counted = trials.answer(counted, how.watch)
+    else:
+        found = trials.run(counted, watch=how.watch)
+    return trials.with_travel(found, counted) if how.follow else found
 
 
 @dataclass(frozen=True)

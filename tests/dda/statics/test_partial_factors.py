@@ -82,7 +82,7 @@ def test_along_one_joint_that_slab_alone_goes(problem):
     design, reduced = design_problem(problem, PartialFactors(cohesion=1.1, friction=1.1), ["bed"])
     found = dda.factor_of_safety(
         design.blocks, design.materials, design.joints, design.loads, design.dda, joint_index=design.joint_index,
-        load_time=1.0, reduce=reduced,
+        load_time=1.0, search=dda.FactorSearch(reduce=reduced),
     )  # fmt: skip
     assert [design.blocks.names[b] for b in found.moving] == ["high"]
     length, dip = math.hypot(2, 1), math.atan2(1, 2)
