@@ -310,8 +310,9 @@ def safety_report(
         problem.blocks, problem.materials, problem.joints, problem.loads, problem.dda, joint_index=problem.joint_index,
         load_time=problem.run.end_time if load_time is None else load_time, search=search,
     )  # fmt: skip
+    weakened, joints = (None if names is None else list(names) for names in (search.reduce, along))
     return SafetyReport(
-        problem, found, None if search.reduce is None else list(search.reduce), factors, None if along is None else list(along), tuple(cracks),
+        problem, found, weakened, factors, joints, tuple(cracks),
         **({"tolerance": search.tolerance} if "tolerance" in wishes else {}),
     )  # fmt: skip
 

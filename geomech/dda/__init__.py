@@ -23,7 +23,7 @@ from .statics.counted_resistance import warn_of_toes, warn_of_toes_at_rest
 from .statics.in_situ_stress import InSituState, NoInSituEquilibrium, in_situ_state
 from .statics.mobilised_strength import MobilisedJoint, mobilised_joints
 from .statics.partial_factors import PartialFactors, design_problem
-from .statics.pseudo_time_equilibrium import RELAXATION_STEP, Equilibrium, equilibrium
+from .statics.pseudo_time_equilibrium import RELAXATION_STEP, Equilibrium, RelaxationLimits, equilibrium
 from .statics.safety_answer import FactorOfSafety
 from .statics.strength_reduction import FactorSearch, NothingToReduce, factor_of_safety
 from .step_control.adaptive_time_step import StepLength
@@ -49,6 +49,7 @@ __all__ = [
     "NotConverged",
     "NothingToReduce",
     "PartialFactors",
+    "RelaxationLimits",
     "StepEnergy",
     "StepLength",
     "StepResult",

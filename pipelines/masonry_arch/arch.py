@@ -33,7 +33,7 @@ def arch(n: int, ratio: float) -> dda.BlockSystem:
 
 def rest(system: dda.BlockSystem) -> dda.Equilibrium:
     # QuasiNewton, an arch that stands moves by its elastic shortening, 1e-4 m: one that has gone a centimetre falls.
-    return dda.equilibrium(system, State.at_rest(system.blocks), WEIGHT, reach=0.01)
+    return dda.equilibrium(system, State.at_rest(system.blocks), WEIGHT, limits=dda.RelaxationLimits(reach=0.01))
 
 
 def thinnest(n: int, low: float = 0.09, high: float = 0.12) -> float:

@@ -81,7 +81,7 @@ def test_a_block_on_an_incline_holds_or_is_told_to_slide(friction_deg, holds):
     slope = np.radians(30)
     polygons = [turned(rectangle(-20, -1, 20, 0), slope), turned(rectangle(4, 0, 5, 1), slope)]
     system = system_of(polygons, np.radians(friction_deg), names=None)
-    found = rest(system, reach=0.5)
+    found = rest(system, limits=dda.RelaxationLimits(reach=0.5))
     assert found.converged == holds and found.collapsed != holds
     if not holds:
         assert found.moving == (1,)
@@ -126,7 +126,7 @@ def test_a_long_fall_is_no_collapse():
 
 def test_what_is_not_found_is_told_and_nothing_to_move_is_at_rest():
     system = wall(4, 3)
-    found = rest(system, max_steps=1)
+    found = rest(system, limits=dda.RelaxationLimits(1))
     assert not found.converged and not found.collapsed and "after 1 steps" in found.reason
     seen = []
     rest(system, tolerance=1e-9, watch=lambda result, row: seen.append(row["kinetic_energy"]))

@@ -96,7 +96,7 @@ def at_rest(blocks: Blocks, law: dict, solver: ContactSolver) -> None:
     joint = JointLaw("joint", **({"friction_angle": block_scenes.FRICTION} | law))
     settings = replace(block_scenes.settings(1.0, dynamic=False), contact_solver=solver)
     system = dda.BlockSystem(blocks, [block_scenes.ROCK], [joint], settings=settings)
-    found = dda.equilibrium(system, State.at_rest(blocks), block_scenes.WEIGHT, max_steps=60)
+    found = dda.equilibrium(system, State.at_rest(blocks), block_scenes.WEIGHT, limits=dda.RelaxationLimits(60))
     if not found.converged and not found.collapsed:
         raise dda.NotConverged(found.reason)
 

@@ -19,7 +19,7 @@ from ..results import CrackResponse
 from ..step_control.relative_motion import Windows
 from ..system import BlockSystem
 from .displacement_limit import FARTHEST, MOVED
-from .pseudo_time_equilibrium import equilibrium
+from .pseudo_time_equilibrium import RelaxationLimits, equilibrium
 from .safety_answer import Anchor, FactorOfSafety
 from .sharp_toes import FREE, ROUNDED, Toe, place
 from .stability_trial import Trial
@@ -92,7 +92,9 @@ def warn_of_toes(
         if not toes:
             return
         finder.toes = ROUNDED
-        other = equilibrium(system, begun, loads, load_time=load_time, crack=crack, follow=False)
+        other = equilibrium(
+            system, begun, loads, load_time=load_time, crack=crack, limits=RelaxationLimits(follow=False)
+        )
     finally:
         finder.toes = before
     if other.collapsed:

@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 
 from ...model import OPEN, Loads, State
+from ...model.former_names import gathered_arguments
 from ..kinematics.simplex_integration import block_moments
 from ..results import CrackResponse, NotConverged, StepResult
 from ..system import BlockSystem
@@ -80,6 +81,25 @@ class Equilibrium:
     result: StepResult | None
 
 
+@dataclass(frozen=True, eq=False)
+class RelaxationLimits:
+    """When blocks that find no equilibrium are given up.
+
+    max_steps  largest number of steps
+    limit      blocks that move farther than it allows have collapsed; None: a limit from the state at the start
+    reach      m: an unbalanced block that has moved this far has collapsed, too. None: a tenth of the extent of the blocks,
+               or a twentieth of the block's own size once the unbalanced force no longer decreases. If it is given, no
+               other limit applies
+    follow     collapsed blocks are followed until they come to rest nearby
+    """
+
+    max_steps: int = 400
+    limit: DisplacementLimit | None = None
+    reach: float | None = None
+    follow: bool = True
+
+
+@gathered_arguments("limits", RelaxationLimits)
 def equilibrium(
     system: BlockSystem,
     state: State,
@@ -87,22 +107,16 @@ def equilibrium(
     *,
     load_time: float | None = None,
     tolerance: float = 1e-6,
-    max_steps: int = 400,
-    reach: float | None = None,
     crack: CrackResponse | None = None,
     watch: Callable[[StepResult, np.void], None] | None = None,
-    limit: DisplacementLimit | None = None,
-    follow: bool = True,
+    limits: RelaxationLimits | None = None,
 ) -> Equilibrium:
     """Find the equilibrium of the blocks of ``system`` from ``state`` under ``loads`` at ``load_time`` (default:
     state.time).
 
-    ``tolerance`` bounds the unbalanced force on any block over the mean force on blocks. Blocks that move farther than
-    ``limit`` allows (default: a limit from ``state``) have collapsed; unless ``follow`` is False, they are followed
-    until they come to rest nearby. An unbalanced block that has moved ``reach`` m has also collapsed. The default of
-    ``reach`` is a tenth of the extent of the blocks, or a twentieth of the block's own size once the unbalanced force
-    no longer decreases; if it is given, no other limit applies. ``watch`` is called with every step and its
-    RELAXATION_STEP. Raises ValueError for a tolerance that is not positive.
+    ``tolerance`` bounds the unbalanced force on any block over the mean force on blocks; ``limits`` say when the search is
+    given up. ``watch`` is called with every step and its RELAXATION_STEP. Raises ValueError for a tolerance that is not
+    positive.
     """
     if not tolerance > 0:
         raise ValueError(f"the tolerance of the unbalanced force must be positive, got {tolerance!r}")
@@ -114,7 +128,9 @@ def equilibrium(
     if not len(free):
         nothing = np.zeros(blocks.n_blocks)
         return Equilibrium(state, True, False, (), "nothing moves", np.empty(0, RELAXATION_STEP), nothing, None)
-    return _Relaxation(static, state, loads, time, reach, crack, limit).run(tolerance, max_steps, watch, follow)
+    until = limits or RelaxationLimits()
+    relaxation = _Relaxation(static, state, loads, time, until.reach, crack, until.limit)
+    return relaxation.run(tolerance, until.max_steps, watch, until.follow)
 
 
 @dataclass(frozen=True, eq=False)

@@ -43,7 +43,7 @@ from .counted_resistance import (
     with_toes,
 )
 from .displacement_limit import DisplacementLimit, without_failure
-from .pseudo_time_equilibrium import Travel, equilibrium, travel
+from .pseudo_time_equilibrium import RelaxationLimits, Travel, equilibrium, travel
 from .safety_answer import FactorOfSafety, mechanism_of, moving_in
 from .sharp_toes import FREE, ROUNDED, SHARP
 from .stability_trial import Trial, TrialLoads, stability_trial
@@ -477,7 +477,7 @@ def _relaxed(system: BlockSystem, under: TrialLoads, state: State) -> tuple[Stat
     none is found. And the displacement limit from there."""
     limit = DisplacementLimit(system, state, under.loads, under.time)
     found = equilibrium(
-        system, state, under.loads, load_time=under.time, max_steps=_RELAXING, limit=limit, follow=False
+        system, state, under.loads, load_time=under.time, limits=RelaxationLimits(_RELAXING, limit, follow=False)
     )
     if found.converged:
         return replace(found.state, time=max(state.time, under.time)), limit
