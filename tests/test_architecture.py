@@ -285,3 +285,43 @@ def test_no_folder_holds_more_than_twelve_files():
     for path in SOURCES:
         counts[path.parent] = counts.get(path.parent, 0) + 1
     assert {str(folder.relative_to(ROOT)): n for folder, n in counts.items() if n > 12} == {}
+
+
+#: Most arguments of a function, and of one that is compiled.
+MOST_ARGUMENTS, MOST_OF_KERNELS = 8, 12
+#: Decorators of compiled functions.
+COMPILED = {"kept", "part", "njit", "jit", "_jit", "_part", "_inlined", "intrinsic"}
+#: Public entry points whose further arguments are named.
+LONGER = {
+    "geomech/ddm/body.py:__init__": 10,
+    "geomech/ddm/propagation.py:propagate": 9,
+    "geomech/dda/stepping.py:run": 9,
+}
+
+
+def too_many_arguments(path, tree):
+    """{path:function: number of arguments} of the functions in ``tree`` that take more than they may."""
+    found = {}
+    for node in ast.walk(tree):
+        if not isinstance(node, ast.FunctionDef):
+            continue
+        given = [arg.arg for arg in (*node.args.posonlyargs, *node.args.args, *node.args.kwonlyargs)]
+        count = len([name for name in given if name not in ("self", "cls")])
+        decorators = {ast.unparse(each).partition("(")[0] for each in node.decorator_list}
+        if count > (MOST_OF_KERNELS if decorators & COMPILED else MOST_ARGUMENTS):
+            found[f"{path}:{node.name}"] = count
+    return found
+
+
+def test_functions_take_few_arguments():
+    nine, thirteen = (", ".join(f"a{k}" for k in range(n)) for n in (9, 13))
+    for text, many in (
+        (f"def f({nine}): 0", 9),
+        (f"@kept()\ndef f({nine}): 0", None),
+        (f"@_part\ndef f({thirteen}): 0", 13),
+    ):
+        assert too_many_arguments("x", ast.parse(text)) == ({} if many is None else {"x:f": many})
+    found = {}
+    for path in SOURCES:
+        found |= too_many_arguments(path.relative_to(ROOT).as_posix(), ast.parse(path.read_text(encoding="utf-8")))
+    assert found == LONGER
