@@ -324,8 +324,8 @@ class _Reader:
             return [(1, lambda: vars(this).update(zip(rest[1::2], self._values(rest[2::2]), strict=True)))]
         if letter in ("d", "C"):
             # Not Counter.update, which adds.
-            pairs = lambda: zip(self._values(rest[0::2]), self._values(rest[1::2]), strict=True)  # noqa: E731
-            return [(2, lambda: dict.update(this, pairs()))]
+            keys, values = rest[0::2], rest[1::2]
+            return [(2, lambda: dict.update(this, zip(self._values(keys), self._values(values), strict=True)))]
         if letter == "S":
             return [(2, lambda: this.update(self._values(rest)))]
         if letter == "s":

@@ -13,6 +13,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -108,7 +109,10 @@ def propagate(
 class _Run:
     """Input of the run, with body, load factor and solution of the last step."""
 
-    def __init__(self, loops, material, load, growth, settings, options, controlled, max_factor):
+    def __init__(
+        self, loops: list[np.ndarray], material: Material, load: BodyLoad | Loading, growth: GrowthSettings,
+        settings: DdmSettings | None, options: dict[str, Any], controlled: bool, max_factor: float,
+    ) -> None:  # fmt: skip
         self.loops, self.material, self.load, self.growth = loops, material, load, growth
         self.settings, self.options = settings, options
         self.controlled, self.max_factor = controlled, max_factor

@@ -18,7 +18,7 @@ import re
 import shutil
 import socket
 import time
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -128,7 +128,7 @@ def _fails(job: Job, row: dict[str, Any]) -> bool | None:
 
 
 @contextmanager
-def _heard():
+def _heard() -> Iterator[list[str]]:
     """Collects the warnings of geomech in this context."""
     texts: list[str] = []
 

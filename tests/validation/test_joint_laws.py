@@ -35,13 +35,13 @@ ROUGH = Roughness(10.0, 50e6)
 
 
 SEAT = rectangle(-1, -0.5, 2, 0)
+#: Pa, on top of the sheared block.
+PRESSURE = 1e6
 
 
-def direct_shear(
-    law: JointLaw, pressure=1e6, travel=0.02, n=100, wall=None, back=False, seat=SEAT, contact="penalty", seen=None
-):
-    """A 1 m block pressed on a joint and pushed along it by a heavy ram of constant speed, against a frictionless
-    ``wall`` (Pa/m) above it if one is given; a second ram pushes it ``back`` by as much in as many steps more. ``seat``
+def direct_shear(law: JointLaw, travel=0.02, n=100, wall=None, back=False, seat=SEAT, contact="penalty", seen=None):
+    """A 1 m block pressed on a joint by `PRESSURE` and pushed along it by a heavy ram of constant speed, against a
+    frictionless ``wall`` (Pa/m) above it if one is given; a second ram pushes it ``back`` by as much in as many steps more. ``seat``
     is the polygon below the joint; ``seen``, a list, gets the joint's contacts.
 
     Per step: shear and normal force N, slip, wear, lift, gap m; and the mean of the iterations.
@@ -76,7 +76,7 @@ def direct_shear(
     )  # fmt: skip
     static = dda.BlockSystem(blocks, materials, laws, index, dataclasses.replace(settings, dynamic_factor=0.0))
     system = dda.BlockSystem(blocks, materials, laws, index, settings)
-    loads = Loads(edge_tractions=(EdgeTraction("top", History.constant([0.0, -pressure])),))
+    loads = Loads(edge_tractions=(EdgeTraction("top", History.constant([0.0, -PRESSURE])),))
     state = static.step(static.step(State.at_rest(blocks), loads, 1e3).state, loads, 1e3).state
     state.velocity[:] = 0.0
     state.velocity[2, 0] = travel

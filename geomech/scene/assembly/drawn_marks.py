@@ -13,7 +13,7 @@ from ..drawing import Drawing
 from ..errors import Fault
 from ..locator import Path
 from ..tables import SceneTables
-from ..tables.loads import BoltTable, ForceTable
+from ..tables.loads import BoltTable, ForceTable, WaterTableTable
 from ..tables.output import MonitorTable
 from ..validation import nearest
 
@@ -132,7 +132,7 @@ class _Matching:
                 ends.append((_pair(line[0]), _pair(line[-1])))
         return ends
 
-    def water(self, table):
+    def water(self, table: WaterTableTable | None) -> WaterTableTable | None:
         if table is None or table.points is not None:
             return table
         name = "water" if table.line is None else table.line
