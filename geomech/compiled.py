@@ -77,10 +77,10 @@ def moved() -> list[str]:
 #: differ between the run that compiles and later ones, and changes in called files are not noticed.
 OWN_WAY = not moved()
 if not OWN_WAY:
-    log.warning("Numba %s has not got %s: kernels are kept in its own way", numba_version, ", ".join(moved()))
+    log.warning("Numba %s lacks %s: kernels are stored in Numba's own cache", numba_version, ", ".join(moved()))
 if kernel_place().instead_of is not None:
     log.warning(
-        "%s cannot be written: compiled kernels are kept in %s (NUMBA_CACHE_DIR names another folder)",
+        "%s is not writable: compiled kernels are stored in %s (NUMBA_CACHE_DIR sets another folder)",
         kernel_place().instead_of, kernel_place().folder,
     )  # fmt: skip
 
@@ -347,7 +347,7 @@ class _CacheFile(IndexDataCacheFile):
         try:
             super().save(key, data)
         except OSError as error:
-            log.warning("a compiled kernel cannot be kept in %s: %s", self._cache_path, error.strerror or error)
+            log.warning("a compiled kernel cannot be stored in %s: %s", self._cache_path, error.strerror or error)
 
     def _load_data(self, name: str):
         stored = Path(self._data_path(name)).read_bytes()

@@ -181,7 +181,7 @@ def test_a_numba_whose_inner_parts_have_moved_is_used_its_own_way(tmp_path, owne
     environment["PYTHONPATH"] = os.pathsep.join([str(tmp_path), str(Path(geomech.__file__).resolve().parents[1])])
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, env=environment, check=False)
     assert done.stdout.strip() == "6.0", done.stderr
-    assert "kernels are kept in its own way" in done.stderr
+    assert "kernels are stored in Numba's own cache" in done.stderr
 
 
 def test_a_part_is_compiled_once_for_all_constants(tmp_path):

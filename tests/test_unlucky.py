@@ -128,7 +128,7 @@ def test_a_home_that_cannot_be_written_is_told_and_gone_round(unwritable):
     assert done.stdout.strip() == "0.5", done.stderr
     folder = unwritable / "tmp" / f"geomech-kernels-{os.getuid()}"
     home = unwritable / "file" / "home" / ".cache" / "geomech" / "kernels"
-    assert f"{home} cannot be written: compiled kernels are kept in {folder}" in done.stderr
+    assert f"{home} is not writable: compiled kernels are stored in {folder}" in done.stderr
     assert list(folder.glob("*/*.nbc")) and folder.stat().st_mode & 0o777 == 0o700
 
 

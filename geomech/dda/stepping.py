@@ -80,7 +80,7 @@ def run(
     state.refuse_misfit(blocks)
     state = state.writable()
     if system.scheme.static and loads.viscous_boundaries:
-        log.warning("viscous boundaries do nothing in a static run")
+        log.warning("viscous boundaries have no effect in a static run")
     watched = _Watch(blocks)
     if settings.equilibrium:
         state = _at_rest(system, state, loads, state.time)
@@ -111,7 +111,7 @@ def _at_rest(system: BlockSystem, state: State, loads: Loads, load_time: float) 
     if found.collapsed:
         raise NotConverged(f"t = {load_time:g} s: {found.reason}")
     if not found.converged:
-        log.warning("t = %g s: %s; going on from there", load_time, found.reason)
+        log.warning("t = %g s: %s; continuing from there", load_time, found.reason)
     elif state.time == load_time:
         warn_of_toes(system, state, found.state, loads, load_time)
     return found.state

@@ -404,8 +404,8 @@ class _Checker:
             cut = f"{made.law}({', '.join(f'{x:g}' for x in within)})"
             self.refuse(
                 ("vary", made.name),
-                f"{made} lies outside {low:g} to {high:g}, which the key may be, with probability {outside:.2g}",
-                f"cut it off, as {cut}"
+                f"{made} lies outside {low:g} to {high:g}, the permitted range of the key, with probability {outside:.2g}",
+                f"truncate it, for example {cut}"
                 if made.law in ("normal", "lognormal", "exponential")
                 else "set its bounds within",
             )
@@ -439,8 +439,8 @@ class _Checker:
         if settings.runs and seeds and len(seeds) != settings.runs:
             self.refuse(
                 ("runs",),
-                f"{settings.runs} samples for {len(seeds)} seeds: each sample takes a seed of its own",
-                "give one of them, or as many of both",
+                f"{settings.runs} samples for {len(seeds)} seeds: each sample needs its own seed",
+                "give only one of them, or the same number of both",
             )
         if random and not settings.runs and not seeds:
             self.refuse(("runs",), "random variables without a number of samples", "say how many: --runs 500")
@@ -453,13 +453,13 @@ class _Checker:
         if settings.sampling == "saltelli" and (settings.correlated or seeds):
             self.refuse(
                 ("sampling",),
-                "Sobol' sensitivities are of independent variables, without seeds",
-                "leave correlations and seeds out, or sample otherwise",
+                "Sobol' sensitivities require independent variables, without seeds",
+                "leave out correlations and seeds, or use another sampling",
             )
         if settings.sampling == "saltelli" and (settings.runs or 0) < len(random) + 2:
             self.refuse(
                 ("runs",),
-                f"Saltelli's design of {len(random)} variables takes {len(random) + 2} runs a group",
+                f"Saltelli's design of {len(random)} variables needs groups of {len(random) + 2} runs",
                 "give more",
             )
 
@@ -468,8 +468,8 @@ class _Checker:
         if settings.rare and (seeds or not random or len(random) < len(plan.variables)):
             self.refuse(
                 ("rare",),
-                "rare failures are searched for among random variables alone",
-                "leave seeds and listed values out",
+                "methods for rare failures support random variables only",
+                "leave out seeds and listed values",
             )
         if settings.rare:
             try:
@@ -482,7 +482,7 @@ class _Checker:
         for each in settings.correlated:
             for name in each.between:
                 if name not in names:
-                    self.refuse(("correlated",), f"{name!r} is no random variable", nearest(name, names))
+                    self.refuse(("correlated",), f"{name!r} is not a random variable", nearest(name, names))
         if settings.correlated and not self.faults:
             try:
                 correlation_matrix(names, plan.design.correlations)

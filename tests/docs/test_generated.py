@@ -65,7 +65,7 @@ def test_all_messages_are_those_of_the_sources(docs):
 
     page = messages.page()
     assert "gravity points upwards\\\n  → *y runs up" in page  # a warning of a scene with its way out
-    assert "viscous boundaries do nothing in a static run" in page  # of a run
+    assert "viscous boundaries have no effect in a static run" in page  # of a run
     assert page.count("\n- ") > 150 and "%" + "s" not in page
     for title, *where in (messages.SCENE_ERRORS, messages.SCENE_WARNINGS, messages.RUN_WARNINGS):
         assert title in page and len(set(messages.messages(*where))) > 15

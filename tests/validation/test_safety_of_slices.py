@@ -113,7 +113,7 @@ def test_equilibrium_of_a_run_names_the_toe_that_holds(caplog, drop, friction, s
     warnings = [record.getMessage() for record in caplog.records if "the toe of" in record.getMessage()]
     assert len(warnings) == said, warnings
     if said:
-        assert "block 1" in warnings[0] and "x = 0, y = 0 m" in warnings[0] and "do not stand" in warnings[0]
+        assert "block 1" in warnings[0] and "x = 0, y = 0 m" in warnings[0] and "blocks are unstable" in warnings[0]
 
 
 def test_equilibrium_of_a_run_does_not_take_a_floor_that_a_block_slides_to():

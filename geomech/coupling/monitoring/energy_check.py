@@ -48,9 +48,9 @@ def check_dissipation(budget: EnergyBudget, time: float, static: bool) -> None:
     if static:
         if turnover and budget.scheme > UNHELD * turnover:
             log.warning(
-                "t = %g s: static steps have dissipated %.2g of all converted energy (scheme_loss in history.csv): on "
-                "their way blocks moved that nothing held, under a load that acts before the weight or the rock that "
-                "resists it, or as a mechanism; where they rest depends on the time step. Apply weight and water "
+                "t = %g s: static steps have dissipated %.2g of all converted energy (scheme_loss in history.csv): some "
+                "blocks moved without support, under a load that acts before the weight or the rock that resists it, "
+                "or as a mechanism; their final position depends on the time step. Apply weight and water "
                 "together, or follow the motion with dda.dynamic_factor = 1",
                 time,
                 budget.scheme / turnover,
@@ -61,8 +61,8 @@ def check_dissipation(budget: EnergyBudget, time: float, static: bool) -> None:
     log.warning(
         "t = %g s: the time integration has taken %.2g of all converted energy from blocks that still move (scheme_loss in "
         "history.csv): the step does not resolve vibrations or impacts that matter to the result, whose error is of "
-        'that order and shrinks with dda.time_step_s. dda.equilibrium = "start" leaves out the swing of a load that '
-        "acts at once; dda.newmark = [0.25, 0.5] dissipates nothing",
+        'that order and shrinks with dda.time_step_s. dda.equilibrium = "start" avoids the vibration due to a '
+        "suddenly applied load; dda.newmark = [0.25, 0.5] has no dissipation",
         time,
         budget.scheme / turnover,
     )

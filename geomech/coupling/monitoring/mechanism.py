@@ -71,9 +71,9 @@ class Mechanism:
         if self.reported or not self.ratios:
             return
         log.warning(
-            "t = %g s: the static run ends out of balance: %.2g %% of the forces on a block are left over, and inertia takes "
-            "them (unbalanced_ratio in history.csv). The block has not reached the place where bolts, joints or other "
-            'blocks hold it: set dda.equilibrium = "loads", or take longer steps',
+            "t = %g s: the static run ends out of balance: %.2g %% of the forces on a block are balanced by "
+            "inertia only (unbalanced_ratio in history.csv). The block has not reached the position in which bolts, joints or "
+            'other blocks support it: set dda.equilibrium = "loads", or take longer steps',
             time, 100 * self.ratios[-1],
         )  # fmt: skip
 

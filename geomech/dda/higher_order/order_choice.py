@@ -192,8 +192,8 @@ class OrderChoice:
             return
         self._reported.add(block)
         log.warning(
-            "t = %g s: %r has order %d, the highest, and higher orders would take up %.2g of the energy (dda.order_target = %g): %s. "
-            "Draw it as several blocks, or allow a larger part",
+            "t = %g s: %r has order %d, the highest, and higher orders would contain %.2g of the energy (dda.order_target = %g): %s. "
+            "Draw it as several blocks, or allow a larger share",
             time, self.blocks.names[block], HIGHEST, left, self.target, self._why(block),
         )  # fmt: skip
 

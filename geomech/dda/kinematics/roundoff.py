@@ -55,6 +55,6 @@ def warn_of_roundoff(
     light = block[c] if weight[block[c]] <= weight[other[c]] else other[c]
     log.warning(
         "%r weighs %.3g N per metre; the last digits of coordinates, up to %.3g m from the origin, make %.2g of that in "
-        "its contact springs, and its friction is known no better: put the origin near, or lower dda.normal_penalty",
+        "its contact springs, and its friction is no more accurate: put the origin near, or lower dda.normal_penalty",
         names[light], least[c], rounding / _ROUNDING, share[c],
     )  # fmt: skip

@@ -41,8 +41,8 @@ class ElasticRange:
         if most >= 2.0 * self.reported:
             self.reported = most
             log.warning(
-                "t = %g s: %s is strained by %.3g %%, beyond the elastic range of rock: what it and its cracks do is a "
-                "guess",
+                "t = %g s: %s is strained by %.3g %%, beyond the elastic range of rock: its behaviour and "
+                "that of its cracks are unreliable",
                 time, name, 100 * most,
             )  # fmt: skip
         return most

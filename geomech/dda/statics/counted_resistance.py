@@ -100,7 +100,7 @@ def warn_of_toes(
     if other.collapsed:
         one = len({toe.block for toe in toes}) == 1
         log.warning(
-            "t = %g s: %s and hold%s %.4g kN/m with %s sharp tip%s; rounded, blocks do not stand: see the factor of "
+            "t = %g s: %s and hold%s %.4g kN/m with %s sharp tip%s; with rounded toes the blocks are unstable: see the factor of "
             "`geomech safety`",
             load_time, _where(system.blocks, toes), "s" if one else "", sum(toe.force for toe in toes) / 1e3,
             "its" if one else "their", "" if one else "s",
@@ -131,8 +131,8 @@ def warn_of_toes_at_rest(system: BlockSystem, state: State, loads: Loads) -> Non
     held = tuple(toe for toe in toes if still[toe.block] and toe.force > _HOLDS * weight[toe.block])
     if held:
         log.warning(
-            "t = %g s: %s, as sharp as drawn, and bear%s %.4g kN/m. Sharp tips can hold what rounded ones would let go: "
-            '`geomech safety` tells the factor with and without, dda.equilibrium = "start" whether the blocks stand',
+            "t = %g s: %s, as sharp as drawn, and bear%s %.4g kN/m. Sharp tips can support blocks that rounded ones "
+            'would not: `geomech safety` gives the factor with and without, dda.equilibrium = "start" shows whether the blocks are stable',
             state.time, _where(blocks, held), "s" if len({toe.block for toe in held}) == 1 else "",
             sum(toe.force for toe in held) / 1e3,
         )  # fmt: skip

@@ -67,7 +67,7 @@ def in_situ_state(
     """
     blocks = system.blocks
     if system.order_choice is not None:
-        raise ValueError('in-situ stress is not supported in blocks of order "auto" yet: give the order by number')
+        raise ValueError('in-situ stress is not supported in blocks of order "auto" yet: give the order as a number')
     bent = None if system.deflected is None else _Bent(system.deflected, stress)
     centres = np.array([blocks.area_moments(b)[1] for b in range(blocks.n_blocks)])
     given = stress.at(centres)

@@ -271,7 +271,7 @@ def _whole(c: Check) -> None:
             c.drawn.path_of_crack(c.cracks.names[crack]),
             f"crack {c.cracks.names[crack]!r} cuts a piece off zone {c.drawn.zones[block]!r}, alone or with "
             "the cracks before it",
-            "draw the pieces as zones of their own: blocks part along their outlines",
+            "draw the pieces as zones of their own: blocks separate along their outlines",
         )
 
 

@@ -33,8 +33,8 @@ def check_orders(c: Check) -> None:
         _check_motions(c, name, refuse)
         if t.loads is not None and t.loads.in_situ is not None and zone.order == "auto":
             refuse(
-                "in-situ stress ([loads] in_situ) with an order that is found is not supported yet",
-                "give the order by number, 2 to 8",
+                'in-situ stress ([loads] in_situ) with order = "auto" is not supported yet',
+                "give the order as a number, 2 to 8",
             )
 
 

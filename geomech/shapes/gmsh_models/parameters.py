@@ -73,7 +73,7 @@ def _value(path: Path, name: str, value: float | str, entry: Parameter) -> float
         raise GmshModelError(f"parameter {name!r} of {path.name}: {message}", way_out, parameter=name)
 
     if isinstance(entry.value, str):
-        return value if isinstance(value, str) else refuse(f"{value!r} is not a text", "put it in quotes")
+        return value if isinstance(value, str) else refuse(f"{value!r} is not a string", "put it in quotes")
     if isinstance(value, bool):
         value = float(value)
     if isinstance(value, str):

@@ -193,4 +193,4 @@ def test_static_steps_that_move_what_nothing_holds_are_told_of(together, caplog)
     )
     with caplog.at_level(logging.WARNING):
         *_, _last = cycles(problem)
-    assert any("nothing held" in record.getMessage() for record in caplog.records) is not together
+    assert any("moved without support" in record.getMessage() for record in caplog.records) is not together

@@ -53,7 +53,7 @@ def test_the_estimate_is_the_work_that_higher_orders_take_up(caplog):
         assert system.step(begun, loads).state.order[1] == order
     with caplog.at_level(logging.WARNING):
         cantilever(AUTO_ORDER, order_target=1e-9)
-    assert "'block 1' has order 8, the highest, and higher orders would take up" in caplog.text
+    assert "'block 1' has order 8, the highest, and higher orders would contain" in caplog.text
 
 
 def test_a_beam_that_orders_2_and_3_cannot_bend_is_raised_beyond_them():
