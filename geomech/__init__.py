@@ -1,8 +1,8 @@
-"""geomech: how a jointed, cracked rock mass comes apart.
+"""geomech: simulation of the failure of jointed, cracked rock masses.
 
 Blocks slide and rotate along joints (discontinuous deformation analysis, `geomech.dda`), cracks grow through the rock
-bridges between them (displacement discontinuity method, `geomech.ddm`), and `geomech.coupling` lets each drive the
-other; each solver also stands alone::
+bridges between them (displacement discontinuity method, `geomech.ddm`), and `geomech.coupling` couples the two;
+each solver can also be used alone::
 
     import geomech
 

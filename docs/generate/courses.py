@@ -1,6 +1,6 @@
 """Courses of geomech's own studies: wall time by cycle, from which the first run on a machine knows the time left.
 
-    python -m docs.generate.courses [PIPELINE …]         # run all, or those named, and write courses.json anew
+    python -m docs.generate.courses [PIPELINE …]         # run all, or those named, and rewrite courses.json
 
 Only the shape counts: a run finds how much slower its machine is from its own share of the course.
 """

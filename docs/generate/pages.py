@@ -1,4 +1,4 @@
-"""All generated pages, written anew where their text has changed."""
+"""All generated pages, rewritten if their text has changed."""
 
 from __future__ import annotations
 

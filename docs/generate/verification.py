@@ -29,7 +29,7 @@ geomech bench --quick --against tests/validation/bench_baseline.json      # what
 
 `tests/validation/test_bench_baseline.py` computes the figures again in every run of the tests and fails where one
 is worse, or better by so much that
-the stored one is stale. Errors are relative; 0 is exact to the last digit. What each is held against:
+the stored one is stale. Errors are relative; 0 is exact to the last digit. For the references see
 [cracks](../verification/cracks.md),
 [blocks](../verification/blocks.md), [blocks and cracks](../verification/coupled.md).
 """
@@ -62,7 +62,7 @@ CHAPTERS = {
 CHAPTER = """# {title}
 
 Made from `{file}`. Each section is one file of tests; its command computes the figures again and fails where one is
-more than three times as far off as stored, or the stored one is out of date. `--record-figures` stores them anew.
+more than three times as far off as stored, or the stored one is out of date. `--record-figures` stores them again.
 Errors are relative unless they have a unit; where a row stands for several variants it is the worst of them.
 """
 

@@ -65,7 +65,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="geomech",
-        description="How a jointed, cracked rock mass comes apart: blocks that move (DDA), cracks that grow (DDM).",
+        description="Failure of jointed, cracked rock masses: moving blocks (DDA) coupled with growing cracks (DDM).",
         epilog="exit codes: 0 done, 1 failed run, 2 bad input, 3 interrupted",
     )
     parser.add_argument("--version", action="version", version=f"geomech {__version__}")

@@ -1,4 +1,4 @@
-"""A borehole breaks out, and is torn open by mud: the crack solver alone, held against closed forms.
+"""A borehole breaks out, and is fractured by mud pressure: the crack solver alone, compared with closed forms.
 
 `geomech run pipelines/borehole_breakout` calls `main`; copy the folder to make a study of your own.
 """

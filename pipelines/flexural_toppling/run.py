@@ -1,4 +1,4 @@
-"""Columns bend over, break at their base and topple: held against bending theory and a rigid body that turns.
+"""Columns bend over, break at their base and topple: compared with bending theory and a rigid body that turns.
 
 `geomech run pipelines/flexural_toppling` calls `main`; copy the folder to make a study of your own.
 """

@@ -1,4 +1,4 @@
-"""How thin may a semicircular arch of stone be? The block solver alone, held against limit analysis and Milankovitch
+"""How thin may a semicircular arch of stone be? The block solver alone, compared with limit analysis and Milankovitch
 (1907).
 
 `geomech run pipelines/masonry_arch` calls `main`; copy the folder to make a study of your own.

@@ -1,4 +1,4 @@
-"""The specimen with one flaw: its wing cracks, held against closed forms, on one page.
+"""The specimen with one flaw: its wing cracks, compared with closed forms, on one page.
 
 `geomech run pipelines/single_flaw` calls `main`; copy the folder to make a study of your own.
 """

@@ -1,4 +1,4 @@
-"""Does a column on an incline stand, slide, topple, or both? The whole map, held against Yagoda-Biran & Hatzor (2013).
+"""Does a column on an incline stand, slide, topple, or both? The whole map, compared with Yagoda-Biran & Hatzor (2013).
 
 `geomech run pipelines/sliding_toppling_map` calls `main`; copy the folder to make a study of your own.
 """

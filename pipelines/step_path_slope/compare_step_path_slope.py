@@ -143,7 +143,7 @@ def _first_load_alone(problem: Problem, outline: np.ndarray, rock) -> float:
 
 
 def check(name: str, seen: StepPath) -> None:
-    """AssertionError where the path is not what it is held against."""
+    """AssertionError if the path differs from the reference."""
     # Blocks press on their base linearly from end to end and hold its ends by friction, an elastic body on rollers as
     # it will: in ground as deep as it is wide 0.3 to 0.7 % are left of that at the joints (a pinned base makes 4 to 6
     # %).

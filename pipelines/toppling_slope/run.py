@@ -1,4 +1,4 @@
-"""A slope of sixteen blocks topples and slides: the block solver alone, held against Goodman & Bray (1976).
+"""A slope of sixteen blocks topples and slides: the block solver alone, compared with Goodman & Bray (1976).
 
 `geomech run pipelines/toppling_slope` calls `main`; copy the folder to make a study of your own.
 """

@@ -1,4 +1,4 @@
-"""A rock bridge holds a key block in a tunnel's roof, and breaks: held against statics, fracture mechanics and Newton.
+"""A rock bridge supports a key block in a tunnel roof, and breaks: compared with statics, fracture mechanics and Newton.
 
 `geomech run pipelines/tunnel_roof` calls `main`; copy the folder to make a study of your own.
 """

@@ -169,7 +169,7 @@ class _Search:
 
     def _break_bonds(self, answer: Answer, bonds: np.ndarray) -> None:
         """Break the first of the overloaded ``bonds`` (n,) bool, once everything else is consistent, and restart the
-        search, whose limits count anew: the number of bonds decreases each time."""
+        search, whose limits start again: the number of bonds decreases each time."""
         found = self.found
         if self.effort.in_order:
             first = self.equations.first_bonds(self.states, answer, bonds)

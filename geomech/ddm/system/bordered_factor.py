@@ -311,7 +311,7 @@ def _entries(matrix: np.ndarray, rows: np.ndarray, columns: np.ndarray) -> np.nd
 
 def _at_tips(elements: ElementSet, settled: np.ndarray) -> np.ndarray:
     """(n,) bool: elements on segments that end at a tip and have no ``settled`` element. Growth may still bend these
-    segments and grade them anew."""
+    segments and regrade them."""
     source = elements.source
     ends, stands = np.zeros((2, int(source.max(initial=0)) + 1), bool)
     ends[source[elements.kind != shape_functions.ORDINARY]], stands[source[settled]] = True, True

@@ -10,7 +10,7 @@ POISSONS_RATIO = 1 / 3
 
 #: β between crack and tension → mean initiation angle, degrees (Erdogan & Sih 1963, J. Basic Engng
 #: 85, 519–527, in the means of Sih 1974, Int. J. Fracture 10, 305–321, Table 1). Neither paper was at hand: angles and
-#: the sheets' sizes were read where a boundary-element code is held against that table (github.com/l-s-campos/BEM_gmsh,
+#: the sheets' sizes were read where a boundary-element code is compared with that table (github.com/l-s-campos/BEM_gmsh,
 #: commit 2b55f3b, scripts/crack/erdogan_sih_mts.jl), and are those of earlier notes from the literature. Single cracks
 #: scattered by degrees.
 MEASURED_TURN = {30.0: 62.4, 40.0: 55.6, 50.0: 51.1, 60.0: 43.1, 70.0: 30.7, 80.0: 17.3}
