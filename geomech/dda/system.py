@@ -19,7 +19,7 @@ from .higher_order.deflected_blocks import DeflectedBlocks
 from .higher_order.glued_cells import GluedFaces, GlueStrength, KeptCorners
 from .higher_order.order_choice import OrderChoice, extended_deflection
 from .higher_order.six_row_system import SixRowPattern, six_row_pattern
-from .higher_order.unsupported import refuse_unsupported, refuse_unsupported_loads
+from .higher_order.unsupported import refuse_unsupported
 from .kinematics.newmark import TimeScheme
 from .kinematics.rigid_blocks import with_rigid
 from .kinematics.roundoff import rounding_of
@@ -111,9 +111,6 @@ class BlockSystem:
         if ordered or blocks.glued is not None:
             refuse_unsupported(blocks, self.materials, self.joints, self.settings)
             self._choose_orders()
-        #: (n_blocks,) bool: blocks that have an order above 1, or may come to have one.
-        self.may_bend = np.zeros(blocks.n_blocks, bool) if blocks.order is None else np.asarray(blocks.order) != 1
-        self.may_bend &= ~blocks.fixed
         #: Strength of the glue; None if it cannot fail.
         self.glue_strength: GlueStrength | None = None
         if blocks.glued is not None and (strength := self._glue_strength()).any:
@@ -272,7 +269,6 @@ class BlockSystem:
         choice, strength = self.order_choice, self.glue_strength
         if choice is None and strength is None:
             return self._step(state, loads, dt, crack, load_time, like, pseudo_inertia)[1]
-        refuse_unsupported_loads(loads, self.may_bend)
         if choice is not None:
             self._take_orders(choice, choice.first if state.order is None else np.asarray(state.order))
         if strength is not None:
@@ -326,7 +322,6 @@ class BlockSystem:
         state = state.writable()
         self._stray_loads.refuse(loads)
         if self.deflected is not None:
-            refuse_unsupported_loads(loads, self.may_bend)
             self.finder.deflection, self.finder.sag = self.deflected.deflection_of(state)
         removed = self.removed(loads, state.time)
         if removed is not self.taken_out:

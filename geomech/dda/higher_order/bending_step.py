@@ -21,6 +21,7 @@ from ..interfaces import SteppedSystem
 from ..kinematics.midpoint_configuration import MidpointConfiguration
 from ..loads.bending_actions import BendingActions, DeflectedPoints
 from ..loads.bending_dashpots import BendingDashpots
+from ..loads.bending_motion import BendingMotion
 from ..loads.load_vectors import generalised
 from ..loads.prescribed_motion import MovedBlocks
 from ..loads.viscous_boundary import ViscousEdges
@@ -90,10 +91,12 @@ class BendingAttempt(Attempt):
     def _actions(self, loads: Loads, end: float) -> BendingActions | None:
         system, state = self.system, self.state
         self.places = DeflectedPoints(system.load_map, self.blocks, state.rotation, self.deflection)
-        moved = MovedBlocks(system.blocks, system.fixed, system.taken_out)
+        bent = self.blocks, state.rotation + self.turn
+        moved = MovedBlocks(system.blocks, system.fixed, system.taken_out, bent)
         actions = BendingActions.of(moved, loads, state, self.places, self.midpoint, system.free, end)
         if actions is not None:
-            actions.bend(self.blocks, state.rotation + self.turn)
+            actions.bend(*bent)
+            actions.rows_of = self._rows
         return actions
 
     def _assemble(self) -> None:
@@ -134,8 +137,11 @@ class BendingAttempt(Attempt):
         super()._absorb(loads, load_time)
         self._own_matrices(self._bending, *self._inertia)
         system, self.dashpots = self.system, None
-        #: block → matrix of its dashpots.
+        #: block → matrix of its dashpots and of springs that move its points.
         self.damped: dict[int, np.ndarray] = {}
+        if self.actions is not None and isinstance(self.actions.imposed, BendingMotion):
+            for equation in self.actions.imposed.spring_equations():
+                self._add_own(*equation)
         if self.quiet is None:
             return
         time = self.state.time + 0.5 * self.dt if load_time is None else load_time
@@ -147,13 +153,22 @@ class BendingAttempt(Attempt):
         if self.dashpots is None:
             return
         for b, (matrix, right) in self.dashpots.equations(self.dt).items():
-            m, width = n_deflections(int(self.blocks.order[b])), 6 * int(self.blocks.rows[b])
-            own = self.own[self.own_at[b] : self.own_at[b] + width * width].reshape(width, width)
-            own[: 6 + m, : 6 + m] += matrix[: 6 + m, : 6 + m]
-            self.own_right[b, :m] += right[6 : 6 + m]
-            self.matrix[self.order[b]] += matrix[:6, :6]
-            self.right[self.order[b]] += right[:6]
-            self.damped[b] = matrix
+            self._add_own(b, matrix, right)
+
+    def _own_of(self, block: int, own: np.ndarray) -> np.ndarray:
+        """The part (6 rows, 6 rows) of the blocks' matrices ``own`` that is that of ``block``."""
+        width, at = 6 * int(self.blocks.rows[block]), self.own_at[block]
+        return own[at : at + width * width].reshape(width, width)
+
+    def _add_own(self, block: int, matrix: np.ndarray, right: np.ndarray) -> None:
+        """Add ``matrix`` (w, w) and ``right`` (w,) to the equations of ``block``."""
+        m = n_deflections(int(self.blocks.order[block]))
+        self._own_of(block, self.own)[: 6 + m, : 6 + m] += matrix[: 6 + m, : 6 + m]
+        self.own_right[block, :m] += right[6 : 6 + m]
+        self.matrix[self.order[block]] += matrix[:6, :6]
+        self.right[self.order[block]] += right[:6]
+        known = self.damped.get(block, 0.0)
+        self.damped[block] = known + matrix[: 6 + m, : 6 + m]
 
     def _own_matrices(self, bending: np.ndarray, shared: np.ndarray, mass: np.ndarray) -> None:
         """The blocks' own matrices, one after the other.
@@ -200,19 +215,66 @@ class BendingAttempt(Attempt):
             # Constraints, prescribed motion and bolts have changed the first six rows and columns.
             own = own.copy()
             for b in moving.tolist():
-                width = 6 * int(blocks.rows[b])
-                own[self.own_at[b] : self.own_at[b] + width * width].reshape(width, width)[:6, :6] = matrix[
-                    self.order[b]
-                ]
+                self._own_of(b, own)[:6, :6] = matrix[self.order[b]]
+        rows, glue = self._rows(contacts, vectors), self.glue
+        if self.actions is not None and self.actions.driven:
+            glue = self._drive(own, full.ravel(), pattern)
+            self.actions.project(contacts.block, contacts.other, rows)
         base = np.empty(pattern.size)
         fill_own(base, pattern.places, pattern.step, (own, self.own_at), pattern.order)
-        if self.glue is not None:
-            self.glue.push(full.ravel(), pattern)
+        if glue is not None:
+            glue.push(full.ravel(), pattern)
             n_bolts = 0 if self.actions is None else self.actions.n_bolts
-            self.glue.stiffen(base, pattern, len(contacts) + n_bolts, self.system.scheme.weight)
+            glue.stiffen(base, pattern, len(contacts) + n_bolts, self.system.scheme.weight)
         if self.actions is not None:
             self.actions.add(full.ravel(), base, pattern, len(contacts))
-        return {"right": full, "base": base, "rows": self._rows(contacts, vectors)}
+        return {"right": full, "base": base, "rows": rows}
+
+    def _drive(self, own: np.ndarray, right: np.ndarray, pattern: SixRowPattern) -> Glue | None:
+        """Impose prescribed motion on the blocks' matrices ``own`` and on ``right`` (6 n,), in place; returns the glue as it
+        acts with it."""
+        assert self.actions is not None
+        #: block → its matrix and right side without what is imposed, contacts, glue and bolts.
+        self.undriven: dict[int, tuple[np.ndarray, np.ndarray]] = {}
+        for b, driven in self.actions.driven.items():
+            w, free = len(driven.known), driven.free
+            matrix, at = self._own_of(b, own)[:w, :w], pattern.unknowns_of(b, len(driven.known))
+            self.undriven[b] = matrix.copy(), right[at].copy()
+            right[at] = free @ (right[at] - matrix @ driven.known)
+            stiff = np.abs(np.diag(matrix)).max()
+            matrix[:] = free @ matrix @ free + stiff * (np.eye(w) - free)
+        if self.glue is None:
+            return None
+        one, two = (np.tile(owner, 2) for owner in self.glue.faces.owners)
+        shift = self.actions.known_motion(one, two, self.glue.vectors)
+        vectors = self.glue.vectors.copy()
+        self.actions.project(one, two, vectors)
+        return replace(
+            self.glue, vectors=vectors, before=self.glue.before + self.system.scheme.weight * shift
+        )  # fmt: skip
+
+    def _residual_of_driven(self) -> None:
+        """Find the forces that impose motion: what the equations of their blocks lack."""
+        if self.actions is None or not self.actions.driven:
+            return
+        found, settled, flat = self.found, self.settled, self.unknowns.ravel()
+        sets: list[tuple[np.ndarray, ...]] = [
+            (found.block, found.other, self._rows(found, self.vectors), settled.normal_force, settled.shear_force)
+        ]
+        if self.glue is not None:
+            owners = [np.tile(owner, 2) for owner in self.glue.faces.owners]
+            elongation = self.glue.before + self.system.scheme.weight * self.glue_change
+            sets.append((*owners, self.glue.vectors, *(-self.glue.springs[:, None] * elongation).T))
+        sets += self.actions.bolt_pushes()
+        for b, driven in self.actions.driven.items():
+            w = len(driven.known)
+            matrix, right = self.undriven[b]
+            left = matrix @ flat[self._six_rows.unknowns_of(b, w)] - right
+            for block, other, rows, normal, shear in sets:
+                for side, owner in enumerate((block, other)):
+                    own = np.flatnonzero(owner == b)
+                    left -= normal[own] @ rows[own, 0, side, :w] + shear[own] @ rows[own, 1, side, :w]
+            driven.residual = left
 
     def _deflection_at(self, pattern) -> np.ndarray:
         """(k,) positions of the unknowns of deflection of blocks that are there among all unknowns."""
@@ -300,6 +362,8 @@ class BendingAttempt(Attempt):
         self.largest = max(self.largest, float(blocks.largest(change)[0].max()))
         if self.dashpots is not None:
             self._brake(self.dashpots)
+        if self.actions is not None and isinstance(self.actions.imposed, BendingMotion) and not static:
+            self.actions.imposed.correct_rates(self.velocity, self.new_rates)
         if self.glue is not None:
             self.glue_change = self.glue.change(self.unknowns.ravel(), self._six_rows)
         if self.n_free:
@@ -312,6 +376,7 @@ class BendingAttempt(Attempt):
             )[:, 1]  # fmt: skip
             if self.actions is not None:
                 self.slid += self.actions.along
+        self._residual_of_driven()
         self.places.take(self.state.rotation + self.increment[:, 2], self.deflection + change)
 
     def _brake(self, dashpots: BendingDashpots) -> None:
@@ -348,11 +413,18 @@ class BendingAttempt(Attempt):
         for b, matrix in self.damped.items():
             own = self.bent_by[self.blocks.basis.of_block(b)]
             right[self.order[b]] -= matrix[:6, 6 : 6 + len(own)] @ own
+        matrix, vectors = self.matrix, self.vectors
+        for b in {} if self.actions is None else self.actions.driven:
+            # The forces that impose motion balance these blocks.
+            matrix, vectors = matrix.copy(), vectors.copy()
+            matrix[self.order[b]], right[self.order[b]] = 0.0, 0.0
+            vectors[found.block == b, :, :6], vectors[found.other == b, :, 6:] = 0.0, 0.0
         if self.glue is not None:
             forces = self.glue.forces(self.system.scheme.weight * self.glue_change, len(self.order))
-            right[self.order[moving]] += forces[moving]
+            balanced = [b for b in moving.tolist() if self.actions is None or b not in self.actions.driven]
+            right[self.order[balanced]] += forces[balanced]
         return imbalance(
-            (self.matrix, right), (found.block, found.other, self.order, self.vectors), settled.unknowns[:n],
+            (matrix, right), (found.block, found.other, self.order, vectors), settled.unknowns[:n],
             (settled.normal_force, settled.shear_force), self.acceleration, tuple(self._mass), (self.gravity, load),
             largest,
         )  # fmt: skip

@@ -41,6 +41,11 @@ class SixRowPattern(assembly.Pattern):
     own: np.ndarray = field(default_factory=lambda: np.empty(0, np.int64))
     step: int = 6
 
+    def unknowns_of(self, block: int, n: int) -> np.ndarray:
+        """(n,) positions of the ``n`` unknowns of ``block`` among all (6 n,)."""
+        first = 6 * int(self.order[block]) + np.arange(6)
+        return np.concatenate([first, 6 * int(self.more[block]) + np.arange(n - 6)])
+
     @property
     def places(self) -> tuple[np.ndarray, ...]:
         """As in `fill`."""

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ...model import AUTO_ORDER, Blocks, DdaSettings, JointLaw, Loads, Material
+from ...model import AUTO_ORDER, Blocks, DdaSettings, JointLaw, Material
 from .deflection_basis import HIGHEST
 
 
@@ -45,11 +45,3 @@ def refuse_unsupported(
         refuse(bends, 'its contacts must be stiff springs: leave dda.springs at "stiff"')
     if settings.contact != "penalty":
         refuse(bends, 'its contacts must be penalty springs or joints with a stiffness: leave dda.contact at "penalty"')
-
-
-def refuse_unsupported_loads(loads: Loads, bends: np.ndarray) -> None:
-    """Raise ValueError for ``loads`` that blocks of higher order, those that ``bends`` (n_blocks,) bool, do not support
-    yet."""
-    for motions, what in ((loads.block_motions, "blocks"), (loads.point_motions, "points")):
-        if any(bends[motion.block] for motion in motions):
-            raise ValueError(f"prescribed motion of {what} of an order above 1 is not supported yet")

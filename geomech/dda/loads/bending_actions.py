@@ -7,13 +7,17 @@ and its length are those between the deflected points.
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from ...model import GROUND
 from ..higher_order.deflected_blocks import DeflectedBlocks, rotation_of
 from ..higher_order.glued_cells import push_springs, stiffen_springs
 from ..higher_order.six_row_system import SixRowPattern, moved
+from ..open_close.contact_set import ContactSet
 from ..open_close.settled_states import Settled
+from .bending_motion import BendingMotion, Driven
 from .bolts import ROUNDS
 from .load_vectors import LoadMap
 from .step_actions import Settle, StepActions
@@ -44,11 +48,17 @@ class DeflectedPoints:
 
 
 class BendingActions(StepActions):
-    """As `StepActions`, with bolts on all unknowns of blocks of higher order."""
+    """As `StepActions`, with bolts and prescribed motion on all unknowns of blocks of higher order.
+
+    ``rows_of(found, vectors)``: rows (n, 2, 2, w) of contacts, with deflection.
+    """
+
+    motion = BendingMotion
+    rows_of: Callable[[ContactSet, np.ndarray], np.ndarray]
 
     def bend(self, blocks: DeflectedBlocks, angle: np.ndarray) -> None:
         """Let the bolts act on the deflection of ``blocks`` rotated by ``angle`` (n_blocks,), where forces act."""
-        self._width = max(blocks.width, 6)
+        self._width, self._deflected = max(blocks.width, 6), blocks
         if self.bolts is None:
             return
         pairs, bolts = self.bolts.pairs, [self.bolts.bolts[k] for k in self.bolts.number]
@@ -70,6 +80,7 @@ class BendingActions(StepActions):
         assert self.bolts is not None
         pairs, n = self.bolts.pairs, len(self.bolts.number)
         rows = np.concatenate([pairs.vectors.reshape(n, 2, 2, 6), self.of_deflection], axis=3)
+        self.project(pairs.block, pairs.other, rows)
         alone = (pairs.other == GROUND) | (pairs.other == pairs.block)
         rows[alone, :, 0] += rows[alone, :, 1]
         rows[alone, :, 1] = 0.0
@@ -92,6 +103,50 @@ class BendingActions(StepActions):
             data, pattern.places, pattern.step, at, (block, other, pattern.order), rows, stiffness.T.ravel()
         )
 
+    @property
+    def driven(self) -> dict[int, Driven]:
+        """Blocks of higher order with prescribed motion."""
+        return self.imposed.driven_bent if isinstance(self.imposed, BendingMotion) else {}
+
+    def project(self, block: np.ndarray, other: np.ndarray, rows: np.ndarray) -> None:
+        """Project the ``rows`` (n, 2, 2, w) of ``block`` and ``other`` (n,) to what prescribed motion leaves free, in
+        place."""
+        for b, driven in self.driven.items():
+            w = len(driven.known)
+            for side, owner in enumerate((block, other)):
+                own = np.flatnonzero(owner == b)
+                rows[own, :, side, :w] = rows[own, :, side, :w] @ driven.free
+
+    def known_motion(self, block: np.ndarray, other: np.ndarray, rows: np.ndarray) -> np.ndarray:
+        """(n, 2) motion of the ``rows`` (n, 2, 2, w) of ``block`` and ``other`` (n,) that is prescribed."""
+        out = np.zeros((len(rows), 2))
+        for b, driven in self.driven.items():
+            w = len(driven.known)
+            for side, owner in enumerate((block, other)):
+                own = np.flatnonzero(owner == b)
+                out[own] += rows[own, :, side, :w] @ driven.known
+        return out
+
+    def _shift_more(self, found: ContactSet, vectors: np.ndarray, shift: np.ndarray) -> None:
+        if not self.driven:
+            return
+        shift += self.known_motion(found.block, found.other, self.rows_of(found, vectors))
+        if self.bolts is not None:
+            pairs, n = self.bolts.pairs, len(self.bolts.number)
+            rows = np.concatenate([pairs.vectors.reshape(n, 2, 2, 6), self.of_deflection], axis=3)
+            pairs.shift += self.known_motion(pairs.block, pairs.other, rows)
+
+    def settle(self, pattern, matrix, right, vectors, acting, found, gap, settle):
+        settled, unknowns = super().settle(pattern, matrix, right, vectors, acting, found, gap, settle)
+        flat = unknowns.reshape(-1)
+        for b, driven in self.driven.items():
+            flat[pattern.unknowns_of(b, len(driven.known))] += driven.known
+        if isinstance(self.imposed, BendingMotion):
+            self.imposed.reached = {
+                s.block: flat[pattern.unknowns_of(s.block, s.rows.shape[1])] for s in self.imposed.springs_bent
+            }
+        return settled, unknowns
+
     def _with_bolts(self, pattern, matrix, right, found, gap, settle: Settle) -> Settled:
         if self.bolts is None:
             return settle(pattern, matrix, right, found, gap)
@@ -106,11 +161,20 @@ class BendingActions(StepActions):
                 return settled
         raise self.bolts.unsettled()
 
-    def deflecting_work(self, change: np.ndarray) -> float:
-        """Work, J/m, of the bolts on the increments ``change`` (n_blocks, m) of deflection."""
+    def bolt_pushes(self) -> list[tuple[np.ndarray, ...]]:
+        """Blocks, others, rows (n, 2, 2, w) and forces (n,) along and across of the bolts, for all their ends."""
         if self.bolts is None:
-            return 0.0
-        pairs, force, out = self.bolts.pairs, self.bolt_forces(), 0.0
+            return []
+        pairs, n = self.bolts.pairs, len(self.bolts.number)
+        rows = np.concatenate([pairs.vectors.reshape(n, 2, 2, 6), self.of_deflection], axis=3)
+        return [(pairs.block, pairs.other, rows, *self.bolt_forces().T)]
+
+    def deflecting_work(self, change: np.ndarray) -> float:
+        """Work, J/m, of bolts and of the forces that move points on the increments ``change`` (n_blocks, m) of deflection."""
+        out = self.imposed.deflecting_work(change) if isinstance(self.imposed, BendingMotion) else 0.0
+        if self.bolts is None:
+            return out
+        pairs, force = self.bolts.pairs, self.bolt_forces()
         m = min(change.shape[1], self._width - 6)
         for side, owner in enumerate((pairs.block, pairs.other)):
             own = np.flatnonzero(owner != GROUND)

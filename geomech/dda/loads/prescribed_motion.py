@@ -8,13 +8,16 @@ its contacts as a shift of their gaps.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from ...model import UNKNOWNS, BaseMotion, BlockMotion, Blocks, Loads, PointMotion
 from ..kinematics.midpoint_configuration import MidpointConfiguration
 from .force_records import POINT_FORCE
+
+if TYPE_CHECKING:
+    from ..higher_order.deflected_blocks import DeflectedBlocks
 
 #: Rows of C are linearly dependent below this relative size: they contradict or repeat one another.
 _DEPENDENT = 1e-10
@@ -68,11 +71,20 @@ class Pairs:
 
 class MovedBlocks(NamedTuple):
     """The ``blocks`` of a step, those that are ``fixed`` (n_blocks,), and ``removed`` (n_blocks,) by excavation (None:
-    none)."""
+    none). ``bent``: those of higher order, and by how much blocks (n_blocks,) are rotated where forces act, rad; None
+    without any."""
 
     blocks: Blocks
     fixed: np.ndarray
     removed: np.ndarray | None
+    bent: tuple[DeflectedBlocks, np.ndarray] | None = None
+
+
+def refuse_contradiction(constraint: np.ndarray, name: str) -> None:
+    """Raise ValueError that names the block where rows of its ``constraint`` (c, w) contradict or repeat one another."""
+    r = np.linalg.qr(constraint.T)[1]
+    if len(constraint) > constraint.shape[1] or np.abs(np.diag(r)).min() <= _DEPENDENT * np.abs(r).max():
+        raise ValueError(f"{name}: the motions prescribed for it contradict or repeat one another")
 
 
 class PrescribedMotion:
@@ -90,7 +102,7 @@ class PrescribedMotion:
         self, moved: MovedBlocks, loads: Loads, midpoint: MidpointConfiguration, point_at, before: np.ndarray, start: float,
         end: float,
     ) -> None:  # fmt: skip
-        blocks, fixed, removed = moved
+        blocks, fixed, removed = moved.blocks, moved.fixed, moved.removed
         n = blocks.n_blocks
         self.blocks, self.fixed, self.moments = blocks, fixed, midpoint.moments
         self._midpoint = midpoint

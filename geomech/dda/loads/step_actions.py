@@ -49,6 +49,9 @@ def effective_gravity(
 class StepActions:
     """Prescribed motion and bolts of one attempt at a step; methods in the order in which the step calls them."""
 
+    #: What imposes motion.
+    motion: type[PrescribedMotion] = PrescribedMotion
+
     def __init__(
         self, moved: MovedBlocks, loads: Loads, state: State, points: MaterialPoints, midpoint: MidpointConfiguration,
         order: np.ndarray, end: float,
@@ -63,7 +66,7 @@ class StepActions:
         self.imposed: PrescribedMotion | None = None
         shaken = loads.base is not None and loads.base.frame == "ground"
         if shaken or loads.block_motions or loads.point_motions:
-            self.imposed = PrescribedMotion(moved, loads, midpoint, point_at, state.imposed, state.time, end)
+            self.imposed = self.motion(moved, loads, midpoint, point_at, state.imposed, state.time, end)
         self.bolts: BoltSet | None = None
         self.memory = np.empty(0, BOLT)
         if loads.bolts:
@@ -129,6 +132,7 @@ class StepActions:
                 1.0, shift,
             )  # fmt: skip
             self.imposed.impose(matrix, right, [contacts, *self._bolted()], self.order)
+            self._shift_more(found, vectors, shift)
         if shift.any():
             geometry = found.geometry.copy()
             geometry[:, 3] += shift[:, 0]
@@ -139,6 +143,9 @@ class StepActions:
         if self.imposed is not None:
             unknowns = self.imposed.recover(unknowns, self.order)
         return settled, unknowns
+
+    def _shift_more(self, found: ContactSet, vectors: np.ndarray, shift: np.ndarray) -> None:
+        """Add the motion of the contacts ``found`` due to other prescribed unknowns to ``shift`` (n, 2), in place."""
 
     def _bolted(self) -> list[Pairs]:
         return [] if self.bolts is None else [self.bolts.pairs]

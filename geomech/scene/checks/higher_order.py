@@ -30,26 +30,11 @@ def check_orders(c: Check) -> None:
         _check_cracks(c, refuse)
         _check_joints(c, refuse)
         _check_solver(c, refuse)
-        _check_motions(c, name, refuse)
         if t.loads is not None and t.loads.in_situ is not None and zone.order == "auto":
             refuse(
                 'in-situ stress ([loads] in_situ) with order = "auto" is not supported yet',
                 "give the order as a number, 2 to 8",
             )
-
-
-def _check_motions(c: Check, zone: str, refuse) -> None:
-    """Motion cannot be prescribed to the blocks of ``zone``, nor to points in them."""
-    loads = c.tables.loads
-    if loads is None:
-        return
-    if any(motion.zone == zone for motion in loads.motions):
-        refuse("prescribed motion ([loads] motions) of blocks of higher order is not supported yet", "leave out one")
-    if any(motion.zone in (zone, None) for motion in loads.point_motions):
-        refuse(
-            "prescribed motion of points ([loads] point_motions) of blocks of higher order is not supported yet",
-            "leave out one, or name the zone of the point if it is another one",
-        )
 
 
 def _check_cell_joint(c: Check, zone: str, joint: str | None) -> None:

@@ -21,7 +21,6 @@ from geomech.model import (
     JointLaw,
     Loads,
     Material,
-    PointMotion,
     State,
     ViscousBoundary,
 )
@@ -161,13 +160,3 @@ def test_a_platen_that_shears_drags_a_block():
     assert shear == pytest.approx(np.tan(0.4) * -normal, rel=2e-3)
     assert budget.friction > 0
     assert abs(budget.residual) < 1e-3 * budget.turnover
-
-
-def test_motion_of_what_bends_is_refused():
-    system = system_of([rectangle(0, 0, 1, 1)], [False], [3])
-    history = History.constant((0.0, 0.0, 0.0))
-    with pytest.raises(ValueError, match="prescribed motion of blocks of an order above 1"):
-        system.step(State.at_rest(system.blocks), Loads(block_motions=(BlockMotion(0, history),)))
-    point = PointMotion(0, (0.5, 0.5), History.constant((0.0, 0.0)))
-    with pytest.raises(ValueError, match="prescribed motion of points of an order above 1"):
-        system.step(State.at_rest(system.blocks), Loads(point_motions=(point,)))

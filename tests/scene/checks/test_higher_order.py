@@ -26,11 +26,6 @@ def scene(tmp_path, *more: str, text: str = BENDING):
     [
         ("[joints.default]\nfriction_angle_deg = 30\nrestitution = 0.4\n", r"\[joints.default\] restitution"),
         ("[joints.default]\nfriction_angle_deg = 30\njrc = 8\njcs_pa = 1e8\n", "softens, dilates or closes"),
-        (
-            "[[loads.point_motions]]\nat = [1.5, 0.5]\nvelocity_m_per_s = [0, -1]\n",
-            r"motion of points \(\[loads\] point_motions\)",
-        ),
-        ('[[loads.motions]]\nzone = "block"\nvelocity_m_per_s = [0, -1]\n', r"prescribed motion"),
     ],
 )
 def test_what_is_not_supported_is_refused_at_its_key(tmp_path, more, message):
@@ -185,6 +180,26 @@ checkpoint_every = 1
     resume(folder, ("run.end_time_s=0.05",), quiet=True)
     run(load_scene(scene(tmp_path, more), ("run.end_time_s=0.05",)), whole)
     assert (folder / "history.csv").read_bytes() == (whole / "history.csv").read_bytes()
+
+
+@pytest.mark.parametrize("zone", ["order = 3", "order = 2\nmesh_size_m = 0.5"])
+def test_a_zone_that_bends_is_driven_and_resumes(tmp_path, zone):
+    more = """[[loads.point_motions]]
+at = [1.5, 1.0]
+axes = "y"
+velocity_m_per_s = [0, -1e-4]
+[output]
+checkpoint_every = 1
+"""
+    text, folder, whole = BENDING.replace("order = 4", zone), tmp_path / "run", tmp_path / "whole"
+    run(load_scene(scene(tmp_path, more, text=text)), folder)
+    resume(folder, ("run.end_time_s=0.05",), quiet=True)
+    run(load_scene(scene(tmp_path, more, text=text), ("run.end_time_s=0.05",)), whole)
+    assert (folder / "history.csv").read_bytes() == (whole / "history.csv").read_bytes()
+    motion = more.replace("point_motions", "motions").replace("at = [1.5, 1.0]", 'zone = "block"')
+    run(load_scene(scene(tmp_path, motion, text=text)), tmp_path / "zone")
+    blocks = Run(tmp_path / "zone").grid("blocks", 3)
+    assert np.asarray(blocks["displacement"])[:, 1].min() < -2e-6
 
 
 def test_cells_have_the_joint_by_which_they_part(tmp_path):
