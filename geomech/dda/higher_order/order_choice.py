@@ -159,7 +159,7 @@ class OrderChoice:
         angle, density = faces.angle, attempt.density
         points = attempt.points
         if attempt.actions is not None:
-            points = np.concatenate([points, attempt.actions.bolt_rows()])
+            points = np.concatenate([points, attempt.actions.point_rows()])
         out = trial.loads(points, attempt.edges, attempt.midpoint.vertices, angle)
         out -= density[:, None] * np.einsum("bej,be->bj", trial.coupling(angle), attempt.acceleration[:, 3:])
         spun = density * attempt.carried[:, 2] ** 2

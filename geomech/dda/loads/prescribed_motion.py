@@ -173,6 +173,11 @@ class PrescribedMotion:
             self._add(b, row, value, speed, number)
 
     @property
+    def at_points(self) -> np.ndarray:
+        """POINT_FORCE rows of point motions, with the forces that `reactions` has found."""
+        return self._rows
+
+    @property
     def driven(self) -> list[int]:
         """Blocks that are not fixed and have prescribed motion: impacts do not change it."""
         return list(self._given)

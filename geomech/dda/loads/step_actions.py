@@ -185,9 +185,11 @@ class StepActions:
         """(n, 2) forces of the acting bolts, N; with their pairs' vectors they give generalised forces."""
         return np.zeros((0, 2)) if self.bolts is None else self.bolts.forces(self._motion)
 
-    def bolt_rows(self) -> np.ndarray:
-        """POINT_FORCE rows of the acting bolts."""
-        return np.zeros(0, POINT_FORCE) if self.bolts is None else self.bolts.point_rows(self.bolt_forces())
+    def point_rows(self) -> np.ndarray:
+        """POINT_FORCE rows of the acting bolts and, after `acted`, of the forces that move points."""
+        rows = [] if self.bolts is None else [self.bolts.point_rows(self.bolt_forces())]
+        rows += [] if self.imposed is None else [self.imposed.at_points]
+        return np.concatenate(rows) if rows else np.zeros(0, POINT_FORCE)
 
     @property
     def largest_bolt_force(self) -> float:

@@ -9,7 +9,7 @@ from scenes_of_bending import after, moved, rectangle, system_of
 from scenes_of_cells import cells_of, columns_and_rows, moved_corners
 
 from geomech.dda import EnergyBudget
-from geomech.model import GROUND, BlockMotion, Bolt, History, JointLaw, Loads, Material, PointMotion, State
+from geomech.model import AUTO_ORDER, GROUND, BlockMotion, Bolt, History, JointLaw, Loads, Material, PointMotion, State
 
 BEAM = Material("rock", 2e10, 0.0, 2500.0, plane="stress")
 CLAMP = JointLaw("clamp", 0.5, cohesion=1e12, tensile_strength=1e12, normal_stiffness=1e15, shear_stiffness=1e15)
@@ -39,6 +39,14 @@ def test_a_tip_goes_where_it_is_sent(order):
     assert result.statistics["reaction_y:point 1"] == pytest.approx(-1e-3 * TIP, rel=3e-3 if order == 3 else 1e-3)
     assert abs(result.statistics["reaction_x:point 1"]) < 1e-6
     assert result.statistics["unbalanced"] < 1e-9
+
+
+def test_an_order_is_raised_for_a_point_that_is_moved():
+    motion = PointMotion(1, END, sent(-1e-3), direction=(0.0, 1.0))
+    system = cantilever(AUTO_ORDER, order_target=0.02)
+    result = after(system, Loads(point_motions=(motion,)), 4)
+    assert result.state.order[1] >= 3
+    assert result.statistics["reaction_y:point 1"] == pytest.approx(-1e-3 * TIP, rel=0.05)
 
 
 def test_a_tip_that_a_spring_moves_goes_half_the_way():
