@@ -18,9 +18,11 @@ def refuse_unsupported(
     if not (((order >= 1) & (order <= HIGHEST)) | (order == AUTO_ORDER)).all():
         raise ValueError(f"the order of a block is 1 to {HIGHEST}, got {order.min()} to {order.max()}")
     bends = (order != 1) & ~blocks.fixed
+    cells = np.zeros(blocks.n_blocks, bool)
     if blocks.glued is not None:
-        bends[blocks.vertex_block[np.asarray(blocks.glued).ravel()]] = True
-        bends &= ~blocks.fixed
+        cells[blocks.vertex_block[np.asarray(blocks.glued).ravel()]] = True
+        cells &= ~blocks.fixed
+    bends |= cells
     names = blocks.names or tuple(f"block {b}" for b in range(blocks.n_blocks))
 
     def refuse(which: np.ndarray, why: str) -> None:
@@ -29,6 +31,7 @@ def refuse_unsupported(
             said = '"auto"' if order[block] == AUTO_ORDER else order[block]
             raise ValueError(f"{names[block]!r} has order {said}: {why}")
 
+    refuse(cells & (order == 1), "cells glued to each other need an order from 2")
     refuse(bends & np.array([materials[m].rigid for m in blocks.material]), "a rigid block does not bend")
     if blocks.constrained is not None:
         refuse(bends & blocks.constrained.any(axis=1), "guided blocks of higher order are not supported yet")

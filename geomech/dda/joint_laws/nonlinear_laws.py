@@ -31,6 +31,9 @@ _LEAST_PRESSURE = 1e-6
 #: Tolerance between forces and laws, relative to the contact's force. Wear by slip is found by successive substitution,
 #: so it is larger than the round-off tolerance of contact states.
 _AGREED = 1e-8
+#: … for normal forces also relative to the force that the rounding of a gap makes in its spring. (Slip of millimetres is
+#: known to some such roundings, and dilation passes them on to the gap: three in a slab on a rough plane.)
+_ROUNDED = 4.0
 
 
 def rough_strength(
@@ -174,10 +177,11 @@ class CurvedJoints:
         return rate
 
     def misfit(
-        self, was: Springs, gap_was: np.ndarray, now: Springs, gap_now: np.ndarray, state, forces: np.ndarray
-    ) -> np.ndarray:
+        self, was: Springs, gap_was: np.ndarray, now: Springs, gap_now: np.ndarray, state, forces: np.ndarray,
+        slack: np.ndarray,
+    ) -> np.ndarray:  # fmt: skip
         """(n,) N: misfit between the ``forces`` (n, 4) of `check_states`, found with the previous linear laws, and the
-        nonlinear laws; 0 within the tolerance."""
+        nonlinear laws; 0 within the tolerance. ``slack`` (n,) m: rounding of gaps."""
         out = np.zeros(len(state))
         at = self.rows
         n, s, gap, slide = forces[at].T
@@ -185,10 +189,11 @@ class CurvedJoints:
         moved = gap - gap_was[at] + was.lift[at] * slide
         pressed = -now.normal[at] * (gap_now[at] + moved - now.lift[at] * slide)
         strength = now.friction[at] * n + now.sliding[at]
+        size = _AGREED * np.maximum(np.abs(n), np.abs(s))
         off = np.where(closed, np.abs(pressed - n), 0.0)
+        off = np.where(off > np.maximum(size, _ROUNDED * now.normal[at] * slack[at]), off, 0.0)
         off = np.maximum(off, np.where(slips, np.abs(strength - np.abs(s)), 0.0))
         sprung = np.abs(now.shear[at] - was.shear[at]) * np.abs(slide)
         off = np.maximum(off, np.where(closed & ~slips, sprung, 0.0))
-        size = np.maximum(np.abs(n), np.abs(s))
-        out[at] = np.where(off > _AGREED * size, off, 0.0)
+        out[at] = np.where(off > size, off, 0.0)
         return out

@@ -178,7 +178,7 @@ class Equations:
             known, known_gap = self.curved.lines(
                 self.springs, self.gap, found, state, direction, bonded, forces[:, 0], slip
             )
-            missed = self.curved.misfit(springs, gap, known, known_gap, state, forces)
+            missed = self.curved.misfit(springs, gap, known, known_gap, state, forces, self.slack)
         tried, strengths = (state, direction, bonded), tuple(Strengths.of(known))
         *called, violation = check_states(forces, tried, strengths, found.shear, self.slack)
         if found.faces is not None:

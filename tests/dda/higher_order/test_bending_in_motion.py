@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scenes_of_bending import ROCK, after, moved, rectangle, system_of, turned
+from scenes_of_cells import cells_of
 
 from geomech.dda import EnergyBudget
 from geomech.model import EdgeTraction, History, JointLaw, Loads, Material, State
@@ -119,5 +120,7 @@ def test_what_is_not_supported_is_refused_by_name():
         system_of(polygons, [1, 0], [1, 3], rock=replace(ROCK, rigid=True))
     with pytest.raises(ValueError, match="1 to 8"):
         system_of(polygons, [1, 0], [1, 11])
+    with pytest.raises(ValueError, match="cells glued to each other need an order from 2"):
+        cells_of([rectangle(0, 0, 1, 1), rectangle(1, 0, 2, 1)], 1)
     # What is fixed does not bend, whatever its order.
     assert after(system_of(polygons, [1, 0], [7, 1]), WEIGHT, 1).state.deflection is None
