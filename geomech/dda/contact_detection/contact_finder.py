@@ -35,6 +35,9 @@ from .neighbour_search import NearPairs
 from .t_junctions import nodes_in_faces
 from .thin_walls import from_outside
 
+#: Vertices nearer to each other than this fraction of the model are one point of cells.
+_SAME_POINT = 1e-9
+
 #: At time zero, faces nearer than this many times the domain's size touch and are bonded by cohesion and tension.
 _TOUCH = 1e-7
 #: Contacts lie on one line if the cosine of the angle between their normals exceeds this.
@@ -559,9 +562,7 @@ class ContactFinder:
         edges = np.asarray(blocks.glued)[parted]
         pair = np.sort(blocks.vertex_block[edges], axis=1)
         self.parted = np.unique(pair[:, 0] * blocks.n_blocks + pair[:, 1])
-        self.joined = np.setdiff1d(
-            _meeting_cells(replace(blocks, glued=np.asarray(blocks.glued)[~parted])), self.parted
-        )
+        self.joined = _meeting_cells(replace(blocks, glued=np.asarray(blocks.glued)[~parted]))
 
     def laws_of(self, edge: np.ndarray, mate: np.ndarray) -> np.ndarray:
         """(n,) joint laws between the edges ``edge`` and ``mate`` (n,); −1 where they do not touch."""
@@ -632,7 +633,8 @@ class ContactFinder:
 
 
 def _meeting_cells(blocks: Blocks) -> np.ndarray:
-    """(k,) a · n_blocks + b, a < b, of all cells a and b that share a corner of bonded faces."""
+    """(k,) a · n_blocks + b, a < b, of all cells a and b that share a corner of bonded faces, and no face that is not
+    bonded."""
     if blocks.glued is None:
         return np.zeros(0, np.int64)
     from scipy.sparse import csr_array
@@ -646,7 +648,22 @@ def _meeting_cells(blocks: Blocks) -> np.ndarray:
     for some in np.split(blocks.vertex_block[order], np.flatnonzero(np.diff(corner[order])) + 1):
         cells = np.unique(some).tolist()
         pairs |= {a * blocks.n_blocks + b for k, a in enumerate(cells) for b in cells[k + 1 :]}
-    return np.array(sorted(pairs), np.int64)
+    return np.setdiff1d(np.array(sorted(pairs), np.int64), _apart_in_a_face(blocks))
+
+
+def _apart_in_a_face(blocks: Blocks) -> np.ndarray:
+    """(k,) a · n_blocks + b, a < b, of all blocks a and b that have an edge in common that is not bonded."""
+    vertices, (edge, mate) = blocks.vertices, np.asarray(blocks.glued, np.int64).T
+    grid = np.round((vertices - vertices.min(axis=0)) / (_SAME_POINT * float(np.ptp(vertices, axis=0).max())))
+    point = np.unique(grid, axis=0, return_inverse=True)[1].ravel()
+    start, end = point, point[blocks.next_vertex]
+    n = int(point.max()) + 1
+    free = np.ones(len(vertices), bool)
+    free[edge] = free[mate] = False
+    edges = np.flatnonzero(free)
+    _, one, two = np.intersect1d(start[edges] * n + end[edges], end[edges] * n + start[edges], return_indices=True)
+    pair = np.sort(blocks.vertex_block[np.stack([edges[one], edges[two]], axis=1)], axis=1)
+    return np.unique(pair[:, 0] * blocks.n_blocks + pair[:, 1])
 
 
 def _sound_transit_time(blocks: Blocks, stiffness: np.ndarray, mass: np.ndarray) -> float:
