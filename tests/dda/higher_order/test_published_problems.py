@@ -167,12 +167,12 @@ def slipping(strength: float, length: float, cells: int, order: int, dt: float, 
     )  # fmt: skip
 
 
-def check_slip(verified, strength, found, exact, order, share):
+def check_slip(state_figure, strength, found, exact, order, share):
     print(
         f"strength {strength}: passed {found[0]:.4f}, should be {exact[0]:.4f}; sent back {found[1]:.4f}, should be "
         f"{exact[1]:.4f}"
     )
-    verified(
+    state_figure(
         f"shear wave through a joint that slips at {strength:g} of its stress: energy passed, cells of order {order}",
         found[0] - exact[0],
         "Miller 1978",
