@@ -102,7 +102,7 @@ for increment in (4e-3, 2e-3, 1e-3):
         rock,
         load,
         GrowthSettings(increment=increment),
-        DdmSettings(),
+        settings=DdmSettings(),
         control="toughness",
         max_steps=round(12e-3 / increment),
     )

@@ -6,7 +6,8 @@ import logging
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 
-from ..model import Blocks, DdaSettings, JointLaw, Loads, Material, Motion, State
+from ..model import Blocks, DdaSettings, JointLaw, Joints, Loads, Material, Motion, State
+from ..model.former_names import folded_argument
 from .energy_balance import EnergyBudget
 from .excavation import until_next_event
 from .kinematics.strain_limits import ElasticRange
@@ -42,20 +43,24 @@ class _Watch:
         self.budget = self.budget.cut()
 
 
+def _indexed(joints: Sequence[JointLaw], index: Callable[[str, str], int | None]) -> Joints:
+    return Joints(joints, index)
+
+
+@folded_argument("joint_index", "joints", _indexed)
 def run(
     blocks: Blocks,
     materials: Sequence[Material],
-    joints: Sequence[JointLaw],
+    joints: Sequence[JointLaw] | Joints,
     loads: Loads,
     settings: DdaSettings,
     end_time: float,
     *,
-    joint_index: Callable[[str, str], int | None] | None = None,
     state: State | None = None,
     watch: Callable[[StepResult], None] | None = None,
 ) -> Iterator[State]:
     """States of a block system from rest (or from ``state``) until ``end_time``, one a step; `StepLength` says how
-    long. ``watch`` sees every `StepResult`. The arrays of states are those with which the run continues: they are
+    long. ``joints``: the law of all joints, first of the sequence, or `Joints` that say which acts where. ``watch`` sees every `StepResult`. The arrays of states are those with which the run continues: they are
     read-only (`State.writable` has copies).
 
     ``settings.equilibrium`` "start" brings the blocks to rest before the first state, "loads" in statics at every load
@@ -74,7 +79,8 @@ def run(
     """
     if not end_time >= 0:
         raise ValueError(f"end_time must not be negative, got {end_time!r} s")
-    system = BlockSystem(blocks, materials, joints, joint_index, settings)
+    laws, index = (joints.laws, joints.index) if isinstance(joints, Joints) else (joints, None)
+    system = BlockSystem(blocks, materials, laws, index, settings)
     if state is None:
         state = State.at_rest(blocks)
     state.refuse_misfit(blocks)

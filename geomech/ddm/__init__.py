@@ -1,7 +1,7 @@
 """Displacement discontinuity method: cracks in an elastic body.
 
     body = ddm.Body(loops, cracks, material)        # loops [] for the infinite plane; holes=, supports=
-    body = ddm.Body([], cracks, material, half_plane=ddm.HalfPlane((0, 0)))     # below a free surface
+    body = ddm.Body(ddm.HalfPlane((0, 0)), cracks, material)        # below a free surface
     sol = body.solve(ddm.BodyLoad(remote_stress=[0, 1e6, 0]))
     sol.tips["k_i"], sol.faces.opening, sol.stress(points), sol.displacement(points)
 
@@ -23,6 +23,7 @@ _PUBLIC = {
     "HalfPlane": ".mesh.half_plane",
     "OutOfEquilibrium": ".loads.body_loads",
     "Pressure": ".loads.body_loads",
+    "Reuse": ".body",
     "Support": ".loads.supports",
     "LoadHistory": ".loads.body_loads",
     "NotConverged": ".crack_contact.frictionless_contact",
@@ -42,6 +43,7 @@ __all__ = [
     "NotConverged",
     "OutOfEquilibrium",
     "Pressure",
+    "Reuse",
     "Solution",
     "Support",
     "TargetMissed",

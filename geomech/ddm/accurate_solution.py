@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..model import Cracks, DdmSettings, Material
+from ..model.former_names import folded_argument
 from .adaptivity import HIGHEST, check_target, finer, of_order, order_for
 from .body import Body
 from .fracture.chord_error import chord_errors
@@ -16,11 +17,13 @@ from .fracture.tip_factors import factors, largest, negligible
 from .iterative.gmres import NotSolved
 from .kernels import shape_functions
 from .loads.body_loads import BodyLoad
+from .mesh.half_plane import HalfPlane, without_outline
 from .solution import Solution
 
 
+@folded_argument("half_plane", "loops", without_outline)
 def solve_to(
-    loops: Sequence[np.ndarray],
+    loops: Sequence[np.ndarray] | HalfPlane,
     cracks: Cracks,
     material: Material,
     load: BodyLoad,
@@ -45,7 +48,7 @@ def solve_to(
     # Begin with a tenfold target; the next mesh is graded more finely.
     order = order_for(min(10 * target_error, 0.5))
     settings = of_order(DdmSettings(nodes=nodes), min(order, HIGHEST - 2), min(2 * target_error, 0.5))
-    rock = Body([*loops], cracks, material, settings, **body)
+    rock = Body(loops, cracks, material, settings, **body)
     before = rock.solve(load)
     while settings.order < shape_functions.MAX_ORDER:
         settings = finer(settings)

@@ -15,6 +15,7 @@ from __future__ import annotations
 import logging
 from collections.abc import Sequence
 from copy import copy
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
@@ -22,6 +23,7 @@ import numpy as np
 
 from ..model import Cracks, DdmSettings, JointLaw, Material
 from ..model.blocks.polygon import area_moments
+from ..model.former_names import folded_argument, gathered_arguments
 from .adaptivity import finer, for_target
 from .counters import Work
 from .crack_contact.face_contact import settle_faces
@@ -43,7 +45,7 @@ from .loads.unit_load_cache import UnitLoad, UnitLoads, on_elements
 from .mesh.edge_location import OFF
 from .mesh.elements import Mesh, mesh, outline_edges
 from .mesh.geometry_checks import check_cracks, check_outline, new_segments
-from .mesh.half_plane import HalfPlane
+from .mesh.half_plane import HalfPlane, without_outline
 from .mesh.point_location import outlined
 from .solution import Solution
 from .system.bordered_factor import SMALLEST_BORDERED, Bordered, WholeMatrix
@@ -56,14 +58,27 @@ from .system.schur_complement import CrackSystem
 _log = logging.getLogger(__name__)
 
 
+@dataclass(frozen=True, eq=False)
+class Reuse:
+    """What a body takes over from others.
+
+    previous   an earlier body whose unchanged elements are reused, factors included (`bordered_factor`); growth then
+               costs the rows and columns of the new elements
+    work       operation counts that it adds to; None: counts of its own
+    """
+
+    previous: Body | None = None
+    work: Work | None = None
+
+
 class Body:
     """An elastic body with cracks.
 
-    ``loops``: (n, 2) arrays, the outline counter-clockwise, then holes clockwise; [] for the infinite plane. ``holes``:
-    further holes in either direction, also in the infinite plane. ``half_plane``: the rock is that below a free
-    surface, where cracks may end. ``cracks``: those of this body. ``previous``: an earlier body whose unchanged
-    elements are reused, factors included (`bordered_factor`); growth then costs the rows and columns of the new
-    elements. ``face_laws``: laws of the crack faces (`face_laws`), selected by the ``law`` of each crack segment.
+    ``loops``: (n, 2) arrays, the outline counter-clockwise, then holes clockwise; [] for the infinite plane; or a
+    `HalfPlane`, the rock below a free surface, where cracks may end. ``holes``: further holes in either direction, also
+    in the infinite plane and below a surface. ``cracks``: those of this body. ``reuse``: what it takes over from an
+    earlier body: that body, or `Reuse`. ``face_laws``: laws of the crack faces (`face_laws`), selected by the ``law`` of
+    each crack segment.
     ``counts``: operations that setting up the body took; ``work``: operations since then of all bodies that share it.
     Raises ValueError, naming the item, if the geometry is not a body, and numpy.linalg.LinAlgError if cracks cut off a
     part.
@@ -90,20 +105,23 @@ class Body:
     _cg: np.ndarray | KeptRows
     _w: BoundaryResponse | TransposedRows
 
+    @folded_argument("half_plane", "loops", without_outline)
+    @gathered_arguments("reuse", Reuse)
     def __init__(
         self,
-        loops: list[np.ndarray],
+        loops: Sequence[np.ndarray] | HalfPlane,
         cracks: Cracks,
         material: Material,
         settings: DdmSettings | None = None,
-        previous: Body | None = None,
+        reuse: Reuse | Body | None = None,
         holes: Sequence[np.ndarray] = (),
         supports: Sequence[Support] = (),
         face_laws: Sequence[JointLaw] = SMOOTH,
-        work: Work | None = None,
-        half_plane: HalfPlane | None = None,
     ):
-        self.half_plane = half_plane
+        reuse = reuse if isinstance(reuse, Reuse) else Reuse(reuse)
+        previous = reuse.previous
+        self.half_plane = half_plane = loops if isinstance(loops, HalfPlane) else None
+        loops = [] if isinstance(loops, HalfPlane) else list(loops)
         self.material, self.cracks = material, cracks
         #: The settings given; ``settings`` are those of the mesh, which may follow from a target error.
         self.requested = DdmSettings() if settings is None else settings
@@ -124,7 +142,7 @@ class Body:
         ):
             previous = None
         self.counts = {"elements": 0, "elements_new": 0, "boundary_assemblies": 0, "boundary_factorisations": 0}
-        self.work = Work() if work is None else work
+        self.work = Work() if reuse.work is None else reuse.work
         given = [*loops, *holes]
         same = previous if previous is not None and _same_loops(previous.given_loops, given) else None
         if same is None and self.supports:
@@ -158,7 +176,7 @@ class Body:
         self.compressed = is_compressed("compressed" if many else solver, self.faces.n_unknowns, factored)
         if half_plane is not None and self.boundary.n_unknowns > FACTORABLE:
             raise ValueError(
-                f"half_plane: {self.boundary.n_unknowns} unknowns on holes, but below a free surface no more than "
+                f"half-plane: {self.boundary.n_unknowns} unknowns on holes, but below a free surface no more than "
                 f"{FACTORABLE} can be solved: set a larger target_error, or draw the surface as a side of a large block"
             )
         self._functionals: tuple[tuple, TipFunctionals] | None = None
@@ -190,20 +208,21 @@ class Body:
     def nu(self) -> float:
         return self.material.effective_poissons_ratio
 
+    @property
+    def outline(self) -> list[np.ndarray] | HalfPlane:
+        """The loops or the half-plane without holes, as `Body` takes them."""
+        return self.loops[: int(self.outlined)] if self.half_plane is None else self.half_plane
+
+    @property
+    def holes(self) -> list[np.ndarray]:
+        """The holes, clockwise."""
+        return self.loops[int(self.outlined) :]
+
     def remeshed(self, settings: DdmSettings, previous: Body | None = None) -> Body:
         """The same body with another mesh; ``previous`` as in `Body`."""
-        n_outlines = int(self.outlined)
         return Body(
-            self.loops[:n_outlines],
-            self.cracks,
-            self.material,
-            settings,
-            previous=previous,
-            holes=self.loops[n_outlines:],
-            supports=self.supports,
-            face_laws=self.face_laws,
-            half_plane=self.half_plane,
-        )
+            self.outline, self.cracks, self.material, settings, Reuse(previous), self.holes, self.supports, self.face_laws
+        )  # fmt: skip
 
     @property
     def refined(self) -> Body:
@@ -221,23 +240,15 @@ class Body:
         if halved is None:
             return None
         loops, cracks, supports = halved
-        n_outlines = int(self.outlined)
+        n = int(self.outlined)
+        outline = loops[:n] if self.half_plane is None else self.half_plane
         return Body(
-            loops[:n_outlines],
-            cracks,
-            self.material,
-            self.settings,
-            holes=loops[n_outlines:],
-            supports=supports,
-            face_laws=self.face_laws,
-            half_plane=self.half_plane,
-        )
+            outline, cracks, self.material, self.settings, None, loops[n:], supports, self.face_laws
+        )  # fmt: skip
 
     def _in_half_plane(self, half_plane: HalfPlane, edges: np.ndarray) -> np.ndarray:
         """``edges`` (m, 2, 2) and a piece of the free surface. Raises ValueError if anything is not below the
         surface."""
-        if self.outlined:
-            raise ValueError("half_plane: the body has an outline; a half-plane has none but its surface")
         half_plane.check_inside(self.loops, self.cracks)
         return np.concatenate([edges, half_plane.edge(self._vertices)])
 

@@ -17,8 +17,9 @@ from typing import Any
 
 import numpy as np
 
-from ..model import TIP, Cracks, DdmSettings, Event, GrowthSettings, Material
-from .body import Body
+from ..model import TIP, Cracks, Event, GrowthSettings, Material
+from ..model.former_names import folded_argument, gathered_arguments, named_argument
+from .body import Body, Reuse
 from .fracture.f_criterion import apply_criterion, check_criterion
 from .growth.cut_off_parts import cutting_segments
 from .growth.initiation import NewCrack, add_new_cracks, new_cracks
@@ -26,6 +27,7 @@ from .growth.path_correction import Memory, corrected
 from .growth.tie_tolerance import reached
 from .growth.tip_advance import Growth, advance
 from .loads.body_loads import BodyLoad
+from .mesh.half_plane import HalfPlane, without_outline
 from .solution import Solution
 
 #: Under a controlled load, tips whose K_eq/K_Ic is within this fraction of the largest grow with it: K at a graded kink
@@ -64,27 +66,31 @@ class Step:
     events: tuple[Event, ...]
 
 
+@named_argument("settings", 5)
+@folded_argument("half_plane", "loops", without_outline)
+@gathered_arguments("reuse", Reuse)
 def propagate(
-    loops: Sequence[np.ndarray],
+    loops: Sequence[np.ndarray] | HalfPlane,
     cracks: Cracks,
     material: Material,
     load: BodyLoad | Loading,
     growth: GrowthSettings | None = None,
-    settings: DdmSettings | None = None,
     *,
     control: str = "load",
     max_steps: int = 200,
     max_factor: float = math.inf,
     **body,
 ) -> Iterator[Step]:
-    """Grow ``cracks`` in the body with outline ``loops`` ([] for the infinite plane); yields one `Step` per increment.
+    """Grow ``cracks`` in the body with outline ``loops`` ([] for the infinite plane, or a `HalfPlane`); yields one `Step`
+    per increment.
 
     ``load``: a `BodyLoad`, which the factor multiplies as a whole, or a function ``load(factor, cracks)`` that returns
     one, so that part of the load (in-situ stress) can stay constant. ``control``: "load" keeps the factor at 1 until no
     tip grows; "toughness" searches in each step, starting from the last factor, for the one at which the largest
     K_eq/K_Ic is one. If K does not increase monotonically with the factor, this need not be the first such factor. The
     run ends with the event "arrest" if nothing grows or the factor would exceed ``max_factor``, "split" if cracks have
-    cut off an unsupported part, or after ``max_steps``. ``body``: further arguments of `Body`. Raises ValueError for an
+    cut off an unsupported part, or after ``max_steps``. ``body``: further arguments of `Body`
+    (``settings``, ``holes`` …). Raises ValueError for an
     unknown control or criterion or a material without toughness, and the errors of `Body` and its ``solve``.
 
     >>> rock = Material("rock", 17e9, 0.21, k_ic=2e6)
@@ -102,7 +108,8 @@ def propagate(
         raise ValueError(
             f"material {material.name!r} has no fracture toughness, so no crack in it can grow: give it k_ic, Pa √m"
         )
-    run = _Run(list(loops), material, load, growth, settings, body, control == "toughness", max_factor)
+    outline = loops if isinstance(loops, HalfPlane) else list(loops)
+    run = _Run(outline, material, load, growth, body, control == "toughness", max_factor)
     return run.steps(cracks, max_steps)
 
 
@@ -110,11 +117,12 @@ class _Run:
     """Input of the run, with body, load factor and solution of the last step."""
 
     def __init__(
-        self, loops: list[np.ndarray], material: Material, load: BodyLoad | Loading, growth: GrowthSettings,
-        settings: DdmSettings | None, options: dict[str, Any], controlled: bool, max_factor: float,
+        self, loops: list[np.ndarray] | HalfPlane, material: Material, load: BodyLoad | Loading, growth: GrowthSettings,
+        options: dict[str, Any], controlled: bool, max_factor: float,
     ) -> None:  # fmt: skip
         self.loops, self.material, self.load, self.growth = loops, material, load, growth
-        self.settings, self.options = settings, options
+        self.reuse: Reuse = options.pop("reuse", None) or Reuse()
+        self.options = options
         self.controlled, self.max_factor = controlled, max_factor
         #: Value of K_eq/K_Ic from which tips grow.
         self.enough = 1 - SETTLED if controlled else 1.0
@@ -168,7 +176,10 @@ class _Run:
         same = None if previous is None else previous.reusable_for(previous.given_loops, cracks, self.material)
         if same is not None:
             return same
-        return Body(self.loops, cracks, self.material, self.settings, previous=previous, **self.options)
+        return Body(self.loops, cracks, self.material, reuse=self._reuse(previous), **self.options)
+
+    def _reuse(self, previous: Body | None) -> Reuse:
+        return Reuse(previous or self.reuse.previous, self.reuse.work)
 
     # -- load ----------------------------------------------------------------------------------------------------
 

@@ -7,7 +7,7 @@ from .contact_solver import ContactSolver
 from .cracks.crack_arrays import Cracks
 from .cracks.whole_network import whole_network
 from .joints.bolt import BOLT, GROUND, Bolt, CrossesNoJoint, grouted_bolt
-from .joints.joint_law import JointLaw, Roughness
+from .joints.joint_law import JointLaw, Joints, Roughness
 from .loads.applied_loads import (
     EdgeTraction,
     Excavation,
@@ -76,6 +76,7 @@ __all__ = [
     "History",
     "InSituStress",
     "JointLaw",
+    "Joints",
     "LinearProfile",
     "Loads",
     "Material",

@@ -6,6 +6,7 @@ import functools
 import warnings
 from collections.abc import Callable, Mapping
 from dataclasses import fields
+from inspect import signature
 from typing import Any, TypeVar, cast
 
 _Function = TypeVar("_Function", bound=Callable[..., Any])
@@ -44,10 +45,10 @@ def gathered_arguments(new: str, record: type) -> Callable[[_Function], _Functio
             former = {name: kwargs.pop(name) for name in gathered.intersection(kwargs)}
             if former:
                 if new in kwargs:
-                    raise TypeError(f"{function.__name__}() got both {new!r} and {', '.join(sorted(former))}")
+                    raise TypeError(f"{_named(function)}() got both {new!r} and {', '.join(sorted(former))}")
                 given = ", ".join(f"{name}=…" for name in sorted(former))
                 warnings.warn(
-                    f"{function.__name__}({given}) is now {function.__name__}({new}={record.__name__}({given}))",
+                    f"{_named(function)}({given}) is now {_named(function)}({new}={record.__name__}({given}))",
                     DeprecationWarning,
                     stacklevel=2,
                 )
@@ -57,6 +58,52 @@ def gathered_arguments(new: str, record: type) -> Callable[[_Function], _Functio
         return cast(_Function, called)
 
     return decorate
+
+
+def folded_argument(old: str, new: str, fold: Callable[[Any, Any], Any]) -> Callable[[_Function], _Function]:
+    """Decorator: the keyword argument ``old`` of a function, if not None, is passed within its argument ``new``, as
+    ``fold(new, old)``, with a DeprecationWarning."""
+
+    def decorate(function: _Function) -> _Function:
+        @functools.wraps(function)
+        def called(*args: Any, **kwargs: Any) -> Any:
+            value = kwargs.pop(old, None)
+            if value is not None:
+                given = signature(function).bind_partial(*args, **kwargs)
+                given.arguments[new] = fold(given.arguments.get(new), value)
+                warnings.warn(
+                    f"{_named(function)}({old}=…) is part of {new}=… now", DeprecationWarning, stacklevel=2
+                )  # fmt: skip
+                args, kwargs = given.args, given.kwargs
+            return function(*args, **kwargs)
+
+        return cast(_Function, called)
+
+    return decorate
+
+
+def named_argument(name: str, position: int) -> Callable[[_Function], _Function]:
+    """Decorator: the argument at ``position`` (from 0) is passed by its ``name``, with a DeprecationWarning."""
+
+    def decorate(function: _Function) -> _Function:
+        @functools.wraps(function)
+        def called(*args: Any, **kwargs: Any) -> Any:
+            if len(args) == position + 1:
+                if name in kwargs:
+                    raise TypeError(f"{_named(function)}() got {name!r} twice")
+                warnings.warn(f"{_named(function)} takes {name}=… by its name now", DeprecationWarning, stacklevel=2)
+                kwargs[name] = args[position]
+                args = args[:position]
+            return function(*args, **kwargs)
+
+        return cast(_Function, called)
+
+    return decorate
+
+
+def _named(function: Callable[..., Any]) -> str:
+    """What a user calls: the class, for its ``__init__``."""
+    return function.__qualname__.removesuffix(".__init__")
 
 
 def renamed_exports(module: str, renamed: Mapping[str, str], names: Mapping[str, Any]) -> Callable[[str], Any]:

@@ -11,7 +11,7 @@ from geomech import dda
 from geomech.bench.slopes.drawn_slopes import drawn, problem_of
 from geomech.bench.slopes.sliding_scenes import Slope
 from geomech.dda.joint_laws.penalty_springs import RESOLVED, SOFTEST, penalties, resolved
-from geomech.model import OPEN, Blocks, DdaSettings, History, JointLaw, Loads, Material, State
+from geomech.model import OPEN, Blocks, DdaSettings, History, JointLaw, Joints, Loads, Material, State
 
 ROCK = Material("rock", 20e9, 0.25, density=2600.0)
 MOTION = DdaSettings(time_step=5e-3, dynamic_factor=1.0)
@@ -108,8 +108,8 @@ def test_a_slope_slides_as_on_stiff_springs_in_fewer_iterations():
         results = []
         settings = replace(problem.dda, springs=springs)
         for _ in dda.run(
-            problem.blocks, problem.materials, problem.joints, problem.loads, settings, 0.2,
-            joint_index=problem.joint_index, watch=results.append,
+            problem.blocks, problem.materials, Joints(problem.joints, problem.joint_index), problem.loads, settings, 0.2,
+            watch=results.append,
         ):  # fmt: skip
             pass
         work[springs] = sum(result.energy.gravity_work for result in results)

@@ -48,7 +48,7 @@ def test_reuse_agrees_with_a_fresh_body():
     body = None
     for n, mouth in ((0, False), (1, False), (2, False), (3, False), (4, False), (5, False), (5, True)):
         cracks = grown(n, mouth, aperture=math.inf)
-        body = ddm.Body([SQUARE], cracks, ROCK, previous=body)
+        body = ddm.Body([SQUARE], cracks, ROCK, reuse=ddm.Reuse(body))
         kept = body.solve(load)
         fresh = ddm.Body([SQUARE], cracks, ROCK).solve(load)
         for name in ("k_i", "k_ii"):
@@ -70,7 +70,7 @@ def test_loads_that_come_again_are_answered_as_new_ones():
     points = np.array([[0.5, 0.4], [-0.8, 0.1]])
     body = None
     for n in (0, 1, 2):
-        body = ddm.Body([SQUARE], grown(n, aperture=math.inf), ROCK, previous=body)
+        body = ddm.Body([SQUARE], grown(n, aperture=math.inf), ROCK, reuse=ddm.Reuse(body))
         for _ in range(4):
             # A uniform pressure, and tractions that hold a uniform body force.
             b = rng.normal(size=2)
@@ -96,7 +96,7 @@ def test_a_load_that_stands_is_brought_to_the_boundary_once():
     body, solved = ddm.Body([SQUARE], NONE, ROCK), []
     body.solve(pressed(-1.0))
     for n, load in ((0, -1.0), (1, -1.0), (2, None), (3, -1.0), (2, -1.0), (3, -2.0), (4, -2.0)):
-        body = ddm.Body([SQUARE], grown(n, aperture=math.inf), ROCK, previous=body)
+        body = ddm.Body([SQUARE], grown(n, aperture=math.inf), ROCK, reuse=ddm.Reuse(body))
         if load is None:
             continue
         before = body.work.back_substitutions
@@ -111,12 +111,12 @@ def test_a_load_that_stands_is_brought_to_the_boundary_once():
 
 def test_boundary_is_not_touched_by_growth_inside():
     first = ddm.Body([SQUARE], grown(0), ROCK)
-    second = ddm.Body([SQUARE], grown(1), ROCK, previous=first)
+    second = ddm.Body([SQUARE], grown(1), ROCK, reuse=ddm.Reuse(first))
     assert first.counts["boundary_factorisations"] == 1 and second.counts["boundary_factorisations"] == 0
     assert second.boundary is first.boundary
-    same = ddm.Body([SQUARE], grown(1), ROCK, previous=second)
+    same = ddm.Body([SQUARE], grown(1), ROCK, reuse=ddm.Reuse(second))
     assert same.counts["elements_new"] == 0
-    other = ddm.Body([SQUARE], grown(1), Material("soft", 10e9, 0.3), previous=second)
+    other = ddm.Body([SQUARE], grown(1), Material("soft", 10e9, 0.3), reuse=ddm.Reuse(second))
     assert other.counts["elements_new"] == other.counts["elements"]
 
 
@@ -133,7 +133,7 @@ def test_faces_in_contact_satisfy_their_conditions():
     assert np.abs(traction[..., 1]).max() < 1e-9 * 1e6
     again = body.solve(pressed(-1.1e6, -0.33e6), warm=sol)
     assert again.solves == 1 and np.allclose(again.tips["k_ii"], 1.1 * sol.tips["k_ii"], rtol=1e-9)
-    larger = ddm.Body([SQUARE], grown(5), ROCK, previous=body).solve(pressed(-1e6, -0.3e6), warm=sol)
+    larger = ddm.Body([SQUARE], grown(5), ROCK, reuse=ddm.Reuse(body)).solve(pressed(-1e6, -0.3e6), warm=sol)
     cold = ddm.Body([SQUARE], grown(5), ROCK).solve(pressed(-1e6, -0.3e6))
     assert (larger.states == cold.states).all()
 

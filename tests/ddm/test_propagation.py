@@ -197,7 +197,7 @@ def test_every_step_meets_a_target_error(law):
     growth = GrowthSettings(increment=0.02)
     more = {} if law is None else {"face_laws": [law]}
     steps = ddm.propagate(
-        [square], cracks, Material("rock", 17e9, 0.21, k_ic=1e6), load, growth, DdmSettings(target_error=1e-3),
+        [square], cracks, Material("rock", 17e9, 0.21, k_ic=1e6), load, growth, settings=DdmSettings(target_error=1e-3),
         control="toughness", max_steps=2, **more,
     )  # fmt: skip
     for step in steps:

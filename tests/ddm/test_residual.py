@@ -18,7 +18,7 @@ PLATE, HOLED, STANDING = (
     ([SQUARE], {"supports": [ddm.Support(0, "both")]}),
 )
 CLAMPED = ([SQUARE], {"supports": [ddm.Support(0, "both"), ddm.Support(2, "both")]})
-GROUND = ([], {"half_plane": ddm.HalfPlane((0, 1), (0, 1))})
+GROUND = (ddm.HalfPlane((0, 1), (0, 1)), {})
 PULL = {0: (0.0, -1.0), 2: (0.0, 1.0)}
 
 #: What the body is, its cracks, its load per Pa.

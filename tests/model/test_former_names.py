@@ -5,8 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from geomech import dda
-from geomech.model import Blocks, JointLaw, Loads, Material
+from geomech import dda, ddm
+from geomech.model import Blocks, Cracks, DdaSettings, DdmSettings, History, JointLaw, Joints, Loads, Material
 from geomech.model.former_names import renamed_argument
 
 SQUARE = [np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])]
@@ -59,3 +59,37 @@ def test_a_former_name_of_a_package_gives_the_present_one():
         assert dda.ToldContacts is dda.InheritedContacts
     with pytest.raises(AttributeError, match="no attribute 'no_such_name'"):
         dda.no_such_name  # noqa: B018
+
+
+def test_a_half_plane_and_what_a_body_reuses_are_taken_by_their_former_names():
+    rock, crack = Material("rock", 1e10, 0.2), Cracks.from_polylines([np.array([[-1.0, -2.0], [1.0, -2.0]])])
+    with pytest.warns(DeprecationWarning, match=r"Body\(half_plane=…\) is part of loops=… now"):
+        body = ddm.Body([], crack, rock, half_plane=ddm.HalfPlane())
+    assert body.half_plane == ddm.HalfPlane() == ddm.Body(ddm.HalfPlane(), crack, rock).half_plane
+    with pytest.raises(ValueError, match="has an outline"):
+        ddm.Body(SQUARE, crack, rock, half_plane=ddm.HalfPlane())
+    with pytest.warns(
+        DeprecationWarning, match=r"Body\(previous=…, work=…\) is now Body\(reuse=Reuse\(previous=…, work=…\)\)"
+    ):
+        again = ddm.Body(ddm.HalfPlane(), crack, rock, previous=body, work=body.work)
+    assert again.work is body.work
+
+
+def test_settings_of_growth_are_taken_by_position_still():
+    rock, crack = Material("rock", 1e10, 0.2, k_ic=1e6), Cracks.from_polylines([np.array([[-1.0, 0.0], [1.0, 0.0]])])
+    load = ddm.BodyLoad(remote_stress=[0, 1.0, 0])
+    with pytest.warns(DeprecationWarning, match=r"propagate takes settings=… by its name now"):
+        (step,) = ddm.propagate([], crack, rock, load, None, DdmSettings(order=3))
+    assert step.solution.body.settings.order == 3
+
+
+def test_which_joint_acts_is_said_by_a_function_still():
+    base = np.array([[-1.0, -1.0], [2.0, -1.0], [2.0, 0.0], [-1.0, 0.0]])
+    blocks = Blocks.from_polygons([[base], SQUARE], fixed=[True, False])
+    laws = [JointLaw("never"), JointLaw("joint", math.radians(30))]
+    loads = Loads(gravity=History.constant([0.0, -9.81]))
+    given = [Material("rock", 1e10, 0.2, 2500.0)], laws, loads, DdaSettings(time_step=0.01), 0.02
+    with pytest.warns(DeprecationWarning, match=r"run\(joint_index=…\) is part of joints=… now"):
+        *_, former = dda.run(blocks, *given, joint_index=lambda a, b: 1)
+    *_, now = dda.run(blocks, given[0], Joints(laws, lambda a, b: 1), *given[2:])
+    assert np.array_equal(former.vertices, now.vertices) and set(now.contacts["law"].tolist()) <= {1}

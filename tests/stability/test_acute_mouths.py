@@ -36,7 +36,7 @@ def test_mouths_at_the_surface_of_a_half_plane(degrees, tolerance):
     """2e-2 at 5° where elements ended at a hundredth of the crack from its mouth. The estimate says as much."""
     tip = [math.cos(math.radians(degrees)), -math.sin(math.radians(degrees))]
     crack = Cracks.from_polylines([np.array([[0, 0], tip])], aperture=math.inf, surface=[(True, False)])
-    body = ddm.Body([], crack, ROCK, half_plane=ddm.HalfPlane((0, 0)))
+    body = ddm.Body(ddm.HalfPlane((0, 0)), crack, ROCK)
     for load, exact in zip((PRESSURE, ddm.BodyLoad(remote_stress=[1, 0, 0])), below_a_surface(degrees)):
         solution = body.solve(load)
         error = np.abs(factors(solution) - exact).max() / largest(exact)

@@ -131,7 +131,7 @@ def test_remote_stress_leaves_holes_free():
         before.solve(load)
     by_traction = ddm.Body([rectangle(1, 1), hole], cracks, ROCK).solve(uniform_load([rectangle(1, 1)], stress))
     for previous in (None, before):
-        by_field = ddm.Body([rectangle(1, 1), hole], cracks, ROCK, previous=previous).solve(load)
+        by_field = ddm.Body([rectangle(1, 1), hole], cracks, ROCK, reuse=ddm.Reuse(previous)).solve(load)
         for name in ("k_i", "k_ii"):
             np.testing.assert_allclose(by_field.tips[name], by_traction.tips[name], rtol=1e-8)
         at = np.array([[0.5, 0.5], [-0.7, 0.2]])

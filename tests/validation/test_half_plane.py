@@ -25,7 +25,7 @@ def slot(start, end, mouth=False):
 
 def body(cracks, order=8, half_plane=SURFACE, **options):
     settings = {name: options.pop(name) for name in ("elements_per_crack", "grading_layers") if name in options}
-    return ddm.Body([], cracks, ROCK, DdmSettings(order=order, **settings), half_plane=half_plane, **options)
+    return ddm.Body(half_plane, cracks, ROCK, DdmSettings(order=order, **settings), **options)
 
 
 def factors(sol):
@@ -58,7 +58,7 @@ def test_edge_crack(verified):
 def test_target_error(target):
     """What is asked for is reached, and the estimate bounds the error."""
     crack, load = slot((0, 0), (0, -2), mouth=True), ddm.BodyLoad(remote_stress=[3, 0, 0])
-    sol = ddm.solve_to([], crack, ROCK, load, target, half_plane=SURFACE)
+    sol = ddm.solve_to(SURFACE, crack, ROCK, load, target)
     exact = crack_arrays.EDGE_CRACK_HALF_PLANE * 3 * math.sqrt(2 * math.pi)
     error = abs(sol.tips["k_i"][0] - exact)
     assert error <= sol.tip_errors[0, 0] <= target * exact
@@ -72,9 +72,7 @@ def test_slanted_edge_crack(verified, angle_deg):
     tip = np.array([math.cos(a), math.sin(a)])
     arms = [Arm(0j, complex(*tip), start_is_tip=False, open=True)]
     exact = dislocations.stress_intensity(arms, lambda p: np.tile([1.0, 0, 0], (len(p), 1)), "half-plane", 257)
-    sol = ddm.solve_to(
-        [], slot((0, 0), tip, True), ROCK, ddm.BodyLoad(remote_stress=[1, 0, 0]), 1e-6, half_plane=SURFACE
-    )
+    sol = ddm.solve_to(SURFACE, slot((0, 0), tip, True), ROCK, ddm.BodyLoad(remote_stress=[1, 0, 0]), 1e-6)
     off = np.abs(factors(sol) - exact).max() / np.abs(exact).max()
     verified(f"edge crack at {angle_deg:g}° to a half-plane: K", off, "distributed dislocations")
     print(f"edge crack at {angle_deg:g}°: {off:.1e}")
@@ -183,7 +181,7 @@ def test_tunnel_near_the_surface(loads):
         exact = shallow_tunnel.stress(points, depth, poissons_ratio=0.4, **known)
         off = []
         for n in (32, 64):
-            tunnel = ddm.Body([], none, rock, DdmSettings(order=4), holes=[circle(n, (0, -depth))], half_plane=SURFACE)
+            tunnel = ddm.Body(SURFACE, none, rock, DdmSettings(order=4), holes=[circle(n, (0, -depth))])
             off.append(np.abs(tunnel.solve(load).stress(points) - exact).max() / np.abs(exact).max())
         print(f"hole at depth {depth}, {loads}: {[f'{e:.1e}' for e in off]}")
         assert off[1] < 4e-4 and off[1] < 0.3 * off[0]
@@ -311,7 +309,7 @@ def test_sizes_offsets_and_poissons_ratios():
             [scale * line + shift for line in lines], aperture=math.inf, surface=[(True, False), (False, False)]
         )
         half_plane = ddm.HalfPlane((0.0, shift))
-        sol = ddm.Body([], cracks, rock, half_plane=half_plane).solve(ddm.BodyLoad(remote_stress=[1, 0, 0]))
+        sol = ddm.Body(half_plane, cracks, rock).solve(ddm.BodyLoad(remote_stress=[1, 0, 0]))
         found = factors(sol) / math.sqrt(scale)
         exact = found if exact is None else exact
         assert np.abs(found - exact).max() <= tolerance * np.abs(exact).max(), (scale, shift, poisson)
@@ -324,7 +322,7 @@ def test_a_tip_that_nearly_reaches_the_surface(gap):
     crack."""
     ends, load = ((0, -gap), (0, -1 - gap)), ddm.BodyLoad(remote_stress=[1, 0, 0])
     k = factors(body(slot(*ends), 4).solve(load))[:, 0]
-    fine = factors(ddm.solve_to([], slot(*ends), ROCK, load, 1e-5, half_plane=SURFACE))[:, 0]
+    fine = factors(ddm.solve_to(SURFACE, slot(*ends), ROCK, load, 1e-5))[:, 0]
     assert np.allclose(k, fine, rtol=1e-4)
     # The ligament pulls like 1/log: the far tip's factor is still a few per cent short at 1e-6.
     assert 1.0 < k[1] / math.sqrt(math.pi / 2) < crack_arrays.EDGE_CRACK_HALF_PLANE * math.sqrt(2)
@@ -338,7 +336,7 @@ def test_closed_faces_below_the_surface():
     way = np.array([math.cos(math.radians(60)), -math.sin(math.radians(60))])
     joint = Cracks.from_polylines([np.array([[0, -depth] - way, [0, -depth] + way])])
     load = ddm.BodyLoad(body_force=[0, -weight], k0=k0)
-    sol = ddm.Body([], joint, ROCK, DdmSettings(order=6), face_laws=[law], half_plane=SURFACE).solve(load)
+    sol = ddm.Body(SURFACE, joint, ROCK, DdmSettings(order=6), face_laws=[law]).solve(load)
     stress = -weight * depth * np.array([k0, 1.0, 0.0])
     _, exact = fracture.closed(stress, math.radians(-60), 1.0, math.tan(law.friction_angle))
     k = factors(sol)
@@ -356,8 +354,8 @@ def test_crack_grows_up_to_the_surface():
     growth = GrowthSettings(increment=0.15, min_increment=0.15)
     steps = list(
         ddm.propagate(
-            [], crack, ROCK, ddm.BodyLoad(crack_pressure=1e6), growth, DdmSettings(order=4),
-            control="toughness", max_steps=30, half_plane=SURFACE,
+            SURFACE, crack, ROCK, ddm.BodyLoad(crack_pressure=1e6), growth, settings=DdmSettings(order=4),
+            control="toughness", max_steps=30,
         )
     )  # fmt: skip
     events = [event.kind for step in steps for event in step.events]
@@ -419,9 +417,7 @@ def test_a_crack_is_born_at_the_surface():
     crack = Cracks.from_polylines([np.array([[-1.0, -0.5], [1.0, -0.5]])])
     growth = GrowthSettings(increment=0.05, min_increment=0.05, initiation="surface")
     load = ddm.BodyLoad(crack_pressure=1e6)
-    step = next(
-        ddm.propagate([], crack, rock, load, growth, DdmSettings(order=6), control="toughness", half_plane=SURFACE)
-    )
+    step = next(ddm.propagate(SURFACE, crack, rock, load, growth, settings=DdmSettings(order=6), control="toughness"))
     born = [event for event in step.events if event.kind == "birth"]
     assert len(born) == 1 and born[0].point == pytest.approx((0.0, 0.0), abs=1e-9)
     top = step.solution.stress([[0.0, 0.0]])[0]
@@ -439,7 +435,7 @@ def test_many_cracks_are_iterated_on():
     found = []
     for solver in ("dense", "compressed"):
         settings = DdmSettings(order=3, elements_per_crack=2, solver=solver)
-        found.append(factors(ddm.Body([], cracks, ROCK, settings, half_plane=SURFACE).solve(load)))
+        found.append(factors(ddm.Body(SURFACE, cracks, ROCK, settings).solve(load)))
     assert np.abs(found[1] - found[0]).max() < 1e-9 * np.abs(found[0]).max()
     assert np.abs(found[0][:, 0]).max() > 0.5
 

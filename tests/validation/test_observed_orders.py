@@ -27,7 +27,7 @@ def slots(*lines, aperture=math.inf, **options):
 
 def factors(order, cracks, load, loops=(), **options):
     """(n_tips, 2) K_I, K_II."""
-    tips = ddm.Body(list(loops), cracks, ROCK, DdmSettings(order=order), **options).solve(load).tips
+    tips = ddm.Body(loops, cracks, ROCK, DdmSettings(order=order), **options).solve(load).tips
     return np.column_stack([tips["k_i"], tips["k_ii"]])
 
 
@@ -56,7 +56,7 @@ def mode_one(factor, half, tips=2):
 def below_surface(depth):
     ends = np.array([[-1.0, -depth], [1.0, -depth]])
     load, ground = ddm.BodyLoad(crack_pressure=1.0), ddm.HalfPlane()
-    return lambda p: factors(p, slots(ends), load, half_plane=ground), lambda: crack_arrays.near_surface(ends, 1.0, 129)
+    return lambda p: factors(p, slots(ends), load, loops=ground), lambda: crack_arrays.near_surface(ends, 1.0, 129)
 
 
 def collinear_pair():

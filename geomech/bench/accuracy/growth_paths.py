@@ -95,7 +95,7 @@ def of_this_solver(increments: int, settings: DdmSettings, correct: bool = True)
     growth = GrowthSettings(increment=length, min_increment=0.1 * length, correct=correct)
     steps = list(
         ddm.propagate(
-            [given.outline], given.cracks, TOUGH, given.load, growth, settings, control="toughness",
+            [given.outline], given.cracks, TOUGH, given.load, growth, settings=settings, control="toughness",
             max_steps=increments + 1,
         )
     )  # fmt: skip

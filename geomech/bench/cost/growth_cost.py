@@ -19,7 +19,7 @@ def measure(increments: int = 40) -> dict:
     Medians over the increments and sums, s; the largest difference of a K between both ways, relative to the largest K;
     and the number of complete factorisations of the crack equations.
     """
-    from ...ddm import Body
+    from ...ddm import Body, Reuse
 
     problem = specimen()
     networks = [_grown(problem.cracks, k) for k in range(increments + 1)]
@@ -29,7 +29,7 @@ def measure(increments: int = 40) -> dict:
     body.solve(problem.load)
     for cracks in networks[1:]:
         spent_on = stopwatch()
-        body = Body([problem.outline], cracks, ROCK, settings, previous=body, work=body.work)
+        body = Body([problem.outline], cracks, ROCK, settings, reuse=Reuse(body, body.work))
         k = factors(body.solve(problem.load))
         incremental.append(spent_on())
         spent_on = stopwatch()

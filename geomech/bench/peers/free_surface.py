@@ -38,7 +38,7 @@ def _crack() -> Cracks:
 
 
 def _half_plane(digits: int) -> Solution:
-    body = Body([], _crack(), ROCK, DdmSettings(target_error=10.0**-digits), half_plane=HalfPlane())
+    body = Body(HalfPlane(), _crack(), ROCK, DdmSettings(target_error=10.0**-digits))
     return body.solve(BodyLoad(remote_stress=np.array([1.0, 0.0, 0.0])))
 
 

@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 
 from ... import dda
-from ...model import Blocks, ContactSolver, DdaSettings, JointLaw, Material, State
+from ...model import Blocks, ContactSolver, DdaSettings, JointLaw, Joints, Material, State
 from ...reference.blocks import masonry
 from ..cost import block_scenes
 from ..figures import Measured
@@ -66,8 +66,8 @@ def random_blocks(seed: int, solver: ContactSolver) -> None:
     """The blocks of a random slope, with closed cracks."""
     problem = problem_of(tomllib.loads(scene_text(seed)))
     for _ in dda.run(
-        problem.blocks, problem.materials, problem.joints, problem.loads, replace(problem.dda, contact_solver=solver),
-        problem.run.end_time, joint_index=problem.joint_index,
+        problem.blocks, problem.materials, Joints(problem.joints, problem.joint_index), problem.loads,
+        replace(problem.dda, contact_solver=solver), problem.run.end_time,
     ):  # fmt: skip
         pass
 
@@ -76,8 +76,8 @@ def sliding(seed: int, solver: ContactSolver, dt: float = 4e-3, end: float = 0.2
     """A slope that slides on its beds."""
     problem = problem_of(tomllib.loads(sliding_slope(seed).text(dt, end)))
     for _ in dda.run(
-        problem.blocks, problem.materials, problem.joints, problem.loads, replace(problem.dda, contact_solver=solver),
-        end, joint_index=problem.joint_index,
+        problem.blocks, problem.materials, Joints(problem.joints, problem.joint_index), problem.loads,
+        replace(problem.dda, contact_solver=solver), end,
     ):  # fmt: skip
         pass
 

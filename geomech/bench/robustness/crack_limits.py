@@ -154,7 +154,7 @@ def growing(increment: float, order: float) -> Outcome:
     cracks = Cracks.from_polylines([np.array([[-half, 0], [half, 0]])], aperture=math.inf)
     growth = GrowthSettings(increment=increment, min_increment=increment)
     *_, last = ddm.propagate(
-        [], cracks, rock, ddm.BodyLoad(remote_stress=PULL), growth, DdmSettings(order=int(order)),
+        [], cracks, rock, ddm.BodyLoad(remote_stress=PULL), growth, settings=DdmSettings(order=int(order)),
         control="toughness", max_steps=6,
     )  # fmt: skip
     k = PULL[1] * math.sqrt(math.pi * (half + last.number * increment))

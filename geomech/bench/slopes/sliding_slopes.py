@@ -16,7 +16,7 @@ from functools import partial
 from pathlib import Path
 
 from ... import dda
-from ...model import Problem
+from ...model import Joints, Problem
 from ...output.tables.summary import write_json
 from ..figures import Measured
 from .drawn_slopes import problem_of
@@ -119,8 +119,8 @@ def _run(problem: Problem, dt: float, threshold: float, seconds: float) -> _Run:
         nonlocal last
         settings = replace(problem.dda, time_step=dt)
         states = dda.run(
-            problem.blocks, problem.materials, problem.joints, problem.loads, settings, problem.run.end_time,
-            joint_index=problem.joint_index,
+            problem.blocks, problem.materials, Joints(problem.joints, problem.joint_index), problem.loads, settings,
+            problem.run.end_time,
             watch=lambda result: iterations.append(result.statistics["open_close_iterations"]),
         )  # fmt: skip
         for state in states:

@@ -61,18 +61,12 @@ def elastic_bodies(
 
     def made(of: tuple) -> Body:
         b, own, material, old, work = of
-        surface = None if problem.endless is None else problem.endless.surface
-        return ddm.Body(
-            _loops(problem, blocks, b) if problem.endless is None else [],
-            own,
-            material,
-            problem.ddm,
-            previous=old,
-            holes=_loops(problem, blocks, b) if problem.endless is not None else [],
-            face_laws=problem.face_laws,
-            work=work,
-            half_plane=None if surface is None else ddm.HalfPlane(*surface),
-        )
+        own_loops, reuse, laws = _loops(problem, blocks, b), ddm.Reuse(old, work), problem.face_laws
+        if problem.endless is None:
+            return ddm.Body(own_loops, own, material, problem.ddm, reuse, face_laws=laws)
+        surface = problem.endless.surface
+        outline = [] if surface is None else ddm.HalfPlane(*surface)
+        return ddm.Body(outline, own, material, problem.ddm, reuse, holes=own_loops, face_laws=laws)
 
     bodies.update(zip([of[0] for of in to_make], parallel_map(made, to_make)))
     return bodies, nodes_of

@@ -118,24 +118,16 @@ def _fitting(body: CrackedBody, length: float) -> np.ndarray:
 
 def _body(body: CrackedBody, k: int, length: float, at: np.ndarray) -> Body:
     """``body`` with kinks in direction ``k`` at the tips ``at``; kept with it."""
-    from ..body import Body
+    from ..body import Body, Reuse
 
     assert isinstance(body, Body)
     kept = body.trials.setdefault(length, {})
     if k not in kept:
-        n_outlines = int(body.outlined)
+        kinked = _kinked(body.cracks, body.tip_elements[0][at], DIRECTIONS[k], length)
         kept[k] = Body(
-            body.loops[:n_outlines],
-            _kinked(body.cracks, body.tip_elements[0][at], DIRECTIONS[k], length),
-            body.material,
-            body.settings,
-            previous=body,
-            holes=body.loops[n_outlines:],
-            supports=body.supports,
-            face_laws=body.face_laws,
-            work=body.work,
-            half_plane=body.half_plane,
-        )
+            body.outline, kinked, body.material, body.settings, Reuse(body, body.work), body.holes, body.supports,
+            body.face_laws,
+        )  # fmt: skip
     return kept[k]
 
 

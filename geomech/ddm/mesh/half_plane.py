@@ -116,3 +116,10 @@ class HalfPlane:
             name = repr(cracks.names[k]) if k < len(cracks.names) else f"crack {k}"
             x, y = nodes[node]
             raise ValueError(f"{name}: ({x:g}, {y:g}) lies outside the rock, above the surface of the half-plane")
+
+
+def without_outline(loops: Sequence[np.ndarray] | None, half_plane: HalfPlane) -> HalfPlane:
+    """``half_plane`` as the outline of a body that has no other ``loops``. Raises ValueError if it has."""
+    if loops is not None and len(loops):
+        raise ValueError("half_plane: the body has an outline; a half-plane has none but its surface")
+    return half_plane

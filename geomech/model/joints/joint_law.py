@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from ..numbers import Number, refuse_numbers
@@ -69,6 +70,15 @@ class Roughness:
         """δ = (Lₙ/500) (JRCₙ/Lₙ)^0.33, m: the slip at which the strength is reached."""
         length = self.sample_length if self.length is None else self.length
         return length / 500.0 * (self.jrc_in_place / length) ** 0.33
+
+
+@dataclass(frozen=True)
+class Joints:
+    """Joint ``laws``, and which of them acts between two edges: ``index(name, name)`` of the law, None where the edges never
+    touch; without ``index`` the first acts everywhere."""
+
+    laws: Sequence[JointLaw]
+    index: Callable[[str, str], int | None] | None = None
 
 
 @dataclass(frozen=True)

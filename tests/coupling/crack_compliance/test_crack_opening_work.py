@@ -108,7 +108,9 @@ def test_work_at_rest_is_what_is_stored_and_released():
     change = pulled.crack_energy - bent.crack_energy
     assert work_on_cracks(bent, pulled) == pytest.approx(change, rel=1e-7)
 
-    longer = ddm.Body([beam], crack(0.3), ROCK, previous=short).solve(ddm.BodyLoad(segments=ends, tractions=2 * bend))
+    longer = ddm.Body([beam], crack(0.3), ROCK, reuse=ddm.Reuse(short)).solve(
+        ddm.BodyLoad(segments=ends, tractions=2 * bend)
+    )
     work = work_on_cracks(bent, longer)
     # With U = t·u the work is ½ (1 + 2)(2 U₂ − U₁), of which 2² U₂/2 − U₁/2 is stored.
     first, second = 2 * bent.crack_energy, longer.crack_energy / 2

@@ -144,7 +144,7 @@ def test_history_goes_on_where_faces_are_divided():
         surface=np.zeros(3, bool),
         names=old.names,
     )
-    longer = ddm.Body([], cracks, ROCK, body.settings, previous=body, face_laws=body.face_laws)
+    longer = ddm.Body([], cracks, ROCK, body.settings, reuse=ddm.Reuse(body), face_laws=body.face_laws)
     grown = longer.solve(under(0, -20e6, 0), history=loaded)
     fresh = longer.solve(under(0, -20e6, 0))
     # One way slip under one load: where it began does not matter.
@@ -232,7 +232,7 @@ def test_work_is_counted_from_body_to_body():
     assert body.work.contact_solves == first.solves and body.work.crack_factorisations >= 1
     before = vars(body.work).copy()
     longer = Cracks.from_polylines([LINE, LINE + [0.2, 1.0]])
-    again = ddm.Body([BLOCK], longer, ROCK, previous=body, work=body.work)
+    again = ddm.Body([BLOCK], longer, ROCK, reuse=ddm.Reuse(body, body.work))
     again.solve(pressed(-1e6, -20e6), warm=first)
     assert again.work.bodies == 2 and again.work.boundary_assemblies == before["boundary_assemblies"] == 1
     assert again.work.elements_assembled - before["elements_assembled"] == again.counts["elements_new"]

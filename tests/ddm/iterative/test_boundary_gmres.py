@@ -75,7 +75,7 @@ def test_bodies_without_cracks_and_bodies_that_grow(few):
     before, after = (Cracks.from_polylines([line[:n]], aperture=np.inf) for n in (2, 3))
     first = ddm.Body([OUTLINE], before, ROCK)
     first.solve(load)
-    grown = ddm.Body([OUTLINE], after, ROCK, previous=first)
+    grown = ddm.Body([OUTLINE], after, ROCK, reuse=ddm.Reuse(first))
     assert grown.counts["boundary_factorisations"] == 0
     alone = ddm.Body([OUTLINE], after, ROCK, DdmSettings(solver="dense")).solve(load)
     size = np.abs(factors(alone)).max()

@@ -132,9 +132,9 @@ def test_growth_may_cross_from_dense_to_compressed():
     load = pressed([0.0, 1e6, 0.0])
     dense = ddm.Body(SQUARE, cracks, ROCK, DdmSettings(solver="dense"))
     for settings in (DdmSettings(solver="compressed"), DdmSettings(solver="dense")):
-        body = ddm.Body(SQUARE, cracks, ROCK, settings, previous=dense)
+        body = ddm.Body(SQUARE, cracks, ROCK, settings, reuse=ddm.Reuse(dense))
         agree(dense.solve(load), body.solve(load))
-        again = ddm.Body(SQUARE, cracks, ROCK, settings, previous=body)
+        again = ddm.Body(SQUARE, cracks, ROCK, settings, reuse=ddm.Reuse(body))
         agree(dense.solve(load), again.solve(load, warm=body.solve(load)))
 
 
@@ -190,7 +190,7 @@ def test_what_the_iteration_does_not_solve_is_factored_after_all(monkeypatch):
     body = ddm.Body(PLANE, cracks, ROCK)
     assert body.compressed
     agree(dense, body.solve(load), 1e-13)
-    assert not body.compressed and not ddm.Body(PLANE, cracks, ROCK, previous=body).compressed
+    assert not body.compressed and not ddm.Body(PLANE, cracks, ROCK, reuse=ddm.Reuse(body)).compressed
     with pytest.raises(NotSolved):
         ddm.Body(PLANE, cracks, ROCK, DdmSettings(solver="compressed")).solve(load)
 

@@ -157,7 +157,7 @@ def test_growth_reuses_a_held_boundary():
     body, solutions = None, []
     for n, mouth in ((2, False), (3, False), (4, True)):
         cracks = Cracks.from_polylines([np.array(lines[:n])], surface=[(False, mouth)])
-        body = ddm.Body([SQUARE], cracks, ROCK, previous=body, supports=held)
+        body = ddm.Body([SQUARE], cracks, ROCK, reuse=ddm.Reuse(body), supports=held)
         body.solve(load)
         again = body.solve(load)
         fresh = ddm.Body([SQUARE], cracks, ROCK, supports=held).solve(load)
@@ -207,7 +207,7 @@ def test_a_block_hangs_on_a_bolt():
         first.solve(load)
         first.solve(load)
     grown = Cracks.from_polylines([lines], aperture=np.inf)
-    body = ddm.Body([SQUARE], grown, ROCK, holes=[0.3 * SQUARE], supports=bolt, previous=first)
+    body = ddm.Body([SQUARE], grown, ROCK, holes=[0.3 * SQUARE], supports=bolt, reuse=ddm.Reuse(first))
     fine = ddm.Body([SQUARE], grown, ROCK, DdmSettings(order=7), holes=[0.3 * SQUARE], supports=bolt)
     for load, force in loads:
         sol = body.solve(load)

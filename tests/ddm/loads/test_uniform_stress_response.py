@@ -58,6 +58,6 @@ def test_a_body_that_has_grown_is_another_one():
     body = body_with(np.inf)
     longer = [LINES[0], np.array([[0.0, 1.1], [0.5, 1.2], [0.6, 1.2]])]
     cracks = Cracks.from_polylines(longer, block=0, aperture=np.inf, surface=[(False, False), (True, False)])
-    grown = ddm.Body([SQUARE], cracks, ROCK, DdmSettings(), previous=body)
+    grown = ddm.Body([SQUARE], cracks, ROCK, DdmSettings(), reuse=ddm.Reuse(body))
     before = scaled(body, np.array([1e6, 0.0, 0.0]))
     assert scaled(grown, np.array([1e6, 0.0, 0.0]), before) is None

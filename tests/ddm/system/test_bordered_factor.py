@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from geomech import ddm
-from geomech.ddm import Body, BodyLoad
+from geomech.ddm import Body, BodyLoad, Reuse
 from geomech.ddm.counters import Work
 from geomech.ddm.system.boundary_system import OFTEN
 from geomech.ddm.system.row_store import KeptRows
@@ -47,7 +47,7 @@ def test_factors_solve_both_ways_and_multiply():
     factors(body)
     for steps in range(1, 7):
         for turn in (0.0, 0.3, 0.1, 0.0):
-            body = Body([PLATE], network(steps, turn), ROCK, SETTINGS, previous=body)
+            body = Body([PLATE], network(steps, turn), ROCK, SETTINGS, reuse=Reuse(body))
         alone = Body([PLATE], network(steps), ROCK, SETTINGS)
         whole = alone.crack_system.matrix.dense
         matrix = body.crack_system.matrix
@@ -68,7 +68,7 @@ def test_a_long_run_is_factored_anew_now_and_then_only():
     body = Body([PLATE], network(0), ROCK, SETTINGS)
     factors(body)
     for steps in range(1, 21):
-        body = Body([PLATE], network(steps), ROCK, SETTINGS, previous=body, work=body.work)
+        body = Body([PLATE], network(steps), ROCK, SETTINGS, reuse=Reuse(body, body.work))
         k = factors(body)
     alone = factors(Body([PLATE], network(20), ROCK, SETTINGS))
     assert np.abs(k - alone).max() < 1e-11 * np.abs(alone).max()
@@ -79,12 +79,12 @@ def test_a_long_run_is_factored_anew_now_and_then_only():
 def test_bodies_that_grow_apart_keep_their_own():
     """From one body three ways on, the second of which bends the step that the first had settled: each has its own
     matrix and factors, whoever came before."""
-    first = Body([PLATE], network(3), ROCK, SETTINGS, previous=Body([PLATE], network(0), ROCK, SETTINGS))
+    first = Body([PLATE], network(3), ROCK, SETTINGS, reuse=Reuse(Body([PLATE], network(0), ROCK, SETTINGS)))
     factors(first)
     ways = [network(5), network(4, 0.3), network(4)]
     for _ in range(2):
-        bodies = [Body([PLATE], way, ROCK, SETTINGS, previous=first) for way in ways]
-        second = Body([PLATE], network(6), ROCK, SETTINGS, previous=bodies[1])
+        bodies = [Body([PLATE], way, ROCK, SETTINGS, reuse=Reuse(first)) for way in ways]
+        second = Body([PLATE], network(6), ROCK, SETTINGS, reuse=Reuse(bodies[1]))
         for body, way in zip([*bodies, second, first], [*ways, network(6), network(3)]):
             again = pickle.loads(pickle.dumps(body))
             alone = factors(Body([PLATE], way, ROCK, SETTINGS))
@@ -126,7 +126,7 @@ def test_what_does_not_pivot_well_is_factored_anew(monkeypatch):
     monkeypatch.setattr(schur_complement, "LOSS", 0.0)
     body = Body([PLATE], network(0), ROCK, SETTINGS)
     factors(body)
-    body = Body([PLATE], network(1), ROCK, SETTINGS, previous=body)
+    body = Body([PLATE], network(1), ROCK, SETTINGS, reuse=Reuse(body))
     assert not body.crack_system.matrix.is_whole
     k, alone = factors(body), factors(Body([PLATE], network(1), ROCK, SETTINGS))
     assert body.crack_system.matrix.is_whole
@@ -142,7 +142,7 @@ def test_cracks_that_grow_together_round_a_piece_are_seen():
     of_segments = {name: np.repeat(getattr(open_, name)[:1], 4) for name in SEGMENT_ARRAYS}
     of_segments["birth_cycle"][3] = 1
     closed = replace(open_, segments=np.array([[0, 1], [1, 2], [2, 3], [3, 0]]), **of_segments)
-    loose = Body([PLATE], closed, ROCK, SETTINGS, previous=body)
+    loose = Body([PLATE], closed, ROCK, SETTINGS, reuse=Reuse(body))
     assert not loose.crack_system.matrix.is_whole
     with pytest.raises(np.linalg.LinAlgError, match="separate a part"):
         loose.solve(LOAD)
@@ -154,8 +154,8 @@ def test_trials_and_bends_of_a_run_keep_factors():
     press = ddm.BodyLoad(sides={0: (0.0, 1e6), 2: (0.0, -1e6)})
     rock, work = replace(ROCK, k_ic=1e6), Work()
     growth = GrowthSettings(increment=0.05, min_increment=0.05)
-    options = {"control": "toughness", "max_steps": 18, "work": work}
-    *_, last = ddm.propagate([PLATE], network(0), rock, press, growth, SETTINGS, **options)
+    options = {"control": "toughness", "max_steps": 18, "reuse": Reuse(work=work)}
+    *_, last = ddm.propagate([PLATE], network(0), rock, press, growth, settings=SETTINGS, **options)
     alone = Body([PLATE], last.cracks, rock, SETTINGS).solve(press.scaled(last.load_factor))
     k, k_alone = (np.stack([s.tips["k_i"], s.tips["k_ii"]]) for s in (last.solution, alone))
     assert np.abs(k - k_alone).max() < 1e-10 * np.abs(k_alone).max()
@@ -170,10 +170,10 @@ def test_long_growth_goes_by_the_inverse_of_the_boundary():
     body = Body([PLATE], network(0), ROCK, SETTINGS)
     for steps in range(1, 13):
         assert ("inverse" in vars(body._outside.factor)) == (steps > OFTEN + 1)
-        body = Body([PLATE], network(steps), ROCK, SETTINGS, previous=body)
+        body = Body([PLATE], network(steps), ROCK, SETTINGS, reuse=Reuse(body))
         factors(body)
     k = factors(Body([PLATE], network(12), ROCK, SETTINGS))
     assert np.abs(factors(body) - k).max() < 1e-12 * np.abs(k).max()
     read = pickle.loads(pickle.dumps(body))
-    grown = [Body([PLATE], network(13), ROCK, SETTINGS, previous=before).solve(LOAD) for before in (read, body)]
+    grown = [Body([PLATE], network(13), ROCK, SETTINGS, reuse=Reuse(before)).solve(LOAD) for before in (read, body)]
     np.testing.assert_array_equal(grown[0].jumps, grown[1].jumps)
