@@ -202,7 +202,7 @@ def draw(
             if name not in known:
                 at = ("geometry", "joints", k, "zones", n)
                 faults.append(Fault(place(at), f"there is no zone {name!r}", nearest(name, known)))
-    origin = local_origin(geometry.origin, parts.arrays(), bool(geometry.traces))
+    origin = local_origin(geometry.origin, parts.arrays())
     if origin.any():
         parts.move(origin)
         geometry = moved_section(geometry, "geometry", origin)

@@ -41,17 +41,15 @@ PLACES: Mapping[str, Any] = {
 }
 
 
-def local_origin(given: tuple[float, float] | None, drawn: Iterable[np.ndarray], far_is_moved: bool) -> np.ndarray:
-    """(2,) world coordinates of the local origin: ``given``, or chosen if that is None and ``far_is_moved``.
-
-    The choice is a round position at the lower left of the ``drawn`` points (arrays (n, 2)), on each axis that is far
-    from 0.
+def local_origin(given: tuple[float, float] | None, drawn: Iterable[np.ndarray]) -> np.ndarray:
+    """(2,) world coordinates of the local origin: ``given``, or if that is None a round position at the lower left of the
+    ``drawn`` points (arrays (n, 2)), on each axis that is far from 0.
     """
     if given is not None:
         return np.array(given, dtype=float)
     drawn = [np.asarray(points) for points in drawn if len(points)]
     size = extent_of(drawn)
-    if not far_is_moved or size == 0.0 or not math.isfinite(size):
+    if size == 0.0 or not math.isfinite(size):
         return np.zeros(2)
     step = 10.0 ** math.floor(math.log10(size))
     low, high = np.min([p.min(axis=0) for p in drawn], axis=0), np.max([p.max(axis=0) for p in drawn], axis=0)

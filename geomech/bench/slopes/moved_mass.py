@@ -25,7 +25,7 @@ class BlockDisplacements:
     """Free blocks.
 
     mass, area     (n,) kg/m, m²
-    centre         (n, 2) m, initial centroids
+    centre         (n, 2) m, initial centroids, in the coordinates of the scene
     displacement   (n, 2) m, of the centroids
     gravity        (2,) m/s²
     """
@@ -44,7 +44,7 @@ class BlockDisplacements:
         free = ~np.asarray(blocks.fixed, bool)
         density = np.array([material.density for material in problem.materials])[blocks.material]
         return cls(
-            (density * before[:, 0])[free], before[free, 0], before[free, 1:3], (now - before)[free, 1:3],
+            (density * before[:, 0])[free], before[free, 0], before[free, 1:3] + problem.origin, (now - before)[free, 1:3],
             np.asarray(problem.loads.gravity.at(state.time), dtype=float),
         )  # fmt: skip
 

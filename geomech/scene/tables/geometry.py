@@ -193,7 +193,7 @@ class Geometry(Table):
     origin: Pair | None = Field(
         None,
         description="world coordinates of the run's origin, [x, y], m: all coordinates here and in files are the "
-        "world's (unset: [0, 0], or near the rock where traces lie far away)",
+        "world's (unset: [0, 0], or near the rock where it lies far away)",
     )
     joint_sets: Annotated[tuple[JointSetShape, ...], Strict(False)] = Field(
         (), description="statistical joint sets, in order: later sets may end on earlier ones"

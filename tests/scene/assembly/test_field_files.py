@@ -6,6 +6,7 @@ import json
 import numpy as np
 import pytest
 
+from geomech.model import DdaSettings, JointLaw
 from geomech.output.block_model.block_system import write_block_system
 from geomech.scene import SceneError, load_scene
 from geomech.scene.keys import kind_of
@@ -133,6 +134,41 @@ def test_world_coordinates_are_moved_to_a_local_origin(tmp_path, kind):
     mesh = pyvista.read(tmp_path / "build" / "block_system.vtu")
     back = mesh.points[:, :2] + [mesh.field_data["WORLD_X"][0], mesh.field_data["WORLD_Y"][0]]
     assert back.min(axis=0) == pytest.approx([EAST - 5, NORTH - 4], abs=1e-8)
+
+
+def test_rock_drawn_far_away_moves_as_it_does_here(tmp_path):
+    """With its own origin, 10 km off, it keeps all but the digits that its coordinates lack; with [0, 0] it does not."""
+    from geomech import dda
+    from geomech.model import Joints
+
+    def last(x, origin=""):
+        at = lambda points: [[a + x, b + x] for a, b in points]  # noqa: E731
+        file = tmp_path / "scene.toml"
+        joints = "".join(
+            f'[[geometry.joints]]\nname = "{name}"\npoints = {at(line)}\n'
+            for name, own in JOINTS.items()
+            for line in own
+        )
+        zones = "".join(
+            f'[[geometry.zones]]\nname = "{name}"\npolygon = {at(of)}\n'
+            for name, of in (("rock", ROCK), ("base", BASE))
+        )
+        file.write_text(f"[geometry]\n{origin}\n{zones}{joints}{REST}", encoding="utf-8")
+        scene = load_scene(file)
+        problem = scene.problem()
+        settings = DdaSettings(time_step=3e-3, dynamic_factor=1.0)
+        *_, state = dda.run(
+            problem.blocks, problem.materials, Joints([JointLaw("smooth")], lambda a, b: 0), problem.loads, settings, 0.009
+        )  # fmt: skip
+        return scene.origin, state.vertices - problem.blocks.vertices
+
+    _, here = last(0.0)
+    origin, far = last(1e4)
+    assert origin == (9990.0, 9990.0)
+    off = np.abs(far - here).max()
+    assert off < 1e-9 * np.abs(here).max()
+    origin, as_drawn = last(1e4, "origin = [0, 0]")
+    assert origin == (0.0, 0.0) and np.abs(as_drawn - here).max() > 30 * off
 
 
 def test_a_resolved_scene_gives_the_same_again(tmp_path):
