@@ -259,7 +259,8 @@ class ContactFinder:
         near = self._widened_windows(window, vertices, old, names.lift, names.gap)
         rank = np.argsort(names.keys, kind="stable")
         corners = Corners(
-            convex_corners(vertices, self._next, self._previous), self._rounding, self._longest, self._pressed(old),
+            convex_corners(vertices, self._next, self._previous), self._rounding, self._longest, self._area,
+            self._pressed(old),
             np.zeros_like(vertices) if motion is None else motion, float(margin) + names.lift,
         )  # fmt: skip
         outlines = Outlines(np.ascontiguousarray(vertices), self._next, self._previous, self._start)

@@ -45,6 +45,8 @@ _ZONE = 2.0
 _HASTE = 2.0
 # cos of the angle between edges that count as mating faces, for tributary lengths.
 _MATING = 0.9986
+#: Areas of blocks that differ by less than this part are the same: then the blocks' numbers decide exact ties.
+_ALIKE = 1e-9
 
 
 @part(fastmath=False, error_model="numpy", nogil=True, **UNCOUNTED)
@@ -166,6 +168,7 @@ class Corners(NamedTuple):
     convex    (n_vertices,)    bool
     rounding  (n_vertices,)    m, their rounding lengths
     longest   (n_vertices,)    m, largest admissible rounding lengths
+    size      (n_blocks,)      m² of each block
     pressed   (n_blocks,)      m, penetration of each block's faces
     motion    (n_vertices, 2)  m, expected motion of each vertex in the step
     margin                     m, further approach that is allowed for: pairs that then stay apart are left out
@@ -174,6 +177,7 @@ class Corners(NamedTuple):
     convex: np.ndarray
     rounding: np.ndarray
     longest: np.ndarray
+    size: np.ndarray
     pressed: np.ndarray
     motion: np.ndarray
     margin: float
@@ -278,6 +282,9 @@ def _look_at(rows, lines, box, pairs, windows, outlines, old_keys, corners):
     count, start = 0, outlines.vertex_start
     for pair in range(pairs.shape[0]):
         a, b = pairs[pair, 0], pairs[pair, 1]
+        # In exact ties vertices of the later block represent a contact: of the smaller one, whatever the blocks' numbers.
+        if corners.size[a] < (1.0 - _ALIKE) * corners.size[b]:
+            a, b = b, a
         # Lines of rounded corners do not act separately.
         zone = rounding_length(
             min(corners.rounding[start[a]], corners.rounding[start[b]]), np.inf,

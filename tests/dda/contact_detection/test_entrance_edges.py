@@ -28,8 +28,8 @@ def search(polygons, window=0.05, turn=0.0, fixed=None, rounding=0.01):
     none = np.empty(0, np.int64)
     near = near_pairs(boxes(v, start[:-1]), fixed, window)
     corners = Corners(
-        convex_corners(v, next_, previous), *corner_lengths(blocks, rounding), np.zeros(len(polygons)), np.zeros_like(v),
-        np.inf,
+        convex_corners(v, next_, previous), *corner_lengths(blocks, rounding), blocks.areas(), np.zeros(len(polygons)),
+        np.zeros_like(v), np.inf,
     )  # fmt: skip
     outlines = Outlines(v, next_, previous, start)
     table, met = find_contacts(outlines, near, window, none, corners)
