@@ -175,8 +175,7 @@ def test_vibrations_that_the_step_does_not_resolve_are_told_of(caplog):
 
 @pytest.mark.parametrize("together", [True, False])
 def test_static_steps_that_move_what_nothing_holds_are_told_of(together, caplog):
-    """A tank of half the weight that water lifts, before its weight is there or as it comes: it floats off, and
-    settles."""
+    """A tank that water lifts by half its weight, before the weight is there or as it comes: it floats off, and settles."""
     weight = 2500.0 * 9.81 * 20.0
     lift = [0.0, 0.5 * weight]
     problem = weighed_column(1.0, 4.0)
