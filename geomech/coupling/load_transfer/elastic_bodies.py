@@ -40,6 +40,10 @@ def elastic_bodies(
         cracked = cracked[~removed[cracked]]
     if not len(cracked):
         return {}, {}
+    if blocks.order is not None and (np.asarray(blocks.order)[cracked] != 1).any():
+        block = int(cracked[np.argmax(np.asarray(blocks.order)[cracked] != 1)])
+        name = blocks.names[block] if blocks.names else f"block {block}"
+        raise ValueError(f"{name!r} is of higher order: such blocks have no cracks yet, and none can begin in them")
     from ... import ddm
 
     bodies: dict[int, Body | None] = {}
