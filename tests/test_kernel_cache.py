@@ -192,12 +192,14 @@ def test_a_part_is_compiled_once_for_all_constants(tmp_path):
         "@kept(nogil=True)\ndef scaled(x, n):\n    return shifted(x, 0) + shifted(x, 1) + shifted(x, n)\n"
     )
     code = (
+        "from numba.core.ir import Inst\n"
         "from numba.core.targetconfig import TargetConfig as settings\n"
         "from numba.core.types.functions import BaseFunction\n"
-        "before = settings.__eq__, settings.__hash__, BaseFunction.get_call_type\n"
+        "before = settings.__eq__, settings.__hash__, BaseFunction.get_call_type, Inst._rec_list_vars\n"
         "from constants import scaled, shifted\n"
         "print(scaled(1.0, 5), len(shifted.overloads))\n"
-        "print((settings.__eq__, settings.__hash__, BaseFunction.get_call_type) == before)"
+        "now = settings.__eq__, settings.__hash__, BaseFunction.get_call_type, Inst._rec_list_vars\n"
+        "print(now == before)"
     )
     environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path / "kernels")}
     environment["PYTHONPATH"] = os.pathsep.join([str(tmp_path), str(Path(geomech.__file__).resolve().parents[1])])
@@ -233,3 +235,55 @@ def test_functions_of_numba_are_compiled_with_the_kernels_that_call_them(tmp_pat
     )  # fmt: skip
     assert first == ["9 1 0 6 True", "negative dimensions not allowed", "negative dimensions not allowed"]
     assert later == ["9 0 0 6 True", *first[1:]]
+
+
+def test_variables_of_statements_are_those_of_numba_in_its_order():
+    from numba.core import ir
+
+    from geomech.compiled import _variables_of
+
+    place = ir.Loc("here", 1)
+    a, b, c, d = (ir.Var(None, name, place) for name in "abcd")
+    called = ir.Expr.call(a, [b, (c, [d])], [("of", b)], place, vararg=c)
+    made = ir.Expr.build_map([(a, b), (c, d)], 2, {}, {}, place)
+    for statement in ir.Assign(called, d, place), ir.Assign(made, a, place), ir.Return(b, place), ir.Del("a", place):
+        assert _variables_of(statement, vars(statement)) == ir.Inst._rec_list_vars(statement, vars(statement))
+    assert [each.name for each in _variables_of(called, called._kws)] == ["a", "b", "c", "d", "b", "c"]
+
+
+def test_settings_are_equal_where_numba_says_so():
+    from numba.core.compiler import Flags
+
+    from geomech.compiled import _same_settings
+
+    plain, default, other = Flags(), Flags(), Flags()
+    default.nrt, other.nrt = Flags.options["nrt"].default, not Flags.options["nrt"].default
+    for one, two in (plain, default), (plain, other), (default, other), (other, other.copy()):
+        assert _same_settings(one, two) == (one.values() == two.values())
+    assert _same_settings(plain, 1) is NotImplemented
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="page faults of Linux")
+def test_calls_of_the_compiler_take_no_memory_from_the_system_however_deep_they_begin():
+    """Somewhere in the depths a chunk of CPython's frames ends; calls across that end are page faults each."""
+    import resource
+
+    from geomech.compiled import _with_room
+
+    def leaf():
+        return 1
+
+    def often(depth):
+        if depth:
+            return often(depth - 1)
+        return sum(leaf() for _ in range(100)) + sum(map(lambda _: leaf(), range(100)))
+
+    def faults() -> int:
+        before = resource.getrusage(resource.RUSAGE_SELF).ru_minflt
+        for depth in range(200):
+            often(depth)
+        return resource.getrusage(resource.RUSAGE_SELF).ru_minflt - before
+
+    _with_room(faults)
+    # 324 without the room, and some for the memory of numbers.
+    assert _with_room(faults) < 100
