@@ -299,9 +299,9 @@ def safety_report(
     if cracks and not without_cracks:
         more = f" and {len(cracks) - 3} more" if len(cracks) > 3 else ""
         raise CracksInBlocks(
-            f"no factor of safety: {', '.join(cracks[:3])}{more} lead into blocks that can move, and what rock bridges "
-            "hold there would count as if it could not break. `geomech run` breaks them: let the loads grow, or the "
-            "strength of [joints] and the toughness of [materials] be divided by the factor that is to be proven"
+            f"no factor of safety: {', '.join(cracks[:3])}{more} lead into blocks that can move, and the rock bridges "
+            "there would be treated as unbreakable. `geomech run` breaks them: increase the loads, or divide the "
+            "strength of [joints] and the toughness of [materials] by the factor of safety to be verified"
         )
     factors = dda.PartialFactors.of(divide)
     problem, reduced = dda.design_problem(problem, factors, along)

@@ -146,13 +146,13 @@ def _changes(header: Mapping[str, Any], resolved: Mapping[str, Any]) -> dict[str
     if forbidden:
         reason = "; ".join(f"{key} was {changes[key][0]!r}, is now {changes[key][1]!r}" for key in forbidden[:6])
         raise NotResumable(
-            f"this would change what has happened in the run: {reason}. Set it back, or run the changed scene into "
+            f"this would change the part of the run already computed: {reason}. Set it back, or run the changed scene into "
             f"another folder. What may be changed: {', '.join(ALLOWED)}"
         )
     files = digests(resolved)
     for name, digest in header["files"].items():
         if files.get(name) != digest:
-            raise NotResumable(f"{name} is not what the run was begun with: bring it back, or run the scene again")
+            raise NotResumable(f"{name} has changed since the run began: restore it, or run the scene again")
     return changes
 
 
@@ -182,7 +182,7 @@ def _refuse_finished(end: str, header: Mapping[str, Any], scene: Any) -> None:
     # Steps to events have none to go to where nothing holds the blocks.
     no_further = end == "mechanism" and settings is not None and settings.stepping == "events"
     if settings is None or no_further or end in ("collapse", "out of sight"):
-        raise Finished(f"the run has ended ({end}): there is nothing to go on with")
+        raise Finished(f"the run has ended ({end}): there is nothing left to continue")
     if end == "end of the scene":
         ended = header["scene"]["run"]["end_time_s"]
         if settings.end_time > ended * (1 + 1e-12):

@@ -392,7 +392,7 @@ def test_another_scene_or_version_is_refused(write, tmp_path, monkeypatch):
     with pytest.raises(NotResumable, match=r"joints.default.friction_angle_deg was 20.0, is now 30"):
         resume(out, ["joints.default.friction_angle_deg=30"])
     record.write_text(record.read_text().replace("2, 0", "3, 0"))
-    with pytest.raises(NotResumable, match=r"push.csv is not what the run was begun with"):
+    with pytest.raises(NotResumable, match=r"push.csv has changed since the run began"):
         resume(out)
     record.write_text(record.read_text().replace("3, 0", "2, 0"))
     copy = out / "scene.toml"
@@ -433,7 +433,7 @@ def test_a_changed_file_that_the_model_includes_is_refused(write, tmp_path):
         file = tmp_path / name
         begun = file.read_text()
         file.write_text(begun.replace(was, now))
-        with pytest.raises(NotResumable, match=rf"{name} is not what the run was begun with"):
+        with pytest.raises(NotResumable, match=rf"{name} has changed since the run began"):
             resume(out)
         file.write_text(begun)
     resume(out, quiet=True)

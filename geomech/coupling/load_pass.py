@@ -103,9 +103,9 @@ def balanced(now: CrackedBlocks, dt: float, load_time: float | None) -> Balance:
         dt = dt if static else 0.5 * found.result.dt
     blocks = [now.blocks.names[b] for b in np.array(list(now.bodies), int)[lost]]
     raise dda.NotConverged(
-        f"t = {found.result.state.time:g} s: {', '.join(blocks[:3])} and the cracks in it find no common strain in "
-        f"{COMPLIANCE_PASSES} passes (they differ by {differences.max():.2g} of it): try a shorter time step, or finer "
-        "elements in [ddm]"
+        f"t = {found.result.state.time:g} s: {', '.join(blocks[:3])} and its cracks do not converge to a common strain "
+        f"in {COMPLIANCE_PASSES} passes (relative difference {differences.max():.2g}): try a shorter time step, or "
+        "finer elements in [ddm]"
     )
 
 
@@ -134,8 +134,8 @@ def at_rest(now: CrackedBlocks, load_time: float) -> dda.Equilibrium:
             break
     else:
         log.warning(
-            "t = %g s: blocks at rest and the cracks in them find no common strain in %d passes (they differ by %.2g of "
-            "it); the first step releases the difference",
+            "t = %g s: blocks at rest and their cracks do not converge to a common strain in %d passes (relative "
+            "difference %.2g); the first step releases the difference",
             load_time, COMPLIANCE_PASSES, differences.max(),
         )  # fmt: skip
     now.by_mean_stress.take_step()

@@ -52,7 +52,7 @@ class Excavations:
         for block in excavation.blocks:
             if not (isinstance(block, (int, np.integer)) and 0 <= block < n):
                 raise ValueError(
-                    f"the excavation at {excavation.time:g} s takes block {block!r}, but there are {n}, numbered from 0"
+                    f"the excavation at {excavation.time:g} s removes block {block!r}, but there are {n}, numbered from 0"
                 )
         taken = list(excavation.blocks)
         if excavation.polygon is not None:

@@ -217,7 +217,7 @@ class StepCutting:
         """Accept, in statics, the motion under a load that does not shrink with the step, and search far enough."""
         search = self.search
         log.info(
-            "step at t = %g s: %s, and a shorter step does not help; accepted", self.start.state.time, used.reason
+            "step at t = %g s accepted: %s, which a shorter step does not reduce", self.start.state.time, used.reason
         )  # fmt: skip
         self.allowed_share = 1.1 * used.share
         search.near = search.near.widened(used.moved.pairs, 1.1 * used.moved.reach, self.system.blocks.n_blocks)
@@ -247,7 +247,9 @@ class StepCutting:
     def _refuse(self) -> NoReturn:
         static, way_out = self.system.scheme.static, ""
         if not static and self.system.settings.springs != "resolved":
-            way_out = '; dda.springs = "resolved" may go on, with contacts no stiffer than the time step resolves'
+            way_out = (
+                '; dda.springs = "resolved" may continue, with contact springs no stiffer than the time step resolves'
+            )
         raise NotConverged(
             f"the block step at t = {self.start.state.time:g} s failed after {self.cuts - 1} cuts "
             f"(dt = {self.dt:.3g} s): {self.reason}{way_out}"
@@ -261,7 +263,7 @@ class StepCutting:
             names = system.blocks.names
             name = names[crushed] if names else f"block {crushed}"
             raise NotConverged(
-                f"{name!r} is crushed to nothing at t = {state.time:g} s: its loads are beyond its stiffness"
+                f"{name!r} is compressed to zero area at t = {state.time:g} s: its loads are too large for its stiffness"
             )
 
     def _search(self) -> _Search:

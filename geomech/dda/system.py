@@ -74,7 +74,7 @@ class BlockSystem:
         if not blocks.n_blocks:
             raise ValueError("there are no blocks to move")
         if int(np.max(blocks.material)) >= len(materials):
-            raise ValueError(f"a block names material {int(np.max(blocks.material))}, but there are {len(materials)}")
+            raise ValueError(f"a block has material {int(np.max(blocks.material))}, but there are {len(materials)}")
         self.blocks = blocks
         self.materials = tuple(materials)
         self.joints = tuple(joints) or (JointLaw("frictionless"),)
@@ -290,7 +290,7 @@ class BlockSystem:
                 return replace(
                     result, state=replace(result.state, order=None if choice is None else self.order, parted=known)
                 )
-            log.info("t = %g s: %d faces of cells part", attempt.time, int(parted.sum() - before.sum()))
+            log.info("t = %g s: %d faces between cells separate", attempt.time, int(parted.sum() - before.sum()))
             self._part(parted)
 
     def _refuse_state_of_others(self, state: State) -> None:
@@ -302,12 +302,12 @@ class BlockSystem:
         ):
             found = len(getattr(state, name))
             if found != rows:
-                raise ValueError(
-                    f"the state is not one of these blocks: its {name} have {found} rows, the blocks ask for {rows}"
-                )
+                raise ValueError(f"the state is not one of these blocks: its {name} have {found} rows, expected {rows}")
         contacts = state.contacts
         if len(contacts) and max(contacts["vertex"].max(), contacts["edge"].max()) >= len(blocks.vertices):
-            raise ValueError("the state is not one of these blocks: its contacts are between vertices that they lack")
+            raise ValueError(
+                "the state is not one of these blocks: its contacts are between vertices that do not exist"
+            )
 
     def _step(
         self, state: State, loads: Loads, dt: float | None, crack: CrackResponse | None, load_time: float | None,
@@ -374,8 +374,8 @@ class BlockSystem:
         )  # fmt: skip
         if self.scheme.static and not holds and loads.gravity.at(time).any():
             raise ValueError(
-                "no block is fixed, so that under gravity all of them fall and statics finds no equilibrium: fix a "
-                "block, or let velocity be carried (dynamic_factor = 1)"
+                "no block is fixed: under gravity all of them fall, and there is no static equilibrium; fix a block, "
+                "or run in time (dynamic_factor = 1)"
             )
 
     def pattern_of(

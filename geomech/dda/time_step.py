@@ -345,14 +345,14 @@ class Attempt:
             if better is None:
                 break
             if self._labours():
-                raise Unsettled(f"contacts have not settled in {self.iterations} open-close iterations")
+                raise Unsettled(f"contact states did not converge in {self.iterations} open–close iterations")
             if tries % _PLACED == 0:
                 # Which part touches may follow contacts that jump at any step: these faces stand on their corners in
                 # this one.
                 better = found.cornered(better)
             found = better.trying_again(settled)
         else:
-            raise Unsettled("faces do not settle on the part of them that touches")
+            raise Unsettled("the contact areas of faces did not converge")
         self.found, self.settled, self.unknowns = found, settled, unknowns
         self.vectors, self.weight, self.acting, self.striking = vectors, weight, geometry, striking
 

@@ -334,7 +334,7 @@ class Body:
 
         if (self.compressed or iterated) and not (old and (old.compressed or old._outside.iterated)):
             of = [f"{g.n_unknowns} on the boundary"] * iterated + [f"{c.n_unknowns} on cracks"] * self.compressed
-            _log.info("solved iteratively instead of factored: %s", ", ".join(of))
+            _log.info("solved iteratively instead of by factorization: %s", ", ".join(of))
         if self.compressed:
             on_boundary, crack = gc(np.arange(c.n)), self.cracks.crack[c.source]
             on_both = system.factor if isinstance(system.factor, IteratedBoundary) else None
@@ -440,7 +440,7 @@ class Body:
         solver was requested, or if there are too many unknowns to factor."""
         if self.settings.solver != "auto" or self.faces.n_unknowns + self.boundary.n_unknowns > FACTORABLE:
             raise failure
-        _log.info("%s; solved with factors instead", failure)
+        _log.info("%s; solved by factorization instead", failure)
         before = copy(self)
         self.compressed, self._factored_after_all = False, True
         vars(self).pop("face_equations", None)

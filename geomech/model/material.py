@@ -53,7 +53,7 @@ class Material:
         if not self.k_iic > 0:
             refuse(f"fracture toughness in mode II must be positive, got {self.k_iic!r} Pa √m")
         if math.isinf(self.k_ic) and math.isfinite(self.k_iic):
-            refuse("a toughness in mode II needs one in mode I beside it")
+            refuse("a mode II toughness requires a mode I toughness")
         if not self.tensile_strength > 0:
             refuse(f"tensile strength must be positive, got {self.tensile_strength!r} Pa")
         if not self.cohesion > 0:

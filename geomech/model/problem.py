@@ -96,13 +96,13 @@ class DdaSettings:
         beta, gamma = self.newmark
         if not (2 * beta >= gamma >= 0.5):
             raise ValueError(
-                f"Newmark's β = {beta:g}, γ = {gamma:g} is not stable at every time step, and contact springs are far "
-                "stiffer than steps resolve: it takes 2β ≥ γ ≥ ½ (trapezoidal rule 0.25, 0.5; Shi's scheme 0.5, 1)"
+                f"Newmark's β = {beta:g}, γ = {gamma:g} is not unconditionally stable, as stiff contact springs "
+                "require: choose 2β ≥ γ ≥ ½ (trapezoidal rule 0.25, 0.5; Shi's scheme 0.5, 1)"
             )
         if beta > max(gamma - 0.25, 0.5 * gamma) * (1 + 1e-12):
             raise ValueError(
-                f"Newmark's β = {beta:g}, γ = {gamma:g} keeps more in its accelerations than it damps, and blocks that "
-                "bounce gain energy: it takes β ≤ γ − ¼ (trapezoidal rule 0.25, 0.5; Shi's scheme 0.5, 1)"
+                f"Newmark's β = {beta:g}, γ = {gamma:g} lets blocks that bounce gain energy: choose β ≤ γ − ¼ "
+                "(trapezoidal rule 0.25, 0.5; Shi's scheme 0.5, 1)"
             )
 
 
@@ -222,7 +222,7 @@ class GrowthSettings:
 
     def __post_init__(self) -> None:
         if not 0 < self.increment < math.inf:
-            raise ValueError(f"increment must be a length, got {self.increment!r} m")
+            raise ValueError(f"increment must be a positive length, got {self.increment!r} m")
         if not 0 < self.min_increment <= self.increment:
             raise ValueError(
                 f"min_increment must be a length of at most the increment of {self.increment:g} m, got {self.min_increment!r} m"
@@ -353,7 +353,7 @@ class Problem:
             material = self.materials[self.blocks.material[block]]
             if material.rigid:
                 name = self.blocks.names[block] if self.blocks.names else f"block {block}"
-                raise ValueError(f"{name!r} holds a crack, but its material {material.name!r} is rigid")
+                raise ValueError(f"{name!r} contains a crack, but its material {material.name!r} is rigid")
 
 
 def counted(number: int, noun: str) -> str:

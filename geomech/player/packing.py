@@ -63,7 +63,7 @@ class Block:
 
     def _add(self, name: str, kind: str, numbers: np.ndarray, factor: float = 1.0, shift: float = 0.0) -> None:
         if name in self.arrays:
-            raise ValueError(f"{name} is there already")
+            raise ValueError(f"{name} exists already")
         width = numbers.dtype.itemsize
         rows = numbers.astype(numbers.dtype.newbyteorder("<")).view(np.uint8).reshape(-1, width)
         self.arrays[name] = [kind, self._size, len(numbers), factor, shift]

@@ -191,7 +191,7 @@ class Page:
     def play(self, records: Sequence[Mapping[str, Any]]) -> None:
         """The player of runs (`geomech.player.page.records_of`), wider than the text; at most one per page."""
         if self._plays:
-            raise ValueError(f"{self.title}: a page plays its runs in one place")
+            raise ValueError(f"{self.title}: a page can play its runs in one place only")
         self._plays = True
         self._body.append(f'<div class="playing">{player(records)}</div>')
 

@@ -132,7 +132,7 @@ def test_the_level_may_rise_and_edges_may_be_dry():
     assert force[0] == pytest.approx(-0.5 * 9810 * 16.0, rel=1e-13)  # nothing on the left to hold the right's push
     with pytest.raises(ValueError, match="'linned' dry, but no edge"):
         resultant(blocks, Loads(water=WaterTable(np.array([[0.0, 2.0]]), dry=("linned",))))
-    with pytest.raises(ValueError, match="ascend in x"):
+    with pytest.raises(ValueError, match="x of the points of a water table must increase"):
         WaterTable(np.array([[1.0, 0.0], [0.0, 0.0]]))
     with pytest.raises(ValueError, match="unit weight"):
         WaterTable(np.array([[1.0, 0.0]]), unit_weight=0.0)

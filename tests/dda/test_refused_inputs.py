@@ -140,7 +140,7 @@ def test_the_tables_hold_every_number_there_is():
 @pytest.mark.parametrize(
     ("make", "words"),
     [
-        (lambda: Roughness(10.0, 1e8, reduction=INF), "divided by a positive number"),
+        (lambda: Roughness(10.0, 1e8, reduction=INF), "reduction factor of a rough joint must be positive"),
         (lambda: JointLaw("b", cohesion=INF, softening_slip=0.1), "infinite cohesion"),
         (lambda: PointLoad(1, (NAN, 0.5), PUSH), "point load on block 1 needs two finite coordinates"),
         (lambda: PointLoad(1, (0.5, 0.5), History.constant([1.0])), "point load on block 1 needs a history of two"),
@@ -149,7 +149,7 @@ def test_the_tables_hold_every_number_there_is():
         (lambda: Loads(gravity=History.constant([9.81])), "gravity needs a history of two columns"),
         (lambda: PointMotion(1, (INF, 0.0), PUSH), "motion of a point of block 1 needs two finite"),
         (lambda: PointMotion(1, (0, 0), History.constant([1.0]), (NAN, 0.0)), "no direction"),
-        (lambda: PointMotion(1, (0.0, 0.0), PUSH, stiffness=INF), "stiffness that moves a point must be positive"),
+        (lambda: PointMotion(1, (0.0, 0.0), PUSH, stiffness=INF), "stiffness of a prescribed point motion must be positive"),
         (lambda: WaterTable(np.zeros((1, 2)), level=PUSH), "level of a water table needs a history of one column"),
         (lambda: WaterTable(np.zeros((1, 2)), unit_weight=NAN), "unit weight of water must be positive"),
         (lambda: Excavation(1.0, polygon=[[0, 0], [1, 0], [NAN, 1]]), "point that is not finite"),
@@ -165,8 +165,8 @@ def test_the_tables_hold_every_number_there_is():
         (lambda: two_blocks(material=[0]), "material needs an entry for each of 2 blocks, got 1"),
         (lambda: two_blocks(material=[0, -1]), "material of block 1 must be an index"),
         (lambda: two_blocks(names=["base"]), "names needs an entry for each of 2 blocks, got 1"),
-        (lambda: two_blocks(constrained=[[True] * 6]), "held needs an entry for each of 2 blocks, got 1"),
-        (lambda: two_blocks(constrained=[[True] * 3] * 2), "held needs six entries a block"),
+        (lambda: two_blocks(constrained=[[True] * 6]), "constrained needs an entry for each of 2 blocks, got 1"),
+        (lambda: two_blocks(constrained=[[True] * 3] * 2), "constrained needs six entries per block"),
         (lambda: two_blocks(edge_names=[[[""] * 4]]), "edge_names needs an entry for each of 2 blocks, got 1"),
         (lambda: two_blocks(edge_names=[[[""] * 4], []]), "block 1: edge_names needs a list for each of 1 loops"),
         (lambda: two_blocks(edge_names=[[[""] * 4], [[""] * 3]]), "block 1: 4 edges but 3 edge names"),
@@ -180,7 +180,7 @@ def test_what_is_not_as_it_must_be_is_refused_by_name(make, words):
 @pytest.mark.parametrize(
     ("make", "words"),
     [
-        (lambda: Loads(gravity=[0.0, -9.81]), "gravity must be a History, .* got a list"),
+        (lambda: Loads(gravity=[0.0, -9.81]), "gravity must be a History .*, got a list"),
         (lambda: EdgeTraction("top", np.zeros(2)), "'top' must be a History"),
         (lambda: PointLoad(1, (0.5, 0.5), 1.0), "point load on block 1 must be a History"),
         (lambda: BlockMotion(1, [0.0, 0.0, 0.0]), "motion of block 1 must be a History"),
@@ -236,7 +236,7 @@ def test_loads_that_would_do_nothing_are_refused():
     with pytest.raises(ValueError, match="edges named 'foot', but the blocks that have them are fixed"):
         dda.BlockSystem(blocks, [ROCK]).step(State.at_rest(blocks), quiet)
     loose = Blocks.from_polygons([SQUARE])
-    with pytest.raises(ValueError, match="ground shakes, but no block is fixed"):
+    with pytest.raises(ValueError, match="ground motion is given, but no block is fixed"):
         dda.BlockSystem(loose, [ROCK]).step(State.at_rest(loose), Loads(base=BaseMotion(PUSH)))
 
 
@@ -275,11 +275,11 @@ def test_a_state_of_other_blocks():
     """It ended the process: kernels read and write past the ends of its arrays."""
     blocks, others = two_blocks(), Blocks.from_polygons([3 * SQUARE - [1, 3]], fixed=[True])
     system = dda.BlockSystem(blocks, (ROCK,), (JointLaw("joint"),), None, DdaSettings())
-    with pytest.raises(ValueError, match="not one of these blocks: its vertices have 4 rows, the blocks ask for 8"):
+    with pytest.raises(ValueError, match="not one of these blocks: its vertices have 4 rows, expected 8"):
         system.step(State.at_rest(others), Loads())
     moved = system.step(State.at_rest(blocks), Loads(gravity=History.constant([0.0, -9.81]))).state
     assert len(moved.contacts)
     contacts = moved.contacts.copy()
     contacts["edge"] += 8
-    with pytest.raises(ValueError, match="its contacts are between vertices that they lack"):
+    with pytest.raises(ValueError, match="its contacts are between vertices that do not exist"):
         system.step(replace(moved, contacts=contacts), Loads())

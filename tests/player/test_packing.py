@@ -48,6 +48,6 @@ def test_what_cannot_be_packed_is_refused():
     with pytest.raises(ValueError, match="x: -1 is below 0"):
         block.whole("x", np.array([-1]))
     block.single("x", np.zeros(2))
-    with pytest.raises(ValueError, match="x is there already"):
+    with pytest.raises(ValueError, match="x exists already"):
         block.single("x", np.zeros(2))
     assert arrays(Block().record()) == {}

@@ -49,7 +49,7 @@ def test_every_key_of_a_joint_arrives(scene_file):
             "",
         ),
         ("jrc = 10\njcs_pa = 1e8\nfriction_angle_deg = 70\n", "friction_angle_deg", "below 70°", "without roughness"),
-        ("jrc = 10\njcs_pa = 1e8\njoint_length_m = 0.05\n", "joint_length_m", "not be below", "leave it out"),
+        ("jrc = 10\njcs_pa = 1e8\njoint_length_m = 0.05\n", "joint_length_m", "at least", "leave it out"),
         (
             "jrc = 10\njcs_pa = 1e8\nstiffness_from_peak_slip = true\nshear_stiffness_pa_per_m = 1e9\n",
             "shear_stiffness_pa_per_m", "as well", "leave it out",

@@ -218,7 +218,7 @@ def test_what_is_no_crack_in_a_body_is_refused_by_name(reason):
 def test_cracks_whose_coordinates_do_not_resolve_them_are_refused():
     """2 mm at 1e9 m, where coordinates have steps of 1.2e-7 m: K was off by 3.5e-3."""
     cracks = lines([[1e9, 0], [1e9 + 2e-3, 1e-3]])
-    with pytest.raises(ValueError, match=r"'crack 0': .* too short for coordinates that large.* from an origin near"):
+    with pytest.raises(ValueError, match=r"'crack 0': .* too short for coordinates this large.* from an origin near"):
         ddm.Body([], cracks, ROCK)
 
 

@@ -186,7 +186,7 @@ def test_a_block_strained_beyond_elasticity_is_told_of_and_ends_the_run(caplog):
     assert [strained(share) for share in (1e-3, 9e-3, 1.1e-2, 1.5e-2, 3e-2, 3e-2, 2e-2)] == [0, 0, 1, 1, 2, 2, 2]
     assert "t = 1.5 s: rock is strained by 1.11 %" in caplog.text
     with pytest.raises(
-        dda.NotConverged, match=r"rock is strained by 34.5 % at t = 1.5 s: no linear elastic body"
+        dda.NotConverged, match=r"rock is strained by 34.5 % at t = 1.5 s: beyond linear elasticity"
     ) as refused:
         strained(0.3)
     assert reason_of(refused.value) == "strained beyond elasticity"

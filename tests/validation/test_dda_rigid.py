@@ -132,5 +132,5 @@ def test_rigid_and_elastic_blocks_meet_with_momentum_kept():
 def test_a_crack_in_a_rigid_block_is_refused():
     blocks = Blocks.from_polygons([rectangle(0, 0, 1, 1)], names=["stone"])
     crack = Cracks.from_polylines([np.array([[0.3, 0.5], [0.7, 0.5]])], block=[0])
-    with pytest.raises(ValueError, match="'stone' holds a crack, but its material 'stone' is rigid"):
+    with pytest.raises(ValueError, match="'stone' contains a crack, but its material 'stone' is rigid"):
         Problem("", blocks, crack, (RIGID,), ())

@@ -45,19 +45,19 @@ REASONS = (
     Reason(
         "block crushed",
         dda.NotConverged,
-        r"is crushed to nothing at t = ",
-        "a block's loads are beyond its stiffness: it would have no area",
+        r"is compressed to zero area at t = ",
+        "a block's loads are too large for its stiffness: it would have no area",
     ),
     Reason(
         "strained beyond elasticity",
         dda.NotConverged,
-        r"is strained by \S+ % at t = \S+ s: no linear elastic body",
-        "a block that hangs by a thread, or is loaded beyond its stiffness, is no linear elastic body: it is named",
+        r"is strained by \S+ % at t = \S+ s: beyond linear elasticity",
+        "a block that hangs by a thin bridge of rock, or is overloaded, is no longer linear elastic: it is named",
     ),
     Reason(
         "no common strain",
         dda.NotConverged,
-        r"find no common strain in \d+ passes",
+        r"do not converge to a common strain in \d+ passes",
         "blocks and the cracks in them agree on no strain at any length of the step: the blocks are named",
     ),
     Reason(

@@ -31,7 +31,7 @@ class Invariant:
 
 #: A block and cracks that disagree have too much strain, overlap their neighbours, and are out of balance by their
 #: strain.
-_HANGS, _STRAINED = "no common strain", "beyond the elastic range"
+_HANGS, _STRAINED = "to a common strain", "beyond the elastic range"
 #: Faces in a blade of rock, for which the crack solver reports place, length and violation of their laws.
 _UNSETTLED = "the remaining violation"
 

@@ -65,6 +65,6 @@ class Crossing:
                 return 0.5 * (a + b)
             return a - f * (b - a) / (g - f)
         if self._last is None:
-            raise ValueError("a crossing is searched for from at least one point")
+            raise ValueError("the search for a root needs at least one point")
         at, value = self._last
         return at - value / self.slope if self.slope > 0 else math.copysign(math.inf, -value)

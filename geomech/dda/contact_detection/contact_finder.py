@@ -552,7 +552,7 @@ class ContactFinder:
                 index = self._joint_index(names[i], names[j])
                 if index is not None and not 0 <= index < self._n_joints:
                     raise ValueError(
-                        f"edges {names[i]!r} and {names[j]!r} have joint law {index}, out of {self._n_joints}"
+                        f"edges {names[i]!r} and {names[j]!r} have joint law {index}, but there are {self._n_joints}"
                     )
                 self._law_of[i, j] = _NEVER if index is None else index
             law = self._law_of[a, b]

@@ -287,7 +287,7 @@ class GlueStrength:
         without tensile strength."""
         weak = next((law for law in laws if law is not None and not law.tensile_strength > 0), None)
         if weak is not None:
-            raise ValueError(f"cells cannot separate by the joint {weak.name!r}: it has no tensile strength")
+            raise ValueError(f"cells cannot separate along the joint {weak.name!r}: it has no tensile strength")
         given = [
             (np.inf, np.inf, 0.0) if law is None else (law.tensile_strength, law.cohesion, law.friction) for law in laws
         ]

@@ -138,7 +138,7 @@ class OrderChoice:
             return None
         names = [f"{self.blocks.names[b]!r} to {out[b]}" for b in np.flatnonzero(out > order).tolist()]
         log.info(
-            "t = %g s: orders are raised, of %s%s", attempt.time, ", ".join(names[:5]),
+            "t = %g s: the order is raised of %s%s", attempt.time, ", ".join(names[:5]),
             f" and {len(names) - 5} more" if len(names) > 5 else "",
         )  # fmt: skip
         return out

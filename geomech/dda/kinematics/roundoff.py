@@ -54,7 +54,7 @@ def warn_of_roundoff(
         return
     light = block[c] if weight[block[c]] <= weight[other[c]] else other[c]
     log.warning(
-        "%r weighs %.3g N per metre; the last digits of coordinates, up to %.3g m from the origin, make %.2g of that in "
-        "its contact springs, and its friction is no more accurate: put the origin near, or lower dda.normal_penalty",
+        "%r weighs %.3g N/m; round-off of coordinates up to %.3g m from the origin changes its contact forces by %.2g of "
+        "that, and its friction is no more accurate: put the origin near, or lower dda.normal_penalty",
         names[light], least[c], rounding / _ROUNDING, share[c],
     )  # fmt: skip

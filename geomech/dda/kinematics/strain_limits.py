@@ -35,8 +35,9 @@ class ElasticRange:
         most, name = float(strain[b]), blocks.names[b] if blocks.names else f"block {b}"
         if most > REFUSED:
             raise NotConverged(
-                f"{name} is strained by {100 * most:.3g} % at t = {time:g} s: no linear elastic body. Its loads are "
-                "beyond its stiffness, or it hangs by a thread of rock: shorten the time step, or cut it where it hangs"
+                f"{name} is strained by {100 * most:.3g} % at t = {time:g} s: beyond linear elasticity. Its loads "
+                "are too large for its stiffness, or it hangs by a thin bridge of rock: shorten the time step, or cut "
+                "the bridge"
             )
         if most >= 2.0 * self.reported:
             self.reported = most

@@ -88,7 +88,7 @@ class LoadChecks:
         """Raise ValueError for a base motion of blocks that are not fixed: it would have no effect on them."""
         if not self._blocks.fixed.any():
             raise ValueError(
-                "the ground shakes, but no block is fixed that would move with it: fix the blocks on which others rest"
+                "ground motion is given, but no block is fixed that would follow it: fix the blocks on which others rest"
             )
         for block in base.blocks or ():
             if not self._blocks.fixed[block]:

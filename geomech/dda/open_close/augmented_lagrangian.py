@@ -98,5 +98,5 @@ def settle_augmented(
         multiplier = mixing.next(multiplier, image, np.concatenate([pressed, sticks]))
     worst = int(np.abs(np.where(pressed, settled.gap, 0.0)).argmax())
     raise Unsettled(
-        f"{_MOST_UPDATES} updates of the contact forces left gaps of {off:.3g} m, {tolerance:.3g} m are allowed", worst
+        f"{_MOST_UPDATES} updates of the contact forces left gaps of {off:.3g} m ({tolerance:.3g} m allowed)", worst
     )

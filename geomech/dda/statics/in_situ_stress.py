@@ -94,7 +94,7 @@ def in_situ_state(
     if bent is not None:
         off = max(off, float(np.abs(bent.beyond_mean(state) - bent.given).max(initial=0.0)))
     off = off / size if size else 0.0
-    log.info("in-situ stress: blocks as drawn settle by %.3g m, stress is off by %.2g of the largest", moved, off)
+    log.info("in-situ stress: the blocks settle by %.3g m; the stress differs by %.2g of the largest", moved, off)
     rest = replace(state, time=0.0, rotation=np.zeros(blocks.n_blocks), imposed=np.empty(0))
     settled = blocks.with_vertices(state.vertices)
     if bent is not None:

@@ -159,10 +159,10 @@ def factor_of_safety(
             "leave `order` and `mesh_size_m` out"
         )
     if blocks.fixed.all():
-        raise NothingToReduce("all blocks are fixed: none could fail")
+        raise NothingToReduce("all blocks are fixed: none can fail")
     if loads.base is not None and loads.base.frame == "ground":
         raise NothingToReduce(
-            "a static search cannot include a moving ground: leave out the motion of the base, or give it the frame "
+            "a static search cannot include ground motion: leave out the motion of the base, or give it the frame "
             '"base", in which it is a body force at the time of the search'
         )
     under = TrialLoads(loads, load_time, how.unbalanced, how.max_steps, how.time_step)
@@ -374,8 +374,8 @@ class _Search:
                 raise _NoOther
             if trial.factor <= 1.0 / _FARTHEST:
                 raise NotConverged(
-                    f"the blocks do not stand even with joints {_FARTHEST:g} times as strong: "
-                    f"{self._moving(trial)}{trial.reason}; the moving blocks do not depend on joint strength, or no "
+                    f"the blocks are unstable even with joints {_FARTHEST:g} times as strong: "
+                    f"{self._moving(trial)}{trial.reason}; the motion does not depend on joint strength, or no "
                     "contact states were found"
                 )
             trial = bracket.begin((_NEARBY if known else 0.5) * trial.factor)

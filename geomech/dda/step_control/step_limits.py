@@ -263,7 +263,7 @@ class StepLimits:
             self._warned_of.add(pair)
             x, y = vertices[vertex[k]]
             log.warning(
-                "t = %g s: a corner of %s is pressed %.3g m into %s near x = %.6g, y = %.6g m, beyond the middle of that "
+                "t = %g s: a corner of %s penetrates %.3g m into %s near x = %.6g, y = %.6g m, beyond the middle of that "
                 "block: contacts are too soft for this speed (dda.normal_penalty_pa)",
                 result.state.time, self._named(pair[0]), -rows["gap"][k], self._named(pair[1]), x, y,
             )  # fmt: skip
@@ -276,7 +276,7 @@ class StepLimits:
         self._work.shortened[key] += 1
         count = self._work.shortened[key]
         if count > 1 and math.log10(count).is_integer():
-            involved = " and ".join(map(repr, names)) or "no one block"
+            involved = " and ".join(map(repr, names)) or "no single block"
             log.info("%s: %s shortened a step for the %s time; %s", why, involved, _ordinal(count), WAY_OUT[why])
 
     def _named(self, block: int) -> str:

@@ -93,9 +93,9 @@ def approximate(
         points = 0.5 * (a + b)[:, None] + 0.5 * t[:, None] * (b - a)[:, None]
         values = np.asarray(function(points.reshape(-1, 2)), dtype=float)
         if values.shape != (len(a) * len(t), 2):
-            raise ValueError(f"{name}: the function gave shape {values.shape} for points ({len(a) * len(t)}, 2)")
+            raise ValueError(f"{name}: the function returned shape {values.shape} for points ({len(a) * len(t)}, 2)")
         if not np.isfinite(values).all():
-            raise ValueError(f"{name}: the function is not finite on it")
+            raise ValueError(f"{name}: the function is not finite there")
         return values.reshape(len(a), len(t), 2)
 
     done: list[LineForces] = []

@@ -161,7 +161,7 @@ class BodyLoad:
         elif not isinstance(given, Pressure) and given == 0:
             return []
         elif not n_holes:
-            raise ValueError("a pressure in holes, but the body has none")
+            raise ValueError("a pressure in holes is given, but the body has none")
         else:
             each = [given] * n_holes
         if len(each) != n_holes:
@@ -260,7 +260,7 @@ def _plus(a, b):
 
 def _number(p) -> float:
     if np.ndim(p):
-        raise ValueError("a pressure that is linear in position cannot be added to a list with one for each crack")
+        raise ValueError("a linear pressure cannot be added to a list with one pressure per crack")
     return float(p)
 
 

@@ -83,7 +83,7 @@ def on_bases(
         still = faces.moved(warm) - gives @ pressure
         found = faces.settled(gives, still, right)
         if found is None:
-            _log.debug("no contact area of a face on its rigid base was found: its pressure is left as it was")
+            _log.debug("the contact area of a face on its rigid base was not found: its pressure is unchanged")
             return warm
         change = np.abs(found - pressure).max()
         if change <= SETTLED * np.abs(found).max():

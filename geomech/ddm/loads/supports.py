@@ -274,7 +274,7 @@ def values_at(
     if callable(value):
         out = np.asarray(value(points), dtype=float)
         if out.shape != points.shape:
-            raise ValueError(f"{name}: the function gave shape {out.shape} for points {points.shape}")
+            raise ValueError(f"{name}: the function returned shape {out.shape} for points {points.shape}")
     else:
         ends = np.asarray(value, dtype=float)
         if ends.shape not in ((2,), (2, 2)):

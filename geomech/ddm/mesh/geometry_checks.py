@@ -142,8 +142,8 @@ def _check_sizes(cracks: Cracks, segments: np.ndarray, span: float, name) -> Non
         s = int(np.argmax(digits))
         x, y = segments[s, 0]
         raise ValueError(
-            f"{name(s)}: its segment of {cracks.lengths[s]:.3g} m at ({x:g}, {y:g}) is too short for coordinates that "
-            f"large, which have steps of {digits[s] * cracks.lengths[s]:.1g} m: count them from an origin near the rock"
+            f"{name(s)}: its segment of {cracks.lengths[s]:.3g} m at ({x:g}, {y:g}) is too short for coordinates this "
+            f"large, which resolve {digits[s] * cracks.lengths[s]:.1g} m: measure them from an origin near the rock"
         )
 
 

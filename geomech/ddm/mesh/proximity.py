@@ -214,7 +214,7 @@ def keep_apart(start, end, kind, source, pieces: Pieces, ratio: float, extent: f
             raise ValueError(f"{_thin(start, end, length, crowded)}: the mesh would need more than {most} elements")
         start, end, kind, source = _halved(start, end, kind, source, cut)
     if len(crowded) and crowded.max() > REFUSED_ABOVE:
-        raise ValueError(f"{_thin(start, end, length, crowded)}: less than coordinates can resolve")
+        raise ValueError(f"{_thin(start, end, length, crowded)}, which coordinates cannot resolve")
     return start, end, kind, source
 
 

@@ -94,7 +94,7 @@ class Blocks:
         (1, 2.0)
         """
         n_blocks = len(polygons)
-        given = {"material": material, "fixed": fixed, "held": constrained, "edge_names": edge_names, "names": names,
+        given = {"material": material, "fixed": fixed, "constrained": constrained, "edge_names": edge_names, "names": names,
                  "order": order}  # fmt: skip
         _refuse_lengths(n_blocks, given)
         names = tuple(names) if names is not None else tuple(f"block {b}" for b in range(n_blocks))
@@ -316,10 +316,11 @@ def _refuse_lengths(n_blocks: int, given: dict[str, Sequence | None]) -> None:
     for what, entries in given.items():
         if entries is not None and len(entries) != n_blocks:
             raise ValueError(f"{what} needs an entry for each of {n_blocks} blocks, got {len(entries)}")
-    constrained = given["held"]
+    constrained = given["constrained"]
     if constrained is not None and np.shape(constrained) != (n_blocks, 6) and n_blocks:
         raise ValueError(
-            f"held needs six entries a block (u0, v0, r0, εx, εy, γxy), got an array of shape {np.shape(constrained)}"
+            f"constrained needs six entries per block (u0, v0, r0, εx, εy, γxy), got an array of shape "
+            f"{np.shape(constrained)}"
         )
     material = given["material"]
     if material is not None and n_blocks:
@@ -385,7 +386,7 @@ def _refuse_stray(outline: np.ndarray, hole: np.ndarray, name: str) -> None:
         if abs(winding_number([outline], point)) < 0.5:
             raise ValueError(
                 f"{name}: an edge of a hole lies along the outline at ({point[0]:.6g}, {point[1]:.6g}): draw the "
-                "outline round what is taken out"
+                "outline around the opening"
             )
 
 
@@ -399,6 +400,6 @@ def _refuse_shared(holes: list[np.ndarray], name: str) -> None:
             shared = point_in_both(hole, holes[m]) if shared is None else shared
             if shared is not None:
                 raise ValueError(
-                    f"{name}: holes {m + 1} and {k + 1} overlap at ({shared[0]:g}, {shared[1]:g}): draw what they take out "
-                    "together as one hole"
+                    f"{name}: holes {m + 1} and {k + 1} overlap at ({shared[0]:g}, {shared[1]:g}): draw them as one "
+                    "hole"
                 )

@@ -98,7 +98,7 @@ class Cracks:
         if join and n:
             points, pairs, ends = _joined(np.concatenate(nodes), np.concatenate(segments), np.concatenate(mouth))
             for s in np.flatnonzero(pairs[:, 0] == pairs[:, 1])[:1]:
-                raise ValueError(f"{names[of_crack[s]]}: a crack segment has no length beside the network's extent")
+                raise ValueError(f"{names[of_crack[s]]}: a crack segment is too short relative to the network's extent")
             nodes, segments, mouth = [points], [pairs], [ends]
         return cls(
             nodes=np.concatenate(nodes) if n else np.empty((0, 2)),

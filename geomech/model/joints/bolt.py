@@ -67,13 +67,15 @@ class Bolt:
         refuse_point(f"{who}: its end", self.end)
         if self.pretension > self.yield_force:
             raise ValueError(
-                f"bolt {self.name!r}: its pretension, {self.pretension:g} N/m, is beyond its yield force, "
+                f"bolt {self.name!r}: its pretension, {self.pretension:g} N/m, exceeds its yield force, "
                 f"{self.yield_force:g} N/m"
             )
         if not math.dist(self.start, self.end) > 0:
-            raise ValueError(f"bolt {self.name!r}: its ends are one point, ({self.start[0]:g}, {self.start[1]:g})")
+            raise ValueError(
+                f"bolt {self.name!r}: both ends are at the same point, ({self.start[0]:g}, {self.start[1]:g})"
+            )
         if self.block == self.other:
-            raise ValueError(f"bolt {self.name!r}: both ends are in one block, which it cannot hold")
+            raise ValueError(f"bolt {self.name!r}: both ends are in the same block, where it has no effect")
 
 
 #: Admissible numbers of `Bolt`.

@@ -41,14 +41,15 @@ class Roughness:
         if not (self.jcs > 0 and math.isfinite(self.jcs)):
             raise ValueError(f"compressive strength of a joint's wall must be positive, got {self.jcs!r} Pa")
         if not 0 < self.reduction < math.inf:
-            raise ValueError(f"the strength of a rough joint is divided by a positive number, got {self.reduction!r}")
+            raise ValueError(
+                f"the reduction factor of a rough joint must be positive and finite, got {self.reduction!r}"
+            )
         for what, value in (("length", self.length), ("sample_length", self.sample_length)):
             if value is not None and not (value > 0 and math.isfinite(value)):
                 raise ValueError(f"{what} of a rough joint must be positive, got {value!r} m")
         if self.length is not None and self.length < self.sample_length:
             raise ValueError(
-                f"length of a rough joint must not be below its sample's {self.sample_length:g} m, got {self.length!r} "
-                "m"
+                f"length of a rough joint must be at least its sample's, {self.sample_length:g} m, got {self.length!r} m"
             )
 
     @property

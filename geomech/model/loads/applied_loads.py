@@ -108,7 +108,7 @@ class WaterTable:
         if (np.diff(points[:, 0]) <= 0).any():
             at = int(np.argmax(np.diff(points[:, 0]) <= 0))
             raise ValueError(
-                f"the points of a water table must ascend in x: {points[at + 1, 0]:g} m follows {points[at, 0]:g} m"
+                f"the x of the points of a water table must increase: {points[at + 1, 0]:g} m follows {points[at, 0]:g} m"
             )
         if not (np.isfinite(self.unit_weight) and self.unit_weight > 0):
             raise ValueError(f"the unit weight of water must be positive, got {self.unit_weight!r} N/m³")

@@ -115,7 +115,7 @@ class History:
                 raise ValueError(f"the {what} of a history needs {values.shape[1]} finite numbers, got {more!r}")
         if (np.diff(times) <= 0).any():
             at = int(np.argmax(np.diff(times) <= 0))
-            raise ValueError(f"the times of a history must ascend: {times[at + 1]:g} s follows {times[at]:g} s")
+            raise ValueError(f"the times of a history must increase: {times[at + 1]:g} s follows {times[at]:g} s")
 
     @classmethod
     def constant(cls, value: ArrayLike) -> History:
@@ -158,9 +158,7 @@ class History:
         """
         times, values = read_record(path)
         if columns is not None and values.shape[1] != columns:
-            raise ValueError(
-                f"{path}: {values.shape[1]} column(s) of values beside the time, but {columns} are wanted here"
-            )
+            raise ValueError(f"{path}: {values.shape[1]} column(s) of values after the time, expected {columns}")
         return cls(times, values * np.asarray(scale, dtype=float))
 
     def at(self, time: float) -> np.ndarray:
@@ -231,7 +229,7 @@ def refuse_no_history(what: str, history: object) -> None:
     """Raise TypeError that begins with ``what`` unless ``history`` is a `History`."""
     if not isinstance(history, History):
         raise TypeError(
-            f"{what} must be a History, for what never changes History.constant(…), got a {type(history).__name__}"
+            f"{what} must be a History (History.constant(…) for a constant), got a {type(history).__name__}"
         )
 
 
@@ -245,9 +243,11 @@ def baseline_corrected(acceleration: History, degree: int = 1) -> History:
     """
     times = np.asarray(acceleration.times, dtype=float)
     if acceleration.rate is not None or acceleration.wave is not None:
-        raise ValueError("a baseline can be taken off a record, not off a ramp or a sinusoid")
+        raise ValueError("a baseline can be subtracted from a record, not from a ramp or a sinusoid")
     if len(times) < degree + 2:
-        raise ValueError(f"a baseline of degree {degree} needs {degree + 2} times or more, the record has {len(times)}")
+        raise ValueError(
+            f"a baseline of degree {degree} needs at least {degree + 2} times, the record has {len(times)}"
+        )
     start, span = times[0], times[-1] - times[0]
     s = (times - start) / span
     velocity, _ = acceleration._sums
@@ -290,13 +290,11 @@ def read_record(path: str | Path) -> tuple[np.ndarray, np.ndarray]:
                 raise ValueError(f"{path}:{number}: {cell!r} is not a finite number")
             row.append(float(cell))
         if rows and row[0] <= rows[-1][0]:
-            raise ValueError(
-                f"{path}:{number}: time {row[0]:g} does not come after {rows[-1][0]:g} in line {lines[-1]}"
-            )
+            raise ValueError(f"{path}:{number}: time {row[0]:g} is not later than {rows[-1][0]:g} in line {lines[-1]}")
         rows.append(row)
         lines.append(number)
     if not rows:
-        raise ValueError(f"{path}: there is no line of numbers: a time and its values")
+        raise ValueError(f"{path}: no line has numbers: a time and its values")
     table = np.array(rows) * (1.0 if factors is None else np.array(factors))
     return table[:, 0], table[:, 1:]
 

@@ -58,7 +58,9 @@ class BlockMotion(_Prescribed):
         _known_kind(self.kind, "the motion of a block")
         refuse_no_history(f"the motion of block {self.block}", self.history)
         if not self.unknowns or len(set(self.unknowns)) < len(self.unknowns) or set(self.unknowns) - set(UNKNOWNS):
-            raise ValueError(f"the imposed unknowns are some of {', '.join(UNKNOWNS)}, once each, not {self.unknowns}")
+            raise ValueError(
+                f"the imposed unknowns must be different ones of {', '.join(UNKNOWNS)}, got {self.unknowns}"
+            )
         if np.shape(self.history.values)[1] != len(self.unknowns):
             raise ValueError(
                 f"{len(self.unknowns)} unknowns of block {self.block} are imposed, but its history has "
@@ -93,7 +95,7 @@ class PointMotion(_Prescribed):
         if self.direction is not None and not 0 < math.hypot(*self.direction) < math.inf:
             raise ValueError(f"the motion of a point of block {self.block} has no direction: {self.direction}")
         if self.stiffness is not None and not (math.isfinite(self.stiffness) and self.stiffness > 0):
-            raise ValueError(f"the stiffness that moves a point must be positive, got {self.stiffness!r} N/m")
+            raise ValueError(f"the stiffness of a prescribed point motion must be positive, got {self.stiffness!r} N/m")
 
     @property
     def axes(self) -> np.ndarray:
@@ -119,12 +121,12 @@ class BaseMotion:
 
     def __post_init__(self) -> None:
         if self.frame not in ("ground", "base"):
-            raise ValueError(f'base motion is seen from the "ground" or from the "base", not {self.frame!r}')
+            raise ValueError(f'the frame of a base motion must be "ground" or "base", got {self.frame!r}')
         refuse_no_history("the acceleration of the base", self.acceleration)
         if np.shape(self.acceleration.values)[1] != 2:
             raise ValueError("the acceleration of the base needs two columns, x and y")
         if self.frame == "base" and self.blocks is not None:
-            raise ValueError('seen from the "base" all fixed blocks move together: name no blocks')
+            raise ValueError('in the frame "base" all fixed blocks move together: name no blocks')
 
     def total(self, time: float) -> np.ndarray:
         """(2,) displacement of the base at ``time`` s, m."""

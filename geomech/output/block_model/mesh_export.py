@@ -23,7 +23,7 @@ def check_format(path: Path) -> None:
 
     known = sorted(meshio.extension_to_filetypes)
     if path.suffix.lower() not in known:
-        raise ValueError(f"{path.suffix or path.name!r} is no format that meshes are written in: {', '.join(known)}")
+        raise ValueError(f"{path.suffix or path.name!r} is not a mesh format that can be written: {', '.join(known)}")
 
 
 def export_blocks(problem: Problem, zones: list[str], path: Path, size: float | None = None) -> str:

@@ -61,7 +61,7 @@ class Series:
         if format not in FORMATS:
             raise ValueError(f"format must be one of {tuple(FORMATS)}, got {format!r}")
         if every < 1 or interior_every < 0:
-            raise ValueError("every counts from 1, interior_every from 0")
+            raise ValueError("every must be at least 1, and interior_every at least 0")
         self.every, self.interior_every, self.configuration = every, interior_every, configuration
         self.format, self.seconds = format, 0.0
         #: The last grid of each series, for pictures at the end.

@@ -28,7 +28,7 @@ _FAULTS = (
     ("shear_stiffness is given", "shear_stiffness_pa_per_m", "leave it out, or stiffness_from_peak_slip"),
     ("below 70°", "friction_angle_deg", "with jrc it is the residual angle, without roughness"),
     (
-        "length of a rough joint must not be below",
+        "length of a rough joint must be at least",
         "joint_length_m",
         "leave it out: the values of the sample are used then",
     ),

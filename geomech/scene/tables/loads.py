@@ -15,7 +15,7 @@ def _refuse_uneven(times: tuple | None, values: tuple | None, name: str) -> None
     if values is None or times is None or len(values) != len(times) or not values:
         raise ValueError(f"`times_s` and `{name}` need the same number of entries, at least one")
     if any(b <= a for a, b in itertools.pairwise(times)):
-        raise ValueError("`times_s` must ascend")
+        raise ValueError("`times_s` must increase")
 
 
 class Timed(Table):
@@ -224,14 +224,14 @@ class WaterTableTable(Table):
             raise ValueError("give either `points`, or the name of a drawn `line`")
         xs = [x for x, _ in self.points] if self.points is not None else [0.0]
         if not xs or any(b <= a for a, b in itertools.pairwise(xs)):
-            raise ValueError("`points` must be at least one, ascending in x")
+            raise ValueError("`points` needs at least one point, with increasing x")
         if (self.level_times_s is None) != (self.levels_m is None):
             raise ValueError("give `level_times_s` and `levels_m` together")
         if self.level_times_s is not None:
             if len(self.level_times_s) != len(self.levels_m) or not self.levels_m:
                 raise ValueError("`level_times_s` and `levels_m` need the same number of entries, at least one")
             if any(b <= a for a, b in zip(self.level_times_s[:-1], self.level_times_s[1:])):
-                raise ValueError("`level_times_s` must ascend")
+                raise ValueError("`level_times_s` must increase")
         return self
 
 
@@ -284,7 +284,7 @@ class BoltTable(Table):
         if self.start is not None and self.start == self.end:
             raise ValueError("both ends of the bolt are the same point")
         if self.yield_force_n_per_m is not None and self.pretension_n_per_m > self.yield_force_n_per_m:
-            raise ValueError("the pretension is beyond the yield force")
+            raise ValueError("the pretension exceeds the yield force")
         return self
 
 

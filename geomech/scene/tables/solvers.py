@@ -109,9 +109,13 @@ class DdaTable(Table):
     def _stable(cls, value):
         beta, gamma = value
         if not 2 * beta >= gamma >= 0.5:
-            raise ValueError(f"Newmark's β = {beta:g}, γ = {gamma:g} is not stable at every time step: 2β ≥ γ ≥ 0.5")
+            raise ValueError(
+                f"Newmark's β = {beta:g}, γ = {gamma:g} is not unconditionally stable: choose 2β ≥ γ ≥ 0.5"
+            )
         if beta > max(gamma - 0.25, 0.5 * gamma) * (1 + 1e-12):
-            raise ValueError(f"Newmark's β = {beta:g}, γ = {gamma:g} lets blocks that bounce gain energy: β ≤ γ − 0.25")
+            raise ValueError(
+                f"Newmark's β = {beta:g}, γ = {gamma:g} lets blocks that bounce gain energy: choose β ≤ γ − 0.25"
+            )
         return value
 
     @model_validator(mode="after")

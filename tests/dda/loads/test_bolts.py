@@ -225,9 +225,9 @@ def test_faulty_bolts_are_refused_by_name():
     good = {"block": 1, "start": (2.0, 0.0), "other": 0, "end": (0.0, 1.0), "stiffness": 1e8, "name": "A"}
     for wrong, match in (
         ({"stiffness": 0.0}, "bolt 'A': stiffness must be positive"),
-        ({"pretension": 2e5, "yield_force": 1e5}, "bolt 'A': its pretension, 200000 N/m, is beyond its yield force"),
-        ({"end": (2.0, 0.0)}, "bolt 'A': its ends are one point"),
-        ({"other": 1}, "bolt 'A': both ends are in one block"),
+        ({"pretension": 2e5, "yield_force": 1e5}, "bolt 'A': its pretension, 200000 N/m, exceeds its yield force"),
+        ({"end": (2.0, 0.0)}, "bolt 'A': both ends are at the same point"),
+        ({"other": 1}, "bolt 'A': both ends are in the same block"),
         ({"installation": -1.0}, "bolt 'A': installation must not be negative"),
     ):
         with pytest.raises(ValueError, match=match):

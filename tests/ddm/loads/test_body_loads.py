@@ -179,11 +179,11 @@ def test_sums_and_histories():
     [
         ({"sides": {7: [0, 1]}}, "side 7: there is no such edge"),
         ({"sides": {((0, 0), (1, 0)): [0, 1]}}, "side load 0 lies .* off the boundary"),
-        ({"sides": {0: lambda x: x[:, 0]}}, "side 0: the function gave shape"),
+        ({"sides": {0: lambda x: x[:, 0]}}, "side 0: the function returned shape"),
         ({"sides": {0: lambda x: np.nan * x}}, "side 0: the function is not finite"),
         ({"points": [[3, 0]], "forces": [[1, 0]]}, "point load 0 at .3, 0. is not on the body"),
         ({"hole_pressure": [1.0]}, "0 holes but 1 pressures"),
-        ({"hole_pressure": 1.0}, "a pressure in holes, but the body has none"),
+        ({"hole_pressure": 1.0}, "a pressure in holes is given, but the body has none"),
         ({"crack_pressure": lambda x: np.nan * x[:, 0]}, "crack_pressure"),
         ({"crack_pressure": [1.0, 2.0]}, "1 crack segments but shape"),
     ],

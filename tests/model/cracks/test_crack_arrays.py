@@ -88,5 +88,5 @@ def test_points_that_coincide_are_joined_where_that_is_asked_for():
         [[[1, 0], [0, 0]], [[0, 0], [1, 1]]], surface=[(False, True), (False, False)], join=True
     )
     assert mouth.surface.tolist() == [False, True, False] and mouth.tips.tolist() == [0, 2]
-    with pytest.raises(ValueError, match=r"short: .*no length beside the network's extent"):
+    with pytest.raises(ValueError, match=r"short: .*too short relative to the network's extent"):
         Cracks.from_polylines([[[0, 0], [1e-12, 0]], [[1, 0], [2, 0]]], names=["short", "long"], join=True)

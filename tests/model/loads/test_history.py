@@ -70,8 +70,8 @@ def test_a_record_is_read_in_its_units(tmp_path):
         ("0\n", r"quake.csv:1: 1 column\(s\), expected 2"),
         ("0, 1\n\n1, x\n", r"quake.csv:3: 'x' is not a finite number"),
         ("0, 1\n1, nan\n", r"quake.csv:2: 'nan' is not a finite number"),
-        ("0, 1\n0.5, 1\n0.5, 2\n", r"quake.csv:3: time 0.5 does not come after 0.5 in line 2"),
-        ("# nothing\n", r"quake.csv: there is no line of numbers"),
+        ("0, 1\n0.5, 1\n0.5, 2\n", r"quake.csv:3: time 0.5 is not later than 0.5 in line 2"),
+        ("# nothing\n", r"quake.csv: no line has numbers"),
         ("time, a, b\n0, 1\n", r"quake.csv:2: 2 column\(s\), expected 3"),
     ],
 )
@@ -85,9 +85,9 @@ def test_a_faulty_record_is_refused_by_its_line(tmp_path, text, message):
 def test_the_wrong_number_of_components_is_refused(tmp_path):
     path = tmp_path / "quake.csv"
     path.write_text("0, 1\n1, 2\n")
-    with pytest.raises(ValueError, match=r"1 column.*2 are wanted"):
+    with pytest.raises(ValueError, match=r"1 column.*expected 2"):
         History.from_file(path, 2)
-    with pytest.raises(ValueError, match="ascend: 0 s follows 1 s"):
+    with pytest.raises(ValueError, match="increase: 0 s follows 1 s"):
         History.table([1.0, 0.0], [0.0, 0.0])
     with pytest.raises(ValueError, match="positive frequency"):
         History.sinusoid([1.0], 0.0)
