@@ -51,7 +51,7 @@ MENDED = {
     0: "less than 3°", 1: "has no length", 10: "did not settle", 14: "less than 3°", 66: "dt = inf", 74: "balance",
     105: "energy", 124: "time goes back", 145: "not inside the outline", 149: "energy", 189: "energy", 219: "overlap",
     231: "balance", 268: "balance", 291: "energy",
-    426: "time goes back", 64: "no common strain", 46: "created energy", 56: "did not settle", 203: "did not settle", 213: "overlap",
+    426: "time goes back", 64: "to a common strain", 46: "created energy", 56: "did not settle", 203: "did not settle", 213: "overlap",
 }  # fmt: skip
 
 
