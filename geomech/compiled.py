@@ -8,10 +8,10 @@ earlier. In the run that compiles, that is the function compiled by itself; in l
 which was optimised together with the kernel and fuses other products and sums: the last digits differ. Here the copies
 belong to the kernel alone, and functions that only kernels call (`part`) are not compiled to machine code elsewhere.
 
-Most of the compilation time is passed in Numba, not in LLVM. While kernels are compiled, the results of type inference
+Most of the compilation time is spent in Numba, not in LLVM. While kernels are compiled, the results of type inference
 for given argument types are cached, settings are compared by the values set, the variables of statements are listed
 without copies, and a `part` is compiled once for all integer arguments, not once for each constant. The compiler's
-frames have room in one piece of memory (`_ROOM`).
+call frames share one piece of memory (`_ROOM`).
 """
 
 from __future__ import annotations
@@ -237,7 +237,7 @@ def _same_settings(self: TargetConfig, other: object) -> bool:
     return True
 
 
-#: What statements mostly hold beside variables.
+#: Types of most values in a statement that contain no variables.
 _NO_VARIABLES = frozenset((Loc, str, int, float, bool, type(None)))
 
 
@@ -249,23 +249,15 @@ def _variables_of(self: Inst, value: object) -> list:
 
 
 def _find_variables(value: object, found: list) -> None:
-    kind = type(value)
-    if kind is Var:
-        found.append(value)
-    elif kind is dict or kind is list or kind is tuple:
-        for each in value.values() if kind is dict else value:  # type: ignore[attr-defined, union-attr]
-            kind = type(each)
-            if kind is Var:
-                found.append(each)
-            elif kind not in _NO_VARIABLES:
-                _find_variables(each, found)
-    elif isinstance(value, Var):
+    """Append the variables in ``value`` to ``found``."""
+    if isinstance(value, Var):
         found.append(value)
     elif isinstance(value, Inst):
         found.extend(value.list_vars())
     elif isinstance(value, (list, tuple, dict)):
         for each in value.values() if isinstance(value, dict) else value:
-            _find_variables(each, found)
+            if type(each) not in _NO_VARIABLES:
+                _find_variables(each, found)
 
 
 @functools.cache
