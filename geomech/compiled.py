@@ -429,10 +429,10 @@ class WithCalled(UserProvidedCacheLocator):
         """Create the folder with a note of its kernels' source; remove kernels whose sources no longer exist."""
         try:
             super().ensure_cache_path()
-            noted = Path(self.get_cache_path()) / SOURCE
-            if not noted.exists():
-                noted.write_text(str(Path(self._file).absolute()), encoding="utf-8")
-            _prune_once(noted.parent.parent)
+            source_note = Path(self.get_cache_path()) / SOURCE
+            if not source_note.exists():
+                source_note.write_text(str(Path(self._file).absolute()), encoding="utf-8")
+            _prune_once(source_note.parent.parent)
         except OSError as error:
             log.debug("%s: %s", self.get_cache_path(), error)  # a warning follows when a kernel cannot be stored
 

@@ -123,8 +123,8 @@ def _line_of(place: Path) -> str:
     scene = place / "scene.toml" if place.is_dir() else place
     if scene.is_file():
         return str(tomllib.loads(scene.read_text(encoding="utf-8")).get("title", place.stem))
-    said = ast.get_docstring(ast.parse((place / "run.py").read_text(encoding="utf-8"))) or place.name
-    return said.split("\n\n")[0].replace("\n", " ").split(": ")[0].rstrip(".")
+    docstring = ast.get_docstring(ast.parse((place / "run.py").read_text(encoding="utf-8"))) or place.name
+    return docstring.split("\n\n")[0].replace("\n", " ").split(": ")[0].rstrip(".")
 
 
 def _picture(folder: Path, name: str) -> Path | None:

@@ -70,10 +70,10 @@ def prune(folder: Path) -> int:
     import shutil
 
     removed = 0
-    for noted in folder.glob(f"*/{SOURCE}"):
+    for source_note in folder.glob(f"*/{SOURCE}"):
         try:
-            if not Path(noted.read_text(encoding="utf-8")).exists():
-                shutil.rmtree(noted.parent)
+            if not Path(source_note.read_text(encoding="utf-8")).exists():
+                shutil.rmtree(source_note.parent)
                 removed += 1
         except (OSError, ValueError):
             continue

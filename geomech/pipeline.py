@@ -249,7 +249,7 @@ def factor_of_safety(
     without_cracks: bool = False,
     along: Sequence[str] | None = None,
     divide: Mapping[str, float] | dda.PartialFactors | None = None,
-    **wishes: Any,
+    **search_options: Any,
 ) -> dda.FactorOfSafety:
     """`geomech.dda.FactorOfSafety` of the blocks of ``scene``, by strength reduction under the loads of ``load_time`` s
     (default: the scene's end). ``wishes``: fields of `geomech.dda.FactorSearch`: tolerance, watch …
@@ -268,7 +268,7 @@ def factor_of_safety(
     '1.2128'
     """
     return safety_report(
-        scene, load_time, without_cracks=without_cracks, along=along, divide=divide, **wishes
+        scene, load_time, without_cracks=without_cracks, along=along, divide=divide, **search_options
     ).found  # fmt: skip
 
 
@@ -280,7 +280,7 @@ def safety_report(
     without_cracks: bool = False,
     along: Sequence[str] | None = None,
     divide: Mapping[str, float] | dda.PartialFactors | None = None,
-    **wishes: Any,
+    **search_options: Any,
 ) -> SafetyReport:
     """`geomech.report.safety_page.SafetyReport` of the same: its ``text()``, ``as_dict()`` and ``draw(path)``; the factor
     itself is ``found``.
@@ -305,7 +305,7 @@ def safety_report(
         )
     factors = dda.PartialFactors.of(divide)
     problem, reduced = dda.design_problem(problem, factors, along)
-    search = dda.FactorSearch(**({"reduce": reduced} | wishes))
+    search = dda.FactorSearch(**({"reduce": reduced} | search_options))
     found = dda.factor_of_safety(
         problem.blocks, problem.materials, problem.joints, problem.loads, problem.dda, joint_index=problem.joint_index,
         load_time=problem.run.end_time if load_time is None else load_time, search=search,
@@ -313,7 +313,7 @@ def safety_report(
     weakened, joints = (None if names is None else list(names) for names in (search.reduce, along))
     return SafetyReport(
         problem, found, weakened, factors, joints, tuple(cracks),
-        **({"tolerance": search.tolerance} if "tolerance" in wishes else {}),
+        **({"tolerance": search.tolerance} if "tolerance" in search_options else {}),
     )  # fmt: skip
 
 

@@ -181,8 +181,8 @@ def _in_words(rows: dict[str, Any]) -> str:
     worst = sorted(
         (key for key in rows if rows[key]["scatter"] > LARGEST_SCATTER), key=lambda key: -rows[key]["scatter"]
     )
-    told = []
+    parts = []
     for key in worst:
         words, unit = QUANTITIES[key]
-        told.append(f"{words} {rows[key]['repeated']:.4g} instead of {rows[key]['run']:.4g}{unit}")
-    return ", ".join(told)
+        parts.append(f"{words} {rows[key]['repeated']:.4g} instead of {rows[key]['run']:.4g}{unit}")
+    return ", ".join(parts)

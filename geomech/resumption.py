@@ -54,15 +54,15 @@ def resume(
     0.3
     """
     changes = overrides if isinstance(overrides, Mapping) else tuple(overrides)
-    wish = _Wish(Path(folder), changes, observers, quiet, tell)
-    _refuse_other_folders(wish.folder)
-    with RunLock(wish.folder) as lock:
+    request = _Request(Path(folder), changes, observers, quiet, tell)
+    _refuse_other_folders(request.folder)
+    with RunLock(request.folder) as lock:
         if lock.stale:
             tell(lock.stale)
-        return _resumed(wish)
+        return _resumed(request)
 
 
-class _Wish(NamedTuple):
+class _Request(NamedTuple):
     """Arguments of `resume`."""
 
     folder: Path
@@ -86,14 +86,14 @@ class _Wish(NamedTuple):
         return standard_observers(scene, quiet=self.quiet)
 
 
-def _resumed(wish: _Wish) -> dict[str, Any]:
-    folder = wish.folder
+def _resumed(request: _Request) -> dict[str, Any]:
+    folder = request.folder
     found = next(checkpoint_file.whole(folder / checkpoint_file.FOLDER), None)
     if found is None:
-        return _begin_again(wish)
+        return _begin_again(request)
     header, path = found
     _refuse_other_sources(header, path)
-    scene = None if header["scene"] is None else wish.scene()
+    scene = None if header["scene"] is None else request.scene()
     changes = {} if scene is None else _changes(header, scene.resolved())
     reason = _end_reason(folder)
     if reason is not None:
@@ -106,7 +106,7 @@ def _resumed(wish: _Wish) -> dict[str, Any]:
     warnings = [f"{name} was {was!r}, is now {now!r}" for name, (was, now) in changes.items()]
     warnings += _other_surroundings(header)
     try:
-        return CoupledRun(problem, folder, wish.watching(scene), stored).go(warnings)
+        return CoupledRun(problem, folder, request.watching(scene), stored).go(warnings)
     except FilesChanged as error:
         raise NotResumable(f"{error}: run it again") from error
 
@@ -196,8 +196,8 @@ def _refuse_finished(end: str, header: Mapping[str, Any], scene: Any) -> None:
     raise Finished(f"the run has ended ({end}); to let it go on: {way_out}")
 
 
-def _begin_again(wish: _Wish) -> dict[str, Any]:
-    folder = wish.folder
+def _begin_again(request: _Request) -> dict[str, Any]:
+    folder = request.folder
     end = _end_reason(folder)
     if end is not None:
         raise Finished(
@@ -206,9 +206,9 @@ def _begin_again(wish: _Wish) -> dict[str, Any]:
         )
     if not (folder / "scene.toml").is_file():
         raise NotResumable(f"{folder} holds neither a checkpoint nor a scene.toml: run the scene again")
-    wish.tell(f"{folder} holds no checkpoint yet: the run begins again")
-    scene = wish.scene()
-    return run(scene, folder, wish.watching(scene), again=True)
+    request.tell(f"{folder} holds no checkpoint yet: the run begins again")
+    scene = request.scene()
+    return run(scene, folder, request.watching(scene), again=True)
 
 
 def _other_surroundings(header: Mapping[str, Any]) -> list[str]:

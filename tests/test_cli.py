@@ -322,7 +322,7 @@ def test_doctor_reads_what_loaders_say():
 def test_doctor_survives_a_library_that_takes_its_process_down():
     check = doctor.check_import("gmsh", "import os, signal; os.kill(os.getpid(), signal.SIGSEGV)", "mend it")
     assert not check.good
-    assert check.mend == "mend it"
+    assert check.remedy == "mend it"
 
 
 def test_doctor_names_a_library_that_is_missing():

@@ -97,7 +97,7 @@ def machine() -> dict:
     }
 
 
-def said(about: dict) -> str:
+def machine_text(about: dict) -> str:
     """One or two lines about the `machine`."""
     versions = ", ".join(f"{name} {version}" for name, version in about["versions"].items())
     return (

@@ -175,7 +175,7 @@ def _modules() -> list[str]:
     from .cost.startup import COMMANDS
 
     lines = ["modules that a run does not load"]
-    for label, unwanted, wishes in (
+    for label, unwanted, overrides in (
         ("run, blocks alone (Gmsh)", (CRACK_SOLVER, PICTURES), []),
         ("run, cracks too (TOML)", (MESHER, PICTURES), ["--set", "output.interior=false"]),
     ):
@@ -186,7 +186,7 @@ def _modules() -> list[str]:
         with TemporaryDirectory() as folder:
             code = (
                 "import sys\nfrom geomech.cli import main\n"
-                f"main({[*command, *wishes, '--quiet', '--out', folder]!r})\n"
+                f"main({[*command, *overrides, '--quiet', '--out', folder]!r})\n"
                 "print(*sorted(sys.modules))"
             )
             done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
@@ -194,5 +194,5 @@ def _modules() -> list[str]:
         there = [name for name in unwanted if name in loaded]
         if there:
             raise AssertionError(f"{label} loads {', '.join(there)}")
-        lines.append(f"  {label}{' without interior fields' if wishes else ''}: neither {' nor '.join(unwanted)}")
+        lines.append(f"  {label}{' without interior fields' if overrides else ''}: neither {' nor '.join(unwanted)}")
     return lines

@@ -40,7 +40,7 @@ class Compiling(logging.Handler):
 
     def __init__(self) -> None:
         super().__init__(logging.DEBUG)
-        self.count, self.began, self.said = 0, 0.0, 0.0
+        self.count, self.began, self.last_shown = 0, 0.0, 0.0
 
     def emit(self, record: logging.LogRecord) -> None:
         if record.levelno > logging.DEBUG:
@@ -49,10 +49,10 @@ class Compiling(logging.Handler):
         now = time.monotonic()
         self.count += 1
         if self.count == 1:
-            self.began = self.said = now
+            self.began = self.last_shown = now
             say(f"compiling kernels, once per version and machine (kept in {os.environ.get('NUMBA_CACHE_DIR', '')}) …")
-        elif now - self.said >= self.EVERY:
-            self.said = now
+        elif now - self.last_shown >= self.EVERY:
+            self.last_shown = now
             say(f"  {self.count} compiled, {now - self.began:.0f} s so far")
 
 

@@ -117,9 +117,9 @@ class StepCutting:
         """The first attempt that holds, and its result. Raises `NotConverged` after ``settings.max_step_cuts`` cuts."""
         while True:
             # One attempt is freed before the next is made: its factors may be of other contacts.
-            held = self._attempt()
-            if held is not None:
-                return held
+            accepted = self._attempt()
+            if accepted is not None:
+                return accepted
 
     def _attempt(self) -> tuple[Attempt, StepResult] | None:
         """One attempt and its result; None where the step begins again."""

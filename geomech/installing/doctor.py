@@ -1,4 +1,4 @@
-"""Is everything here that a run needs? Each check names what is missing and the one line that mends it."""
+"""Checks whether everything that a run needs is installed; each names what is missing and the command that installs it."""
 
 from __future__ import annotations
 
@@ -40,12 +40,12 @@ PACKAGES = ("numpy", "scipy", "numba", "shapely", "pydantic", "tomli-w", "tqdm",
 
 @dataclass(frozen=True)
 class Check:
-    """``found`` is what is there or what is wrong; ``mend`` the way out, empty when ``good``."""
+    """``found``: what is there, or what is wrong; ``remedy``: the command that mends it, empty when ``good``."""
 
     name: str
     good: bool
     found: str
-    mend: str = ""
+    remedy: str = ""
 
 
 def examine() -> list[Check]:
@@ -67,8 +67,8 @@ def _packages() -> Check:
         except importlib.metadata.PackageNotFoundError:
             missing.append(package)
     if missing:
-        mend = f"{sys.executable} -m pip install {' '.join(missing)}"
-        return Check("packages", False, f"missing: {', '.join(missing)}", mend)
+        remedy = f"{sys.executable} -m pip install {' '.join(missing)}"
+        return Check("packages", False, f"missing: {', '.join(missing)}", remedy)
     return Check("packages", True, ", ".join(found))
 
 

@@ -58,17 +58,19 @@ class Number:
 POSITIVE, NOT_NEGATIVE = Number(closed=False), Number()
 
 
-def refuse_numbers(of: object, table: Mapping[str, Number], who: str = "") -> None:
+def refuse_numbers(of: object, table: Mapping[str, Number], subject: str = "") -> None:
     """Check the attributes of ``of`` that ``table`` names against their ranges.
 
-    Raises ValueError that names ``who``, the attribute and its value, for the first one outside its range."""
+    Raises ValueError that names ``subject``, the attribute and its value, for the first one outside its range."""
     for name, number in table.items():
         value = getattr(of, name)
         if number.holds(value):
             continue
         finite = isinstance(value, (float, np.floating)) and math.isinf(value) and value > 0 and number.most == math.inf
         wish = f"{number.wish} and finite" if finite else number.wish
-        raise ValueError(f"{f'{who}: ' if who else ''}{name} {wish}, got {as_text(value)} {number.unit}".rstrip())
+        raise ValueError(
+            f"{f'{subject}: ' if subject else ''}{name} {wish}, got {as_text(value)} {number.unit}".rstrip()
+        )
 
 
 def as_text(value: object) -> str:

@@ -149,10 +149,10 @@ def _read(handle: int) -> dict[str, Any]:
 
 
 def _holder_text(found: dict[str, Any]) -> str:
-    who = f"process {found.get('process', '?')}"
+    holder = f"process {found.get('process', '?')}"
     if found.get("host"):
-        who += f" on {found['host']}"
-    return who + (f" since {found['since']}" if found.get("since") else "")
+        holder += f" on {found['host']}"
+    return holder + (f" since {found['since']}" if found.get("since") else "")
 
 
 def _alive(found: dict[str, Any]) -> bool:

@@ -118,9 +118,9 @@ def write_player(runs: Sequence[Run], path: Path, budget: int = BUDGET) -> Path:
             f"{', '.join(str(run.folder) for run in runs)}: nothing has been written that could be drawn"
         )
     path.parent.mkdir(parents=True, exist_ok=True)
-    beside = path.with_name(path.name + ".part")
-    beside.write_text(whole_page(records[0]["title"], lead_of(records), player(records)), encoding="utf-8")
-    beside.replace(path)
+    partial_file = path.with_name(path.name + ".part")
+    partial_file.write_text(whole_page(records[0]["title"], lead_of(records), player(records)), encoding="utf-8")
+    partial_file.replace(path)
     return path
 
 

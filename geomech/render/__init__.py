@@ -32,7 +32,7 @@ def draw(
     for a run without a cycle, KeyError for an unknown stress component.
     """
     from .curves.plots import plots
-    from .fields.draw import Wish, draw_end, draw_field, suited, usual_field
+    from .fields.draw import PictureRequest, draw_end, draw_field, suited, usual_field
     from .movie import movie as draw_movie
 
     if not len(run.history):
@@ -51,22 +51,24 @@ def draw(
         made = draw_movie(painter, folder / "growth.gif", frames_per_second=pace)
         paths += [made] if made is not None else []
     if len(run.tips):
-        paths += draw_field([run], Wish(field="K", scale=painter.view.scale, size=(painter.view.width, None)), folder)
+        paths += draw_field(
+            [run], PictureRequest(field="K", scale=painter.view.scale, size=(painter.view.width, None)), folder
+        )
     return [*paths, *plots(run, folder)]
 
 
 def _motion(run: Run, folder: Path, asked: dict[str, Any], width: int | None, movie: bool | None) -> list[Path]:
     """Pictures of a run whose blocks move: displacement and, after an earthquake, slip of the joints."""
-    from .fields.draw import Wish, draw_field
+    from .fields.draw import PictureRequest, draw_field
 
-    wish = Wish(
+    request = PictureRequest(
         scale=asked.get("deformation_scale"),
         size=(width or asked.get("width_px", 800), None),
         movies=(".gif",) if (asked.get("gif", True) if movie is None else movie) else (),
         frames_per_second=asked.get("frames_per_second", 10.0),
     )
-    paths = draw_field([run], wish, folder)
+    paths = draw_field([run], request, folder)
     loads = run.scene.get("loads", {})
     if loads.get("base") or loads.get("viscous_boundaries"):
-        paths += draw_field([run], replace(wish, field="slip", movies=()), folder)
+        paths += draw_field([run], replace(request, field="slip", movies=()), folder)
     return paths

@@ -59,12 +59,12 @@ def moments(run: Run, frames: int) -> list[int]:
     the growth."""
     last = final_cycle(run)
     written = [c for c in run.grids("blocks") if c <= last]
-    told = agreeing(run, written)
+    usable = agreeing(run, written)
     history = run.history
     length = {int(c): float(v) for c, v in zip(history["cycle"], history["crack_length"])}
     grew = set(history["cycle"][history["growing"] > 0].astype(int))
-    growth = np.array([c for c in told if c in grew or length[c] > length[written[0]]], dtype=int)
-    loading = np.array([c for c in told if c not in set(growth.tolist())], dtype=int)
+    growth = np.array([c for c in usable if c in grew or length[c] > length[written[0]]], dtype=int)
+    loading = np.array([c for c in usable if c not in set(growth.tolist())], dtype=int)
 
     def spread(cycles: np.ndarray, count: int) -> np.ndarray:
         return cycles[np.unique(np.linspace(0, len(cycles) - 1, min(count, len(cycles))).round().astype(int))]

@@ -42,8 +42,8 @@ def _add_topics(page: Page, found: Mapping[str, Any], folder: Path) -> None:
     for topic, figures in found["topics"].items():
         page.section(topic)
         # The stability maps have a folder of their own.
-        for beside in (f"bench_{topic}", topic):
-            page.figures(_pictures(folder.parent / beside), whole=True)
+        for subfolder in (f"bench_{topic}", topic):
+            page.figures(_pictures(folder.parent / subfolder), whole=True)
         for kind, values in figures.items():
             if isinstance(values, Mapping) and values:
                 page.table(["", kind], list(values.items()))

@@ -53,20 +53,22 @@ def add_energy(page: Page, energy: Mapping[str, float]) -> None:
         return
     rows = [(label, energy.get(name)) for name, label in GIVEN.items()]
     _add(page, "energy at cracks", "% of what was given", rows + spent, abs(given))
-    said = []
+    sentences = []
     if energy.get("toughness_energy"):
-        said.append(f"Fracture energy of all new cracks, K_Ic²/E' times length: {energy['toughness_energy']:.4g} J/m.")
+        sentences.append(
+            f"Fracture energy of all new cracks, K_Ic²/E' times length: {energy['toughness_energy']:.4g} J/m."
+        )
     if energy.get("unpaid_toughness"):
-        said.append(
+        sentences.append(
             f"Of this, blocks did not supply {energy['unpaid_toughness']:.4g} J/m: they store no bending, and cracks that "
             "it opens take no energy from the motion."
         )
     if energy.get("budget_residual") is not None:
-        said.append(
+        sentences.append(
             f"Of all energy turned over by blocks and cracks, {abs(energy['budget_residual']):.1e} is not "
             "accounted for."
         )
-    page.text(*said)
+    page.text(*sentences)
 
 
 def _add(page: Page, what: str, share: str, parts: list[tuple[str, float | None]], whole: float) -> None:

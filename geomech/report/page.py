@@ -145,7 +145,7 @@ class Page:
         rows = [list(row) for row in rows]
         words = [any(isinstance(row[k], str) and not is_number(row[k]) for row in rows) for k in range(len(headers))]
         long = [any(isinstance(row[k], str) and len(row[k]) > 40 for row in rows) for k in range(len(headers))]
-        kinds = ["told" if lengthy else "words" if wordy else "" for lengthy, wordy in zip(long, words)]
+        kinds = ["told" if is_long else "words" if is_text else "" for is_long, is_text in zip(long, words)]
 
         def line(tag: str, cells: Sequence[Any]) -> str:
             return "".join(
@@ -216,9 +216,9 @@ class Page:
     def write(self, path: Path) -> Path:
         """Write the page to ``path``, atomically."""
         path.parent.mkdir(parents=True, exist_ok=True)
-        beside = path.with_name(path.name + ".part")
-        beside.write_text(str(self), encoding="utf-8")
-        beside.replace(path)
+        partial_file = path.with_name(path.name + ".part")
+        partial_file.write_text(str(self), encoding="utf-8")
+        partial_file.replace(path)
         return path
 
 

@@ -79,17 +79,17 @@ class _Writer:
         self._again()
 
     def _facts(self) -> None:
-        sure, values = probability(self.rows), self._values()
+        failure, values = probability(self.rows), self._values()
         facts: dict[str, Any] = {}
         if self.found.rare is not None:
             low, high = self.found.rare.interval
             facts |= {"probability of failure": f"{self.found.rare.value:.3g}", "95 %": f"{low:.2g} to {high:.2g}",
                       "by": self.found.rare.method}  # fmt: skip
-        elif sure.answered:
+        elif failure.answered:
             facts |= {"probability of "
-                      "failure": share_text(sure.value), "95 % (Wilson)": f"{share_text(sure.low)} to "
-                                                                          f"{share_text(sure.high)}",
-                      "failed": f"{sure.failures} of {sure.answered}"}  # fmt: skip
+                      "failure": share_text(failure.value), "95 % (Wilson)": f"{share_text(failure.low)} to "
+                                                                          f"{share_text(failure.high)}",
+                      "failed": f"{failure.failures} of {failure.answered}"}  # fmt: skip
         if len(values) and self.found.rare is None:
             facts |= {
                 f"mean {self.label}": float(values.mean()),
@@ -102,16 +102,16 @@ class _Writer:
                 f"The sweep is not complete: {len(self.rows)} of {len(self.found.plan.table)} runs. To continue: "
                 "geomech sweep … --resume"
             )
-        if self.found.rare is None and sure.few and sure.failures < sure.answered:
+        if self.found.rare is None and failure.few and failure.failures < failure.answered:
             self.page.warning(
-                f"Only {sure.failures} runs failed: the probability of failure is known to its order of "
+                f"Only {failure.failures} runs failed: the probability of failure is known to its order of "
                 "magnitude. More runs, or --rare subset, would reduce the uncertainty."
             )
-        if sure.answered < sure.runs and self.found.rare is None:
+        if failure.answered < failure.runs and self.found.rare is None:
             self.page.warning(
-                f"{sure.runs - sure.answered} runs have no answer and are left out of the probability of "
+                f"{failure.runs - failure.answered} runs have no answer and are left out of the probability of "
                 "failure; it would be "
-                f"{share_text(sure.least)} if all of them were stable, {share_text(sure.most)} if all failed."
+                f"{share_text(failure.least)} if all of them were stable, {share_text(failure.most)} if all failed."
             )
 
     def _asked(self) -> None:

@@ -175,8 +175,8 @@ def draw(
         parts.add(read, in_model)
     else:
         _draw_here(geometry, parts)
-    sound, crs = read_traces(geometry, folder, parts.add, place, faults, warnings)
-    if not sound:
+    valid, crs = read_traces(geometry, folder, parts.add, place, faults, warnings)
+    if not valid:
         return None
     if not parts.zones:
         layers = ", ".join(repr(joint.name.removeprefix(JOINT)) for joint in parts.joints[:8])
@@ -303,8 +303,8 @@ def _assembled(
             message = f"{at}: {flaw.message}" if at else flaw.message
             faults.append(Fault(place(path), message, flaw.way_out + counted_from))
         return drawing
-    mended = cut.repair_lines("listed by geomech build")
-    warnings += [Fault(place(("geometry",)), f"{MENDED}: {text}", "") for text in mended]
+    repairs = cut.repair_lines("listed by geomech build")
+    warnings += [Fault(place(("geometry",)), f"{MENDED}: {text}", "") for text in repairs]
     joints = tuple(joint.name for joint in cut.joints)
     return replace(
         drawing,

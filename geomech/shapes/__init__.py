@@ -1,5 +1,6 @@
 """Drawings: outlines, cracks and named edges from TOML or Gmsh, assembled into the model; meshes for pictures."""
 
+import warnings
 from importlib import import_module
 
 # Imported on first use: only drawing needs Shapely and Gmsh.
@@ -14,7 +15,7 @@ _PUBLIC = {
     "InteriorMesh": "meshing",
     "Joint": "parts",
     "Mark": "parts",
-    "Mend": "block_cutting.noding",
+    "Repair": "block_cutting.noding",
     "ShapeError": "parts",
     "Trace": "parts",
     "Zone": "parts",
@@ -33,6 +34,9 @@ __all__ = list(_PUBLIC)
 
 
 def __getattr__(name: str):
+    if name == "Mend":
+        warnings.warn(f"{__name__}.Mend is now {__name__}.Repair", DeprecationWarning, stacklevel=2)
+        name = "Repair"
     if name in _PUBLIC:
         return getattr(import_module(f"{__name__}.{_PUBLIC[name]}"), name)
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -110,18 +110,18 @@ class DaskEngine:
                 f"the workers at {self.address} cannot import geomech.sweep ({error}): install geomech "
                 f"{__version__} there"
             ) from error
-        for worker, theirs in found.items():
+        for worker, on_worker in found.items():
             for name, what in (("version", "geomech"), ("program", "geomech's sources"), ("scene", "the scene")):
-                if theirs[name] != here[name]:
+                if on_worker[name] != here[name]:
                     raise EngineRefused(
-                        f"the worker {worker} on {theirs['host']} has other {what} ({theirs[name]}, here "
+                        f"the worker {worker} on {on_worker['host']} has other {what} ({on_worker[name]}, here "
                         f"{here[name]}): "
                         + ("put the scene and its files there under the same path" if name == "scene"
                            else f"install the same geomech on all machines, {__version__} as here")
                     )  # fmt: skip
-            if self._folder is not None and not theirs["folder"]:
+            if self._folder is not None and not on_worker["folder"]:
                 raise EngineRefused(
-                    f"the worker {worker} on {theirs['host']} does not see {self._folder}: --keep wants a "
+                    f"the worker {worker} on {on_worker['host']} does not see {self._folder}: --keep wants a "
                     "folder that all machines share"
                 )
 

@@ -71,14 +71,14 @@ class _Worker:
     """A process and the jobs that it has."""
 
     def __init__(self) -> None:
-        ours, theirs = _pipe()
+        parent_end, child_end = _pipe()
         environment = {**os.environ, **ONE_THREAD}
         self.process = subprocess.Popen(
-            [sys.executable, "-c", _WORKER.format(handle=theirs)], pass_fds=[theirs], env=environment,
+            [sys.executable, "-c", _WORKER.format(handle=child_end)], pass_fds=[child_end], env=environment,
             stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL,
         )  # fmt: skip
-        os.close(theirs)
-        self.pipe = Connection(ours)
+        os.close(child_end)
+        self.pipe = Connection(parent_end)
         self.jobs: deque[Job] = deque()
         self.retiring = False
 
@@ -99,8 +99,8 @@ class _Worker:
 def _pipe() -> tuple[int, int]:
     import socket
 
-    ours, theirs = socket.socketpair()
-    return ours.detach(), theirs.detach()
+    parent_end, child_end = socket.socketpair()
+    return parent_end.detach(), child_end.detach()
 
 
 class LocalEngine:

@@ -41,7 +41,7 @@ class CannotResume(ValueError):
     """The sweep cannot be resumed; the message gives the reason."""
 
 
-class Telling(NamedTuple):
+class SweepMessages(NamedTuple):
     """Messages during a sweep: ``say`` takes a line; one line per run if ``log``, and progress every ``seconds``."""
 
     say: Callable[[str], None] | None = None
@@ -173,7 +173,7 @@ def carry_out_sweep(
     *,
     resume: bool = False,
     overwrite: bool = False,
-    telling: Telling | None = None,
+    messages: SweepMessages | None = None,
 ) -> Sweep:
     """Make the runs of ``plan`` that are not in ``folder`` yet with ``engine``; returns the sweep, complete or not.
 
@@ -181,11 +181,11 @@ def carry_out_sweep(
     raises KeyboardInterrupt. Finished runs are kept.
     """
     with RunLock(folder) as lock:
-        if lock.stale and telling and telling.say:
-            telling.say(lock.stale)
+        if lock.stale and messages and messages.say:
+            messages.say(lock.stale)
         _prepare(folder, plan, resume, overwrite)
         with Journal(folder / JOURNAL) as journal, Interruption(_STOPPING, patience=None) as interruption:
-            conduct = _Conduct(plan, folder, journal, engine, interruption, telling or Telling())
+            conduct = _Conduct(plan, folder, journal, engine, interruption, messages or SweepMessages())
             return conduct.go()
 
 
@@ -194,7 +194,7 @@ def _prepare(folder: Path, plan: Plan, resume: bool, overwrite: bool) -> None:
     stored_at = folder / PLAN
     stored = json.loads(stored_at.read_text(encoding="utf-8")) if stored_at.is_file() else None
     table = "" if plan.settings["rare"] else digest_of(plan.table)
-    mine = {"plan": plan.as_dict(), "table": table, "program": program(),
+    requested = {"plan": plan.as_dict(), "table": table, "program": program(),
             "files": _files(plan)}  # fmt: skip
     if resume:
         if stored is None:
@@ -205,7 +205,7 @@ def _prepare(folder: Path, plan: Plan, resume: bool, overwrite: bool) -> None:
             ("files", "the scene"),
             ("program", "geomech"),
         ):
-            if stored[name] != mine[name]:
+            if stored[name] != requested[name]:
                 raise CannotResume(
                     f"{what} has changed since the sweep in {folder} began: start again in another folder "
                     "(--out DIR), or over it (--overwrite)"
@@ -218,7 +218,7 @@ def _prepare(folder: Path, plan: Plan, resume: bool, overwrite: bool) -> None:
         )
     for name in (JOURNAL, "runs.csv", "runs.parquet", "times.csv"):
         (folder / name).unlink(missing_ok=True)
-    write_json(stored_at, mine | {"versions": versions(), "complete": False})
+    write_json(stored_at, requested | {"versions": versions(), "complete": False})
 
 
 def _files(plan: Plan) -> str:
@@ -239,10 +239,16 @@ class _Conduct:
     """A sweep in progress."""
 
     def __init__(
-        self, plan: Plan, folder: Path, journal: Journal, engine: Engine, interruption: Interruption, telling: Telling
+        self,
+        plan: Plan,
+        folder: Path,
+        journal: Journal,
+        engine: Engine,
+        interruption: Interruption,
+        messages: SweepMessages,
     ) -> None:
         self.plan, self.folder, self.journal, self.engine = plan, folder, journal, engine
-        self.interruption, self.telling = interruption, telling
+        self.interruption, self.messages = interruption, messages
         self.durations: deque[float] = deque(maxlen=2000)
         self.warm: set[tuple[str, int]] = set()
         self.settled = False
@@ -251,7 +257,7 @@ class _Conduct:
         self.written, self.cost = self.began, 0.0
         self.fresh = 0
         self.total = len(plan.table) if not plan.settings["rare"] else 0
-        self.noted = 0
+        self.notes_shown = 0
 
     def go(self) -> Sweep:
         rare = None
@@ -331,23 +337,23 @@ class _Conduct:
             self.written, self.cost = time.monotonic(), time.monotonic() - now
 
     def _tell(self, row: Mapping[str, Any], values: Mapping[str, Any]) -> None:
-        say = self.telling.say
+        say = self.messages.say
         if say is None:
             return
-        for note in self.engine.notes[self.noted :]:
+        for note in self.engine.notes[self.notes_shown :]:
             say(note)
-        self.noted = len(self.engine.notes)
-        if self.telling.log:
+        self.notes_shown = len(self.engine.notes)
+        if self.messages.log:
             result = row.get(self.plan.result)
             shown = f"{self.plan.result} {result:.4g}" if isinstance(result, (int, float)) else row["status"]
             say(
                 f"run {row['run']}: {shown}, {row['seconds']:.2f} s; "
                 + ", ".join(f"{k} = {v}" for k, v in values.items())
             )
-        if row["status"] != DONE and self.telling.log:
+        if row["status"] != DONE and self.messages.log:
             say(f"  {row['status']}: {row['reason']}\n  again: {self.plan.how_to_repeat(values)}")
         now = time.monotonic()
-        if now - self.last_report >= self.telling.seconds or len(self.journal.rows) == self.total:
+        if now - self.last_report >= self.messages.seconds or len(self.journal.rows) == self.total:
             self.last_report = now
             say(self._progress())
 

@@ -64,15 +64,15 @@ def carry_out(job: Job) -> dict[str, Any]:
     """The row of a run: "run", "status", "reason", its columns, and its `TIMES`. Never raises but for interrupts."""
     clock, processor = time.perf_counter(), time.process_time()
     row: dict[str, Any] = {"run": job.number, "status": DONE, "reason": ""}
-    with _heard() as heard:
+    with _collected_warnings() as warnings_seen:
         try:
             row |= _MEASURES[job.settings["measure"]](job)
             row |= _columns(job, row)
         except Exception as error:
             refused = any(kind.__name__ in _REFUSALS for kind in type(error).__mro__)
             row |= {"status": REFUSED if refused else FAILED, "reason": _error_text(error)}
-    row["warnings"] = len(heard)
-    row["first_warnings"] = [text[:_REASON] for text in heard[:_WARNED]]
+    row["warnings"] = len(warnings_seen)
+    row["first_warnings"] = [text[:_REASON] for text in warnings_seen[:_WARNED]]
     row["fails"] = _fails(job, row)
     _keep(job, row)
     for name in ("_parts", "_summary", "_history"):
@@ -128,7 +128,7 @@ def _fails(job: Job, row: dict[str, Any]) -> bool | None:
 
 
 @contextmanager
-def _heard() -> Iterator[list[str]]:
+def _collected_warnings() -> Iterator[list[str]]:
     """Collects the warnings of geomech in this context."""
     texts: list[str] = []
 
@@ -341,6 +341,6 @@ def _keep(job: Job, row: Mapping[str, Any]) -> None:
         shutil.rmtree(job.folder, ignore_errors=True)
         return
     with suppress(OSError):
-        told = {"run": job.number, "scene": job.scene, "variant": job.variant, "changes": list(job.changes),
+        run_record = {"run": job.number, "scene": job.scene, "variant": job.variant, "changes": list(job.changes),
                 "status": row["status"], "reason": row["reason"]}  # fmt: skip
-        (_own_folder(job) / "sweep_run.json").write_text(json.dumps(told, indent=1), encoding="utf-8")
+        (_own_folder(job) / "sweep_run.json").write_text(json.dumps(run_record, indent=1), encoding="utf-8")

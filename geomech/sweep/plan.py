@@ -173,9 +173,9 @@ def _merged(base: Any, table: Path | None, given: dict[str, Any], source: str, a
     if base.tables.sweep is not None and not alone:
         written = base.tables.sweep.model_dump(exclude_unset=True)
         sources.append((written, lambda path: f"{base.path}: {'.'.join(map(str, path))}"))
-    beside = base.path.parent / SWEEP_FILE
-    if not alone and (table is not None or beside.is_file()):
-        file = table or beside
+    sweep_file = base.path.parent / SWEEP_FILE
+    if not alone and (table is not None or sweep_file.is_file()):
+        file = table or sweep_file
         try:
             text = file.read_bytes().decode("utf-8-sig").replace("\r\n", "\n")
             data = tomllib.loads(text)

@@ -101,9 +101,9 @@ def write_tables(folder: Path, rows: Sequence[Mapping[str, Any]]) -> list[Path]:
     except ImportError:
         return written
     arrays = {name: _array(pyarrow, [_plain(row.get(name)) for row in rows]) for name in names}
-    beside = folder / f"{PARQUET}.part"
-    pyarrow.parquet.write_table(pyarrow.table(arrays), beside)
-    os.replace(beside, folder / PARQUET)
+    partial_file = folder / f"{PARQUET}.part"
+    pyarrow.parquet.write_table(pyarrow.table(arrays), partial_file)
+    os.replace(partial_file, folder / PARQUET)
     return [*written, folder / PARQUET]
 
 
@@ -117,12 +117,12 @@ def _array(pyarrow: Any, values: list[Any]) -> Any:
 
 
 def _write_csv(path: Path, names: Sequence[str], rows: Sequence[Mapping[str, Any]]) -> Path:
-    beside = path.with_name(path.name + ".part")
-    with open(beside, "w", newline="", encoding="utf-8") as file:
+    partial_file = path.with_name(path.name + ".part")
+    with open(partial_file, "w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(names)
         writer.writerows([_cell(row.get(name)) for name in names] for row in rows)
-    os.replace(beside, path)
+    os.replace(partial_file, path)
     return path
 
 

@@ -136,9 +136,9 @@ def tornado(rows: Sequence[Mapping[str, Any]], names: Sequence[str], result: str
         known = np.isfinite(at) & np.isfinite(values)
         if known.sum() < 2 or np.ptp(at[known]) == 0:
             continue
-        own, mine = at[known], values[known]
+        own, selected = at[known], values[known]
         low, high = np.quantile(own, _END), np.quantile(own, 1.0 - _END)
-        ends = mine[own <= low], mine[own >= high]
+        ends = selected[own <= low], selected[own >= high]
         means = [float(end.mean()) for end in ends]
         errors = [float(end.std(ddof=1) / math.sqrt(len(end))) if len(end) > 1 else math.nan for end in ends]
         found.append(Swing(name, *means, *errors))

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from geomech.report import write_sweep_page
 from geomech.sweep.engine import LocalEngine
-from geomech.sweep.execution import Telling, carry_out_sweep
+from geomech.sweep.execution import SweepMessages, carry_out_sweep
 from geomech.sweep.plan import plan_of
 
 sys.path.insert(0, str(Path(__file__).parent))
@@ -34,8 +34,8 @@ def main(folder: Path, out: Path, overrides=(), variants=(), quiet: bool = False
         )
         own = {key: value for key, value in given.items() if (key == "seeds") == (name == "two_sets")}
         plan = plan_of(scene, own, table=table)
-        telling = Telling(None if quiet else lambda text: print(text, flush=True), seconds=30.0)
-        found[name] = carry_out_sweep(plan, Path(out) / name, LocalEngine(), overwrite=True, telling=telling)
+        messages = SweepMessages(None if quiet else lambda text: print(text, flush=True), seconds=30.0)
+        found[name] = carry_out_sweep(plan, Path(out) / name, LocalEngine(), overwrite=True, messages=messages)
         write_sweep_page(Path(out) / name)
     text = report(found)
     (Path(out) / "comparison.txt").write_text(text + "\n", encoding="utf-8")

@@ -93,3 +93,16 @@ def test_which_joint_acts_is_said_by_a_function_still():
         *_, former = dda.run(blocks, *given, joint_index=lambda a, b: 1)
     *_, now = dda.run(blocks, given[0], Joints(laws, lambda a, b: 1), *given[2:])
     assert np.array_equal(former.vertices, now.vertices) and set(now.contacts["law"].tolist()) <= {1}
+
+
+def test_repairs_of_drawings_and_requests_for_pictures_are_found_by_their_former_names():
+    from geomech import shapes
+    from geomech.render.fields import draw
+
+    with pytest.warns(DeprecationWarning, match=r"shapes\.Mend is now geomech\.shapes\.Repair"):
+        assert shapes.Mend is shapes.Repair
+    with pytest.warns(DeprecationWarning, match=r"draw\.Wish is now geomech\.render\.fields\.draw\.PictureRequest"):
+        assert draw.Wish is draw.PictureRequest
+    cutting = shapes.cut([shapes.Zone("rock", (SQUARE[0],))], [])
+    with pytest.warns(DeprecationWarning, match=r"Cutting\.mends is now Cutting\.repairs"):
+        assert cutting.mends is cutting.repairs

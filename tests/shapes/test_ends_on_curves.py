@@ -54,7 +54,7 @@ def test_radial_joints_part_the_rock_about_a_tunnel(tmp_path, seed, dead_ends):
     cutting = cut_alone(drawing, dead_ends)
     assert cutting.blocks.n_blocks == 5 and cutting.cracks.n_cracks == 0
     assert cutting.partings[0][:3] == ("joint:radial", 5, 5)
-    assert cutting.mends == ()
+    assert cutting.repairs == ()
     # The blocks tile the zone: the tunnel's chords are 28 sides or more, which the joints leave in place.
     area = sum(abs(_area(loop)) * sign for loop, sign in zip(drawing.zones[0].loops, (1, -1)))
     assert cutting.blocks.areas().sum() == pytest.approx(area, rel=1e-10)  # coordinates carry twelve digits
@@ -231,10 +231,10 @@ def test_traces_that_are_trimmed_away_whole_are_told():
     joint = Joint("joint:a", (np.array([[2.0, 1.0], [2.0, 4.0]]), np.array([[0.0, 5.0], [10.0, 5.0]]),
                               np.array([[6.0, 5.0], [6.0, 7.0]]), np.array([[20.0, 5.0], [20.0, 7.0]])))  # fmt: skip
     cutting = cut([Zone("rock", (square,))], [joint], dead_ends="trim")
-    gone = [mend for mend in cutting.mends if mend.kind == "trimmed away"]
-    assert [(mend.x, mend.y, mend.size) for mend in gone] == [(2.0, 2.5, 3.0), (6.0, 6.0, 2.0)]
+    gone = [repair for repair in cutting.repairs if repair.kind == "trimmed away"]
+    assert [(repair.x, repair.y, repair.size) for repair in gone] == [(2.0, 2.5, 3.0), (6.0, 6.0, 2.0)]
     assert cutting.partings == (("joint:a", 3, 1, 10.0),)
-    assert cut([Zone("rock", (square,))], [joint]).mends == ()
+    assert cut([Zone("rock", (square,))], [joint]).repairs == ()
 
 
 def test_a_line_is_not_drawn_to_its_own_chords():

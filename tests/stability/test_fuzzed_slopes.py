@@ -85,8 +85,10 @@ def test_what_does_not_hold_is_wrong_unless_a_warning_says_so(monkeypatch):
     monkeypatch.setitem(INVARIANTS, "strain", tight)
     found = watched(34)
     assert found.verdict == WRONG and "strain" in found.faults[0] and "cycle 1:" in found.faults[0]
-    monkeypatch.setattr(limited_runs.Heard, "said", [f"t = 0 s: rock and cracks {tight.reported[0]}"], raising=False)
-    monkeypatch.setattr(limited_runs.Heard, "__init__", lambda self: super(type(self), self).__init__())
+    monkeypatch.setattr(
+        limited_runs.CollectedWarnings, "messages", [f"t = 0 s: rock and cracks {tight.reported[0]}"], raising=False
+    )
+    monkeypatch.setattr(limited_runs.CollectedWarnings, "__init__", lambda self: super(type(self), self).__init__())
     found = watched(34)
     assert found.verdict == REPORTED and not found.faults and "strain" in found.reported[0]
 

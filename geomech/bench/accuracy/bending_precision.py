@@ -158,8 +158,8 @@ def table(points: list[Point]) -> str:
     for problem in dict.fromkeys(p.problem for p in points):
         lines.append(problem)
         for method in dict.fromkeys(p.method for p in points if p.problem == problem):
-            mine = [p for p in points if (p.problem, p.method) == (problem, method)]
-            row = "   ".join(f"{p.size:g}: {p.error:.1e} {1e3 * p.seconds:7.1f}" for p in mine)
+            selected = [p for p in points if (p.problem, p.method) == (problem, method)]
+            row = "   ".join(f"{p.size:g}: {p.error:.1e} {1e3 * p.seconds:7.1f}" for p in selected)
             lines.append(f"  {method:<34}{row}")
     if not finite_elements.available():
         lines.append("  (finite elements: pip install 'geomech[bench]')")

@@ -185,7 +185,7 @@ def _table(points: list[Point]) -> str:
             curve = [p for p in points if (p.problem, p.method) == (problem, method)]
             for p, before in zip(curve, [None, *curve]):
                 order = math.nan if before is None else math.log(before.error / p.error, before.size / p.size)
-                said = "" if before is None or "step" not in problem else f"   order {order:5.2f}"
+                order_text = "" if before is None or "step" not in problem else f"   order {order:5.2f}"
                 label = "" if before else method
-                lines.append(f"  {label:<30}{p.size:>10g}   {p.error:8.1e}   {1e3 * p.seconds:9.2f} ms{said}")
+                lines.append(f"  {label:<30}{p.size:>10g}   {p.error:8.1e}   {1e3 * p.seconds:9.2f} ms{order_text}")
     return "\n".join(lines)

@@ -37,13 +37,13 @@ def specimen(phi_deg: int, boundary_stress: str = "contacts", rate: float = STRE
     """The specimen of the study with its elements, and a toughness that prevents growth."""
     from ...scene import load_scene
 
-    wishes = [
+    overrides = [
         f"run.boundary_stress={boundary_stress}",
         f"loads.tractions.0.rate_pa_per_s=[0.0, {-rate}]",
         f"run.end_time_s={end}",
         "materials.rock.k_ic_pa_sqrt_m=1e12",
     ]
-    return load_scene(SPECIMEN, wishes, f"phi_{phi_deg}").problem()
+    return load_scene(SPECIMEN, overrides, f"phi_{phi_deg}").problem()
 
 
 def factors(tips: np.ndarray) -> np.ndarray:

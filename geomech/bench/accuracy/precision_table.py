@@ -54,9 +54,9 @@ class Point:
 
 def curves(points: Sequence[Point], problem: str, method: str) -> list[list[Point]]:
     """Curves of a method, sorted by size."""
-    mine = [p for p in points if (p.problem, p.method) == (problem, method)]
-    names = dict.fromkeys(p.curve for p in mine)
-    return [sorted((p for p in mine if p.curve == name), key=lambda p: p.size) for name in names]
+    selected = [p for p in points if (p.problem, p.method) == (problem, method)]
+    names = dict.fromkeys(p.curve for p in selected)
+    return [sorted((p for p in selected if p.curve == name), key=lambda p: p.size) for name in names]
 
 
 def _error_of(problem: str) -> float:
@@ -114,13 +114,13 @@ def goals_of(points: Sequence[Point]) -> dict:
     goals["time at one error over this solver's"] = ratios = []
     for name in problems:
         error = _error_of(name)
-        ours = own_time(points, name, error)
+        own_seconds = own_time(points, name, error)
         for method in METHODS[2:]:
             curve = [p for p in points if (p.problem, p.method) == (name, method)]
-            if not curve or ours is None:
+            if not curve or own_seconds is None:
                 continue
-            theirs = time_to(points, name, method, error)
-            further = None if theirs is not None else extrapolated(points, name, method, error)
+            other_seconds = time_to(points, name, method, error)
+            further = None if other_seconds is not None else extrapolated(points, name, method, error)
             best, longest = min(p.error for p in curve), max(p.seconds for p in curve)
             ratios.append(
                 {
@@ -128,10 +128,10 @@ def goals_of(points: Sequence[Point]) -> dict:
                     "method": method,
                     "error": error,
                     "sizes": len({p.size for p in curve}),
-                    "ratio": (longest if theirs is None else theirs) / ours,
-                    "reached": theirs is not None,
+                    "ratio": (longest if other_seconds is None else other_seconds) / own_seconds,
+                    "reached": other_seconds is not None,
                     "best": best,
-                    "extrapolated": None if further is None else further / ours,
+                    "extrapolated": None if further is None else further / own_seconds,
                 }
             )
     return goals
@@ -166,8 +166,8 @@ def table(points: Sequence[Point], growth: dict, goals: dict) -> str:
         "",
         "K to 1e-6: "
         + "; ".join(
-            f"{label} {_said(goals[f'{name}: s to 1e-6'])} with the order chosen,"
-            f" {_said(goals[f'{name}: s when 1e-6 is asked for'])} when 1e-6 is asked for (goal {1e3 * goal:.0f} ms)"
+            f"{label} {_time_text(goals[f'{name}: s to 1e-6'])} with the order chosen,"
+            f" {_time_text(goals[f'{name}: s when 1e-6 is asked for'])} when 1e-6 is asked for (goal {1e3 * goal:.0f} ms)"
             for label, name, goal in (
                 ("one crack", "Griffith crack", ONE_CRACK_S),
                 ("specimen", "two-crack specimen", SPECIMEN_S),
@@ -185,13 +185,13 @@ def table(points: Sequence[Point], growth: dict, goals: dict) -> str:
         "time grew no faster than its unknowns (extrapolated)",
     ]
     for row in goals["time at one error over this solver's"]:
-        said = f"{row['ratio']:8.0f}  measured"
+        result = f"{row['ratio']:8.0f}  measured"
         if not row["reached"]:
-            said = f"{row['ratio']:8.0f}  and then still at {row['best']:.0e}; "
+            result = f"{row['ratio']:8.0f}  and then still at {row['best']:.0e}; "
             further = row["extrapolated"]
             still = "its error does not fall" if row["sizes"] > 1 else "of one size"
-            said += still if further is None else f"{further:.1g} extrapolated"
-        lines.append(f"  {row['problem']:<30}{row['method']:<36}{said}")
+            result += still if further is None else f"{further:.1g} extrapolated"
+        lines.append(f"  {row['problem']:<30}{row['method']:<36}{result}")
     return "\n".join(lines)
 
 
@@ -203,5 +203,5 @@ def _row(p: Point, first: bool) -> str:
     return f"  {label:<36}{what:>8}{p.unknowns:>8} unknowns   {p.error:8.1e}   {1e3 * p.seconds:10.2f} ms{parts}"
 
 
-def _said(seconds: float | None) -> str:
+def _time_text(seconds: float | None) -> str:
     return "not reached" if seconds is None else f"{1e3 * seconds:.3g} ms"

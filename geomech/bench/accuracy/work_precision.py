@@ -104,16 +104,16 @@ def errors() -> dict[str, float]:
     """Errors of a quick `measure` by chosen order and by target digits, without times; without the many cracks, whose
     reference is expensive."""
     out = {}
-    for name, (make, _, ours) in PROBLEMS.items():
+    for name, (make, _, own_problem) in PROBLEMS.items():
         if name == MANY:
             continue
         given = make()
         problem = with_reference(given, False) if given is not None else None
         for order in QUICK_ORDERS.get(name, (2, 3, 4, 6, 8)):
-            own, settings = ours(problem, order)
+            own, settings = own_problem(problem, order)
             out[f"{name}, {OURS}: {order}"] = max(own.error(factors(own.solve(settings))), LEAST)
         for digits in QUICK_DIGITS.get(name, (2, 4, 6)):
-            own = ours(None, digits + 1)[0] if problem is None else problem
+            own = own_problem(None, digits + 1)[0] if problem is None else problem
             asked = DdmSettings(target_error=10.0**-digits)
             out[f"{name}, {ASKED}: {digits}"] = max(own.error(factors(own.solve(asked))), LEAST)
     return out | {p.name: p.error for p in _growth(True, own=True)}
@@ -142,13 +142,13 @@ def _curves(name: str, quick: bool) -> Iterator[Point]:
         (QUICK_ORDERS.get(name, (2, 3, 4, 6, 8)), QUICK_DIGITS.get(name, (2, 4, 6))) if quick else (ORDERS, DIGITS)
     )
     counts = QUICK_COUNTS.get(name, (4, 8, 16)) if quick else COUNTS
-    make, low, ours = PROBLEMS[name]
+    make, low, own_problem = PROBLEMS[name]
     given = make()
     problem = with_reference(given, quick and name == MANY) if given is not None else None
-    own = list(_until(name, OURS, orders, lambda p: ours(problem, p)))
+    own = list(_until(name, OURS, orders, lambda p: own_problem(problem, p)))
 
     def asked_for(digits: int):
-        refined = ours(None, digits + 1)[0] if problem is None else problem
+        refined = own_problem(None, digits + 1)[0] if problem is None else problem
         return refined, DdmSettings(target_error=10.0**-digits)
 
     own += _until(name, ASKED, digits, asked_for)

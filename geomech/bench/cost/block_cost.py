@@ -333,9 +333,9 @@ def errors() -> dict[str, float]:
     expected = 0.5 * GRAVITY * (math.sin(angle) - math.tan(FRICTION) * math.cos(angle)) * end**2
     out["block that slides at 50°, way after 0.25 s"] = float(abs(way / expected - 1))
     rest = states(block_scenes.incline(-math.radians(30)), 1e-3, end)
-    crept = np.linalg.norm((rest[-1].vertices - rest[0].vertices)[4:].mean(axis=0))
+    travelled = np.linalg.norm((rest[-1].vertices - rest[0].vertices)[4:].mean(axis=0))
     out["block that sticks at 30°, creep in 0.25 s over the way it would slide without friction"] = float(
-        crept / (0.5 * GRAVITY * math.sin(math.radians(30)) * end**2)
+        travelled / (0.5 * GRAVITY * math.sin(math.radians(30)) * end**2)
     )
     blocks = block_scenes.column(20)
     # Without friction, so that every block can expand laterally.
@@ -385,11 +385,11 @@ def _table(costs: list[Cost], exponents: dict[str, float], iterated: list[dict],
     known_n, known_s = np.log(list(SHI)), np.log(list(SHI.values()))
     for c in costs:
         if c.scene == "wall":
-            his = math.exp(np.interp(math.log(c.blocks), known_n, known_s)) if c.blocks <= max(SHI) else None
+            shi_seconds = math.exp(np.interp(math.log(c.blocks), known_n, known_s)) if c.blocks <= max(SHI) else None
             goal = GOALS.get(10 ** round(math.log10(c.blocks)))
-            said = f"{his / c.iteration:8.1f} times as fast" if his else "   beyond his memory"
+            comparison = f"{shi_seconds / c.iteration:8.1f} times as fast" if shi_seconds else "   beyond his memory"
             lines.append(
-                f"  {c.blocks:8d} blocks {1e3 * c.iteration:9.2f} ms {said}"
+                f"  {c.blocks:8d} blocks {1e3 * c.iteration:9.2f} ms {comparison}"
                 + (f"  (goal {1e3 * goal:g} ms by the clock, here {1e3 * c.by_the_clock:.2f})" if goal else "")
             )
     lines += [

@@ -39,7 +39,7 @@ class Cost:
     network: str
     blocks: int
     cracks: int
-    mends: int
+    repairs: int
     making: float
     cutting: float
     memory: float
@@ -84,7 +84,7 @@ def cost(network: str, n: int, repeats: int) -> Cost:
         network,
         result.blocks.n_blocks,
         result.cracks.n_cracks,
-        len(result.mends),
+        len(result.repairs),
         min(making),
         min(cutting),
         peak_memory(),

@@ -89,5 +89,5 @@ def _outline(times: dict[str, float], errors: dict[str, float]) -> str:
     errors["outline, iterated, against few elements"] = error = np.abs(k - few).max() / np.abs(few).max()
     names = ("made", "first load", "another")
     times |= {f"outline of {n} unknowns: {name}": s for name, s in zip(names, spent)}
-    told = ", ".join(f"{name} {s:.1f} s" for name, s in zip(names, spent))
-    return f"an outline of {n} unknowns, iterated: {told}; K within {error:.0e} of that with few elements"
+    times_text = ", ".join(f"{name} {s:.1f} s" for name, s in zip(names, spent))
+    return f"an outline of {n} unknowns, iterated: {times_text}; K within {error:.0e} of that with few elements"

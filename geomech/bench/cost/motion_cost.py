@@ -20,7 +20,7 @@ from ...model import Problem, State
 from ...output.tables.summary import write_json
 from ..figures import Measured, stopwatch
 from ..slopes.drawn_slopes import problem_of
-from ..slopes.limited_runs import LONG, RIGHT, Heard, limited
+from ..slopes.limited_runs import LONG, RIGHT, CollectedWarnings, limited
 from ..slopes.moved_mass import BlockDisplacements
 from ..slopes.sliding_scenes import Slab, Slope, slab
 from ..slopes.sliding_slopes import OF_SLIDE
@@ -129,7 +129,7 @@ def _cost(problem: Problem, slope: Slope, rigid: Slab | None, dt: float, longest
     seconds: list[float] = []
     state = None
 
-    def run(heard: Heard) -> Iterator[None]:
+    def run(collected: CollectedWarnings) -> Iterator[None]:
         nonlocal state
         system = dda.BlockSystem(problem.blocks, problem.materials, problem.joints, problem.joint_index, settings)
         length, now = dda.StepLength(settings), State.at_rest(problem.blocks)

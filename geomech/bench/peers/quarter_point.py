@@ -92,21 +92,21 @@ class Plate:
         # Three constraints of a rigid motion: a corner, and the height of another.
         x, y = self.mesh.p[:, : self.basis.nodal_dofs.shape[1]]
         low, right = int(np.argmin(x + y)), int(np.argmax(x - y))
-        held = np.concatenate([self.basis.nodal_dofs[:, low], self.basis.nodal_dofs[1:, right]])
-        return solve(*condense(self._stiffness(), force, D=held), solver=symmetric)
+        constrained = np.concatenate([self.basis.nodal_dofs[:, low], self.basis.nodal_dofs[1:, right]])
+        return solve(*condense(self._stiffness(), force, D=constrained), solver=symmetric)
 
     def moved(self, displacement: Field) -> np.ndarray:
         """Displacements if the whole outline moves by ``displacement`` (n, 2) → (n, 2), with unloaded cracks."""
         from skfem import condense, solve
 
-        held = self.basis.get_dofs(facets=np.flatnonzero(self._sides >= 0)).flatten()
-        u, at = np.zeros(self.basis.N), self.basis.doflocs[:, held]
+        constrained = self.basis.get_dofs(facets=np.flatnonzero(self._sides >= 0)).flatten()
+        u, at = np.zeros(self.basis.N), self.basis.doflocs[:, constrained]
         # Unknowns come in pairs, x before y, at one place.
         given = displacement(at.T)
         along = np.zeros(self.basis.N, np.int64)
         along[self.basis.nodal_dofs[1]], along[self.basis.facet_dofs[1]] = 1, 1
-        u[held] = given[np.arange(len(held)), along[held]]
-        return solve(*condense(self._stiffness(), np.zeros(len(u)), x=u, D=held), solver=symmetric)
+        u[constrained] = given[np.arange(len(constrained)), along[constrained]]
+        return solve(*condense(self._stiffness(), np.zeros(len(u)), x=u, D=constrained), solver=symmetric)
 
     def _stiffness(self):
         from skfem import BilinearForm
@@ -185,9 +185,9 @@ class Plate:
                 out[row, mode] = np.sum(np.sum(_flow(field, x, tip, turn, mode, inside)[2] * dq, axis=0) * dx)
                 if faces is not None:
                     # A point on a face belongs to the side of its rock.
-                    beside = side[row](faces.at - 0.01 * radius * faces.normal)
+                    own_side = side[row](faces.at - 0.01 * radius * faces.normal)
                     normal = np.einsum("ab,b...->a...", turn, faces.normal)
-                    a, b, flow = _flow(faces.gradient, faces.at, tip, turn, mode, beside)
+                    a, b, flow = _flow(faces.gradient, faces.at, tip, turn, mode, own_side)
                     # The remaining computed traction on a free face would only disturb.
                     through = np.sum((flow - np.einsum("ij...,i...->j...", a, b)) * normal, axis=0)
                     q_here = _falling(np.hypot(*(faces.at - tip[:, None, None])) / radius)

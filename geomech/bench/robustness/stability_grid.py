@@ -64,18 +64,18 @@ class Map:
                 yield Cell(self.title, f"{row:g}", f"{column:g}", verdict, **asdict(found), reason=reason)
 
     def _judged(self, row: float, column: float) -> tuple[str, Outcome, str]:
-        heard = _Warnings()
+        collected = _Warnings()
         log = logging.getLogger("geomech")
-        log.addHandler(heard)
+        log.addHandler(collected)
         try:
             found = self.scene(row, column)
         except (ValueError, dda.NotConverged) as refusal:
             return REFUSED, Outcome(math.nan), str(refusal)
         finally:
-            log.removeHandler(heard)
+            log.removeHandler(collected)
         if found.error <= self.bound:
             return RIGHT, found, ""
-        return (REPORTED, found, heard.first) if heard.first else (WRONG, found, "")
+        return (REPORTED, found, collected.first) if collected.first else (WRONG, found, "")
 
 
 class _Warnings(logging.Handler):
@@ -94,20 +94,21 @@ def table(grid: Map, cells: Sequence[Cell]) -> Iterator[str]:
     yield f"{grid.title}: {grid.measure} (right below {grid.bound:g}); {grid.row_name} down, {grid.column_name} across"
     yield " " * 10 + "".join(f"{value:>11g}" for value in grid.columns)
     for k, row in enumerate(grid.rows):
-        mine = cells[k * len(grid.columns) : (k + 1) * len(grid.columns)]
+        row_cells = cells[k * len(grid.columns) : (k + 1) * len(grid.columns)]
         marks = (
-            f"{c.error:.1e}" + ("!" if c.verdict == WRONG else "") if c.verdict != REFUSED else "refused" for c in mine
+            f"{c.error:.1e}" + ("!" if c.verdict == WRONG else "") if c.verdict != REFUSED else "refused"
+            for c in row_cells
         )
         yield f"{row:>10g}" + "".join(f"{mark:>11}" for mark in marks)
     for verdict in (REFUSED, REPORTED):
         for reason in sorted({c.reason for c in cells if c.verdict == verdict})[:2]:
             yield f"    {verdict}: {reason}"
-    ran = [c for c in cells if c.verdict != REFUSED]
-    told = []
+    solved = [c for c in cells if c.verdict != REFUSED]
+    parts = []
     for quantity, name in QUANTITIES.items():
-        known = [value for value in (getattr(c, quantity) for c in ran) if not math.isnan(value)]
+        known = [value for value in (getattr(c, quantity) for c in solved) if not math.isnan(value)]
         if known and quantity == "cuts":
-            told.append(f"{sum(known):g} steps cut")
+            parts.append(f"{sum(known):g} steps cut")
         elif known:
-            told.append(f"{name.split(',')[0]} {max(known):.1e}")
-    yield "    largest " + ", ".join(told)
+            parts.append(f"{name.split(',')[0]} {max(known):.1e}")
+    yield "    largest " + ", ".join(parts)

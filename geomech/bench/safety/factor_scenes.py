@@ -229,8 +229,8 @@ def _two_blocks(rng, lean: float) -> _Drawn:
         slope = math.radians(steep)
         plane = (kink[0] + cut * math.cos(slope), kink[1] + cut * math.sin(slope))
         side = math.radians(90 - lean)
-        beside = (kink[0] + cut * math.cos(side), kink[1] + cut * math.sin(side))
-        active = [plane, back, (top, height), beside]
+        side_end = (kink[0] + cut * math.cos(side), kink[1] + cut * math.sin(side))
+        active = [plane, back, (top, height), side_end]
     drawn = _Drawn(
         _base(_frame(rng, "free", 8.0), base),
         {"passive": [(0.0, 0.0), kink, (top, height), (crest, height)], "active": active},

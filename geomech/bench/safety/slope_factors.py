@@ -25,7 +25,7 @@ from ..slopes.limited_runs import (
     RIGHT,
     VERDICTS,
     WRONG,
-    Heard,
+    CollectedWarnings,
     TimeUp,
     at_most,
     time_up,
@@ -83,8 +83,8 @@ class Factored:
     @property
     def off(self) -> float:
         """Largest difference of a search from the expected factor, with its sign."""
-        offs = [s.off(self.expected) for s in self.searches if not math.isnan(s.factor)]
-        return max(offs, key=abs, default=math.nan)
+        deviations = [s.off(self.expected) for s in self.searches if not math.isnan(s.factor)]
+        return max(deviations, key=abs, default=math.nan)
 
     @property
     def seconds(self) -> float:
@@ -114,9 +114,9 @@ def _search(slope: FactorSlope, variant: str, seconds: float) -> Searched:
     from ... import dda
 
     problem = problem_of(moved(slope.scene, VARIANTS[variant]))
-    heard, log, began = Heard(), logging.getLogger("geomech"), time.process_time()
-    log.addHandler(heard)
-    verdict, factor, message, said = WRONG, math.nan, "", ()
+    collected, log, began = CollectedWarnings(), logging.getLogger("geomech"), time.process_time()
+    log.addHandler(collected)
+    verdict, factor, message, result_warnings = WRONG, math.nan, "", ()
     try:
         with at_most(seconds):
             found = dda.factor_of_safety(
@@ -125,7 +125,7 @@ def _search(slope: FactorSlope, variant: str, seconds: float) -> Searched:
                 search=dda.FactorSearch(tolerance=TOLERANCE),
             )  # fmt: skip
         factor = found.factor if math.isfinite(found.upper) else math.inf
-        said = tuple(getattr(found, "warnings", ()))
+        result_warnings = tuple(getattr(found, "warnings", ()))
     except TimeUp as up:
         verdict, message = LONG, str(up)
     except Exception as error:  # any error other than the known ones is a finding
@@ -135,9 +135,9 @@ def _search(slope: FactorSlope, variant: str, seconds: float) -> Searched:
         elif isinstance(error, dda.NotConverged) and reason_of(error):
             verdict = REFUSED
     finally:
-        log.removeHandler(heard)
+        log.removeHandler(collected)
     spent = time.process_time() - began
-    warnings = (*said, *heard.said)
+    warnings = (*result_warnings, *collected.messages)
     if not math.isnan(factor):
         right = abs(_off(factor, slope.expected)) <= BOUND
         verdict = RIGHT if right else REPORTED if warnings else WRONG
@@ -192,7 +192,7 @@ def table(every: Sequence[Factored]) -> Measured:
     ]  # fmt: skip
     for each in every:
         by_variant = {search.variant: search for search in each.searches}
-        offs = "".join(
+        deviations = "".join(
             f"{by_variant[name].off(each.expected):10.4f}" if name in by_variant else f"{'-':>10}" for name in names
         )
         why = next((s.message for s in each.searches if s.message), "") or next(
@@ -201,7 +201,7 @@ def table(every: Sequence[Factored]) -> Measured:
         has = ", ".join([stretch if trait == "anchor" else trait for trait in each.traits])
         lines.append(
             f"{each.seed:4d}  {each.family:9s} {each.verdict:9s}  {each.toe:12s}{each.limit:8.4f} {each.bound:8.4f}"
-            f"{offs}{each.seconds:9.1f}  {has}{f'; {why[:90]}' if why else ''}"
+            f"{deviations}{each.seconds:9.1f}  {has}{f'; {why[:90]}' if why else ''}"
         )
     lines += ["", f"{'':12}" + "".join(f"{verdict:>10}" for verdict in VERDICTS) + "     above in silence   below"]
     for family in (*FAMILIES, "all"):

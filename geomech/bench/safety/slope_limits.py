@@ -74,13 +74,13 @@ def shared_faces(problem: Problem) -> Faces:
             a, b = max(a, 0.0), min(b, float(length[i]))
             if max(off) < 10 * near and b - a > 10 * near:
                 found.append((i, j, start[i] + a * unit[i], start[i] + b * unit[i]))
-    mine = np.array([row[0] for row in found], int)
-    theirs = np.array([row[1] for row in found], int)
-    names = [[blocks.edge_names[blocks.edge_name[k]] for k in of] for of in (mine, theirs)]
-    normal = np.stack([unit[mine, 1], -unit[mine, 0]], axis=1)
+    own_edge = np.array([row[0] for row in found], int)
+    other_edge = np.array([row[1] for row in found], int)
+    names = [[blocks.edge_names[blocks.edge_name[k]] for k in of] for of in (own_edge, other_edge)]
+    normal = np.stack([unit[own_edge, 1], -unit[own_edge, 0]], axis=1)
     law = np.array([problem.joint_index(a, b) for a, b in zip(*names)], int)
     ends = [np.array([row[k] for row in found]).reshape(-1, 2) for k in (2, 3)]
-    return Faces(owner[mine], owner[theirs], *ends, normal, [a or b for a, b in zip(*names)], law)
+    return Faces(owner[own_edge], owner[other_edge], *ends, normal, [a or b for a, b in zip(*names)], law)
 
 
 def loads_on_blocks(problem: Problem) -> np.ndarray:
@@ -220,11 +220,11 @@ def sliding_factor(problem: Problem, planes: Collection[str], interface: str = "
             if block >= 0:
                 loads[block] += sign * pull
     free = [int(b) for b in np.flatnonzero(~problem.blocks.fixed)]
-    held = [_held_on(problem, faces, {block}, planes) for block in free]
+    bearing = [_held_on(problem, faces, {block}, planes) for block in free]
     between = None
     if interface:
         between = _held_on(problem, faces, {free[0]}, {interface}, free[1])
-        ways = [np.stack(each.way) for each in held]
+        ways = [np.stack(each.way) for each in bearing]
         ratio = (ways[0] @ between.normal) / (ways[1] @ between.normal)
         slip = (ways[0] - ratio * ways[1]) @ between.tangent
         between = between.against(slip)
@@ -232,7 +232,7 @@ def sliding_factor(problem: Problem, planes: Collection[str], interface: str = "
     def surplus(factor: float) -> tuple[float, np.ndarray]:
         unknown = len(free) + (between is not None)
         matrix, right = np.zeros((2 * len(free), unknown)), np.zeros(2 * len(free))
-        for k, (block, on) in enumerate(zip(free, held)):
+        for k, (block, on) in enumerate(zip(free, bearing)):
             rows = slice(2 * k, 2 * k + 2)
             matrix[rows, k], fixed = on.forces(factor)
             right[rows] = -loads[block] - fixed
@@ -242,7 +242,7 @@ def sliding_factor(problem: Problem, planes: Collection[str], interface: str = "
                 matrix[rows, -1], right[rows] = sign * by_normal, right[rows] - sign * fixed
         # Normal forces from all equations except that of the last block along its plane; the surplus is that of the
         # latter.
-        way = held[-1].way
+        way = bearing[-1].way
         across = np.array([-way[1], way[0]])
         turn = np.eye(2 * len(free))
         turn[-2:, -2:] = [across, way]
@@ -284,9 +284,9 @@ class _Held:
 def _held_on(
     problem: Problem, faces: Faces, block: set[int], names: Collection[str], other: int | None = None
 ) -> _Held:
-    mine = np.array([name in names for name in faces.name], bool)
-    first = mine & np.isin(faces.block, list(block))
-    second = mine & np.isin(faces.other, list(block))
+    named = np.array([name in names for name in faces.name], bool)
+    first = named & np.isin(faces.block, list(block))
+    second = named & np.isin(faces.other, list(block))
     if other is not None:
         first, second = first & (faces.other == other), second & (faces.block == other)
     rows = np.flatnonzero(first | second)

@@ -17,7 +17,7 @@ from functools import partial
 from pathlib import Path
 
 from ..figures import Measured
-from .limited_runs import LONG, REFUSED, REPORTED, RIGHT, VERDICTS, WRONG, Heard, limited
+from .limited_runs import LONG, REFUSED, REPORTED, RIGHT, VERDICTS, WRONG, CollectedWarnings, limited
 from .random_slopes import scene_text
 from .refusals import REASONS
 from .seed_rows import program, rows_of_seeds
@@ -78,13 +78,13 @@ def watched(seed: int, seconds: float = LIMIT, text: str | None = None) -> Watch
     blocks = tips = 0
     events: Counter[str] = Counter()
 
-    def run(heard: Heard) -> Iterator[None]:
+    def run(collected: CollectedWarnings) -> Iterator[None]:
         nonlocal invariants, blocks, tips
         with tempfile.TemporaryDirectory() as folder:
             path = Path(folder) / f"slope_{seed}.toml"
             path.write_text(scene_text(seed) if text is None else text, encoding="utf-8")
             problem = load_scene(path).problem()
-        invariants = Invariants(problem, lambda: heard.said)
+        invariants = Invariants(problem, lambda: collected.messages)
         for cycle in cycles(problem):
             blocks, tips = cycle.blocks.n_blocks, max(tips, len(cycle.tips))
             events.update(event.kind for event in cycle.events)

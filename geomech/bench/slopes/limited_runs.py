@@ -25,15 +25,15 @@ class TimeUp(BaseException):
     """Not an error of the run: nothing may catch it."""
 
 
-class Heard(logging.Handler):
-    """The warnings so far, ``said``."""
+class CollectedWarnings(logging.Handler):
+    """Handler that collects the `messages` of warnings."""
 
     def __init__(self) -> None:
         super().__init__(logging.WARNING)
-        self.said: list[str] = []
+        self.messages: list[str] = []
 
     def emit(self, record: logging.LogRecord) -> None:
-        self.said.append(record.getMessage())
+        self.messages.append(record.getMessage())
 
 
 @dataclass(frozen=True)
@@ -49,14 +49,14 @@ class Ended:
     seconds: float = 0.0
 
 
-def limited(run: Callable[[Heard], Iterable], seconds: float) -> Ended:
-    """Exhaust ``run``, which takes the `Heard` and yields once per cycle, within ``seconds`` processor seconds."""
-    heard, log, began = Heard(), logging.getLogger("geomech"), time.process_time()
-    log.addHandler(heard)
+def limited(run: Callable[[CollectedWarnings], Iterable], seconds: float) -> Ended:
+    """Exhaust ``run``, which takes the `CollectedWarnings` and yields once per cycle, within ``seconds`` processor seconds."""
+    collected, log, began = CollectedWarnings(), logging.getLogger("geomech"), time.process_time()
+    log.addHandler(collected)
     verdict, reason, message, number = RIGHT, "", "", 0
     try:
         with at_most(seconds):
-            for _ in run(heard):
+            for _ in run(collected):
                 number += 1
     except TimeUp as up:
         verdict, message = LONG, str(up)
@@ -70,8 +70,8 @@ def limited(run: Callable[[Heard], Iterable], seconds: float) -> Ended:
             verdict = REFUSED if reason else WRONG
             message = str(error) if reason else traceback.format_exc(limit=-3)
     finally:
-        log.removeHandler(heard)
-    return Ended(verdict, reason, message, number, tuple(heard.said), time.process_time() - began)
+        log.removeHandler(collected)
+    return Ended(verdict, reason, message, number, tuple(collected.messages), time.process_time() - began)
 
 
 def time_up(error: BaseException | None) -> TimeUp | None:

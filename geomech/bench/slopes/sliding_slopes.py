@@ -20,7 +20,7 @@ from ...model import Joints, Problem
 from ...output.tables.summary import write_json
 from ..figures import Measured
 from .drawn_slopes import problem_of
-from .limited_runs import LONG, REFUSED, REPORTED, RIGHT, VERDICTS, WRONG, Ended, Heard, limited
+from .limited_runs import LONG, REFUSED, REPORTED, RIGHT, VERDICTS, WRONG, CollectedWarnings, Ended, limited
 from .moved_mass import BlockDisplacements
 from .seed_rows import program, rows_of_seeds
 from .sliding_scenes import Slope, random_slope, slab
@@ -115,7 +115,7 @@ def slid(
 def _run(problem: Problem, dt: float, threshold: float, seconds: float) -> _Run:
     last, iterations = None, []
 
-    def run(heard: Heard) -> Iterator[None]:
+    def run(collected: CollectedWarnings) -> Iterator[None]:
         nonlocal last
         settings = replace(problem.dda, time_step=dt)
         states = dda.run(

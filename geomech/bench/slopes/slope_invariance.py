@@ -34,7 +34,7 @@ from .drawn_slopes import (
     problem_of,
     reordered,
 )
-from .limited_runs import LONG, REFUSED, REPORTED, RIGHT, VERDICTS, WRONG, Ended, Heard, limited
+from .limited_runs import LONG, REFUSED, REPORTED, RIGHT, VERDICTS, WRONG, CollectedWarnings, Ended, limited
 from .moved_mass import BlockDisplacements, moving_from
 from .random_slopes import scene_text
 from .seed_rows import program, rows_of_seeds
@@ -167,7 +167,7 @@ def invariance(seed: int, seconds: float = LIMIT, text: str | None = None) -> In
         first = problem_of(scene)
     except ValueError as error:
         refusal = error
-        ended = limited(lambda heard: _raise(refusal), seconds)
+        ended = limited(lambda collected: _raise(refusal), seconds)
         return Invariance(seed, ended.verdict, reason=ended.reason or ended.message.strip())
     compared = _Compared(seed, scene, seconds)
     threshold = moving_from(first)
@@ -258,7 +258,7 @@ class _Compared:
 
         last = None
 
-        def run(heard: Heard) -> Iterator[None]:
+        def run(collected: CollectedWarnings) -> Iterator[None]:
             nonlocal last
             for cycle in cycles(problem):
                 last = cycle

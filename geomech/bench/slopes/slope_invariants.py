@@ -74,10 +74,10 @@ INVARIANTS = {
 
 class Invariants:
     """The cycles so far: ``worst`` of every quantity, ``faults`` beyond a bound without a warning, and those
-    ``reported`` by one. ``heard`` gives the warnings so far."""
+    ``reported`` by one. ``warnings`` gives the warnings so far."""
 
-    def __init__(self, problem: Problem, heard: Callable[[], list[str]]) -> None:
-        self.heard = heard
+    def __init__(self, problem: Problem, warnings: Callable[[], list[str]]) -> None:
+        self.warnings = warnings
         self.worst = dict.fromkeys(INVARIANTS, 0.0)
         self.faults: list[str] = []
         self.reported: list[str] = []
@@ -91,7 +91,7 @@ class Invariants:
         self._strain = 0.0
         self._standing: tuple[int, float, str] | None = None
         # Number of warnings at the last cycle, and at the one before.
-        self._heard_at = (0, 0)
+        self._warnings_before = (0, 0)
 
     def check(self, cycle: Cycle) -> None:
         broken = [*_nowhere(cycle), *_strayed(cycle)]
@@ -104,7 +104,7 @@ class Invariants:
         for of in (self._blocks, self._balance, self._growth, self._crack_faces):
             for name, value, where in of(cycle):
                 self._take(name, value, f"cycle {cycle.number}: {where}")
-        self._heard_at = (self._heard_at[1], len(self.heard()))
+        self._warnings_before = (self._warnings_before[1], len(self.warnings()))
 
     def end(self) -> None:
         """After the last cycle of a run that reached its end: its tips are at rest."""
@@ -116,9 +116,9 @@ class Invariants:
         invariant = INVARIANTS[name]
         bound = invariant.bound + {"balance": self._strain, "overlap": self._rounded}.get(name, 0.0)
         if value > bound:
-            lines = self.heard()[0 if invariant.lasting else self._heard_at[0] :]
-            said = any(words in line for words in invariant.reported for line in lines)
-            (self.reported if said else self.faults).append(f"{where}: {name} {value:.2g}")
+            lines = self.warnings()[0 if invariant.lasting else self._warnings_before[0] :]
+            is_reported = any(words in line for words in invariant.reported for line in lines)
+            (self.reported if is_reported else self.faults).append(f"{where}: {name} {value:.2g}")
 
     def _blocks(self, cycle: Cycle) -> Iterator[tuple[str, float, str]]:
         blocks, vertices = cycle.blocks, cycle.state.vertices

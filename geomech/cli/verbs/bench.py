@@ -73,7 +73,7 @@ def _bench(options: argparse.Namespace) -> int:
         raise BadInput("--invariance belongs to slopes, with --seeds: geomech bench slopes --seeds 0-9 --invariance")
     unit, found = figures.yardstick(), {}
     spent: dict[str, dict[str, float]] = {}
-    print(figures.said(figures.machine()), end="\n\n")
+    print(figures.machine_text(figures.machine()), end="\n\n")
     for name in options.topics or TOPICS:
         began = time.perf_counter(), figures.processor_seconds()
         if name == "slopes" and options.invariance:

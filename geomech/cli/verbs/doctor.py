@@ -29,5 +29,5 @@ def _doctor(options: argparse.Namespace) -> int:
     for check in checks:
         print(f"{'ok  ' if check.good else 'FAIL'} {check.name:<12} {check.found}")
         if not check.good:
-            print(f"     {'':<12} → {check.mend}")
+            print(f"     {'':<12} → {check.remedy}")
     return DONE if all(check.good for check in checks) else FAILED

@@ -77,12 +77,12 @@ def _size(options: argparse.Namespace) -> tuple[int | None, int | None]:
 def _usual(run, options: argparse.Namespace, width: int | None) -> list[Path]:
     from ...render import draw
 
-    wishes = {"component": options.component, "width": width, "movie": options.gif}
-    return draw(run, options.out, **{key: value for key, value in wishes.items() if value is not None})
+    given = {"component": options.component, "width": width, "movie": options.gif}
+    return draw(run, options.out, **{key: value for key, value in given.items() if value is not None})
 
 
 def _fields(runs: list, options: argparse.Namespace, size: tuple[int | None, int | None]) -> list[Path]:
-    from ...render.fields.draw import Wish, draw_field, usual_field
+    from ...render.fields.draw import PictureRequest, draw_field, usual_field
     from ...render.fields.even_movie import NoEncoder
     from ...render.fields.quantity import UnknownField
 
@@ -93,7 +93,7 @@ def _fields(runs: list, options: argparse.Namespace, size: tuple[int | None, int
     asked = runs[0].scene.get("render", {})
     try:
         field = options.field or options.component or usual_field(runs[0]) or asked.get("component", "yy")
-        wish = Wish(
+        request = PictureRequest(
             field=field, cycle=options.cycle, time=options.time, scale=options.scale,
             span=None if options.range is None else tuple(options.range),
             size=(size[0] or asked.get("width_px", 800), size[1]),
@@ -101,7 +101,7 @@ def _fields(runs: list, options: argparse.Namespace, size: tuple[int | None, int
             movies=(".gif",) * bool(options.gif) + (".mp4",) * options.mp4,
             frames_per_second=asked.get("frames_per_second", 10.0),
         )  # fmt: skip
-        return draw_field(runs, wish, options.out)
+        return draw_field(runs, request, options.out)
     except (UnknownField, NoEncoder, ValueError) as error:
         raise BadInput(str(error)) from None
     except KeyError as error:

@@ -97,7 +97,7 @@ def _sweep(options: argparse.Namespace) -> int:
     if not options.quiet:
         report_compiling()
     from ...sweep.cluster import EngineRefused
-    from ...sweep.execution import CannotResume, Telling, carry_out_sweep, default_folder, engine_for, read_sweep
+    from ...sweep.execution import CannotResume, SweepMessages, carry_out_sweep, default_folder, engine_for, read_sweep
     from ...sweep.plan import plan_of
 
     given = _given(options)
@@ -117,10 +117,10 @@ def _sweep(options: argparse.Namespace) -> int:
         if not options.quiet:
             say(described(plan))
         engine = engine_for(plan, folder, options.workers, options.scheduler)
-        telling = Telling(None if options.quiet else say, options.log)
+        messages = SweepMessages(None if options.quiet else say, options.log)
         try:
             found = carry_out_sweep(
-                plan, folder, engine, resume=options.resume, overwrite=options.overwrite, telling=telling
+                plan, folder, engine, resume=options.resume, overwrite=options.overwrite, messages=messages
             )
         except KeyboardInterrupt:
             say(f"finished runs are kept; to continue: geomech sweep {options.scene} --out {folder} --resume")

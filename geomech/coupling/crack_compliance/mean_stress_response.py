@@ -150,8 +150,8 @@ class ByMeanStress:
             return False
         first, known.states = known.states is None, states
         compliance = passive(body.compliance(solution))
-        felt, _ = _limited(elastic, known.limit.T @ compliance @ known.limit)
-        if not first and felt <= SOFTEST * (1.0 + _SAME):
+        present_softness, _ = _limited(elastic, known.limit.T @ compliance @ known.limit)
+        if not first and present_softness <= SOFTEST * (1.0 + _SAME):
             return False
         before, (_, known.limit) = known.limit, _limited(elastic, compliance)
         return not np.allclose(before, known.limit, rtol=0.0, atol=_SAME)

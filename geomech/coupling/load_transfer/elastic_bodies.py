@@ -212,12 +212,14 @@ def inherited(history: dict, parent: np.ndarray, cracks: Cracks) -> dict:
     """child → memory of the faces of its ``cracks`` (`ddm.FaceMemory`), from ``history`` of the ``parent``
     (n_children,). Children keep the reference coordinates of their parent, and so its memory. The friction work so far
     is assigned to one of the children, so that sums over blocks count it once."""
-    found, told = {}, set()
+    found, assigned = {}, set()
     for child in np.unique(cracks.block).tolist():
         block = int(parent[child])
         if block in history:
-            found[child] = replace(history[block], work=0.0, released=Released()) if block in told else history[block]
-            told.add(block)
+            found[child] = (
+                replace(history[block], work=0.0, released=Released()) if block in assigned else history[block]
+            )
+            assigned.add(block)
     return found
 
 

@@ -142,14 +142,14 @@ class Watched:
         if not len(self.face_state) or not len(before.face_state):
             return []
         if self.same_faces(before):
-            mine = theirs = np.ones(len(self.crack), bool)
+            known_rows = known_before = np.ones(len(self.crack), bool)
             changed = self.face_state != before.face_state
         else:
-            mine, theirs = _of_both(self.segment, before.segment)
-            changed = mine
+            known_rows, known_before = _of_both(self.segment, before.segment)
+            changed = known_rows
         changes = []
         for c in np.unique(self.crack[changed]).tolist():
-            here, then = mine & (self.crack == c), theirs & (before.crack == c)
+            here, then = known_rows & (self.crack == c), known_before & (before.crack == c)
             for kind, last in _turns(before.face_state[then], self.face_state[here]):
                 rows = np.flatnonzero(here & changed & np.isin(self.face_state, _TAKES[kind]))
                 if len(rows):

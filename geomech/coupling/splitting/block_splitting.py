@@ -90,12 +90,12 @@ def split_blocks(
         return None
     motion = Motion.of(blocks, state.vertices)
     pieces: list[_Piece] = []
-    fate = np.full(cracks.n_segments, CRACK)
+    role = np.full(cracks.n_segments, CRACK)
     holder = np.full(cracks.n_segments, -1)
     for block in range(blocks.n_blocks):
         if block in cut:
             own = cut[block].segments
-            children, fate[own], holder[own] = _divide(blocks, state, cracks, cut[block], motion)
+            children, role[own], holder[own] = _divide(blocks, state, cracks, cut[block], motion)
             holder[own] += len(pieces)
             pieces += children
         else:
@@ -105,8 +105,8 @@ def split_blocks(
     children_blocks = _assemble(blocks, pieces)
     vertices = np.concatenate([now for piece in pieces for _, now, _ in piece.loops])
 
-    rest = _remaining(cracks, fate, holder)
-    held = np.isin(np.arange(len(parent)), rest.block)
+    rest = _remaining(cracks, role, holder)
+    cracked = np.isin(np.arange(len(parent)), rest.block)
     divided = np.bincount(parent, minlength=blocks.n_blocks)[parent] > 1
 
     stress = state.stress[parent].copy()
@@ -114,7 +114,7 @@ def split_blocks(
         for child in np.flatnonzero(divided):
             if int(parent[child]) in mean_stress:
                 stress[child] = mean_stress[int(parent[child])](children_blocks.loops(int(child)))
-    crack_strain = np.where((held | ~divided)[:, None], state.crack_strain[parent], 0.0)
+    crack_strain = np.where((cracked | ~divided)[:, None], state.crack_strain[parent], 0.0)
     after = replace(
         state,
         vertices=vertices,
@@ -275,12 +275,12 @@ def _centroid(loops: list[np.ndarray]) -> np.ndarray:
     return base + moment / area
 
 
-def _remaining(cracks: Cracks, fate: np.ndarray, holder: np.ndarray) -> Cracks:
+def _remaining(cracks: Cracks, role: np.ndarray, holder: np.ndarray) -> Cracks:
     """The remaining crack segments, with the new numbers of their blocks. A node on a new boundary becomes a mouth; a
     node shared by cracks of two parts is duplicated."""
-    rows = np.flatnonzero(fate == CRACK)
+    rows = np.flatnonzero(role == CRACK)
     on_wall = np.zeros(len(cracks.nodes), bool)
-    on_wall[cracks.segments[fate == WALL]] = True
+    on_wall[cracks.segments[role == WALL]] = True
     pairs = np.column_stack([cracks.segments[rows].ravel(), np.repeat(holder[rows], 2)])
     unique, number = np.unique(pairs, axis=0, return_inverse=True)
     return Cracks(

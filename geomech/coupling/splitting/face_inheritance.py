@@ -34,17 +34,17 @@ def from_their_faces(found: ContactSet, kept: np.ndarray, old: np.ndarray, paren
     parts = np.bincount(parent)[parent] > 1
     new = (parts[found.block] | parts[found.other]) & (parent[found.block] != parent[found.other])
     new &= (found.geometry[:, 4] > 0) & ~np.isin(_key(found.vertex, found.edge), _key(kept["vertex"], kept["edge"]))
-    heirs, of = [], []
+    rows_after, of = [], []
     for row in np.flatnonzero(new).tolist():
         nearest = _nearest(found, row, faces, parent)
         if nearest >= 0:
-            heirs.append(row)
+            rows_after.append(row)
             of.append(nearest)
-    if not heirs:
+    if not rows_after:
         return found
     memory = {name: getattr(found, name).copy() for name in _MEMORY}
     for name in _MEMORY:
-        memory[name][heirs] = faces[name][of]
+        memory[name][rows_after] = faces[name][of]
     # (Slip along the edge is the same seen from the other block, whose edge has the opposite direction.)
     return replace(found, **memory)
 

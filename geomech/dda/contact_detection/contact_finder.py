@@ -188,7 +188,7 @@ class ContactFinder:
             nodes = nodes_in_faces(vertex, edge, self._owner, self._flat, geometry, law, self._by_length[law])
         if nodes is not None:
             geometry[:, 4] = nodes.left(geometry[:, 4])
-            parent = nodes.heirs(met.parent, np.ascontiguousarray(old["state"]))
+            parent = nodes.continued(met.parent, np.ascontiguousarray(old["state"]))
         block, other = self._owner[vertex], self._owner[edge]
         springs = self._springs(block, other, law, geometry[:, 4], state.time >= self._softened_from)
         remembered = self._remembered(old, parent, state.time, geometry, springs, self._stiff[law])
@@ -204,8 +204,8 @@ class ContactFinder:
         keep = np.ones(len(vertex), bool)
         if nodes is not None:
             for name in ("normal", "shear") if len(old) else ():
-                borne = np.where(met.parent >= 0, old[name + "_force"][met.parent], 0.0)
-                remembered[name] = nodes.left(borne)
+                former_force = np.where(met.parent >= 0, old[name + "_force"][met.parent], 0.0)
+                remembered[name] = nodes.left(former_force)
             keep[nodes.node] = False
         glued = self._bonded_corners(vertices, vertex, edge, geometry, remembered["bonded"]) if glue_holds else None
         if glued is not None:
@@ -293,8 +293,8 @@ class ContactFinder:
         block, other = self._owner[table[:, 0]], self._owner[table[:, 1]]
         # A step that rounding smooths away does not count, and a vertex that is slightly behind a line that it has not
         # touched brings no energy: contacts begin without force there.
-        hair = _TOUCHING_DEPTH * np.sqrt(np.minimum(self._area[block], self._area[other]))
-        smoothed = (table[:, 3] == SMOOTHED) | ((geometry[:, 3] > -hair) & (len(old) > 0))
+        touching_depth = _TOUCHING_DEPTH * np.sqrt(np.minimum(self._area[block], self._area[other]))
+        smoothed = (table[:, 3] == SMOOTHED) | ((geometry[:, 3] > -touching_depth) & (len(old) > 0))
         smoothed &= (state == OPEN) & (remembered["bonded"] == 0) & (geometry[:, 3] < lift)
         lift = np.where(smoothed, geometry[:, 3], lift)
         # A vertex that has climbed a ramp continues from there with its penetration.
@@ -321,16 +321,16 @@ class ContactFinder:
             if points is not None:
                 kept[points.ends] = True
             out = found.inset & ~kept
-            stood = self._face_points(found, vertices, found.inset) if out.any() else None
-            found = _at_their_corners(found, stood, out, inside & kept)
+            inside_springs = self._face_points(found, vertices, found.inset) if out.any() else None
+            found = _at_their_corners(found, inside_springs, out, inside & kept)
         return replace(found, by_length=self._stiff_along[found.law]).placed(points)
 
     def _face_points(self, found: ContactSet, vertices: np.ndarray, inside: np.ndarray) -> FacePoints | None:
         """Locations of springs in the faces of the contacts ``found``; bonds have theirs inside the face where
         ``inside`` (n,)."""
-        borne = FaceForces(found.normal, found.bare, (found.bonded == 1) & (found.springs.tension > 0))
+        forces = FaceForces(found.normal, found.bare, (found.bonded == 1) & (found.springs.tension > 0))
         return FacePoints.of(
-            found.block, found.other, found.geometry, np.where(inside, 2, self._stiff[found.law]), borne,
+            found.block, found.other, found.geometry, np.where(inside, 2, self._stiff[found.law]), forces,
             least_face(found.block, found.other, self._area, self._fixed), partial(self._softened, found, vertices),
         )  # fmt: skip
 
@@ -674,18 +674,23 @@ def _sound_transit_time(blocks: Blocks, stiffness: np.ndarray, mass: np.ndarray)
     return float(np.hypot(*np.ptp(blocks.vertices, axis=0))) / slowest
 
 
-def _at_their_corners(found: ContactSet, stood: FacePoints | None, out: np.ndarray, inset: np.ndarray) -> ContactSet:
+def _at_their_corners(
+    found: ContactSet, inside_springs: FacePoints | None, out: np.ndarray, inset: np.ndarray
+) -> ContactSet:
     """The contacts ``found``, with springs of those that come ``out`` (n,) of their faces moved from ``inset`` to the
     corners.
 
     The forces that they had are kept: from the corners, faces that no longer match begin to press and to pull. Only
     spring forces count: what dashpots carried in the last step would remain as energy without a source.
     """
-    if stood is None:
+    if inside_springs is None:
         return replace(found, inset=inset)
     gap, full = found.geometry[:, 3], found.springs
-    soft, before = stood.springs(full, np.zeros(len(gap), bool)), stood.between_corners(found.gap_before)
-    spring = stood.at_corners(-soft.normal * before) / full.normal
+    soft, before = (
+        inside_springs.springs(full, np.zeros(len(gap), bool)),
+        inside_springs.between_corners(found.gap_before),
+    )
+    spring = inside_springs.at_corners(-soft.normal * before) / full.normal
     closed = (found.state != OPEN) | (found.bonded > 0)
     gap_kept = np.where(closed, gap + spring, np.minimum(gap, 0.0))
     # Blocks that were bent by the moments on their faces while the springs were inside are no longer bent.

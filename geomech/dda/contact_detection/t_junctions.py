@@ -32,22 +32,22 @@ class NodesInFaces(NamedTuple):
     neighbours: np.ndarray
     share: np.ndarray
 
-    def left(self, borne: np.ndarray) -> np.ndarray:
-        """(n,) ``borne`` (n,), tributary lengths or forces of all contacts, with the nodes' share moved to their
+    def left(self, carried: np.ndarray) -> np.ndarray:
+        """(n,) ``carried`` (n,), tributary lengths or forces of all contacts, with the nodes' share moved to their
         neighbours."""
-        return _left(borne, self.node, self.neighbours, self.share)
+        return _left(carried, self.node, self.neighbours, self.share)
 
-    def heirs(self, parent: np.ndarray, state: np.ndarray) -> np.ndarray:
+    def continued(self, parent: np.ndarray, state: np.ndarray) -> np.ndarray:
         """(n,) rows of the last step that contacts continue: ``parent`` (n,), −1 for new ones.
 
         A contact that is new, or was open, next to a node whose contact was closed continues that one. ``state``: of
         the last step's rows."""
-        return _heirs(parent, state, self.node, self.neighbours)
+        return _continued(parent, state, self.node, self.neighbours)
 
 
 @kept(fastmath=False, error_model="numpy", nogil=True)
-def _left(borne, node, neighbours, share):
-    out = borne.copy()
+def _left(carried, node, neighbours, share):
+    out = carried.copy()
     for k in range(node.shape[0]):
         # In this order: a node between passes on what it has received.
         for side in range(2):
@@ -57,7 +57,7 @@ def _left(borne, node, neighbours, share):
 
 
 @kept(fastmath=False, error_model="numpy", nogil=True)
-def _heirs(parent, state, node, neighbours):
+def _continued(parent, state, node, neighbours):
     out = parent.copy()
     for k in range(node.shape[0]):
         before = parent[node[k]]
@@ -82,15 +82,15 @@ def nodes_in_faces(
 
     ``owner`` and ``flat`` (n_vertices,): block, and `Blocks.in_side`; ``geometry`` (n, 7) and ``law`` (n,) as in
     `ContactSet`; ``by_length`` (n,) bool: contacts whose stiffness is proportional to their length."""
-    mine = flat[vertex] & by_length & (geometry[:, 4] > 0)
-    if not mine.any():
+    candidate = flat[vertex] & by_length & (geometry[:, 4] > 0)
+    if not candidate.any():
         return None
-    node, neighbours, share = _between(mine, vertex, edge, owner, geometry, law)
+    node, neighbours, share = _between(candidate, vertex, edge, owner, geometry, law)
     return NodesInFaces(node, neighbours, share) if len(node) else None
 
 
 @kept(fastmath=False, error_model="numpy", nogil=True)
-def _between(mine, vertex, edge, owner, geometry, law):
+def _between(candidate, vertex, edge, owner, geometry, law):
     n = vertex.shape[0]
     out = np.zeros(n, np.bool_)
     length = geometry[:, 4].copy()
@@ -105,7 +105,7 @@ def _between(mine, vertex, edge, owner, geometry, law):
             or (owner[vertex[first]] == b and owner[edge[first]] == a)
         ):
             first += 1
-        if not mine[r]:
+        if not candidate[r]:
             continue
         nx, ny = geometry[r, 1], geometry[r, 2]
         before, after = -np.inf, np.inf

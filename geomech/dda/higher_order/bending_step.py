@@ -389,7 +389,7 @@ class BendingAttempt(Attempt):
         self.points = np.concatenate([self.points, forces])
         acting = generalised(forces, self.edges[:0], self.midpoint.centroid)
         self.load = self.load + self.midpoint.loads_back(acting)
-        self.braked = dashpots.deflecting_work(forces, change)
+        self.dashpot_work = dashpots.deflecting_work(forces, change)
 
     def path(self, after: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         blocks, q, turned = self.blocks, self.deflection, self.state.rotation + self.increment[:, 2]
@@ -445,7 +445,7 @@ class BendingAttempt(Attempt):
         if self.actions is not None:
             worked += self.actions.deflecting_work(padded)
         if self.dashpots is not None:
-            worked += self.braked
+            worked += self.dashpot_work
         # Work of inertia with the mean acceleration of the step: of deflection alone, and of its coupling with strains.
         rate = 2.0 / dt**2 * (change - dt * self.rates)
         mean = self.acceleration[:, 3:]

@@ -281,8 +281,8 @@ class DeflectedBlocks:
             points, weights = polygon_points(moved.vertices[some], end[some], basis.centroid[b], 2 * int(self.order[b]))
             was = self.material_points(moved.vertices, points, np.full(len(points), b))
             field = self.basis.displacement(was, b)[..., :m] @ q[own]
-            mine = basis.displacement(points, b)[..., :m]
-            out[own] = np.einsum("n,naj,na...->j...", weights, mine, field) / basis.area[b]
+            own_basis = basis.displacement(points, b)[..., :m]
+            out[own] = np.einsum("n,naj,na...->j...", weights, own_basis, field) / basis.area[b]
         return out
 
     def kinetic(self, rates: np.ndarray, strain_rates: np.ndarray, angle: np.ndarray, density: np.ndarray) -> float:

@@ -422,36 +422,36 @@ def _matching(found: FaceContacts, memory: np.ndarray) -> np.ndarray:
     faces, n = found.on_faces, len(found)
     far = faces.far_ends(found.on_corners)
     # Coordinates along a face, in millionths, identify points.
-    mine = np.column_stack([found.vertex, found.edge, far, np.round(faces.place * _NAMED)]).astype(np.int64)
+    names_now = np.column_stack([found.vertex, found.edge, far, np.round(faces.place * _NAMED)]).astype(np.int64)
     names = [memory[name] for name in ("vertex", "edge", "far_vertex", "far_edge")]
-    theirs = np.column_stack([*names, np.round(memory["place"] * _NAMED)]).astype(np.int64)
-    if mine.shape == theirs.shape and np.array_equal(mine, theirs):
+    names_before = np.column_stack([*names, np.round(memory["place"] * _NAMED)]).astype(np.int64)
+    if names_now.shape == names_before.shape and np.array_equal(names_now, names_before):
         return np.arange(n)
-    number = np.unique(np.concatenate([mine, theirs]), axis=0, return_inverse=True)[1].ravel()
+    number = np.unique(np.concatenate([names_now, names_before]), axis=0, return_inverse=True)[1].ravel()
     row = np.full(int(number.max()) + 1, -1)
     row[number[n:]] = np.arange(len(memory))
     out = row[number[:n]]
     unknown = np.flatnonzero(out < 0)
     if len(unknown):
-        out[unknown] = _nearest(found, memory, mine, theirs, unknown)
+        out[unknown] = _nearest(found, memory, names_now, names_before, unknown)
     return out
 
 
 def _nearest(
-    found: FaceContacts, memory: np.ndarray, mine: np.ndarray, theirs: np.ndarray, unknown: np.ndarray
+    found: FaceContacts, memory: np.ndarray, names_now: np.ndarray, names_before: np.ndarray, unknown: np.ndarray
 ) -> np.ndarray:
     """(k,) as `_matching`, for the contacts ``unknown`` (k,) that are not in ``memory``.
 
-    ``mine`` (n, 5) and ``theirs`` identify contacts: corners by their vertex and edge, other points by their position.
+    ``names_now`` (n, 5) and ``names_before`` identify contacts: corners by their vertex and edge, other points by their position.
     """
-    alone, place = theirs[:, 2] < 0, theirs[:, 4]
+    alone, place = names_before[:, 2] < 0, names_before[:, 4]
     corner: dict[tuple[int, ...], int] = {}
-    for rows, ends in ((alone | (place == 0), theirs[:, :2]), (~alone & (place == _NAMED), theirs[:, 2:4])):
+    for rows, ends in ((alone | (place == 0), names_before[:, :2]), (~alone & (place == _NAMED), names_before[:, 2:4])):
         corner |= dict(zip(map(tuple, ends[rows].tolist()), np.flatnonzero(rows).tolist(), strict=True))
     low, high = np.minimum(memory["block"], memory["other"]), np.maximum(memory["block"], memory["other"])
     out = np.full(len(unknown), -1)
     for k, c in enumerate(unknown.tolist()):
-        v, e, w, f, at = mine[c].tolist()
+        v, e, w, f, at = names_now[c].tolist()
         known = corner.get((v, e), -1) if w < 0 or at == 0 else -1
         if known < 0 and at == _NAMED:
             known = corner.get((w, f), -1)

@@ -28,8 +28,8 @@ def refuse_unsupported(
     def refuse(which: np.ndarray, why: str) -> None:
         if which.any():
             block = int(np.argmax(which))
-            said = '"auto"' if order[block] == AUTO_ORDER else order[block]
-            raise ValueError(f"{names[block]!r} has order {said}: {why}")
+            order_text = '"auto"' if order[block] == AUTO_ORDER else order[block]
+            raise ValueError(f"{names[block]!r} has order {order_text}: {why}")
 
     refuse(cells & (order == 1), "cells glued to each other need an order from 2")
     refuse(bends & np.array([materials[m].rigid for m in blocks.material]), "a rigid block does not bend")

@@ -117,11 +117,11 @@ class Striking:
         there[:, 0] = np.minimum(there[:, 0], 0.0)
         # Sticking and closed contacts keep their velocity; sliding ones may be stopped.
         along = np.where(hit, ended[:, 1] - there[:, 1], np.where(settled.state[rows] == SLIP, 0.0, ended[:, 1]))
-        dull = ended[:, 0] - np.where(hit, there[:, 0], 0.0)
+        plastic = ended[:, 0] - np.where(hit, there[:, 0], 0.0)
         problem = problem._replace(along=along)
-        impulse, after = problem._replace(across=dull - np.where(hit, bouncing * there[:, 0], 0.0)).impulses()
+        impulse, after = problem._replace(across=plastic - np.where(hit, bouncing * there[:, 0], 0.0)).impulses()
         if bouncing[hit].any():
-            at_rest, least = problem._replace(across=dull).impulses()
+            at_rest, least = problem._replace(across=plastic).impulses()
             share = _without_gain(at_rest, impulse, np.where(hit[:, None], there, ended), problem, least, after)
             impulse, after = at_rest + share * (impulse - at_rest), least + share * (after - least)
         change = problem.speeds(after - blocks.velocity)
@@ -198,21 +198,21 @@ def touching_time(gap: np.ndarray, left: np.ndarray, begun: np.ndarray, ended: n
 
 
 def _without_gain(
-    dull: np.ndarray,
+    plastic: np.ndarray,
     bounced: np.ndarray,
     before: np.ndarray,
     problem: ImpulseProblem,
     least: np.ndarray,
     most: np.ndarray,
 ) -> float:
-    """The largest s in [0, 1] for which impulses ``dull`` + s (``bounced`` − ``dull``) (n, 2) create no energy. The two
+    """The largest s in [0, 1] for which impulses ``plastic`` + s (``bounced`` − ``plastic``) (n, 2) create no energy. The two
     give the velocities ``least`` and ``most`` (n_blocks, 3); relative velocities ``before`` (n, 2)."""
     start = problem.speeds(least - problem.velocity)
     way = problem.speeds(most - least)
-    more = bounced - dull
-    # Work of dull + s more on before + ½ (start + s way), quadratic in s.
-    zeroth = float((dull * (before + 0.5 * start)).sum())
-    first = float((more * (before + 0.5 * start)).sum() + 0.5 * (dull * way).sum())
+    more = bounced - plastic
+    # Work of plastic + s more on before + ½ (start + s way), quadratic in s.
+    zeroth = float((plastic * (before + 0.5 * start)).sum())
+    first = float((more * (before + 0.5 * start)).sum() + 0.5 * (plastic * way).sum())
     second = 0.5 * float((more * way).sum())
     if zeroth + first + second <= 0.0 or second <= 0.0:
         return 1.0

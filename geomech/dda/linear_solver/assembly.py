@@ -380,10 +380,10 @@ def assemble_contacts(
 
 
 def solve(
-    pattern: Pattern, data: np.ndarray, right: np.ndarray, symmetric: bool, force: float = 0.0, beside: bool = False,
+    pattern: Pattern, data: np.ndarray, right: np.ndarray, symmetric: bool, force: float = 0.0, alternate: bool = False,
     near: np.ndarray | None = None, within: float = RESIDUAL,
 ) -> np.ndarray:  # fmt: skip
-    """Unknowns (6 n,) in the pattern's order; ``force``, ``near``, ``within`` and ``beside`` as for
+    """Unknowns (6 n,) in the pattern's order; ``force``, ``near``, ``within`` and ``alternate`` as for
     `BlockSolver.solve`. Overwrites ``data`` when dense. Raises numpy.linalg.LinAlgError."""
     pattern.add_links(data)
     if pattern.solver is None:
@@ -398,5 +398,5 @@ def solve(
         if info != 0:
             raise np.linalg.LinAlgError(f"the step's matrix is singular (unknown {info - 1})")
         return x
-    solver = pattern.solver.beside if beside else pattern.solver
+    solver = pattern.solver.alternate if alternate else pattern.solver
     return solver.solve(data, right, within, force, near)

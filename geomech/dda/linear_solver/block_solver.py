@@ -168,7 +168,7 @@ class BlockSolver:
         self._factored = np.empty((self.n, 36))
         self._has_factors = False
         self._rough: Factors | None = None
-        self._beside: BlockSolver | None = None
+        self._alternate: BlockSolver | None = None
         self._rough_serves, self.single_only = True, False
         self._make_room_for_directions()
         #: Largest entry of the residual of the last solution.
@@ -188,17 +188,17 @@ class BlockSolver:
         return self._factors.tree.kept
 
     @property
-    def beside(self) -> BlockSolver:
+    def alternate(self) -> BlockSolver:
         """A second solver of the same pattern, for matrices of another kind that alternate with this one's, so that
         each is refactored in part. This solver itself where partial factorisation is not available, or for so many
         blocks that two would take too much memory: two of 50 000 take 3 GB, and without the second one steps that stop
         blocks take 4 % longer."""
         if not self.in_parts or 2 * self._factors.tree.own_room_size > KEPT:
             return self
-        if self._beside is None:
-            self._beside = BlockSolver(*self._pattern, self._factors.tree)
-            self._beside.work, self._beside.counts = self.work, self.counts
-        return self._beside
+        if self._alternate is None:
+            self._alternate = BlockSolver(*self._pattern, self._factors.tree)
+            self._alternate.work, self._alternate.counts = self.work, self.counts
+        return self._alternate
 
     def _make_room_for_directions(self) -> None:
         """Directions of coarse solutions, kept until the next matrix. For so many blocks that these use other factors,

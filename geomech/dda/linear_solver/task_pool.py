@@ -41,8 +41,8 @@ def add_at_once(typingctx, array, index, value):
 
     def codegen(context, builder, signature, args):
         kind = signature.args[0]
-        held = make_array(kind)(context, builder, args[0])
-        place = cgutils.get_item_pointer(context, builder, kind, held, [args[1]], wraparound=False)
+        array_struct = make_array(kind)(context, builder, args[0])
+        place = cgutils.get_item_pointer(context, builder, kind, array_struct, [args[1]], wraparound=False)
         return builder.atomic_rmw("add", place, args[2], "seq_cst")
 
     return types.int64(array, types.intp, types.int64), codegen

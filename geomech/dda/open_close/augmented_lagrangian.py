@@ -59,33 +59,33 @@ def settle_augmented(
     found: ContactSet,
     springs: Springs,
     gap: np.ndarray,
-    held: tuple[np.ndarray, np.ndarray],
+    incremented: tuple[np.ndarray, np.ndarray],
     tolerance: float,
 ) -> Settled:
     """The converged step of ``found`` with multipliers. ``solve`` (contacts, springs, starting gaps, stretch) iterates
-    open–close states; ``springs`` and starting ``gap`` (n,) are those of the step; ``held``: two arrays (n,), which
+    open–close states; ``springs`` and starting ``gap`` (n,) are those of the step; ``incremented``: two arrays (n,), which
     contacts have normal and shear penalty springs; ``tolerance`` m.
 
     Raises `Unsettled` if the multipliers do not converge.
     """
     n = len(found)
     closed = found.state != OPEN
-    pressed, drawn = closed & held[0], closed & held[1]
+    pressed, drawn = closed & incremented[0], closed & incremented[1]
     multiplier = np.concatenate([np.where(pressed, found.normal, 0.0), np.where(drawn, found.shear, 0.0)])
     stretch = found.stretch
-    unheld, mixing, iterations = found.shear, _Mixing(), 0
+    penalty_shear, mixing, iterations = found.shear, _Mixing(), 0
     for update in range(_MOST_UPDATES):
         if update and update % _PATIENCE == 0:
-            more = np.where(held[0], (_STIFFER - 1.0) * springs.normal, 0.0)
+            more = np.where(incremented[0], (_STIFFER - 1.0) * springs.normal, 0.0)
             gap = (springs.normal * gap + more * found.gap) / (springs.normal + more)
-            shear = np.where(held[1], _STIFFER, 1.0) * springs.shear
+            shear = np.where(incremented[1], _STIFFER, 1.0) * springs.shear
             springs, mixing = replace(springs, normal=springs.normal + more, shear=shear), _Mixing()
         normal, shear = multiplier[:n], multiplier[n:]
-        start = replace(found, shear=np.where(held[1], shear, unheld))
+        start = replace(found, shear=np.where(incremented[1], shear, penalty_shear))
         settled = solve(start, springs, gap - normal / springs.normal, stretch)
         iterations += settled.iterations
         closed = settled.state != OPEN
-        pressed, drawn = closed & held[0], closed & held[1]
+        pressed, drawn = closed & incremented[0], closed & incremented[1]
         sticks = drawn & (settled.state == STICK)
         left = np.where(drawn, (shear - settled.shear_force) / springs.shear, 0.0)
         off = max(np.abs(settled.gap[pressed]).max(initial=0.0), np.abs(left[sticks]).max(initial=0.0))

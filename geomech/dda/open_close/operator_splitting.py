@@ -52,9 +52,9 @@ class Proposal(NamedTuple):
 
 
 @kept(fastmath={"contract"}, error_model="numpy", nogil=True, **UNCOUNTED)
-def _turn(unknowns, contacts, law, rho, held, relaxation, at_hand, states):
+def _turn(unknowns, contacts, law, rho, intact, relaxation, at_hand, states):
     """The contact part of one iteration, for the blocks' ``unknowns`` (6 n_free,) and ``contacts`` (`ContactMotion`).
-    ``law`` (n, 6): gap, kₙ, kₛ, S₀, μ, c; ``rho`` (2, n) normal and tangential; ``held`` (n,): bonded. ``at_hand`` (n,
+    ``law`` (n, 6): gap, kₙ, kₛ, S₀, μ, c; ``rho`` (2, n) normal and tangential; ``intact`` (n,): unbroken bonds. ``at_hand`` (n,
     6): ζ, z and the forces ρ (2z − ζ − q), each normal and tangential; ``states``: state and direction (n,) of z."""
     state, direction = states
     block, other, order, vectors = contacts
@@ -67,22 +67,32 @@ def _turn(unknowns, contacts, law, rho, held, relaxation, at_hand, states):
             for a in range(6):
                 apart += vectors[c, 0, k + a] * unknowns[6 * b + a]
                 along += vectors[c, 1, k + a] * unknowns[6 * b + a]
-        gap, normal, shear, before, friction, firm = law[c, 0], law[c, 1], law[c, 2], law[c, 3], law[c, 4], law[c, 5]
-        hard, rough = rho[0, c], rho[1, c]
-        across = at_hand[c, 0] + relaxation * (apart - at_hand[c, 2])
-        slid = at_hand[c, 1] + relaxation * (along - at_hand[c, 3])
-        z, s = across, slid
+        gap, normal, shear, before, friction, cohesion = (
+            law[c, 0],
+            law[c, 1],
+            law[c, 2],
+            law[c, 3],
+            law[c, 4],
+            law[c, 5],
+        )
+        normal_rho, shear_rho = rho[0, c], rho[1, c]
+        normal_motion = at_hand[c, 0] + relaxation * (apart - at_hand[c, 2])
+        shear_motion = at_hand[c, 1] + relaxation * (along - at_hand[c, 3])
+        z, s = normal_motion, shear_motion
         state[c], direction[c] = OPEN, 0.0
-        if held[c] or gap + across < 0.0:
-            z = (hard * across - normal * gap) / (hard + normal)
-            s = (rough * slid + before) / (rough + shear)
-            strength, force = firm - friction * normal * (gap + z), before - shear * s
+        if intact[c] or gap + normal_motion < 0.0:
+            z = (normal_rho * normal_motion - normal * gap) / (normal_rho + normal)
+            s = (shear_rho * shear_motion + before) / (shear_rho + shear)
+            strength, force = cohesion - friction * normal * (gap + z), before - shear * s
             state[c] = STICK
-            if not held[c] and abs(force) > strength:
+            if not intact[c] and abs(force) > strength:
                 state[c], direction[c] = SLIP, (1.0 if force > 0.0 else -1.0)
-                s = slid + direction[c] * strength / rough
-        at_hand[c, 0], at_hand[c, 1], at_hand[c, 2], at_hand[c, 3] = across, slid, z, s
-        at_hand[c, 4], at_hand[c, 5] = hard * (2.0 * z - across - apart), rough * (2.0 * s - slid - along)
+                s = shear_motion + direction[c] * strength / shear_rho
+        at_hand[c, 0], at_hand[c, 1], at_hand[c, 2], at_hand[c, 3] = normal_motion, shear_motion, z, s
+        at_hand[c, 4], at_hand[c, 5] = (
+            normal_rho * (2.0 * z - normal_motion - apart),
+            shear_rho * (2.0 * s - shear_motion - along),
+        )
 
 
 def can_split(equations: Equations) -> bool:
@@ -109,9 +119,9 @@ class _Springs:
             return np.where(np.isfinite(softer), softer, 1.0)
 
         inertia = np.minimum(matrix[:, 0, 0], matrix[:, 1, 1])
-        loose, firm = of_softer(inertia), of_softer(np.maximum(inertia, matrix[:, 3, 3]))
-        self._mean = np.sqrt(loose * firm)
-        self._if_open, self._if_closed = np.sqrt(self._mean * loose), np.sqrt(self._mean * firm)
+        soft, stiff = of_softer(inertia), of_softer(np.maximum(inertia, matrix[:, 3, 3]))
+        self._mean = np.sqrt(soft * stiff)
+        self._if_open, self._if_closed = np.sqrt(self._mean * soft), np.sqrt(self._mean * stiff)
         self._become(found.state if found.tried is None else found.tried[0])
 
     def _become(self, state: np.ndarray) -> None:
@@ -148,20 +158,20 @@ def split(equations: Equations, bonded: np.ndarray, solver: ContactSolver) -> Pr
 
     slipped, slides = bonded == SLIPPED, found.state == SLIP
     friction = np.where(slides, springs.friction, springs.peak)
-    firm = np.where(slides, springs.sliding, springs.hold + np.where(slipped, springs.cohesion, 0.0))
-    held = (bonded > 0) & ~slipped
-    law = np.stack([equations.gap, springs.normal, springs.shear, found.shear, friction, firm], axis=1)
+    cohesion = np.where(slides, springs.sliding, springs.hold + np.where(slipped, springs.cohesion, 0.0))
+    intact = (bonded > 0) & ~slipped
+    law = np.stack([equations.gap, springs.normal, springs.shear, found.shear, friction, cohesion], axis=1)
 
     # Before the first iteration z is unknown: ζ starts as q − F/ρ.
     assert equations.expected is not None  # `split` is for motion
     unknowns, at_hand = equations.expected.copy(), np.zeros((len(found), 6))
-    strength = np.where(held, np.inf, friction * np.maximum(found.normal, 0.0) + firm)
+    strength = np.where(intact, np.inf, friction * np.maximum(found.normal, 0.0) + cohesion)
     forces = np.stack([found.normal, np.clip(found.shear, -strength, strength)], axis=1)
     at_hand[:, :2] = -forces / between.rho.T
     states = found.state.copy(), np.zeros(len(found))
     seen, relaxation, spent = states[0].copy(), 1.0, _FACTORS
     for taken in range(1, solver.splitting_iterations + 1):
-        _turn(unknowns, contacts, law, between.rho, held, relaxation, at_hand, states)
+        _turn(unknowns, contacts, law, between.rho, intact, relaxation, at_hand, states)
         relaxation, spent = _RELAXATION, spent + _TURN
         if taken % _LOOK == 0:
             changing = np.count_nonzero(states[0] != seen) / len(found)

@@ -124,8 +124,8 @@ class AdmissibleForces:
             raise Unsolved(found.message)
         friction = self.friction * self.reduced * (found.x[:n] - found.x[n : 2 * n])
         slope = -float(found.eqlin.marginals @ (shear @ friction))
-        held, own = slice(2 * n, 2 * n + len(bonded)), (self.cohesion * self.reduced)[bonded]
-        slope += float(own @ (found.upper.marginals[held] - found.lower.marginals[held]))
+        bond_rows, own = slice(2 * n, 2 * n + len(bonded)), (self.cohesion * self.reduced)[bonded]
+        slope += float(own @ (found.upper.marginals[bond_rows] - found.lower.marginals[bond_rows]))
         return float(found.fun), slope
 
     def balance(self, factor: float) -> bool:

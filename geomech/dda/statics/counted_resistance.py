@@ -128,14 +128,14 @@ def warn_of_toes_at_rest(system: BlockSystem, state: State, loads: Loads) -> Non
     weight = system.mass * float(np.hypot(*loads.gravity.at(state.time)))
     moved = np.hypot(*blocks.displacements(state.vertices).T)
     still = moved <= _UNMOVED * size
-    held = tuple(toe for toe in toes if still[toe.block] and toe.force > _HOLDS * weight[toe.block])
-    if held:
+    bearing = tuple(toe for toe in toes if still[toe.block] and toe.force > _HOLDS * weight[toe.block])
+    if bearing:
         log.warning(
             "t = %g s: %s, with corners as sharp as drawn, and bear%s %.4g kN/m. Sharp tips can support blocks that rounded "
             'ones would not: `geomech safety` gives the factor with and without; dda.equilibrium = "start" shows whether the '
             "blocks are stable",
-            state.time, _where(blocks, held), "s" if len({toe.block for toe in held}) == 1 else "",
-            sum(toe.force for toe in held) / 1e3,
+            state.time, _where(blocks, bearing), "s" if len({toe.block for toe in bearing}) == 1 else "",
+            sum(toe.force for toe in bearing) / 1e3,
         )  # fmt: skip
 
 

@@ -150,8 +150,8 @@ def _short_faces(
     for row in some:
         same = (low == low[row]) & (high == high[row])
         near = same & (np.hypot(*(point - point[row]).T) <= 1.5 * length[row])
-        beside = long[near[long]]
-        if (np.abs(_cross(across[row], across[beside])) > _LEANS).any():
+        partner = long[near[long]]
+        if (np.abs(_cross(across[row], across[partner])) > _LEANS).any():
             out |= near & is_short & (np.abs(_cross(across[row], across)) < _LEANS)
     return np.flatnonzero(out)
 

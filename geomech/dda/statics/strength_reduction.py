@@ -443,8 +443,8 @@ class _Bracket:
             if math.isinf(upper):
                 if self.lower >= _FARTHEST:
                     return self._answer(self.lower, None)
-                beside = _beside(self._aim, self.lower, tolerance) if math.isfinite(self._aim) else None
-                factor = 2.0 * self.lower if beside is None else beside
+                close_trial = _close_to(self._aim, self.lower, tolerance) if math.isfinite(self._aim) else None
+                factor = 2.0 * self.lower if close_trial is None else close_trial
             elif self._aim and sum(not t.stable for t in known) == 1:
                 factor = upper * (1.0 + _SECOND)
             elif upper > self.lower * (1.0 + tolerance):
@@ -508,15 +508,15 @@ def _drift_ends(trials: Sequence[Trial], lower: float, upper: float) -> float | 
 
 def _next_factor(trials: Sequence[Trial], lower: float, upper: float, tolerance: float) -> float:
     """The next F: close to the predicted factor, on the side that is farther away; the mean without a prediction."""
-    middle = 2.0 * lower * upper / (lower + upper)
+    harmonic_mean = 2.0 * lower * upper / (lower + upper)
     failed = [t for t in trials if not t.stable and math.isfinite(t.drift)]
     if len(failed) < 2:
-        return middle
-    beside = _beside(_pointed_at(trials, lower, upper), lower, tolerance)
-    return beside if beside is not None and beside < upper else middle
+        return harmonic_mean
+    close_trial = _close_to(_pointed_at(trials, lower, upper), lower, tolerance)
+    return close_trial if close_trial is not None and close_trial < upper else harmonic_mean
 
 
-def _beside(aim: float, lower: float, tolerance: float) -> float | None:
+def _close_to(aim: float, lower: float, tolerance: float) -> float | None:
     """The factor to try near the expected one, ``aim``: just below it or, if blocks are stable nearly up to it, just
     above; None if they are stable beyond it."""
     margin = _BESIDE * tolerance

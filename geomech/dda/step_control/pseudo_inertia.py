@@ -44,29 +44,29 @@ def balanced_attempt(
     attempt = short = Attempt(system, start, dt, found, cuts)
     left, size = attempt.inertia_and_size()
     begun, nothing, ahead = left, _NOTHING * size, None
-    held, bolted = left > nothing, reach > 0.0 and _bolts_hold(start)
+    supported, bolted = left > nothing, reach > 0.0 and _bolts_hold(start)
     for _ in range(_SOLUTIONS):
-        if not (held & (left > nothing)).any():
+        if not (supported & (left > nothing)).any():
             break
-        again = _again(system, start, attempt, np.where(held[:, None], attempt.increment, 0.0))
+        again = _again(system, start, attempt, np.where(supported[:, None], attempt.increment, 0.0))
         if again is None:
             break
         after = again.inertia_and_size()[0]
-        falls = after <= np.maximum(_FALLS * left, nothing)
-        if falls[held].all():
+        decreases = after <= np.maximum(_FALLS * left, nothing)
+        if decreases[supported].all():
             attempt, left = again, after
             continue
-        drawn = _Drawn.of(attempt, again, left, after, held & ~falls, reach) if bolted else None
-        there = None if drawn is None else _again(system, start, again, drawn.rest(again, held & falls))
-        if drawn is not None and there is not None and drawn.bears(there, left, held & falls, nothing):
-            attempt, left, held = there, there.inertia_and_size()[0], (held & falls) | drawn.blocks
+        drawn = _Drawn.of(attempt, again, left, after, supported & ~decreases, reach) if bolted else None
+        there = None if drawn is None else _again(system, start, again, drawn.rest(again, supported & decreases))
+        if drawn is not None and there is not None and drawn.bears(there, left, supported & decreases, nothing):
+            attempt, left, supported = there, there.inertia_and_size()[0], (supported & decreases) | drawn.blocks
             ahead = drawn.ahead if ahead is None else ahead
             if drawn.share < 1.0:
                 break
             continue
         if attempt.rest is not None:
             break
-        held &= falls
+        supported &= decreases
     return (
         short if ahead is not None and _too_far(attempt, ahead, left > np.maximum(_BACK * begun, nothing)) else attempt
     )
@@ -124,13 +124,13 @@ class _Drawn:
             return None
         return cls(slow, ahead * slow[:, None], min(1.0, reach / max(float(far[slow].max()), 1e-300)))
 
-    def bears(self, there: Attempt, left: np.ndarray, held: np.ndarray, nothing: np.ndarray) -> bool:
+    def bears(self, there: Attempt, left: np.ndarray, supported: np.ndarray, nothing: np.ndarray) -> bool:
         """Whether in the attempt ``there``, solved about `rest`, inertia takes as much less than what was ``left``,
-        (n_blocks,) N, as it should. ``held``: other blocks; ``nothing``: what counts as none."""
+        (n_blocks,) N, as it should. ``supported``: other blocks; ``nothing``: what counts as none."""
         least = np.where(self.blocks, 1.0 - _GONE * self.share, _FALLS)
         after = there.inertia_and_size()[0]
-        return bool((after <= np.maximum(least * left, nothing))[held | self.blocks].all())
+        return bool((after <= np.maximum(least * left, nothing))[supported | self.blocks].all())
 
-    def rest(self, again: Attempt, held: np.ndarray) -> np.ndarray:
-        """(n_blocks, 6) displacement to solve about, with that of ``again`` for the blocks ``held``."""
-        return np.where((held | self.blocks)[:, None], again.increment + self.share * self.ahead, 0.0)
+    def rest(self, again: Attempt, supported: np.ndarray) -> np.ndarray:
+        """(n_blocks, 6) displacement to solve about, with that of ``again`` for the blocks ``supported``."""
+        return np.where((supported | self.blocks)[:, None], again.increment + self.share * self.ahead, 0.0)

@@ -207,9 +207,9 @@ def _on_faces(solution: Solution):
     middle = np.flatnonzero(np.abs(t) <= max(0.5, np.abs(t).min()))
     points = np.tile(c.nodes[:, middle].reshape(-1, 2), (2, 1))
     inward = np.concatenate([side * np.repeat(c.normal, len(middle), axis=0) for side in (1.0, -1.0)])
-    beside = np.tile(np.repeat(_BESIDE * c.length, len(middle)), 2)[:, None] * inward
+    offset = np.tile(np.repeat(_BESIDE * c.length, len(middle)), 2)[:, None] * inward
     segment = np.tile(np.repeat(c.source, len(middle)), 2)
-    return points, inward, segment, lambda which: solution.stress((points + beside)[which])
+    return points, inward, segment, lambda which: solution.stress((points + offset)[which])
 
 
 def _on_free_surface(solution: Solution, settings: GrowthSettings):
@@ -298,7 +298,7 @@ def _from_surface(solution, material, settings, points, inward, segment, stress)
     loops = solution.body.limits
     for kind, way in _ways(stress, material, inward):
         here = np.flatnonzero(np.isfinite(way[:, 0]))
-        felt = stress[here]
+        acting = stress[here]
         if settings.initiation_distance > 0:
             # Gauss points in the root of the distance, which resolve a rise as 1/√r towards a corner.
             t, weight = np.polynomial.legendre.leggauss(5)
@@ -307,8 +307,8 @@ def _from_surface(solution, material, settings, points, inward, segment, stress)
             inner = points[here, None] + at[None, :, None] * way[here, None]
             ok = inside(loops, inner.reshape(-1, 2)).reshape(len(here), len(t)).all(axis=1)
             here, inner = here[ok], inner[ok]
-            felt = np.einsum("k,nkc->nc", weight * root, solution.stress(inner.reshape(-1, 2)).reshape(-1, len(t), 3))
-        size = _on_plane(kind, felt, way[here], material)
+            acting = np.einsum("k,nkc->nc", weight * root, solution.stress(inner.reshape(-1, 2)).reshape(-1, len(t), 3))
+        size = _on_plane(kind, acting, way[here], material)
         for row, value in zip(here.tolist(), size.tolist()):
             yield NewCrack(
                 kind,
@@ -332,11 +332,11 @@ def _ways(stress: np.ndarray, material: Material, inward: np.ndarray) -> Iterato
         return way
 
     across = angle + math.pi / 2  # the direction of σ3, along which tensile cracks run
-    tears = reached(tension, shear)
-    yield "tension", into(across, (tension > 0) & tears)
+    tensile = reached(tension, shear)
+    yield "tension", into(across, (tension > 0) & tensile)
     slant = math.pi / 4 - material.friction_angle / 2
     for turn in (slant, -slant):
-        yield "shear", into(across + turn, ~tears)
+        yield "shear", into(across + turn, ~tensile)
 
 
 def _on_plane(kind: str, stress: np.ndarray, way: np.ndarray, material: Material) -> np.ndarray:
@@ -348,8 +348,8 @@ def _on_plane(kind: str, stress: np.ndarray, way: np.ndarray, material: Material
     pull = np.sum(t * normal, axis=1)
     if kind == "tension":
         return np.maximum(pull, 0.0) / material.tensile_strength
-    rub = np.abs(np.sum(t * way, axis=1))
-    return np.maximum(rub + pull * math.tan(material.friction_angle), 0.0) / material.cohesion
+    shear_stress = np.abs(np.sum(t * way, axis=1))
+    return np.maximum(shear_stress + pull * math.tan(material.friction_angle), 0.0) / material.cohesion
 
 
 def _in_rock(solution, material, settings) -> Iterator[NewCrack]:
@@ -370,15 +370,15 @@ def _in_rock(solution, material, settings) -> Iterator[NewCrack]:
     points = points[_away(body.cracks, points, np.full(len(points), -1), settings)]
     stress = solution.stress(points)
     tension, shear, angle = overstress(stress, material)
-    tears = reached(tension, shear)
-    theta = angle + math.pi / 2 + np.where(tears, 0.0, math.pi / 4 - material.friction_angle / 2)
+    tensile = reached(tension, shear)
+    theta = angle + math.pi / 2 + np.where(tensile, 0.0, math.pi / 4 - material.friction_angle / 2)
     # The second end is the one to the right; of a vertical crack the upper one.
     quarter = math.pi / 2 - ONE_WAY
     theta = np.mod(theta + quarter, math.pi) - quarter
     half = 0.5 * settings.increment * np.column_stack([np.cos(theta), np.sin(theta)])
     for k in np.flatnonzero(np.maximum(tension, shear) > 0).tolist():
         value = float(max(tension[k], shear[k]))
-        kind = "tension" if tears[k] else "shear"
+        kind = "tension" if tensile[k] else "shear"
         yield NewCrack(
             kind, "rock", value, tuple((points[k] - half[k]).tolist()), tuple((points[k] + half[k]).tolist())
         )

@@ -126,7 +126,7 @@ class Chords:
         angle = tips["angle"].copy()
         first = self.looks == 1
         known = np.isfinite(self.kappa)
-        kappa, told = (
+        kappa, determined = (
             (np.where(known, self.kappa, self._first_guess(turns)), known) if first else self._secant(turns, angle)
         )
         share = np.maximum(self.share, 1 - 1 / np.maximum(kappa, 1.0))
@@ -151,7 +151,7 @@ class Chords:
             unsettled = off & ~np.where(known, left <= TOLERANCE, smooth)
             # That determines κ: the next trial has half a turn, which suits trials without correction (`ACCEPTED_TURN`). A
             # straight path does not determine κ.
-            told = known | (smooth & ~(straight & (np.abs(turns) < ONE_WAY)))
+            determined = known | (smooth & ~(straight & (np.abs(turns) < ONE_WAY)))
         else:
             unsettled = off & (left > TOLERANCE)
             if self.looks == 2:
@@ -159,7 +159,7 @@ class Chords:
                 gentle = self.onward & (kappa < GENTLE)
                 tips["angle"][gentle], unsettled = self.whole[gentle], unsettled & ~gentle
         self.last_angle, self.last_turns = angle, turns
-        self.kappa = np.where(told, kappa, np.nan)
+        self.kappa = np.where(determined, kappa, np.nan)
         if (np.abs(tips["angle"] - angle)[seen] <= ACCEPTED_TURN).all():
             tips["angle"] = angle
             return True
@@ -168,8 +168,8 @@ class Chords:
     def remember(self, memory: Memory, tips: np.ndarray, growth: Growth, cycle: int) -> None:
         """Store in ``memory``, by their ends, the data of the accepted steps."""
         ends = _new_ends(tips, growth.grown, growth.cracks, cycle)
-        told = np.stack([self.kappa, tips["angle"], self.last_angle, self.last_turns, self.start], axis=1).tolist()
-        for point, end, step in zip(tips["point"].tolist(), ends, told):
+        rows = np.stack([self.kappa, tips["angle"], self.last_angle, self.last_turns, self.start], axis=1).tolist()
+        for point, end, step in zip(tips["point"].tolist(), ends, rows):
             if end >= 0:
                 memory.pop(tuple(point), None)
                 memory[tuple(growth.cracks.nodes[end].tolist())] = Remembered(*step)

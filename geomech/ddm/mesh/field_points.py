@@ -57,32 +57,32 @@ class ElementEnds:
 
         Returns the points, followed by the second points of the k that have two, and the indices (k,) of these.
         """
-        who, at, distance = within(points, self.points, np.where(self.tip, self.near, self.reach))
-        if not len(who):
-            return points, who
+        row, at, distance = within(points, self.points, np.where(self.tip, self.near, self.reach))
+        if not len(row):
+            return points, row
         # The nearest end, where several are close.
-        order = np.lexsort((distance, who))
-        order = order[np.r_[True, np.diff(who[order]) > 0]]
-        who, at, distance = who[order], at[order], distance[order]
+        order = np.lexsort((distance, row))
+        order = order[np.r_[True, np.diff(row[order]) > 0]]
+        row, at, distance = row[order], at[order], distance[order]
         moved = points.copy()
         double, single = self._straight[at], ~self._straight[at]
         # Twice the reach, so that neither point lies at the end.
         step = self._ahead[at[double]] * (2 * self.reach[at[double], None])
-        moved[who[double]] += step
-        second = points[who[double]] - step
-        self._move(moved, who[single], at[single], distance[single], side)
-        return np.concatenate([moved, second]), who[double]
+        moved[row[double]] += step
+        second = points[row[double]] - step
+        self._move(moved, row[single], at[single], distance[single], side)
+        return np.concatenate([moved, second]), row[double]
 
-    def _move(self, points, who, at, distance, side):
-        """Move the points ``who`` to the reach of the ends ``at``, in place."""
-        way = points[who] - self.points[at]
+    def _move(self, points, row, at, distance, side):
+        """Move the points ``row`` to the reach of the ends ``at``, in place."""
+        way = points[row] - self.points[at]
         here = distance <= self.near[at]
         rock = self._inward[at] + side * self._up[at]
         # The faces' normals may be opposite: then either serves.
         lost = np.hypot(*rock.T) < 1e-6
         rock[lost] = self._any[at[lost]]
         way[here] = rock[here]
-        points[who] = self.points[at] + way * (self.reach[at] / np.hypot(*way.T))[:, None]
+        points[row] = self.points[at] + way * (self.reach[at] / np.hypot(*way.T))[:, None]
 
 
 #: Element kinds with a tip at the start, and at the end.

@@ -2,7 +2,7 @@
 
 Unknowns are kept in order of arrival (`growing_lu`). A body with grown cracks shares matrix and factors with its
 predecessor, which stays valid, and computes only the rows and columns of new elements. Elements at tips are replaced in
-the next increment: they form a last, loose border of each body. Their rows are reused, since a tip element that becomes
+the next increment: they form a last, temporary border of each body. Their rows are reused, since a tip element that becomes
 an ordinary one gets other shape functions but keeps its collocation points. An element removed elsewhere stays in the
 matrix, and an additional unknown replaces its equation by w = 0 (Woodbury's formula).
 
@@ -25,9 +25,9 @@ from .influence_matrix import ElementSet, unknowns_of
 
 #: Fraction of removed elements above which S is factored again, as they still cost time.
 REMOVED = 0.25
-#: Several bodies may grow from one in different ways. Each keeps its own unknowns loose up to this fraction of all;
+#: Several bodies may grow from one in different ways. Each keeps its own unknowns temporary up to this fraction of all;
 #: beyond it the shared part is copied.
-LOOSE = 0.15
+TEMPORARY = 0.15
 #: Number of unknowns below which factoring takes less time than bordering.
 SMALLEST_BORDERED = 200
 #: Loss of accuracy, ‖L‖ ‖U‖ / ‖S‖ divided by the reciprocal condition, above which S is factored again: at this loss K
@@ -38,24 +38,30 @@ SINGULAR = "cracks separate a part from the body"
 
 
 class Bordered:
-    """S of the crack ``elements``: the first ``n_firm`` unknowns of the ``firm`` matrix, followed by a ``loose``
+    """S of the crack ``elements``: the first ``n_permanent`` unknowns of the ``permanent`` matrix, followed by a ``temporary``
     border. ``at`` (n_places,): numbers of the elements in this order, −1 for a removed element and for the unknown that
     replaces its equation. Before any growth there is a `WholeMatrix` instead."""
 
     def __init__(
         self,
         elements: ElementSet,
-        firm: GrowingFactor,
-        n_firm: int,
+        permanent: GrowingFactor,
+        n_permanent: int,
         at: np.ndarray,
-        loose: Border,
+        temporary: Border,
         together: tuple[Border, int] | None = None,
     ):
-        self.elements, self.firm, self.n_firm, self.at, self.loose = elements, firm, n_firm, at, loose
-        #: The last growth as one border, with the number of its unknowns that became firm.
+        self.elements, self.permanent, self.n_permanent, self.at, self.temporary = (
+            elements,
+            permanent,
+            n_permanent,
+            at,
+            temporary,
+        )
+        #: The last growth as one border, with the number of its unknowns that became permanent.
         self.together = together
         self.n = elements.n_unknowns
-        #: L (transposed) and U of the loose border, after its elimination.
+        #: L (transposed) and U of the temporary border, after its elimination.
         self.eliminated: tuple[np.ndarray, np.ndarray] | None = None
 
     @staticmethod
@@ -68,7 +74,7 @@ class Bordered:
     @property
     def unfactored(self) -> bool:
         """Whether `factored` will have to factor a whole matrix."""
-        return self.firm.unfactored
+        return self.permanent.unfactored
 
     def grown(
         self,
@@ -89,24 +95,24 @@ class Bordered:
 
     def _changed(self, elements: ElementSet, was: np.ndarray, seen: np.ndarray, compute) -> Bordered:
         width = 2 * elements.per
-        n_places = self.n_firm // width
+        n_places = self.n_permanent // width
         now = np.full(self.elements.n + 1, -1)  # the last entry is for elements removed earlier
         now[was[was >= 0]] = np.flatnonzero(was >= 0)
-        firm, loose = now[self.at[:n_places]], self.at[n_places:]
-        given_up = np.flatnonzero((self.at[:n_places] >= 0) & (firm < 0))
+        permanent, temporary = now[self.at[:n_places]], self.at[n_places:]
+        given_up = np.flatnonzero((self.at[:n_places] >= 0) & (permanent < 0))
         settled = np.zeros(elements.n, bool)
-        settled[firm[firm >= 0]] = True
+        settled[permanent[permanent >= 0]] = True
         came, at_tip = np.flatnonzero(~settled), _at_tips(elements, settled)
         came = np.concatenate([came[~at_tip[came]], came[at_tip[came]]])
         n_inner = len(came) - int(at_tip[came].sum())
-        # Places in the loose border of unchanged elements (columns) and of elements with the same rows.
+        # Places in the temporary border of unchanged elements (columns) and of elements with the same rows.
         place = np.full(self.elements.n + 1, -1)
-        place[loose] = np.arange(len(loose))
+        place[temporary] = np.arange(len(temporary))
         column, row = place[was[came]], place[seen[came]]
-        border = self._border(elements, came, firm, row, column, compute)
+        border = self._border(elements, came, permanent, row, column, compute)
         names = [elements.keys[k] for k in came[:n_inner].tolist()]
         m = width * n_inner
-        base, n = self.firm, self.n_firm
+        base, n = self.permanent, self.n_permanent
         inner, outer = _divided(border, m, self._known(row, column, width, 0, m), self._known(row, column, width, m))
         if given_up.size:
             names += [(place, "given up") for place in given_up.tolist()]
@@ -116,7 +122,7 @@ class Bordered:
         if n_new:
             if base.n > n and not base.continues_with(n, n_new, names):
                 # Another body has already grown from this one in a different way.
-                if width * len(came) < LOOSE * n and not given_up.size:
+                if width * len(came) < TEMPORARY * n and not given_up.size:
                     inner, outer = _divided(border, 0, None, self._known(row, column, width))
                     names, n_inner, n_new = [], 0, 0
                 else:
@@ -125,27 +131,27 @@ class Bordered:
                 base.append(inner, names)
                 if not given_up.size:
                     together = border._replace(known=self._known(row, column, width)), n_new
-        at = np.concatenate([firm, came[:n_inner], np.full(len(given_up), -1), came[n_inner:]])
+        at = np.concatenate([permanent, came[:n_inner], np.full(len(given_up), -1), came[n_inner:]])
         return Bordered(elements, base, n + n_new, at, outer, together)
 
-    def _border(self, elements, came, firm, row, column, compute) -> Border:
-        """Border of the new elements ``came`` (k,) to those at the places ``firm``. ``row`` and ``column`` (k,): places
-        in the loose border that their rows and columns are copied from, −1 where these are computed."""
+    def _border(self, elements, came, permanent, row, column, compute) -> Border:
+        """Border of the new elements ``came`` (k,) to those at the places ``permanent``. ``row`` and ``column`` (k,): places
+        in the temporary border that their rows and columns are copied from, −1 where these are computed."""
         width = 2 * elements.per
         every, (old, fresh) = np.arange(elements.n), (np.flatnonzero(row >= 0), np.flatnonzero(row < 0))
         old_c, new_c = np.flatnonzero(column >= 0), np.flatnonzero(column < 0)
         gone, numbers, here = (
-            np.flatnonzero(firm < 0),
-            unknowns_of(np.maximum(firm, 0), width),
+            np.flatnonzero(permanent < 0),
+            unknowns_of(np.maximum(permanent, 0), width),
             unknowns_of(came, width),
         )
-        k, n = width * len(came), width * len(firm)
+        k, n = width * len(came), width * len(permanent)
         down, right, corner = np.empty((n, k), order="F").T, np.empty((k, n)).T, np.empty((k, k), order="F")
         r_old, r_fresh, c_old, c_new = (unknowns_of(x, width) for x in (old, fresh, old_c, new_c))
         if len(old):
             from_r, from_c = unknowns_of(row[old], width), unknowns_of(column[old_c], width)
-            down[r_old], right.T[c_old] = self.loose.down[from_r], self.loose.right.T[from_c]
-            corner[np.ix_(r_old, c_old)] = self.loose.corner[np.ix_(from_r, from_c)]
+            down[r_old], right.T[c_old] = self.temporary.down[from_r], self.temporary.right.T[from_c]
+            corner[np.ix_(r_old, c_old)] = self.temporary.corner[np.ix_(from_r, from_c)]
         if len(new_c):
             values = compute(every, came[new_c])
             # Column-major: transposed, copying runs along memory.
@@ -162,7 +168,7 @@ class Bordered:
         return Border(down, right, corner, scale, None)
 
     def _known(self, row: np.ndarray, column: np.ndarray, width: int, first: int = 0, end: int | None = None):
-        """Factors that are already known of the elements at ``row`` and ``column`` of the eliminated loose border, for
+        """Factors that are already known of the elements at ``row`` and ``column`` of the eliminated temporary border, for
         the unknowns from ``first`` to ``end``."""
         if self.eliminated is None:
             return None
@@ -193,21 +199,21 @@ class Bordered:
     @cached_property
     def dense(self) -> np.ndarray:
         """(n, n) S."""
-        n, k = self.n_firm, len(self.loose.corner)
+        n, k = self.n_permanent, len(self.temporary.corner)
         out = np.empty((n + k, n + k), order="F")
-        out[:n, :n], out[n:, :n], out[:n, n:], out[n:, n:] = self.firm.matrix(n), *self.loose[:3]
+        out[:n, :n], out[n:, :n], out[:n, n:], out[n:, n:] = self.permanent.matrix(n), *self.temporary[:3]
         return out.T[np.ix_(self.places, self.places)].T
 
     def entries(self, rows: np.ndarray, columns: np.ndarray) -> np.ndarray:
         """(len(rows), len(columns)) of S, column-major."""
         if "dense" in vars(self):
             return _entries(self.dense, rows, columns)
-        n, firm = self.n_firm, self.firm.matrix(self.n_firm)
+        n, permanent = self.n_permanent, self.permanent.matrix(self.n_permanent)
         r, c = self.places[rows], self.places[columns]
         out = np.empty((len(r), len(c)), order="F")
         up, down, left, right = r < n, r >= n, c < n, c >= n
         for at, across, part in (
-            (up, left, firm), (down, left, self.loose.down), (up, right, self.loose.right), (down, right, self.loose.corner)
+            (up, left, permanent), (down, left, self.temporary.down), (up, right, self.temporary.right), (down, right, self.temporary.corner)
         ):  # fmt: skip
             i, j = r[at] - n * (at is down), c[across] - n * (across is right)
             out.T[np.ix_(across, at)] = _entries(part, i, j).T
@@ -217,11 +223,11 @@ class Bordered:
         """S ``w`` (n,) or (n, k)."""
         if "dense" in vars(self):
             return self.dense @ w
-        n, x = self.n_firm, np.zeros((self.n_firm + len(self.loose.corner), *w.shape[1:]))
+        n, x = self.n_permanent, np.zeros((self.n_permanent + len(self.temporary.corner), *w.shape[1:]))
         x[self.places] = w
         first, last = x[:n], x[n:]
-        above = self.firm.matrix(n) @ first + self.loose.right @ last
-        return np.concatenate([above, self.loose.down @ first + self.loose.corner @ last])[self.places]
+        above = self.permanent.matrix(n) @ first + self.temporary.right @ last
+        return np.concatenate([above, self.temporary.down @ first + self.temporary.corner @ last])[self.places]
 
     def factored(self) -> BorderedFactor:
         """Factors of S. Raises LinAlgError when it is singular."""
@@ -248,9 +254,9 @@ class WholeMatrix:
             return self
         if self._grown is None:
             known = self._factor if self._factor is not None and self._factor.columns else None
-            firm, n = GrowingFactor(self.dense, list(self.elements.keys), known), self.n
+            permanent, n = GrowingFactor(self.dense, list(self.elements.keys), known), self.n
             none = Border(np.empty((0, n)), np.empty((n, 0)), np.empty((0, 0)), np.empty(0), None)
-            self._grown = Bordered(self.elements, firm, n, np.arange(self.elements.n), none)
+            self._grown = Bordered(self.elements, permanent, n, np.arange(self.elements.n), none)
         return self._grown.grown(elements, was, seen, compute)
 
     def entries(self, rows: np.ndarray, columns: np.ndarray) -> np.ndarray:
@@ -272,32 +278,32 @@ class BorderedFactor:
     blocks; ``growth``: the loss of accuracy described at the top."""
 
     def __init__(self, of: Bordered):
-        self.n, self._places, self._firm, self._n_firm = of.n, of.places, of.firm, of.n_firm
-        firm, n = of.firm, of.n_firm
+        self.n, self._places, self._permanent, self._n_permanent = of.n, of.places, of.permanent, of.n_permanent
+        permanent, n = of.permanent, of.n_permanent
         border, m = of.together or (None, 0)
-        if border is not None and m and firm.is_next(n - m, m):
+        if border is not None and m and permanent.is_next(n - m, m):
             # Both in one solution: forty columns take hardly more time than twenty.
-            self._lower, self._upper, t = firm.eliminate_next(n - m, border, m, SINGULAR)
-            self.rcond, self.growth = firm.eliminate(n, SINGULAR)
+            self._lower, self._upper, t = permanent.eliminate_next(n - m, border, m, SINGULAR)
+            self.rcond, self.growth = permanent.eliminate(n, SINGULAR)
         else:
-            self.rcond, self.growth = firm.eliminate(n, SINGULAR)
-            self._lower, self._upper, t = firm.eliminate_border(n, of.loose)
-        self._scale, self._t = of.loose.scale, Factor(t, SINGULAR)
+            self.rcond, self.growth = permanent.eliminate(n, SINGULAR)
+            self._lower, self._upper, t = permanent.eliminate_border(n, of.temporary)
+        self._scale, self._t = of.temporary.scale, Factor(t, SINGULAR)
         self.rcond = min(self.rcond, self._t.rcond)
         self.growth = max(self.growth, loss(self._lower, self._upper, t))
-        of.eliminated, of.together, of.loose = (self._lower, self._upper), None, of.loose._replace(known=None)
+        of.eliminated, of.together, of.temporary = (self._lower, self._upper), None, of.temporary._replace(known=None)
 
     def solve(self, right: np.ndarray, transposed: bool = False) -> np.ndarray:
         """Solution for ``right`` (n,) or (n, k), of the ``transposed`` system if asked."""
-        n = self._n_firm
+        n = self._n_permanent
         # Transposed, so that indexing runs along memory.
         x = np.zeros((*right.shape[1:], n + len(self._scale))).T
         x.T[..., self._places] = right.T
-        beside, below = (self._lower, self._upper) if transposed else (self._upper, self._lower)
+        off_diagonal, below = (self._lower, self._upper) if transposed else (self._upper, self._lower)
         scale = self._scale if right.ndim == 1 else self._scale[:, None]
-        y = self._firm.forward_substitution(n, x[:n], transposed)
+        y = self._permanent.forward_substitution(n, x[:n], transposed)
         last = self._t.solve((x[n:] if transposed else x[n:] * scale) - below.T @ y, transposed)
-        x[:n] = self._firm.back_substitution(n, y - beside @ last, transposed)
+        x[:n] = self._permanent.back_substitution(n, y - off_diagonal @ last, transposed)
         x[n:] = last * scale if transposed else last
         return x.T[..., self._places].T
 

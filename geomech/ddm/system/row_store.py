@@ -41,13 +41,13 @@ class _GrowingRows:
 
 
 class KeptRows:
-    """A matrix (n, m) of the rows of ``elements``: the first ``n_firm`` rows of ``firm``, then the ``loose`` rows of
+    """A matrix (n, m) of the rows of ``elements``: the first ``n_permanent`` rows of ``permanent``, then the ``temporary`` rows of
     tip elements, which are replaced when the tip advances. ``at`` (n_elements,): positions of the elements in this
     order."""
 
-    def __init__(self, firm: _GrowingRows, n_firm: int, loose: np.ndarray, at: np.ndarray, width: int):
-        self._firm, self._n, self._loose, self.at, self._width = firm, n_firm, loose, at, width
-        self._total = n_firm + len(loose)
+    def __init__(self, permanent: _GrowingRows, n_permanent: int, temporary: np.ndarray, at: np.ndarray, width: int):
+        self._permanent, self._n, self._temporary, self.at, self._width = permanent, n_permanent, temporary, at, width
+        self._total = n_permanent + len(temporary)
         self._in_order = len(at) * width == self._total and bool((at == np.arange(len(at))).all())
         self._places = unknowns_of(at, width)
 
@@ -62,42 +62,45 @@ class KeptRows:
         width, n = self._width, self._n // self._width
         at = np.append(self.at, -1)[was]  # the last entry is for −1
         new = np.flatnonzero(at < 0)
-        # Other rows are old loose ones or are computed.
+        # Other rows are old temporary ones or are computed.
         come = np.flatnonzero((at < 0) | (at >= n))
         stay = elements.kind[come] == ORDINARY
         come = np.concatenate([come[stay], come[~stay]])
-        k, m = width * int(stay.sum()), self._loose.shape[1]
+        k, m = width * int(stay.sum()), self._temporary.shape[1]
         blocks = np.empty((len(come), width, m))
         old = at[come] >= 0
-        blocks[old] = self._loose.reshape(len(self._loose) // width, width, m)[at[come[old]] - n]
+        blocks[old] = self._temporary.reshape(len(self._temporary) // width, width, m)[at[come[old]] - n]
         if len(new):
             blocks[~old] = compute(come[~old]).reshape(len(new), width, m)
         at[come] = n + np.arange(len(come))
         rows = blocks.reshape(width * len(come), m)
-        firm = self._firm.extended(self._n, rows[:k]) if k else self._firm
-        out = KeptRows(firm, self._n + k, rows[k:], at, width)
+        permanent = self._permanent.extended(self._n, rows[:k]) if k else self._permanent
+        out = KeptRows(permanent, self._n + k, rows[k:], at, width)
         return out if out._total < CARRIED * len(out._places) else KeptRows.whole(out.dense, elements)
 
     def of(self, elements: np.ndarray) -> np.ndarray:
         """(k, m) rows of ``elements``."""
         places = unknowns_of(self.at[elements], self._width)
-        out, loose = np.empty((len(places), self._loose.shape[1])), places >= self._n
-        out[loose], out[~loose] = self._loose[places[loose] - self._n], self._firm.rows[places[~loose]]
+        out, temporary = np.empty((len(places), self._temporary.shape[1])), places >= self._n
+        out[temporary], out[~temporary] = (
+            self._temporary[places[temporary] - self._n],
+            self._permanent.rows[places[~temporary]],
+        )
         return out
 
     @property
     def dense(self) -> np.ndarray:
-        if self._in_order and not len(self._loose):
-            return self._firm.rows[: self._n]
-        return np.concatenate([self._firm.rows[: self._n], self._loose])[self._places]
+        if self._in_order and not len(self._temporary):
+            return self._permanent.rows[: self._n]
+        return np.concatenate([self._permanent.rows[: self._n], self._temporary])[self._places]
 
     def __matmul__(self, x: np.ndarray) -> np.ndarray:
         """(n,) or (n, k), column-major, the matrix times ``x`` (m,) or (m, k)."""
         # Writing the product column-major takes half the time.
         out = np.empty((self._total, *x.shape[1:]), order="F")
-        np.matmul(self._firm.rows[: self._n], x, out=out[: self._n])
-        if len(self._loose):
-            np.matmul(self._loose, x, out=out[self._n :])
+        np.matmul(self._permanent.rows[: self._n], x, out=out[: self._n])
+        if len(self._temporary):
+            np.matmul(self._temporary, x, out=out[self._n :])
         return out if self._in_order else out.T[..., self._places].T
 
     @property
@@ -109,7 +112,7 @@ class KeptRows:
         if not self._in_order:
             given, x = x, np.zeros((self._total, *x.shape[1:]))
             x[self._places] = given
-        return self._firm.rows[: self._n].T @ x[: self._n] + self._loose.T @ x[self._n :]
+        return self._permanent.rows[: self._n].T @ x[: self._n] + self._temporary.T @ x[self._n :]
 
 
 class TransposedRows:

@@ -61,10 +61,10 @@ class Bolt:
     name: str = "bolt"
 
     def __post_init__(self) -> None:
-        who = f"bolt {self.name!r}"
-        refuse_numbers(self, _NUMBERS, who)
-        refuse_point(f"{who}: its start", self.start)
-        refuse_point(f"{who}: its end", self.end)
+        subject = f"bolt {self.name!r}"
+        refuse_numbers(self, _NUMBERS, subject)
+        refuse_point(f"{subject}: its start", self.start)
+        refuse_point(f"{subject}: its end", self.end)
         if self.pretension > self.yield_force:
             raise ValueError(
                 f"bolt {self.name!r}: its pretension, {self.pretension:g} N/m, exceeds its yield force, "

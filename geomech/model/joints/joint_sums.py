@@ -37,8 +37,8 @@ def joint_names(blocks: Blocks, contacts: np.ndarray, joints: Sequence[JointLaw]
     joints = joints or (JointLaw("frictionless"),)
     edge = np.asarray(blocks.edge_name)
     name = edge[contacts["edge"]]
-    for beside in (edge[contacts["vertex"]], edge[blocks.previous_vertex[contacts["vertex"]]]):
-        name = np.where(name > 0, name, beside)
+    for vertex_edge_name in (edge[contacts["vertex"]], edge[blocks.previous_vertex[contacts["vertex"]]]):
+        name = np.where(name > 0, name, vertex_edge_name)
     by_law = np.array([law.name for law in joints], dtype=object)
     return np.where(name > 0, np.array(blocks.edge_names, dtype=object)[name], by_law[contacts["law"]])
 
@@ -74,10 +74,10 @@ def joint_sums(blocks: Blocks, contacts: np.ndarray, joints: Sequence[JointLaw])
     out["shear_force"] = total(np.abs(contacts["shear_force"]))
     friction = np.array([law.friction for law in joints])[contacts["law"]]
     cohesion = np.array([law.cohesion for law in joints])[contacts["law"]]
-    held = total(
+    strength = total(
         (friction * np.maximum(contacts["normal_force"], 0.0) + cohesion * length * (contacts["bonded"] > 0)) * ~is_open
     )
-    out["mobilised"] = np.where(held > 0, out["shear_force"] / np.where(held > 0, held, 1.0), 0.0)
+    out["mobilised"] = np.where(strength > 0, out["shear_force"] / np.where(strength > 0, strength, 1.0), 0.0)
     out["bonded_length"] = total(length * (contacts["bonded"] > 0) * (state >= STICK))
     return dict(zip(names.tolist(), out, strict=True))
 

@@ -19,7 +19,7 @@ SILENCE = 5.0
 _last = [time.monotonic()]
 
 
-def spoken() -> None:
+def note_output() -> None:
     """Record that something has been shown to the user just now."""
     _last[0] = time.monotonic()
 
@@ -52,7 +52,7 @@ class AtWork:
         self._course.add(0, 0.0, 0.0)
         self._compiled = Compiled()
         _studies.append(self)
-        spoken()
+        note_output()
         if not self.quiet:
             self._thread = threading.Thread(target=self._watch, name="at work", daemon=True)
             self._thread.start()
@@ -91,7 +91,7 @@ class AtWork:
                 continue
             now = time.monotonic() - self._began
             self._say(f"  {self.name}: running for {now:.0f} s{self._left(now)}")
-            spoken()
+            note_output()
 
     def _say(self, text: str) -> None:
         stream = self.stream or sys.stderr

@@ -169,8 +169,8 @@ def name_of_study(folder: Path, asked: object) -> str:
     return _digest(([(path.name, path.read_bytes()) for path in files], asked))
 
 
-def _digest(told: object) -> str:
-    return hashlib.sha256(repr(told).encode()).hexdigest()[:24]
+def _digest(settings: object) -> str:
+    return hashlib.sha256(repr(settings).encode()).hexdigest()[:24]
 
 
 def _file(name: str) -> Path:

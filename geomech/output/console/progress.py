@@ -20,7 +20,7 @@ from ..checkpoints import checkpoint_file
 from ..tables.deepest_penetration import limits_line
 from ..tables.motion_state import closing, state_text
 from ..units import duration_text, length_text, stress_text
-from .at_work import spoken
+from .at_work import note_output
 from .pace import Compiled, Course, Pace, name_of_run
 
 #: Number of warnings shown at the end of a run, and the largest length of each.
@@ -121,9 +121,9 @@ class Progress:
             if now - self._said >= self._bar.mininterval:
                 self._said = now
                 # The time left comes first: a narrow terminal cuts off the end.
-                said = f"{self._left(cycle).removeprefix(', ')}, {_cycle_text(cycle)}"
-                self._bar.set_postfix_str(said.removeprefix(", "), refresh=False)
-                spoken()
+                postfix = f"{self._left(cycle).removeprefix(', ')}, {_cycle_text(cycle)}"
+                self._bar.set_postfix_str(postfix.removeprefix(", "), refresh=False)
+                note_output()
             with suppress(OSError):  # the terminal is gone
                 self._bar.update(max(0.0, min(cycle.state.time, self._end) - self._bar.n))
         elif now - self._said >= self.interval:
@@ -178,7 +178,7 @@ class Progress:
     def _say(self, text: str) -> None:
         if self._out is None:
             return
-        spoken()
+        note_output()
         try:
             self._out.write(text + "\n")
             self._out.flush()

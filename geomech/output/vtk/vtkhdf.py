@@ -121,11 +121,11 @@ class HdfStore:
                 ("point", len(grid.points), grid.point_data),
                 ("cell", len(grid.types), grid.cell_data),
             ):
-                told = declared(name, place, count, arrays)
+                declared_arrays = declared(name, place, count, arrays)
                 for f in SERIES[name]:
                     if f.place == place:
                         array = np.zeros((count, *f.shape), f.dtype)
-                        value = np.asarray(told[f.name])
+                        value = np.asarray(declared_arrays[f.name])
                         array[(..., slice(value.shape[1])) if array.ndim == 2 else ...] = value
                         self._add(name, f"{place.capitalize()}Data/{f.name}", array)
             for key, number in numbers.items():

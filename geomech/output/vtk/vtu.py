@@ -194,7 +194,7 @@ class _Layout:
             attributes += "".join(f' ComponentName{k}="{c}"' for k, c in enumerate(column.components))
             tags[column.section].append(f'<DataArray {tuples}{attributes} offset="{at}"/>\n')
             at += size
-        active = {name: f" {said}" for name, said in ACTIVE.get(self._series, {}).items()}
+        active = {name: f" {assigned}" for name, assigned in ACTIVE.get(self._series, {}).items()}
         text = {
             name: f"<{name}{active.get(name, '')}>\n{''.join(reversed(lines))}</{name}>\n"
             for name, lines in tags.items()

@@ -54,8 +54,8 @@ def bridged_plane_multiplier(
     from the two formulas above. As the bridge gets shorter K rises, so that a bridge that breaks along the plane fails
     at once.
     """
-    held = cohesion * length + toughness * math.sqrt(math.pi * bridge / 2)
-    return held / driving_force(weight, dip, 0.0, 0.0, friction_angle)
+    resistance = cohesion * length + toughness * math.sqrt(math.pi * bridge / 2)
+    return resistance / driving_force(weight, dip, 0.0, 0.0, friction_angle)
 
 
 def jennings_rock_cohesion(apparent: float, persistence: float, joint: float) -> float:

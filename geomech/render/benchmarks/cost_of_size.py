@@ -39,11 +39,16 @@ def draw(costs: Sequence[Measured], other: Mapping[int, float], path: Path) -> P
     axes = figure.subplots()
     axes.loglog(list(other), [1e3 * s for s in other.values()], color="#c8553d", marker="^", label="Shi's DDA in C")
     for scene, (colour, marker) in zip(dict.fromkeys(c.scene for c in costs), _STYLES):
-        mine = [c for c in costs if c.scene == scene]
-        n = [c.blocks for c in mine]
-        axes.loglog(n, [1e3 * c.iteration for c in mine], color=colour, marker=marker, lw=2, label=scene)
+        selected = [c for c in costs if c.scene == scene]
+        n = [c.blocks for c in selected]
+        axes.loglog(n, [1e3 * c.iteration for c in selected], color=colour, marker=marker, lw=2, label=scene)
         axes.loglog(
-            n, [1e3 * c.search for c in mine], color=colour, ls=":", lw=1.2, label=f"{scene}, contact search of a step"
+            n,
+            [1e3 * c.search for c in selected],
+            color=colour,
+            ls=":",
+            lw=1.2,
+            label=f"{scene}, contact search of a step",
         )
     first = min(costs, key=lambda c: c.blocks)
     n = [first.blocks, max(c.blocks for c in costs)]
@@ -68,9 +73,9 @@ def draw_solvers(solutions: Sequence[Mapping[str, Any]], path: Path) -> Path:
     for panel, (scene, blocks) in zip(panels, scenes):
         here = [row for row in solutions if (row["scene"], row["blocks"]) == (scene, blocks)]
         for method, (colour, marker) in styles.items():
-            mine = sorted((row for row in here if row["method"] == method), key=lambda row: -row["residual"])
+            selected = sorted((row for row in here if row["method"] == method), key=lambda row: -row["residual"])
             panel.loglog(
-                [row["residual"] for row in mine], [1e3 * row["seconds"] for row in mine], color=colour, marker=marker,
+                [row["residual"] for row in selected], [1e3 * row["seconds"] for row in selected], color=colour, marker=marker,
                 lw=1.5, label=method,
             )  # fmt: skip
         panel.set_title(f"{scene}, {blocks} blocks", fontsize=10, loc="left")
@@ -100,11 +105,11 @@ def draw_cutting(costs: Sequence[Cut], path: Path) -> Path:
     figure = Figure(figsize=(7.2, 5.2), dpi=130, layout="constrained")
     axes = figure.subplots()
     for network, (colour, marker) in zip(dict.fromkeys(c.network for c in costs), _STYLES):
-        mine = [c for c in costs if c.network == network]
-        last = mine[-1]
+        selected = [c for c in costs if c.network == network]
+        last = selected[-1]
         label = f"{network}, {last.blocks / last.cutting:,.0f} blocks/s at {last.blocks:,}".replace(",", "\u202f")
         axes.loglog(
-            [c.blocks for c in mine], [c.cutting for c in mine], color=colour, marker=marker, lw=2,
+            [c.blocks for c in selected], [c.cutting for c in selected], color=colour, marker=marker, lw=2,
             label=label.replace("\u202f", ",", 1),
         )  # fmt: skip
     low, high = min(costs, key=lambda c: c.blocks), max(costs, key=lambda c: c.blocks)

@@ -46,12 +46,12 @@ def draw(grids: Sequence[Grid], cells: Sequence[Judged], path: Path, quantities:
     figure, panels, foot = _panels([len(grid.rows) for grid in grids], 1 + len(quantities))
     shades = {quantity: _Shades([getattr(c, quantity) for c in cells]) for quantity in quantities}
     for row, grid in zip(panels, grids):
-        mine = [c for c in cells if c.map == grid.title]
-        texts = ["–" if c.verdict == "refused" else _short(c.error) for c in mine]
-        _squares(row[0], grid, [COLOURS[c.verdict] for c in mine], texts)
+        selected = [c for c in cells if c.map == grid.title]
+        texts = ["–" if c.verdict == "refused" else _short(c.error) for c in selected]
+        _squares(row[0], grid, [COLOURS[c.verdict] for c in selected], texts)
         row[0].set_title(f"{grid.title}: error, right below {grid.bound:g}", fontsize=10, loc="left")
         for panel, (quantity, name) in zip(row[1:], quantities.items()):
-            values = [math.nan if c.verdict == "refused" else float(getattr(c, quantity)) for c in mine]
+            values = [math.nan if c.verdict == "refused" else float(getattr(c, quantity)) for c in selected]
             if all(math.isnan(value) for value in values):
                 panel.set_axis_off()
                 continue
@@ -100,9 +100,9 @@ def _panels(rows: Sequence[int], across: int):
     # Margins in inches, the same for all: a layout that measures every text takes longer than everything else.
     over, under, square, foot = 0.35, 0.55, 0.21, 0.4
     if across == 1:
-        abreast = 3
-        rows = [max(rows[k : k + abreast]) for k in range(0, len(rows), abreast)]
-        figure, made, height = _stacked(Figure, rows, abreast, over, under, square, foot)
+        n_columns = 3
+        rows = [max(rows[k : k + n_columns]) for k in range(0, len(rows), n_columns)]
+        figure, made, height = _stacked(Figure, rows, n_columns, over, under, square, foot)
         return figure, [[panel] for row in made for panel in row], 0.08 / height
     figure, made, height = _stacked(Figure, rows, across, over, under, square, foot)
     return figure, made, 0.08 / height

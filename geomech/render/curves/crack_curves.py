@@ -61,8 +61,8 @@ def stress_intensity(axes: Axes, run: Run) -> None:
     if toughness:
         axes.axhline(toughness / 1e6, color="#222222", lw=0.9, ls=":", label=r"$K_{Ic}$")
     # With many curves none of the corners is free.
-    beside = {"loc": "upper left", "bbox_to_anchor": (1.0, 1.0)} if others else {}
-    axes.legend(frameon=False, fontsize=8, **beside)
+    placement = {"loc": "upper left", "bbox_to_anchor": (1.0, 1.0)} if others else {}
+    axes.legend(frameon=False, fontsize=8, **placement)
     low, high = _calm_span(run)
     title = run.title
     if high > low:
@@ -89,8 +89,8 @@ def _foremost(curves: list[TipCurve]) -> list[int]:
 
 def _calm_span(run: Run) -> tuple[float, float]:
     """Least and largest K_I or K_II, MPa√m, right after load increments; of many tips, the percentile `MOST_TIPS`."""
-    calm = run.history["cycle"][run.history["growth_pass"] == 0]
-    tips = run.tips[np.isin(run.tips["cycle"], calm)]
+    converged_cycles = run.history["cycle"][run.history["growth_pass"] == 0]
+    tips = run.tips[np.isin(run.tips["cycle"], converged_cycles)]
     every = np.concatenate([tips["K_I"], tips["K_II"]]) / 1e6
     every = every[np.isfinite(every)]
     if not len(every):
@@ -110,18 +110,18 @@ def tip_curves(run: Run) -> list[TipCurve]:
     near = SAME * float(np.percentile(every, 90.0 if many else 100.0)) if len(every) else 0.0
     groups: list[tuple[list[tuple[int, int]], np.ndarray]] = []
     for crack, end in np.unique(np.stack([tips["crack"], tips["end"]], axis=1), axis=0).astype(int):
-        mine = tips[(tips["crack"] == crack) & (tips["end"] == end)]
+        own = tips[(tips["crack"] == crack) & (tips["end"] == end)]
         for members, known in groups:
-            if np.array_equal(known["cycle"], mine["cycle"]) and all(
-                np.abs(known[name] - mine[name]).max() <= near for name in ("K_I", "K_II")
+            if np.array_equal(known["cycle"], own["cycle"]) and all(
+                np.abs(known[name] - own[name]).max() <= near for name in ("K_I", "K_II")
             ):
                 members.append((crack, end))
                 break
         else:
-            groups.append(([(crack, end)], mine))
+            groups.append(([(crack, end)], own))
     return [
-        TipCurve(members, drive(run, mine), mine["K_I"] / 1e6, mine["K_II"] / 1e6, float(np.nansum(mine["grown_m"])))
-        for members, mine in groups
+        TipCurve(members, drive(run, own), own["K_I"] / 1e6, own["K_II"] / 1e6, float(np.nansum(own["grown_m"])))
+        for members, own in groups
     ]
 
 
@@ -135,7 +135,7 @@ def _tip_names(run: Run, members: list[tuple[int, int]], n_tips: int) -> str:
         name = names[crack] if crack < len(names) else f"crack {crack}"
         parts.append((f"{name}, {'both tips' if len(ends) > 1 else ('start', 'end')[ends[0]]}", len(ends)))
     more = sum(count for _, count in parts[SHARING:])
-    return "; ".join(told for told, _ in parts[:SHARING]) + (f"; {more} tips like them" if more else "")
+    return "; ".join(description for description, _ in parts[:SHARING]) + (f"; {more} tips like them" if more else "")
 
 
 def crack_length(axes: Axes, run: Run) -> None:
@@ -167,7 +167,7 @@ def length_ever(run: Run) -> np.ndarray:
     length = history["crack_length"]
     grown = np.zeros(len(history))
     row = np.minimum(np.searchsorted(history["cycle"], run.tips["cycle"]), len(history) - 1)
-    mine = np.isfinite(run.tips["grown_m"]) & (run.tips["cycle"] <= history["cycle"][-1])
-    np.add.at(grown, row[mine], run.tips["grown_m"][mine])
+    own = np.isfinite(run.tips["grown_m"]) & (run.tips["cycle"] <= history["cycle"][-1])
+    np.add.at(grown, row[own], run.tips["grown_m"][own])
     change = np.diff(length)
     return length[0] + np.concatenate([[0.0], np.cumsum(np.where(change < -1e-12, grown[:-1], change))])

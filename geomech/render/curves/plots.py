@@ -78,7 +78,7 @@ def _energy_curves(run: Run) -> dict[str, np.ndarray]:
     done = ("load_work", "gravity_work", "uneven_work")
     work = [history[name] for name in done if name in (history.dtype.names or ())]
     curves = {"work done": np.nansum(work, axis=0)} if work else {}
-    curves |= {told: history[name] for name, told in _ENERGIES.items() if name in (history.dtype.names or ())}
+    curves |= {label: history[name] for name, label in _ENERGIES.items() if name in (history.dtype.names or ())}
     largest = max((float(np.nanmax(np.abs(curve), initial=0.0)) for curve in curves.values()), default=0.0)
     return {
         name: curve

@@ -87,17 +87,17 @@ def draw_convergence(table: np.ndarray, path: Path) -> Path:
     return _saved(figure, path)
 
 
-def draw_tornado(swings: Sequence[Any], middle: float, label: str, path: Path) -> Path:
+def draw_tornado(swings: Sequence[Any], centre: float, label: str, path: Path) -> Path:
     """One bar for each of ``swings`` (name, low, high and their errors), from its mean at low to that at high values of
     the variable, around ``middle``."""
     figure = _figure(8.6, 0.9 + 0.42 * len(swings))
     axes = figure.subplots()
     for k, each in enumerate(swings):
         for value, error, colour in ((each.low, each.low_error, SOFT), (each.high, each.high_error, ACCENT)):
-            axes.barh(k, value - middle, 0.6, left=middle, color=colour)
+            axes.barh(k, value - centre, 0.6, left=centre, color=colour)
             if math.isfinite(error):
                 axes.plot([value - 1.96 * error, value + 1.96 * error], [k, k], color=INK, lw=1.2)
-    axes.axvline(middle, color=INK, lw=0.8)
+    axes.axvline(centre, color=INK, lw=0.8)
     axes.set_yticks(range(len(swings)), [each.name for each in swings], fontsize=8)
     axes.set_ylim(len(swings) - 0.5, -0.5)
     axes.set_xlabel(f"mean {label} where the variable is among its lowest (grey) and highest (blue) fifth")
@@ -197,8 +197,8 @@ def draw_map(
         vmax=top,
         interpolation="nearest",
     )
-    still = [outline for outline, held in zip(outlines, fixed, strict=True) if held]
-    free = [outline for outline, held in zip(outlines, fixed, strict=True) if not held]
+    still = [outline for outline, is_fixed in zip(outlines, fixed, strict=True) if is_fixed]
+    free = [outline for outline, is_fixed in zip(outlines, fixed, strict=True) if not is_fixed]
     axes.add_collection(PolyCollection(still, facecolors="#d5d2ca", edgecolors="none"))
     axes.add_collection(PolyCollection(free, facecolors="none", edgecolors=INK, linewidths=0.4, alpha=0.6))
     width, height = box[2] - box[0], box[3] - box[1]

@@ -10,6 +10,7 @@ import numpy as np
 
 from geomech.output.reading import Run
 
+from ...model.former_names import renamed_exports
 from ..pictures.field import COMPONENTS
 from ..pictures.look import final_cycle
 from .even_movie import even_movie
@@ -22,7 +23,7 @@ MOVES = 0.03
 
 
 @dataclass(frozen=True)
-class Wish:
+class PictureRequest:
     """Specification of a field picture; None: chosen for the run.
 
     cycle, time   the cycle, or the time (s), to draw; by default the run's final state (`final_cycle`)
@@ -83,8 +84,8 @@ def usual_field(run: Run) -> str | None:
     return "displacement" if np.abs(np.asarray(last["displacement"])).max() > MOVES * extent else None
 
 
-def draw_field(runs: Sequence[Run], wish: Wish, out: Path | None = None) -> list[Path]:
-    """Draw ``wish.field`` of ``runs`` with common colours into ``out`` (default: ``pictures`` in each run folder).
+def draw_field(runs: Sequence[Run], request: PictureRequest, out: Path | None = None) -> list[Path]:
+    """Draw ``request.field`` of ``runs`` with common colours into ``out`` (default: ``pictures`` in each run folder).
 
     Returns the paths. Raises UnknownField, NoEncoder, KeyError for a cycle or time before the first, and ValueError for
     a run without blocks.
@@ -92,35 +93,38 @@ def draw_field(runs: Sequence[Run], wish: Wish, out: Path | None = None) -> list
     for run in runs:
         if not run.series("blocks"):
             raise ValueError(f"{run.folder}: the run has written no blocks yet: continue it, then draw it")
-    wanted = {run: quantity(run, wish.field, compression_positive=wish.compression_positive) for run in runs}
-    if wish.span is None and len(runs) > 1:
+    wanted = {run: quantity(run, request.field, compression_positive=request.compression_positive) for run in runs}
+    if request.span is None and len(runs) > 1:
         spans = [limits([run], wanted[run]) for run in runs]
-        wish = replace(wish, span=(min(low for low, _ in spans), max(high for _, high in spans)))
+        request = replace(request, span=(min(low for low, _ in spans), max(high for _, high in spans)))
     paths = []
     for run in runs:
         folder = run.folder / "pictures" if out is None else out if len(runs) == 1 else out / run.folder.name
         folder.mkdir(parents=True, exist_ok=True)
-        fixed = view(run, wanted[run], scale=wish.scale, span=wish.span, size=wish.size)
+        fixed = view(run, wanted[run], scale=request.scale, span=request.span, size=request.size)
         painter = FieldPainter(run, wanted[run], fixed, run.scene.get("render", {}).get("crack_colour", "birth"))
-        name = wish.field.replace("/", "_")
-        if wish.cycle is not None:
-            name += f"_{wish.cycle:06d}"
-        elif wish.time is not None:
-            name += f"_{wish.time:g}s"
-        painter.draw(_time(painter, wish))
-        paths.append(painter.save(folder / f"{name}{wish.suffix}"))
-        if wish.movies:
-            files = [folder / f"{wish.field}{suffix}" for suffix in wish.movies]
-            paths += even_movie(painter, files, frames_per_second=wish.frames_per_second)
+        name = request.field.replace("/", "_")
+        if request.cycle is not None:
+            name += f"_{request.cycle:06d}"
+        elif request.time is not None:
+            name += f"_{request.time:g}s"
+        painter.draw(_time(painter, request))
+        paths.append(painter.save(folder / f"{name}{request.suffix}"))
+        if request.movies:
+            files = [folder / f"{request.field}{suffix}" for suffix in request.movies]
+            paths += even_movie(painter, files, frames_per_second=request.frames_per_second)
     return paths
 
 
-def _time(painter: FieldPainter, wish: Wish) -> float:
+def _time(painter: FieldPainter, request: PictureRequest) -> float:
     first, last = painter.frames.span()
-    if wish.cycle is not None:
-        return painter.frames.cycle_time(wish.cycle)
-    if wish.time is None:
+    if request.cycle is not None:
+        return painter.frames.cycle_time(request.cycle)
+    if request.time is None:
         return painter.frames.cycle_time(final_cycle(painter.run))
-    if not first <= wish.time <= last * (1 + 1e-9):
-        raise KeyError(f"{painter.run.folder} has output from t = {first:g} s to {last:g} s, not at {wish.time:g} s")
-    return wish.time
+    if not first <= request.time <= last * (1 + 1e-9):
+        raise KeyError(f"{painter.run.folder} has output from t = {first:g} s to {last:g} s, not at {request.time:g} s")
+    return request.time
+
+
+__getattr__ = renamed_exports(__name__, {"Wish": "PictureRequest"}, globals())

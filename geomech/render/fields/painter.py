@@ -224,14 +224,14 @@ class FieldPainter:
 
     def _told(self, time: float) -> str:
         row = self.run.at(self.cycle)
-        said = [f"t = {time:.5g} s"]
+        caption = [f"t = {time:.5g} s"]
         if self.run.led and np.isfinite(row["load"]):
-            said.append(f"load {stress_text(row['load'])}" + (" in tension" if row["load"] < 0 else ""))
+            caption.append(f"load {stress_text(row['load'])}" + (" in tension" if row["load"] < 0 else ""))
         if abs(self.frames.cycle_time(self.cycle) - time) <= 1e-9 * max(1.0, abs(time)):
-            said.append(f"cycle {self.cycle}")
+            caption.append(f"cycle {self.cycle}")
         if self.view.scale not in (0.0, 1.0):
-            said.append(f"displacements × {self.view.scale:g}")
-        return "    ".join(said)
+            caption.append(f"displacements × {self.view.scale:g}")
+        return "    ".join(caption)
 
     def _last_cycle(self, time: float) -> int:
         """The last cycle whose blocks were written up to ``time`` (s)."""

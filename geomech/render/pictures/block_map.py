@@ -85,8 +85,10 @@ def _draw_rock(axes: Axes, problem: Problem) -> list[Any]:
         if (blocks.material[~blocks.fixed] == m).any():
             keys.append(Patch(facecolor=ROCKS[m % len(ROCKS)], edgecolor=INK, lw=0.5, label=material.name))
     if blocks.fixed.any():
-        held = [outline for outline, fixed in zip(outlines, blocks.fixed) if fixed]
-        axes.add_collection(PathCollection(held, facecolors="none", edgecolors="#8d9199", hatch="////", linewidths=0))
+        supports = [outline for outline, fixed in zip(outlines, blocks.fixed) if fixed]
+        axes.add_collection(
+            PathCollection(supports, facecolors="none", edgecolors="#8d9199", hatch="////", linewidths=0)
+        )
         keys.append(Patch(facecolor=FIXED, edgecolor="#8d9199", hatch="////", label="fixed"))
     return keys
 

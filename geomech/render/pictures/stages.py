@@ -24,9 +24,9 @@ def stages(run: Run, folder: Path, *, width: int = 560) -> list[tuple[Path, str,
     painter = suited(run, width=width)
     folder.mkdir(parents=True, exist_ok=True)
     out = []
-    for cycle, told in shown.items():
+    for cycle, caption in shown.items():
         painter.draw(painter.frames.cycle_time(cycle))
-        out.append((painter.save(folder / f"stage_{cycle:06d}.png"), told, cycle))
+        out.append((painter.save(folder / f"stage_{cycle:06d}.png"), caption, cycle))
     return out
 
 

@@ -46,7 +46,7 @@ def read_traces(
     by_file: dict[int, list[Named]] = {}
     path_of: dict[str, Path] = {}
     systems: dict[str, Any] = {}
-    sound = True
+    valid = True
     for k, entry in enumerate(geometry.traces):
         source: Path = ("geometry", "traces", k, "file")
         try:
@@ -55,7 +55,7 @@ def read_traces(
             )
         except FieldFileError as error:
             faults.append(Fault(place(source), error.message, error.way_out))
-            sound = False
+            valid = False
             continue
         warnings += [Fault(place(source), message, way_out) for message, way_out in file.warnings]
         if file.crs is not None:
@@ -77,7 +77,7 @@ def read_traces(
         by_file[k] = [item for item in named if item.role == "joint"]
         path_of.update((item.line.place, source) for item in named)
     crs = next(iter(systems.values()), None)
-    if not sound:
+    if not valid:
         return False, crs
     try:
         # Joints by file, because each may cut its own zones; outlines of all files together, because they may close one
@@ -132,13 +132,13 @@ def _named_lines(
     """
     named, idle, left = named_lines(file, entry.layers, entry.name, entry.kind)
     present = list(dict.fromkeys(line.layer for line in file.lines))
-    for pattern, said in entry.layers.items():
-        if said.strip().lower() in UNFINISHED:
+    for pattern, meaning in entry.layers.items():
+        if meaning.strip().lower() in UNFINISHED:
             faults.append(
                 Fault(
                     place(("geometry", "traces", k, "layers", pattern)),
-                    f"{said!r} needs a name after it",
-                    f'write "{said}:{"x" if said == "guided" else "NAME"}", or "" to use the name of the layer',
+                    f"{meaning!r} needs a name after it",
+                    f'write "{meaning}:{"x" if meaning == "guided" else "NAME"}", or "" to use the name of the layer',
                 )
             )
     for pattern in idle:

@@ -83,7 +83,7 @@ def check_joints(c: Check) -> None:
         try:
             laws[name] = joint_law(name, joint)
         except ValueError as error:
-            key, way = next(((key, way) for said, key, way in _FAULTS if said in str(error)), ("", ""))
+            key, way = next(((key, way) for fragment, key, way in _FAULTS if fragment in str(error)), ("", ""))
             c.refuse(("joints", name, key) if key else ("joints", name), str(error), way)
     for name, crack in (c.tables.cracks or {}).items():
         if crack.joint in laws and not laws[crack.joint].straight:

@@ -55,16 +55,17 @@ class Jointed:
         """Defects found and repaired, one line per kind, with the first places and their junctions; ``others`` says
         where the rest are listed."""
         kinds: dict[str, list[Mend]] = {}
-        for mend in self.cutting.mends:
-            kinds.setdefault(mend.kind, []).append(mend)
+        for repair in self.cutting.mends:
+            kinds.setdefault(repair.kind, []).append(repair)
         lines = []
         for kind, own in kinds.items():
             unit = "m²" if kind in ("sliver", "small block kept") else "m"
             places = [
-                f"({mend.x:.6g}, {mend.y:.6g}){f' {mend.junction}' * bool(mend.junction)}" for mend in own[:_LISTED]
+                f"({repair.x:.6g}, {repair.y:.6g}){f' {repair.junction}' * bool(repair.junction)}"
+                for repair in own[:_LISTED]
             ]
             more = f" and {len(own) - _LISTED} more, {others}" if len(own) > _LISTED else ""
-            size = max(mend.size for mend in own)
+            size = max(repair.size for repair in own)
             lines.append(f"{len(own)} × {kind}, up to {size:.3g} {unit}, at {', '.join(places)}{more}")
         return lines
 
@@ -132,10 +133,10 @@ def make_joints(
         except ValueError as error:
             flaws.append(Flaw("joint_sets", k, str(error), "check its means and deviations"))
             continue
-        strangers = [name for name in shape.zones if name not in {zone.name for zone in zones}]
-        if strangers:
+        unknown_zones = [name for name in shape.zones if name not in {zone.name for zone in zones}]
+        if unknown_zones:
             known = ", ".join(repr(name) for name in dict.fromkeys(zone.name for zone in zones))
-            flaws.append(Flaw("joint_sets", k, f"there is no zone {strangers[0]!r}", f"there are {known}"))
+            flaws.append(Flaw("joint_sets", k, f"there is no zone {unknown_zones[0]!r}", f"there are {known}"))
             continue
         if shape.zones:
             joint = within(joint, [zone for zone in zones if zone.name in shape.zones])
@@ -176,10 +177,10 @@ def _too_fine(geometry: Geometry, box: np.ndarray) -> list[Flaw]:
         each = min(wanted.get("mean_length_m", math.inf), math.sqrt(area))
         number = length / each
         # Boxes around inclined joints overlap, however nearly parallel they are.
-        beside = min(
+        neighbours = min(
             number, number / area * 2 * each**2 * abs(math.sin(2 * math.radians(wanted.get("mean_angle_deg", 45.0))))
         )
-        pairs += number * beside
+        pairs += number * neighbours
         # Two sets in one region cross about as often as lines with random directions (Miles 1964).
         pieces += number + 4 / math.pi * length * lengths / area
         lengths += length

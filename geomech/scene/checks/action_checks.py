@@ -27,10 +27,10 @@ def check_actions(c: Check) -> None:
 
 def records_are_sound(c: Check) -> bool:
     """Whether every file of a load can be read."""
-    return not any(_trouble(load) for _, load in c.tables.loads.timed)
+    return not any(_fault(load) for _, load in c.tables.loads.timed)
 
 
-def _trouble(load) -> str:
+def _fault(load) -> str:
     if load.file is None:
         return ""
     try:
@@ -44,10 +44,10 @@ def _trouble(load) -> str:
 
 def _records(c: Check) -> None:
     for place, load in c.tables.loads.timed:
-        trouble = _trouble(load)
-        if trouble:
+        fault = _fault(load)
+        if fault:
             c.refuse(
-                ("loads", *place, "file"), trouble,
+                ("loads", *place, "file"), fault,
                 "every line of a record has a time and its values, x and y (or one value and a `direction`)",
             )  # fmt: skip
 

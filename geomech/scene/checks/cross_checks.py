@@ -99,7 +99,7 @@ def _stepping(c: Check) -> None:
             "leave it out, or set dda.dynamic_factor = 0",
         )
     if run.stepping == "events":
-        for key, hinders, way_out in (
+        for key, conflicts, way_out in (
             ("dynamic_factor", dda.dynamic_factor > 0, "set dda.dynamic_factor = 0"),
             ("equilibrium", dda.equilibrium == "loads", 'set dda.equilibrium = "start", or ""'),
             (
@@ -108,7 +108,7 @@ def _stepping(c: Check) -> None:
                 "leave out dda.automatic_time_step: steps adapt anyway",
             ),
         ):
-            if hinders:
+            if conflicts:
                 value = getattr(dda, key)
                 c.refuse(
                     ("run", "stepping"),
@@ -396,14 +396,14 @@ def _toughness(c: Check) -> None:
     t, cracks = c.tables, c.cracks
     if t.growth is None or t.materials is None or t.zones is None:
         return
-    needy: dict[str, str] = {}
+    bodies_without_toughness: dict[str, str] = {}
     fixed = fixed_blocks(t, c.drawn)
     # One warning per crack of several segments.
     for k, b in dict.fromkeys(zip(cracks.crack.tolist(), cracks.block.tolist())):
         zone = c.drawn.zones[b]
         name = material_of(t, zone)
         if name in t.materials and t.materials[name].k_ic_pa_sqrt_m is None:
-            needy.setdefault(name, cracks.names[k])
+            bodies_without_toughness.setdefault(name, cracks.names[k])
         if fixed[b] and not (zone in t.zones and t.zones[zone].body != "block"):
             by_key = zone in t.zones and t.zones[zone].fixed
             c.warn(
@@ -420,7 +420,7 @@ def _toughness(c: Check) -> None:
     geometry, joints = t.geometry, set[str]()
     if geometry is not None:
         joints = {joint.name for joint in geometry.joints} | {joint_set.name for joint_set in geometry.joint_sets}
-    for name, crack in needy.items() if t.growth.enabled else ():
+    for name, crack in bodies_without_toughness.items() if t.growth.enabled else ():
         dead_end = crack.rpartition(" ")[0] in joints
         c.refuse(
             ("materials", name, "k_ic_pa_sqrt_m"),

@@ -205,9 +205,9 @@ def _sudden_weight(c: Check) -> None:
     """Rock bridges that carry all the weight, in dynamics up to twice that, in the first steps."""
     t = c.tables
     loads, bridges = t.loads, len(c.cracks.names) - len(t.geometry.cracks)
-    tough = all(m.k_ic_pa_sqrt_m is None for m in t.materials.values()) or not t.growth.enabled
-    eased = loads.gravity_ramp_s > 0 or loads.in_situ is not None or t.dda.equilibrium
-    if t.geometry.dead_ends != "cracks" or not t.geometry.joint_sets or bridges <= 0 or tough or eased:
+    no_growth = all(m.k_ic_pa_sqrt_m is None for m in t.materials.values()) or not t.growth.enabled
+    applied_gradually = loads.gravity_ramp_s > 0 or loads.in_situ is not None or t.dda.equilibrium
+    if t.geometry.dead_ends != "cracks" or not t.geometry.joint_sets or bridges <= 0 or no_growth or applied_gradually:
         return
     if any(loads.gravity_m_s2) and t.dda.dynamic_factor > 0:
         c.warn(

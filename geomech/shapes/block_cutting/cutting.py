@@ -7,6 +7,7 @@ their places. Cuts are exact otherwise: the blocks tile their zones.
 
 from __future__ import annotations
 
+import warnings
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -18,7 +19,7 @@ import numpy as np
 from ...model import Blocks, Cracks
 from ..assembly import TOLERANCE, block_names
 from ..parts import JOINT, Flaw, Joint, ShapeError, Zone, extent_of, grid_decimals
-from .noding import FREE, Drawn, Graph, Mend, noded
+from .noding import FREE, Drawn, Graph, Repair, noded
 from .partings import Parting, partings, trace_lengths, trimmed_away
 from .planar_arrangement import Arrangement, arrange, following_in, gathered
 
@@ -36,7 +37,7 @@ class Cutting:
     """Result of cutting.
 
     zone      (n_blocks,)  zone of each block
-    mends                  what was moved, joined or left out
+    repairs                what was moved, joined or left out
     nodes                  {"I": n, "Y": n, "X": n}: ends in rock, junctions of three (T or Y), crossings of four joints
     partings               for the joints of every name, in their order
     """
@@ -44,9 +45,15 @@ class Cutting:
     blocks: Blocks
     cracks: Cracks
     zone: np.ndarray
-    mends: tuple[Mend, ...]
+    repairs: tuple[Repair, ...]
     nodes: dict[str, int]
     partings: tuple[Parting, ...] = ()
+
+    @property
+    def mends(self) -> tuple[Repair, ...]:
+        """Former name of ``repairs``."""
+        warnings.warn("Cutting.mends is now Cutting.repairs", DeprecationWarning, stacklevel=2)
+        return self.repairs
 
 
 class _Rules(NamedTuple):
@@ -90,40 +97,40 @@ def cut(
     drawn = Drawn.of(zones, joints, origin, decimals)
     # Crossings have two digits more than the drawing: corners of blocks stay on the lines of their neighbours.
     decimals += 2
-    mends: list[Mend] = []
+    repairs: list[Repair] = []
     rules = _Rules(tolerance, dead_ends, shortest_crack, smallest_area, smallest_share, lasting)
     grid = 10.0**-decimals
-    graph = noded(drawn, tolerance, decimals, mends)
+    graph = noded(drawn, tolerance, decimals, repairs)
     reach = None
     while True:
         arrangement = arrange(graph.nodes, graph.edges)
         zone = _zones_of(arrangement, graph.source >= drawn.n_outlines, zones, origin)
         if reach is None:
             reach = trace_lengths(graph, drawn, ~_outside(arrangement, zone))
-        keep, stay = _kept(arrangement, graph, drawn, zone, rules, mends)
+        keep, stay = _kept(arrangement, graph, drawn, zone, rules, repairs)
         # Faces do not change, except those between which an edge is removed.
         bounds = (arrangement.left != arrangement.right) & ~_outside(arrangement, zone)
         if keep[bounds].all():
             break
         graph = graph.only(keep)
-    mends += stay
+    repairs += stay
     if not keep.all():
         arrangement, graph = arrangement.only(keep), graph.only(keep)
     inside = np.flatnonzero(zone >= 0)
     if dead_ends == "trim":
-        mends += trimmed_away(drawn, reach, trace_lengths(graph, drawn, np.ones(len(graph.edges), bool)))
+        repairs += trimmed_away(drawn, reach, trace_lengths(graph, drawn, np.ones(len(graph.edges), bool)))
     cutting = trace_lengths(graph, drawn, ~arrangement.dead)
     cracks = _cracks(arrangement, graph, drawn, inside)
     blocks = _blocks(arrangement, drawn, graph.source, inside, [zones[z].name for z in zone[inside]], grid)
     if origin.any():
         blocks = blocks.with_vertices(blocks.vertices + origin)
         cracks = replace(cracks, nodes=cracks.nodes + origin)
-        mends = [mend._replace(x=mend.x + origin[0], y=mend.y + origin[1]) for mend in mends]
+        repairs = [repair._replace(x=repair.x + origin[0], y=repair.y + origin[1]) for repair in repairs]
     kind = _junctions(graph, drawn)
-    mends = _with_junctions(mends, graph.nodes + origin, kind, tolerance)
+    repairs = _with_junctions(repairs, graph.nodes + origin, kind, tolerance)
     nodes = {name: int(np.isin(kind, kinds).sum()) for name, kinds in (("I", "I"), ("Y", ("T", "Y")), ("X", "X"))}
     return Cutting(
-        blocks, cracks, zone[inside], tuple(mends), nodes, partings(drawn, [j.name for j in joints], reach, cutting)
+        blocks, cracks, zone[inside], tuple(repairs), nodes, partings(drawn, [j.name for j in joints], reach, cutting)
     )
 
 
@@ -201,8 +208,8 @@ def _outside(arrangement: Arrangement, zone: np.ndarray) -> np.ndarray:
 
 
 def _kept(
-    arrangement: Arrangement, graph: Graph, drawn: Drawn, zone: np.ndarray, rules: _Rules, mends: list[Mend]
-) -> tuple[np.ndarray, list[Mend]]:
+    arrangement: Arrangement, graph: Graph, drawn: Drawn, zone: np.ndarray, rules: _Rules, repairs: list[Repair]
+) -> tuple[np.ndarray, list[Repair]]:
     """(n_edges,) False for edges to be left out; and the small blocks that are kept.
 
     Left out are edges outside the rock, dead ends that are too short or unwanted, and a joint of blocks that are too
@@ -214,7 +221,7 @@ def _kept(
     if dead.any():
         shortest, reported = np.inf, []
         if rules.dead_ends != "trim":
-            shortest, reported = max(rules.shortest_crack, rules.tolerance), mends
+            shortest, reported = max(rules.shortest_crack, rules.tolerance), repairs
         keep[_short_dead_ends(arrangement, dead, shortest, reported)] = False
     area, rim = arrangement.areas_and_rims()
     thin = 2 * area < rules.tolerance * rim
@@ -224,11 +231,18 @@ def _kept(
     if not len(small):
         return keep, []
     return keep, _join_small(
-        arrangement, graph, zone, keep, drawn.rank[graph.source], small, np.where(thin[small], 0, rules.lasting), mends
+        arrangement,
+        graph,
+        zone,
+        keep,
+        drawn.rank[graph.source],
+        small,
+        np.where(thin[small], 0, rules.lasting),
+        repairs,
     )
 
 
-def _join_small(arrangement: Arrangement, graph: Graph, zone, keep, rank, small, lasting, mends) -> list[Mend]:
+def _join_small(arrangement: Arrangement, graph: Graph, zone, keep, rank, small, lasting, repairs) -> list[Repair]:
     """Remove the edges between each of the ``small`` faces and one neighbour from ``keep``; returns the faces that
     stay."""
     import shapely
@@ -249,7 +263,7 @@ def _join_small(arrangement: Arrangement, graph: Graph, zone, keep, rank, small,
     edge = edge[order]
     shapes = arrangement.polygons(small)
     area = shapely.area(shapes)
-    stay: list[Mend] = []
+    stay: list[Repair] = []
     for k in np.argsort(area).tolist():
         own = edge[begin[k] : begin[k + 1]]
         own = own[inner[own]]
@@ -263,17 +277,17 @@ def _join_small(arrangement: Arrangement, graph: Graph, zone, keep, rank, small,
         may = between >= lasting[k]
         if not may.any():
             # A block that a neighbour has joined in this round is examined again in the next.
-            stay += [Mend("small block kept", at.x, at.y, float(area[k]))]
+            stay += [Repair("small block kept", at.x, at.y, float(area[k]))]
             continue
         # Joined across a short side, a thin block would be a needle on its neighbour.
         may &= length >= 0.5 * length[may].max()
         best = neighbours[np.lexsort((length, between, may))[-1]]
         keep[own[other == best]] = inner[own[other == best]] = False
-        mends.append(Mend("sliver", at.x, at.y, float(area[k])))
+        repairs.append(Repair("sliver", at.x, at.y, float(area[k])))
     return stay
 
 
-def _short_dead_ends(arrangement: Arrangement, dead: np.ndarray, shortest: float, mends: list[Mend]) -> np.ndarray:
+def _short_dead_ends(arrangement: Arrangement, dead: np.ndarray, shortest: float, repairs: list[Repair]) -> np.ndarray:
     """Indices of ``dead`` edges that are connected over less than ``shortest``."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
@@ -292,7 +306,7 @@ def _short_dead_ends(arrangement: Arrangement, dead: np.ndarray, shortest: float
     total = np.bincount(label, weights=length)
     for part in np.flatnonzero(total < shortest):
         at = ends[label == part].mean(axis=(0, 1))
-        mends.append(Mend("dead end", float(at[0]), float(at[1]), float(total[part])))
+        repairs.append(Repair("dead end", float(at[0]), float(at[1]), float(total[part])))
     return index[total[label] < shortest]
 
 
@@ -415,18 +429,18 @@ def _junctions(graph: Graph, drawn: Drawn) -> np.ndarray:
     a, b, c = away[three[:, 0]], away[three[:, 1]], away[three[:, 2]]
     straight = np.min([np.einsum("ij,ij->i", *pair) for pair in ((a, b), (b, c), (c, a))], axis=0)
     kind[node[three[:, 0]][straight < -_STRAIGHT_ON]] = "T"
-    kind[graph.home != FREE] = "E"
+    kind[graph.outline_of != FREE] = "E"
     return kind
 
 
-def _with_junctions(mends: list[Mend], nodes: np.ndarray, kind: np.ndarray, tolerance: float) -> list[Mend]:
-    """``mends`` with the junction at each place after the repair."""
-    met = [k for k, mend in enumerate(mends) if mend.kind in ("near miss", "near corners")]
+def _with_junctions(repairs: list[Repair], nodes: np.ndarray, kind: np.ndarray, tolerance: float) -> list[Repair]:
+    """``repairs`` with the junction at each place after the repair."""
+    met = [k for k, repair in enumerate(repairs) if repair.kind in ("near miss", "near corners")]
     if met:
         from scipy.spatial import cKDTree
 
-        away, node = cKDTree(nodes).query([(mends[k].x, mends[k].y) for k in met])
+        away, node = cKDTree(nodes).query([(repairs[k].x, repairs[k].y) for k in met])
         for k, distance, there in zip(met, away.tolist(), node.tolist(), strict=True):
             if distance <= tolerance:
-                mends[k] = mends[k]._replace(junction=str(kind[there]))
-    return mends
+                repairs[k] = repairs[k]._replace(junction=str(kind[there]))
+    return repairs

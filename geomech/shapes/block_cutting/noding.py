@@ -19,7 +19,7 @@ FREE, CORNER = -1, -2
 _CELLS = 256
 
 
-class Mend(NamedTuple):
+class Repair(NamedTuple):
     """A repaired defect: its ``kind``, its location (m), its ``size`` (m; m² for blocks), and the ``junction`` there
     now.
 
@@ -120,22 +120,22 @@ class Graph:
     nodes: np.ndarray
     edges: np.ndarray
     source: np.ndarray
-    home: np.ndarray
+    outline_of: np.ndarray
 
     def only(self, keep: np.ndarray) -> Graph:
         edges = self.edges[keep]
         used, flat = np.unique(edges.ravel(), return_inverse=True)
-        return Graph(self.nodes[used], flat.reshape(-1, 2), self.source[keep], self.home[used])
+        return Graph(self.nodes[used], flat.reshape(-1, 2), self.source[keep], self.outline_of[used])
 
 
-def noded(drawn: Drawn, tolerance: float, decimals: int, mends: list[Mend]) -> Graph:
-    """The graph of ``drawn`` with everything within ``tolerance`` (m) joined; repairs are added to ``mends``."""
+def noded(drawn: Drawn, tolerance: float, decimals: int, repairs: list[Repair]) -> Graph:
+    """The graph of ``drawn`` with everything within ``tolerance`` (m) joined; repairs are added to ``repairs``."""
     start, end, source = drawn.start, drawn.end, drawn.source
     # Parts unchanged since the previous round are not examined again.
     fresh = np.ones(len(start), bool)
     for _ in range(_ROUNDS):
-        graph, fresh = _crossed(start, end, source, fresh, drawn.n_outlines, decimals, mends)
-        moved = _met(graph, fresh, drawn.n_outlines, tolerance, 10.0 ** (3 - decimals), mends)
+        graph, fresh = _crossed(start, end, source, fresh, drawn.n_outlines, decimals, repairs)
+        moved = _met(graph, fresh, drawn.n_outlines, tolerance, 10.0 ** (3 - decimals), repairs)
         if moved is None:
             return graph
         start, end, source, fresh = moved
@@ -151,7 +151,7 @@ def noded(drawn: Drawn, tolerance: float, decimals: int, mends: list[Mend]) -> G
     )
 
 
-def _crossed(start, end, source, fresh, n_outlines, decimals, mends) -> tuple[Graph, np.ndarray]:
+def _crossed(start, end, source, fresh, n_outlines, decimals, repairs) -> tuple[Graph, np.ndarray]:
     """All crossings made nodes, and which edges belong to ``fresh`` segments. Touching parts are joined in `_met`."""
     one, other, t, u = _crossings(start, end, source < n_outlines, fresh, 10.0 ** (3 - decimals))
     at = np.round(start[one] + t[:, None] * (end[one] - start[one]), decimals) + 0.0
@@ -176,7 +176,7 @@ def _crossed(start, end, source, fresh, n_outlines, decimals, mends) -> tuple[Gr
     again = np.unique(edges[~first & (of >= n_outlines)], axis=0)
     for p, q in nodes[again]:
         x, y = (0.5 * (p + q)).tolist()
-        mends.append(Mend("duplicate", x, y, float(np.hypot(*(q - p)))))
+        repairs.append(Repair("duplicate", x, y, float(np.hypot(*(q - p)))))
     new = np.logical_or.reduceat(new, np.flatnonzero(first))
     edges, of = edges[first], of[first]
     rim = np.flatnonzero(of < n_outlines)
@@ -271,7 +271,7 @@ def _vicinity(low: np.ndarray, high: np.ndarray, fresh: np.ndarray, margin: floa
     return np.flatnonzero(total[c, d] - total[a, d] - total[c, b] + total[a, b])
 
 
-def _met(graph: Graph, fresh: np.ndarray, n_outlines: int, tolerance: float, roundoff: float, mends: list[Mend]):
+def _met(graph: Graph, fresh: np.ndarray, n_outlines: int, tolerance: float, roundoff: float, repairs: list[Repair]):
     """Segments (start, end, source, fresh) after joining everything within ``tolerance``; None if nothing was joined.
 
     Edges that are not ``fresh`` have been examined before.
@@ -281,12 +281,12 @@ def _met(graph: Graph, fresh: np.ndarray, n_outlines: int, tolerance: float, rou
     from scipy.sparse.csgraph import connected_components
     from scipy.spatial import cKDTree
 
-    nodes, edges, source, home = graph.nodes.copy(), graph.edges, graph.source, graph.home
+    nodes, edges, source, outline_of = graph.nodes.copy(), graph.edges, graph.source, graph.outline_of
     n = len(nodes)
     settled = np.zeros(n, bool)
     pairs = cKDTree(nodes).query_pairs(tolerance, output_type="ndarray").reshape(-1, 2)
     # Corners do not move; points on an outline move along it only.
-    one, other = home[pairs[:, 0]], home[pairs[:, 1]]
+    one, other = outline_of[pairs[:, 0]], outline_of[pairs[:, 1]]
     pairs = pairs[
         (one == FREE)
         | (other == FREE)
@@ -298,27 +298,29 @@ def _met(graph: Graph, fresh: np.ndarray, n_outlines: int, tolerance: float, rou
     if len(pairs):
         links = coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(n, n))
         cluster = connected_components(links, directed=False)[1]
-        rank = np.lexsort((np.arange(n), home == FREE, home != CORNER, cluster))
-        chief = rank[np.searchsorted(cluster[rank], np.arange(cluster.max() + 1))][cluster]
-        follows = (home == FREE) | ((home >= 0) & ((home[chief] == home) | (home[chief] == CORNER)))
-        follows |= np.hypot(*(nodes - nodes[chief]).T) <= roundoff
-        for k in np.flatnonzero((chief != np.arange(n)) & follows):
-            away = float(np.hypot(*(nodes[k] - graph.nodes[chief[k]])))
+        rank = np.lexsort((np.arange(n), outline_of == FREE, outline_of != CORNER, cluster))
+        representative = rank[np.searchsorted(cluster[rank], np.arange(cluster.max() + 1))][cluster]
+        follows = (outline_of == FREE) | (
+            (outline_of >= 0) & ((outline_of[representative] == outline_of) | (outline_of[representative] == CORNER))
+        )
+        follows |= np.hypot(*(nodes - nodes[representative]).T) <= roundoff
+        for k in np.flatnonzero((representative != np.arange(n)) & follows):
+            away = float(np.hypot(*(nodes[k] - graph.nodes[representative[k]])))
             if away > _REPORTED * tolerance:
-                x, y = graph.nodes[chief[k]].tolist()
-                mends.append(Mend("near corners", x, y, away))
-            nodes[k] = graph.nodes[chief[k]]
-            settled[k] = settled[chief[k]] = True
+                x, y = graph.nodes[representative[k]].tolist()
+                repairs.append(Repair("near corners", x, y, away))
+            nodes[k] = graph.nodes[representative[k]]
+            settled[k] = settled[representative[k]] = True
         alive = (nodes[edges[:, 0]] != nodes[edges[:, 1]]).any(axis=1)
         edges, source, fresh = edges[alive], source[alive], fresh[alive]
-    firm = home != FREE
+    on_outline = outline_of != FREE
     merged = settled.any()
     fresh = fresh | settled[edges].any(axis=1)
     node, edge = _near_edges(nodes, edges, np.flatnonzero(~settled), fresh, tolerance)
     near = ~(nodes[edges[edge]] == nodes[node][:, None]).all(axis=2).any(axis=1)
     # A node on an outline divides it wherever round-off has put it; other outlines are led through it only if it lies
     # on them, as a brick's corner does on the course below.
-    foreign = np.flatnonzero((source[edge] < n_outlines) & firm[node] & (home[node] != source[edge]))
+    foreign = np.flatnonzero((source[edge] < n_outlines) & on_outline[node] & (outline_of[node] != source[edge]))
     lines = shapely.linestrings(nodes[edges[edge[foreign]]])
     near[foreign] &= shapely.distance(shapely.points(nodes[node[foreign]]), lines) <= roundoff
     degree = np.bincount(edges.ravel(), minlength=n)
@@ -329,17 +331,17 @@ def _met(graph: Graph, fresh: np.ndarray, n_outlines: int, tolerance: float, rou
         foot = a + float((nodes[k] - a) @ along / (along @ along)) * along
         away = float(np.hypot(*(foot - nodes[k])))
         # Near an end, corners are concerned, which have been joined where possible.
-        beside = min(float((foot - a) @ along), float((b - foot) @ along)) <= tolerance * float(np.hypot(*along))
-        if settled[k] or beside:
+        near_end = min(float((foot - a) @ along), float((b - foot) @ along)) <= tolerance * float(np.hypot(*along))
+        if settled[k] or near_end:
             continue
-        if not firm[k] and (source[e] < n_outlines or degree[k] == 1):
+        if not on_outline[k] and (source[e] < n_outlines or degree[k] == 1):
             nodes[k] = foot
             settled[k] = True
         # The edge is led through the node; a node that has been moved onto it lies on it to round-off.
         through.setdefault(e, []).append(k)
         if away > _REPORTED * tolerance:
             x, y = nodes[k].tolist()
-            mends.append(Mend("near miss", x, y, away))
+            repairs.append(Repair("near miss", x, y, away))
     if not merged and not through:
         return None
     return _led_through(nodes, edges, source, settled, through)

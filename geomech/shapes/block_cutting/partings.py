@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .noding import Drawn, Graph, Mend
+from .noding import Drawn, Graph, Repair
 
 
 class Parting(NamedTuple):
@@ -26,14 +26,14 @@ def trace_lengths(graph: Graph, drawn: Drawn, among: np.ndarray) -> np.ndarray:
     return np.bincount(graph.source[among], weights=span[among], minlength=len(drawn.names))
 
 
-def trimmed_away(drawn: Drawn, reach: np.ndarray, left: np.ndarray) -> list[Mend]:
+def trimmed_away(drawn: Drawn, reach: np.ndarray, left: np.ndarray) -> list[Repair]:
     """Traces of which ``reach`` (m) lay in the rock and nothing is ``left``."""
     gone = np.flatnonzero((reach > 0) & (left == 0))
     gone = gone[gone >= drawn.n_outlines]
     # Pieces are in the order of their traces; a trace is reported at its middle one.
     middle = (np.searchsorted(drawn.source, gone) + np.searchsorted(drawn.source, gone, "right")) // 2
     at = 0.5 * (drawn.start[middle] + drawn.end[middle])
-    return [Mend("trimmed away", x, y, size) for (x, y), size in zip(at.tolist(), reach[gone].tolist(), strict=True)]
+    return [Repair("trimmed away", x, y, size) for (x, y), size in zip(at.tolist(), reach[gone].tolist(), strict=True)]
 
 
 def partings(drawn: Drawn, names: Sequence[str], reach: np.ndarray, cutting: np.ndarray) -> tuple[Parting, ...]:

@@ -73,13 +73,13 @@ def _read(kind: str, path: Path, arguments: Mapping[str, Any], error: type[Excep
         code, out = done.returncode, done.stdout
     if code == 0:
         try:
-            said, what = plain_data.read(io.BytesIO(out), ALLOWED)
+            outcome, what = plain_data.read(io.BytesIO(out), ALLOWED)
         except plain_data.Broken:
-            said, what = "failed", "its reader returned no valid answer"
-        if said == "read":
+            outcome, what = "failed", "its reader returned no valid answer"
+        if outcome == "read":
             return what
-        if said in ERRORS:
-            raise ERRORS[said](*what)
+        if outcome in ERRORS:
+            raise ERRORS[outcome](*what)
         raise error(f"{path} cannot be read: {what}", "the file is damaged: export it again")
     way_out = "the file is damaged: export it again"
     if path.suffix in SCRIPTS:

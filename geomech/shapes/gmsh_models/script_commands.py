@@ -81,17 +81,20 @@ def refuse_commands(path: Path, folder: Path | None = None) -> list[Path]:
     It may read files below its own folder, or below ``folder``; they are checked as well. Returns all files that Gmsh
     will read, the model first.
     """
-    homes = [path.parent.resolve(), *([folder.resolve()] if folder else [])]
+    allowed_folders = [path.parent.resolve(), *([folder.resolve()] if folder else [])]
     seen: list[Path] = []
     waiting = [path]
     while waiting:
         file = waiting.pop(0)
         # Gmsh also reads a file of options, MODEL.opt, as a script.
-        for found in (file, *([beside] if (beside := file.with_name(file.name + ".opt")).is_file() else [])):
+        for found in (
+            file,
+            *([options_file] if (options_file := file.with_name(file.name + ".opt")).is_file() else []),
+        ):
             if found.resolve() in seen:
                 continue
             seen.append(found.resolve())
-            waiting += _files_of(found, homes, is_script=found is not file)
+            waiting += _files_of(found, allowed_folders, is_script=found is not file)
     return seen
 
 
@@ -127,7 +130,7 @@ def files_read(path: Path) -> list[Path]:
     return list(seen.values())
 
 
-def _files_of(path: Path, homes: Sequence[Path], is_script: bool) -> list[Path]:
+def _files_of(path: Path, allowed_folders: Sequence[Path], is_script: bool) -> list[Path]:
     """The files that ``path`` reads, after a check of its other commands."""
     if not is_script and path.suffix.lower() in OTHER_MESHES:
         return _other_mesh(path)
@@ -146,7 +149,7 @@ def _files_of(path: Path, homes: Sequence[Path], is_script: bool) -> list[Path]:
                 "save it as .msh again, or call it .geo if it is a script",
             )
         return []
-    return _script(path, data, homes)
+    return _script(path, data, allowed_folders)
 
 
 def _other_mesh(path: Path) -> list[Path]:
@@ -160,7 +163,7 @@ def _other_mesh(path: Path) -> list[Path]:
     return []
 
 
-def _script(path: Path, data: bytes, homes: Sequence[Path]) -> list[Path]:
+def _script(path: Path, data: bytes, allowed_folders: Sequence[Path]) -> list[Path]:
     if b"\0" in data:
         line = data[: data.index(b"\0")].count(b"\n") + 1
         raise GmshModelError(f"{path}:{line}: a zero byte in a script", "save it as text")
@@ -174,7 +177,7 @@ def _script(path: Path, data: bytes, homes: Sequence[Path]) -> list[Path]:
         for number, text in enumerate(re.split(rb"[\r\n]", data), 1):
             if len(text) > _LONGEST_LINE:
                 raise GmshModelError(f"{path}:{number}: a line of {len(text)} characters", "break it into shorter ones")
-    found = _judged(path, tokens, homes)
+    found = _judged(path, tokens, allowed_folders)
     if jumps:
         for token in tokens:
             if token.kind in ("line", "block", "text") and (hidden := re.search(rb"[\r\n]", token.text)):
@@ -183,7 +186,7 @@ def _script(path: Path, data: bytes, homes: Sequence[Path]) -> list[Path]:
                     for k, line in enumerate(re.split(rb"[\r\n]", token.text[hidden.end() :]), 1)
                     for piece in _tokens(line)
                 ]
-                found += _judged(path, inner, homes, comment=True)
+                found += _judged(path, inner, allowed_folders, comment=True)
     return found
 
 
@@ -196,7 +199,7 @@ def _tokens(data: bytes) -> Iterator[_Token]:
         line += text.count(b"\n")
 
 
-def _judged(path: Path, tokens: Sequence[_Token], homes: Sequence[Path], comment: bool = False) -> list[Path]:
+def _judged(path: Path, tokens: Sequence[_Token], allowed_folders: Sequence[Path], comment: bool = False) -> list[Path]:
     """The files that ``tokens`` read. Raises GmshModelError for other actions."""
     code = [token for token in tokens if token.kind not in ("line", "block")]
     found = []
@@ -216,7 +219,7 @@ def _judged(path: Path, tokens: Sequence[_Token], homes: Sequence[Path], comment
         if word == "FileName" and code[k - 1].text == b"." and not comment:
             _refuse(path, token.line, ".FileName", "reads a file", comment)
         if word in _READS:
-            found += _read(path, token, code[k + 1 : k + 4], homes, comment)
+            found += _read(path, token, code[k + 1 : k + 4], allowed_folders, comment)
     return found
 
 
@@ -242,8 +245,10 @@ def _is_sent_to_a_file(rest: Sequence[_Token]) -> bool:
     return False
 
 
-def _read(path: Path, token: _Token, rest: Sequence[_Token], homes: Sequence[Path], comment: bool) -> list[Path]:
-    """The file that such a word reads: its name must be literal, and it must be below one of ``homes``."""
+def _read(
+    path: Path, token: _Token, rest: Sequence[_Token], allowed_folders: Sequence[Path], comment: bool
+) -> list[Path]:
+    """The file that such a word reads: its name must be literal, and it must be below one of ``allowed_folders``."""
     word = token.text.decode()
     rest = rest[1:] if rest and rest[0].text in (b"(", b"[") else rest
     if len(rest) < 2 or rest[0].kind != "text" or rest[1].text not in (b";", b")", b"]"):
@@ -253,8 +258,8 @@ def _read(path: Path, token: _Token, rest: Sequence[_Token], homes: Sequence[Pat
     name = rest[0].text[1:-1].decode("utf-8", "surrogateescape")
     # Gmsh knows neither drives nor "~"; a relative path is relative to the file that names it.
     file = path.parent / name
-    if not any(file.resolve().is_relative_to(home) for home in homes):
-        _refuse(path, token.line, f'{word} "{name}"', f"reads a file outside {homes[-1]}", comment)
+    if not any(file.resolve().is_relative_to(allowed) for allowed in allowed_folders):
+        _refuse(path, token.line, f'{word} "{name}"', f"reads a file outside {allowed_folders[-1]}", comment)
     # Gmsh itself reports missing files; a list of numbers is not a script.
     return [file] if file.is_file() and word not in ("ListFromFile",) else []
 

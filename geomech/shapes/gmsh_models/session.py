@@ -39,9 +39,9 @@ def gmsh_session(name: str = "geomech") -> Iterator:
     """An empty Gmsh model, silent; a session that the caller has already opened is left as it was."""
     gmsh = load_gmsh()
     with _LOCK:
-        mine = not gmsh.isInitialized()
+        opened_here = not gmsh.isInitialized()
         before = None
-        if mine:
+        if opened_here:
             # Signal handlers work in the main thread only, and a user's ~/.gmshrc must not affect results.
             gmsh.initialize(interruptible=False, readConfigFiles=False)
         else:
@@ -51,7 +51,7 @@ def gmsh_session(name: str = "geomech") -> Iterator:
             gmsh.model.add(name)
             yield gmsh
         finally:
-            if mine:
+            if opened_here:
                 gmsh.onelab.clear()
                 gmsh.finalize()
             else:

@@ -111,8 +111,8 @@ def _factor(document: Any, path: Path, unit: str | None, warnings: list[tuple[st
     code = int(document.header.get("$INSUNITS", 0))
     if code in _INSUNITS:
         return _INSUNITS[code]
-    said = "names no unit ($INSUNITS is 0)" if code == 0 else f"is in an unsuitable unit ($INSUNITS {code})"
-    warnings.append((f"{path.name} {said}: taken for metres", 'give its unit: unit = "m", "mm", …'))
+    unit_text = "names no unit ($INSUNITS is 0)" if code == 0 else f"is in an unsuitable unit ($INSUNITS {code})"
+    warnings.append((f"{path.name} {unit_text}: taken for metres", 'give its unit: unit = "m", "mm", …'))
     return 1.0
 
 

@@ -144,13 +144,13 @@ def named_lines(
             hits = [p for p in layers or () if fnmatch.fnmatch(line.layer.lower(), p.lower())]
             idle.difference_update(hits[:1])
             meant[line.layer] = (layers[hits[0]] or line.layer) if layers and hits else None if layers else line.layer
-        said = meant[line.layer]
-        if said is None:
+        meaning = meant[line.layer]
+        if meaning is None:
             out[line.layer] = out.get(line.layer, 0) + 1
             continue
-        known = ("hole", "hole") if line.shape == "hole" else role_of(said)
+        known = ("hole", "hole") if line.shape == "hole" else role_of(meaning)
         if known is None:
-            own = name if name is not None and said == line.layer else said
+            own = name if name is not None and meaning == line.layer else meaning
             role = "zone" if line.shape == "area" else kind
             known = role, f"{role}:{own}"
         found.append(Named(*known, line))
@@ -171,7 +171,7 @@ def drawing_of_lines(lines: Sequence[Named]) -> FieldDrawing:
     cracks: dict[str, list[FieldLine]] = {}
     edges: list[EdgeLine] = []
     outlines: list[Named] = []
-    pointed: dict[str, list[FieldLine]] = {}
+    unnamed: dict[str, list[FieldLine]] = {}
     for named in lines:
         role, name, line = named
         points = line.points
@@ -179,7 +179,7 @@ def drawing_of_lines(lines: Sequence[Named]) -> FieldDrawing:
         if is_point and name.startswith("load:"):
             role = "mark"
         elif is_point and not name.startswith("monitor"):
-            pointed.setdefault(name, []).append(line)
+            unnamed.setdefault(name, []).append(line)
             continue
         is_closed = role != "mark" and line.shape != "line"
         closed = np.concatenate([points, points[:1]]) if is_closed else points
@@ -201,7 +201,7 @@ def drawing_of_lines(lines: Sequence[Named]) -> FieldDrawing:
                 continue
             places.setdefault(("marks", list(marks).index(full) if full in marks else len(marks)), line.place)
             marks.setdefault(full, []).append(points)
-    for name, own in pointed.items():
+    for name, own in unnamed.items():
         what = f"{len(own)} points" if len(own) > 1 else "a point"
         warnings.append(
             (f"{own[0].place}: {what} called {name!r}, left out", 'points are monitors: call them "monitor:NAME"')

@@ -11,7 +11,7 @@ import synthetic_run as made
 from geomech.model import RunSettings
 from geomech.output import Progress
 from geomech.output.console import at_work
-from geomech.output.console.at_work import AtWork, run_ended, spoken
+from geomech.output.console.at_work import AtWork, note_output, run_ended
 from geomech.output.console.pace import name_of_study
 
 
@@ -27,7 +27,7 @@ def test_nothing_is_said_beside_what_is_shown_nor_when_quiet():
     out = io.StringIO()
     with AtWork("study", stream=out, silence=0.5):
         for _ in range(8):
-            spoken()
+            note_output()
             time.sleep(0.02)
     with AtWork("study", stream=out, silence=0.01, quiet=True):
         time.sleep(0.05)

@@ -11,7 +11,7 @@ import synthetic_run as made
 
 from geomech.cli import main
 from geomech.output import Histories, Run, Series, Summary
-from geomech.render.fields.draw import Wish, draw_field, usual_field
+from geomech.render.fields.draw import PictureRequest, draw_field, usual_field
 from geomech.render.fields.frame import Frames
 from geomech.render.fields.painter import FieldPainter, view
 from geomech.render.fields.quantity import UnknownField, limits, quantity, readable
@@ -75,7 +75,7 @@ def test_colours_follow_the_displacement(run):
     "field", ["slip", "opening", "force", "K", "principal", "velocity.Y", "bolts.force", "blocks.material"]
 )
 def test_every_kind_of_field_is_drawn(run, tmp_path, field):
-    (path,) = draw_field([run], Wish(field=field, size=(300, None)), tmp_path)
+    (path,) = draw_field([run], PictureRequest(field=field, size=(300, None)), tmp_path)
     assert path.name == f"{field}.png" and imageio.imread(path).std() > 10
 
 
@@ -91,7 +91,7 @@ def test_compared_runs_share_their_colours(run, tmp_path):
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("geomech.render.fields.draw.FieldPainter", Seen)
-        draw_field([run, other], Wish(field="force", size=(200, None)), tmp_path / "out")
+        draw_field([run, other], PictureRequest(field="force", size=(200, None)), tmp_path / "out")
     assert seen[0] == seen[1] == limits([run], quantity(run, "force"))
 
 

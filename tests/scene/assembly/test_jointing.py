@@ -143,7 +143,7 @@ def test_small_blocks_spare_the_drawn_fault_and_are_told(tmp_path):
     assert coarse.problem().blocks.areas()[free].min() >= 3
     assert length(coarse, "joint:fault") == pytest.approx(length(whole, "joint:fault"), rel=1e-12) == pytest.approx(20)
     said = coarse.drawing.jointed.repair_lines("listed elsewhere")
-    number = len([mend for mend in coarse.drawing.jointed.cutting.mends if mend.kind == "sliver"])
+    number = len([repair for repair in coarse.drawing.jointed.cutting.repairs if repair.kind == "sliver"])
     assert any(text.startswith(f"{number} × sliver, up to ") and " m², at (" in text for text in said)
 
 

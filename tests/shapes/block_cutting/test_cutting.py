@@ -35,7 +35,7 @@ def edge_names(blocks, block) -> list[str]:
 
 
 def found(cutting, kind):
-    return [mend for mend in cutting.mends if mend.kind == kind]
+    return [repair for repair in cutting.repairs if repair.kind == kind]
 
 
 def sound(cutting, zones) -> None:
@@ -58,7 +58,7 @@ def test_a_grid_of_joints_cuts_a_grid_of_blocks():
     cutting = cut([rock(names=(("bottom", "right", "top", "left"),))], joints)
     assert cutting.blocks.n_blocks == 10
     assert cutting.blocks.areas() == pytest.approx(np.full(10, 10.0), rel=1e-14)
-    assert cutting.cracks.n_cracks == 0 and cutting.mends == () and cutting.nodes == {"I": 0, "Y": 0, "X": 4}
+    assert cutting.cracks.n_cracks == 0 and cutting.repairs == () and cutting.nodes == {"I": 0, "Y": 0, "X": 4}
     assert edge_names(cutting.blocks, 0) == ["bottom", "joint:b", "joint:a", "left"]
     sound(cutting, [rock()])
 
@@ -88,8 +88,8 @@ def test_ends_that_nearly_meet_do():
     ]
     cutting = cut([rock()], nearly)
     assert cutting.blocks.n_blocks == 3 and cutting.cracks.n_cracks == 1
-    (mend,) = found(cutting, "near miss")
-    assert (mend.x, mend.y, mend.size) == pytest.approx((4, 5, 4e-6))
+    (repair,) = found(cutting, "near miss")
+    assert (repair.x, repair.y, repair.size) == pytest.approx((4, 5, 4e-6))
     assert cut([rock()], nearly, tolerance=0.02).blocks.n_blocks == 4
     # An overshoot is no crack.
     over = cut([rock()], [nearly[0], Joint("joint:b", (line([4, 0], [4, 5 + 4e-6]),))])
@@ -287,7 +287,7 @@ def joint_edges(blocks, name) -> np.ndarray:
     return np.stack([blocks.vertices[edges], blocks.vertices[blocks.next_vertex[edges]]], axis=1)
 
 
-def test_what_is_mended_says_what_meets_there_now():
+def test_repairs_name_the_junction_at_their_place():
     """A T short of its trace, ends that nearly make a bend, a trace that nearly passes through a crossing, a Y."""
     joints = [
         Joint("joint:a", (line([1, 2], [9, 2]), line([1, 6], [4, 6]), line([1, 8], [9, 8]), line([3, 7], [5, 9]))),
@@ -295,11 +295,11 @@ def test_what_is_mended_says_what_meets_there_now():
         Joint("joint:c", (line([8, 4], [8 + 4e-6, 5]), line([8, 4 - 4e-6], [7.3, 3.5]), line([8, 4], [8.7, 3.5]))),
     ]
     cutting = cut([rock()], joints)
-    there = {(round(m.x), round(m.y)): (m.kind, m.junction) for m in cutting.mends}
+    there = {(round(m.x), round(m.y)): (m.kind, m.junction) for m in cutting.repairs}
     assert there[5, 2] == ("near miss", "T") and there[4, 6] == ("near corners", "V")
     assert there[4, 8][1] == "X" and there[8, 4] == ("near corners", "Y")
     assert cutting.nodes["Y"] == 2 and cutting.nodes["X"] == 1
-    assert all(1e-6 < m.size < 1e-5 for m in cutting.mends)
+    assert all(1e-6 < m.size < 1e-5 for m in cutting.repairs)
 
 
 def fine_network(seed: int) -> tuple[np.ndarray, ...]:

@@ -46,11 +46,11 @@ def _work(
     chunks, task, target, parts, between, springs, sides, variables, linearised, blocks, step, tried
 ):  # fmt: skip
     """Carry out the ``task`` together with other threads: first for contacts, with sums ``parts`` (n_shares,), then for
-    blocks. ``chunks``: claimed (1,) and told (2,) as for the elimination of fronts, and the numbers of contacts and of
+    blocks. ``chunks``: claimed (1,) and finished (2,) as for the elimination of fronts, and the numbers of contacts and of
     blocks per chunk; ``target``: ε in units, and the step length; ``sides`` as from `assembly.sides_of`; ``blocks``:
     forces on blocks, given and found, and unknowns. ``step`` (goals, `Changes`) is the present one, ``tried`` the new one.
     """
-    claimed, told, share, share_blocks = chunks
+    claimed, finished, share, share_blocks = chunks
     epsilon, far = target
     kn, _, _, _, _, unit = springs
     _, _, vectors, _ = between
@@ -87,12 +87,12 @@ def _work(
                 pull(first, last, better, linearised)
         else:
             # The forces on blocks need those of all contacts.
-            await_value(told, 0, shares)
+            await_value(finished, 0, shares)
             first, last = (q - shares) * share_blocks, min(n_blocks, (q - shares + 1) * share_blocks)
             balance(first, last, start, side, vectors, pulled, 0, 2, given, out)
-        add_at_once(told, 0 if q < shares else 1, 1)
-    await_value(told, 0, shares)
-    await_value(told, 1, whole - shares)
+        add_at_once(finished, 0 if q < shares else 1, 1)
+    await_value(finished, 0, shares)
+    await_value(finished, 1, whole - shares)
 
 
 class _Step:
