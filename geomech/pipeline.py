@@ -85,7 +85,7 @@ def run(
     scene = _loaded(scene)
     folder = Path(out) if out is not None else Path("outputs") / scene.name
     if not again:
-        _spare(scene, folder)
+        _refuse_to_overwrite_scene(scene, folder)
     problem = scene.problem()
     if observers is None:
         from .output import standard_observers
@@ -317,7 +317,7 @@ def safety_report(
     )  # fmt: skip
 
 
-def _spare(scene: Scene, folder: Path) -> None:
+def _refuse_to_overwrite_scene(scene: Scene, folder: Path) -> None:
     """Refuse to put a run, and with it a scene.toml, where the scene itself is kept."""
     kept = folder / "scene.toml"
     if kept.exists() and kept.samefile(scene.path):

@@ -90,7 +90,7 @@ def _resumed(request: _Request) -> dict[str, Any]:
     folder = request.folder
     found = next(checkpoint_file.whole(folder / checkpoint_file.FOLDER), None)
     if found is None:
-        return _begin_again(request)
+        return _run_from_start(request)
     header, path = found
     _refuse_other_sources(header, path)
     scene = None if header["scene"] is None else request.scene()
@@ -196,7 +196,7 @@ def _refuse_finished(end: str, header: Mapping[str, Any], scene: Any) -> None:
     raise Finished(f"the run has ended ({end}); to let it go on: {way_out}")
 
 
-def _begin_again(request: _Request) -> dict[str, Any]:
+def _run_from_start(request: _Request) -> dict[str, Any]:
     folder = request.folder
     end = _end_reason(folder)
     if end is not None:

@@ -50,10 +50,10 @@ class Picture:
 
 def pictures() -> list[Picture]:
     """All pictures of the list."""
-    told = tomllib.loads(LIST.read_text(encoding="utf-8"))
+    entries = tomllib.loads(LIST.read_text(encoding="utf-8"))
     return [
         Picture(file, entry["command"], entry["makes"], tuple(entry["sources"]), entry.get("digest", ""))
-        for file, entry in told.items()
+        for file, entry in entries.items()
     ]
 
 

@@ -88,7 +88,9 @@ figure.colorbar(shades, ax=right, label="σyy, MPa")
 
 def grow(network: Cracks, **options) -> list:
     """Eight steps, each at the pressure at which the most heavily loaded tip just grows."""
-    return list(ddm.propagate([], network, rock, load, growth, settings=settings, control="toughness", max_steps=8, **options))
+    return list(
+        ddm.propagate([], network, rock, load, growth, settings=settings, control="toughness", max_steps=8, **options)
+    )
 
 
 beside = grow(cracks, face_laws=laws)

@@ -349,10 +349,10 @@ class Coupling:
         now, result, cracks = self.now, found.result, self.now.crack_energy
         budget = self._budget_after(result, self.static and step.growth_pass > 0)
         statistics = {**result.statistics, **budget.statistics(), **found.statistics}
-        gone_by = result.state.time - self.began
-        if abs(gone_by - result.dt) > 1e-9 * result.dt:
+        advanced = result.state.time - self.began
+        if abs(advanced - result.dt) > 1e-9 * result.dt:
             # An event step shorter than the inertia step, or one that goes back; the last part of a dynamic pass.
-            statistics["dt"] = gone_by
+            statistics["dt"] = advanced
         if (now.bodies or cracks.under_way) and not self.endless:
             cracks.passed(found.tips, now.blocks, now.problem.materials, *self._strain_solutions())
             if grown.ends or grown.rests:

@@ -166,17 +166,17 @@ class _OscillatingBlocks:
     asked: float
     cement_breaks: bool
     blocks: set[int] = field(default_factory=set)
-    lately: set[int] = field(default_factory=set)
+    recent: set[int] = field(default_factory=set)
     broken: dict[int, FaceMemory] = field(default_factory=dict)
     tried_whole: bool = False
-    doubt: float = 0.0
+    cut_mismatch: float = 0.0
 
     def agreed(self, now: CrackedBlocks, dt: float) -> tuple[bool, set[int]]:
         """Whether the iteration may end after strains have agreed in a step of ``dt`` s. If not, the full step is tried
         again; the returned blocks take the mean-stress response first."""
         # In a shortened static step blocks agree because inertia limits their motion; that is not equilibrium.
         give_way = _softest(now, self.blocks) if self.static and dt != self.asked and self.tried_whole else set()
-        if not self.static or dt == self.asked or ((self.tried_whole or self.doubt < AGREED) and not give_way):
+        if not self.static or dt == self.asked or ((self.tried_whole or self.cut_mismatch < AGREED) and not give_way):
             return True, set()
         # A crack strain assumed in the first iterations may have caused the cut of a static step.
         self.tried_whole, self.blocks = True, set()
@@ -188,14 +188,14 @@ class _OscillatingBlocks:
         oscillating = set(np.array(list(now.bodies), int)[differences > FAILED].tolist())
         self.blocks |= oscillating
         if attempt < PATIENCE // 2:
-            self.lately = set()
+            self.recent = set()
             return set(), False
-        self.lately = self.lately | oscillating
+        self.recent = self.recent | oscillating
         if self.cement_breaks:
             self._note_broken(now)
         if attempt + 1 != PATIENCE:
             return set(), False
-        broke, softest = self.cement_breaks and self._break_cement(now), _softest(now, self.lately)
+        broke, softest = self.cement_breaks and self._break_cement(now), _softest(now, self.recent)
         return softest, broke or bool(softest)
 
     def _note_broken(self, now: CrackedBlocks) -> None:
@@ -203,7 +203,7 @@ class _OscillatingBlocks:
         for block, solution in now.strain_solutions().items():
             memory, most = solution.memory, self.broken.get(block)
             if (
-                block in self.lately
+                block in self.recent
                 and memory is not None
                 and (most is None or memory.broken.sum() > most.broken.sum())
             ):
@@ -260,7 +260,7 @@ def _passes(now: CrackedBlocks, dt: float, load_time: float | None, ways: _Ways)
             _solve_bodies(now, result)
         response, differences, answer = _take_response(now, result.state, quasi_newton, tolerance)
         left.append(float(differences.max()))
-        oscillating.doubt = max(oscillating.doubt, left[-1]) if cut else oscillating.doubt
+        oscillating.cut_mismatch = max(oscillating.cut_mismatch, left[-1]) if cut else oscillating.cut_mismatch
         if left[-1] < tolerance:
             if static:
                 _remember(now, answer)

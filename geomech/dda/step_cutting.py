@@ -107,13 +107,13 @@ class StepCutting:
             if system.scheme.static and self.found.tried is not None:
                 # (In motion the step's arcs are those that the velocity predicts.)
                 self.found = self.found.along(*like.arcs)
-        self.cuts, self.farther, self.redirected = 0, 0, 0
+        self.cuts, self.extensions, self.redirected = 0, 0, 0
         #: Why the last attempt failed, and the last of those that made the step shorter.
         self.reason = self.failed = ""
         #: Share of the limits that a step may use, and that the last attempt used.
         self.allowed_share, self.last_share = 1.0, np.inf
 
-    def until_it_holds(self) -> tuple[Attempt, StepResult]:
+    def accepted_step(self) -> tuple[Attempt, StepResult]:
         """The first attempt that holds, and its result. Raises `NotConverged` after ``settings.max_step_cuts`` cuts."""
         while True:
             # One attempt is freed before the next is made: its factors may be of other contacts.
@@ -124,12 +124,12 @@ class StepCutting:
     def _attempt(self) -> tuple[Attempt, StepResult] | None:
         """One attempt and its result; None where the step begins again."""
         system, found = self.system, self.found
-        begun: Callable[..., Attempt] = Attempt if system.deflected is None else BendingAttempt
+        make: Callable[..., Attempt] = Attempt if system.deflected is None else BendingAttempt
         if self.balances:
             reach = _REACH * system.limits.displacement * self.dt / self.asked
-            begun = partial(balanced_attempt, reach=reach)
+            make = partial(balanced_attempt, reach=reach)
         try:
-            attempt = begun(system, self.start, self.dt, found, self.cuts)
+            attempt = make(system, self.start, self.dt, found, self.cuts)
             result = attempt.result()
         except Unsettled as failure:
             self.failed = self.reason = f"{failure}{system.finder.where(found, failure.contact)}"
@@ -140,7 +140,7 @@ class StepCutting:
         used = system.limits.used(attempt, result)
         self.reason = used.reason
         if used.share <= 1.0001 * self.allowed_share:
-            return (attempt, result) if self._holds(attempt, result, used) else None
+            return (attempt, result) if self._accepts(attempt, result, used) else None
         if system.scheme.static and used.share > 0.9 * self.last_share:
             self._allow(used)
         else:
@@ -153,12 +153,12 @@ class StepCutting:
         broken: they must act before it breaks."""
         found, search, bonded = self.found, self.search, result.contacts["bonded"]
         lost = (bonded != found.bonded) & found.inset
-        unheld = found.relies_on_glue and (bonded < found.bonded).any()
-        if not (unheld or lost.any()):
+        corners_needed = found.relies_on_glue and (bonded < found.bonded).any()
+        if not (corners_needed or lost.any()):
             return False
         broken = found.vertex[lost] * len(self.start.vertices) + found.edge[lost]
         search.broken = np.append(search.broken, broken)
-        search.glue_holds = bool(found.relies_on_glue and not unheld)
+        search.glue_holds = bool(found.relies_on_glue and not corners_needed)
         self.found = search.find()
         return True
 
@@ -173,7 +173,7 @@ class StepCutting:
         self.redirected, self.found = self.redirected + 1, again
         return True
 
-    def _holds(self, attempt: Attempt, result: StepResult, used: Used) -> bool:
+    def _accepts(self, attempt: Attempt, result: StepResult, used: Used) -> bool:
         """Whether an attempt within its limits holds: not if something went into or through a block in it."""
         system, state = self.system, self.start.state
         crossed = system.limits.crossed(attempt, result)
@@ -190,27 +190,27 @@ class StepCutting:
                 )  # fmt: skip
             result.statistics["limit_share"] = used.share
             return True
-        if self._searched_farther(attempt, crossed):
+        if self._extend_search(attempt, crossed):
             return False
         if self.cuts >= system.settings.max_step_cuts and not crossed.through:
             log.warning("step at t = %g s: %s, and no shorter step avoids it", state.time, crossed.reason)
             result.statistics["limit_share"] = used.share
             return True
         self.failed = self.reason = crossed.reason
-        self.farther = 0
+        self.extensions = 0
         self._cut(0.5 * self.dt, CROSSING, *crossed.blocks)
         return False
 
-    def _searched_farther(self, attempt: Attempt, crossed: Crossed) -> bool:
+    def _extend_search(self, attempt: Attempt, crossed: Crossed) -> bool:
         """Search farther for contacts, where that finds more: what went in met no contact, and with it the step may be
         as long."""
         search = self.search
         wider = search.near.widened(crossed.pairs, crossed.motion, self.system.blocks.n_blocks)
-        if self.farther >= _FARTHER or not wider.reaches_beyond(search.near):
+        if self.extensions >= _FARTHER or not wider.reaches_beyond(search.near):
             return False
         search.near, search.motion = wider, attempt.new_vertices - self.start.vertices
         search.glue_holds = self.found.relies_on_glue
-        self.farther, self.found = self.farther + 1, search.find()
+        self.extensions, self.found = self.extensions + 1, search.find()
         return True
 
     def _allow(self, used: Used) -> None:
@@ -294,15 +294,15 @@ class StepCutting:
         found = found.on_corners
         pressed = (found.corner >= 0) & (state != OPEN)
         off = np.abs(moved if search.motion is None else moved - search.motion).max(axis=1)
-        strayed = np.zeros(system.blocks.n_blocks, bool)
-        strayed[system.owner[off > 0.5 * search.margin]] = True
-        if not pressed.any() and not strayed.any():
+        deviating = np.zeros(system.blocks.n_blocks, bool)
+        deviating[system.owner[off > 0.5 * search.margin]] = True
+        if not pressed.any() and not deviating.any():
             return None
         search.motion, search.glue_holds = moved, found.relies_on_glue
         # Only these pairs may meet differently; all pairs are searched again if one of them does.
         near = search.near
-        some = strayed[near.pairs].any(axis=1)
-        at = near.of_contacts(found.block[pressed], found.other[pressed], len(strayed))
+        some = deviating[near.pairs].any(axis=1)
+        at = near.of_contacts(found.block[pressed], found.other[pressed], len(deviating))
         some[at[at >= 0]] = True
         doubtful = replace(search, near=Windows(near.pairs[some], near.reach[some])).find()
         if not self._meets_otherwise(attempt, found, doubtful, state):

@@ -337,7 +337,7 @@ class BlockSystem:
             self._excavations.refuse(loads)
             self._refuse_unsupported(loads, state.time + dt if load_time is None else load_time)
         start = StepStart(state, vertices, carried, moments, loads.gravity.at(state.time + dt), loads, crack, load_time)
-        return StepCutting(self, start, dt, like, pseudo_inertia).until_it_holds()
+        return StepCutting(self, start, dt, like, pseudo_inertia).accepted_step()
 
     def contacts_near(self, state: State) -> ContactSet:
         """The contacts at the start of a step from ``state``."""

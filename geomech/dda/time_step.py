@@ -62,7 +62,7 @@ if TYPE_CHECKING:
 
 #: A step in motion whose faces have not found the part on which they touch after this many times the iterations that
 #: contact states may take is cut, this many times at most: two half steps take a tenth of them (a thousand blocks that slide: 400 for 24 000).
-_LABOUR, _EASED = 6, 3
+_MOST_WORK, _MOST_WORK_CUTS = 6, 3
 #: A step begins again this many times at most to find the part of a joint face that touches. Few take more than four.
 _PLACED = 20
 #: … this many times to find which ends of faces carry the cohesion of the whole face, …
@@ -172,7 +172,7 @@ class Attempt:
             self._assemble()
             self._absorb(start.loads, start.load_time)
             self._settle()
-            if not bends or not self._bent():
+            if not bends or not self._update_arcs():
                 break
         self._move()
 
@@ -344,7 +344,7 @@ class Attempt:
                 better, shared = (None if sharing is found else sharing), shared + 1
             if better is None:
                 break
-            if self._labours():
+            if self._takes_too_long():
                 raise Unsettled(f"contact states did not converge in {self.iterations} open–close iterations")
             if tries % _PLACED == 0:
                 # Which part touches may follow contacts that jump at any step: these faces stand on their corners in
@@ -367,13 +367,13 @@ class Attempt:
         speed = contact_speeds(found, found.geometry, rigid, centroid)
         return Striking.of(found, restitution, speed, float(np.hypot(*self.gravity)) * self.dt)
 
-    def _labours(self) -> bool:
+    def _takes_too_long(self) -> bool:
         """Whether shorter steps are likely to need fewer iterations in all."""
-        if self.system.scheme.static or self.cuts >= _EASED:
+        if self.system.scheme.static or self.cuts >= _MOST_WORK_CUTS:
             return False
-        return self.iterations > _LABOUR * self.system.settings.max_open_close_iterations
+        return self.iterations > _MOST_WORK * self.system.settings.max_open_close_iterations
 
-    def _bent(self) -> bool:
+    def _update_arcs(self) -> bool:
         """Give contacts the gaps that the motion really leads to, and the forces of the step the place that they have
         in its middle; False if those are known."""
         system, found, settled = self.system, self.found, self.settled

@@ -42,10 +42,10 @@ def durations(run: Run, shown: list[int], frames_per_second: float) -> list[int]
     growth, perhaps at constant load, get at least `LINGER` times the mean.
     """
     rows = [run.at(cycle) for cycle in shown]
-    gone_by = np.abs(np.diff([float(row["time"]) for row in rows]))
+    elapsed = np.abs(np.diff([float(row["time"]) for row in rows]))
     pace = np.ones(len(rows))
-    if gone_by.sum() > 0:
-        pace[:-1] = np.clip(gone_by / gone_by.mean(), *PACES)
+    if elapsed.sum() > 0:
+        pace[:-1] = np.clip(elapsed / elapsed.mean(), *PACES)
     start = float(run.history["crack_length"][0])
     grown = np.array([float(row["crack_length"]) > start for row in rows])
     pace = np.where(grown, np.maximum(pace, LINGER), pace)

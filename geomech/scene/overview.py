@@ -9,7 +9,7 @@ import numpy as np
 
 from ..model import Blocks, Cracks, History, counted
 from .assembly.fixed_blocks import holds
-from .assembly.load_functions import deepest_pond, force_history, said_of_pond, traction_history
+from .assembly.load_functions import deepest_pond, force_history, pond_text, traction_history
 from .checks.cross_checks import material_of
 from .drawing import Drawing
 from .tables import SceneTables
@@ -134,7 +134,7 @@ def _loads(tables: SceneTables, drawing: Drawing) -> list[str]:
         text = f"water table over {counted(len(given(tables.loads.water.points)), 'point')}"
         pond = deepest_pond(tables, blocks)
         text += ", following the ground" if tables.loads.water.follows_ground else ""
-        lines.append(text if pond is None else f"{text}, {said_of_pond(*pond, drawing.origin)}")
+        lines.append(text if pond is None else f"{text}, {pond_text(*pond, drawing.origin)}")
     if tables.loads.base is not None:
         lines.append(f"shaking, seen from the {tables.loads.base.frame}")
     if tables.loads.in_situ is not None:

@@ -185,8 +185,8 @@ def carry_out_sweep(
             messages.say(lock.stale)
         _prepare(folder, plan, resume, overwrite)
         with Journal(folder / JOURNAL) as journal, Interruption(_STOPPING, patience=None) as interruption:
-            conduct = _Conduct(plan, folder, journal, engine, interruption, messages or SweepMessages())
-            return conduct.go()
+            runner = _Runner(plan, folder, journal, engine, interruption, messages or SweepMessages())
+            return runner.go()
 
 
 def _prepare(folder: Path, plan: Plan, resume: bool, overwrite: bool) -> None:
@@ -235,7 +235,7 @@ def _files(plan: Plan) -> str:
     return digest.hexdigest()[:16]
 
 
-class _Conduct:
+class _Runner:
     """A sweep in progress."""
 
     def __init__(
@@ -306,10 +306,10 @@ class _Conduct:
             if self.journal.add(row):
                 self.fresh += 1
                 self._took(row)
-            self._tell(row, values[number])
+            self._show_row(row, values[number])
             if self.interruption.asked:
                 self.engine.stop()
-            self._write_sometimes()
+            self._write_periodically()
 
     def _took(self, row: Mapping[str, Any]) -> None:
         """Record the duration of a run; that of a process's first run, which loads and compiles, only until there are
@@ -330,13 +330,13 @@ class _Conduct:
                 return
             yield self._job(number, values[number])
 
-    def _write_sometimes(self) -> None:
+    def _write_periodically(self) -> None:
         now = time.monotonic()
         if now - self.written > max(_SELDOM, _SHARE * self.cost):
             write_tables(self.folder, self._rows())
             self.written, self.cost = time.monotonic(), time.monotonic() - now
 
-    def _tell(self, row: Mapping[str, Any], values: Mapping[str, Any]) -> None:
+    def _show_row(self, row: Mapping[str, Any], values: Mapping[str, Any]) -> None:
         say = self.messages.say
         if say is None:
             return

@@ -94,7 +94,7 @@ class Invariants:
         self._warnings_before = (0, 0)
 
     def check(self, cycle: Cycle) -> None:
-        broken = [*_nowhere(cycle), *_strayed(cycle)]
+        broken = [*_not_finite(cycle), *_tips_outside_rock(cycle)]
         if not cycle.state.time >= self._time:
             broken.append(f"time goes back from {self._time:g} to {cycle.state.time:g} s")
         self._time = cycle.state.time
@@ -108,7 +108,7 @@ class Invariants:
 
     def end(self) -> None:
         """After the last cycle of a run that reached its end: its tips are at rest."""
-        for name, value, where in self._stood():
+        for name, value, where in self._excess_at_rest():
             self._take(name, value, f"at the end: {where}")
 
     def _take(self, name: str, value: float, where: str) -> None:
@@ -152,7 +152,7 @@ class Invariants:
     def _growth(self, cycle: Cycle) -> Iterator[tuple[str, float, str]]:
         # Whether the tips of a cycle are at rest is known when the next one belongs to another load.
         if self._standing is not None and cycle.growth_pass == 0:
-            yield from self._stood()
+            yield from self._excess_at_rest()
         self._standing = None
         if not (self._static and len(cycle.tips)) or any(event.kind in self._stop_at for event in cycle.events):
             return
@@ -160,7 +160,7 @@ class Invariants:
         worst = int(np.argmax(over))
         self._standing = max(0.0, float(over[worst])), f"tip of crack {int(cycle.tips['crack'][worst])}"
 
-    def _stood(self) -> Iterator[tuple[str, float, str]]:
+    def _excess_at_rest(self) -> Iterator[tuple[str, float, str]]:
         if self._standing is not None:
             yield "toughness", *self._standing
 
@@ -179,7 +179,7 @@ class Invariants:
             yield "pull", max(0.0, float(normal[state != OPEN].max()) - self._bond) / pressed, "closed crack faces"
 
 
-def _nowhere(cycle: Cycle) -> Iterator[str]:
+def _not_finite(cycle: Cycle) -> Iterator[str]:
     state, faces = cycle.state, cycle.faces
     if not all(np.isfinite(values).all() for values in (state.vertices, state.velocity, state.stress)):
         yield "a block is nowhere"
@@ -190,7 +190,7 @@ def _nowhere(cycle: Cycle) -> Iterator[str]:
         yield "a crack face is nowhere"
 
 
-def _strayed(cycle: Cycle) -> Iterator[str]:
+def _tips_outside_rock(cycle: Cycle) -> Iterator[str]:
     for tip in cycle.tips:
         if not inside(cycle.blocks.loops(int(tip["block"])), tip["point"][None]).all():
             yield f"a tip of crack {tip['crack']} at {tip['point']} lies outside {cycle.blocks.names[tip['block']]}"

@@ -137,8 +137,8 @@ class EventSteps:
             search.add(at, excess)
             same = JUMP * max(abs(at), SOON * self.time_step)
             self.reached = abs(excess) <= SETTLED or (excess > 0 and search.width <= same)
-            goes_on = whole and (search.enclosed or (at < limit and k < OPEN)) and not self.changes.reached
-            if self.reached or (excess < 0 and not goes_on):
+            searches_on = whole and (search.enclosed or (at < limit and k < OPEN)) and not self.changes.reached
+            if self.reached or (excess < 0 and not searches_on):
                 break
             if search.next <= start:
                 # Tips exceed their toughness from the start of the step, after the last growth; the load is not reduced
@@ -180,8 +180,8 @@ class EventSteps:
             at = found.result.state.time
             search.add(at, excess)
             self.reached = abs(excess) <= SETTLED or (excess > 0 and (at == 0.0 or search.width <= JUMP * at))
-            goes_on = whole and (search.enclosed or at > limit) and not self.changes.reached
-            if self.reached or (excess > 0 and not goes_on):
+            searches_on = whole and (search.enclosed or at > limit) and not self.changes.reached
+            if self.reached or (excess > 0 and not searches_on):
                 break
             aim = max(search.next, limit)
             if rough and not search.enclosed:

@@ -297,7 +297,7 @@ class BendingAttempt(Attempt):
             out[:, :, side, 6 : 6 + m] = sign * np.einsum("nwa,naj->nwj", directions, matrix, optimize=True)
         return out
 
-    def _bent(self) -> bool:
+    def _update_arcs(self) -> bool:
         """As `Attempt._bent`: whether the step must be solved again with gaps that follow the circular arcs of its
         motion."""
         system, found = self.system, self.found

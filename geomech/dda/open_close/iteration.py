@@ -175,7 +175,7 @@ class _Search:
             first = self.equations.first_bonds(self.states, answer, bonds)
         else:
             order = self.equations.pattern.order
-            first = bonds & _half_as_wrong_as_the_worst(answer.violation, found.block, found.other, order)
+            first = bonds & _at_least_half_of_the_worst(answer.violation, found.block, found.other, order)
         self.states = self.states.switched(first, answer.called)
         self.most = max(self.most, self.newton + self.effort.max_iterations)
         self._restart()
@@ -276,7 +276,7 @@ class _Search:
         self.most = max(self.most, self.newton + self.effort.max_iterations)
         found, violation = self.found, np.where(wrong, answer.violation, 0.0)
         if self.pivots <= self.effort.max_iterations // 2:
-            some = wrong & _half_as_wrong_as_the_worst(
+            some = wrong & _at_least_half_of_the_worst(
                 violation, found.block, found.other, self.equations.pattern.order
             )
         else:
@@ -375,7 +375,7 @@ def _negligible(answer: Answer, found: ContactSet, number: int, solver: ContactS
     return bool((answer.violation[wrong] <= solver.sliver_force * bears).all())
 
 
-def _half_as_wrong_as_the_worst(
+def _at_least_half_of_the_worst(
     violation: np.ndarray, block: np.ndarray, other: np.ndarray, order: np.ndarray
 ) -> np.ndarray:
     """(n,) True for contacts at least half as violated as any other contact of either of their free blocks."""

@@ -206,7 +206,7 @@ class _Relaxation:
             if self.beyond_limit and not follow:
                 break
             self.travelled += moved
-            if self._labours():
+            if self._takes_too_long():
                 return self._ended(False, False, "contacts find their states too slowly to go on")
             statistics = result.statistics
             collapse = self._collapse(statistics["unbalanced_ratio"])
@@ -220,7 +220,7 @@ class _Relaxation:
         unbalanced = self.history[-1]["unbalanced"]
         return self._ended(False, False, f"unbalanced force {unbalanced:.2g} after {max_steps} steps")
 
-    def _labours(self) -> bool:
+    def _takes_too_long(self) -> bool:
         cuts, iterations = (sum(int(row[name]) for row in self.history) for name in ("cuts", "iterations"))
         return cuts > self.most_cuts or iterations - len(self.history) > self.most_iterations
 

@@ -352,7 +352,7 @@ class _Search:
         the answer is the same."""
         try:
             return self.run(counted, first, above, stands)
-        except (NotConverged, _NoOther):
+        except (NotConverged, _SameFactor):
             return None
 
     def run(
@@ -368,10 +368,10 @@ class _Search:
         known = near or 0.0 < aim < _FARTHEST
         trial = bracket.begin(first if near or not known else _BELOW * aim)
         if trial.stable and stands:
-            raise _NoOther
+            raise _SameFactor
         while not trial.stable:
             if first >= above:
-                raise _NoOther
+                raise _SameFactor
             if trial.factor <= 1.0 / _FARTHEST:
                 raise NotConverged(
                     f"the blocks are unstable even with joints {_FARTHEST:g} times as strong: "
@@ -380,7 +380,7 @@ class _Search:
                 )
             trial = bracket.begin((_NEARBY if known else 0.5) * trial.factor)
         if first < above < math.inf and not bracket.tried(above).stable:
-            raise _NoOther
+            raise _SameFactor
         return bracket.closed(self.tolerance)
 
     def _moving(self, failed: Trial) -> str:
@@ -392,7 +392,7 @@ class _Search:
         return f"{names}{' and others' if len(moving) > _NAMED else ''}: "
 
 
-class _NoOther(Exception):
+class _SameFactor(Exception):
     """With other assumptions, the factor is the same."""
 
 
@@ -449,14 +449,14 @@ class _Bracket:
                 factor = upper * (1.0 + _SECOND)
             elif upper > self.lower * (1.0 + tolerance):
                 factor = _next_factor(known, self.lower, upper, tolerance)
-            elif self._from_afar(known, upper, tolerance):
+            elif self._started_far_below(known, upper, tolerance):
                 factor = upper
             else:
                 failed = next(t for t in known if t.factor == upper)
-                return self._answer(_pointed_at(known, self.lower, upper), failed)
+                return self._answer(_extrapolated_factor(known, self.lower, upper), failed)
             self.tried(factor)
 
-    def _from_afar(self, known: list[Trial], upper: float, tolerance: float) -> bool:
+    def _started_far_below(self, known: list[Trial], upper: float, tolerance: float) -> bool:
         """Whether the failed trial at ``upper`` started so far below that it might be stable, unless the drift of
         failed trials shows that it is not."""
         if self._began[upper] >= self.lower * (1.0 - _FROM_AFAR * tolerance):
@@ -488,7 +488,7 @@ def _has_strength(law: JointLaw) -> bool:
     return law.friction_angle > 0 or law.cohesion > 0 or law.tensile_strength > 0 or law.roughness is not None
 
 
-def _pointed_at(trials: Sequence[Trial], lower: float, upper: float) -> float:
+def _extrapolated_factor(trials: Sequence[Trial], lower: float, upper: float) -> float:
     """The factor at which the drift of failed trials vanishes, between ``lower`` and ``upper``; their mean if
     unknown."""
     end = _drift_ends(trials, lower, upper)
@@ -512,7 +512,7 @@ def _next_factor(trials: Sequence[Trial], lower: float, upper: float, tolerance:
     failed = [t for t in trials if not t.stable and math.isfinite(t.drift)]
     if len(failed) < 2:
         return harmonic_mean
-    close_trial = _close_to(_pointed_at(trials, lower, upper), lower, tolerance)
+    close_trial = _close_to(_extrapolated_factor(trials, lower, upper), lower, tolerance)
     return close_trial if close_trial is not None and close_trial < upper else harmonic_mean
 
 

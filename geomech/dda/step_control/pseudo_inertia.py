@@ -41,34 +41,50 @@ def balanced_attempt(
     """A static step of ``dt`` from ``start`` in which the blocks that are held bear their loads without inertia;
     arguments as for `Attempt`. Blocks on bolts go by ``reach`` m at most to where these hold them. Raises
     `Unsettled`."""
-    attempt = short = Attempt(system, start, dt, found, cuts)
-    left, size = attempt.inertia_and_size()
-    begun, nothing, ahead = left, _NOTHING * size, None
-    supported, bolted = left > nothing, reach > 0.0 and _bolts_hold(start)
+    attempt = first = Attempt(system, start, dt, found, cuts)
+    inertia, size = attempt.inertia_and_size()
+    begun, negligible, ahead = inertia, _NOTHING * size, None
+    supported, bolted = inertia > negligible, reach > 0.0 and _bolts_hold(start)
     for _ in range(_SOLUTIONS):
-        if not (supported & (left > nothing)).any():
+        if not (supported & (inertia > negligible)).any():
             break
         again = _again(system, start, attempt, np.where(supported[:, None], attempt.increment, 0.0))
         if again is None:
             break
         after = again.inertia_and_size()[0]
-        decreases = after <= np.maximum(_FALLS * left, nothing)
+        decreases = after <= np.maximum(_FALLS * inertia, negligible)
         if decreases[supported].all():
-            attempt, left = again, after
+            attempt, inertia = again, after
             continue
-        drawn = _Drawn.of(attempt, again, left, after, supported & ~decreases, reach) if bolted else None
-        there = None if drawn is None else _again(system, start, again, drawn.rest(again, supported & decreases))
-        if drawn is not None and there is not None and drawn.bears(there, left, supported & decreases, nothing):
-            attempt, left, supported = there, there.inertia_and_size()[0], (supported & decreases) | drawn.blocks
-            ahead = drawn.ahead if ahead is None else ahead
-            if drawn.share < 1.0:
+        extrapolated = (
+            _Extrapolated.of(attempt, again, inertia, after, supported & ~decreases, reach) if bolted else None
+        )
+        trial = (
+            None
+            if extrapolated is None
+            else _again(system, start, again, extrapolated.rest(again, supported & decreases))
+        )
+        if (
+            extrapolated is not None
+            and trial is not None
+            and extrapolated.bears(trial, inertia, supported & decreases, negligible)
+        ):
+            attempt, inertia, supported = (
+                trial,
+                trial.inertia_and_size()[0],
+                (supported & decreases) | extrapolated.blocks,
+            )
+            ahead = extrapolated.ahead if ahead is None else ahead
+            if extrapolated.share < 1.0:
                 break
             continue
         if attempt.rest is not None:
             break
         supported &= decreases
     return (
-        short if ahead is not None and _too_far(attempt, ahead, left > np.maximum(_BACK * begun, nothing)) else attempt
+        first
+        if ahead is not None and _too_far(attempt, ahead, inertia > np.maximum(_BACK * begun, negligible))
+        else attempt
     )
 
 
@@ -100,7 +116,7 @@ def _too_far(attempt: Attempt, ahead: np.ndarray, unbalanced: np.ndarray) -> boo
 
 
 @dataclass(frozen=True, eq=False)
-class _Drawn:
+class _Extrapolated:
     """Blocks that bolts will hold: ``blocks`` (n_blocks,) bool, the displacement ``ahead`` (n_blocks, 6) of them after
     that of an attempt, and the ``share`` of it that a step may make."""
 
@@ -110,11 +126,11 @@ class _Drawn:
 
     @classmethod
     def of(
-        cls, attempt: Attempt, again: Attempt, left: np.ndarray, after: np.ndarray, slow: np.ndarray, reach: float
-    ) -> _Drawn | None:
+        cls, attempt: Attempt, again: Attempt, inertia: np.ndarray, after: np.ndarray, slow: np.ndarray, reach: float
+    ) -> _Extrapolated | None:
         """From two attempts and what inertia takes in each, (n_blocks,) N; of the blocks ``slow``. None for none."""
         size = np.sqrt(attempt.moments[:, 0])
-        gain = 1.0 - after / np.maximum(left, 1e-300)
+        gain = 1.0 - after / np.maximum(inertia, 1e-300)
         slow = slow & (gain > _ROUNDED)
         ahead = np.where(slow[:, None], again.increment - attempt.increment, 0.0)
         ahead /= np.where(slow, gain, 1.0)[:, None]
@@ -124,12 +140,12 @@ class _Drawn:
             return None
         return cls(slow, ahead * slow[:, None], min(1.0, reach / max(float(far[slow].max()), 1e-300)))
 
-    def bears(self, there: Attempt, left: np.ndarray, supported: np.ndarray, nothing: np.ndarray) -> bool:
+    def bears(self, trial: Attempt, inertia: np.ndarray, supported: np.ndarray, negligible: np.ndarray) -> bool:
         """Whether in the attempt ``there``, solved about `rest`, inertia takes as much less than what was ``left``,
         (n_blocks,) N, as it should. ``supported``: other blocks; ``nothing``: what counts as none."""
         least = np.where(self.blocks, 1.0 - _GONE * self.share, _FALLS)
-        after = there.inertia_and_size()[0]
-        return bool((after <= np.maximum(least * left, nothing))[supported | self.blocks].all())
+        after = trial.inertia_and_size()[0]
+        return bool((after <= np.maximum(least * inertia, negligible))[supported | self.blocks].all())
 
     def rest(self, again: Attempt, supported: np.ndarray) -> np.ndarray:
         """(n_blocks, 6) displacement to solve about, with that of ``again`` for the blocks ``supported``."""

@@ -143,7 +143,7 @@ def advance(
             )
         )
     work = _Work(Network(cracks, loops_of, cycle), settings)
-    met = _meet_half_way(work, steps, grown)
+    met = _join_approaching_tips(work, steps, grown)
     for step in steps:
         # A tip that another one has joined is no longer a tip.
         if step.row not in met and work.network.is_tip(step.node):
@@ -171,7 +171,7 @@ class _Work:
         self.joins.append(Join(kind, node, crack, other, point))
 
 
-def _meet_half_way(work: _Work, steps: list[_Step], grown: np.ndarray) -> set[int]:
+def _join_approaching_tips(work: _Work, steps: list[_Step], grown: np.ndarray) -> set[int]:
     """Join pairs of tips that approach and meet each other in this step; returns their rows."""
     network, pairs, met = work.network, [], set()
     for i, a in enumerate(steps):

@@ -116,9 +116,9 @@ class Blocks:
             with np.errstate(invalid="ignore"):
                 simple, turns_left = convex_and_simple(np.concatenate(loops), loop_start)
             for k in np.flatnonzero(~simple).tolist():
-                _refuse_crooked(loops[k], names[owner[k]])
+                _refuse_invalid_outline(loops[k], names[owner[k]])
             for k in np.flatnonzero(~outer).tolist():
-                _refuse_stray(loops[block_loop[owner[k]]], loops[k], names[owner[k]])
+                _refuse_hole_outside(loops[block_loop[owner[k]]], loops[k], names[owner[k]])
             for b in np.flatnonzero(np.diff(block_loop) > 2).tolist():
                 _refuse_shared(loops[block_loop[b] + 1 : block_loop[b + 1]], names[b])
             for k in np.flatnonzero(turns_left != outer).tolist():
@@ -252,11 +252,11 @@ class Blocks:
     @cached_property
     def side_start(self) -> list[int]:
         """(n_vertices,) the first edge of the straight side that each edge is part of."""
-        goes_on, previous = self.in_side.tolist(), self.previous_vertex.tolist()
+        is_straight, previous = self.in_side.tolist(), self.previous_vertex.tolist()
         first = [-1] * self.n_vertices
         for edge in range(self.n_vertices):
             chain = [edge]
-            while first[chain[-1]] < 0 and goes_on[chain[-1]]:
+            while first[chain[-1]] < 0 and is_straight[chain[-1]]:
                 chain.append(previous[chain[-1]])
             start = max(first[chain[-1]], -1)
             for k in chain:
@@ -343,7 +343,7 @@ def _refuse_shape(loop: np.ndarray, label: list[str] | None, name: str) -> None:
         raise ValueError(f"{name}: {len(loop)} edges but {len(label)} edge names")
 
 
-def _refuse_crooked(loop: np.ndarray, name: str) -> None:
+def _refuse_invalid_outline(loop: np.ndarray, name: str) -> None:
     if not np.isfinite(loop).all():
         raise ValueError(
             f"{name}: vertex {int(np.flatnonzero(~np.isfinite(loop).all(axis=1))[0])} is not a finite point"
@@ -369,7 +369,7 @@ def _refuse_crooked(loop: np.ndarray, name: str) -> None:
         raise ValueError(f"{name}: the outline encloses no area")
 
 
-def _refuse_stray(outline: np.ndarray, hole: np.ndarray, name: str) -> None:
+def _refuse_hole_outside(outline: np.ndarray, hole: np.ndarray, name: str) -> None:
     near, following = roundoff_of(outline, hole), np.roll(outline, -1, axis=0)
     for x, y in hole:
         # On a corner where it touches the outline, a hole sees the outline's angle there; beside an edge, either side.

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from geomech.model import Blocks, Cracks, counted
-from geomech.scene.assembly.load_functions import deepest_pond, said_of_pond
+from geomech.scene.assembly.load_functions import deepest_pond, pond_text
 from geomech.shapes.joint_networks.fracture_statistics import Topology, block_sizes, passing_curve
 from geomech.shapes.joint_networks.rock_bridges import rock_bridges
 from geomech.shapes.mesh_exchange import PhysicalMesh, msh_text
@@ -123,7 +123,7 @@ def _statistics(
             [
                 problem.inventory,
                 *([counted(len(bridges), "rock bridge")] if len(bridges) else []),
-                *([] if pond is None else [f"water {said_of_pond(*pond, problem.origin)}"]),
+                *([] if pond is None else [f"water {pond_text(*pond, problem.origin)}"]),
             ]
         ),
         "ponded_water": None if pond is None else {**pond[0]._asdict(), "time_s": pond[1]},

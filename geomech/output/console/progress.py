@@ -75,7 +75,7 @@ class Progress:
         self._out = self.stream or sys.stderr
         self._folder, self._end = Path(folder), problem.run.end_time
         self._stops = problem.run.stop_at
-        self._said = self._began = time.perf_counter()
+        self._last_shown = self._began = time.perf_counter()
         self._percent = -1
         self._last: Cycle | None = None
         self._pace, self._course, self._problem = Pace(), Course(), problem
@@ -118,19 +118,19 @@ class Progress:
         self._course.add(cycle.number, now - self._began, float(cycle.state.time))
         if self._bar is not None:
             # The text is made only when the bar is drawn.
-            if now - self._said >= self._bar.mininterval:
-                self._said = now
+            if now - self._last_shown >= self._bar.mininterval:
+                self._last_shown = now
                 # The time left comes first: a narrow terminal cuts off the end.
                 postfix = f"{self._left(cycle).removeprefix(', ')}, {_cycle_text(cycle)}"
                 self._bar.set_postfix_str(postfix.removeprefix(", "), refresh=False)
                 note_output()
             with suppress(OSError):  # the terminal is gone
                 self._bar.update(max(0.0, min(cycle.state.time, self._end) - self._bar.n))
-        elif now - self._said >= self.interval:
+        elif now - self._last_shown >= self.interval:
             percent = self._share(cycle)
-            if percent == self._percent and now - self._said < 2 * self.interval:
+            if percent == self._percent and now - self._last_shown < 2 * self.interval:
                 return
-            self._said, self._percent = now, percent
+            self._last_shown, self._percent = now, percent
             self._say(f"  {percent:3d} %  {_cycle_text(cycle)}{self._left(cycle)}")
 
     def on_end(self, summary: dict[str, Any], error: BaseException | None = None) -> None:

@@ -203,7 +203,7 @@ class FieldPainter:
         title = self.run.title
         figure.text(0.1 / PAGE, 1 - 0.2 / height, title, fontsize=min(9.5, 9.5 * 62 / max(len(title), 1)), color=INK,
                     weight="bold", va="center")  # fmt: skip
-        figure.text(0.1 / PAGE, 1 - 0.38 / height, self._told(time), fontsize=7.5, color=SOFT, va="center")
+        figure.text(0.1 / PAGE, 1 - 0.38 / height, self._caption(time), fontsize=7.5, color=SOFT, va="center")
         x0, x1 = axes.get_xlim()
         length = _round_length(0.22 * (x1 - x0))
         # The scale bar is below the axis, where nothing else is drawn.
@@ -222,7 +222,7 @@ class FieldPainter:
             strip.legend(handles=keys, loc="center", ncols=min(len(keys), 3), frameon=False, fontsize=7, labelcolor=INK,
                          handlelength=1.8, columnspacing=1.4, borderpad=0, labelspacing=0.3)  # fmt: skip
 
-    def _told(self, time: float) -> str:
+    def _caption(self, time: float) -> str:
         row = self.run.at(self.cycle)
         caption = [f"t = {time:.5g} s"]
         if self.run.led and np.isfinite(row["load"]):

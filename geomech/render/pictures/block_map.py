@@ -57,7 +57,7 @@ def draw_block_map(scene: Any, statistics: dict[str, Any], path: Path | str) -> 
         side.set_visible(False)
     left = (0.55 + across + 0.15) / (across + 4.1)
     figure.text(0.35 / (across + 4.1), 1 - 0.36 / (up + 1.3), problem.title, fontsize=13, color=INK, weight="bold")
-    figure.text(0.35 / (across + 4.1), 1 - 0.6 / (up + 1.3), _said(statistics), fontsize=9, color="#4a4e55")
+    figure.text(0.35 / (across + 4.1), 1 - 0.6 / (up + 1.3), _caption(statistics), fontsize=9, color="#4a4e55")
     figure.legend(
         handles=keys, loc="upper left", bbox_to_anchor=(left, 1 - 0.72 / (up + 1.3)), frameon=False, fontsize=9,
         labelcolor=INK, handlelength=1.9,
@@ -259,7 +259,7 @@ def _rgb(colour: str) -> tuple[float, float, float]:
     return red, green, blue
 
 
-def _said(statistics: dict[str, Any]) -> str:
+def _caption(statistics: dict[str, Any]) -> str:
     text = statistics["summary"]
     if statistics["sets"]:
         size = statistics["blocks"]["size_m_by_part_passing"]["0.5"]

@@ -251,7 +251,7 @@ def _joined(lines: Sequence[np.ndarray], near: float, straight_on: bool) -> list
             fitting = [
                 (a, b)
                 for a, b in pairs
-                if np.hypot(*(a[-1] - b[0])) <= near and (not straight_on or _goes_on(a[-2], a[-1], b[1]))
+                if np.hypot(*(a[-1] - b[0])) <= near and (not straight_on or _is_straight_on(a[-2], a[-1], b[1]))
             ]
             if fitting:
                 a, b = fitting[0]
@@ -265,7 +265,7 @@ def _joined(lines: Sequence[np.ndarray], near: float, straight_on: bool) -> list
     return joined
 
 
-def _goes_on(a: np.ndarray, b: np.ndarray, c: np.ndarray) -> bool:
+def _is_straight_on(a: np.ndarray, b: np.ndarray, c: np.ndarray) -> bool:
     first, then = b - a, c - b
     turn = first[0] * then[1] - first[1] * then[0]
     return bool(first @ then > 0 and abs(turn) <= _STRAIGHT * np.hypot(*first) * np.hypot(*then))

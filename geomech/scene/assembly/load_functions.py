@@ -159,7 +159,7 @@ def deepest_pond(tables: SceneTables, blocks: Blocks) -> tuple[Pond, float] | No
     return max(found, key=lambda pair: pair[0].depth) if found else None
 
 
-def said_of_pond(pond: Pond, time: float, origin: tuple[float, float]) -> str:
+def pond_text(pond: Pond, time: float, origin: tuple[float, float]) -> str:
     """Description of a pond at ``time``."""
     return (
         f"ponded up to {pond.depth:.3g} m deep from x = {pond.start + origin[0]:.6g} to {pond.end + origin[0]:.6g} m "

@@ -105,7 +105,7 @@ class ForceTable(Timed):
     values_n_per_m: Points | None = Field(None, description="forces [[x, y], …] at `times_s`, N/m")
 
     @model_validator(mode="after")
-    def _somewhere(self):
+    def _has_place(self):
         if (self.at is None) == (self.point is None):
             raise ValueError("a force acts `at` a place, or on a drawn `point`")
         return self
@@ -299,7 +299,7 @@ class ExcavationTable(Table):
     drained: bool = Field(True, description="true: water no longer acts on faces that touched them")
 
     @model_validator(mode="after")
-    def _something(self):
+    def _has_content(self):
         if not self.zones and self.polygon is None:
             raise ValueError("give `zones` or a `polygon`")
         if self.polygon is not None and len(self.polygon) < 3:

@@ -123,18 +123,18 @@ def arrange(nodes: np.ndarray, edges: np.ndarray) -> Arrangement:
 def _loops(nodes, node, edge, start, face_of_cycle, outer, inner):
     """The cycles of each face combined: (loop_node, loop_edge, loop_start, face_loop) of an `Arrangement`."""
     holes = inner[face_of_cycle[inner] >= 0]
-    crooked = _pinched(node, start)
-    crooked = crooked[face_of_cycle[crooked] >= 0]
+    pinched = _pinched(node, start)
+    pinched = pinched[face_of_cycle[pinched] >= 0]
     order = np.concatenate([outer, holes])
     order = order[np.argsort(face_of_cycle[order], kind="stable")]
-    if len(crooked):
+    if len(pinched):
         # The few faces with a loop that touches itself are assembled one by one.
-        special = np.unique(face_of_cycle[crooked])
+        special = np.unique(face_of_cycle[pinched])
         mine = np.isin(face_of_cycle[order], special)
         loops: dict[int, list[np.ndarray]] = {int(face): [] for face in special}
         for c in order[mine].tolist():
             loops[int(face_of_cycle[c])].append(_pairs(node, edge, start, c))
-        for c in crooked.tolist():
+        for c in pinched.tolist():
             _unpinch(nodes, loops[int(face_of_cycle[c])], _pairs(node, edge, start, c))
         order = order[~mine]
         begin, flat = gathered(start, order)

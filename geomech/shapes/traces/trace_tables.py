@@ -110,7 +110,9 @@ def _read_csv(path: Path) -> FieldFile:
     if len(wrong):
         row, k = wrong[0]
         raise FieldFileError(f"{path.name}:{numbers[row]}: {wanted[k]} is {values[row, k]}", "give a finite number")
-    return FieldFile(tuple((_ended if wanted is _ENDS else _strung)(path, numbers, sets, ids, values)))
+    return FieldFile(
+        tuple((_traces_from_ends if wanted is _ENDS else _traces_from_vertices)(path, numbers, sets, ids, values))
+    )
 
 
 def _number(text: str, mark: str, what: str) -> float:
@@ -120,7 +122,7 @@ def _number(text: str, mark: str, what: str) -> float:
         raise FieldFileError(f"{what} is {text!r}, not a number", "write metres, with a decimal point") from None
 
 
-def _ended(
+def _traces_from_ends(
     path: Path, numbers: Sequence[int], sets: Sequence[str], ids: Sequence[str], values: np.ndarray
 ) -> list[FieldLine]:
     """One trace per row; one with equal ends is a point."""
@@ -131,7 +133,7 @@ def _ended(
     ]
 
 
-def _strung(
+def _traces_from_vertices(
     path: Path, numbers: Sequence[int], sets: Sequence[str], ids: Sequence[str], values: np.ndarray
 ) -> list[FieldLine]:
     """One trace per id, its vertices in the order of the rows; it is closed if the last vertex is the first."""

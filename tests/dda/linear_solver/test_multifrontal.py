@@ -366,22 +366,22 @@ def test_matrices_of_two_kinds_that_come_by_turns_are_each_factored_in_part(monk
     right = np.random.default_rng(5).normal(size=1800)
     solver, other = BlockSolver(points, rows, columns), data * np.where(rows == columns, 3.0, 1.0)[:, None, None]
     solver.solve(data.ravel(), right)
-    solver.beside.solve(other.ravel(), right)
+    solver.alternate.solve(other.ravel(), right)
     assert solver.counts == {"factorisations": 2, "shares": 2.0, "substitutions": solver.counts["substitutions"]}
     for at in np.flatnonzero(rows == columns)[[7, 150]]:
         data[at] *= 1.5
         other[at] *= 1.5
         solver.solve(data.ravel(), right)
-        x = solver.beside.solve(other.ravel(), right)
+        x = solver.alternate.solve(other.ravel(), right)
     assert solver.counts["factorisations"] == 6 and solver.counts["shares"] < 4.0
     expected = splu(full(rows, columns, other, 300).tocsc()).solve(right)
     assert np.abs(x - expected).max() <= 1e-8 * np.abs(expected).max()
     # Where two would take more room than one may, one serves both, in part or …
     with monkeypatch.context() as patched:
         patched.setattr(block_solver, "KEPT", 2 * solver._factors.tree.own_room_size - 1)
-        assert solver.in_parts and solver.beside is solver
-    assert solver.beside is not solver
+        assert solver.in_parts and solver.alternate is solver
+    assert solver.alternate is not solver
     # … where factors are made anew, in full.
     monkeypatch.setattr(nested_dissection, "KEPT", 0)
     large = BlockSolver(points, rows, columns)
-    assert large.beside is large
+    assert large.alternate is large
