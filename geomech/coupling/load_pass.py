@@ -110,8 +110,8 @@ def balanced(now: CrackedBlocks, dt: float, load_time: float | None) -> Balance:
 
 
 def at_rest(now: CrackedBlocks, load_time: float) -> dda.Equilibrium:
-    """Equilibrium of the blocks under the loads of ``load_time``. In motion their cracks open and slide on the way there,
-    so that the first step begins with nothing to release; in statics the first step does this.
+    """Bring the blocks to equilibrium under the loads of ``load_time``. In dynamics their cracks open and slide on the
+    way, so that the first step begins without unbalanced crack strain; in statics the first step does this.
 
     Sets ``now.state`` and ``now.response``.
     """

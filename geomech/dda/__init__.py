@@ -1,6 +1,7 @@
 """Discontinuous deformation analysis: blocks that move, deform and slide along joints.
 
-`BlockSystem.step` moves a `State` by one time step; `run` does it until an end time. Stands alone::
+`BlockSystem.step` moves a `State` by one time step, and `run` repeats steps until an end time. The package can be used
+alone::
 
     rock, joint = Material("rock", 10e9, 0.25, density=2600.0), JointLaw("joint", friction_angle=0.6)
     loads = Loads(gravity=History.constant([0.0, -9.81]))

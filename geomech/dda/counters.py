@@ -1,4 +1,4 @@
-"""What block systems have done, and what they had no need to do again: counts that go on from system to system."""
+"""Counts of the operations of block systems, and of those that reuse made unnecessary; systems may share one object."""
 
 from __future__ import annotations
 
@@ -8,16 +8,15 @@ from dataclasses import dataclass, field
 
 @dataclass(eq=False)
 class Work:
-    """Counts of work; systems that are given the same one add to it.
+    """Operation counts; systems that share an object add to it.
 
-    pair_searches, pair_searches_kept     lists of near blocks that were made; that served again, since no vertex had
-                                          moved far enough for another pair to come near
-    lone_searches                         contacts asked for of a block without another: nothing is looked for
-    factorisations, factorisations_kept   of a sparse matrix, whole or in part; solutions with the factors of a matrix
-                                          before, from which the present one hardly differs
-    pair_search_s, factorisation_s        what those that were made took, s, but for the first, which may have loaded
-                                          kernels
-    shortened                             how often each (reason, block's name, the other's or "") has shortened a step
+    pair_searches, pair_searches_kept     neighbour lists computed, and reused because no vertex had moved far enough
+                                      another pair to come near
+    lone_searches                         contact searches for a single block, which has no neighbours
+    factorisations, factorisations_kept   sparse factorisations, complete or partial; and solutions that reused the
+                                      of an earlier, nearly equal matrix
+    pair_search_s, factorisation_s        s, time of these operations except the first, which may have loaded kernels
+    shortened                             number of steps shortened, by (reason, name of the block, of the other or "")
     """
 
     pair_searches: int = 0

@@ -1,16 +1,16 @@
-"""Where the energy of a step goes, and the budget of a run.
+"""Energy balance of a step, and the energy budget of a run.
 
 Every step solves M ā = (weight, loads, centrifugal force) + contacts − elastic and viscous forces. Multiplied by the
-displacement d of the step, this is a balance of works, and each work is a change of what is stored plus what is lost:
+displacement d of the step, this is a balance of works. Each work equals a change of stored energy plus a loss:
 
     kinetic    d·M ā      = ΔT + (loss of the time scheme; none where d = ½ (v + v′) dt, as in Shi's)
     elastic    A σ̄·Δε     = ΔU + ½ A (σ + σ′)·Δe_c (the strain of cracks) + (θ − ½) A Δσ·Δε
     contact   −N̄ Δn − S̄ Δs = ΔΦ + friction + dashpots + broken bonds + (θ − ½) k Δg² + (θ − ½) ΔS²/kₛ …
 
-with the forces weighed between the step's start and its end (θ; 1 in Shi's scheme, see `newmark`). What the
-implicit scheme damps is computed, not inferred, so that the balance closes to round-off within each step. Between two
-steps the geometry is updated exactly where the step was linear, and blocks change their area; what stored energy that
-changes is the budget's residual, of the order of the strain and of the turn of blocks in a step.
+Forces are weighted between the start and the end of the step (weight θ at the end; 1 in Shi's scheme, see `newmark`).
+The dissipation of the implicit scheme is computed, not inferred, so the balance of each step closes to round-off.
+Between two steps the geometry is updated exactly, whereas the step was linear, and the areas of blocks change. The
+change of stored energy that this causes is the residual of the budget, of the order of strain and rotation in a step.
 """
 
 from __future__ import annotations
@@ -27,31 +27,31 @@ from .kinematics.newmark import BlockMass, SchemeTerms
 
 log = logging.getLogger(__name__)
 
-#: A gain above this part of the energy that has been turned over is reported. Sliding, falling and colliding blocks
-#: stay within 3e-4 (most below 1e-5), a specimen strained by half a per cent within 3e-3.
+#: Energy gain, relative to the energy converted (`EnergyBudget.turnover`), above which a warning is given. Sliding,
+#: falling and colliding blocks stay within 3e-4 (most below 1e-5), a specimen strained by half a per cent within 3e-3.
 GAIN = 0.01
 
 
 class StepEnergy(NamedTuple):
-    """Energies of one step, J/m. What is stored is that of the step's end, on the geometry on which it was assembled.
+    """Energies of one step, J/m. Stored energies are those at the end of the step, on the geometry on which it was
+    assembled.
 
     kinetic          T = ½ ∫ρ|u̇|²
     elastic          U = ½ A σ·C⁻¹σ
     contact          Φ of contact springs, normal and shear
-    before           T + U + Φ as the step began
-    gravity_work     of the weight
-    load_work        of edge tractions and point loads, bolts, and what imposes motion
-    crack_work       done on the blocks' cracks: stored, rubbed off and released there
-    friction         lost in sliding, ≥ 0
-    damping          lost in the blocks' viscosity and in contact dashpots, ≥ 0
+    before           T + U + Φ at the start of the step
+    gravity_work     work of the weight
+    load_work        work of edge tractions, point loads, bolts and prescribed motion
+    crack_work       work on the cracks of the blocks: stored, dissipated by friction and released there
+    friction         dissipated by sliding, ≥ 0
+    damping          dissipated by the viscosity of blocks and in contact dashpots, ≥ 0
     bond             released where cohesion or tensile strength has failed
-    scheme           lost to the time integration: vibrations it does not resolve, impacts
+    scheme           dissipated by the time integration: unresolved vibrations, impacts
     carried          lost because only a part of the velocity is carried over (dynamic factor below 1)
-    overlap          brought in by contacts that close where blocks already overlap
+    overlap          created by contacts that close where blocks already overlap
     residual         of the balance within the step: round-off
-    impact           lost in impacts with a coefficient of restitution, across the contact (`impacts`); their friction
-                     is in
-                     ``friction``
+    impact           dissipated normal to the contact in impacts with a coefficient of restitution (`impacts`); their
+                     friction is part of ``friction``
     """
 
     kinetic: float
@@ -78,7 +78,7 @@ class StepEnergy(NamedTuple):
 
 @part(fastmath=False, error_model="numpy", nogil=True, **UNCOUNTED)
 def _product(first, second, b, c, d, area, xx, yy, xy):
-    """∫ u·w over a block with these moments, of two first-order fields with the rigid motions ``first[b]`` and
+    """∫ u·w over a block with these moments, for two first-order fields with the rigid motions ``first[b]`` and
     ``second[b]`` and the strains c and d."""
     p, q = 0.5 * c[2] - first[b, 2], 0.5 * c[2] + first[b, 2]
     r, s = 0.5 * d[2] - second[b, 2], 0.5 * d[2] + second[b, 2]
@@ -91,13 +91,13 @@ def _product(first, second, b, c, d, area, xx, yy, xy):
 
 @part(fastmath=False, error_model="numpy", nogil=True, **UNCOUNTED)
 def _push(stiffness, gap, limit):
-    """Normal force (N) of a contact's spring, straight or of Bandis' hyperbolic closure."""
+    """Normal force (N) of a contact's spring, linear or with Bandis' hyperbolic closure."""
     return -stiffness * gap / (1.0 + gap / limit)
 
 
 @part(fastmath=False, error_model="numpy", nogil=True, **UNCOUNTED)
 def _stored(stiffness, gap, limit, bonded):
-    """Energy (J/m) of a contact's normal spring; apart, only a bonded one has any."""
+    """Energy (J/m) of a contact's normal spring; an open contact stores energy only if it is bonded."""
     if gap > 0.0 and bonded == 0:
         return 0.0
     if limit == np.inf:
@@ -123,12 +123,12 @@ def sliding(vectors, unknowns, order, block, other, way=1):
 class StepMotion(NamedTuple):
     """Blocks in a step, (n_blocks, 6) each, in the unknowns u0, v0, r0, εx, εy, γxy.
 
-    increment        displacement over the step, m
-    old_velocity     as the last step ended
-    carried          with which the step begins (its dynamic factor times ``old_velocity``)
-    velocity         as it ends, on the rotated axes
-    acceleration     of the scheme's equation of motion
-    load             generalised forces of all loads but weight, N and N m
+    increment        displacement in the step, m
+    old_velocity     at the end of the last step
+    carried          at the start of this step: ``old_velocity`` times the dynamic factor
+    velocity         at the end of the step, on the rotated axes
+    acceleration     in the scheme's equation of motion
+    load             generalised forces of all loads except weight, N and N m
     """
 
     increment: np.ndarray
@@ -140,8 +140,8 @@ class StepMotion(NamedTuple):
 
 
 class StepStress(NamedTuple):
-    """Stresses of blocks in a step: σ = ``old_stress`` (n_blocks, 3) Pa as it begins, σ′ = ``tangent`` Δε + ``stress0``
-    as it ends, and the blocks' own ``stiffness`` and ``compliance`` (n_blocks, 3, 3), Pa and 1/Pa."""
+    """Stresses of blocks in a step: σ = ``old_stress`` (n_blocks, 3) Pa at its start, σ′ = ``tangent`` Δε + ``stress0``
+    at its end, and the ``stiffness`` and ``compliance`` (n_blocks, 3, 3) of the intact blocks, Pa and 1/Pa."""
 
     old_stress: np.ndarray
     tangent: np.ndarray
@@ -153,17 +153,17 @@ class StepStress(NamedTuple):
 class ContactStep(NamedTuple):
     """Contacts (n,) in a step.
 
-    was_state, state      as it begins and as it ends
-    was_bonded, bonded    their bonds
-    gap0, gap             from where the faces meet, m
-    arc, lifted           of the gap's change: by blocks that turn, by dilation, m
+    was_state, state      at its start and at its end
+    was_bonded, bonded    bond state at its start and at its end
+    gap0, gap             at its start and at its end, from where the faces meet, m
+    arc, lifted           parts of the change of gap due to rotation of the blocks and to dilation, m
     slip, sliding         plastic slip, and motion along the edge, m
-    normal_force          that acted over the step, N
-    shear_force0, shear_force, end_shear    as the step begins, over it, and as it ends, N
+    normal_force          acting over the step, N
+    shear_force0, shear_force, end_shear    at its start, acting over it, and at its end, N
     normal                stiffness without dashpot, N/m
-    shear                 that of the step (``theta`` times the spring), N/m. Both are 0 where a multiplier holds and
-                          nothing is stored
-    theta                 weight of the step's end
+    shear                 stiffness in the step (``theta`` times that of the spring), N/m. Both are 0 for multipliers,
+                          which store no energy
+    theta                 weight of the end of the step
     law                   joint law
     """
 
@@ -187,15 +187,15 @@ class ContactStep(NamedTuple):
     law: np.ndarray
 
 
-#: Where the terms of `StepEnergy` stand in the sums of a step.
+#: Positions of the terms of `StepEnergy` in the sums of a step.
 _KINETIC, _ELASTIC, _CONTACT, _BEFORE, _GRAVITY_WORK, _LOAD_WORK, _CRACK_WORK = range(7)
 _FRICTION, _DAMPING, _BOND, _SCHEME, _CARRIED, _OVERLAP, _RESIDUAL = range(7, 14)
 
 
 @part(fastmath=False, error_model="numpy", nogil=True, **UNCOUNTED)
 def _strain_energies(b, strain, stress, weight, now):
-    """Of block ``b``, per area (J/m³): ½ σ·C⁻¹σ before and after the step, the work done on its cracks, σ̄·Δε, and
-    Δσ·Δε; ``strain`` (3,) is Δε, ``now`` (3,) room for σ′."""
+    """For block ``b``, per area (J/m³): ½ σ·C⁻¹σ before and after the step, the work on its cracks, σ̄·Δε, and Δσ·Δε.
+    ``strain`` (3,) is Δε, ``now`` (3,) work space for σ′."""
     u0 = u1 = cracked = mean = quadratic = changed = 0.0
     for k in range(3):
         now[k] = stress.stress0[b, k]
@@ -217,13 +217,14 @@ def _strain_energies(b, strain, stress, weight, now):
 
 @part(fastmath=False, error_model="numpy", nogil=True, **UNCOUNTED)
 def _kinetic_energies(b, motion, mass, rate):
-    """Of block ``b`` (J/m): kinetic energy as the last step ended, as this one begins and as it ends; the work of its
-    inertia on the step's displacement; and ∫ρ|d|², kg m. ``rate`` (3,): room for strain rates."""
+    """For block ``b`` (J/m): kinetic energy at the end of the last step, at the start and at the end of this one; the
+    work of its inertia on the displacement of the step; and ∫ρ|d|², kg m. ``rate`` (3,): work space for strain rates.
+    """
     increment, velocity = motion.increment, motion.velocity
     old, carried, acceleration = motion.old_velocity, motion.carried, motion.acceleration
     area, xx, yy, xy = mass.moments[b, 0], mass.moments[b, 3], mass.moments[b, 4], mass.moments[b, 5]
     rho = mass.density[b]
-    # The new velocity is on the rotated axes: rotated back, it is compared on the step's own.
+    # The new velocity is on the rotated axes; it is rotated back to those of the step.
     c, s = np.cos(increment[b, 2]), np.sin(increment[b, 2])
     ex, ey, g = velocity[b, 3], velocity[b, 4], 0.5 * velocity[b, 5]
     rate[0] = c * c * ex + s * s * ey + 2 * s * c * g
@@ -233,7 +234,7 @@ def _kinetic_energies(b, motion, mass, rate):
     begun = 0.5 * rho * _product(carried, carried, b, carried[b, 3:], carried[b, 3:], area, xx, yy, xy)
     work = rho * _product(increment, acceleration, b, increment[b, 3:], acceleration[b, 3:], area, xx, yy, xy)
     moved = rho * _product(increment, increment, b, increment[b, 3:], increment[b, 3:], area, xx, yy, xy)
-    # The second moments of the mass as the step ends, (I + ε) S (I + ε): the rotation continues on the strained block.
+    # Second moments of mass at the end of the step, (I + ε) S (I + ε): the strained block continues to rotate.
     fx, fy, h = 1.0 + increment[b, 3], 1.0 + increment[b, 4], 0.5 * increment[b, 5]
     xx1 = fx * fx * xx + 2.0 * fx * h * xy + h * h * yy
     yy1 = h * h * xx + 2.0 * h * fy * xy + fy * fy * yy
@@ -244,7 +245,7 @@ def _kinetic_energies(b, motion, mass, rate):
 
 @part(fastmath=False, error_model="numpy", nogil=True, **UNCOUNTED)
 def _add_blocks(out, motion, stress, mass, scheme, gravity, room):
-    """The terms of blocks, into ``out`` (14,); ``room`` (3,) is working space."""
+    """Add the terms of blocks to ``out`` (14,); ``room`` (3,) is work space."""
     increment = motion.increment
     kinetic = elastic = before = fallen = loads = cracks = viscous = scheme_loss = lost = 0.0
     for b in range(increment.shape[0]):
@@ -252,7 +253,7 @@ def _add_blocks(out, motion, stress, mass, scheme, gravity, room):
         u0, u1, cracked, mean, changed = _strain_energies(b, strain, stress, scheme.weight, room)
         elastic += area * u1
         before += area * u0
-        # A fixed block may be made to move: what drives it works.
+        # The motion of a fixed block may be prescribed: the forces that drive it do work.
         for k in range(6):
             loads += motion.load[b, k] * increment[b, k]
         if mass.fixed[b]:
@@ -279,7 +280,7 @@ def _add_blocks(out, motion, stress, mass, scheme, gravity, room):
 
 @part(fastmath=False, error_model="numpy", nogil=True, **UNCOUNTED)
 def _add_contacts(out, contacts, closure):
-    """Add the terms of contacts to the sums ``out`` (14,); ``closure`` (n_laws,) m, the largest of a joint's faces."""
+    """Add the terms of contacts to the sums ``out`` (14,); ``closure`` (n_laws,) m: largest closure of a joint's faces."""
     contact = overlap = friction = bond = 0.0
     before, viscous, scheme_loss = out[_BEFORE], out[_DAMPING], out[_SCHEME]
     for i in range(contacts.state.shape[0]):
@@ -296,7 +297,7 @@ def _add_contacts(out, contacts, closure):
             if was == OPEN and g0 < 0.0:
                 given = _stored(kn, g0, limit, 0)
             phi1 = _stored(kn, g1, limit, contacts.bonded[i]) + 0.5 * give * end * end
-            # Forces act along the straight motion: what the arc takes from it or adds is the scheme's.
+            # Forces act along the straight motion: the difference of the work along the arc belongs to the scheme.
             lifted, slid = contacts.lifted[i], contacts.sliding[i]
             done = pushed * (g1 - g0 - contacts.arc[i] + lifted) + sheared * slid
             if state == SLIP:
@@ -320,11 +321,11 @@ def _add_contacts(out, contacts, closure):
 
 @kept(fastmath=False, error_model="numpy", nogil=True)
 def step_energies(motion, stress, mass, scheme, gravity, contacts, closure):
-    """The terms of `StepEnergy` in its order but for impacts, (14,) J/m.
+    """The terms of `StepEnergy` in their order, without impacts, (14,) J/m.
 
-    Plain tuples: ``motion``, ``stress`` and ``mass`` of the blocks (`StepMotion`, `StepStress`, `BlockMass`), ``scheme``
-    (`SchemeTerms`), ``gravity`` (2,) m/s², ``contacts`` (`ContactStep`), and ``closure`` (n_laws,) m, the largest of
-    joints with Bandis' law, inf for the others.
+    Plain tuples: ``motion``, ``stress`` and ``mass`` of the blocks (`StepMotion`, `StepStress`, `BlockMass`),
+    ``scheme`` (`SchemeTerms`), ``gravity`` (2,) m/s², ``contacts`` (`ContactStep`), and ``closure`` (n_laws,) m, the
+    largest closure of joints with Bandis' law, inf for others.
     """
     out = np.zeros(14)
     blocks = StepMotion(*motion), StepStress(*stress), BlockMass(*mass), SchemeTerms(*scheme)
@@ -339,18 +340,18 @@ def step_energies(motion, stress, mass, scheme, gravity, contacts, closure):
 
 @dataclass(frozen=True)
 class EnergyBudget:
-    """Energies of a run, J/m: what its steps did, added up. ``budget = budget.after(result.energy,
-    result.state.time)``.
+    """Energies of a run, J/m: sums over its steps. ``budget = budget.after(result.energy, result.state.time)``.
 
-    work       weight and loads
-    losses     friction, damping, bonds, impacts, time scheme, carried velocity, cracks
-    overlap    brought in by blocks that overlapped, and of that ``drawn`` in the first step, as blocks were drawn
-    start      stored as the first step began
+    work       of weight and loads
+    losses     friction, damping, bonds, impacts, time scheme, velocity not carried over, cracks
+    overlap    created by overlapping blocks; ``drawn``: the part created in the first step, by overlaps in the drawing
+    start      stored at the start of the first step
     stored     stored now
-    split      stored energy that has changed because blocks were cut or dug out (`cut`)
-    released   of the time scheme's losses, what was less than none while cracks grew at one load: set free by growth
-    residual   stored + losses − work − overlap − split − start: what updating the geometry between steps has added (>
-               0) or taken away, and round-off
+    split      change of stored energy due to splitting or excavation of blocks (`cut`)
+    released   negative losses of the time scheme while cracks grew at constant load: energy released by growth
+    residual   stored + losses − work − overlap − split − start: energy added (> 0) or removed by updating the geometry
+               between steps, and round-off
+    turnover   energy converted: |gravity_work| + |load_work|, or the largest energy stored, whichever is larger
     """
 
     steps: int = 0
@@ -366,8 +367,8 @@ class EnergyBudget:
     released: float = 0.0
 
     def after(self, step: StepEnergy, time: float = float("nan"), *, growing: bool = False) -> EnergyBudget:
-        """The budget with one more step; logs a warning, naming ``time``, when energy has come from nowhere. In a step
-        in which cracks are ``growing`` without motion, at one load, it comes from them."""
+        """The budget with one more step; logs a warning with the ``time`` when blocks have gained energy without work.
+        In a step in which cracks are ``growing`` at constant load in statics, such energy is released by the cracks."""
         first = self.last is None
         totals = self.totals + step
         start = step.before if first else self.start
@@ -378,7 +379,7 @@ class EnergyBudget:
         turnover = max(self.turnover, step.stored, step.before, work)
         warned = self.warned
         released = self.released + (max(0.0, -step.scheme) if growing else 0.0)
-        # A scheme that loses less than nothing gives.
+        # A negative loss of the scheme is a gain.
         gain = residual - min(0.0, float(totals[_SUMS["scheme"]]) + released)
         if gain > warned * turnover:
             log.warning(
@@ -393,14 +394,15 @@ class EnergyBudget:
         )
 
     def cut(self) -> EnergyBudget:
-        """The same as the next step finds blocks cut or dug out: what that changes is no residual."""
+        """The budget before a step in which blocks are newly split or excavated: the change of stored energy is no
+        residual."""
         return EnergyBudget(
             self.steps, self.last, self.start, self.totals, self.split, self.residual, self.turnover,
             self.last is not None, self.warned, self.drawn, self.released,
         )  # fmt: skip
 
     def __getattr__(self, name: str) -> float:
-        # The sums go by the names of `StepEnergy`; what is stored is no sum.
+        # Sums have the names of `StepEnergy`; stored energies are not sums.
         if name in _SUMS:
             return float(self.totals[_SUMS[name]])
         raise AttributeError(name)
@@ -411,7 +413,7 @@ class EnergyBudget:
 
     @property
     def by_overlap(self) -> float:
-        """What overlaps have brought in that were not drawn, as a part of all energy turned over."""
+        """Energy created by overlaps other than drawn ones, relative to the energy converted."""
         brought = self.overlap - self.drawn
         return brought / self.turnover if brought > 0.0 else 0.0
 
@@ -420,13 +422,13 @@ class EnergyBudget:
         return float(self.totals[_LOSSES].sum())
 
     def left_over(self, at_cracks: float = 0.0, more_work: float = 0.0) -> float:
-        """The residual as a part of all energy turned over; ``at_cracks`` J/m of the work on them are not accounted for
-        there, ``more_work`` has been done on them by weight and loads than the blocks know."""
+        """The residual relative to the energy converted. ``at_cracks`` J/m of the work on cracks are not accounted for
+        in their own balance; ``more_work`` has been done on them by weight and loads beyond the work on the blocks."""
         turnover = max(self.turnover, abs(self.work + more_work))
         return (self.residual - at_cracks) / turnover if turnover else 0.0
 
     def statistics(self) -> dict[str, float]:
-        """The columns of a history, J/m."""
+        """Columns of the history, J/m."""
         sums = self.totals.tolist()
         out = {column: sums[_SUMS[name]] for column, name in _COLUMNS.items()}
         out["split_energy"] = self.split
@@ -435,7 +437,7 @@ class EnergyBudget:
         return out
 
 
-#: Sums of a run: where they stand in `StepEnergy`; and the columns of a history that they make.
+#: Sums of a run, with their positions in `StepEnergy`; and the history columns that they give.
 _SUMS = {name: at for at, name in enumerate(StepEnergy._fields) if at >= StepEnergy._fields.index("gravity_work")}
 del _SUMS["residual"]
 _COLUMNS = {

@@ -1,4 +1,4 @@
-"""Records that the compiled kernels of a step's equations take: contacts, their springs, and where blocks stand in the
+"""Records taken by the compiled kernels for the equations of a step: contacts, springs, and block positions in the
 matrix."""
 
 from __future__ import annotations
@@ -16,11 +16,11 @@ class BlockEquations(NamedTuple):
 
 
 class ContactMotion(NamedTuple):
-    """How contacts (n,) move with the unknowns.
+    """Relative motion of contacts (n,) in terms of the unknowns.
 
     block, other  (n,)         owners of the vertex and of the edge
     order         (n_blocks,)  number of each block's unknowns, −1 if fixed
-    vectors       (n, 2, 12)   as from `assembly.contact_vectors`
+    vectors       (n, 2, 12)   from `assembly.contact_vectors`
     """
 
     block: np.ndarray
@@ -30,7 +30,7 @@ class ContactMotion(NamedTuple):
 
 
 class ContactSides(NamedTuple):
-    """Contact sides block by block: those of block b are ``side`` from ``start[b]`` to before ``start[b + 1]``, 2 c the
+    """Contact sides by block: those of block b are ``side`` from ``start[b]`` to before ``start[b + 1]``; 2 c is the
     vertex of contact c and 2 c + 1 its edge."""
 
     start: np.ndarray
@@ -38,8 +38,8 @@ class ContactSides(NamedTuple):
 
 
 class MatrixPlaces(NamedTuple):
-    """Where the flat matrix holds its 6×6 blocks, as in `assembly.Pattern`: ``begins`` (n + 1,), ``stride`` and
-    ``diagonal`` (n,) of the rows of blocks, ``upper`` and ``lower`` (n_contacts,) of the two couplings of a contact."""
+    """Locations of the 6×6 blocks in the flat matrix, as in `assembly.Pattern`: ``begins`` (n + 1,), ``stride`` and
+    ``diagonal`` (n,) of the block rows, ``upper`` and ``lower`` (n_contacts,) of the two couplings of a contact."""
 
     begins: np.ndarray
     stride: np.ndarray
@@ -61,12 +61,12 @@ class ContactStiffness(NamedTuple):
 class SpringsInStates(NamedTuple):
     """Contacts (n,) in given states, and their springs (`penalty_springs.Springs`).
 
-    state, direction         and sense of sliding
-    gap                      as the step begins, m
+    state, direction         contact state, and sense of sliding
+    gap                      at the start of the step, m
     normal, shear            stiffness, N/m
     friction, sliding        a sliding contact carries ``friction`` N + ``sliding``
     lift                     dilation, m per m
-    shear0                   shear force as the step begins, N
+    shear0                   shear force at the start of the step, N
     """
 
     state: np.ndarray

@@ -1,4 +1,4 @@
-"""Blocks that are taken out while a run goes on: which they are at a time, and when the next event is."""
+"""Excavation during a run: the blocks removed at a given time, and the time of the next event."""
 
 from __future__ import annotations
 
@@ -7,20 +7,20 @@ import numpy as np
 from ..model import Blocks, Excavation, Loads
 from ..model.blocks.polygon import winding_number
 
-#: Times nearer than this part of their size are one.
+#: Times that differ by less than this, relative to their size, are equal.
 _SAME = 1e-12
 
 
 class Excavations:
-    """The excavations of loads on given blocks."""
+    """The excavations of ``loads`` on given blocks."""
 
     def __init__(self, blocks: Blocks) -> None:
         self._blocks = blocks
         self._known: dict[tuple[Excavation, ...], np.ndarray] = {}
 
     def removed(self, loads: Loads, time: float) -> np.ndarray | None:
-        """(n_blocks,) True for blocks that are gone in a step that begins at ``time``; None before anything is. The
-        same array as long as nothing more is taken out."""
+        """(n_blocks,) True for blocks that are removed in a step that begins at ``time``; None before the first
+        excavation. The same array until the next excavation."""
         past = tuple(e for e in loads.excavations if e.time <= time + _SAME * abs(time))
         if not past:
             return None
@@ -32,7 +32,7 @@ class Excavations:
         return self._known[past]
 
     def drained(self, loads: Loads, time: float) -> np.ndarray | None:
-        """(n_blocks,) True for those of them that took the water with them; None before anything is."""
+        """(n_blocks,) True for removed blocks whose space is drained; None before the first excavation."""
         if self.removed(loads, time) is None:
             return None
         out = np.zeros(self._blocks.n_blocks, bool)
@@ -42,8 +42,8 @@ class Excavations:
         return out
 
     def refuse(self, loads: Loads) -> None:
-        """Raises ValueError for an excavation, now or later, that takes none of these blocks, or one that is not
-        there."""
+        """Raises ValueError for an excavation, present or future, that contains none of these blocks or a block that
+        does not exist."""
         for excavation in loads.excavations:
             self._taken(excavation)
 
@@ -65,8 +65,8 @@ class Excavations:
 
 
 def until_next_event(loads: Loads, time: float, dt: float) -> float:
-    """``dt``, or the time left from ``time`` to the next excavation or installation of a bolt: a step does not pass
-    one."""
+    """``dt``, or the time from ``time`` to the next excavation or bolt installation if that is shorter: a step does not
+    pass such an event."""
     coming = [e.time for e in loads.excavations] + [b.installation for b in loads.bolts]
     left = [t - time for t in coming if t > time + _SAME * max(abs(time), abs(t))]
     return min([dt, *left])

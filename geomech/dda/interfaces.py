@@ -1,7 +1,7 @@
-"""What one step needs of a system of blocks, and what the limits of a step need of the step.
+"""Protocols of a system of blocks and of an attempted step, for the modules that compute and limit a step.
 
-`geomech.dda.system.BlockSystem` and `geomech.dda.time_step.Attempt` are these. Arrays are by block (n_blocks,) unless
-said otherwise; units are m, kg, s, Pa.
+`geomech.dda.system.BlockSystem` and `geomech.dda.time_step.Attempt` implement them. Arrays are by block (n_blocks,)
+unless stated otherwise; units are m, kg, s, Pa.
 """
 
 from __future__ import annotations
@@ -19,8 +19,8 @@ if TYPE_CHECKING:
 
 
 class AttemptedStep(Protocol):
-    """A step as it was solved: ``increment`` (n_blocks, 6) of the unknowns, ``vertices`` (n_vertices, 2) before it,
-    ``largest`` displacement of a vertex."""
+    """A solved step: ``increment`` (n_blocks, 6) of the unknowns, ``vertices`` (n_vertices, 2) before it, ``largest``
+    displacement of a vertex."""
 
     state: State
     increment: np.ndarray
@@ -32,11 +32,11 @@ class AttemptedStep(Protocol):
 
 
 class SteppedSystem(Protocol):
-    """Blocks with what stays from step to step: material, mass, freedom, contact finder, time scheme.
+    """Blocks with the data that are kept from step to step: materials, mass, constraints, contact finder, time scheme.
 
-    ``free`` is the row of each block in the equations, −1 where it is fixed, ``moving`` the numbers of those that have
-    one; ``next`` and ``owner`` are by vertex; ``no_compliance`` (n_blocks, 3, 3) and ``no_offset`` (n_blocks, 3) are
-    those of blocks without cracks.
+    ``free`` is the row of each block in the equations, −1 if it is fixed; ``moving`` are the numbers of the blocks that
+    have a row. ``next`` and ``owner`` are by vertex. ``no_compliance`` (n_blocks, 3, 3) and ``no_offset`` (n_blocks, 3)
+    are those of blocks without cracks.
     """
 
     blocks: Blocks

@@ -1,4 +1,4 @@
-"""How far a step is from solving its equations, and how far its blocks are from rest."""
+"""Residual of the equations of a step, and unbalanced force ratio of its blocks."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from ..compiled import kept
 def imbalance(own, contacts, unknowns, forces, acceleration, mass, loads, largest):
     """(residual, unbalanced force ratio).
 
-    The residual is the largest of the equations of motion, contact forces as reported, over the largest force in them:
-    round-off. The unbalanced force ratio is the part of the forces on a block that goes into moving it, |m a| over the
-    sum of the sizes of its weight, loads and contact forces (for its rotation moments over √area), at the block where
-    it is largest: 0 at rest, 1 in free flight.
+    The residual is the largest residual of the equations of motion with the reported contact forces, over the largest
+    force in them: round-off. The unbalanced force ratio of a block is |m a| over the sum of the magnitudes of its
+    weight, loads and contact forces (for rotation, moments over √area); the largest of all blocks counts. It is 0 at
+    rest, 1 in free flight.
 
-    ``own`` (`BlockEquations`), ``contacts`` (`ContactMotion`) and ``unknowns`` (n, 6) as solved; ``forces``, normal and
-    shear (n_contacts,); ``acceleration`` (n_blocks, 6); ``mass`` (`BlockMass`); ``loads`` (`BlockLoads`), all as plain
-    tuples; ``largest`` N of the forces in the right side that may cancel there.
+    ``own`` (`BlockEquations`), ``contacts`` (`ContactMotion`) and ``unknowns`` (n, 6) are those of the solution;
+    ``forces``: normal and shear (n_contacts,); ``acceleration`` (n_blocks, 6); ``mass`` (`BlockMass`); ``loads``
+    (`BlockLoads`), all as plain tuples. ``largest`` N: of forces on the right-hand side that may cancel there.
     """
     matrix, right = own
     block, other, order, vectors = contacts

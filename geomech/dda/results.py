@@ -1,4 +1,4 @@
-"""What a step takes and gives: the cracks' compliance, the settled contacts, forces in equilibrium, statistics."""
+"""Input and results of a step: compliance of cracks, contacts, forces in equilibrium, statistics."""
 
 from __future__ import annotations
 
@@ -12,14 +12,15 @@ from .loads.load_vectors import AppliedForces
 
 
 class NotConverged(RuntimeError):
-    """No acceptable step was found, however short: the message says why and names the contact concerned."""
+    """No acceptable step was found at any length; the message gives the reason and the contact concerned."""
 
 
 @dataclass(frozen=True, eq=False)
 class CrackResponse:
-    """How cracks soften their blocks: mean crack strain e(σ) = ``offset`` + ``compliance`` σ, current axes.
+    """Response of cracks in blocks: mean crack strain e(σ) = ``offset`` + ``compliance`` σ, current axes.
 
-    ``compliance`` (n_blocks, 3, 3) 1/Pa, symmetric; ``offset`` (n_blocks, 3), engineering shear. Zeros: a whole block.
+    ``compliance`` (n_blocks, 3, 3) 1/Pa, symmetric; ``offset`` (n_blocks, 3), engineering shear. Zero for an intact
+    block.
     """
 
     compliance: np.ndarray
@@ -38,22 +39,21 @@ class CrackResponse:
 class StepResult:
     """A finished step.
 
-    state          the new State; ``state.contacts`` stand on its geometry
-    dt             s, the time it advanced (less than asked if the step was cut)
-    contacts       CONTACT rows on the geometry on which the forces acted, with the converged ones
-    forces         whatever else acted, on the same geometry
-    acceleration   (n_blocks, 6) mean of the unknowns over the step, with what mass-proportional damping adds
+    state          the new State; ``state.contacts`` refer to its geometry
+    dt             s, the time advanced (less than requested if the step was cut)
+    contacts       CONTACT rows on the geometry on which the forces acted, with the converged forces
+    forces         all other forces, on the same geometry
+    acceleration   (n_blocks, 6) mean over the step, including the contribution of mass-proportional damping
     energy         the terms of the step's energy balance
-    vertices       (n_vertices, 2) m, that geometry: the middle of the step in dynamics (`dda.kinematics.midpoint_configuration`)
-    turn           (n_blocks,) rad, by which blocks have turned there since the step began
-    arcs           (n_contacts,) m each, the arc and the swing that the contacts have followed (`contact_set`)
-    reserve        (n_contacts,) N, how far each of ``contacts`` is from leaving its state (`contact_states.reserves`)
-    overlap        the overlap that brought most energy into the step; None where none did
+    vertices       (n_vertices, 2) m, that geometry: in dynamics the midpoint configuration
+    turn           (n_blocks,) rad, rotation of the blocks there since the start of the step
+    arcs           (n_contacts,) m each, the arc and the swing of the contacts (`contact_set`)
+    reserve        (n_contacts,) N, distance of each of ``contacts`` from a change of state (`coulomb_return.reserves`)
+    overlap        the overlap that created most energy in the step; None without overlap
     statistics     open_close_iterations, dt, step_cuts, kinetic_energy, elastic_energy, contact_energy (J/m),
-                   worst_penetration (m), max_displacement_ratio, limit_share (the part of what a step may
-                   move that it has used), unbalanced (largest residual of the equations of
-                   motion over the largest force in them), unbalanced_ratio (0 at rest, 1 in free flight: see
-                   `out_of_balance`)
+                   worst_penetration (m), max_displacement_ratio, limit_share (largest ratio of motion to its limit),
+                   unbalanced (largest residual of the equations of motion over the largest force in them),
+                   unbalanced_ratio (0 at rest, 1 in free flight: see `out_of_balance`)
     """
 
     state: State

@@ -1,8 +1,9 @@
-"""Attempts at one step: with contacts found again, or shorter, until a step holds.
+"""Attempts at one step, with another contact search or a shorter step, until one is accepted.
 
-A step whose contact states do not settle is halved; one in which blocks move beyond the limits (`step_limits`) is
-shortened in proportion; where a corner has gone into or through a block unseen, contacts are searched for farther away
-first. In statics, where a load does not shrink with the step, what a shorter step does not improve is accepted.
+A step whose contact states do not converge is halved. A step in which blocks move beyond the limits (`step_limits`) is
+shortened in proportion. If a corner has entered or passed through a block without a contact, contacts are first
+searched within a larger distance. In statics, where loads do not decrease with the step length, a violation of the
+limits that a shorter step does not reduce is accepted.
 """
 
 from __future__ import annotations
@@ -32,16 +33,17 @@ from .time_step import Attempt, StepStart
 
 log = logging.getLogger(__name__)
 
-#: Contacts of one step are searched for farther away this many times at most; then it is cut.
+#: Most extensions of the search distance in one step; then the step is cut.
 _FARTHER = 6
-#: A step begins again this many times at most where corners meet in another direction than expected, …
+#: Most repetitions of a step because corners meet in an unexpected direction, …
 _REDIRECTED = 3
-#: … by more than this angle (cosine).
+#: … and the angle to the expected direction above which it is repeated (cosine).
 _OTHER_DIRECTION = 0.95
-#: Corners are searched for this much farther, in units of √area of the smallest block, than their weight may bring them: what
-#: elastic blocks move in a step that they bear at rest.
+#: Additional search distance of corners beyond the motion due to weight, in units of √area of the smallest block:
+#: elastic motion of blocks at rest in a step.
 _BESIDES = 1e-6
-#: Part of the largest displacement of a step by which a static step takes blocks to where bolts hold them.
+#: Largest displacement towards the equilibrium of soft bolts in a static step, relative to the largest displacement
+#: allowed in a step.
 _REACH = 0.25
 
 
@@ -52,7 +54,7 @@ class Deflection(Protocol):
 
 
 class LimitedSystem(SteppedSystem, Protocol):
-    """A system whose steps have limits; ``deflected`` are its blocks of higher order, None without."""
+    """A system whose steps have limits; ``deflected`` are its blocks of higher order, None if there are none."""
 
     limits: StepLimits
 
@@ -62,7 +64,7 @@ class LimitedSystem(SteppedSystem, Protocol):
 
 @dataclass(eq=False)
 class _Search:
-    """The search for the contacts of a step, see `ContactFinder.find`."""
+    """Arguments of the contact search in a step, see `ContactFinder.find`."""
 
     finder: ContactFinder
     state: State
@@ -81,9 +83,9 @@ class _Search:
 
 
 def windows_of(system: LimitedSystem, start: StepStart, dt: float) -> Windows:
-    """Where a step of ``dt`` from ``start`` looks for contacts."""
+    """Search distances for contacts in a step of ``dt`` from ``start``."""
     rows = start.state.contacts
-    # Pairs that have yet to come nearer press nowhere.
+    # Pairs that meet only closer than the geometry shows (negative lift) and are open do not press.
     lift = float(np.abs(rows["lift"][(rows["state"] != OPEN) | (rows["lift"] > 0.0)]).max(initial=0.0))
     if system.deflected is not None:
         lift += 2.0 * float(system.finder.deflection.max())
@@ -91,8 +93,8 @@ def windows_of(system: LimitedSystem, start: StepStart, dt: float) -> Windows:
 
 
 class StepCutting:
-    """Attempts at a step of ``system`` from ``start`` by ``dt`` at most; ``like``: the result of the same step with other
-    cracks, whose contact states are the first guess; ``pseudo_inertia`` as in `BlockSystem.step`."""
+    """Attempts at a step of ``system`` from ``start`` by at most ``dt``. ``like``: the result of the same step with
+    other cracks, whose contact states are the first guess; ``pseudo_inertia`` as in `BlockSystem.step`."""
 
     def __init__(
         self, system: LimitedSystem, start: StepStart, dt: float, like: StepResult | None, pseudo_inertia: bool = True
@@ -105,24 +107,24 @@ class StepCutting:
         if like is not None:
             self.found = self.found.like(like.state.contacts)
             if system.scheme.static and self.found.tried is not None:
-                # (In motion the step's arcs are those that the velocity predicts.)
+                # (In dynamics the arcs are predicted from the velocity.)
                 self.found = self.found.along(*like.arcs)
         self.cuts, self.extensions, self.redirected = 0, 0, 0
-        #: Why the last attempt failed, and the last of those that made the step shorter.
+        #: Reason of the last failed attempt, and of the last one that shortened the step.
         self.reason = self.failed = ""
-        #: Share of the limits that a step may use, and that the last attempt used.
+        #: Allowed ratio of motion to its limit, and that of the last attempt.
         self.allowed_share, self.last_share = 1.0, np.inf
 
     def accepted_step(self) -> tuple[Attempt, StepResult]:
-        """The first attempt that holds, and its result. Raises `NotConverged` after ``settings.max_step_cuts`` cuts."""
+        """The first accepted attempt, and its result. Raises `NotConverged` after ``settings.max_step_cuts`` cuts."""
         while True:
-            # One attempt is freed before the next is made: its factors may be of other contacts.
+            # Each attempt is freed before the next one: its factors may belong to other contacts.
             accepted = self._attempt()
             if accepted is not None:
                 return accepted
 
     def _attempt(self) -> tuple[Attempt, StepResult] | None:
-        """One attempt and its result; None where the step begins again."""
+        """One attempt and its result; None if it was not accepted."""
         system, found = self.system, self.found
         make: Callable[..., Attempt] = Attempt if system.deflected is None else BendingAttempt
         if self.balances:
@@ -149,8 +151,8 @@ class StepCutting:
         return None
 
     def _bonds_missed(self, result: StepResult) -> bool:
-        """Search again for corners that were left out, and springs that were moved, for the sake of a bond that has
-        broken: they must act before it breaks."""
+        """Whether a bond has broken that corner contacts or springs at corners had been omitted for: these must act
+        before it breaks, so the search is repeated with them."""
         found, search, bonded = self.found, self.search, result.contacts["bonded"]
         lost = (bonded != found.bonded) & found.inset
         corners_needed = found.relies_on_glue and (bonded < found.bonded).any()
@@ -163,8 +165,8 @@ class StepCutting:
         return True
 
     def _corners_missed(self, attempt: Attempt, result: StepResult) -> bool:
-        """Take the contacts of corners that have met elsewhere than expected; where they meet is known once the motion
-        of the step is."""
+        """Whether corners have met elsewhere than expected, so that the step is repeated with these contacts. Where
+        they meet is known once the motion of the step is."""
         if self.redirected >= _REDIRECTED:
             return False
         again = self._with_corners_of(attempt, result.contacts["state"])
@@ -174,7 +176,7 @@ class StepCutting:
         return True
 
     def _accepts(self, attempt: Attempt, result: StepResult, used: Used) -> bool:
-        """Whether an attempt within its limits holds: not if something went into or through a block in it."""
+        """Whether an attempt within its limits is accepted: nothing has entered or passed through a block."""
         system, state = self.system, self.start.state
         crossed = system.limits.crossed(attempt, result)
         if crossed is None and self.cuts < system.settings.max_step_cuts:
@@ -202,8 +204,7 @@ class StepCutting:
         return False
 
     def _extend_search(self, attempt: Attempt, crossed: Crossed) -> bool:
-        """Search farther for contacts, where that finds more: what went in met no contact, and with it the step may be
-        as long."""
+        """Whether contacts are found within a larger distance; the step is then repeated with its length unchanged."""
         search = self.search
         wider = search.near.widened(crossed.pairs, crossed.motion, self.system.blocks.n_blocks)
         if self.extensions >= _FARTHER or not wider.reaches_beyond(search.near):
@@ -214,7 +215,8 @@ class StepCutting:
         return True
 
     def _allow(self, used: Used) -> None:
-        """Accept, in statics, the motion under a load that does not shrink with the step, and search far enough."""
+        """Accept, in statics, motion under a load that does not decrease with the step, and search contacts far enough
+        for it."""
         search = self.search
         log.info(
             "step at t = %g s accepted: %s, which a shorter step does not reduce", self.start.state.time, used.reason
@@ -225,7 +227,7 @@ class StepCutting:
         self.found = search.find()
 
     def _cut(self, shorter: float, why: str, *blocks: int) -> None:
-        """Begin again with a step as long as ``shorter``, for the ``blocks`` that ask for it."""
+        """Repeat with the length ``shorter``; ``blocks`` are those that required it, for the reason ``why``."""
         system = self.system
         self.cuts += 1
         if self.cuts > system.settings.max_step_cuts:
@@ -233,7 +235,7 @@ class StepCutting:
                 system.scheme.static and why == UNSETTLED and not self.start.bonds_give and self.found.bonded.any()
             ):
                 self._refuse()
-            # No step is short enough for contacts whose bonds are all to hold until the others are consistent.
+            # If bonds break only when all other contacts are consistent, no step may be short enough.
             self.start, self.cuts, shorter = replace(self.start, bonds_give=True), 0, self.asked
         system.limits.shortens(why, *blocks)
         log.debug("step at t = %g s cut from %.4g to %.4g s: %s", self.start.state.time, self.dt, shorter, self.reason)
@@ -267,8 +269,8 @@ class StepCutting:
             )
 
     def _search(self) -> _Search:
-        """How a step of the present length looks for contacts. Two corners may come nearer by their weight than their
-        velocities say; what comes nearer still is searched for once the motion of the step is known."""
+        """Contact search of a step of the present length. Corners may approach by their weight beyond the motion due to
+        their velocities; anything that comes closer is searched once the motion of the step is known."""
         system, start, dt = self.system, self.start, self.dt
         margin = np.inf
         if not system.scheme.static:
@@ -278,7 +280,7 @@ class StepCutting:
         )
 
     def _expected_motion(self) -> np.ndarray | None:
-        """(n_vertices, 2) m: motion of the step by the velocities with which it begins; None where there are none."""
+        """(n_vertices, 2) m: motion of the step at its initial velocities; None if these are zero."""
         start = self.start
         if not start.carried.any():
             return None
@@ -287,8 +289,8 @@ class StepCutting:
         return end.vertices - start.vertices
 
     def _with_corners_of(self, attempt: Attempt, state: np.ndarray) -> ContactSet | None:
-        """The contacts with which the step begins again because corners have met elsewhere than expected in the
-        ``attempt``, which left its contacts in ``state`` (n,); None where all met as expected."""
+        """The contacts with which the step is repeated because corners have met elsewhere than expected in the
+        ``attempt``, whose contacts ended in ``state`` (n,); None if all met as expected."""
         system, search = self.system, self.search
         found, moved = attempt.found, attempt.new_vertices - attempt.vertices
         found = found.on_corners
@@ -311,8 +313,9 @@ class StepCutting:
         return again if self._meets_otherwise(attempt, found, again, state) else None
 
     def _meets_otherwise(self, attempt: Attempt, found: ContactSet, again: ContactSet, state: np.ndarray) -> bool:
-        """Whether corners meet differently in ``again``, contacts searched for with the motion of the ``attempt``, than in
-        ``found``, which the attempt left in ``state`` (n,): pressed ones in another direction, or some that ``found`` lacks."""
+        """Whether corners meet differently in ``again``, contacts found with the motion of the ``attempt``, than in
+        ``found``, whose states at the end of the attempt are ``state`` (n,): closed ones in another direction, or some
+        that ``found`` lacks."""
         again = again.on_corners
         if self._redirected(found, again, state):
             return True
@@ -322,7 +325,7 @@ class StepCutting:
         return bool((~known & (gap < -again.precision)).any())
 
     def _redirected(self, found: ContactSet, again: ContactSet, state: np.ndarray) -> bool:
-        """Whether any pair of rounded corners that presses in ``state`` (n,) of ``found`` meets in another direction in
+        """Whether any closed pair of rounded corners in ``state`` (n,) of ``found`` meets in another direction in
         ``again``."""
         known = {pair: c for c, pair in enumerate(zip(again.vertex.tolist(), again.edge.tolist(), strict=True))}
         previous = self.system.blocks.previous_vertex

@@ -1,4 +1,4 @@
-"""A run of blocks alone: steps until an end time, with its energy balance and strains checked."""
+"""Runs of blocks without cracks: steps until an end time, with checks of the energy balance and of strains."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ log = logging.getLogger(__name__)
 
 @dataclass(eq=False)
 class _Watch:
-    """What is reported of steps: energy gained without work or by overlaps, strains beyond the elastic range."""
+    """Checks of each step: energy gained without work or created by overlaps, strains beyond the elastic range."""
 
     blocks: Blocks
     budget: EnergyBudget = field(default_factory=EnergyBudget)
@@ -39,7 +39,8 @@ class _Watch:
         self.range.check(Motion.of(self.blocks, state.vertices), self.blocks, state.time)
 
     def at_rest(self) -> None:
-        """Blocks have come to rest outside the steps of the run: the energy stored by that is not part of its residual."""
+        """Record that blocks were brought to rest outside the steps of the run: the energy stored by this is no
+        residual."""
         self.budget = self.budget.cut()
 
 
@@ -59,14 +60,15 @@ def run(
     state: State | None = None,
     watch: Callable[[StepResult], None] | None = None,
 ) -> Iterator[State]:
-    """States of a block system from rest (or from ``state``) until ``end_time``, one a step; `StepLength` says how
-    long. ``joints``: the law of all joints, first of the sequence, or `Joints` that say which acts where. ``watch`` sees every `StepResult`. The arrays of states are those with which the run continues: they are
-    read-only (`State.writable` has copies).
+    """States of a block system from rest (or from ``state``) until ``end_time``, one per step; step lengths follow from
+    `StepLength`. ``joints``: a sequence, whose first law applies to all joints, or `Joints` with the law of each pair
+    of edges. ``watch`` is called with every `StepResult`. The run continues with the arrays of the states, so they are
+    read-only (`State.writable` makes copies).
 
     ``settings.equilibrium`` "start" brings the blocks to rest before the first state, "loads" in statics at every load
-    too. Logs a warning when energy is gained without work, a block is strained beyond the elastic range, or dashpots have
-    nothing to brake in statics. Raises `NotConverged` where no step or equilibrium is found, or a block is strained by
-    more than a quarter, and ValueError for input that makes no sense, before the first step as far as possible.
+    too. Logs a warning when energy is gained without work, when a block is strained beyond the elastic range, or when
+    viscous boundaries have no effect in statics. Raises `NotConverged` if no step or equilibrium is found or a block is
+    strained by more than a quarter, and ValueError for invalid input, before the first step as far as possible.
 
     >>> ground, square = np.array([[-1, -1], [2, -1], [2, 0], [-1, 0]]), np.array([[0, 0], [1, 0], [1, 1], [0, 1]])
     >>> blocks = Blocks.from_polygons([ground, square], fixed=[True, False])
@@ -112,7 +114,7 @@ def run(
 
 
 def _at_rest(system: BlockSystem, state: State, loads: Loads, load_time: float) -> State:
-    """``state`` brought to rest under the loads of ``load_time``."""
+    """``state`` brought to equilibrium under the loads of ``load_time``."""
     found = equilibrium(system, state, loads, load_time=load_time, tolerance=system.settings.unbalanced_tolerance)
     if found.collapsed:
         raise NotConverged(f"t = {load_time:g} s: {found.reason}")

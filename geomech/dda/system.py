@@ -36,29 +36,29 @@ from .time_step import Attempt, StepStart
 
 log = logging.getLogger(__name__)
 
-#: Half the diagonal of the domain: no limit for what blocks that hold together move.
+#: Displacement limit, in units of half the diagonal of the domain, that is never reached by blocks at rest.
 _ANYWHERE = 1.0
-#: Smallest penetration tolerance of multipliers, in units of that round-off.
+#: Smallest penetration tolerance of multipliers, in units of the round-off of coordinates.
 _FINEST = 10.0
 
 
 class BlockSystem:
     """Blocks that move, deform and touch: first-order discontinuous deformation analysis (Shi 1988).
 
-    ``joint_index(edge_name, other_name)`` gives the index in ``joints`` of the law between two edges; None from it
-    means that such edges do not touch; without it the first law holds everywhere. Contact springs are
-    ``settings.normal_penalty`` and ``shear_penalty`` (Pa), by default both 40 times the E' of the two blocks
-    (`penalties`). ``work`` counts operations, over all systems that share it.
+    ``joint_index(edge_name, other_name)`` gives the index in ``joints`` of the law between two edges, or None if such
+    edges do not touch; without it the first law applies everywhere. Contact springs are ``settings.normal_penalty`` and
+    ``shear_penalty`` (Pa), by default both 40 times the E' of the two blocks (`penalties`). ``work`` counts operations
+    over all systems that share it.
 
-    Arrays that every `Attempt` at a step reads are made once: ``density`` (kg/m³), ``mass`` (kg/m), ``stiffness`` and
-    ``compliance`` (3, 3) of each block, ``constrained`` (which of its unknowns), ``rigid`` (indices), the ``finder`` of
-    contacts and the ``load_map``; and again when blocks are ``taken_out``: which ones are ``fixed``, ``moving``
-    (indices), which of them ``turns``, and ``free``, the number of a block among those that move, −1 for the others.
-    ``allowed_penetration`` (m) is zero where only penalty springs act; ``rounding`` (m) is that of coordinates:
-    less is no motion; its effect relative to blocks' weights is reported once.
+    Arrays used by every `Attempt` are computed once: ``density`` (kg/m³), ``mass`` (kg/m), ``stiffness`` and
+    ``compliance`` (3, 3) of each block, ``constrained`` (its constrained unknowns), ``rigid`` (indices), the ``finder``
+    of contacts and the ``load_map``. After an excavation the following are updated: ``fixed``, ``moving`` (indices),
+    ``turns`` (blocks that can rotate), and ``free``, the number of a block among the moving ones, −1 for others.
+    ``allowed_penetration`` (m) is zero if only penalty springs act. ``rounding`` (m) is the round-off of coordinates; a
+    warning is logged once if its contact forces are large relative to a block's weight.
 
-    Raises ValueError when there are no blocks, materials or joints are missing, a block has no area, or one that moves
-    has no mass in a dynamic run.
+    Raises ValueError if there are no blocks, if materials or joints are missing, if a block has no area, or if a moving
+    block has no mass in a dynamic run.
     """
 
     def __init__(
@@ -98,20 +98,20 @@ class BlockSystem:
             blocks, self.joints, joint_index, self.settings, modulus, rigid, self.mass, self.work
         )
         self.deflected: DeflectedBlocks | None = None
-        #: Faces of cells that are glued; None where no blocks are cells. ``bonded`` (m,): their numbers in `Blocks.glued`.
+        #: Bonded faces of cells; None if there are no cells. ``bonded`` (m,): their numbers in `Blocks.glued`.
         self.glued: GluedFaces | None = None
         #: Choice of orders during the run; None if all are given.
         self.order_choice: OrderChoice | None = None
-        #: Pairs of blocks (2, n) and the pattern of the last sparse equations; None before.
+        #: Pairs of blocks (2, n) and pattern of the last sparse equations; None before the first ones.
         self._sparse: tuple[np.ndarray, assembly.Pattern] | None = None
-        #: Glued faces that have parted (n_faces,); None without cells.
+        #: (n_faces,) bonded faces that have separated; None without cells.
         self._parted: np.ndarray | None = None
         self._take_out(None, None)
         ordered = blocks.order is not None and (np.asarray(blocks.order) != 1)[~self.fixed].any()
         if ordered or blocks.glued is not None:
             refuse_unsupported(blocks, self.materials, self.joints, self.settings)
             self._choose_orders()
-        #: Strength of the glue; None if it cannot fail.
+        #: Strength of the bonded faces; None if they cannot separate.
         self.glue_strength: GlueStrength | None = None
         if blocks.glued is not None and (strength := self._glue_strength()).any:
             self.glue_strength = strength
@@ -177,7 +177,7 @@ class BlockSystem:
             self._part(np.zeros(len(self.blocks.glued), bool))
 
     def _glue_strength(self) -> GlueStrength:
-        """Strength of glued faces: those whose edges have names, by their joint law."""
+        """Strength of bonded faces of cells, from the joint law of faces whose edges have names."""
         edge, mate = np.asarray(self.blocks.glued).T
         law, named = (
             self.finder.laws_of(edge, mate),
@@ -188,7 +188,7 @@ class BlockSystem:
         )
 
     def _part(self, parted: np.ndarray) -> None:
-        """Continue with cells whose glued faces have ``parted`` (n_faces,)."""
+        """Continue with the bonded faces that have not ``parted`` (n_faces,)."""
         if self._parted is not None and np.array_equal(parted, self._parted):
             return
         assert self.deflected is not None
@@ -199,7 +199,7 @@ class BlockSystem:
         self.finder.deflection, self.finder.sag = np.zeros((2, self.blocks.n_blocks))
 
     def _bond(self) -> None:
-        """Continue with the glue of cells that have neither parted nor been taken out."""
+        """Continue with the bonds of cells that have neither separated nor been excavated."""
         assert self._parted is not None  # of a system with cells
         holds, every = ~self._parted, self._all_glued
         if self.taken_out is not None:
@@ -219,7 +219,7 @@ class BlockSystem:
         return out
 
     def with_joints(self, joints: Sequence[JointLaw]) -> BlockSystem:
-        """The same blocks with other joint laws, in the order of ``joints``, whose steps have no displacement limit."""
+        """The same blocks with other joint laws, in the order of ``joints``, and steps without displacement limit."""
         settings = replace(self.settings, max_displacement_ratio=_ANYWHERE)
         out = BlockSystem(self.blocks, self.materials, joints, self._joint_index, settings, self.work)
         out.finder.toes, out.finder.whole_faces = self.finder.toes, self.finder.whole_faces
@@ -231,7 +231,7 @@ class BlockSystem:
 
     def _take_out(self, removed: np.ndarray | None, drained: np.ndarray | None) -> None:
         """Continue without the blocks ``removed`` (n_blocks,): they keep their rows in all arrays, fixed and without
-        contacts; around ``drained`` ones there is no water."""
+        contacts. The space of ``drained`` blocks contains no water."""
         self.taken_out = removed
         fixed = self.blocks.fixed if removed is None else self.blocks.fixed | removed
         self.fixed = np.ascontiguousarray(fixed, dtype=np.bool_)
@@ -256,15 +256,16 @@ class BlockSystem:
         like: StepResult | None = None,
         pseudo_inertia: bool = False,
     ) -> StepResult:
-        """Move ``state`` by ``dt`` (default: the settings' time step) under ``loads`` taken at the time that the scheme
-        weighs them to (the end of the step in Shi's), or at ``load_time`` however short the step becomes. ``like``: the
-        result of the same step with another ``crack``, from whose contact states iterations begin. In statics, blocks that
-        are held bear their loads without inertia, unless ``pseudo_inertia`` is True, which moves all blocks more gently.
+        """Move ``state`` by ``dt`` (default: the settings' time step) under ``loads``. The loads are those of the time
+        at which the scheme weights them (the end of the step in Shi's), or of ``load_time``, however short the step
+        becomes. ``like``: the result of the same step with another ``crack``, whose contact states are the first guess.
+        In statics, supported blocks bear their loads without inertia, unless ``pseudo_inertia`` is True, with which all
+        blocks move more gradually.
 
-        A step whose contact states do not settle, or that moves a vertex too far, is halved or shortened and begun
-        again from ``state``, which is never changed; ``result.dt`` says what was done, and the log why contacts wanted a
-        shorter one. Raises `NotConverged` after ``settings.max_step_cuts`` cuts, and ValueError when blocks overlap
-        before they have moved, when nothing holds them up in statics, or if ``state`` is one of other blocks.
+        A step without consistent contact states is halved, one that exceeds a motion limit is shortened, and it is
+        repeated from ``state``, which is never modified. ``result.dt`` is the length of the accepted step; the log
+        gives the reason for cuts. Raises `NotConverged` after ``settings.max_step_cuts`` cuts, and ValueError if blocks
+        overlap initially, if nothing supports them in statics, or if ``state`` does not belong to these blocks.
         """
         choice, strength = self.order_choice, self.glue_strength
         if choice is None and strength is None:
@@ -313,7 +314,7 @@ class BlockSystem:
         self, state: State, loads: Loads, dt: float | None, crack: CrackResponse | None, load_time: float | None,
         like: StepResult | None, pseudo_inertia: bool,
     ) -> tuple[Attempt, StepResult]:  # fmt: skip
-        """As `step`, with the present orders of blocks."""
+        """As `step`, with the present orders of the blocks."""
         dt = self.settings.time_step if dt is None else float(dt)
         if not 0 < dt < np.inf:
             raise ValueError(f"a time step must be positive, got {dt!r} s")
@@ -352,8 +353,8 @@ class BlockSystem:
         return windows_of(self, start, 0.0)
 
     def inherited_contacts(self, state: State, found: ContactSet, forces: InheritedContacts) -> np.ndarray:
-        """CONTACT rows of ``found``, the contacts near ``state``, with the inherited ``forces``, for a `State` from
-        which the next step starts."""
+        """CONTACT rows of ``found``, the contacts near ``state``, with the inherited ``forces``: contacts of a `State`
+        with which the next step starts."""
 
         def on_multiplier(contacts: ContactSet) -> np.ndarray:
             has_multipliers = bool(self.allowed_penetration)
@@ -382,7 +383,7 @@ class BlockSystem:
         self, block: np.ndarray, other: np.ndarray, moments: np.ndarray, linked: tuple[np.ndarray, np.ndarray] | None
     ) -> assembly.Pattern:
         """Sparsity pattern of the matrix for contacts between ``block`` and ``other`` (n,) and blocks ``linked`` by
-        bolts, with its solver; reused while the pairs of blocks are the same."""
+        bolts, with its solver; reused as long as the pairs of blocks do not change."""
         if linked is not None:
             block, other = np.concatenate([block, linked[0]]), np.concatenate([other, linked[1]])
         if self.glued is not None:

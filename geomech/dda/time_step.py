@@ -1,6 +1,6 @@
-"""One step of a given length: the equations of blocks, the states of contacts in them, the motion, and its energy.
+"""One step of a given length: block equations, contact states, motion of the blocks, and energy balance.
 
-`step_cutting` attempts a shorter step where contacts do not settle or blocks move too far.
+If contacts find no consistent states, or blocks move too far, `step_cutting` attempts a shorter step.
 """
 
 from __future__ import annotations
@@ -60,30 +60,31 @@ if TYPE_CHECKING:
     from .interfaces import SteppedSystem
     from .joint_laws.nonlinear_laws import CurvedJoints
 
-#: A step in motion whose faces have not found the part on which they touch after this many times the iterations that
-#: contact states may take is cut, this many times at most: two half steps take a tenth of them (a thousand blocks that slide: 400 for 24 000).
+#: A dynamic step whose contact areas of faces have not converged after this multiple of ``max_open_close_iterations``
+#: is cut, this many times at most: two half steps take a tenth of the iterations (a thousand sliding blocks: 400
+#: instead of 24 000).
 _MOST_WORK, _MOST_WORK_CUTS = 6, 3
-#: A step begins again this many times at most to find the part of a joint face that touches. Few take more than four.
+#: Most repetitions of a step to find the parts of joint faces in contact. Few steps need more than four.
 _PLACED = 20
-#: … this many times to find which ends of faces carry the cohesion of the whole face, …
+#: Most repetitions to find the ends of faces that carry the cohesion of the whole face.
 _SHARED = 8
-#: … and this many times for the gaps that rotating blocks reach, until these are known to this fraction of the contacts'
-#: ``precision``. The second is that of statics, where contacts store little and springs of 40 E' turn an error of the gap
-#: into energy (for leaning slabs, at a tenth of it, as much in one step as the work of all loads).
+#: Most repetitions for the gaps of rotating blocks, and accuracy of these relative to the contacts' ``precision``, in
+#: dynamics and in statics. In statics contacts store little energy, and springs of 40 E' turn an error of the gap into
+#: energy (for leaning slabs, at a tenth of the precision, as much in one step as the work of all loads).
 _BENDS, _KNOWN, _KNOWN_IN_STATICS = 4, 0.1, 1e-3
 
 
-#: Blocks that have struck and overlap because of other impacts are set apart this many times.
+#: Most corrections of blocks that overlap after an impact because of other impacts.
 _LANDINGS = 4
 
 
 @dataclass(eq=False)
 class Impact:
-    """Effect of the impacts of a step so far.
+    """Effect of the impacts in a step so far.
 
     without  (n_blocks, 6)   velocities without impacts
-    moved    (n_blocks, 6)   displacements in addition to that of the step
-    lost, rubbed             J/m taken by restitution and friction
+    moved    (n_blocks, 6)   displacements in addition to those of the step
+    lost, rubbed             J/m dissipated by restitution and by friction
     """
 
     without: np.ndarray
@@ -103,17 +104,17 @@ class Impact:
 
 @dataclass(frozen=True, eq=False)
 class StepStart:
-    """What all attempts at a step begin with.
+    """Data common to all attempts at a step.
 
-    state                      as the last step ended
+    state                      at the end of the last step
     vertices  (n_vertices, 2)  its vertices, m
-    carried   (n_blocks, 6)    velocity that the step begins with
+    carried   (n_blocks, 6)    initial velocity of the step
     moments   (n_blocks, 6)    of the blocks (`block_moments`)
-    gravity   (2,)             m/s² at the end of the step as it was asked for
-    loads, crack               that act, None for none
-    load_time                  at which loads are taken, s; None: as the time scheme weights them
-    rest      (n_blocks, 6)    displacement in a static step that inertia does not count (`pseudo_inertia`); None for none
-    bonds_give                 whether overloaded bonds break where contacts find no states with them
+    gravity   (2,)             m/s² at the end of the requested step
+    loads, crack               loads, and response of cracks; None without
+    load_time                  time at which loads are taken, s; None: the time at which the scheme weights them
+    rest      (n_blocks, 6)    displacement in a static step about which inertia acts (`pseudo_inertia`); None: zero
+    bonds_give                 whether overloaded bonds break if contacts find no states with them
     """
 
     state: State
@@ -129,11 +130,10 @@ class StepStart:
 
 
 class Attempt:
-    """A step of ``system`` by ``dt`` from ``start`` with the contacts ``found``, after ``cuts`` attempts at longer ones.
-    Raises `Unsettled` where contacts find no states.
-    """
+    """A step of ``system`` by ``dt`` from ``start`` with the contacts ``found``, after ``cuts`` attempts at longer
+    ones. Raises `Unsettled` if contacts find no consistent states."""
 
-    #: What the states of contacts are found from.
+    #: Class of the equations from which contact states are found.
     equations: type[Equations] = Equations
 
     def __init__(self, system: SteppedSystem, start: StepStart, dt: float, found: ContactSet, cuts: int) -> None:
@@ -142,7 +142,7 @@ class Attempt:
         self.dt, self.found, self.cuts, self.bonds_give, scheme = dt, found, cuts, start.bonds_give, system.scheme
         state, moments, crack = start.state, start.moments, start.crack
         self.time = state.time + dt
-        # Mass stays, whatever the strain does to the area.
+        # The mass is constant, whereas strain changes the area.
         self.density = system.mass / moments[:, 0]
         self.n_free = len(system.moving)
         compliance, offset = (
@@ -154,10 +154,10 @@ class Attempt:
         )  # fmt: skip
         self.stress = np.array(state.stress)
         if system.taken_out is not None:
-            # What blocks store goes with them, in the first step without them and not after it.
+            # The stored energy of excavated blocks is removed in the first step without them.
             self.stress[system.taken_out] = 0.0
         self.iterations = 0
-        #: J/m of the mean velocity of a static step, which it does not keep.
+        #: J/m, kinetic energy of the mean velocity of a static step, which is not carried over.
         self.dropped = 0.0
         if not scheme.static and found.tried is None and len(found):
             self.found = found.expecting(*self._expected_states())
@@ -165,7 +165,7 @@ class Attempt:
         predicted = self._predicted()
         self._place(predicted)
         if scheme.place == 1.0 and predicted is not None:
-            # Measured from the end of the step the arc is long, but as well known as the arms.
+            # About the end of the step the arc is long, but as accurate as the lever arms.
             self._follow(predicted, self.midpoint.vertices)
         for bends in range(_BENDS, -1, -1):
             self._act(start.loads, start.load_time)
@@ -177,9 +177,9 @@ class Attempt:
         self._move()
 
     def _expected_states(self) -> tuple[np.ndarray, np.ndarray]:
-        """States and senses of sliding (n,) that open-close iterations begin with: those carried over, but of contacts
-        whose blocks part, meet or slide so fast that more than all the forces they bear would be needed to prevent it in
-        a step."""
+        """States and senses of sliding (n,) with which open–close iterations begin: those carried over, except for
+        contacts whose blocks separate, meet or slide so fast that preventing it in a step would take more force than
+        the largest one on them."""
         found, system = self.found, self.system
         centroid = np.ascontiguousarray(self.moments[:, 1:3])
         apart, along = contact_speeds(found, found.geometry, self.carried, centroid).T
@@ -196,7 +196,7 @@ class Attempt:
         return state, np.where(slides, -np.sign(along), np.where(parts, 0.0, found.direction))
 
     def _predicted(self) -> np.ndarray | None:
-        """(n_blocks, 6) displacement of this step at the velocity carried into it; None in statics."""
+        """(n_blocks, 6) displacement of this step at its initial velocity; None in statics."""
         system = self.system
         if system.scheme.static or not self.n_free:
             return None
@@ -211,7 +211,7 @@ class Attempt:
         self.turn = np.zeros(len(self.moments)) if self.midpoint.turn is None else self.midpoint.turn
 
     def _act(self, loads: Loads, load_time: float | None) -> None:
-        """Forces, imposed motion and bolts of this step."""
+        """Set the forces, prescribed motion and bolts of this step."""
         system, state, scheme, dt, midpoint = self.system, self.state, self.system.scheme, self.dt, self.midpoint
         acting = state.time + scheme.weight * dt if load_time is None else load_time
         self.gravity = effective_gravity(
@@ -222,13 +222,13 @@ class Attempt:
         self.actions = self._actions(loads, self.time if load_time is None else load_time)
 
     def _actions(self, loads: Loads, end: float) -> StepActions | None:
-        """Imposed motion and bolts of ``loads`` until ``end``, s; None where there are none."""
+        """Prescribed motion and bolts of ``loads`` until ``end``, s; None if there are none."""
         system = self.system
         moved = MovedBlocks(system.blocks, system.fixed, system.taken_out)
         return StepActions.of(moved, loads, self.state, system.load_map, self.midpoint, system.free, end)
 
     def _assemble(self) -> None:
-        """The equations of blocks without their contacts."""
+        """Assemble the block equations without contacts."""
         system, scheme, found, dt = self.system, self.system.scheme, self.found, self.dt
         self.begun, self.heavier = scheme.begun(self.carried, self.state.acceleration, dt)
         linked = None if self.actions is None else self.actions.linked
@@ -257,8 +257,8 @@ class Attempt:
         return out
 
     def inertia_and_size(self) -> tuple[np.ndarray, np.ndarray]:
-        """(n_blocks,) N each: the largest force (moment over √area) that inertia takes of each block in a static step, and
-        the sum of all forces on it; 0 on fixed blocks."""
+        """(n_blocks,) N each: largest inertia force (moment over √area) on each block in a static step, and sum of the
+        magnitudes of all forces on it; 0 on fixed blocks."""
         found, settled, order, moving = self.found, self.settled, self.order, self.system.moving
         counted = self.increment if self.rest is None else self.increment - self.rest
         inertia, size = np.zeros(len(order)), np.zeros(len(order))
@@ -288,11 +288,11 @@ class Attempt:
 
     @property
     def _without_dashpots(self) -> np.ndarray:
-        """(n_blocks,) bool: blocks on whose edges `quiet` has no dashpots."""
+        """(n_blocks,) bool: blocks whose edges have no dashpots in `quiet`."""
         return self.system.fixed
 
     def _constrained(self) -> np.ndarray | None:
-        """(n_blocks, 6) bool: which unknowns of blocks are constrained in this step; None without."""
+        """(n_blocks, 6) bool: constrained unknowns of this step; None without any."""
         system, actions, constrained = self.system, self.actions, self.system.constrained
         alone = system.scheme.static and system.blocks.n_blocks == 1 and self.n_free and actions is None
         if alone:
@@ -302,7 +302,8 @@ class Attempt:
         return constrained if actions is None else actions.constrained(constrained)
 
     def _settle(self) -> None:
-        """The states of contacts and the unknowns; faces with a stiffness are tried on other parts until they fit."""
+        """Find contact states and unknowns; repeated with other contact areas of faces with a stiffness until these
+        agree."""
         actions, found, order, midpoint = self.actions, self.found, self.order, self.midpoint
         constrained = self._constrained()
         own, shared = (self.matrix, self.right), 0
@@ -347,8 +348,8 @@ class Attempt:
             if self._takes_too_long():
                 raise Unsettled(f"contact states did not converge in {self.iterations} open–close iterations")
             if tries % _PLACED == 0:
-                # Which part touches may follow contacts that jump at any step: these faces stand on their corners in
-                # this one.
+                # If contact areas alternate at any step length, these faces are supported at their corners in this
+                # step.
                 better = found.cornered(better)
             found = better.trying_again(settled)
         else:
@@ -357,7 +358,7 @@ class Attempt:
         self.vectors, self.weight, self.acting, self.striking = vectors, weight, geometry, striking
 
     def _striking(self, found: ContactSet) -> Striking | None:
-        """The contacts of ``found`` through which blocks may strike each other with a coefficient of restitution."""
+        """The contacts of ``found`` at which blocks may collide with a coefficient of restitution."""
         restitution = self.system.finder.restitution(found)
         if restitution is None or self.system.scheme.static or not len(found) or not self.n_free:
             return None
@@ -368,19 +369,19 @@ class Attempt:
         return Striking.of(found, restitution, speed, float(np.hypot(*self.gravity)) * self.dt)
 
     def _takes_too_long(self) -> bool:
-        """Whether shorter steps are likely to need fewer iterations in all."""
+        """Whether shorter steps are likely to need fewer iterations in total."""
         if self.system.scheme.static or self.cuts >= _MOST_WORK_CUTS:
             return False
         return self.iterations > _MOST_WORK * self.system.settings.max_open_close_iterations
 
     def _update_arcs(self) -> bool:
-        """Give contacts the gaps that the motion really leads to, and the forces of the step the place that they have
-        in its middle; False if those are known."""
+        """Update the gaps of contacts to those of the actual motion, and in dynamics the midpoint configuration; False
+        if they are already known accurately enough."""
         system, found, settled = self.system, self.found, self.settled
         if not len(found) or not self.n_free:
             return False
         known = (_KNOWN_IN_STATICS if system.scheme.static else _KNOWN) * found.precision
-        # What turns by r while it moves by d leaves its chord by r d at most.
+        # A point that rotates by r while it moves by d deviates from its chord by at most r d.
         increment = self._increment(self.unknowns)
         if 2.0 * np.abs(increment[:, 2]).max() * system.step_limit < known.min():
             return False
@@ -397,14 +398,14 @@ class Attempt:
         if not system.scheme.static:
             self._place(increment)
         self._follow(increment, vertices)
-        # In statics bonds are judged with blocks where they stand: on the arcs of one that has flown off, any would seem
-        # intact.
+        # In statics bonds are checked with the blocks in place: on the arcs of a block that has flown off, all would
+        # seem intact.
         self.found = self.found.trying(tried, without_lost=system.scheme.static)
         return True
 
     def _follow(self, increment: np.ndarray, vertices: np.ndarray) -> None:
-        """Let the contacts follow the arcs of ``increment`` (n_blocks, 6), which leads to ``vertices``: by what these
-        go beyond what the equations of this middle make of it."""
+        """Set the arcs of the contacts for the motion ``increment`` (n_blocks, 6) to ``vertices``: the parts of gaps
+        and of motion along edges that the equations in the midpoint configuration do not contain."""
         system, found, scaled = self.system, self.found.on_corners, increment.copy()
         if not len(found):
             return
@@ -429,14 +430,13 @@ class Attempt:
         return along
 
     def _over_the_step(self, found: ContactSet) -> tuple[Springs, np.ndarray, float | np.ndarray, CurvedJoints | None]:
-        """What acts over the step of the contacts ``found``: springs, starting gaps (n,), how the step's end weighs,
-        curved laws."""
+        """Contacts ``found`` over the step: springs, starting gaps (n,), weight of the end of the step, nonlinear laws."""
         system = self.system
         curved = system.finder.curved(found)
         # Multipliers are forces at the end of the step.
         weight: float | np.ndarray = 1.0 if system.allowed_penetration else system.scheme.weight
         if curved is not None and weight != 1.0:
-            # The lines of a law that is curved are those of the end of the step.
+            # Tangents of nonlinear laws refer to the end of the step.
             each = np.full(len(found), weight)
             each[curved.rows] = 1.0
             weight = each
@@ -449,7 +449,7 @@ class Attempt:
 
     def _settled(self, pattern, matrix, right, found, gap, vectors, springs, curved) -> Settled:
         system = self.system
-        # In statics the loads at which contacts change are looked for, and known to round-off.
+        # In statics the loads at which contact states change are found to round-off.
         slack = self.slack = (
             np.full(len(found), system.rounding)
             if system.scheme.static
@@ -484,11 +484,12 @@ class Attempt:
         return settle_augmented(solve, found, springs, gap, system.finder.on_penalty(found), system.allowed_penetration)
 
     def _further_equations(self, pattern, matrix, right, contacts, vectors) -> dict[str, Any]:
-        """Fields of `equations` that other unknowns change; ``right`` (n_free, 6) is that of the first six."""
+        """Fields of `equations` that depend on further unknowns; ``right`` (n_free, 6) is the right-hand side of the
+        first six."""
         return {"right": right, "expected": self._expected_unknowns()}
 
     def _expected_unknowns(self) -> np.ndarray | None:
-        """(6 n_free,) displacement of this step at the velocity carried into it, in the unknowns of `assembly`; None in
+        """(6 n_free,) displacement of this step at its initial velocity, in the unknowns of `assembly`; None in
         statics."""
         if self.system.scheme.static:
             return None
@@ -509,7 +510,7 @@ class Attempt:
         return increment
 
     def _advanced(self, increment: np.ndarray):
-        """As `advance` returns it."""
+        """The result of `advance`."""
         system = self.system
         outlines = Outlines(self.vertices, system.vertex_start, self.moments)
         return advance(
@@ -518,7 +519,7 @@ class Attempt:
         )  # fmt: skip
 
     def _move(self) -> None:
-        """Move the blocks; velocities, stresses and accelerations at the end of the step."""
+        """Move the blocks; compute velocities, stresses and accelerations at the end of the step."""
         scheme, found, dt = self.system.scheme, self.found, self.dt
         carried, actions = self.carried, self.actions
         increment = self._increment(self.unknowns)
@@ -550,15 +551,16 @@ class Attempt:
                 self._rebound(imposed)
 
     def path(self, after: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """(n_vertices, 2) twice: where corners are before the step, and after it, from the vertices ``after`` it, m."""
+        """(n_vertices, 2) twice, m: corners before the step, and after it, given its vertices ``after``."""
         return self.vertices, after
 
     def _remembered(self, mean: np.ndarray) -> np.ndarray | None:
-        """(n_blocks, 6) the acceleration that the step began with, as far as it still holds; None before there is any.
+        """(n_blocks, 6) initial acceleration of the step, as far as it is still valid; None before there is any.
 
-        Where a contact has opened or closed it includes forces that no longer act, or lacks new ones; and the part of a
-        spring that the step does not resolve, k dt² > m, is noise that can grow from bounce to bounce. There it is
-        replaced by the ``mean`` of the step, with which no step gains energy."""
+        If a contact has opened or closed, it includes forces that no longer act, or lacks new ones. The part of a
+        spring that the step does not resolve, k dt² > m, is noise that can grow from bounce to bounce. For the blocks
+        of such contacts it is replaced by the ``mean`` acceleration of the step, with which no step gains energy.
+        """
         before, system = self.state.acceleration, self.system
         if before is None or system.scheme.alpha or not system.scheme.memory:
             return before
@@ -572,7 +574,7 @@ class Attempt:
         return before
 
     def _stop(self, imposed) -> None:
-        """Remove from the velocity what the step cannot resolve (`friction_arrest`), and record the energy (J/m) of it."""
+        """Remove unresolved motion from the velocity (`friction_arrest`), and record its energy (J/m)."""
         system, found, velocity = self.system, self.found, self.velocity
         mass = np.where(system.fixed, np.inf, system.mass)
         if not len(found):
@@ -602,7 +604,7 @@ class Attempt:
         self.velocity, self.rubbed = velocity + rates, min(max(rubbed, 0.0), taken)
 
     def _rebound(self, imposed) -> None:
-        """Apply the impacts of blocks that strike each other in the step (`impacts`)."""
+        """Apply the impacts of blocks that collide in the step (`impacts`)."""
         found, striking = self.found, self.striking
         assert striking is not None
         gap = self._gaps_now()
@@ -622,7 +624,7 @@ class Attempt:
         self.impact = impact
 
     def _gaps_now(self) -> np.ndarray:
-        """(n,) m of the contacts at the end of the step, from where faces meet."""
+        """(n,) m, gaps of the contacts at the end of the step, from where faces meet."""
         found = self.found.on_corners
         return self.system.finder.gaps(self.new_vertices, self.vertices, found) - found.lift
 
@@ -653,7 +655,7 @@ class Attempt:
         )  # fmt: skip
 
     def result(self) -> StepResult:
-        """The result of the step."""
+        """Results of the step."""
         system, scheme, found, settled = self.system, self.system.scheme, self.found, self.settled
         actions, gravity, midpoint = self.actions, self.gravity, self.midpoint
         acting = self.acting
@@ -679,7 +681,7 @@ class Attempt:
         )  # fmt: skip
         memory = rows
         if scheme.weight != 1.0 or found.points is not None:
-            # Each of the springs inside a face continues with its own part of what they bear in shear.
+            # Each spring inside a face continues with its own share of the shear force.
             memory = copied(rows)
             memory["shear_force"] = found.shear_of_rows(end_shear)
         new_state = self._new_state(memory, self._new_stresses(rows, load, reaction))
@@ -695,18 +697,18 @@ class Attempt:
 
     @property
     def _rotation(self) -> np.ndarray:
-        """(n_blocks,) rad of the step, with that of its impacts."""
+        """(n_blocks,) rad, rotation in the step, including that of its impacts."""
         turn = self.increment[:, 2]
         return turn if self.impact is None else turn + self.impact.moved[:, 2]
 
     def _new_stresses(self, rows: np.ndarray, load: np.ndarray, reaction: np.ndarray | None) -> np.ndarray:
-        """(n_blocks, 3) Pa as the step ends; of rigid blocks the mean of what contacts ``rows``, ``load`` and ``reaction``
-        (n_blocks, 6) do."""
+        """(n_blocks, 3) Pa, stress at the end of the step; of rigid blocks the mean stress of the contacts ``rows``,
+        ``load`` and ``reaction`` (n_blocks, 6)."""
         system, midpoint, stress = self.system, self.midpoint, self.new_stress
         if len(system.rigid):
             from_outside = load.copy()
             if reaction is not None:
-                # The forces that constrain the strains of a rigid block are its stress.
+                # The forces that constrain the strains of a rigid block are part of its stress.
                 from_outside[:, 3:] -= reaction[:, 3:]
             stress[system.rigid] = mean_stress(
                 system.rigid, rows, from_outside, BlockMass(self.density, midpoint.moments, system.fixed),
@@ -733,7 +735,7 @@ class Attempt:
         return acceleration, beyond
 
     def _new_state(self, memory: np.ndarray, stress: np.ndarray) -> State:
-        """The state as the step ends, with the CONTACT rows ``memory`` and ``stress`` (n_blocks, 3)."""
+        """The state at the end of the step, with the CONTACT rows ``memory`` and ``stress`` (n_blocks, 3)."""
         system, state, actions = self.system, self.state, self.actions
         imposed = None if actions is None else actions.imposed
         return State(
@@ -751,7 +753,7 @@ class Attempt:
         )
 
     def _statistics(self, energy: StepEnergy, residual: float, ratio: float) -> dict[str, float]:
-        """What `StepResult.statistics` says of a step, but for bolts and reactions."""
+        """`StepResult.statistics` of the step, without those of bolts and reactions."""
         settled = self.settled
         return {
             "open_close_iterations": self.iterations,
@@ -772,7 +774,7 @@ class Attempt:
         return end_of_step(self.found.shear, settled.shear_force, settled.state == STICK, self.weight)
 
     def _imbalance(self, right: np.ndarray, load: np.ndarray, largest: float) -> tuple[float, float]:
-        """As `imbalance`."""
+        """The result of `imbalance`."""
         found, settled = self.found, self.settled
         return imbalance(
             (self.matrix, right), (found.block, found.other, self.order, self.vectors), settled.unknowns,
@@ -781,7 +783,7 @@ class Attempt:
         )  # fmt: skip
 
     def _worst_overlap(self) -> tuple[float, int, int, float, float, float]:
-        """As `overlap_energy.Overlap`: of the contact that closed with the largest spring energy of its overlap."""
+        """`overlap_energy.Overlap` of the newly closed contact with the largest spring energy due to overlap."""
         found = self.found
         fresh = (found.state == OPEN) & (self.settled.state != OPEN)
         given = np.where(fresh, 0.5 * found.springs.normal * np.minimum(found.gap_before, 0.0) ** 2, 0.0)
@@ -790,7 +792,7 @@ class Attempt:
         return float(given[worst]), *found.blocks_of(worst), -float(found.gap_before[worst]), x, y
 
     def _energy(self, load: np.ndarray, end_shear: np.ndarray) -> StepEnergy:
-        """The terms of the step's balance under the generalised ``load``; contacts end it with ``end_shear`` (n,)."""
+        """Terms of the energy balance under the generalised ``load``; contacts end the step with ``end_shear`` (n,)."""
         system, scheme, found, settled = self.system, self.system.scheme, self.found, self.settled
         weight = self.weight if isinstance(self.weight, np.ndarray) else np.full(len(found), self.weight)
         impact, velocity = self.impact, self.velocity if self.impact is None else self.impact.without
@@ -808,7 +810,7 @@ class Attempt:
         )  # fmt: skip
         energy = StepEnergy(*energies.tolist())
         if scheme.static:
-            # No velocity is carried over: what inertia takes is lost within the step.
+            # No velocity is carried over: the work of inertia is lost within the step.
             self.dropped = energy.kinetic
             energy = energy._replace(
                 kinetic=0.0, before=energy.before - energy.carried, carried=0.0, scheme=energy.scheme + energy.kinetic
@@ -825,14 +827,14 @@ class Attempt:
                 load_work=energy.load_work + pulled,
                 friction=energy.friction + impact.rubbed,
                 impact=impact.lost,
-                # What is left: impulses at the step's end, displacements in a straight line.
+                # The rest: impulses act at the end of the step, and displacements are straight.
                 scheme=energy.scheme + fallen + pulled - kinetic - impact.rubbed - impact.lost,
             )
         return energy._replace(
             before=energy.before + found.unbent + found.released,
             bond=energy.bond + found.unbent,
             friction=energy.friction + self.rubbed,
-            # Elastic energy released where faces part is a vibration that no step resolves.
+            # Elastic energy released where faces separate is a vibration that no step resolves.
             scheme=energy.scheme - self.rubbed + found.released,
         )
 

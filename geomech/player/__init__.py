@@ -1,1 +1,1 @@
-"""Runs that play in a browser: a page in one file, a page of a run that still lasts, a widget in a notebook."""
+"""Playback of runs in a browser: a self-contained page, a served page of a run in progress, and a notebook widget."""

@@ -1,4 +1,4 @@
-"""Outlines of blocks and of rock that is meshed, from the triangles that a run has written."""
+"""Outlines of blocks and of meshed rock, from the triangles that a run has written."""
 
 from __future__ import annotations
 
@@ -34,9 +34,10 @@ def outlines(triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 def joint_faces(points: np.ndarray, owner: np.ndarray, other: np.ndarray) -> np.ndarray:
     """(k, 2) indices of the contacts between which the faces of joints are drawn.
 
-    ``points`` (n, 2) m are the contacts of blocks ``owner`` with blocks ``other``. Those of one pair of blocks are
-    taken in their order along the face; where one block has two corners or more on it, they alone are joined, so that
-    a line stays on that block when the face opens."""
+    ``points`` (n, 2) m are the contacts of blocks ``owner`` with blocks ``other``. The contacts of each pair of blocks
+    are joined in their order along the face. If one block has two corners or more on the face, only these are joined,
+    so that a line stays on that block when the face opens.
+    """
     if not len(points):
         return np.empty((0, 2), np.int64)
     low, high = np.minimum(owner, other).astype(np.int64), np.maximum(owner, other).astype(np.int64)
@@ -47,7 +48,7 @@ def joint_faces(points: np.ndarray, owner: np.ndarray, other: np.ndarray) -> np.
     xx, xy, yy = (np.bincount(pair, arm[:, i] * arm[:, j], n) for i, j in ((0, 0), (0, 1), (1, 1)))
     angle = 0.5 * np.arctan2(2 * xy, xx - yy)[pair]
     along = arm[:, 0] * np.cos(angle) + arm[:, 1] * np.sin(angle)
-    # The side of a pair whose own corners reach farther.
+    # The block of the pair whose own corners extend farther.
     side = 2 * pair + (owner != low)
     reach = np.full((2, 2 * n), -np.inf)
     np.maximum.at(reach[0], side, along)

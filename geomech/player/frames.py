@@ -1,7 +1,8 @@
 """One cycle of a run as a block of arrays: blocks, joints, cracks, tips and the field inside cracked rock.
 
-Places are kept in the reference, m from the middle of the model, with displacements beside them, so that the reader can
-magnify the motion. What stays from cycle to cycle (outlines, triangles) is a block of its own, a *mesh*.
+Positions are those of the reference configuration, m from the centre of the model, together with displacements, so that
+the page can magnify the motion. Data that are constant over several cycles (outlines, triangles) are stored separately
+as a *mesh*.
 """
 
 from __future__ import annotations
@@ -18,14 +19,13 @@ from .packing import Block
 if TYPE_CHECKING:
     import pyvista as pv
 
-#: In-plane stress and the one across the plane, in VTK's order of components.
+#: In-plane and out-of-plane stress components, by their position in VTK's order.
 _STRESS = {"xx": 0, "yy": 1, "xy": 3, "zz": 2}
 
 
 @dataclass
 class Frames:
-    """Reads cycles of ``run``. ``meshes`` are those met so far, as records; ``origin`` (2,) m is where places count
-    from."""
+    """Reads cycles of ``run``. ``meshes``: records of the meshes met so far; ``origin`` (2,) m: origin of positions."""
 
     run: Run
     origin: np.ndarray
@@ -33,8 +33,8 @@ class Frames:
     _known: dict[bytes, int] = field(default_factory=dict)
 
     def frame(self, cycle: int) -> dict[str, Any]:
-        """The record of ``cycle``: its numbers, its meshes and its arrays; ``field_cycle`` is that of the field inside its
-        rock, where that is older."""
+        """The record of ``cycle``: its number, its meshes and its arrays; ``field_cycle`` is the cycle of the field
+        inside the rock, if that is an earlier one."""
         from ..render.pictures.field import agreeing
 
         made = Block()
@@ -56,7 +56,7 @@ class Frames:
         return record | made.record()
 
     def _grid(self, series: str, cycle: int) -> pv.UnstructuredGrid | None:
-        """``series`` at ``cycle`` in the reference configuration; None without one."""
+        """The ``series`` at ``cycle`` in the reference configuration; None if there is none."""
         try:
             grid = self.run.grid(series, cycle)
         except KeyError:
@@ -134,8 +134,8 @@ class Frames:
         return made
 
     def _mesh(self, grid: pv.UnstructuredGrid, names: tuple[str, ...], make: Any) -> int:
-        """Which of ``meshes`` the triangles of ``grid`` are, made where they are new. Points in the reference come from
-        files of current coordinates with round-off, which single precision takes off but for a rare last digit."""
+        """Index in ``meshes`` of the triangles of ``grid``, added if they are new. Reference positions computed from
+        files of current coordinates have round-off, which single precision nearly always removes."""
         parts = [np.asarray(grid.points, np.float32), grid.cells, *(np.asarray(grid[name]) for name in names)]
         key = b"|".join(part.tobytes() for part in parts)
         if key not in self._known:
@@ -213,7 +213,7 @@ class Frames:
         made.whole("w_lines", grid.cells.reshape(-1, 3)[:, 1:])
 
     def _ends(self, cycle: int, crack: np.ndarray) -> np.ndarray:
-        """0 for tips that grew from their crack's start, 1 from its end: ``tips.csv`` lists them in the same order."""
+        """0 for tips that grew from the start of their crack, 1 for those from its end; in the order of ``tips.csv``."""
         rows = self.run.tips[self.run.tips["cycle"] == cycle]
         if len(rows) == len(crack) and np.array_equal(rows["crack"], crack):
             return rows["end"].astype(np.int64)
@@ -226,15 +226,15 @@ class Frames:
 
 
 def in_reference(grid: pv.UnstructuredGrid) -> pv.UnstructuredGrid:
-    """``grid`` with the points where they were in the reference; a run may write them where they are."""
+    """``grid`` with its points in the reference configuration; a run may have written current coordinates."""
     if "displacement" in grid.point_data and not int(grid.field_data["REFERENCE"][0]):
         grid.points = np.asarray(grid.points, float) - np.asarray(grid["displacement"], float)
     return grid
 
 
 def faces_of(cracks: pv.UnstructuredGrid, interior: pv.UnstructuredGrid | None) -> tuple[np.ndarray, np.ndarray]:
-    """(n, 2) displacement of the upper and of the lower face at the points of ``cracks``: as the mesh of the rock moves,
-    which is torn along them; where it is not, as the block moves, parted by opening and slip."""
+    """(n, 2) displacement of the upper and of the lower face at the points of ``cracks``: that of the rock's mesh,
+    which is split along them; without a mesh, that of the block, plus opening and slip."""
     moved = np.asarray(cracks["displacement"], float)[:, :2]
     points, lines = np.asarray(cracks.points)[:, :2], cracks.cells.reshape(-1, 3)[:, 1:]
     tangent = np.zeros_like(points)
@@ -255,8 +255,7 @@ def faces_of(cracks: pv.UnstructuredGrid, interior: pv.UnstructuredGrid | None) 
 
 
 def _vertices_of(blocks: pv.UnstructuredGrid, points: np.ndarray, owner: np.ndarray) -> np.ndarray:
-    """(n,) the corner of block ``owner`` that lies at each of ``points``, -1 where there is none within 1e-6 of the
-    model's size."""
+    """(n,) the corner of block ``owner`` at each of ``points``, -1 if there is none within 1e-6 of the model's size."""
     from scipy.spatial import cKDTree
 
     triangles = blocks.cells.reshape(-1, 4)[:, 1:]
@@ -264,7 +263,7 @@ def _vertices_of(blocks: pv.UnstructuredGrid, points: np.ndarray, owner: np.ndar
     of_point[triangles.ravel()] = np.repeat(np.asarray(blocks["block_id"]), 3)
     corners = np.asarray(blocks.points)[:, :2]
     size = float(np.ptp(corners, axis=0).max())
-    # Blocks lie apart in the third direction, so that the nearest corner is one of the block's own.
+    # Blocks are separated in the third direction, so that the nearest corner belongs to the same block.
     tree = cKDTree(np.column_stack([corners, size * of_point]))
     distance, vertex = tree.query(np.column_stack([points[:, :2], size * owner]), distance_upper_bound=1e-6 * size)
     return np.where(np.isfinite(distance), vertex, -1)

@@ -1,9 +1,9 @@
-"""Arrays as short text in a page: rounded to what a drawing shows, deflated, in base 64.
+"""Compact text form of arrays in a page: quantised to drawing accuracy, deflated, base 64.
 
-A block of arrays is one string of bytes. Each array lies in it byte by byte (all first bytes, then all second ones),
-since neighbouring numbers mostly differ in their low bytes only; the block is then deflated (zlib). A displacement
-is a 16-bit fraction of its range, so it is right to 1.5e-5 of that; a stress, whose largest values at crack tips are
-thousands of times the usual ones, is a 16-bit floating-point number, right to 5e-4 of itself.
+A block of arrays is one byte string. Each array is stored byte by byte (all first bytes, then all second ones), since
+neighbouring numbers mostly differ in their low bytes only; the block is then deflated (zlib). Displacements are 16-bit
+fractions of their range, accurate to 1.5e-5 of it. Stresses, whose largest values at crack tips are thousands of times
+the usual ones, are 16-bit floating-point numbers with a relative accuracy of 5e-4.
 """
 
 from __future__ import annotations
@@ -15,15 +15,15 @@ from typing import Any
 
 import numpy as np
 
-#: The largest number of a fraction; one more stands for nan.
+#: Largest integer of a fraction; the next one represents nan.
 _STEPS = 65534
-#: Floating-point numbers of 16 bits reach 65504.
+#: Largest value stored as a 16-bit floating-point number (their limit is 65504).
 _LARGEST_HALF = 6e4
 
 
 class Block:
-    """Arrays that are deflated together. ``arrays`` (name → [kind, offset, count, factor, shift]) is what a reader
-    needs: a value is factor × number + shift, counts and offsets in numbers and bytes."""
+    """Arrays that are deflated together. ``arrays`` (name → [kind, offset, count, factor, shift]) tells a reader how to
+    decode them: value = factor × number + shift; offsets in bytes, counts in numbers."""
 
     def __init__(self) -> None:
         self.arrays: dict[str, list[Any]] = {}
@@ -31,7 +31,7 @@ class Block:
         self._size = 0
 
     def fraction(self, name: str, values: np.ndarray) -> None:
-        """Finite or nan ``values`` as 16-bit fractions of their range."""
+        """``values``, finite or nan, as 16-bit fractions of their range."""
         flat = np.asarray(values, float).ravel()
         known = np.isfinite(flat)
         low, high = (float(flat[known].min()), float(flat[known].max())) if known.any() else (0.0, 0.0)
@@ -53,7 +53,7 @@ class Block:
         self._add(name, "f", np.asarray(values, np.float32).ravel())
 
     def whole(self, name: str, values: np.ndarray) -> None:
-        """Integers from 0 upwards, in as many bytes as the largest takes."""
+        """Integers from 0 upwards, with as many bytes as the largest one needs."""
         flat = np.asarray(values).ravel().astype(np.int64)
         if len(flat) and flat.min() < 0:
             raise ValueError(f"{name}: {flat.min()} is below 0")
@@ -75,5 +75,5 @@ class Block:
         return base64.b64encode(zlib.compress(b"".join(self._parts), 9)).decode("ascii")
 
     def record(self) -> dict[str, Any]:
-        """The block as a reader takes it."""
+        """The block as its reader in the page takes it."""
         return {"arrays": self.arrays, "data": self.text()}

@@ -1,7 +1,7 @@
-"""The player as HTML: its style, its script and its data in one text, which asks for nothing else.
+"""The player as a self-contained HTML page: style, script and data.
 
-The page's content security policy names the script by its hash, so that no other runs in it; the data are no script but
-text that is parsed as JSON, and every word of a run is set as text, never as markup.
+The content security policy of the page names the script by its hash, so that no other script runs in it. Data are not
+script but text that is parsed as JSON, and all texts of a run are inserted as text, never as markup.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from typing import Any
 from ..output.reading import Run
 from .recording import BUDGET, NothingToPlay, Recording
 
-#: More runs than these are too small beside each other to be seen.
+#: Largest number of runs side by side: more would be too small.
 MOST_RUNS = 4
 
 _PAGE = """<!DOCTYPE html>
@@ -67,8 +67,8 @@ def _web() -> Any:
 
 
 def policy(connect: str = "'none'") -> str:
-    """The content security policy of a page with the player: its own script, styles and pictures in the page, ``connect``
-    as the only place that it may ask."""
+    """The content security policy of a page with the player: its own script, styles and pictures, and ``connect`` as
+    the only address that it may request."""
     digest = base64.b64encode(hashlib.sha256(script().encode()).digest()).decode("ascii")
     return (
         f"default-src 'none'; script-src 'sha256-{digest}'; style-src 'unsafe-inline'; img-src data: blob:; "
@@ -77,7 +77,8 @@ def policy(connect: str = "'none'") -> str:
 
 
 def player(records: Sequence[Mapping[str, Any]] | None = None, live: str | None = None) -> str:
-    """The player of ``records`` (`Recording.whole`), or of what the address ``live`` answers, for the body of a page."""
+    """HTML of the player, for the body of a page, with the ``records`` (`Recording.whole`), or with those served at the
+    address ``live``."""
     attribute = f' data-live="{html.escape(live, quote=True)}" class="gm-alone"' if live else ""
     data = "" if records is None else f'<script type="application/json" id="geomech-runs">{_json(records)}</script>\n'
     return (
@@ -87,13 +88,13 @@ def player(records: Sequence[Mapping[str, Any]] | None = None, live: str | None 
 
 
 def _json(records: Any) -> str:
-    """JSON that can stand in a script element: no tag can end it, and numbers that JSON has not are null."""
+    """JSON inside a script element: no tag can end it, and numbers that JSON does not have become null."""
     text = json.dumps(records, separators=(",", ":"), ensure_ascii=False, allow_nan=False)
     return text.replace("&", "\\u0026").replace("<", "\\u003c").replace(">", "\\u003e")
 
 
 def records_of(runs: Iterable[Run], budget: int = BUDGET) -> list[dict[str, Any]]:
-    """The records of as many of ``runs`` as can be played, up to `MOST_RUNS`, in ``budget`` bytes together."""
+    """Records of up to `MOST_RUNS` playable ``runs``, in ``budget`` bytes together."""
     shown = []
     for run in runs:
         try:
@@ -106,12 +107,12 @@ def records_of(runs: Iterable[Run], budget: int = BUDGET) -> list[dict[str, Any]
 
 
 def whole_page(title: str, lead: str, body: str, connect: str = "'none'") -> str:
-    """A page of its own for a `player`."""
+    """A complete page with a `player`."""
     return _PAGE.format(title=html.escape(title), lead=html.escape(lead), player=body, policy=policy(connect))
 
 
 def write_player(runs: Sequence[Run], path: Path, budget: int = BUDGET) -> Path:
-    """The page that plays ``runs``, as the file ``path``. Raises NothingToPlay where none of them can be drawn."""
+    """Write the page that plays ``runs`` to ``path``. Raises NothingToPlay if none of them can be drawn."""
     records = records_of(runs, budget)
     if not records:
         raise NothingToPlay(

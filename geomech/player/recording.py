@@ -28,7 +28,7 @@ _NUMBERS_OF_THE_SOLVER = ("cycle", "load_step", "growth_pass")
 
 
 class NothingToPlay(ValueError):
-    """A run that has written no cycle yet."""
+    """The run has not written a cycle yet."""
 
 
 class Recording:
@@ -133,14 +133,14 @@ def written_cycles(run: Run) -> list[int]:
 
 
 def sample(cycles: Sequence[int], n: int) -> list[int]:
-    """``n`` of ``cycles``, evenly by their number, the first and the last among them."""
+    """``n`` of ``cycles``, evenly spaced by their number, including the first and the last."""
     at = np.unique(np.round(np.linspace(0, len(cycles) - 1, n)).astype(int))
     return [cycles[k] for k in at.tolist()]
 
 
 def evenly(run: Run, cycles: Sequence[int], most: int) -> list[int]:
-    """At most ``most`` of ``cycles``, spread over time, crack growth and cycles alike; the first, the last and the
-    first event of each kind are among them as far as there is room."""
+    """At most ``most`` of ``cycles``, distributed evenly over time, crack growth and number; they include the first,
+    the last and the first event of each kind as far as there is room."""
     if len(cycles) <= most:
         return list(cycles)
     rows = run.history[np.isin(run.history["cycle"], cycles)]
@@ -185,8 +185,8 @@ def picture_ranges(run: Run) -> dict[str, list[float]]:
 
 
 def quick_magnification(run: Run, cycle: int) -> float:
-    """A round factor by which points are seen to move against each other at ``cycle``, a quarter of what pictures begin
-    with: those then look for blocks that would be drawn inside each other, which takes seconds."""
+    """A round factor that makes the relative motion of points at ``cycle`` visible, to a quarter of the size at which
+    pictures begin. (Pictures also avoid blocks drawn inside each other, which takes seconds.)"""
     from ..render.pictures.look import DEFORMATION
 
     size = spread = 0.0
@@ -201,7 +201,7 @@ def quick_magnification(run: Run, cycle: int) -> float:
 
 
 def _bounds(run: Run) -> tuple[np.ndarray, np.ndarray]:
-    """Lower left and upper right corner of what the run drew at first, m."""
+    """Lower left and upper right corner of the initial model, m."""
     numbers = written_cycles(run)
     places = []
     for series in ("blocks", "cracks", "interior"):
@@ -220,7 +220,7 @@ def _bounds(run: Run) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _places(run: Run, origin: np.ndarray) -> dict[str, Any]:
-    """Monitors and bolts whose places the run has left in ``places.json``; the end of a bolt in the ground is marked."""
+    """Monitors and bolts from ``places.json`` of the run; ends of bolts in the ground are marked."""
     path = run.folder / PLACES
     if path.is_file():
         found = json.loads(path.read_text(encoding="utf-8"))
@@ -251,12 +251,12 @@ def _places(run: Run, origin: np.ndarray) -> dict[str, Any]:
 
 
 def thinned(n: int, most: int) -> np.ndarray:
-    """Rows of a table of ``n`` that a curve shows."""
+    """Rows of a table of ``n`` rows that a curve shows."""
     return np.arange(n) if n <= most else np.unique(np.round(np.linspace(0, n - 1, most)).astype(int))
 
 
 def _curves(run: Run) -> dict[str, Any]:
-    """Columns of ``history.csv`` as curves, those that are not zero or empty throughout."""
+    """Columns of ``history.csv`` as curves, without those that are zero or empty throughout."""
     table = run.history[thinned(len(run.history), MOST_ROWS)]
     made = Block()
     made.single("cycle", table["cycle"])
@@ -287,7 +287,7 @@ def _unit(name: str) -> str:
 
 
 def _tips(run: Run) -> dict[str, Any] | None:
-    """``tips.csv``, of so many cycles that its rows fit."""
+    """``tips.csv``, for as many cycles as the limit of rows allows."""
     rows = run.tips
     if not len(rows):
         return None
@@ -303,7 +303,7 @@ def _tips(run: Run) -> dict[str, Any] | None:
 
 
 def _joints(run: Run) -> dict[str, Any] | None:
-    """``joints.csv`` where the run has written it: a row a joint and cycle."""
+    """``joints.csv``, if the run has written it: one row per joint and cycle."""
     rows = read_table(run.folder / "joints.csv", ("cycle", "time"))
     columns = rows.dtype.names or ()
     if not len(rows) or "joint" not in columns:
@@ -337,7 +337,7 @@ def _number(value: float) -> float | None:
 
 
 def _crack_names(run: Run) -> list[str]:
-    """The cracks' names by number, from ``tips.csv``, where the run has not ended."""
+    """Names of the cracks by number, from ``tips.csv``, if the run has not ended."""
     if not len(run.tips) or "crack_name" not in (run.tips.dtype.names or ()):
         return []
     names: dict[int, str] = {int(k): str(name) for k, name in zip(run.tips["crack"], run.tips["crack_name"])}

@@ -1,8 +1,8 @@
-"""`geomech view`: a page that plays runs while they last, served to this machine's browser.
+"""`geomech view`: serves a page that plays runs, also while they are running, to a browser on the same machine.
 
-The server answers two addresses: the page, and what its runs have written since the reader last asked. It listens on
-the loopback interface; for others it is opened by ``--host`` only, and every request must then carry a token. It refuses
-requests that name another host than it was opened for, so that no page from elsewhere can reach it by a name of its own
+The server has two addresses: the page, and the data that its runs have written since the last request. It listens on
+the loopback interface; ``--host`` opens it to others, and every request must then carry a token. Requests that name
+another host than the server was opened for are rejected, so that no foreign page can reach it under a name of its own
 (DNS rebinding).
 """
 
@@ -27,19 +27,19 @@ from ..output.reading import Run
 from .page import player, policy, whole_page
 from .recording import MOST_FRAMES, NothingToPlay, Recording, evenly, magnification, quick_magnification
 
-#: Bytes of text that the cycles of one run may take in the browser.
+#: Largest size of the cycles of one run in the browser, bytes of text.
 LIVE_BUDGET = 48_000_000
-#: Seconds that one answer may take: then what has been read is sent, and the rest with the next.
+#: Longest time of one answer, s: then the data read so far are sent, and the rest with the next answer.
 _PATIENCE = 1.5
 
 
 class PortInUse(OSError):
-    """Another program listens at the port."""
+    """The port is used by another program."""
 
 
 @dataclass
 class Watched:
-    """A run that may go on. ``frames`` and ``meshes`` were read so far, in the order they are sent."""
+    """A run that may be in progress. ``frames`` and ``meshes`` were read so far, in the order in which they are sent."""
 
     folder: Path
     frames: list[dict[str, Any]] = field(default_factory=list)
@@ -53,10 +53,10 @@ class Watched:
     _scale: float | None = None
 
     def refresh(self) -> None:
-        """Read what is new; a run that was begun again is read from its start."""
+        """Read new data; a run that was started again is read from its beginning."""
         run = Run(self.folder)
         scene, history = self.folder / "scene.toml", self.folder / "history.csv"
-        # A run rewrites its scene when it begins, and its history with every cycle.
+        # A run rewrites its scene at its start, and its history in every cycle.
         began = scene.stat().st_mtime if scene.is_file() else 0.0
         written = history.stat().st_mtime, (self.folder / "summary.json").is_file()
         if written != self._written:
@@ -77,7 +77,7 @@ class Watched:
         self.more = False
         if not cycles:
             if self.frames and run.summary and self._scale is None:
-                # It takes seconds, which a reader who sees the run already does not wait for.
+                # This takes seconds, so it is left out once the run is shown.
                 self._scale = magnification(run)
                 self.version += 1
             return
@@ -98,8 +98,8 @@ class Watched:
         return int(self.frames[-1]["cycle"]) if self.frames else -1
 
     def answer(self, frames: int, meshes: int, version: int) -> dict[str, Any] | None:
-        """What a reader lacks who has so many frames and meshes, and the curves of ``version``; None where that is
-        nothing."""
+        """New data for a reader who has this many frames and meshes, and the curves of ``version``; None if there are
+        none."""
         assert self.recording is not None
         if frames >= len(self.frames) and version == self.version and frames:
             return None
@@ -115,8 +115,8 @@ class Watched:
 
 
 class Viewer:
-    """Serves the page of ``folders`` at ``host`` and ``port`` (0: any free one). Raises PortInUse, FileNotFoundError
-    where a folder holds no run, and OSError for a host that is not this machine's."""
+    """Serves the page of ``folders`` at ``host`` and ``port`` (0: any free one). Raises PortInUse, FileNotFoundError if
+    a folder contains no run, and OSError for a host that is not this machine."""
 
     def __init__(self, folders: Sequence[Path], host: str = "127.0.0.1", port: int = 0) -> None:
         self.watched = [Watched(Path(folder)) for folder in folders]
@@ -135,35 +135,35 @@ class Viewer:
 
     @property
     def address(self) -> str:
-        """Where a browser finds the page."""
+        """Address of the page for a browser."""
         name = f"[{self.host}]" if ":" in self.host else self.host
         if self.host in ("0.0.0.0", "::"):
             name = socket.gethostname()
         return f"http://{name}:{self.port}/" + (f"?token={self.token}" if self.token else "")
 
     def serve(self) -> None:
-        """Answer until `close` or an interrupt."""
+        """Answer requests until `close` or an interrupt."""
         self._server.serve_forever(poll_interval=0.2)
 
     def start(self) -> Viewer:
-        """Answer in the background; for notebooks and tests."""
+        """Answer requests in the background; for notebooks and tests."""
         threading.Thread(target=self.serve, daemon=True, name="geomech view").start()
         return self
 
     def close(self) -> None:
-        """Stop answering and give the port back."""
+        """Stop answering and release the port."""
         self._server.shutdown()
         self._server.server_close()
 
     def page(self) -> str:
-        """The page itself; its data come from `news`."""
+        """The page; its data come from `news`."""
         live = f"news?token={self.token}" if self.token else "news?"
         names = ", ".join(str(each.folder) for each in self.watched)
         return whole_page(self.title, f"{names} · new cycles appear by themselves · ? lists the keys",
                           player(live=live), connect="'self'")  # fmt: skip
 
     def news(self, known: str) -> dict[str, Any]:
-        """What a reader lacks, who has ``known`` ("frames,meshes,version;…" of each run)."""
+        """New data for a reader who has ``known`` ("frames,meshes,version;…" for each run)."""
         with self._lock:
             before = [each.generation for each in self.watched]
             for each in self.watched:
@@ -179,7 +179,7 @@ class Viewer:
             return {"runs": runs, "more": any(each.more for each in self.watched)}
 
     def allows(self, host: str, given: str) -> bool:
-        """Whether a request that names ``host`` and brings the token ``given`` is answered."""
+        """Whether a request that names ``host`` and carries the token ``given`` is answered."""
         if self.token:
             return hmac.compare_digest(given.encode(), self.token.encode())
         name = urlsplit(f"//{host}").hostname or ""
@@ -187,7 +187,7 @@ class Viewer:
 
 
 def _counts(known: str, n: int) -> list[tuple[int, int, int]]:
-    """The numbers of "frames,meshes,version;…"; zeros where that is not what was sent."""
+    """The numbers in "frames,meshes,version;…"; zeros if the text has another form."""
     found = [tuple(int(part) if part.isdecimal() else -1 for part in each.split(",")) for each in known.split(";")]
     fitting = len(found) == n and all(len(each) == 3 and min(each) >= 0 for each in found)
     return [(a, b, c) for a, b, c in found] if fitting else [(0, 0, 0)] * n

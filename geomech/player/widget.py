@@ -1,4 +1,4 @@
-"""The player in a notebook: the page of its own in a frame, which works in an exported notebook too."""
+"""The player in a notebook: its page in a frame, which also works in an exported notebook."""
 
 from __future__ import annotations
 
@@ -12,9 +12,10 @@ from .recording import NothingToPlay
 
 
 class RunPlayer:
-    """``runs`` as a notebook shows them, ``height`` pixels high, in a page of about ``megabytes``.
+    """Notebook display of ``runs``, ``height`` pixels high, in a page of about ``megabytes``.
 
-    Raises NothingToPlay where none of them has written anything that could be drawn."""
+    Raises NothingToPlay if none of them has written anything that can be drawn.
+    """
 
     def __init__(self, runs: Sequence[Run], height: int = 860, megabytes: float = 4.0) -> None:
         self.height = int(height)
@@ -27,11 +28,11 @@ class RunPlayer:
 
     @cached_property
     def page(self) -> str:
-        """The page as HTML, complete in itself."""
+        """The page as self-contained HTML."""
         return whole_page(self._records[0]["title"], lead_of(self._records), player(self._records))
 
     def _repr_html_(self) -> str:
-        # Scripts run in the frame only, without the notebook's origin.
+        # Scripts run inside the frame only, without access to the notebook.
         return (
             f'<iframe srcdoc="{html.escape(self.page, quote=True)}" sandbox="allow-scripts allow-downloads" '
             f'style="width:100%;height:{self.height}px;border:0" title="{html.escape(self._records[0]["title"], quote=True)}">'

@@ -1,1 +1,1 @@
-"""Closed forms, published values and second methods that results are compared with."""
+"""Closed forms, published values and independent methods with which results are compared."""

@@ -1,7 +1,7 @@
-"""Fixed load steps against steps from event to event: the two-crack specimen to coalescence, its loads and their cost.
+"""Fixed load steps compared with event stepping: loads and cost of the two-crack specimen up to coalescence.
 
-Fixed steps find an event at the end of the step in which it comes about, so that loads are right to a step; steps to
-events find the load itself, whatever the longest step.
+Fixed steps detect an event at the end of the step in which it occurs, so that its load is accurate to one step. Event
+stepping finds the load itself, for any longest step.
 """
 
 from __future__ import annotations
@@ -12,13 +12,14 @@ from pathlib import Path
 from ...output.tables.summary import write_json
 from ..figures import Measured, Point, stopwatch
 
-#: Where the numbers go, below the working folder.
+#: Folder of the numbers, in the working folder.
 FOLDER = Path("outputs/bench_steps")
 SCENE = Path("pipelines/two_cracks/scene.toml")
 VARIANT = "phi_0"
-#: Methods of the picture; an event's load is found to `LEAST`, relative (a tip then has its toughness to 1e-6).
+#: Methods in the picture; the load of an event is found to the relative accuracy `LEAST` (K of the tip then equals its
+#: toughness to 1e-6).
 FIXED_STEPS, EVENTS, LEAST = "fixed steps", "from event to event", 1e-6
-#: Fixed steps, s (0.2 MPa each); longest steps from event to event, s (None: as long as blocks may move in one).
+#: Fixed steps, s (0.2 MPa each); longest steps of event stepping, s (None: limited by the motion of blocks only).
 FIXED, LONGEST = (16.0, 8.0, 4.0, 2.0, 1.0), (None, 20.0, 5.0)
 
 
@@ -42,14 +43,14 @@ def of_run(overrides: list[str], repeats: int) -> dict:
 
 
 def measure(quick: bool = False) -> Measured:
-    """The table; leaves ``steps.json`` and ``work_precision.png`` in `FOLDER`. ``quick``: one fixed step, once."""
+    """The table; writes ``steps.json`` and ``work_precision.png`` to `FOLDER`. ``quick``: one fixed step, once."""
     from ...render.benchmarks.work_precision import draw
 
     if not SCENE.exists():
         return Measured.of(f"Load steps: {SCENE} is not below this folder")
     repeats = 1 if quick else 2
     events = 'run.stepping="events"'
-    # What is compiled, or loaded, is not counted: a run until some increments after the first growth.
+    # Compilation and loading do not count: a run until some increments after the first growth precedes.
     of_run([events, "run.end_time_s=260"], 1)
     rows = {
         "events" if longest is None else f"events, at most {longest:g} s": of_run(

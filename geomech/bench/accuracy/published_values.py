@@ -1,5 +1,5 @@
-"""Computed values compared with published or closed-form ones: the figures of the README's "How right", with default
-settings unless the row says otherwise."""
+"""Computed values compared with published or closed-form ones, as in the README's table "Accuracy", with default
+settings unless the row states otherwise."""
 
 from __future__ import annotations
 

@@ -97,7 +97,7 @@ class Followed:
 
     @property
     def gained(self) -> float:
-        """Energy created by updating the geometry and by overlaps, over all energy turned over."""
+        """Energy created by updating the geometry and by overlaps, relative to the energy converted."""
         return max(0.0, self.budget.residual + self.budget.overlap) / self.budget.turnover
 
 

@@ -26,8 +26,8 @@ class Outcome:
 
     error         in the measure of its map
     penetration   in block sizes
-    gain          of mechanical energy, over all there was
-    drift         of energy, the larger of that gain and the unexplained part of the balance, over all turned over
+    gain          of mechanical energy, relative to the initial energy
+    drift         of energy, the larger of that gain and the residual of the balance, relative to the energy converted
     cuts          of steps
     condition     number, and ``residual`` of the equations; nan: none
     """

@@ -2,7 +2,7 @@
 
 The reference is topology: no overlaps, and enclosed blocks stay enclosed. The error of a scene is the largest of: the
 deepest overlap over half the wall's thickness (fast impacts compress springs), the fraction of the blocks that escaped,
-and the energy created by overlaps over a hundredth of all energy turned over; right below 1.
+and the energy created by overlaps over a hundredth of the energy converted; the scene is right if it is below 1.
 """
 
 from __future__ import annotations

@@ -1,14 +1,14 @@
 """Work of static loads in opening the cracks of a body, beyond the work of its mean stress.
 
 Tractions t displace the outline of a cracked body by u_c more than that of the intact one. By Betti's theorem their
-work on it is ∫ t·u_c ds = ∫ t₀·[u] ds, where t₀ are the tractions that the same loads would cause on closed crack
-faces; half of it is stored by open cracks (Clapeyron). The mean stress does the part A σ : ε_c. The rest is the work of
-loads that bend, shear or press the block unevenly, which a block of uniform strain does not know.
+work on u_c is ∫ t·u_c ds = ∫ t₀·[u] ds, where t₀ are the tractions that the same loads would cause on closed crack
+faces; open cracks store half of it (Clapeyron). The mean stress does the part A σ : ε_c. The rest is the work of loads
+that bend, shear or press the block unevenly, on which a block of uniform strain does no work.
 
-Cracks that grow while loads change release what a body does that goes from its first state straight to its last:
-½ ∫ (τ_a·[u_b] − τ_b·[u_a]) ds with τ = t₀ − t, t the traction on crack faces, each load on each geometry (the area
-between the two loading lines; Betti). It is nothing where no crack has grown. Where a step takes several increments,
-each at its own loads, the release along these is the sum over them, and differs from that of the straight line.
+If cracks grow while loads change, the energy released along the straight line from the initial to the final state is ½
+∫ (τ_a·[u_b] − τ_b·[u_a]) ds with τ = t₀ − t, t the traction on crack faces and each load on each geometry (the area
+between the two loading lines; Betti). It is zero where no crack has grown. If a step contains several increments, each
+at its own loads, the release along these is the sum over the increments, which differs from that of the straight line.
 """
 
 from __future__ import annotations
@@ -38,8 +38,8 @@ def work_on_cracks(before: Solution, after: Solution) -> float:
 
 
 def first_work_on_cracks(stress: np.ndarray, rotation: float, after: Solution) -> float:
-    """The same for cracks cut into a block whose only stress was the mean ``stress`` (3,), Pa, current axes; the block
-    is rotated by ``rotation`` rad."""
+    """The same for cracks cut into a block whose stress was uniform before, ``stress`` (3,), Pa, current axes; the
+    block is rotated by ``rotation`` rad."""
     load = after.closed_traction
     if np.any(stress):
         load = load + after.body.mean_stress_traction @ (stress_rotation(-rotation) @ stress)
@@ -48,7 +48,7 @@ def first_work_on_cracks(stress: np.ndarray, rotation: float, after: Solution) -
 
 @dataclass(frozen=True, eq=False)
 class Loaded:
-    """A block with the ``solution`` of its cracks. ``mean``, where it responds to its mean stress alone: that stress in
+    """A block with the ``solution`` of its cracks. If it responds to its mean stress alone: ``mean``, that stress in
     its own axes, Pa, and its `ByMeanStress.limit`."""
 
     solution: Solution
@@ -73,8 +73,8 @@ class Loaded:
 
 
 def release_between(before: Loaded, after: Loaded) -> float:
-    """Release by growth on the straight line between two states of a block, J/m, under the loads of the crack solver:
-    those that remain of the mean stress where it is limited."""
+    """Energy released by growth on the straight line between two states of a block, J/m, under the loads of the crack
+    solver: the reduced loads if its mean stress is limited."""
     a, b = before.solution, after.solution
     if before.mean is None or after.mean is None:
         forward = b.work_at_cracks(b.body.closed_traction(a.load)) if b.jumps.size else 0.0
@@ -87,8 +87,7 @@ def release_between(before: Loaded, after: Loaded) -> float:
 
 
 def release_of_mean_stress(before: Loaded, after: Loaded) -> float:
-    """`release_between` as a block with mean-stress response knows it: with what it does as the limit of its softness
-    changes."""
+    """`release_between` for a block with mean-stress response, including the effect of a change of its softness limit."""
     if before.mean is None or after.mean is None:
         raise ValueError("the block does not respond to its mean stress alone")
     (stress_a, limit_a), (stress_b, limit_b) = before.mean, after.mean

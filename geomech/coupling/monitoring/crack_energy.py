@@ -1,30 +1,30 @@
-"""Energy balance of cracks: the work of blocks on their cracks is stored around them, dissipated in friction, released
+"""Energy balance of cracks: the work of blocks on their cracks is stored around them, dissipated by friction, released
 by breaking cement and at growing tips, or released where blocks split.
 
 - DDA gives the work of the mean stress on the crack strain, A σ : dε_c.
 - Stored: a body with jumps [u] whose faces carry t, where the same loads would cause t₀ on closed faces, stores
   ½ ∫ (t₀ − t)·[u] more (Clapeyron).
-- Released over an increment a of growth: ∫ G da with G = (K_I² + K_II²)/E' (Irwin 1957), from G before it, at the
-  kink, and after it, with K linear in between.
+- Released over an increment a of growth: ∫ G da with G = (K_I² + K_II²)/E' (Irwin 1957), from G before it, at the kink,
+  and after it, with K linear in between.
 
 These are computed independently and must add up; the residual is reported. K is taken under the forces that strain the
-block: under its mean stress where it responds to that alone (`mean_stress_response`).
+block: under its mean stress if it responds to that alone (`mean_stress_response`).
 
-Passes of a step follow each other at loads of their own, from increment to increment, while work and friction are those
-of the straight line from the step's beginning to its end. What cracks release on both ways is found from the loads on
-them, without K (`release_between`), and the integral of G is taken over from the one to the other (`_on_the_line`).
-(With one factor on G for all of the step, found in its first pass, three of 300 random slopes missed 3 to 14 % of their
-energy.)
+The passes of a step follow each other at different loads, from increment to increment, whereas work and friction are
+computed on the straight line from the start to the end of the step. The release on both paths is computed from the
+loads on the cracks, without K (`release_between`), and with it the integral of G is converted from the passes to the
+straight line (`_on_the_line`). (With one factor on G for the whole step, found in its first pass, three of 300 random
+slopes missed 3 to 14 % of their energy.)
 
 In statics all forces count, since they open cracks by more than their mean stress does (`crack_opening_work`), also
-where faces hold until the forces reach their strength (`Released`). The work beyond A σ : dε_c has a column of its own,
-as the blocks do not account for it. Where G exceeds the toughness, the surplus is lost in statics; in motion it stays
-in the balance.
+where faces hold until the forces reach their strength (`Released`). The work beyond A σ : dε_c has its own column,
+because the blocks do not account for it. If G exceeds the toughness, the surplus is lost in statics; in dynamics it
+stays in the balance.
 
 Cracks that cut through a block in statics do so under forces that are kept until the block splits. G and the work of
-the forces then grow without bound as the last ligament breaks, although no such work is done. A step in which a block
-splits is therefore charged with the least possible: K_Ic²/E' for the length its tips grew, from what its cracks had
-stored. A surplus is lost, and a deficit is work of the forces.
+the forces then grow without bound as the last ligament breaks, although no such work is done. For a step in which a
+block splits, the least possible release is therefore assumed: K_Ic²/E' times the growth of its tips, taken from the
+energy that its cracks had stored. A surplus is lost, and a deficit is work of the forces.
 """
 
 from __future__ import annotations
@@ -62,7 +62,7 @@ def _add(sums: dict[int, float], block: int, energy: float) -> None:
 
 @dataclass(frozen=True)
 class _Growing:
-    """A tip in ``block`` that grows by ``way``, m, from G ``before``; ``cost``: fracture energy, J/m²."""
+    """A tip in ``block`` that grows by ``way``, m, from G = ``before``; ``cost``: fracture energy, J/m²."""
 
     way: float
     before: float
@@ -175,7 +175,7 @@ class CrackEnergy:
         self._asked += float(tips["grown"][grows] @ cost[grows])
 
     def _follow(self, solutions: dict[int, Solution], by_mean_stress: ByMeanStress) -> None:
-        """Add what cracks have released since the last pass, from the loads on them."""
+        """Add the energy that cracks have released since the last pass, computed from the loads on them."""
         for block, of in solutions.items():
             now, last = Loaded.of(block, of, by_mean_stress), self._last.get(block)
             if last is not None and now.responds_as(last) and not now.same_geometry(last):
@@ -204,9 +204,9 @@ class CrackEnergy:
         self._growing = {key: replace(of, block=now[of.block]) for key, of in self._growing.items() if of.block in now}
 
     def _runs_through(self, block: int, rubbed: float = 0.0, bond: float = 0.0) -> None:
-        """In statics ``block`` is cut by tips that have grown in the present step or are about to. Since the beginning
-        of the step, ``rubbed`` J/m were lost in friction in it and ``bond`` released by cement. Its release so far has
-        not been charged."""
+        """In statics ``block`` is cut by tips that have grown in the present step or are about to grow. Since the start
+        of the step, ``rubbed`` J/m were dissipated by friction in it and ``bond`` released by cement. Its release has
+        not been entered yet."""
         own = [key for key, of in self._growing.items() if of.block == block]
         taken = self._taken.pop(block, 0.0) + sum(of.way * of.cost for of in map(self._growing.pop, own))
         for sums in (self._released, self._lost, self._along):
@@ -223,12 +223,12 @@ class CrackEnergy:
 
     @property
     def grows(self) -> bool:
-        """Whether tips have grown whose release is still to be added."""
+        """Whether tips have grown whose release has not been added yet."""
         return bool(self._growing)
 
     @property
     def under_way(self) -> bool:
-        """Whether the balance has entries, even if no crack is left."""
+        """Whether the balance has entries, even if there are no cracks any more."""
         return self.work != 0.0 or self.stored != 0.0
 
     def after(
@@ -295,13 +295,15 @@ class CrackEnergy:
         self._last, self._along = dict(self._rested), {}
 
     def _on_the_line(self, before: State, by_mean_response: dict[int, bool]) -> None:
-        """Take the release of the present step, integrated over G from pass to pass, to the straight line from the
-        beginning of the step, ``before``, to its end.
+        """Convert the release of the present step, integrated over G from pass to pass, to the straight line from the
+        start of the step, ``before``, to its end.
 
-        From the loads the passes release ``along`` J/m and the line ``straight`` ones. What K tells otherwise than the
-        loads, ∫ G da − ``along``, remains as the error of the increments: in proportion where the line releases less,
-        as under a load that rises from nothing, and as it is where it releases more. Blocks of limited softness
-        (`ByMeanStress.limit`) release what lies between their loading lines: K under limited stress drives nothing."""
+        From the loads, the passes release ``along`` J/m and the straight line ``straight`` J/m. The difference between
+        K and the loads, ∫ G da − ``along``, remains as the error of the increments: reduced in proportion if the line
+        releases less, as under a load that starts from zero, and unchanged if it releases more. Blocks of limited
+        softness (`ByMeanStress.limit`) release the energy between their loading lines, since K under limited stress
+        drives no growth.
+        """
         for block, along in self._along.items():
             began, now = self._rested.get(block), self._last[block]
             if began is None:

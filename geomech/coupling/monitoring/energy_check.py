@@ -11,13 +11,13 @@ log = logging.getLogger(__name__)
 
 #: Fraction of the fracture energy that the blocks may not have supplied: increments and steps leave some per cent.
 UNPAID = 0.25
-#: Fraction of the energy turned over that the time integration may take from blocks that still move: the work of the
-#: weight is then off by up to as much, in proportion to the time step …
+#: Fraction of the energy converted that the time integration may take from blocks that still move: the work of the
+#: weight is then in error by up to as much, in proportion to the time step …
 DISSIPATED = 0.05
 #: … and their kinetic energy as a fraction of it. Blocks that have come to rest have rightly lost their energy.
 IN_MOTION = 0.01
-#: Fraction of it that static steps may take. A load that acts at once leaves half of its work; what is far beyond has
-#: moved blocks that nothing held.
+#: Fraction of it that static steps may take. Half of the work of a suddenly applied load is dissipated; a much larger
+#: fraction means that unsupported blocks have moved.
 UNHELD = 0.8
 
 

@@ -1,11 +1,11 @@
-"""T-junctions: contacts of flat vertices inside a common face, whose stiffness goes to the contacts at its ends.
+"""T-junctions: contacts of flat vertices inside a common face, whose stiffness is assigned to the contacts at its ends.
 
 Where a joint ends on a block's side, cutting leaves a flat vertex in it. First-order blocks keep their sides straight,
 so that the two ends of a face determine its pressure, wherever vertices lie between them. At first such a vertex
 coincides with the corner of another block. When the blocks slide, the corner moves on and the vertex stays behind in
 the face. If contacts of both shared the stiffness by tributary length, the vertex would have all of it before and
-almost none after, with a force that stretches the remaining spring, while the corner would be pressed in suddenly. (In
-a wall one such vertex created half of the energy turned over.) This concerns stiffness per area times length alone:
+almost none after, with a force that stretches the remaining spring, while the corner would suddenly be pressed in. (In
+a wall one such vertex created half of the energy converted.) This concerns stiffness per area times length alone:
 penalty springs do not depend on the length.
 """
 

@@ -45,7 +45,8 @@ GROUND_RATIO = 1e-11
 
 
 class SchemeTerms(NamedTuple):
-    """What kernels take of a `TimeScheme`, for a step of ``dt`` s whose inertia is ``heavier`` (1/w) by the α-scheme."""
+    """The coefficients of a `TimeScheme` as kernels take them, for a step of ``dt`` s whose inertia is multiplied by
+    ``heavier`` (1/w) in the α-scheme."""
 
     weight: float
     block_damping: float
@@ -56,7 +57,7 @@ class SchemeTerms(NamedTuple):
 
 
 class BlockMass(NamedTuple):
-    """Mass of blocks as a step begins: ``density`` (n_blocks,) kg/m³, ``moments`` (n_blocks, 6) of the outline
+    """Mass of blocks at the start of a step: ``density`` (n_blocks,) kg/m³, ``moments`` (n_blocks, 6) of the outline
     (`block_moments`), and which blocks are ``fixed`` (n_blocks,)."""
 
     density: np.ndarray
@@ -65,8 +66,8 @@ class BlockMass(NamedTuple):
 
 
 class BlockStart(NamedTuple):
-    """With what blocks begin a step: ``velocity`` (n_blocks, 6), m/s and 1/s, and ``stress`` (n_blocks, 3), Pa; and their
-    own ``stiffness`` and ``compliance`` (n_blocks, 3, 3), Pa and 1/Pa."""
+    """State of blocks at the start of a step: ``velocity`` (n_blocks, 6), m/s and 1/s, ``stress`` (n_blocks, 3), Pa;
+    and the ``stiffness`` and ``compliance`` (n_blocks, 3, 3) of the intact blocks, Pa and 1/Pa."""
 
     velocity: np.ndarray
     stress: np.ndarray
@@ -75,8 +76,8 @@ class BlockStart(NamedTuple):
 
 
 class CrackTerms(NamedTuple):
-    """Mean strain of blocks by their cracks: ``strain`` (n_blocks, 3) as a step begins, and at its end ``offset`` +
-    ``compliance`` σ, (n_blocks, 3) and (n_blocks, 3, 3) 1/Pa; these do not count unless ``given``."""
+    """Mean strain of blocks due to cracks: ``strain`` (n_blocks, 3) at the start of a step, and at its end ``offset`` +
+    ``compliance`` σ, (n_blocks, 3) and (n_blocks, 3, 3) 1/Pa; the latter are used only if ``given``."""
 
     given: bool
     strain: np.ndarray
@@ -92,8 +93,8 @@ class BlockLoads(NamedTuple):
 
 
 class Outlines(NamedTuple):
-    """Blocks as polygons: ``vertices`` (n_vertices, 2) m, those of block b from ``start[b]`` to before ``start[b + 1]``,
-    and ``moments`` (n_blocks, 6)."""
+    """Blocks as polygons: ``vertices`` (n_vertices, 2) m, those of block b from ``start[b]`` to before ``start[b +
+    1]``, and ``moments`` (n_blocks, 6)."""
 
     vertices: np.ndarray
     start: np.ndarray
@@ -154,7 +155,7 @@ class TimeScheme:
         )
 
     def terms(self, dt: float, heavier: float = 1.0) -> SchemeTerms:
-        """As kernels take it, for a step of ``dt`` s; ``heavier`` as from `begun`."""
+        """Coefficients for kernels, for a step of ``dt`` s; ``heavier`` as from `begun`."""
         return SchemeTerms(
             self.weight, self.block_damping, self.mass_damping, self.stiffness_damping, dt, heavier
         )  # fmt: skip
@@ -239,7 +240,7 @@ def _tangent(b, stiffness, compliance, crack_given, crack_compliance, out):
     if soft:
         _invert(compliance[b], crack_compliance[b], out[b])
     else:
-        # By numbers: Numba takes seconds to compile the assignment of one array to another.
+        # Number by number: Numba takes seconds to compile the assignment of one array to another.
         for k in range(3):
             for m in range(3):
                 out[b, k, m] = stiffness[b, k, m]
@@ -263,7 +264,7 @@ def _unit_mass(moments, mass):
 
 @part(fastmath=False, error_model="numpy", nogil=True, **UNCOUNTED)
 def _rotated(c, s, xx, yy, xy):
-    """The components of a symmetric tensor turned by the angle of cosine ``c`` and sine ``s``."""
+    """Components of a symmetric tensor rotated by the angle with cosine ``c`` and sine ``s``."""
     return (
         c * c * xx + s * s * yy - 2 * s * c * xy,
         s * s * xx + c * c * yy + 2 * s * c * xy,

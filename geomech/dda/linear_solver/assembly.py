@@ -1,7 +1,7 @@
-"""Assembly of the 6×6-block system of a step: the blocks' own equations and contact springs; and its solution.
+"""Assembly of the 6×6-block system of a step from block equations and contact springs, and its solution.
 
-Unknowns are (u0, v0, h r0, h εx, h εy, h γxy) with h = √area, so that all six are lengths and the matrix is well
-scaled. Fixed blocks have no unknowns.
+The unknowns are (u0, v0, h r0, h εx, h εy, h γxy) with h = √area: all six are lengths, and the matrix is well scaled.
+Fixed blocks have no unknowns.
 """
 
 from __future__ import annotations
@@ -34,8 +34,8 @@ FILLED_AGAIN = 0.25
 
 @dataclass(frozen=True, eq=False)
 class Links:
-    """Couplings of blocks other than contacts: ``blocks`` (k, 6, 6) of the matrix at ``row`` and ``column`` (k,) of its
-    6×6 blocks, at ``places`` (k, 6, 6) of the flat matrix."""
+    """Couplings of blocks other than contacts: ``blocks`` (k, 6, 6) at ``row`` and ``column`` (k,) of the matrix of 6×6
+    blocks, at ``places`` (k, 6, 6) of the flat matrix."""
 
     row: np.ndarray
     column: np.ndarray
@@ -45,11 +45,10 @@ class Links:
 
 @dataclass(frozen=True, eq=False)
 class Pattern:
-    """Position of the 6×6 blocks in the flat matrix: entry (a, b) of a block is data[base + a·stride[row] + b].
+    """Positions of the 6×6 blocks in the flat matrix: entry (a, b) of a block is data[base + a·stride[row] + b].
 
-    ``order`` (n_blocks,) is the number of each block's unknowns, −1 if fixed; those of one begin at ``begins``
-    (n + 1,). ``solver`` is None for a dense matrix.
-    ``links``: couplings other than contacts, or None.
+    ``order`` (n_blocks,) is the number of each block's unknowns, −1 if it is fixed; the entries of row block i begin at
+    ``begins[i]``. ``solver`` is None for a dense matrix. ``links``: couplings other than contacts, or None.
     """
 
     n: int
@@ -64,7 +63,7 @@ class Pattern:
     links: Links | None = None
 
     def add_links(self, data: np.ndarray) -> None:
-        """Add the links to an assembled matrix."""
+        """Add the links to an assembled matrix, in place."""
         if self.links is not None:
             np.add.at(data, self.links.places, self.links.blocks)
 
@@ -97,10 +96,10 @@ def dense_pattern(order: np.ndarray, block: np.ndarray, other: np.ndarray) -> Pa
 def sparse_pattern(
     order: np.ndarray, block: np.ndarray, other: np.ndarray, points: np.ndarray, kept: BlockSolver | None = None
 ) -> Pattern:
-    """Pattern of a block-sparse matrix, its 6×6 blocks stored one after the other. ``points`` (n_blocks, 2) m:
+    """Pattern of a block-sparse matrix whose 6×6 blocks are stored one after the other. ``points`` (n_blocks, 2) m:
     centroids.
 
-    The ``kept`` solver is reused unless two blocks are in contact that were not when it was made.
+    The ``kept`` solver is reused unless two blocks are in contact for which it has no entry.
     """
     n = int(order.max()) + 1
     i, j = order[block], order[other]
@@ -194,7 +193,8 @@ def _put_block(where, at, stride, r0, r1, r2, r3, r4, r5):
 
 @part(error_model="numpy", nogil=True)
 def _add_pair(room, pull, across, r0, r1, r2, r3, r4, r5):
-    """The rows r and the 6 × 6 block push ⊗ ``pull`` + drag ⊗ ``across``; push and drag are at 0 and 8 of ``room``."""
+    """Add to the rows r and the 6 × 6 block the product push ⊗ ``pull`` + drag ⊗ ``across``; push and drag begin at 0
+    and 8 of ``room``."""
     r0 = plus_product(plus_product(r0, spread(room, 0), pull), spread(room, 8), across)
     r1 = plus_product(plus_product(r1, spread(room, 1), pull), spread(room, 9), across)
     r2 = plus_product(plus_product(r2, spread(room, 2), pull), spread(room, 10), across)
@@ -242,7 +242,7 @@ def _fill_rows(first, last, sides, data, matrix, places, contacts, stiffness):
                     if at_hand >= 0:
                         _put_block(into, at_hand, step, p0, p1, p2, p3, p4, p5)
                     at_hand = their
-                    # Sum of earlier contacts with this neighbour, which need not be consecutive.
+                    # Sum over earlier contacts with this neighbour, which need not be consecutive.
                     p0, p1 = load_six(into, their), load_six(into, their + step)
                     p2, p3 = load_six(into, their + 2 * step), load_six(into, their + 3 * step)
                     p4, p5 = load_six(into, their + 4 * step), load_six(into, their + 5 * step)
@@ -322,8 +322,8 @@ def assemble(
 
 @part(fastmath=False, error_model="numpy", nogil=True)
 def spring_in_state(state, direction, normal, shear, friction, sliding, shear0):
-    """A closed contact's stiffness across and along, the ratio of its shear to its normal force where it slides (0 where
-    it sticks), and the shear force that it bears without motion."""
+    """Stiffness of a closed contact normal to and along the edge, the ratio of shear to normal force while it slides (0
+    while it sticks), and its shear force at zero motion."""
     if state == SLIP:
         return normal, 0.0, direction * friction, direction * sliding
     return normal, shear if state == STICK else 0.0, 0.0, shear0

@@ -1,5 +1,8 @@
-"""Number of BLAS threads of NumPy and SciPy: it changes the order of sums and so their rounding, and after a few steps
-the events of blocks and cracks depend on last digits."""
+"""Number of BLAS threads of NumPy and SciPy.
+
+The number of threads changes the order of sums and so their round-off. After a few steps, events of blocks and cracks
+depend on the last digits, so the number is kept constant.
+"""
 
 from __future__ import annotations
 
@@ -17,8 +20,8 @@ _Item = TypeVar("_Item")
 
 @cache
 def limits() -> tuple[Callable[[int], int], ...]:
-    """Functions that set the number of threads of one library each and return the previous number; empty without
-    such."""
+    """Functions, one per library, that set its number of threads and return the previous number; empty if there is
+    none."""
     found = []
     for package in ("numpy", "scipy"):
         found_at = importlib.util.find_spec(package)
@@ -46,7 +49,7 @@ def blas_threads(number: int) -> Iterator[None]:
 
 
 def asked_for() -> int:
-    """The number of threads set in the environment; one by default, whatever the machine has."""
+    """The number of threads set in the environment; by default one, whatever the machine has."""
     try:
         return max(int(os.environ.get("OPENBLAS_NUM_THREADS", "1")), 1)
     except ValueError:
@@ -54,7 +57,8 @@ def asked_for() -> int:
 
 
 def alike(items: Iterator[_Item]) -> Iterator[_Item]:
-    """The ``items``, each computed with the number of threads of `asked_for`; between them BLAS is as it was."""
+    """The ``items``, each computed with the number of threads of `asked_for`; between items the previous number is
+    restored."""
     while True:
         with blas_threads(asked_for()):
             try:

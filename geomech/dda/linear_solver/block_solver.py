@@ -33,13 +33,13 @@ RESIDUAL = 1e-12
 ROUND_OFF = 2e-15
 #: Residuals above this are hardly ever round-off.
 COARSE = 1e-6
-#: Most refinements of a solution.
+#: Largest number of refinements of a solution.
 REFINEMENTS = 3
 #: A 6×6 diagonal block counts as changed when an entry differs by more than this fraction of the largest diagonal one:
 #: the error from stiff springs stays below the inertia that balances them (measured: 1e-3 takes twice the time at dt =
 #: 1 ms).
 CHANGED = 1e-6
-#: Most solutions in a cycle of conjugate residuals.
+#: Largest number of solutions in a cycle of conjugate residuals.
 TRIES = 16
 #: If a cycle with single-precision factors reduces the residual by this factor, another follows, up to this number:
 #: cheaper than double factors up to 54 solutions (a slope of 107 720 blocks, 2.5 ms: eight decades in the first
@@ -97,7 +97,7 @@ def _multiply_shared(claimed, done, share, data, pointer, columns, x, out):
 
 
 def multiply(data: np.ndarray, pointer: np.ndarray, columns: np.ndarray, x: np.ndarray) -> np.ndarray:
-    """A x for 6×6 blocks stored row by row; large systems on all cores, with the same bits."""
+    """A x for 6×6 blocks stored row by row; large systems on all cores, with the same result bit for bit."""
     out = np.empty(6 * (len(pointer) - 1))
     given = data, pointer, columns, x, out
     if len(pointer) <= SHARED:
@@ -241,7 +241,7 @@ class BlockSolver:
         return x
 
     def _go_on_in_double(self) -> None:
-        """Raises numpy.linalg.LinAlgError if that is not wanted."""
+        """Continue with double-precision factors; raises numpy.linalg.LinAlgError if these are not wanted."""
         if self.single_only:
             raise np.linalg.LinAlgError("the block system is beyond single precision")
         self._hold(np.float64)
@@ -297,8 +297,9 @@ class BlockSolver:
         return solution
 
     def corrections(self, data: np.ndarray) -> Callable[[np.ndarray], np.ndarray]:
-        """What gives, for one right side after the other, nearly the solution x (6n,) by one substitution, with the factors
-        of `rough_solution`: for iterations that correct themselves. Raises numpy.linalg.LinAlgError."""
+        """A function that returns, for one right-hand side after the other, an approximate solution x (6n,) by one
+        substitution with the factors of `rough_solution`; for iterations that correct its error. Raises
+        numpy.linalg.LinAlgError."""
         factors = self._rough_factors()
         if factors is None:
             self.factor(data)
@@ -354,8 +355,8 @@ class BlockSolver:
         return ROUND_OFF * largest_terms(data, self.pointer, self.columns, x)
 
     def _bring(self, data: np.ndarray, few: int, rough: bool = False) -> bool:
-        """Refactor the changed part of the matrix of ``data`` if more than ``few`` blocks have changed; returns whether
-        it was. Of matrices of ``rough`` solutions mostly everything changes."""
+        """Refactor the changed part of the matrix ``data`` if more than ``few`` blocks have changed; returns whether
+        that was done. Matrices of ``rough`` solutions mostly change everywhere."""
         changed = _changed(data, self._diagonal, self._factored, CHANGED) if self._has_factors else None
         number = self.n if changed is None else np.count_nonzero(changed)
         if number <= few:

@@ -5,14 +5,14 @@ panels of two blocks,
 
     Z = F_kk⁻¹,   U = −Z F_k·,   F_ij ← F_ij + F_ik U_j,
 
-and what remains of F_BB is added to the parent's front (Duff & Reid 1983). Arrays of the tree are those of
-`nested_dissection.Tree`; ``child`` and ``sibling`` (n_fronts,) chain the children of a front.
+and the remaining F_BB is added to the front of the parent (Duff & Reid 1983). Arrays of the tree are those of
+`nested_dissection.Tree`; ``child`` and ``sibling`` (n_fronts,) link the children of a front.
 
 Factors are stored in the order in which `triangular_solve` reads them, first for the forward, then for the backward
-pass: one core then reads 28 GB/s, against 9 if it skips every few kilobytes (measured). ``at`` and ``back`` (n_fronts,)
-are the begins of each front: at ``at`` F_k· of every panel, then Z, and behind all panels F_BP; at ``back`` U of every
-panel, the last first. Each is a number of *sixes*: six rows interleaved register by register, and then their
-remainders.
+pass: one core then reads 28 GB/s, instead of 9 if it skips every few kilobytes (measured). ``at`` and ``back``
+(n_fronts,) are the starting positions of each front: at ``at`` F_k· of every panel, then Z, and after all panels F_BP;
+at ``back`` U of every panel, the last one first. Each is stored as *sixes*, six rows interleaved register by register,
+followed by their remainders.
 """
 
 from __future__ import annotations
@@ -43,14 +43,14 @@ _part = part(fastmath={"reassoc", "contract", "nsz"}, error_model="numpy", nogil
 
 #: Unknowns eliminated at a time.
 PANEL = 12
-#: Unknowns whose effect on the rows and columns behind them is one product; a BLAS product if these are many.
+#: Unknowns whose effect on the following rows and columns is computed in one product (by BLAS if these are many).
 STRIP = 96
 #: Rows in which a panel is inverted: whole registers in either precision.
 SIDE = 16
-#: Size of a product from which BLAS is faster: it no longer fits the second-level cache.
+#: Size of a product from which BLAS is faster, because it no longer fits the second-level cache.
 LARGE = 300_000
 
-#: The general product of BLAS, as Numba binds it for np.dot: here with strides, and added in place.
+#: The general matrix product of BLAS, as bound by Numba for np.dot; here with strides, and added in place.
 _gemm = types.ExternalFunction(
     "numba_xxgemm",
     types.intc(
@@ -80,7 +80,7 @@ def _add_product(c_of, a_of, b_of, size, keep, width, units):
 
 @_part
 def _pivot(cell, k, n):
-    """The row, from ``k`` on, whose number in column ``k`` is largest; −1 if there is none but zero, or none finite."""
+    """Row, from ``k`` on, with the largest entry in column ``k``; −1 if all entries are zero or one is not finite."""
     pivot, largest = k, abs(cell[SIDE * k + k])
     for i in range(k + 1, n):
         size = abs(cell[SIDE * i + k])
@@ -91,7 +91,8 @@ def _pivot(cell, k, n):
 
 @_part
 def _swap_back(cell, n, swapped):
-    """Exchange the columns of an inverse as the rows of its matrix were ``swapped``, the last first."""
+    """Exchange the columns of an inverse in the order in which rows of the matrix were ``swapped``, the last exchange
+    first."""
     for k in range(n - 1, -1, -1):
         pivot = swapped[k]
         if pivot != k:
@@ -101,8 +102,8 @@ def _swap_back(cell, n, swapped):
 
 @_part
 def _invert(front, at, m, n, cell, others, swapped, width):
-    """Invert n × n numbers of a ``front`` with rows of m, from ``at`` on, in place, by Gauss–Jordan elimination with
-    row exchanges; False if they are singular. ``cell`` (`SIDE`² + 1,): working space; ``others`` (`SIDE`²,): ones with
+    """Invert an n × n block of a ``front`` with rows of length m, from ``at`` on, in place, by Gauss–Jordan elimination
+    with row exchanges; False if it is singular. ``cell`` (`SIDE`² + 1,): work space; ``others`` (`SIDE`²,): ones, with
     zeros on the diagonal."""
     whole, here, but = numbers(front), numbers(cell), numbers(others)
     for i in range(n):
@@ -145,8 +146,7 @@ def _clear(array):
 
 
 def places(own: np.ndarray, far: np.ndarray) -> tuple[np.ndarray, np.ndarray, int]:
-    """``at`` and ``back`` of fronts with these numbers of ``own`` and ``far`` blocks (n_fronts,), and the size of all
-    factors."""
+    """``at`` and ``back`` of fronts with ``own`` and ``far`` blocks (n_fronts,), and the total size of the factors."""
     p, b = 6 * own, 6 * far
     panels, rest = p // PANEL, p % PANEL
     # Σ h e over the panels of h rows up to the row e.
@@ -157,7 +157,7 @@ def places(own: np.ndarray, far: np.ndarray) -> tuple[np.ndarray, np.ndarray, in
 
 @_part
 def _leave_sixes(given, at, stride, rows, n, taken, to, width):
-    """Write ``rows`` at this distance, of n numbers each, as sixes; returns their end."""
+    """Write the ``rows``, this distance apart and of length n, as sixes; returns the position after them."""
     for i in range(at, at + rows * stride, 6 * stride):
         j = 0
         while j + width <= n:
@@ -174,7 +174,7 @@ def _leave_sixes(given, at, stride, rows, n, taken, to, width):
 
 @_part
 def _leave(front, p, m, factors, at, back):
-    """Write the factors of a ``front`` to their places."""
+    """Write the factors of a ``front`` to their positions."""
     if p == 0:
         return 0
     width = BYTES // front.itemsize
@@ -193,8 +193,8 @@ def _leave(front, p, m, factors, at, back):
 
 @_part
 def _runs(met, own, begins):
-    """Runs of consecutive seats among ``met`` (n,) in a front with ``own`` blocks: their begins in ``begins``, followed
-    by n; the number of runs, and the number within its own blocks."""
+    """Runs of consecutive positions among ``met`` (n,) in a front with ``own`` blocks: their starts in ``begins``,
+    followed by n; returns the number of runs, and the number of positions within its own blocks."""
     runs = mine = 0
     for v in range(len(met)):
         if v == 0 or met[v] != met[v - 1] + 1 or met[v] == own:
@@ -207,8 +207,8 @@ def _runs(met, own, begins):
 
 @_part
 def _add_runs(into, at, added, begin, met, begins, first, last, width):
-    """Add to the row of a front that begins at ``into[at]`` the runs from ``first`` to before ``last`` of a child's row
-    that begins at ``added[begin]``."""
+    """Add to the row of a front that begins at ``into[at]`` the runs from ``first`` to before ``last`` of the row of a
+    child that begins at ``added[begin]``."""
     for r in range(first, last):
         v, j = begin + 6 * begins[r], at + 6 * met[begins[r]]
         n = 6 * (begins[r + 1] - begins[r])
@@ -222,7 +222,8 @@ def _add_runs(into, at, added, begin, met, begins, first, last, width):
 
 @_part
 def _fill(front, f, own, p, m, matrix):
-    """Add the entries of the ``matrix`` that belong to front ``f``: rows of m of its ``own`` blocks, then rows of p."""
+    """Add the entries of ``matrix`` that belong to front ``f``: rows of length m of its ``own`` blocks, then rows of
+    length p."""
     data, entries, entry, row, column = matrix
     for k in range(entries[f], entries[f + 1]):
         i, j = row[k], column[k]
@@ -236,7 +237,7 @@ def _fill(front, f, own, p, m, matrix):
 
 @_part
 def _gather(here, further, f, own, p, m, fronts, stack, begins, width):
-    """Add what children contribute to the rows and columns that are eliminated in front ``f``."""
+    """Add the contributions of children to the rows and columns that are eliminated in front ``f``."""
     _, reach, seat, child, sibling = fronts
     g = child[f]
     while g >= 0:
@@ -255,7 +256,7 @@ def _gather(here, further, f, own, p, m, fronts, stack, begins, width):
 
 @_part
 def _pass_on(further, f, own, p, b, fronts, stack, begins, width):
-    """Add what children contribute to what is left of front ``f`` behind its own blocks."""
+    """Add the contributions of children to the part of front ``f`` that remains after its own blocks."""
     _, reach, seat, child, sibling = fronts
     g = child[f]
     while g >= 0:
@@ -271,7 +272,7 @@ def _pass_on(further, f, own, p, b, fronts, stack, begins, width):
 
 @_part
 def _factor(front, p, b, space, units, width):
-    """Factor the p own unknowns of a ``front``, of which b others remain; False if it is singular."""
+    """Factor the p own unknowns of a ``front`` in which b others remain; False if it is singular."""
     panel, cell, others, swapped = space
     here, m = numbers(front), p + b
     lower = p * m
@@ -281,7 +282,7 @@ def _factor(front, p, b, space, units, width):
             end = min(start + PANEL, stop)
             h, k, known = end - start, start - begin, begin * m + start
             if k > 0:
-                # Effect of this strip's earlier panels on the rows of this one, and on the columns below.
+                # Effect of earlier panels of this strip on the rows of this panel, and on the columns below.
                 above = Matrix(here, known, m)
                 rows, earlier = Matrix(here, start * m + start, m), Matrix(here, start * m + begin, m)
                 small_product(rows, earlier, above, Size(h, k, m - start), width, True)
@@ -314,8 +315,9 @@ def eliminate(first, last, touched, fronts, matrix, stored, memory, space):
     """Eliminate the ``touched`` (n_fronts,) fronts from ``first`` to before ``last``; False if one is singular.
 
     ``fronts``: pivots, reach, seat, child and sibling; ``matrix``: data, entries, entry, row and column; ``stored``:
-    places of S in the room (n_fronts,), and ``at`` and ``back`` of factors; ``memory``: room, factors, and the numbers 1
-    and 0; ``space`` as from `working_space`."""
+    positions of S (n_fronts,), and ``at`` and ``back`` of the factors; ``memory``: storage of S, factors, and the
+    numbers 1 and 0; ``space`` from `working_space`.
+    """
     pivots, reach, _, _, _ = fronts
     stack, at, back = stored
     room, factors, units = memory
@@ -328,7 +330,7 @@ def eliminate(first, last, touched, fronts, matrix, stored, memory, space):
         own, far = pivots[f + 1] - pivots[f], reach[f + 1] - reach[f]
         p, b = 6 * own, 6 * far
         m = p + b
-        # Rows of m of the own unknowns, then rows of p of the others; F_BB is in the room.
+        # Rows of length m of the own unknowns, then rows of length p of the others; F_BB is in the storage of S.
         _clear(front[: p * m + b * p])
         _fill(front, f, own, p, m, matrix)
         _gather(here, further, f, own, p, m, fronts, stack, begins, width)
@@ -347,7 +349,7 @@ def eliminate(first, last, touched, fronts, matrix, stored, memory, space):
 
 @part(error_model="numpy", nogil=True)
 def working_space(pivots, reach, factors):
-    """Working space of `eliminate`: a front without its F_BB, a panel, and index arrays."""
+    """Work space of `eliminate`: a front without its F_BB, a panel, and index arrays."""
     most, far, size = 0, 0, 0
     for f in range(len(reach) - 1):
         p, b = 6 * (pivots[f + 1] - pivots[f]), 6 * (reach[f + 1] - reach[f])

@@ -20,7 +20,7 @@ _LEAST = 0.3
 #: Directions (2, k) across which cuts are searched, more of them from this number of blocks on: joints may be inclined.
 _LARGE = 200
 _TWO, _MANY = (np.stack([np.cos(t), np.sin(t)]) for t in (np.pi / 2 * np.arange(2), np.pi / 8 * np.arange(8)))
-#: Largest total number of entries of all S for which they are kept: 1.2 GB in single precision, some fifty thousand
+#: Largest total number of entries of all S up to which they are kept: 1.2 GB in single precision, some fifty thousand
 #: blocks.
 KEPT = 300_000_000
 
@@ -133,15 +133,15 @@ def _partition(order, side, counts, room):
 
 @kept(fastmath=False, error_model="numpy", nogil=True)
 def _dissected(orders, pointer, neighbour, leaf, large, least_part, across):
-    """The blocks (n,) front by front, where each front begins among them (n_fronts + 1,), and its parent. ``orders``
-    (k, n), overwritten: all blocks in order across each direction, ``across`` the ones that small parts are cut
-    across; the direction square to number d is d + k/2, or that of d − k/2 turned round."""
+    """The blocks (n,) front by front, the start of each front among them (n_fronts + 1,), and its parent. ``orders``
+    (k, n), overwritten: all blocks in their order across each direction; ``across``: the directions across which small
+    parts are cut. The direction perpendicular to number d is d + k/2, or d − k/2 reversed."""
     k, n = orders.shape
     place, side = np.full(n, -1), np.empty(n, np.int64)
     room = np.empty(n, np.int64)
     blocks, begins, parent = np.empty(n, np.int64), np.zeros(2 * n + 2, np.int64), np.full(2 * n + 1, -1)
-    # Parts to be divided, as ranges of every order; and separators, as ranges and the number of their children: −1 for
-    # what is still to be divided.
+    # Parts to be divided, as ranges of every order; and separators, as ranges with the number of their children (−1 for
+    # parts still to be divided).
     work, waiting, done, ended = np.empty((2 * n + 8, 3), np.int64), 1, np.empty(2 * n + 1, np.int64), 0
     work[0, 0], work[0, 1], work[0, 2] = 0, n, -1
     fronts = 0
@@ -195,11 +195,11 @@ def _dissected(orders, pointer, neighbour, leaf, large, least_part, across):
 
 
 def dissect(points: np.ndarray, pointer: np.ndarray, neighbour: np.ndarray) -> tuple[np.ndarray, ...]:
-    """The blocks (n,) front by front, where each front begins among them (n_fronts + 1,), and its parent (n_fronts,),
-    in postorder; ``points`` (n, 2) lie where the blocks do, ``pointer`` and ``neighbour`` say which meet.
+    """The blocks (n,) front by front, the start of each front among them (n_fronts + 1,), and its parent (n_fronts,),
+    in postorder. ``points`` (n, 2): positions of the blocks; ``pointer`` and ``neighbour``: which blocks meet.
 
-    Cut across one of several directions, where the separator, the smaller of the two rows of blocks along the cut, is
-    smallest: bricks are many to a metre upwards and few along a course.
+    A part is cut across the direction in which the separator, the smaller of the two rows of blocks along the cut, is
+    smallest: bricks, for example, are many per metre upwards and few along a course.
     """
     directions = _MANY if len(points) >= _LARGE else _TWO
     across = np.abs(directions).max(axis=0) > 1.0 - 1e-9
@@ -209,7 +209,7 @@ def dissect(points: np.ndarray, pointer: np.ndarray, neighbour: np.ndarray) -> t
 
 @part(fastmath=False, error_model="numpy", nogil=True, **UNCOUNTED)
 def _seat(number, front, pivots, reach, boundary):
-    """Where a block stands in a front: its own first, then its boundary."""
+    """Position of a block in a front: its own blocks first, then its boundary."""
     if number < pivots[front + 1]:
         return number - pivots[front]
     low, high = reach[front], reach[front + 1]
@@ -224,8 +224,8 @@ def _seat(number, front, pivots, reach, boundary):
 
 @part(fastmath=False, error_model="numpy", nogil=True, **UNCOUNTED)
 def _sort(numbers, first, last):
-    """Sort the ``numbers`` from ``first`` to before ``last`` in place, by insertion at ever smaller distances (Shell
-    1959): some hundred that are mostly in order. (np.sort takes two seconds to compile.)"""
+    """Sort the ``numbers`` from ``first`` to before ``last`` in place, by insertion at decreasing distances (Shell
+    1959): some hundred numbers that are mostly in order. (np.sort takes two seconds to compile.)"""
     apart = 1
     while 3 * apart < last - first:
         apart = 3 * apart + 1
@@ -280,8 +280,8 @@ def _reached(blocks, rank, pivots, parent, pointer, neighbour):
 
 @kept(fastmath=False, error_model="numpy", nogil=True)
 def _places(row, column, entry, entries, pivots, reach, boundary):
-    """Where the rows and columns of the matrix blocks ``entry`` (…,), given by their blocks' numbers, stand in their
-    fronts."""
+    """Positions in their fronts of the rows and columns of the matrix blocks ``entry`` (…,), given by their block
+    numbers."""
     rows, columns = np.empty(len(entry), np.int64), np.empty(len(entry), np.int64)
     for f in range(len(entries) - 1):
         for k in range(entries[f], entries[f + 1]):
@@ -302,7 +302,8 @@ def plan(points: np.ndarray, rows: np.ndarray, columns: np.ndarray) -> Tree:
     reach, boundary, seat = _reached(blocks, rank, pivots, parent, pointer, columns)
     own, far = np.diff(pivots), np.diff(reach)
     row, column = rank[rows], rank[columns]
-    # A front without blocks of its own begins where the next one does: the last that begins there owns them.
+    # A front without own blocks begins at the same position as the next one: the last front that begins there owns the
+    # blocks.
     front = np.searchsorted(pivots, np.minimum(row, column), side="right") - 1
     entry = np.argsort(front, kind="stable")
     entries = np.searchsorted(front[entry], np.arange(n_fronts + 1))
@@ -333,8 +334,9 @@ def plan(points: np.ndarray, rows: np.ndarray, columns: np.ndarray) -> Tree:
 
 
 def _tasks(parent: np.ndarray, own: np.ndarray, far: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Subtrees, as ranges of fronts in postorder, none of which holds more than an eighth of the arithmetic, and the
-    fronts above them one by one; and the task above each. First come those with most arithmetic on their way up."""
+    """Subtrees, as ranges of fronts in postorder, none of which has more than an eighth of the arithmetic, and the
+    fronts above them one by one; and the task above each. Tasks with the most arithmetic on their path to the root come
+    first."""
     cost = own * (own + far) ** 2.0
     alone, first = cost.copy(), np.arange(len(parent))
     for f, p in enumerate(parent):
@@ -355,9 +357,9 @@ def _tasks(parent: np.ndarray, own: np.ndarray, far: np.ndarray) -> tuple[np.nda
 
 
 def _stacked(parent: np.ndarray, size: np.ndarray, tasks: np.ndarray) -> tuple[np.ndarray, int]:
-    """Where each front leaves its S of ``size`` (n_fronts,), and the room that takes. Each task has two stacks, for
-    fronts an even and an odd number of levels from the root: a front's goes onto one while those of its children, the
-    last on the other, are used up."""
+    """Storage position of the S, of ``size`` (n_fronts,), of each front, and the total size. Each task has two stacks,
+    for fronts an even and an odd number of levels below the root: S of a front is put on one while those of its
+    children, the last on the other, are used up."""
     at, level = np.zeros(len(parent), np.int64), np.zeros(len(parent), np.int64)
     for f in range(len(parent) - 1, -1, -1):
         if parent[f] >= 0:
@@ -367,7 +369,7 @@ def _stacked(parent: np.ndarray, size: np.ndarray, tasks: np.ndarray) -> tuple[n
         top, most = [0, 0], [0, 0]
         for f in range(a, b):
             mine = level[f] % 2
-            # The first of its children, where they are of this task, lies lowest.
+            # If its children belong to this task, the first one lies lowest.
             if below[f] >= a:
                 top[1 - mine] = at[below[f]]
             at[f] = top[mine]

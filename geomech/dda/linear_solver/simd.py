@@ -1,9 +1,9 @@
-"""Registers of several numbers in compiled kernels, for sums that are too short for a compiler to make them so.
+"""SIMD registers in compiled kernels, for sums that are too short for a compiler to vectorise.
 
-Fronts are short (thirty to some hundred unknowns) and their rows begin anywhere: loops over them are mostly remainders,
-which a compiler leaves to single numbers. Here the remainder is a register of which the first few numbers count.
-Numbers are found by `numbers` of an array, which has no count of who refers to it: whoever asks for them keeps the
-array until they are done with.
+Fronts are short (thirty to some hundred unknowns) and their rows begin at any address, so that loops over them consist
+mostly of remainders, which a compiler processes number by number. Here a remainder is a register of which only the
+first numbers count. `numbers` gives the address of an array without a reference count: the caller must keep the array
+alive while the address is used.
 """
 
 from __future__ import annotations
@@ -16,14 +16,14 @@ from numba.np.arrayobj import make_array
 
 from ...compiled import UNCOUNTED, part
 
-#: Bytes of a register. Where processors have none of 64, two of 32 are one.
+#: Bytes of a register. On processors without registers of 64 bytes, two of 32 are combined.
 BYTES = 64
 
 _COUNT = ir.IntType(32)
 
 
 class Lanes(types.Type):
-    """As many numbers of ``dtype`` as a register holds."""
+    """A register of numbers of ``dtype``."""
 
     def __init__(self, dtype: types.Float) -> None:
         self.dtype = dtype
@@ -46,7 +46,7 @@ def _places(numbers) -> ir.Constant:
 
 
 def _first(builder, vector, n):
-    """Which numbers of a register are among the first ``n``."""
+    """Mask of the first ``n`` numbers of a register."""
     undefined = ir.Constant(ir.VectorType(_COUNT, vector.count), ir.Undefined)
     one = builder.insert_element(undefined, builder.trunc(n, _COUNT), _COUNT(0))
     many = builder.shuffle_vector(one, undefined, _places([0] * vector.count))
@@ -54,7 +54,7 @@ def _first(builder, vector, n):
 
 
 def _call(builder, name, vector, result, given, suffix=""):
-    """Call LLVM's function ``name`` for this kind of register."""
+    """Call the LLVM function ``name`` for this type of register."""
     bits = 32 if vector.element == ir.FloatType() else 64
     kinds = ir.FunctionType(result, [value.type for value in given])
     name = f"llvm.{name}.v{vector.count}f{bits}{suffix}"
@@ -67,7 +67,7 @@ def _address(builder, args, vector):
 
 @intrinsic
 def numbers(typingctx, array):
-    """Where the first number of a contiguous ``array`` lies."""
+    """Address of the first number of a contiguous ``array``."""
 
     def codegen(context, builder, signature, args):
         return make_array(signature.args[0])(context, builder, args[0]).data
@@ -77,7 +77,7 @@ def numbers(typingctx, array):
 
 @intrinsic
 def beyond(typingctx, where, index):
-    """Where the number lies that is so many further on."""
+    """Address of the number that is so many numbers further on."""
 
     def codegen(context, builder, signature, args):
         return builder.gep(args[0], [args[1]])
@@ -87,7 +87,7 @@ def beyond(typingctx, where, index):
 
 @intrinsic
 def zeros(typingctx, where):
-    """A register of zeros of the type of what lies there."""
+    """A register of zeros of the type at this address."""
 
     def codegen(context, builder, signature, args):
         return ir.Constant(_vector(signature.return_type.dtype), None)
@@ -108,7 +108,7 @@ def load(typingctx, where, index):
 
 @intrinsic
 def load_first(typingctx, where, index, n):
-    """As `load`, of which the first ``n`` are read, and the others zero."""
+    """As `load`; only the first ``n`` numbers are read, the others are zero."""
 
     def codegen(context, builder, signature, args):
         dtype = signature.return_type.dtype
@@ -122,7 +122,7 @@ def load_first(typingctx, where, index, n):
 
 @intrinsic
 def load_six(typingctx, where, index):
-    """As `load_first` of six, which waits for none of what was written just beside them."""
+    """`load_first` of six numbers, which does not wait for a preceding write to adjacent addresses."""
 
     def codegen(context, builder, signature, args):
         dtype = signature.return_type.dtype
@@ -136,7 +136,7 @@ def load_six(typingctx, where, index):
 
 @intrinsic
 def store_six(typingctx, where, index, value):
-    """As `store_first` of six; see `load_six`."""
+    """`store_first` of six numbers; see `load_six`."""
 
     def codegen(context, builder, signature, args):
         vector = args[2].type
@@ -162,7 +162,7 @@ def store(typingctx, where, index, value):
 
 @intrinsic
 def store_first(typingctx, where, index, value, n):
-    """As `store`, of which the first ``n`` are written."""
+    """As `store`; only the first ``n`` numbers are written."""
 
     def codegen(context, builder, signature, args):
         vector = args[2].type
@@ -176,7 +176,7 @@ def store_first(typingctx, where, index, value, n):
 
 @intrinsic
 def spread(typingctx, where, index):
-    """A register full of the number at ``index``."""
+    """A register filled with the number at ``index``."""
 
     def codegen(context, builder, signature, args):
         vector = _vector(signature.return_type.dtype)
@@ -239,10 +239,10 @@ def minus_product(typingctx, total, a, b):
 
 @intrinsic
 def sums(typingctx, a, b, c, d, e, f):
-    """The sums of six registers' numbers, as the first six of one."""
+    """The sums over each of six registers, as the first six numbers of one register."""
 
     def codegen(context, builder, signature, args):
-        # Each of ``these`` holds the rests of sums, in groups of this length: their halves are added.
+        # Each of ``these`` holds partial sums, in groups of this length, whose halves are added.
         these, length, whole = list(args), args[0].type.count, args[0].type
         while length > 1:
             half, halved = length // 2, []
@@ -260,7 +260,8 @@ def sums(typingctx, a, b, c, d, e, f):
 
 @part(error_model="numpy", nogil=True, **UNCOUNTED)
 def copy(given, at, taken, to, n, width):
-    """Copy n numbers ``given`` from ``at`` on to those ``taken`` from ``to`` on; ``width`` numbers are a register."""
+    """Copy n numbers from position ``at`` of ``given`` to position ``to`` of ``taken``; a register holds ``width``
+    numbers."""
     j = 0
     while j + width <= n:
         store(taken, to + j, load(given, at + j))

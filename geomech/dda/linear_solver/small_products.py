@@ -1,7 +1,7 @@
-"""Products of small matrices whose rows come in sixes, as fronts are made of.
+"""Products of small matrices whose rows are interleaved in sixes, as in fronts.
 
-A tile of C, six rows by two registers, stays in registers while it is summed. BLAS copies what it multiplies first,
-which pays in large products only.
+A tile of C, six rows by two registers, stays in registers while it is summed. BLAS first copies its operands, which
+pays only in large products.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ _part = part(error_model="numpy", nogil=True, **UNCOUNTED)
 
 
 class Matrix(NamedTuple):
-    """A matrix whose first number is ``of[at]`` and whose rows lie ``row`` numbers apart."""
+    """A matrix whose first number is ``of[at]`` and whose rows are ``row`` numbers apart."""
 
     of: Any
     at: int
@@ -23,7 +23,7 @@ class Matrix(NamedTuple):
 
 
 class Size(NamedTuple):
-    """Of a product: ``rows`` × ``k`` times ``k`` × ``n`` numbers."""
+    """Size of a product: (``rows`` × ``k``) times (``k`` × ``n``)."""
 
     rows: int
     k: int
@@ -32,7 +32,7 @@ class Size(NamedTuple):
 
 @_part
 def _put(c, at, sum_, n, width, keep):
-    """Write the first ``n`` of ``sum_`` to ``c``, or add them to what it ``keep``s."""
+    """Write the first ``n`` numbers of ``sum_`` to ``c``, or add them if ``keep``."""
     if n == width:
         store(c, at, plus(load(c, at), sum_) if keep else sum_)
     else:
@@ -53,7 +53,7 @@ def _put_six(c, s0, s1, s2, s3, s4, s5, n, width, keep):
 
 @_part
 def _two_wide(c_of, a_of, b_of, k, n, width, keep):
-    """Six rows of C in two registers, of the second ``n``."""
+    """Six rows of C in two registers; of the second one only the first ``n`` numbers."""
     (c, at, row_c), (a, at_a, row_a), (b, at_b, row_b) = c_of, a_of, b_of
     s0 = s1 = s2 = s3 = s4 = s5 = t0 = t1 = t2 = t3 = t4 = t5 = zeros(c)
     a0, a1, a2 = at_a, at_a + row_a, at_a + 2 * row_a
@@ -73,7 +73,7 @@ def _two_wide(c_of, a_of, b_of, k, n, width, keep):
 
 @_part
 def _one_wide(c_of, a_of, b_of, k, n, width, keep):
-    """Six rows of C, ``n`` numbers of a register wide."""
+    """Six rows of C in one register, its first ``n`` numbers."""
     (a, at_a, row_a), (b, at_b, row_b) = a_of, b_of
     s0 = s1 = s2 = s3 = s4 = s5 = zeros(c_of.of)
     a0, a1, a2 = at_a, at_a + row_a, at_a + 2 * row_a
@@ -89,8 +89,8 @@ def _one_wide(c_of, a_of, b_of, k, n, width, keep):
 
 @_part
 def small_product(c, a, b, size, width, keep):
-    """C ← A B, or C + A B to ``keep`` C: `Matrix` of pointers, their rows by sixes; ``size`` as `Size`; ``width``
-    numbers are a register."""
+    """C ← A B, or C + A B if ``keep``: `Matrix` records of addresses, rows interleaved in sixes; ``size`` as `Size`; a
+    register holds ``width`` numbers."""
     rows, k, n = size
     j = 0
     while j < n:

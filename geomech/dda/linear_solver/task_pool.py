@@ -34,8 +34,8 @@ _usleep = types.ExternalFunction("usleep", types.intc(types.uint32))
 
 @intrinsic
 def add_at_once(typingctx, array, index, value):
-    """What ``array[index]`` (int64) was before ``value`` was added to it, as one operation that all threads see in the
-    same order as what was written before and after it."""
+    """Add ``value`` to ``array[index]`` (int64) and return its previous value, as one atomic, sequentially consistent
+    operation."""
     if not (isinstance(array, types.Array) and array.dtype == types.int64):
         return None
 

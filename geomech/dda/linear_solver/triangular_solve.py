@@ -1,7 +1,7 @@
-"""Forward and backward substitution through the factors of dense fronts (`front_elimination`), at memory speed.
+"""Forward and backward substitution with the factors of dense fronts (`front_elimination`), at memory speed.
 
-Rows come in sixes, and six are multiplied at a time: their common factor is read once for all, and their sums, each as
-slow as a row of thirty by itself, are formed together.
+Rows are interleaved in sixes and multiplied six at a time: their common factor is read once, and their sums, each of
+which would be slow by itself, are formed together.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ _uncounted_part = part(fastmath=False, error_model="numpy", nogil=True, **UNCOUN
 
 @_uncounted_part
 def _six(rows, at, x, begin, n, width):
-    """The products of six ``rows``, from ``at`` on, with n numbers of ``x``, as the first six of a register of that
+    """Products of six ``rows``, from ``at`` on, with n numbers of ``x``, as the first six numbers of a register of this
     ``width``."""
     s0 = s1 = s2 = s3 = s4 = s5 = zeros(rows)
     j = 0
@@ -54,7 +54,7 @@ def _six(rows, at, x, begin, n, width):
 
 @_uncounted_part
 def _longest(pivots, reach, first, last):
-    """The most unknowns of any front from ``first`` to before ``last``."""
+    """Largest number of unknowns of a front from ``first`` to before ``last``."""
     most = 0
     for f in range(first, last):
         most = max(most, 6 * (pivots[f + 1] - pivots[f] + reach[f + 1] - reach[f]))

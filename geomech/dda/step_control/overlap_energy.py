@@ -1,7 +1,7 @@
-"""Energy created by overlaps: a warning at one fraction of all energy turned over, the end of the run at another.
+"""Energy created by overlaps: a warning at one fraction of the energy converted, the end of the run at another.
 
-A contact that closes with its vertex already inside a block pushes it out, with the work ½ k g² of springs that nothing
-has compressed. Blocks that do not overlap create none; overlaps in the drawing create theirs in the first step
+A contact that closes with its vertex already inside a block pushes it out, with the work ½ k g² of a spring that
+nothing has compressed. Blocks that do not overlap create none; overlaps in the drawing create theirs in the first step
 (`EnergyBudget.drawn`).
 """
 
@@ -16,7 +16,7 @@ from ..results import NotConverged
 
 log = logging.getLogger(__name__)
 
-#: Fractions of all energy turned over: for the warning, and for the end of the run.
+#: Fractions of the energy converted: for the warning, and for the end of the run.
 WARNED, ENDED = 0.01, 0.1
 
 
@@ -33,7 +33,7 @@ class Overlap(NamedTuple):
 
 
 class OverlapWatch:
-    """Logs one warning when overlaps have created `WARNED` of all energy turned over, and ends the run at `ENDED`.
+    """Logs one warning when overlaps have created `WARNED` of the energy converted, and ends the run at `ENDED`.
 
     ``names`` are those of the blocks of the step.
     """

@@ -1,14 +1,16 @@
-"""Static steps without the inertia that keeps free blocks in place.
+"""Static steps in which supported blocks bear their loads without inertia.
 
-A static step solves (2M/dt² + K) d = F: the inertia 2M d/dt² decides how far a block goes that nothing holds, and of one
-that is held it takes a part of the force, the larger the shorter the step (a joint that dilates by d = v dt tan ψ would be
-pressed by 2 M v tan ψ/dt). Solved again about the displacement d_k found before, a proximal point iteration,
+A static step solves (2M/dt² + K) d = F. The inertia 2M d/dt² limits the displacement of unsupported blocks. On a
+supported block it carries a part of the load, the larger the shorter the step: a joint that dilates by d = v dt tan ψ
+would be pressed by 2 M v tan ψ/dt. The step is therefore solved again about the last displacement d_k, a proximal point
+iteration,
 
     2M/dt² (d_{k+1} − d_k) + K d_{k+1} = F,
 
-what inertia takes falls by q = M/(M + K dt²/2) each time, to nothing on blocks that are held. On others it stays, and these
-keep their first displacement. Bolts are soft: on blocks that they hold, q is little below 1. Their displacement is
-extrapolated to the sum of the geometric series, d_k + (d_{k+1} − d_k)/(1 − q) (Aitken 1926), and solved again from there.
+in which the inertia force decreases by q = M/(M + K dt²/2) each time and vanishes on supported blocks. On unsupported
+blocks it does not decrease, and they keep their first displacement. Bolts are soft: on the blocks that they support, q
+is little below 1. The displacement of these is extrapolated to the sum of the geometric series, d_k + (d_{k+1} −
+d_k)/(1 − q) (Aitken 1926), and the step is solved again from there.
 """
 
 from __future__ import annotations
@@ -22,24 +24,25 @@ from ..open_close.contact_set import ContactSet
 from ..open_close.equations import Unsettled
 from ..time_step import Attempt, StepStart
 
-#: Inertia below this part of the forces on a block is none.
+#: Inertia force, relative to the forces on a block, below which it counts as zero.
 _NOTHING = 1e-6
-#: Blocks are held on which what inertia takes falls to this part each time; it is solved again so often at most. (In a
-#: slope of 200 blocks under sudden weight it falls to an eighth.)
+#: Blocks are supported if their inertia force decreases to this fraction or less each time; and largest number of
+#: solutions. (In a slope of 200 blocks under sudden weight it decreases to an eighth.)
 _FALLS, _SOLUTIONS = 0.5, 12
 
 
-#: A bolt holds a block if it would stop it within this part of the block's size √area, and what inertia takes falls by
-#: more than rounding, relative to it. Of a shortfall that is extrapolated, this share must be gone, and less than the last
-#: part may be left in the opposite direction: friction would hold a block that has gone too far.
+#: A bolt supports a block if it would stop it within this fraction of the block's size √area and the inertia force
+#: decreases by more than this relative round-off. After an extrapolation this fraction of the inertia force must have
+#: vanished, and at most the last fraction may remain in the opposite direction: friction would hold a block that has
+#: gone too far.
 _WITHIN, _ROUNDED, _GONE, _BACK = 0.1, 1e-9, 0.5, 1e-3
 
 
 def balanced_attempt(
     system: SteppedSystem, start: StepStart, dt: float, found: ContactSet, cuts: int, reach: float = 0.0
 ) -> Attempt:
-    """A static step of ``dt`` from ``start`` in which the blocks that are held bear their loads without inertia;
-    arguments as for `Attempt`. Blocks on bolts go by ``reach`` m at most to where these hold them. Raises
+    """A static step of ``dt`` from ``start`` in which supported blocks bear their loads without inertia; arguments as
+    for `Attempt`. Blocks on bolts move by at most ``reach`` m to the position in which these balance them. Raises
     `Unsettled`."""
     attempt = first = Attempt(system, start, dt, found, cuts)
     inertia, size = attempt.inertia_and_size()
@@ -89,7 +92,7 @@ def balanced_attempt(
 
 
 def _again(system: SteppedSystem, start: StepStart, attempt: Attempt, rest: np.ndarray) -> Attempt | None:
-    """The step of ``attempt`` solved again about the displacements ``rest`` (n_blocks, 6); None where contacts find no
+    """The step of ``attempt`` solved again about the displacements ``rest`` (n_blocks, 6); None if contacts find no
     states."""
     same = attempt.found.trying(attempt.found.rows(attempt.settled), without_lost=True)
     try:
@@ -101,14 +104,15 @@ def _again(system: SteppedSystem, start: StepStart, attempt: Attempt, rest: np.n
 
 
 def _bolts_hold(start: StepStart) -> bool:
-    """Whether bolts are installed that can take more load."""
+    """Whether there are installed bolts that can take more load."""
     rows = start.state.bolts
     most = np.array([bolt.yield_force for bolt in start.loads.bolts])[: len(rows)]
     return bool((rows["installed"] & ~rows["broken"] & (rows["force"] < most)).any())
 
 
 def _too_far(attempt: Attempt, ahead: np.ndarray, unbalanced: np.ndarray) -> bool:
-    """Whether an ``unbalanced`` block has gone farther ``ahead``, (n_blocks, 6), than to where its bolt holds it."""
+    """Whether an ``unbalanced`` block has moved beyond the equilibrium position on its bolt, which lies ``ahead``,
+    (n_blocks, 6)."""
     if attempt.rest is None:
         return False
     back = np.einsum("na,na->n", attempt.increment - attempt.rest, ahead) < 0.0
@@ -117,8 +121,8 @@ def _too_far(attempt: Attempt, ahead: np.ndarray, unbalanced: np.ndarray) -> boo
 
 @dataclass(frozen=True, eq=False)
 class _Extrapolated:
-    """Blocks that bolts will hold: ``blocks`` (n_blocks,) bool, the displacement ``ahead`` (n_blocks, 6) of them after
-    that of an attempt, and the ``share`` of it that a step may make."""
+    """Blocks that bolts will stop: ``blocks`` (n_blocks,) bool, their remaining displacement ``ahead`` (n_blocks, 6)
+    after an attempt, and the ``share`` of it that a step may make."""
 
     blocks: np.ndarray
     ahead: np.ndarray
@@ -128,7 +132,8 @@ class _Extrapolated:
     def of(
         cls, attempt: Attempt, again: Attempt, inertia: np.ndarray, after: np.ndarray, slow: np.ndarray, reach: float
     ) -> _Extrapolated | None:
-        """From two attempts and what inertia takes in each, (n_blocks,) N; of the blocks ``slow``. None for none."""
+        """From two attempts and the inertia forces in each, ``inertia`` and ``after`` (n_blocks,) N; only blocks that
+        are ``slow``. None if there are none."""
         size = np.sqrt(attempt.moments[:, 0])
         gain = 1.0 - after / np.maximum(inertia, 1e-300)
         slow = slow & (gain > _ROUNDED)
@@ -141,12 +146,13 @@ class _Extrapolated:
         return cls(slow, ahead * slow[:, None], min(1.0, reach / max(float(far[slow].max()), 1e-300)))
 
     def bears(self, trial: Attempt, inertia: np.ndarray, supported: np.ndarray, negligible: np.ndarray) -> bool:
-        """Whether in the attempt ``there``, solved about `rest`, inertia takes as much less than what was ``left``,
-        (n_blocks,) N, as it should. ``supported``: other blocks; ``nothing``: what counts as none."""
+        """Whether in the attempt ``trial``, solved about `rest`, the inertia force has decreased from ``inertia``,
+        (n_blocks,) N, as expected. ``supported``: other blocks that must meet the criterion; ``negligible``: force that
+        counts as zero."""
         least = np.where(self.blocks, 1.0 - _GONE * self.share, _FALLS)
         after = trial.inertia_and_size()[0]
         return bool((after <= np.maximum(least * inertia, negligible))[supported | self.blocks].all())
 
     def rest(self, again: Attempt, supported: np.ndarray) -> np.ndarray:
-        """(n_blocks, 6) displacement to solve about, with that of ``again`` for the blocks ``supported``."""
+        """(n_blocks, 6) displacement about which to solve; that of ``again`` for the blocks ``supported``."""
         return np.where((supported | self.blocks)[:, None], again.increment + self.share * self.ahead, 0.0)

@@ -109,11 +109,11 @@ def uplift_acceleration(slenderness: float, gravity: float = 9.81) -> float:
 
 
 def overturning_pulse(duration: float, slenderness: float, half_diagonal: float, gravity: float = 9.81) -> float:
-    """Least constant acceleration (m/s²) that overturns a slender block when it lasts for ``duration`` s and then
-    stops.
+    """Smallest constant acceleration (m/s²) of the base that overturns a slender block if it lasts for ``duration`` s
+    and then stops.
 
-    Housner (1963, eq. 13): cosh(p t₁) = 1 + ½ /[(a/gα)(a/gα − 1)], from θ̈ = p²(θ − α + a/g) and then the energy to
-    pass the top; linear in the angles. ``duration`` → ∞: g α.
+    Housner (1963, eq. 13): cosh(p t₁) = 1 + ½ /[(a/gα)(a/gα − 1)], from θ̈ = p²(θ − α + a/g) and then the energy needed
+    to pass the upright position; linear in the angles. ``duration`` → ∞: g α.
     """
     p = rocking_parameter(half_diagonal, gravity)
     product = 0.5 / (math.cosh(p * duration) - 1.0)

@@ -1,4 +1,4 @@
-"""Closed forms for moving blocks: falling, sliding, spinning, vibrating, standing in columns."""
+"""Closed forms for moving blocks: fall, sliding, rotation, vibration, and columns at rest."""
 
 from __future__ import annotations
 
@@ -93,18 +93,20 @@ def spinning_square_stress(side: float, density: float, spin: float) -> float:
 def column_shortening(
     load: np.ndarray, height: float, width: float, plane_modulus: float, contact_stiffness: float
 ) -> float:
-    """Shortening (m) of a column of equal blocks, block k carrying the mean force ``load[k]`` (N/m), and of the
-    contacts under each block, which carry ``load[k]`` too if the load stands at its end: Σ F h/(w E') + Σ F/(2 p).
+    """Shortening (m) of a column of equal blocks by Hooke's law, and of the contacts under the blocks: Σ F h/(w E') + Σ
+    F/(2 p).
 
-    Hooke's law with the plane modulus E/(1−ν²) for free lateral expansion in plane strain; two springs p per joint.
+    Block k carries the mean force ``load[k]`` (N/m); the contact under it carries ``load[k]`` as well, if the load acts
+    at its end. E' is the plane modulus E/(1−ν²), for free lateral expansion in plane strain; each joint has two springs
+    p.
     """
     load = np.asarray(load, dtype=float)
     return float(np.sum(load * height / (width * plane_modulus)) + np.sum(load) / (2 * contact_stiffness))
 
 
 def plastic_impact_bounds(masses: tuple[float, float], speeds: tuple[float, float]) -> tuple[float, float]:
-    """Total momentum and least kinetic energy of two bodies in a head-on impact; the least is that of a plastic impact
-    (Newton 1687)."""
+    """Total momentum and smallest kinetic energy of two bodies after a head-on impact; the latter is that of a plastic
+    impact (Newton 1687)."""
     m, v = np.asarray(masses), np.asarray(speeds)
     momentum = float(m @ v)
     return momentum, momentum**2 / (2 * float(m.sum()))

@@ -17,10 +17,10 @@ MODES = ("stable", "sliding", "toppling", "sliding and toppling")
 
 
 def toe_holds_above(slenderness: float, incline: float) -> float:
-    """The friction angle (rad) below which the toe of a column that topples from rest slides as well; δ < α.
+    """The friction angle (rad) below which the toe of a column that topples from rest also slides; δ < α.
 
-    From rest it turns about the toe with θ̈ = ¾ (g/r) sin(α−δ), r the half diagonal, so that the toe must carry
-    T = mg [sin α − ¾ sin(α−δ) cos δ] on N = mg [cos α + ¾ sin(α−δ) sin δ] (Bray & Goodman 1981; Sagaseta 1986).
+    From rest the column rotates about the toe with θ̈ = ¾ (g/r) sin(α−δ), r the half diagonal, so that the toe must
+    carry T = mg [sin α − ¾ sin(α−δ) cos δ] on N = mg [cos α + ¾ sin(α−δ) sin δ] (Bray & Goodman 1981; Sagaseta 1986).
     """
     turn = 0.75 * math.sin(incline - slenderness)
     along = math.sin(incline) - turn * math.cos(slenderness)

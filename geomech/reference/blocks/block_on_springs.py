@@ -1,9 +1,10 @@
-"""A deformable square block on an incline, on two frictional springs: explicit time integration, a second method.
+"""A deformable square block on an incline, on two frictional springs, by explicit time integration: an independent
+method.
 
-Independent of the block solver: small displacements on fixed axes along and across the incline, forces at the start of
-each step, steps that resolve the stiffest spring, friction by the return mapping of a spring in series with a slider. A
-first-order block has no other physics, so that the block solver must converge to this motion under a suddenly applied
-weight.
+It shares nothing with the block solver: small displacements on fixed axes along and across the incline, forces at the
+start of each step, steps that resolve the stiffest spring, and friction by the return mapping of a spring in series
+with a slider. The physics is that of a first-order block, so the block solver must converge to this motion under
+suddenly applied weight.
 """
 
 from __future__ import annotations
@@ -34,11 +35,11 @@ def creep_of_a_sudden_weight(
     material: Material,
     gravity: float = 9.81,
 ) -> np.ndarray:
-    """(outputs,) m that a 1 m square has gone down an ``incline`` (rad) at equal times up to ``duration`` (s), when its
-    weight acts at once on a block that just touches, in plane strain.
+    """(outputs,) m: displacement of a 1 m square down an ``incline`` (rad) at equal times up to ``duration`` (s), if
+    its weight acts suddenly on a block that just touches; plane strain.
 
-    The ``contact`` is at its two lower corners; damping means a viscous stress for the block's vibration, ω² = 12
-    C₁₁/(ρ h²), and a dashpot 2 ξ √(k m) across each contact. Semi-implicit Euler steps ``dt`` (s), of first order.
+    The ``contact`` is at its two lower corners. Damping is a viscous stress for the vibration of the block, ω² = 12
+    C₁₁/(ρ h²), and a dashpot 2 ξ √(k m) normal to each contact. Semi-implicit Euler steps ``dt`` (s), of first order.
     """
     friction_angle, damping, spring = contact
     poissons_ratio, density = material.poissons_ratio, material.density

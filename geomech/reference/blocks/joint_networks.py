@@ -12,14 +12,14 @@ def fisher_mean_resultant(concentration: float) -> float:
 
 
 def trace_length_of_discs(length: np.ndarray, diameter: float) -> np.ndarray:
-    """Fraction of traces not longer than ``length`` m where a plane cuts randomly placed discs of one ``diameter`` m:
-    1 − √(1 − (l/D)²) (Warburton 1980, Int. J. Rock Mech. Min. Sci. 17, 33: density l / (D √(D² − l²)))."""
+    """Fraction of traces not longer than ``length`` m in a plane section of randomly located discs of one ``diameter``
+    m: 1 − √(1 − (l/D)²) (Warburton 1980, Int. J. Rock Mech. Min. Sci. 17, 33: density l / (D √(D² − l²)))."""
     return 1.0 - np.sqrt(1.0 - np.clip(np.asarray(length, dtype=float) / diameter, 0.0, 1.0) ** 2)
 
 
 def trace_length_moments(diameter_moments: tuple[float, float, float]) -> tuple[float, float]:
-    """(mean m, mean square m²) of the traces of discs with E[D], E[D²], E[D³] ``diameter_moments``: π/4 E[D²]/E[D] and
-    2/3 E[D³]/E[D], larger discs being cut more often (Warburton 1980)."""
+    """(mean m, mean square m²) of the traces of discs with E[D], E[D²], E[D³] = ``diameter_moments``: π/4 E[D²]/E[D]
+    and 2/3 E[D³]/E[D], because larger discs are intersected more often (Warburton 1980)."""
     first, second, third = diameter_moments
     return 0.25 * np.pi * second / first, 2.0 / 3.0 * third / first
 

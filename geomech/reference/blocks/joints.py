@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-#: Basic friction angle (rad), JRC and JCS (Pa) of the example that `ROUGH_JOINT_TABLE` is of.
+#: Basic friction angle (rad), JRC and JCS (Pa) of the example in `ROUGH_JOINT_TABLE`.
 ROUGH_JOINT_EXAMPLE = (math.radians(29.0), 16.9, 96e6)
 
 #: Normal stress, shear strength (MPa), its slope, and the cohesion of its tangent (MPa): Hoek, Practical Rock
@@ -37,9 +37,12 @@ def barton_strength(pressure: float, jrc: float, jcs: float, residual_angle: flo
 def lift_at_constant_stiffness(
     slip: np.ndarray, jrc: float, jcs: float, pressure: float, stiffness: float, peak_slip: float
 ) -> np.ndarray:
-    """(n,) m: lift of a rough joint that slides by ``slip`` (n,) m beyond its peak against a wall of ``stiffness``
-    Pa/m, from ``pressure`` Pa on: dv/ds = tan(½ JRC_mob log₁₀(JCS/σ)), σ = σ₀ + K v (Barton & Choubey 1977 eq. 11;
-    decay of JRC by Barton, Bandis & Bakhtar 1985), by Runge–Kutta of order 8."""
+    """(n,) m: dilation of a rough joint that slides by ``slip`` (n,) m beyond its peak against a wall of ``stiffness``
+    Pa/m, from the initial ``pressure`` Pa on.
+
+    dv/ds = tan(½ JRC_mob log₁₀(JCS/σ)), σ = σ₀ + K v (Barton & Choubey 1977 eq. 11; decay of JRC by Barton, Bandis &
+    Bakhtar 1985), integrated by a Runge–Kutta method of order 8.
+    """
     from scipy.integrate import solve_ivp
 
     def rate(s, v):

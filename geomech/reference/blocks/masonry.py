@@ -29,13 +29,14 @@ def voussoirs(n: int, ratio: float, radius: float = 1.0) -> list[np.ndarray]:
 
 
 def least_pull(n: int, ratio: float) -> float:
-    """Least tension, over all equilibria of ``n`` rigid voussoirs under their own weight, that some joint's corner must
-    carry.
+    """Smallest tension, over all equilibria of ``n`` rigid voussoirs under their own weight, that a corner of a joint
+    must carry.
 
-    In units of the weight per area times R²; negative: the arch stands, and its corners can all be pressed by as much.
-    Heyman's (1966) safe theorem as a linear program (Livesley 1978, "Limit analysis of structures formed from rigid
-    blocks", International Journal for Numerical Methods in Engineering 12, 1853-1871): at each joint two corner forces
-    N and a shear of any size, three equations of equilibrium a voussoir; the least s with all N ≥ −s.
+    In units of the weight per area times R²; a negative value means that the arch is stable, with all corners
+    compressed by as much. Heyman's (1966) safe theorem as a linear programme (Livesley 1978, "Limit analysis of
+    structures formed from rigid blocks", International Journal for Numerical Methods in Engineering 12, 1853-1871): at
+    each joint two corner forces N and an unlimited shear force, three equations of equilibrium per voussoir; the
+    smallest s with all N ≥ −s.
     """
     from scipy.optimize import linprog
     from scipy.sparse import csr_array
@@ -72,8 +73,8 @@ def least_pull(n: int, ratio: float) -> float:
 def thinnest_arch(n: int) -> float:
     """Limit thickness t/R below which an arch of ``n`` voussoirs collapses: the root of `least_pull`.
 
-    Hinges form at joints only, so few voussoirs stand at less: 0.1041 (6), 0.1015 (9), 0.1049 (12), 0.1070 (25), 0.1074
-    (50); Milankovitch's 0.1075 is the limit of many.
+    Hinges form at joints only, so few voussoirs are stable at a smaller thickness: 0.1041 (6), 0.1015 (9), 0.1049 (12),
+    0.1070 (25), 0.1074 (50); Milankovitch's 0.1075 is the limit for many.
     """
     from scipy.optimize import brentq
 
@@ -86,30 +87,33 @@ def three_hinge_thrust(span: float, thickness: float, unit_weight: float) -> flo
 
 
 def voussoir_contact(span: float, thickness: float) -> float:
-    """Part of its faces on which a beam of two elastic halves bears at the crown and the abutments, n = 1/(0.22 S/T +
-    2.7): fitted to finite elements by Sofianos (1996), "Analysis and design of an underground hard rock voussoir beam
-    roof", International Journal of Rock Mechanics 33, 153-166, values of 0.12 to 0.30; quoted in Brady & Brown (2004),
+    """Fraction n of its end faces on which a beam of two elastic halves bears at the crown and the abutments: n =
+    1/(0.22 S/T + 2.7).
+
+    Fitted to finite elements by Sofianos (1996), "Analysis and design of an underground hard rock voussoir beam roof",
+    International Journal of Rock Mechanics 33, 153-166, for values of 0.12 to 0.30; quoted in Brady & Brown (2004),
     "Rock mechanics for underground mining", eq. 8.15. Diederichs & Kaiser (1999), Int. J. Rock Mech. 36, 97-117, take n
-    near 0.75, from the least of the greatest stresses, which no continuum bears out (ibid.)."""
+    near 0.75, which minimises the largest stress but is not confirmed by any continuum analysis (ibid.).
+    """
     return 1.0 / (0.22 * span / thickness + 2.7)
 
 
 def voussoir_thrust(span: float, thickness: float, unit_weight: float, sag: float = 0.0) -> float:
-    """Thrust (N) of that beam: w S²/(8 z), z = T (1 − 2 n/3) − ``sag`` (m), for triangles of pressure at both ends of
-    the arm."""
+    """Thrust (N) of that beam: w S²/(8 z), z = T (1 − 2 n/3) − ``sag`` (m), with triangular pressure at both ends of
+    the arch."""
     arm = thickness * (1.0 - 2.0 / 3.0 * voussoir_contact(span, thickness)) - sag
     return unit_weight * thickness * span**2 / (8.0 * arm)
 
 
-#: Sag at which it snaps through, over its arm before: w ∝ z (z₀² − z²) is greatest at z = z₀/√3 (Sofianos 1996; Brady &
-#: Brown 2004, eqs. 8.37 and 8.38).
+#: Sag at snap-through, relative to the initial lever arm: w ∝ z (z₀² − z²) is largest at z = z₀/√3 (Sofianos 1996;
+#: Brady & Brown 2004, eqs. 8.37 and 8.38).
 SNAP_THROUGH_SAG = 1.0 - 1.0 / math.sqrt(3.0)
 
 
 def two_block_beam(
     span: float, thickness: float, unit_weight: float, compliance: np.ndarray, spring: float
 ) -> tuple[float, float]:
-    """(thrust N, sag of the crown m) of a beam of two halves, each of them strained uniformly by its own forces.
+    """(thrust N, sag of the crown m) of a beam of two halves, each with the uniform strain caused by its own forces.
 
     Three-hinge statics on the deformed halves: mean stress σ̄ = (1/A) Σ sym(x ⊗ f) of the corner forces, plane
     compliance (3, 3) 1/Pa, and a ``spring`` N/m in each corner contact. Fixed-point iteration on the rotation of a
@@ -128,7 +132,8 @@ def two_block_beam(
         exx, eyy, gxy = compliance @ stress
         stretch = np.array([[1 + exx, 0.5 * gxy], [0.5 * gxy, 1 + eyy]])
         a, b = stretch @ lower, stretch @ upper
-        # Between the faces of the abutment and of the other half, each pressed in by its spring.
+        # Distance between the faces of the abutment and of the other half, each displaced by the compression of its
+        # spring.
         gap = half + 1.5 * thrust / spring
         across = b - a
         turn = math.acos(gap / math.hypot(*across)) - math.atan2(across[1], across[0])

@@ -1,1 +1,1 @@
-"""Closed forms and second methods for cracks."""
+"""Closed forms and independent methods for cracks."""

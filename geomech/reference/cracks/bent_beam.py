@@ -1,29 +1,29 @@
-"""Three-point bending of a beam with an edge crack, by complex series and boundary collocation: a second method.
+"""Three-point bending of a beam with an edge crack, by complex series and boundary collocation: an independent method.
 
-The three point loads are Flamant's (1892) solutions, each in its own half-plane: the side that it acts on is free of
-traction. Their tractions on the other sides, and on the crack, are cancelled by
+The three point loads are Flamant's (1892) solutions, each in its own half-plane, whose surface is the side on which the
+load acts and is free of traction. Their tractions on the other sides, and on the crack, are cancelled by
 
     Φ = P/√z + Q + q/2,   Ω = P/√z − Q + q/2
 
-with the tip in z = 0, the crack along z < 0 and q(x) the polynomial that is minus the loads' traction there (its
-Taylor series about the lower side): the crack's faces are free whatever P and Q are, and these, polynomials with real
-coefficients made orthogonal on the outline (Brubeck, Nakatsukasa & Trefethen 2021), are fitted to the rest by least
-squares. K_I = 2√(2π) P(0).
+with the tip at z = 0, the crack along z < 0 and q(x) the polynomial that is minus the traction of the loads there (its
+Taylor series about the lower side): the crack faces are free for any P and Q. P and Q, polynomials with real
+coefficients that are orthogonal on the outline (Brubeck, Nakatsukasa & Trefethen 2021), are fitted to the remaining
+tractions by least squares. K_I = 2√(2π) P(0).
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-#: Terms of q.
+#: Number of terms of q.
 _ACROSS = 16
 
 
 def three_point_bending(ratio: float, terms: int = 60, half_span: float = 2.0, half_length: float = 2.2) -> float:
-    """K_I √W/P of a beam of depth W = 1 on supports ±``half_span``, ±``half_length`` long, under a force P in its
-    middle above a crack of length ``ratio``; ``terms`` of each series."""
+    """K_I √W/P of a beam of depth W = 1 and half-length ``half_length`` on supports at ±``half_span``, under a force P
+    at midspan above a crack of length ``ratio``; ``terms``: number of terms of each series."""
     a = ratio
-    # Half of the outline, x upwards from the tip and y across; points crowd to the ends of the sides.
+    # Half of the outline, x upwards from the tip and y across; points are concentrated at the ends of the sides.
     s = 0.5 * (1 - np.cos((np.arange(8 * terms) + 0.5) * np.pi / (8 * terms)))
     z = np.concatenate([-a + 1j * half_length * s, -a + s + 1j * half_length, 1 - a + 1j * half_length * s])
     along = np.repeat([1j, 1.0, 1j], len(s))
@@ -49,7 +49,7 @@ def three_point_bending(ratio: float, terms: int = 60, half_span: float = 2.0, h
     slope = across.deriv()
 
     def of_pair(phi: np.ndarray, d_phi: np.ndarray, sign: float) -> np.ndarray:
-        """The same of Φ = ``phi``, Ω = ``sign`` Φ."""
+        """The same for Φ = ``phi``, Ω = ``sign`` Φ."""
         return 2 * phi.real + along**2 * ((np.conj(z) - z) * d_phi + (sign - 1) * phi)
 
     right = -of_loads(z, along) - of_pair(0.5 * across(z + a), 0.5 * slope(z + a), 1)
@@ -66,7 +66,7 @@ def three_point_bending(ratio: float, terms: int = 60, half_span: float = 2.0, h
 
 
 def _orthogonal(z: np.ndarray, terms: int):
-    """Real polynomials, orthogonal on ``z`` and its mirror image: p and dp/dz at ``z``, p(0)."""
+    """Real polynomials, orthogonal on ``z`` and its mirror image: p and dp/dz at ``z``, and p(0)."""
     size = np.sqrt(len(z))
     known = [(np.ones(len(z), complex), np.zeros(len(z), complex), 1.0)]
     for _ in range(terms):

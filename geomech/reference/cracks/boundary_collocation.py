@@ -1,12 +1,12 @@
-"""A straight central crack in a plate or disc, by complex series and boundary collocation: a second method.
+"""A straight central crack in a plate or disc, by complex series and boundary collocation: an independent method.
 
-With the crack on |x| < a, y = 0 and free of traction, Muskhelishvili's Φ and Ω are (Isida 1971; Newman 1971)
+With the crack on |x| < a, y = 0 free of traction, Muskhelishvili's Φ and Ω are (Isida 1971; Newman 1971)
 
     Φ = F/√(z²−a²) + G,   Ω = F/√(z²−a²) − G,
 
-F and G analytic. For loads that a half turn leaves as they are F is odd and G even: z and 1 times polynomials of z²,
-made orthogonal on the outline (Brubeck, Nakatsukasa & Trefethen 2021) and fitted to the tractions there by least
-squares; the crack's faces are free whatever the coefficients are. The error falls exponentially with the number of
+F and G analytic. For loads that are invariant under a rotation by 180°, F is odd and G even: z and 1 times polynomials
+of z², orthogonal on the outline (Brubeck, Nakatsukasa & Trefethen 2021) and fitted to the tractions there by least
+squares. The crack faces are free of traction for any coefficients. The error decreases exponentially with the number of
 terms, the faster the farther the tips are from the outline. K_I − i K_II = 2√π F(a)/√a.
 """
 
@@ -18,11 +18,12 @@ import numpy as np
 def centre_crack(
     half_length: float, half_width: float, half_height: float, angle: float = 0.0, terms: int = 50
 ) -> tuple[float, float]:
-    """K_I, K_II of a crack 2·``half_length`` at ``angle`` (rad) from x in the middle of a plate pulled in y by unit
-    tractions on its two ends. ``terms`` of each series."""
+    """K_I, K_II of a crack 2·``half_length`` at ``angle`` (rad) from x in the centre of a plate with unit tractions
+    along y on its two ends; ``terms``: number of terms of each series."""
     w, h = half_width, half_height
     n = 10 * terms
-    # Points crowd to the corners, where the series converge worst; a half turn makes the other half of the outline.
+    # Points are concentrated at the corners, where the series converge worst; a rotation by 180° gives the other half
+    # of the outline.
     s = np.cos((np.arange(n) + 0.5) * np.pi / n)
     turn = np.exp(-1j * angle)
     z = np.concatenate([s * w + 1j * h, w + 1j * h * s]) * turn
@@ -32,9 +33,12 @@ def centre_crack(
 
 
 def crack_in_disc(half_length: float, power: int, shear: bool = False, terms: int = 24) -> float:
-    """K_I (K_II with ``shear``) of a crack 2·``half_length`` in the middle of a free disc of radius 1 whose faces a
-    traction x^``power``, even, pulls apart (shears). Less a field with that traction along the whole x-axis (Φ = 0, Ψ =
-    z^power) the faces are free and the outline bears the field's."""
+    """K_I (K_II with ``shear``) of a crack 2·``half_length`` in the centre of a traction-free disc of radius 1, whose
+    faces carry a traction x^``power``, even, that opens (shears) it.
+
+    After subtraction of a field with that traction on the whole x-axis (Φ = 0, Ψ = z^power), the faces are free and the
+    outline carries the traction of that field.
+    """
     angle = (np.arange(10 * terms) + 0.5) * np.pi / (10 * terms)
     z = np.exp(1j * angle)
     right = (1j * z) ** 2 * (1j if shear else 1.0) * z**power
@@ -42,8 +46,8 @@ def crack_in_disc(half_length: float, power: int, shear: bool = False, terms: in
 
 
 def _fitted(a: float, z, along, weight, right, terms: int) -> tuple[float, float]:
-    """K_I, K_II from ``right`` (n,), normal plus i times minus shear traction at points ``z`` of half the outline,
-    which runs ``along``; each counts by its ``weight``."""
+    """K_I, K_II from ``right`` (n,), normal plus i times minus shear traction, at points ``z`` of half the outline,
+    which runs ``along``; each point has its ``weight``."""
     root = np.sqrt(z - a) * np.sqrt(z + a)
     columns, tip = [], []
     for p, dp, p_tip in _orthogonal(z, a, terms):
@@ -54,7 +58,7 @@ def _fitted(a: float, z, along, weight, right, terms: int) -> tuple[float, float
                 rest = (np.conj(z) - z) * c * d_phi + (sign * np.conj(c) - c) * phi
                 columns.append(weight * (2 * (c * phi).real + along**2 * rest))
                 tip.append(c * a * p_tip if sign > 0 else 0.0)
-    # A constant imaginary G turns the plate and is without stress.
+    # A constant imaginary G is a rotation of the plate without stress.
     del columns[3], tip[3]
     matrix, right = np.array(columns).T, weight * right
     both = np.concatenate([matrix.real, matrix.imag])

@@ -1,5 +1,5 @@
-"""Star-shaped and kinked cracks: straight arms that meet at a point, by `dislocations` graded there, and their
-limits."""
+"""Star-shaped and kinked cracks: straight arms that meet at a point, by `dislocations` graded there, and limiting
+cases."""
 
 from __future__ import annotations
 

@@ -11,14 +11,14 @@ from .dislocations import Arm, stack, stress_intensity
 
 
 def collinear_array(stress: float, half_length: float, period: float) -> float:
-    """K_I (and, for a shear, K_II) of cracks 2a in a row, a ``period`` b from middle to middle: σ√(b tan(πa/b))
+    """K_I (and, in shear, K_II) of collinear cracks 2a with a ``period`` b between their centres: σ√(b tan(πa/b))
     (Westergaard 1939; Irwin 1957)."""
     return stress * math.sqrt(period * math.tan(math.pi * half_length / period))
 
 
 def stacked_array(half_length: float, period: float, n: int = 65) -> float:
-    """K_I/σ of cracks 2a above one another, a ``period`` h apart, pulled across (computed, `dislocations.stack`);
-    √(h/2) when they are long beside it (Koiter 1959)."""
+    """K_I/σ of parallel cracks 2a above one another, with a ``period`` h, in tension normal to them (computed,
+    `dislocations.stack`); √(h/2) if they are long compared with h (Koiter 1959)."""
     pulled = np.array([0.0, 1.0, 0.0])
     return float(stress_intensity([Arm(-half_length, half_length)], _uniform(pulled), stack(period), n)[0, 0])
 
@@ -29,14 +29,14 @@ def stacked_array_limit(stress: float, period: float) -> float:
 
 
 def straight_cracks(ends: Sequence[np.ndarray], stress: np.ndarray, n: int = 33) -> np.ndarray:
-    """(2 n_cracks, 2) K_I, K_II at the start and end of every crack (2, 2) in a remote ``stress`` (3,), all of them
-    open (computed, `dislocations`)."""
+    """(2 n_cracks, 2) K_I, K_II at the start and end of every crack (2, 2) in a remote ``stress`` (3,), with all of
+    them open (computed, `dislocations`)."""
     arms = [Arm(complex(*a), complex(*b), crack=k) for k, (a, b) in enumerate(ends)]
     return stress_intensity(arms, _uniform(stress), n=n)
 
 
 def near_surface(ends: np.ndarray, pressure: float, n: int = 65) -> np.ndarray:
-    """(2, 2) K_I, K_II at the start and end of a crack (2, 2) below the free surface y = 0 with a fluid's ``pressure``
+    """(2, 2) K_I, K_II at the start and end of a crack (2, 2) below the free surface y = 0 with the fluid ``pressure``
     in it (computed, `dislocations`)."""
     (a, b), inside = ends, np.array([pressure, pressure, 0.0])
     return stress_intensity([Arm(complex(*a), complex(*b))], _uniform(inside), "half-plane", n)
@@ -52,8 +52,8 @@ def _uniform(stress: np.ndarray):
 
 
 def random_cracks(number: int, seed: int = 7, length: float = 1.0, spacing: float = 1.0) -> list[np.ndarray]:
-    """``number`` cracks (2, 2) of a ``length`` between 0.4 and 1 times the given one in random directions in a square;
-    none comes nearer to another than a fifth of its own length. ``spacing`` is the side of the square a crack has."""
+    """``number`` cracks (2, 2) of 0.4 to 1 times the given ``length`` in random directions in a square. Distances
+    between cracks are at least a fifth of their length. ``spacing``: side of the square per crack."""
     random = np.random.default_rng(seed)
     side = spacing * math.sqrt(number) * length
     chosen: list[np.ndarray] = []
@@ -71,9 +71,9 @@ def random_cracks(number: int, seed: int = 7, length: float = 1.0, spacing: floa
 
 
 def cracks_in_cells(number: int, seed: int = 0, spread: float = 6.0) -> list[np.ndarray]:
-    """``number``² cracks (2, 2) of lengths from 0.96 down to that over ``spread``, evenly in the logarithm, each
-    anywhere in its cell of side 1 and in any direction; quick for thousands of them, and neighbours come as near as a
-    fiftieth."""
+    """``number``² cracks (2, 2) of lengths from 0.96 down to 0.96/``spread``, evenly distributed in the logarithm, each
+    in a random position and direction in its cell of side 1. Fast for thousands of cracks; neighbours may be as near as
+    a fiftieth."""
     random = np.random.default_rng(seed)
     n = number * number
     half = 0.48 * spread ** -random.uniform(0, 1, n)

@@ -8,22 +8,23 @@ import numpy as np
 def griffith_field(
     points: np.ndarray, half_length: float, remote: np.ndarray, shear_modulus: float, poissons_ratio: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """(n, 3) stress and (n, 2) displacement about an open crack |x| < a, y = 0 in a ``remote`` stress (Westergaard
-    1939; Muskhelishvili's potentials for the parallel field that Westergaard's lack, Sih 1966). Plane strain.
+    """(n, 3) stress and (n, 2) displacement around an open crack |x| < a, y = 0 in a ``remote`` stress (Westergaard
+    1939; Muskhelishvili's potentials for the field parallel to the crack, which Westergaard's lack, Sih 1966). Plane
+    strain.
 
-    With T = σ_yy − iσ_xy of the remote field the crack adds Φ = T (z/√(z²−a²) − 1)/2 and as much to Ω with T's
-    conjugate. Its displacement vanishes at infinity, that of the uniform strain at the origin. On the crack: the upper
-    face.
+    With T = σ_yy − iσ_xy of the remote field, the crack adds Φ = T (z/√(z²−a²) − 1)/2, and the same with the conjugate
+    of T to Ω. Its displacement vanishes at infinity, that of the uniform strain at the origin. On the crack: values of
+    the upper face.
     """
     points = np.asarray(points, dtype=float)
     z = points[:, 0] + 1j * points[:, 1]
-    # On the crack itself, −0 in y included, the root is that of the upper side.
+    # On the crack itself, including y = −0, the root is that of the upper side.
     z[points[:, 1] == 0] = points[points[:, 1] == 0, 0]
     xx, yy, xy = np.asarray(remote, dtype=float)
     a, t = half_length, yy - 1j * xy
     with np.errstate(divide="ignore", invalid="ignore"):
         root = np.sqrt(z - a) * np.sqrt(z + a)
-        # What the crack adds: Φ = Ω = T (z/√ − 1)/2, its integral φ = ω = T (√ − z)/2.
+        # Contribution of the crack: Φ = Ω = T (z/√ − 1)/2, its integral φ = ω = T (√ − z)/2.
         phi = 0.5 * t * (z / root - 1)
         d_phi = -0.5 * t * a**2 / root**3
         omega = 0.5 * t * np.conj(z / root - 1)
@@ -62,19 +63,19 @@ def tip_stress(r: np.ndarray, angle: np.ndarray, k_i: float, k_ii: float) -> np.
 def arc_field(
     points: np.ndarray, tension: float, half_angle: float, shear_modulus: float, poissons_ratio: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """(n, 3) stress and (n, 2) displacement about an open crack along the unit circle, ``half_angle`` (rad) to either
-    side of the y axis, in equal biaxial ``tension`` (Muskhelishvili 1953, §124). Plane strain; points off the circle's
-    cracked part and its centre.
+    """(n, 3) stress and (n, 2) displacement around an open crack along the unit circle, ``half_angle`` (rad) to either
+    side of the y axis, in equal biaxial ``tension`` (Muskhelishvili 1953, §124). Plane strain; not for points on the
+    crack or at the centre.
 
-    With X = √((z − a)(z − b)), cut along the arc between its ends a and b, and m = (a + b)/2:
-    Φ + Ω = d (z − m)/X and Φ − Ω = T − d, where Ω(z) = conj Φ(1/z̄) − … stands for Ψ. That Ψ is finite at the circle's
-    centre gives d = 2T/(3 − cos α). Displacements are those of the whole field, no rotation at infinity.
+    With X = √((z − a)(z − b)), cut along the arc between its ends a and b, and m = (a + b)/2: Φ + Ω = d (z − m)/X and Φ
+    − Ω = T − d, where Ω(z) = conj Φ(1/z̄) − … replaces Ψ. The condition that Ψ is finite at the centre of the circle
+    gives d = 2T/(3 − cos α). Displacements are those of the whole field, without rotation at infinity.
     """
     points = np.asarray(points, dtype=float)
     z = points[:, 0] + 1j * points[:, 1]
     a, b = 1j * np.exp(-1j * half_angle), 1j * np.exp(1j * half_angle)
     middle, d = 0.5 * (a + b), 2 * tension / (3 - np.cos(half_angle))
-    # (z − a)/(z − b) has one argument all along the arc: the root's cut is turned there.
+    # (z − a)/(z − b) has the same argument along the whole arc: the cut of the root is rotated onto it.
     cut = -(1j - a) / (1j - b)
 
     def root(w: np.ndarray) -> np.ndarray:

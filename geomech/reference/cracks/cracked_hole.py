@@ -19,8 +19,8 @@ NASGRO_FIT = (3.364500, -7.209304, 8.230965, -3.500286, -2.923363, 4.306705, -1.
 
 
 def bowie(ratio: float, cracks: int) -> float:
-    """K_I/(σ√(πL)) at ``ratio`` = L/R by `BOWIE_FIT`: with Bowie's short series 1 to 2 % off up to L/R = 2, 4 % at
-    10."""
+    """K_I/(σ√(πL)) at ``ratio`` = L/R by `BOWIE_FIT`. Owing to Bowie's short series the error is 1 to 2 % up to L/R = 2
+    and 4 % at 10."""
     a, b, c = BOWIE_FIT[cracks]
     return a + b / (c + ratio)
 
@@ -32,9 +32,8 @@ def nasgro(ratio: float) -> float:
 
 
 def factor(length: float, cracks: int, stress: np.ndarray, pressure: float = 0.0, n: int = 65) -> float:
-    """K_I/√(πL) of ``cracks`` (1, or 2 opposite ones) along x of ``length`` L from a hole of radius 1 in a remote
-    ``stress`` (xx, yy, xy = 0); a fluid's ``pressure`` acts on the wall and in the cracks (computed,
-    `dislocations`)."""
+    """K_I/√(πL) of ``cracks`` (1, or 2 opposite ones) of ``length`` L along x from a hole of radius 1 in a remote
+    ``stress`` (xx, yy, xy = 0), with a fluid ``pressure`` on the wall and in the cracks (computed, `dislocations`)."""
     arms = [Arm(side, side * (1 + length), False, k, True) for k, side in enumerate((1.0, -1.0)[:cracks])]
 
     def field(points):

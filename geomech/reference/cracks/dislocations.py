@@ -1,15 +1,15 @@
-"""Straight cracks by distributed dislocations: a second method, independent of the crack solver.
+"""Straight cracks by distributed dislocations: a method independent of the crack solver.
 
 A crack is an unknown density a(t) of edge dislocations, each of which has Muskhelishvili's potentials
 
     Φ = a/(z − t),   Ψ = ā/(z − t) + a t̄/(z − t)²          (Muskhelishvili 1953; Erdogan, Gupta & Cook 1973)
 
-plus images that free a straight or a circular boundary from traction. Tractions on the faces are collocated half-way
-between the quadrature points (Erdogan & Gupta 1972): Gauss–Chebyshev where an arm ends in two tips. An arm that begins
-in a corner, a junction or at a boundary is parametrised by the power `GRADING` of the same variable, which makes the
-weak singularity there smooth; the error then falls like n^(−2·GRADING) or better. It shares neither
-unknowns, nor shape functions, nor quadrature with displacement discontinuity elements; it is slow but converges to ten
-digits.
+plus images that make a straight or a circular boundary free of traction. Tractions on the faces are collocated half-way
+between the quadrature points (Erdogan & Gupta 1972), which are Gauss–Chebyshev points on an arm that ends in two tips.
+An arm that begins at a corner, a junction or a boundary is parametrised by the power `GRADING` of the same variable,
+which makes the weak singularity there smooth; the error then decreases as n^(−2·GRADING) or faster. The method has
+neither unknowns, nor shape functions, nor quadrature in common with displacement discontinuity elements. It is slow but
+converges to ten digits.
 """
 
 from __future__ import annotations
@@ -24,8 +24,8 @@ GRADING = 4
 
 @dataclass(frozen=True)
 class Arm:
-    """A straight piece of crack from ``start`` to ``end`` (complex), which is a tip; ``start`` is one too, or else a
-    junction or a mouth. Arms of one ``crack`` make one crack; it is ``open`` when it has a mouth."""
+    """A straight piece of crack from ``start`` to ``end`` (complex). ``end`` is a tip; ``start`` is a tip, a junction
+    or a mouth. Arms of one ``crack`` form one crack, which is ``open`` if it has a mouth."""
 
     start: complex
     end: complex
@@ -56,7 +56,7 @@ def _half_plane(z, t, a):
 
 
 def _hole(z, t, a):
-    """Outside the free circle |z| = 1, which carries the opposite dislocation, so that the whole has none."""
+    """Outside the traction-free circle |z| = 1, which contains the opposite dislocation, so that the sum is zero."""
     phi, dphi, psi = _plane(z, t, a)
     b, s = np.conj(a), np.conj(t)
     e = 1 / (1 - s * z)
@@ -69,7 +69,7 @@ def _hole(z, t, a):
 
 
 def _disc(z, t, a):
-    """Inside the free circle |z| = 1."""
+    """Inside the traction-free circle |z| = 1."""
     phi, dphi, psi = _plane(z, t, a)
     b, s = np.conj(a), np.conj(t)
     e = 1 / (1 - s * z)
@@ -87,7 +87,7 @@ def stack(period: float):
     def potentials(z, t, a):
         q = np.pi / period
         one, two = q / np.tanh(q * (z - t)), (q / np.sinh(q * (z - t))) ** 2
-        # z̄Φ' + Ψ summed over the images, less the z̄Φ' that is added to Ψ where they are used.
+        # z̄Φ' + Ψ summed over the images, minus the z̄Φ' that is added to Ψ where they are used.
         return a * one, -a * two, np.conj(a) * one + a * one - 2 * a * (z - t).real * two + np.conj(z) * a * two
 
     return potentials
@@ -97,10 +97,11 @@ DOMAINS = {"plane": _plane, "half-plane": _half_plane, "hole": _hole, "disc": _d
 
 
 def stress_intensity(arms: list[Arm], stress, domain="plane", n: int = 65) -> np.ndarray:
-    """(n_tips, 2) K_I, K_II at the ends of all ``arms``, and before each at its start if that is a tip.
+    """(n_tips, 2) K_I, K_II at the ends of all ``arms``, each preceded by those at its start if that is a tip.
 
-    ``stress(points (m, 2)) → (m, 3)`` is the field without cracks. ``domain``: a key of `DOMAINS` ("half-plane" y < 0,
-    "hole" |z| > 1, "disc" |z| < 1) or a function of (z, t, a) that gives Φ, Φ', Ψ. ``n`` odd: points an arm.
+    ``stress(points (m, 2)) → (m, 3)`` is the field without cracks. ``domain``: a key of `DOMAINS` ("half-plane": y < 0,
+    "hole": |z| > 1, "disc": the disc |z| < 1) or a function of (z, t, a) that returns Φ, Φ', Ψ. ``n``, odd: number of
+    points per arm.
     """
     potentials = DOMAINS[domain] if isinstance(domain, str) else domain
     theta = (np.arange(n) + 0.5) * np.pi / n
@@ -126,7 +127,8 @@ def stress_intensity(arms: list[Arm], stress, domain="plane", n: int = 65) -> np
         if not arms[here[0]].open:
             # The crack closes at both ends: the net dislocation is zero.
             extra.append(np.repeat(crack == k, n).astype(float))
-        # An arm has one point more than equations; what is left after closure vanishes at junctions and mouths.
+        # An arm has one more point than equations; after closure, the remaining density vanishes at junctions and
+        # mouths.
         for arm in here if arms[here[0]].open else here[1:]:
             unit = np.zeros(m)
             unit[arm * n] = 1.0

@@ -57,7 +57,7 @@ def collinear_pair(stress: float, inner: float, outer: float) -> tuple[float, fl
     from scipy.special import ellipe, ellipkm1
 
     b, c = inner, outer
-    # By 1 − k², which keeps its digits when the inner tips nearly meet.
+    # Computed from 1 − k², which is accurate when the inner tips nearly meet.
     rest = (b / c) ** 2
     lam = float(ellipe(1 - rest) / ellipkm1(rest))
     root = stress * math.sqrt(math.pi)
@@ -80,10 +80,10 @@ def dilute_compliance(half_length: float, area: float, plane_modulus: float) -> 
 
 
 def crack_in_bending(gradient: float, half_length: float) -> tuple[float, float]:
-    """Closure point and K_I of a crack |x| < a without friction across σ = gradient · x, gradient > 0.
+    """Closure point and K_I of a frictionless crack |x| < a under the normal stress σ = gradient · x, gradient > 0.
 
-    The compressed side is shut up to x = −a/3, where K_I of the open part [−a/3, a] vanishes: with half-length l = 2a/3
-    and middle m = a/3 the two tips have s(m ∓ l/2)√(πl), so K_I = s l √(πl) at x = a.
+    The compressed side is closed up to x = −a/3, where K_I of the open part [−a/3, a] vanishes: with half-length l =
+    2a/3 and midpoint m = a/3 the two tips have s(m ∓ l/2)√(πl), so K_I = s l √(πl) at x = a.
     """
     open_half = 2 * half_length / 3
     return -half_length / 3, gradient * open_half * math.sqrt(math.pi * open_half)

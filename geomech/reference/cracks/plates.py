@@ -47,9 +47,12 @@ THREE_POINT_BENDING = {0.3: 6.05566, 0.5: 10.57489, 0.7: 23.36767}
 
 
 def three_point_bending(ratio: float, load: float, depth: float) -> float:
-    """K_I of a beam of span 4W under ``load`` (N/m) in the middle, depth W, edge crack a = ``ratio``·W: stated to be
-    within 0.5 % for 0 ≤ a/W ≤ 1 (Srawley 1976, Int. J. Fracture 12, 475–476; coefficients as ASTM E399 has them, quoted
-    by Dowling, Mechanical Behavior of Materials, fig. 8.13b: the paper itself was not at hand)."""
+    """K_I of a beam of span 4W under ``load`` (N/m) at midspan, depth W, edge crack a = ``ratio``·W: stated accuracy
+    0.5 % for 0 ≤ a/W ≤ 1.
+
+    Srawley (1976), Int. J. Fracture 12, 475–476; coefficients as in ASTM E399, quoted by Dowling, Mechanical Behavior
+    of Materials, fig. 8.13b (the paper itself was not available).
+    """
     r = ratio
     f = 3 * math.sqrt(r) * (1.99 - r * (1 - r) * (2.15 - 3.93 * r + 2.7 * r * r)) / (2 * (1 + 2 * r) * (1 - r) ** 1.5)
     return 4 * load / math.sqrt(depth) * f

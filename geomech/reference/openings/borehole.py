@@ -1,7 +1,7 @@
 """Borehole breakout and breakdown from Kirsch's wall stress and the strength of intact rock.
 
-All stresses count as compressive when positive here: ``greater`` and ``lesser`` remote ones across the hole, Pa; mud
-``pressure`` on the wall, none of it in the rock.
+Stresses are positive in compression here: remote stresses ``greater`` and ``lesser`` normal to the hole, Pa; mud
+``pressure`` on the wall, which does not enter the rock.
 """
 
 from __future__ import annotations
@@ -10,10 +10,12 @@ import math
 
 
 def breakout_ratio(greater: float, lesser: float, cohesion: float, friction_angle: float) -> float:
-    """Factor on both remote stresses at which the wall of an empty hole fails in shear: uniaxial
-    strength 2c cos φ/(1 − sin φ) over the greatest hoop stress 3σ_H − σ_h (Kirsch 1898; Jaeger, Cook & Zimmerman 2007,
-    ch. 8). It is reached where the wall faces σ_h, so that breakouts point along the lesser stress (Bell & Gough
-    1979)."""
+    """Factor on both remote stresses at which the wall of an empty hole fails in shear.
+
+    Uniaxial strength 2c cos φ/(1 − sin φ) over the largest hoop stress 3σ_H − σ_h (Kirsch 1898; Jaeger, Cook &
+    Zimmerman 2007, ch. 8). This stress acts at the points of the wall in the direction of σ_h, so that breakouts point
+    along the lesser stress (Bell & Gough 1979).
+    """
     strength = 2 * cohesion * math.cos(friction_angle) / (1 - math.sin(friction_angle))
     return strength / (3 * greater - lesser)
 

@@ -6,8 +6,8 @@ import numpy as np
 
 
 def kirsch_stress(points: np.ndarray, remote: np.ndarray, radius: float = 1.0, pressure: float = 0.0) -> np.ndarray:
-    """(n, 3) stress at ``points`` (n, 2) about a hole at the origin under ``remote`` (3,) stress and ``pressure``
-    inside.
+    """(n, 3) stress at ``points`` (n, 2) around a hole centred at the origin under ``remote`` (3,) stress and internal
+    ``pressure``.
 
     Kirsch (1898), as in Jaeger, Cook & Zimmerman (2007), eqs. 8.103–8.105; pressure after Lamé (1852).
     """

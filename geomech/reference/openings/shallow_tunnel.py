@@ -1,9 +1,9 @@
-"""A circular hole below a free surface: closed forms for pressure in it, and a series for any load (Mindlin 1940).
+"""A circular hole below a free surface: closed forms for internal pressure, and a series for any load (Mindlin 1940).
 
-The potentials of the whole plane outside the circle, in powers of 1/(z − z₀) and with the logarithms of the force that
-the hole bears, are continued through the surface (Muskhelishvili 1953, §§ 92–93), so that it is free whatever the
-coefficients are; those are fitted to the tractions on the circle by least squares. The error falls geometrically with
-the number of terms. Radius 1, rock in y < 0, the hole's centre at (0, −depth).
+The potentials of the whole plane outside the circle, in powers of 1/(z − z₀) and with the logarithms of the resultant
+force on the hole, are continued through the surface (Muskhelishvili 1953, §§ 92–93), so that it is traction-free for
+any coefficients. The coefficients are fitted to the tractions on the circle by least squares; the error decreases
+geometrically with the number of terms. Radius 1, rock in y < 0, centre of the hole at (0, −depth).
 """
 
 from __future__ import annotations
@@ -14,20 +14,20 @@ import numpy as np
 
 
 def surface_stress(x: np.ndarray, depth: float, pressure: float = 1.0) -> np.ndarray:
-    """σ_xx of the surface above a hole with ``pressure`` in it (Jeffery 1920): 4p (d² − 1 − x²)/(d² − 1 + x²)²."""
+    """σ_xx at the surface above a hole with internal ``pressure`` (Jeffery 1920): 4p (d² − 1 − x²)/(d² − 1 + x²)²."""
     q = depth**2 - 1
     return 4 * pressure * (q - np.asarray(x) ** 2) / (q + np.asarray(x) ** 2) ** 2
 
 
 def wall_stress(angle: np.ndarray, depth: float, pressure: float = 1.0) -> np.ndarray:
-    """Hoop stress on the wall of the same hole at ``angle`` from straight up, seen from its centre: p (1 + 2 tan²β), β
-    the angle at the surface, above the centre, between straight down and the point (Jeffery 1920; Timoshenko & Goodier
-    1951, §66)."""
+    """Hoop stress on the wall of the same hole at ``angle`` from the upward direction, seen from its centre: p (1 + 2
+    tan²β), with β the angle, at the surface point above the centre, between the downward direction and the point
+    (Jeffery 1920; Timoshenko & Goodier 1951, §66)."""
     return pressure * (1 + 2 * (np.sin(angle) / (depth - np.cos(angle))) ** 2)
 
 
 def in_situ(points: np.ndarray, weight: float, k0: float, along: float) -> np.ndarray:
-    """(n, 3) stress of whole ground: σ_yy = weight · y, σ_xx = k0 σ_yy + ``along``."""
+    """(n, 3) stress of the intact ground: σ_yy = weight · y, σ_xx = k0 σ_yy + ``along``."""
     y = np.asarray(points)[:, 1]
     return np.column_stack([k0 * weight * y + along, weight * y, 0 * y])
 
@@ -42,9 +42,9 @@ def stress(
     poissons_ratio: float = 0.25,
     terms: int = 60,
 ) -> np.ndarray:
-    """(n, 3) stress at ``points`` (n, 2) about the hole in ground of ``weight`` per volume with ``k0`` and a stress
-    ``along`` the surface, ``pressure`` in the hole. Poisson's ratio counts because the hole bears a force, the weight
-    of what was in it."""
+    """(n, 3) stress at ``points`` (n, 2) around the hole in ground of unit ``weight`` with ``k0`` and a stress
+    ``along`` the surface, with ``pressure`` in the hole. It depends on Poisson's ratio because the resultant force on
+    the hole is not zero: it is the weight of the excavated ground."""
     angle = 2 * math.pi * (np.arange(6 * terms) + 0.5) / (6 * terms)
     wall = np.column_stack([np.cos(angle), np.sin(angle) - depth])
     turn = (1j * np.exp(1j * angle)) ** 2
@@ -65,8 +65,8 @@ def stress(
 
 
 def _fields(points: np.ndarray, depth: float, sources: list) -> list[tuple[np.ndarray, np.ndarray]]:
-    """Half the trace and (σyy − σxx)/2 + i σxy at ``points`` of φ₀ = a g, ψ₀ = b g, for (a, b, k) in ``sources``: g =
-    (z − z₀)^−k, or log(z − z₀) where k is zero, and what frees the surface."""
+    """Half the trace and (σyy − σxx)/2 + i σxy at ``points`` of φ₀ = a g, ψ₀ = b g, for (a, b, k) in ``sources``, with
+    the contribution that makes the surface traction-free; g = (z − z₀)^−k, or log(z − z₀) if k is zero."""
     z = np.asarray(points) @ np.array([1.0, 1j])
 
     def powers(w: np.ndarray, k: int) -> list[np.ndarray]:

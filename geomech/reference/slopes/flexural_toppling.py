@@ -1,6 +1,8 @@
-"""Flexural toppling of rock columns under their own weight: stress at the base, and K of a flaw and of joints there.
+"""Flexural toppling of rock columns under their own weight: stress at the base, and K of a flaw and of joint ends
+there.
 
-A column of length ℓ and thickness t stands on rock; gravity acts at δ (rad) from its axis. Per metre of width; SI.
+A column of length ℓ and thickness t stands on rock; gravity is inclined by δ (rad) to its axis. Per metre of width; SI
+units.
 """
 
 from __future__ import annotations
@@ -21,19 +23,19 @@ def base_stresses(unit_weight: float, length: float, thickness: float, tilt: flo
 
 
 def flaw_factor(unit_weight: float, length: float, thickness: float, tilt: float, ratio: float) -> float:
-    """K_I, Pa √m, of a flaw of depth ``ratio``·t across the side in tension, ``length`` below the column's end: bending
-    and mean stress with the factors of Kaya & Erdogan (1987), for the ratios of their tables."""
+    """K_I, Pa √m, of a flaw of depth ``ratio``·t in the tension side at the base, ``length`` below the column's end:
+    bending and mean stress with the factors of Kaya & Erdogan (1987), for the ratios in their tables."""
     bending, mean = base_stresses(unit_weight, length, thickness, tilt)
     factor = bending * EDGE_CRACK_BENDING[round(ratio, 6)] + mean * EDGE_CRACK[round(ratio, 6)]
     return factor * math.sqrt(math.pi * ratio * thickness)
 
 
 def joint_end_factor(unit_weight: float, length: float, thickness: float, tilt: float) -> float:
-    """|K_II|, Pa √m, at the ends of smooth joints between many equal columns on solid rock: σ_b √(t/6).
+    """Magnitude of K_II, Pa √m, at the ends of smooth joints between many equal columns on solid rock: σ_b √(t/6).
 
-    Every joint's end releases the bending energy of one column, G = M²/2E'I = 6M²/E't³, for beams far longer than thick
-    (as in the end-notched beam: Russell & Street 1982); below the ends the rock is one piece, in which that energy is
-    nothing.
+    The end of each joint releases the bending energy of one column, G = M²/2E'I = 6M²/E't³, for beams much longer than
+    thick (as in the end-notched beam: Russell & Street 1982); below the ends the rock is solid and its bending energy
+    is negligible.
     """
     bending, _ = base_stresses(unit_weight, length, thickness, tilt)
     return bending * math.sqrt(thickness / 6)
@@ -42,7 +44,8 @@ def joint_end_factor(unit_weight: float, length: float, thickness: float, tilt: 
 def turning(
     moment_arm: tuple[float, float], inertia_per_mass: float, gravity: tuple[float, float], spin: float, times
 ) -> list[float]:
-    """Angles (rad, counter-clockwise from the first of ``times``) of a rigid body that turns about a fixed point.
+    """Angles (rad, counter-clockwise from that at the first of ``times``) of a rigid body that rotates about a fixed
+    point.
 
     ``moment_arm`` m, from the point to the centroid at the first time; ``inertia_per_mass`` m², about the point;
     ``spin`` rad/s at the first time: θ̈ = (r × g)/i².

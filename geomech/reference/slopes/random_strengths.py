@@ -1,5 +1,5 @@
-"""Probabilities of failure of planar slopes with random strengths: the exact one of normal strengths, and the published
-study of the Sau Mau Ping slope.
+"""Probabilities of failure of planar slopes with random strengths: exact for normal strengths, and published for the
+Sau Mau Ping slope.
 
 Lengths m, angles rad, forces N per metre of thickness.
 """
@@ -23,8 +23,8 @@ LOW_BETA, LOW_PROBABILITY = 1.556, 0.060
 
 @dataclass(frozen=True)
 class PlanarSlope:
-    """A slope ``height`` high whose face is at ``face``, with a plane at ``dip`` through its toe, and an upright
-    tension crack ``crack`` deep behind the crest, filled to ``water`` above its tip; shaken by ``shaking`` g
+    """A slope of this ``height`` with a face at the angle ``face`` and a plane at ``dip`` through its toe. A vertical
+    tension crack behind the crest is ``crack`` deep and filled to ``water`` above its tip; ``shaking`` g acts
     horizontally."""
 
     height: float = 60.0
@@ -38,7 +38,7 @@ class PlanarSlope:
 
     @property
     def length(self) -> float:
-        """Of the plane, from the toe to the crack."""
+        """Length of the plane, from the toe to the crack."""
         return (self.height - self.crack) / math.sin(self.dip)
 
     @property
@@ -50,13 +50,13 @@ class PlanarSlope:
 
     @property
     def driving(self) -> float:
-        """What acts along the plane: weight, shaking and the water in the crack."""
+        """Force along the plane: weight, shaking and water in the crack."""
         thrust = self._thrust + self.shaking * self.weight
         return self.weight * math.sin(self.dip) + thrust * math.cos(self.dip)
 
     @property
     def pressing(self) -> float:
-        """What acts across the plane, less the water in it."""
+        """Force normal to the plane, minus the water pressure in it."""
         thrust = self._thrust + self.shaking * self.weight
         return self.weight * math.cos(self.dip) - self._uplift - thrust * math.sin(self.dip)
 
@@ -76,8 +76,9 @@ class PlanarSlope:
     def probability(
         self, cohesion: tuple[float, float], tangent: tuple[float, float], correlation: float = 0.0
     ) -> float:
-        """The exact probability of a factor below 1 where cohesion and tan φ are normal, (mean, standard deviation)
-        each: Φ(−β) with β the mean of c A + N tan φ − S over its standard deviation, for that is normal too."""
+        """The exact probability of a factor below 1 if cohesion and tan φ are normally distributed, (mean, standard
+        deviation) each: Φ(−β), with β the mean of c A + N tan φ − S over its standard deviation, since this is normally
+        distributed as well."""
         a, b = self.length * cohesion[1], self.pressing * tangent[1]
         mean = self.length * cohesion[0] + self.pressing * tangent[0] - self.driving
         beta = mean / math.sqrt(a * a + b * b + 2.0 * correlation * a * b)

@@ -32,17 +32,17 @@ def plane_failure_factor(
 def two_block_friction(
     active: tuple[float, float], passive: tuple[float, float], interface: float | None = None
 ) -> float:
-    """The friction angle (rad) at which two blocks on two planes just slide, ``active`` = (weight, dip) on the steeper
+    """The friction angle (rad) at which two blocks on two planes just slide: ``active`` = (weight, dip) on the steeper
     plane behind ``passive`` = (weight, dip), across a vertical interface of friction angle ``interface`` (None: that of
     the planes).
 
-    Both slide down their planes, the active block down along the interface too, friction fully mobilised everywhere:
-    two equations of force a block, three unknown forces and tan φ (Jaeger 1971, "Friction of rocks and stability of
-    rock slopes", Géotechnique 21, 97-134; the sliding-block method of the active and passive wedge).
+    Both slide down their planes, and the active block also down along the interface, with friction fully mobilised
+    everywhere: two force equations per block for three unknown forces and tan φ (Jaeger 1971, "Friction of rocks and
+    stability of rock slopes", Géotechnique 21, 97-134; the sliding-block method of the active and passive wedge).
     """
 
     def surplus(angle: float) -> float:
-        """Thrust of the active block minus resistance of the passive one."""
+        """Thrust of the active block minus the resistance of the passive one."""
         slope = math.tan(angle)
         drag = slope if interface is None else math.tan(interface)
         thrusts = []

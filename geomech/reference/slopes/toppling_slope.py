@@ -22,7 +22,7 @@ WIDTH, BASE_DIP_DEG, UNIT_WEIGHT, CREST = 10.0, 30.0, 25.0, 10
 STEP_BELOW, STEP_ABOVE, STEP_BASE = 5.0, 5.0, 1.0
 HEIGHTS = np.array([4.0, 8, 12, 16, 20, 24, 28, 32, 36, 40, 34, 28, 22, 16, 10, 4])
 
-#: tan φ at which the slope just stands without support, and the φ printed with it, degrees.
+#: tan φ at which the slope is just stable without support, and the printed φ, degrees.
 LIMIT_FRICTION, LIMIT_FRICTION_DEG = 0.7855, 38.15
 
 #: Blocks 1 … 16 at that friction: force from the block above P_{n+1} (what the table calls P_n comes from block n on
@@ -45,8 +45,8 @@ SLIDING, TOPPLING, STANDING = range(1, 4), range(4, 14), range(14, 17)
 
 @dataclass(frozen=True, eq=False)
 class Limit:
-    """Forces (16,) kN of blocks 1 … 16: ``thrust`` P_n that block n hands to block n−1, ``normal`` R_n and ``shear``
-    S_n on its base. ``thrust[0]`` is what would have to hold the toe: the slope stands while it is zero."""
+    """Forces (16,) kN of blocks 1 … 16: ``thrust`` P_n of block n on block n−1, ``normal`` R_n and ``shear`` S_n on its
+    base. ``thrust[0]`` is the force required to support the toe: the slope is stable while it is zero."""
 
     thrust: np.ndarray
     normal: np.ndarray
@@ -54,11 +54,11 @@ class Limit:
 
 
 def limit_equilibrium(friction: float) -> Limit:
-    """Goodman & Bray's (1976) calculation, from the top block down, at friction ``friction`` = tan φ in all joints.
+    """Goodman & Bray's (1976) calculation, from the top block down, with ``friction`` = tan φ in all joints.
 
     Block n topples about its toe under P_{n−1} = [P_n (M − Δx tan φ) + ½ W (y sin α − Δx cos α)]/L, or slides under
-    P_{n−1} = P_n − W (cos α tan φ − sin α)/(1 − tan²φ); the greater acts, if it pushes. M and L are the heights of the
-    two thrusts above the base.
+    P_{n−1} = P_n − W (cos α tan φ − sin α)/(1 − tan²φ); the larger thrust acts, if it is positive. M and L are the
+    heights of the two thrusts above the base.
     """
     dip = math.radians(BASE_DIP_DEG)
     sine, cosine = math.sin(dip), math.cos(dip)
@@ -70,7 +70,7 @@ def limit_equilibrium(friction: float) -> Limit:
         m = height if n < CREST else height - STEP_ABOVE
         arm = height if n > CREST else height - STEP_BELOW
         slide = above - weight * (cosine * friction - sine) / (1 - friction**2)
-        # The toe block has nothing below it to lean on: it can only slide.
+        # The toe block has no block in front of it to topple against: it can only slide.
         topple = -math.inf
         if n > 1:
             topple = (above * (m - friction * WIDTH) + 0.5 * weight * (height * sine - WIDTH * cosine)) / arm

@@ -28,16 +28,16 @@ WING_FACTOR = 0.03371
 
 
 def open_slot_in_plane(half_length: float = HALF_LENGTH, angle_deg: float = ANGLE_DEG) -> tuple[float, float]:
-    """(|K_I|, |K_II|)/σ of an open slot at ``angle_deg`` from the horizontal, infinite plane under vertical
-    compression: cos²β √(πa) and sin β cos β √(πa); K_I is negative, the faces approach."""
+    """(|K_I|, |K_II|)/σ of an open slot at ``angle_deg`` to the horizontal in an infinite plane under vertical
+    compression: cos²β √(πa) and sin β cos β √(πa). K_I is negative, since the faces approach each other."""
     b = math.radians(angle_deg)
     root = math.sqrt(math.pi * half_length)
     return math.cos(b) ** 2 * root, math.sin(b) * math.cos(b) * root
 
 
 def secant_correction(half_length: float = HALF_LENGTH, angle_deg: float = ANGLE_DEG, width: float = WIDTH) -> float:
-    """√sec(πc/W) with c = a cos β the flaw's half-length across the load (Feddersen 1966; exact to 1 % for a crack
-    straight across with 2c < 0.8 W). For a slanted flaw a guide only."""
+    """√sec(πc/W) with c = a cos β the projection of the flaw's half-length normal to the load (Feddersen 1966; within 1
+    % for a crack normal to the load with 2c < 0.8 W). For an inclined flaw an approximation only."""
     c = half_length * math.cos(math.radians(angle_deg))
     return math.sqrt(1 / math.cos(math.pi * c / width))
 
@@ -45,11 +45,11 @@ def secant_correction(half_length: float = HALF_LENGTH, angle_deg: float = ANGLE
 def wing_horii_nemat_nasser(
     wing: np.ndarray, half_length: float = HALF_LENGTH, angle_deg: float = ANGLE_DEG, friction: float = 0.0
 ) -> np.ndarray:
-    """K_I/σ of straight wings along the load, ``wing`` m long, from a **closed** flaw in an infinite plane.
+    """K_I/σ of straight wings of length ``wing`` m, parallel to the load, from a **closed** flaw in an infinite plane.
 
-    Horii & Nemat-Nasser (1986), Phil. Trans. R. Soc. A 319, 337-374, for uniaxial compression without cohesion:
-    K_I = 2a τ* sin θ/√(π(l + l*)), τ* = σ cos β (sin β − μ cos β), l* = 0.27 a; the wing is θ = 90° − β from the flaw,
-    so sin θ = cos β, and the load does not press on its faces.
+    Horii & Nemat-Nasser (1986), Phil. Trans. R. Soc. A 319, 337-374, for uniaxial compression without cohesion: K_I =
+    2a τ* sin θ/√(π(l + l*)), τ* = σ cos β (sin β − μ cos β), l* = 0.27 a. The wing is at θ = 90° − β to the flaw, so
+    that sin θ = cos β, and the load causes no pressure on its faces.
     """
     b = math.radians(angle_deg)
     driving = max(0.0, math.cos(b) * (math.sin(b) - friction * math.cos(b)))
@@ -68,8 +68,8 @@ def wing_ashby_hallam(wing: np.ndarray, half_length: float = HALF_LENGTH, fricti
 
 
 def tangent_modulus() -> float:
-    """Axial stress over axial strain before growth: plane strain E' softened by the open slot as if it were small,
-    E'/(1 + 2πa² cos²β/A) (Walsh 1965). Image effects of the sides soften a little more."""
+    """Axial stress over axial strain before growth: plane strain modulus E' reduced by the open slot as for a small
+    crack, E'/(1 + 2πa² cos²β/A) (Walsh 1965). The free sides reduce it slightly more."""
     plane = YOUNGS_MODULUS / (1 - POISSONS_RATIO**2)
     slot = 2 * math.pi * (HALF_LENGTH * math.cos(math.radians(ANGLE_DEG))) ** 2 / (WIDTH * HEIGHT)
     return plane / (1 + slot)

@@ -17,7 +17,7 @@ MEASURED_TURN = {30.0: 62.4, 40.0: 55.6, 50.0: 51.1, 60.0: 43.1, 70.0: 30.7, 80.
 
 
 def largest_hoop_stress(beta_deg: float) -> float:
-    """The turn, degrees, of the largest hoop stress for a crack at β from the pull in the infinite plane: the root of
-    sin θ = cot β (3 cos θ − 1) (Erdogan & Sih 1963, closed form)."""
+    """Angle (degrees) of the largest hoop stress for a crack at β to the tension in the infinite plane: the root of sin
+    θ = cot β (3 cos θ − 1) (Erdogan & Sih 1963, closed form)."""
     ratio = 1 / math.tan(math.radians(beta_deg))
     return math.degrees(2 * math.atan(2 * ratio / (1 + math.sqrt(1 + 8 * ratio**2))))

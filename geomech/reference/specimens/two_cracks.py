@@ -72,8 +72,8 @@ OPEN_SLOT_K_II = {
 
 
 def line_beside_centre(slope: float, intercept: float, exchanged: bool = False) -> tuple[float, float]:
-    """(degrees from the horizontal, m by which it passes the specimen's centre) of y = slope · x + intercept, or, with
-    the axes ``exchanged``, of x = slope · y + intercept."""
+    """(degrees from the horizontal, distance m from the specimen's centre) of the line y = slope · x + intercept or,
+    with the axes ``exchanged``, x = slope · y + intercept."""
     (x, y), angle = CENTRE, float(np.degrees(np.arctan(slope)))
     if exchanged:
         (x, y), angle = (y, x), (90.0 - angle if slope > 0 else -90.0 - angle)
@@ -81,7 +81,7 @@ def line_beside_centre(slope: float, intercept: float, exchanged: bool = False) 
 
 
 def crack_ends(phi_deg: float) -> tuple[np.ndarray, np.ndarray]:
-    """Ends of crack 1 and crack 2, each (2, 2) from the −u to the +u end, m, origin at the specimen's centre."""
+    """Ends of crack 1 and crack 2, each (2, 2) from the −u to the +u end, m, with the origin at the specimen's centre."""
 
     def crack(centre_y: float, angle_deg: float) -> np.ndarray:
         u = HALF_LENGTH * np.array([np.cos(np.radians(angle_deg)), np.sin(np.radians(angle_deg))])
