@@ -383,7 +383,7 @@ class EnergyBudget:
         gain = residual - min(0.0, float(totals[_SUMS["scheme"]]) + released)
         if gain > warned * turnover:
             log.warning(
-                "t = %g s: the blocks have gained %.3g J/m without work, %.2g of all energy turned over: shorten the "
+                "t = %g s: the blocks have gained %.3g J/m without work, %.2g of all converted energy: shorten the "
                 "time step",
                 time, gain, gain / turnover,
             )  # fmt: skip

@@ -65,8 +65,7 @@ def add_energy(page: Page, energy: Mapping[str, float]) -> None:
         )
     if energy.get("budget_residual") is not None:
         sentences.append(
-            f"Of all energy turned over by blocks and cracks, {abs(energy['budget_residual']):.1e} is not "
-            "accounted for."
+            f"Of all energy converted by blocks and cracks, {abs(energy['budget_residual']):.1e} is not accounted for."
         )
     page.text(*sentences)
 

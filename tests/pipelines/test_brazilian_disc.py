@@ -35,7 +35,7 @@ def run_pipeline(out: Path, *variants: str, wishes: tuple[str, ...] = ()) -> dic
     finally:
         Pressed.on_end = ended
     for name in variants:
-        # Of the energy turned over, in any cycle, through growth and splitting.
+        # Of the energy converted, in any cycle, through growth and splitting.
         assert np.nanmax(np.abs(Run(out / name).history["budget_residual"])) < 0.01
     return dict(zip(variants, seen))
 

@@ -15,7 +15,7 @@ from geomech.reference.slopes import flexural_toppling as published
 
 FOLDER = Path(__file__).parents[2] / "pipelines" / "flexural_toppling"
 FEW_FILES = ("--set", "output.interior=false", "--set", "output.every=1000")
-#: Of the energy turned over, what may be left over in any cycle.
+#: Of the energy converted, what may be left over in any cycle.
 LEFT_OVER = 0.01
 
 

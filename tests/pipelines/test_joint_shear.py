@@ -37,7 +37,7 @@ def run_pipeline(out: Path, *variants: str) -> dict[str, Sheared]:
 
 
 def unbalanced(run: Path) -> float:
-    """The largest part of all energy turned over that was not accounted for in any cycle."""
+    """The largest part of all energy converted that was not accounted for in any cycle."""
     with (run / "history.csv").open(encoding="utf-8") as file:
         return max(abs(float(row["budget_residual"])) for row in csv.DictReader(file) if row["budget_residual"])
 

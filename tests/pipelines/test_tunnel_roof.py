@@ -35,7 +35,7 @@ def ran(out: Path, *variants: str) -> dict[str, study.Watch]:
     finally:
         study.check = checked
     for name in variants:
-        # Of the energy turned over, in any cycle.
+        # Of the energy converted, in any cycle.
         assert np.nanmax(np.abs(Run(out / name).history["budget_residual"])) < 0.01
     return seen
 

@@ -19,7 +19,7 @@ RIGHT, REPORTED, REFUSED, WRONG = "right", "reported", "refused", "wrong"
 #: Quantities of cells of blocks, and of cracks, in addition to the error.
 OF_BLOCKS = {
     "penetration": "worst penetration, over the block's size",
-    "drift": "energy drift, over all that was turned over",
+    "drift": "energy drift, relative to all energy converted",
     "cuts": "steps cut",
 }
 OF_CRACKS = {"condition": "condition number", "residual": "residual"}

@@ -63,7 +63,7 @@ REASONS = (
     Reason(
         "energy by overlap",
         dda.NotConverged,
-        r"overlapping blocks have created \S+ of all energy turned over",
+        r"overlapping blocks have created \S+ of all converted energy",
         "blocks that move where nothing holds them have closed a contact while they overlapped: the pair is named",
     ),
     Reason(

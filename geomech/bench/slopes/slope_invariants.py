@@ -52,7 +52,7 @@ INVARIANTS = {
         "strain of a block's cracks found and assumed, over the block's", 1e-1, (_HANGS,), lasting=False
     ),
     "energy": Invariant(
-        "energy not accounted for, over what was turned over (steps of a hundredth of the height leave up to 1e-2)",
+        "energy not accounted for, relative to all energy converted (steps of a hundredth of the height leave up to 1e-2)",
         GAIN,
         ("without work", _STRAINED),
     ),

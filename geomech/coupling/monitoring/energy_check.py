@@ -94,7 +94,7 @@ class BendingWatch:
 
 
 class GrowthWatch:
-    """Reports, once, that growth at constant load has released more than `GAIN` of all energy converted: it is
+    """Reports, once, that growth at constant load has released more than `GAIN` of all converted energy: it is
     unstable."""
 
     def __init__(self) -> None:

@@ -55,7 +55,7 @@ class OverlapWatch:
             return
         a, b = (names[k] if names else f"block {k}" for k in (worst.block, worst.other))
         what = (
-            f"overlapping blocks have created {share:.2g} of all energy turned over in the run, most of it at "
+            f"overlapping blocks have created {share:.2g} of all converted energy in the run, most of it at "
             f"t = {self._when:.6g} s: {a!r} and {b!r} overlapped by {worst.deep:.3g} m near x = {worst.x:.6g}, "
             f"y = {worst.y:.6g} m; shorten dda.time_step_s, or merge slivers (geometry.smallest_block_m2)"
         )

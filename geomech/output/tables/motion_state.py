@@ -65,7 +65,7 @@ def motion_summary(cycle: Cycle) -> dict[str, Any]:
 def energy_summary(cycle: Cycle) -> dict[str, float]:
     """Energy budget of the run, J/m, for ``summary.json``; empty without one.
 
-    ``budget_residual`` is relative to all energy turned over. ``unpaid_toughness``: fracture energy in a run in motion
+    ``budget_residual`` is relative to all energy converted. ``unpaid_toughness``: fracture energy in a run in motion
     that the blocks, which store no bending energy, did not supply.
     """
     names = (

@@ -130,7 +130,7 @@ def test_hooks_combs_cogs_sticks_and_boxes_stay_out_of_each_other(scene, thin, s
 
 
 def test_energy_of_overlaps_is_told_of_and_ends_the_run(caplog):
-    """At 1 % of what was turned over, once, and at 10 %: with the blocks and the place. Overlaps that were drawn count
+    """At 1 % of the energy converted, once, and at 10 %: with the blocks and the place. Overlaps that were drawn count
     for nothing."""
     empty = dda.StepEnergy(*[0.0] * len(dda.StepEnergy._fields))
     drawn = empty._replace(kinetic=100.0, overlap=50.0)
@@ -145,5 +145,5 @@ def test_energy_of_overlaps_is_told_of_and_ends_the_run(caplog):
     assert len(caplog.records) == 1
     assert "'a' and 'b' overlapped by 0.01 m near x = 2, y = 3 m" in caplog.text
     budget = budget.after(empty._replace(kinetic=100.0, before=100.0, overlap=3.0), 0.5)
-    with pytest.raises(dda.NotConverged, match=r"0.11 of all energy turned over .* 'a' and 'b'"):
+    with pytest.raises(dda.NotConverged, match=r"0.11 of all converted energy .* 'a' and 'b'"):
         watch.check(budget, worst, ("a", "b"), 0.5)
