@@ -403,7 +403,7 @@ class _CacheFile(IndexDataCacheFile):
     def _load_data(self, name: str):
         stored = Path(self._data_path(name)).read_bytes()
         if zlib.crc32(stored[:-4]).to_bytes(4, "little") != stored[-4:]:
-            raise ValueError("its sum is another")
+            raise ValueError("its checksum does not match")
         return super()._load_data(name)
 
     def _save_data(self, name: str, data) -> None:

@@ -324,7 +324,7 @@ def _refuse_to_overwrite_scene(scene: Scene, folder: Path) -> None:
         from .scene import Fault, SceneError
 
         way_out = "name another folder: --out DIR on the command line"
-        raise SceneError([Fault(str(scene.path), "the run would write over the scene it is run from", way_out)])
+        raise SceneError([Fault(str(scene.path), "the run would overwrite its own scene", way_out)])
 
 
 def _end_reason(stopping: list[str], error: BaseException | None) -> str:

@@ -130,7 +130,7 @@ def _refuse_other_sources(header: Mapping[str, Any], path: Path) -> None:
             what = {"format": "way of storing runs", "sources": "geomech's sources"}.get(name, name)
             was = "" if name == "sources" else f" ({header.get(name)}, now {value})"
             raise NotResumable(
-                f"{path} was written with another {what}{was}: go on with what wrote it, geomech "
+                f"{path} was written with another {what}{was}: continue it with the version that wrote it, geomech "
                 f"{header.get('geomech')}, or run the scene again"
             )
 
@@ -193,7 +193,7 @@ def _refuse_finished(end: str, header: Mapping[str, Any], scene: Any) -> None:
             return
         kept = [kind for kind in settings.stop_at if kind != end]
         way_out = f"--set 'run.stop_at={json.dumps(kept)}'"
-    raise Finished(f"the run has ended ({end}); to let it go on: {way_out}")
+    raise Finished(f"the run has ended ({end}); to continue it: {way_out}")
 
 
 def _run_from_start(request: _Request) -> dict[str, Any]:
@@ -201,8 +201,8 @@ def _run_from_start(request: _Request) -> dict[str, Any]:
     end = _end_reason(folder)
     if end is not None:
         raise Finished(
-            f"the run has ended ({end}), and it has no checkpoint: run the scene again to let it go on, with a larger "
-            "output.checkpoint_kept_mb where it is its checkpoint's size that was too large"
+            f"the run has ended ({end}), and it has no checkpoint: to continue it, run the scene again, with a larger "
+            "output.checkpoint_kept_mb if its checkpoint was too large to keep"
         )
     if not (folder / "scene.toml").is_file():
         raise NotResumable(f"{folder} holds neither a checkpoint nor a scene.toml: run the scene again")

@@ -47,7 +47,7 @@ def test_overrides_that_cannot_be_are_told_all_at_once():
     with pytest.raises(SceneError) as refused:
         geomech.load_scene(TUNNEL, {"dda.time_step_s": object(), "dda.nothing": 1, "growth.enabled": False})
     assert len(refused.value.errors) == 2 and "is not possible in a scene" in str(refused.value)
-    with pytest.raises(SceneError, match="is one text"):
+    with pytest.raises(SceneError, match="is a single string"):
         geomech.load_scene(TUNNEL, "dda.time_step_s=1")
 
 

@@ -309,7 +309,7 @@ def test_a_checkpoint_changes_nothing_of_the_run_that_writes_it(write, tmp_path)
     assert differing(tmp_path / "often", tmp_path / "never") == ["scene.toml"]
     assert len(checkpoint_file.found(tmp_path / "often" / checkpoint_file.FOLDER)) == checkpoint_file.KEPT
     assert not (tmp_path / "never" / checkpoint_file.FOLDER).exists()
-    with pytest.raises(Finished, match="no checkpoint: run the scene again"):
+    with pytest.raises(Finished, match="no checkpoint: to continue it, run the scene again"):
         resume(tmp_path / "never", ["run.end_time_s=0.2"])
 
 
@@ -404,7 +404,7 @@ def test_another_scene_or_version_is_refused(write, tmp_path, monkeypatch):
     known = checkpoint_file.identity()
     for name, told in (("sources", "geomech's sources"), ("numpy", "another numpy"), ("format", "way of storing")):
         monkeypatch.setattr(checkpoint_file, "identity", lambda name=name: {**known, name: "another"})
-        with pytest.raises(NotResumable, match=f"{told}.*go on with what wrote it, geomech 0"):
+        with pytest.raises(NotResumable, match=f"{told}.*continue it with the version that wrote it, geomech 0"):
             resume(out)
     monkeypatch.setattr(checkpoint_file, "identity", lambda: known)
     history = (out / "history.csv").read_bytes()

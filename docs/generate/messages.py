@@ -1,4 +1,4 @@
-"""The page of all messages: what checks of a scene and warnings of a run can say, read from the sources.
+"""The page of all messages: the messages of checks of a scene and the warnings of a run, read from the sources.
 
 A message is the text of the source; what stands in braces there is shown as an ellipsis.
 """
@@ -16,9 +16,9 @@ PACKAGE = ROOT / "geomech"
 
 OPENING = """# All messages
 
-Read from the sources, so that none is missing: every error and warning of a scene with its way out, and every warning that a
-run can write to the terminal and `run.log`. An ellipsis stands for names and numbers. What needs more explanation:
-[messages, and what to do](../reference/messages.md).
+Every error and warning of a scene with its remedy, and every warning that a run can write to the terminal and `run.log`. The
+list is read from the sources, so that none is missing. An ellipsis stands for names and numbers.
+[Messages, and what to do](../reference/messages.md) explains those that need more words.
 """
 
 #: Title → calls that make such a message, and where they may stand.
@@ -33,7 +33,7 @@ def page() -> str:
     for title, calls, places in (SCENE_ERRORS, SCENE_WARNINGS, RUN_WARNINGS):
         lines.append(f"## {title}\n")
         for message, way_out in sorted(set(messages(calls, places)), key=lambda pair: pair[0].strip("… '").lower()):
-            empty = "" if calls == RUN_WARNINGS[1] else "what to do depends on the scene, and stands beside the message"
+            empty = "" if calls == RUN_WARNINGS[1] else "the remedy depends on the scene and is given with the message"
             lines += (
                 [f"- {_escaped(message)}\\", f"  → *{_escaped(way_out or empty)}*"]
                 if way_out or empty

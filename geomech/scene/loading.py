@@ -194,7 +194,7 @@ def load_scene(
         _apply_variant(data, variant, places, faults)
     if isinstance(overrides, str):
         way = 'write ["section.key=value"] or {"section.key": value}'
-        raise SceneError([Fault(str(path), f"{overrides!r} is one text", way)])
+        raise SceneError([Fault(str(path), f"{overrides!r} is a single string", way)])
     changes: Iterable[str | tuple[str, Any]] = overrides.items() if isinstance(overrides, Mapping) else overrides
     for number, one in enumerate(changes):
         called = f"--set {one}" if isinstance(one, str) else f"{one[0]} = {one[1]!r}"

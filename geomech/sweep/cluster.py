@@ -86,7 +86,7 @@ class DaskEngine:
             return Client(self.address, timeout=seconds, set_as_default=False)
         except (OSError, TimeoutError, ValueError) as error:
             raise EngineRefused(
-                f"no scheduler answers at {self.address} ({error}): start one, dask scheduler --port 8786"
+                f"no scheduler answers at {self.address} ({error}): start one: dask scheduler --port 8786"
             ) from error
 
     def _check_workers(self, seconds: float) -> None:
@@ -95,7 +95,7 @@ class DaskEngine:
         while not self._client.nthreads():
             if time.monotonic() > until:
                 raise EngineRefused(
-                    f"the scheduler at {self.address} has no workers: start some, dask worker {self.address} "
+                    f"the scheduler at {self.address} has no workers: start some: dask worker {self.address} "
                     "--nthreads 1"
                 )
             time.sleep(0.2)
@@ -114,14 +114,14 @@ class DaskEngine:
             for name, what in (("version", "geomech"), ("program", "geomech's sources"), ("scene", "the scene")):
                 if on_worker[name] != here[name]:
                     raise EngineRefused(
-                        f"the worker {worker} on {on_worker['host']} has other {what} ({on_worker[name]}, here "
+                        f"the worker {worker} on {on_worker['host']} has a different version of {what} ({on_worker[name]}, here "
                         f"{here[name]}): "
                         + ("put the scene and its files there under the same path" if name == "scene"
                            else f"install the same geomech on all machines, {__version__} as here")
                     )  # fmt: skip
             if self._folder is not None and not on_worker["folder"]:
                 raise EngineRefused(
-                    f"the worker {worker} on {on_worker['host']} does not see {self._folder}: --keep wants a "
+                    f"the worker {worker} on {on_worker['host']} does not see {self._folder}: --keep needs a "
                     "folder that all machines share"
                 )
 
@@ -230,7 +230,7 @@ def made_there(jobs: list[Job]) -> list[dict[str, Any]]:
     if jobs[0].program != program():
         raise EngineRefused(
             f"{socket.gethostname()} has geomech {__version__} of other sources than this sweep: install the "
-            "same everywhere"
+            "same version everywhere"
         )
     if getattr(_OWN, "engine", None) is None:
         _OWN.engine = LocalEngine(1)

@@ -198,7 +198,7 @@ def _prepare(folder: Path, plan: Plan, resume: bool, overwrite: bool) -> None:
             "files": _files(plan)}  # fmt: skip
     if resume:
         if stored is None:
-            raise CannotResume(f"{folder} holds no sweep to go on with")
+            raise CannotResume(f"{folder} holds no sweep to continue")
         for name, what in (
             ("plan", "what varies or is measured"),
             ("table", "the table of runs"),
@@ -208,12 +208,12 @@ def _prepare(folder: Path, plan: Plan, resume: bool, overwrite: bool) -> None:
             if stored[name] != requested[name]:
                 raise CannotResume(
                     f"{what} has changed since the sweep in {folder} began: start again in another folder "
-                    "(--out DIR), or over it (--overwrite)"
+                    "(--out DIR), or replace it (--overwrite)"
                 )
         return
     if stored is not None and not overwrite:
         raise FolderTaken(
-            f"{folder} holds a sweep: go on with it (--resume), run over it (--overwrite), or name another "
+            f"{folder} holds a sweep: continue it (--resume), replace it (--overwrite), or name another "
             "folder (--out DIR)"
         )
     for name in (JOURNAL, "runs.csv", "runs.parquet", "times.csv"):

@@ -49,18 +49,18 @@ _LONGEST, _DEEPEST = 2000, 40
 
 
 class ExpressionError(ValueError):
-    """What is no expression, or asks for more than one may."""
+    """An invalid expression, or one with operations that are not permitted."""
 
 
 @lru_cache(maxsize=4096)
 def parsed(text: str) -> ast.expr:
     """The expression ``text``. Raises ExpressionError that names what is not allowed."""
     if len(text) > _LONGEST:
-        raise ExpressionError(f"an expression of {len(text)} characters: at most {_LONGEST}")
+        raise ExpressionError(f"the expression has {len(text)} characters; at most {_LONGEST} are permitted")
     try:
         tree = ast.parse(text.strip(), mode="eval").body
     except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
-        raise ExpressionError(f"{text!r} is no expression: {getattr(error, 'msg', error)}") from error
+        raise ExpressionError(f"{text!r} is not a valid expression: {getattr(error, 'msg', error)}") from error
     _check(tree, text, 0)
     return tree
 
@@ -100,7 +100,9 @@ def evaluate(text: str, names: Mapping[str, Any]) -> Any:
     if isinstance(found, (str, bool, np.bool_)):
         return found if isinstance(found, str) else bool(found)
     if isinstance(found, Mapping):
-        raise ExpressionError(f"{text!r} is a table, not a number: it has {', '.join(map(str, list(found)[:8]))}")
+        raise ExpressionError(
+            f"{text!r} is a table, not a number: its entries are {', '.join(map(str, list(found)[:8]))}"
+        )
     return float(found)
 
 
@@ -114,7 +116,7 @@ def margin_of(text: str) -> str:
             return f"({left}) - ({right})"
         if isinstance(node.ops[0], (ast.Gt, ast.GtE)):
             return f"({right}) - ({left})"
-    raise ExpressionError(f"{text!r} is no comparison of two numbers, as factor_of_safety < 1")
+    raise ExpressionError(f"{text!r} is not a comparison of two numbers, such as factor_of_safety < 1")
 
 
 def _check(node: ast.AST, text: str, depth: int) -> None:
@@ -123,26 +125,26 @@ def _check(node: ast.AST, text: str, depth: int) -> None:
     if isinstance(node, ast.Call):
         name = node.func.id if isinstance(node.func, ast.Name) else ast.unparse(node.func)
         if name not in FUNCTIONS or node.keywords or any(isinstance(each, ast.Starred) for each in node.args):
-            raise ExpressionError(f"{text!r} calls {name}: there are {', '.join(FUNCTIONS)}")
+            raise ExpressionError(f"{text!r} calls {name}, which is not available; there are {', '.join(FUNCTIONS)}")
         if not node.args:
-            raise ExpressionError(f"{text!r}: {name} of what?")
+            raise ExpressionError(f"{text!r}: {name} needs an argument")
         children = node.args
     elif isinstance(node, ast.Attribute):
         _dotted(node)
         return
     elif isinstance(node, ast.Constant):
         if not isinstance(node.value, (int, float, str, bool)) or isinstance(node.value, complex):
-            raise ExpressionError(f"{text!r}: {node.value!r} is neither a number nor a text")
+            raise ExpressionError(f"{text!r}: {node.value!r} is neither a number nor a string")
         return
     elif isinstance(node, (ast.BinOp, ast.UnaryOp, ast.Compare, ast.BoolOp, ast.IfExp, ast.Name)):
         operators = [getattr(node, "op", None), *getattr(node, "ops", [])]
         known = (*_BINARY, *_COMPARED, ast.UAdd, ast.USub, ast.Not, ast.And, ast.Or)
         unknown = [each for each in operators if each is not None and not isinstance(each, known)]
         if unknown:
-            raise ExpressionError(f"{text!r}: {type(unknown[0]).__name__} is not known here")
+            raise ExpressionError(f"{text!r}: {type(unknown[0]).__name__} is not permitted")
         children = [each for each in ast.iter_child_nodes(node) if isinstance(each, ast.expr)]
     else:
-        raise ExpressionError(f"{text!r}: {type(node).__name__} is not known here, only arithmetic and comparisons are")
+        raise ExpressionError(f"{text!r}: {type(node).__name__} is not permitted, only arithmetic and comparisons are")
     for child in children:
         _check(child, text, depth + 1)
 
@@ -152,7 +154,7 @@ def _dotted(node: ast.AST) -> str:
         return node.id
     if isinstance(node, ast.Attribute):
         return f"{_dotted(node.value)}.{node.attr}"
-    raise ExpressionError(f"{ast.unparse(node)!r}: a name stands before a dot")
+    raise ExpressionError(f"{ast.unparse(node)!r}: a name is required before a dot")
 
 
 def _value(node: ast.AST, names: Mapping[str, Any]) -> Any:
@@ -190,7 +192,7 @@ def _value(node: ast.AST, names: Mapping[str, Any]) -> Any:
 def _number(value: Any) -> Any:
     """A float, or an array of them: products of texts and long whole numbers are not made."""
     if isinstance(value, (str, Mapping)):
-        raise ExpressionError(f"{str(value)[:40]!r} is no number")
+        raise ExpressionError(f"{str(value)[:40]!r} is not a number")
     return value if isinstance(value, np.ndarray) else float(value)
 
 

@@ -249,12 +249,12 @@ def seeds_of(written: Any) -> tuple[int, ...]:
         for part in written.split(","):
             first, dash, last = part.strip().partition("-")
             if not first.isdecimal() or (dash and not last.isdecimal()) or (dash and int(last) < int(first)):
-                raise ValueError(f"{part.strip()!r} is no range of seeds that ascends")
+                raise ValueError(f"{part.strip()!r} is not an ascending range of seeds")
             found += range(int(first), int(last or first) + 1)
     if not found or min(found) < 0:
-        raise ValueError("seeds are whole numbers ≥ 0, at least one")
+        raise ValueError("seeds are whole numbers ≥ 0; give at least one")
     if len(set(found)) < len(found):
-        raise ValueError("a seed stands twice")
+        raise ValueError("a seed is given twice")
     return tuple(found)
 
 
@@ -286,7 +286,9 @@ class _Checker:
                     self._check_kind(made, key)
             elif not name.isidentifier():
                 self.refuse(
-                    ("vary", name), f"{name!r} is neither a key of the scene nor a name", "write section.key, or a word"
+                    ("vary", name),
+                    f"{name!r} is neither a key of the scene nor a name",
+                    "write section.key, or a single word",
                 )
         names = {each.name for each in variables} | {"seed"}
         for name, text in _by_key(settings.derive).items():
@@ -303,7 +305,7 @@ class _Checker:
                 )
         twice = [key for key in derived if key in keys.values()]
         if twice:
-            self.refuse(("derive", twice[0]), "the key varies and is derived too", "leave one of them out")
+            self.refuse(("derive", twice[0]), "the key is both varied and derived", "leave one of them out")
         plain = json.loads(settings.model_dump_json())
         plain["vary"], plain["derive"] = _by_key(settings.vary), _by_key(settings.derive)
         box, cells = _map_of(self.base)
@@ -385,7 +387,9 @@ class _Checker:
             return
         kind = kind_of(found.annotation)[1]
         if kind is int:
-            self.refuse(("vary", made.name), "the key takes whole numbers", "list them, or write a range, as 1:9:2")
+            self.refuse(
+                ("vary", made.name), "the key takes whole numbers", "list them, or write a range, such as 1:9:2"
+            )
             return
         low, high = -math.inf, math.inf
         metadata = [*found.metadata, *getattr(found.annotation, "__metadata__", ())]
@@ -415,7 +419,7 @@ class _Checker:
             parsed(text)
             unknown = sorted(name for name in names_in(text) if name not in names)
         except ExpressionError as error:
-            self.refuse(where, str(error), "write an expression of what varies, as 0.5 * z")
+            self.refuse(where, str(error), "write an expression of the variables, such as 0.5 * z")
             return False
         if unknown:
             self.refuse(where, f"there is no variable {unknown[0]!r}", nearest(unknown[0], sorted(names)))
@@ -443,12 +447,14 @@ class _Checker:
                 "give only one of them, or the same number of both",
             )
         if random and not settings.runs and not seeds:
-            self.refuse(("runs",), "random variables without a number of samples", "say how many: --runs 500")
+            self.refuse(
+                ("runs",), "random variables without a number of samples", "give the number, for example --runs 500"
+            )
         if settings.runs and not random and not settings.rare:
             self.refuse(
                 ("runs",),
                 "nothing random varies",
-                "leave `runs` out; listed values are all run, seeds are counted by `seeds`",
+                "leave `runs` out: all listed values are run, and `seeds` gives the number of seeds",
             )
         if settings.sampling == "saltelli" and (settings.correlated or seeds):
             self.refuse(
@@ -475,7 +481,7 @@ class _Checker:
             try:
                 margin_of(plan.fails)
             except ExpressionError as error:
-                self.refuse(("fails",), str(error), "the method follows how far a run is from failure")
+                self.refuse(("fails",), str(error), "the method needs the distance of a run from failure")
 
     def _check_correlations(self, plan: Plan) -> None:
         settings, names = self.settings, [each.name for each in plan.random]
@@ -497,7 +503,9 @@ class _Checker:
                     parsed(text or "0")
                 except ExpressionError as error:
                     self.refuse(
-                        (name, key) if key else (name,), str(error), "write an expression, as factor_of_safety < 1.3"
+                        (name, key) if key else (name,),
+                        str(error),
+                        "write an expression, such as factor_of_safety < 1.3",
                     )
 
     def check_values(self, plan: Plan) -> None:

@@ -158,11 +158,11 @@ def design_point(g: LimitState, dimensions: int) -> tuple[np.ndarray, int]:
         values = np.asarray(g(np.concatenate([point[None], point + moved, point - moved])), dtype=float)
         made += len(values)
         if not np.isfinite(values).all():
-            raise ValueError("importance sampling found a point without an answer: use subset simulation")
+            raise ValueError("importance sampling met a run without a result: use subset simulation")
         here, gradient = values[0], (values[1 : dimensions + 1] - values[dimensions + 1 :]) / (2 * _DIFFERENCE)
         size = float(gradient @ gradient)
         if size == 0:
-            raise ValueError("nothing that varies changes the result: there is no design point")
+            raise ValueError("no variable changes the result: there is no design point")
         scale = abs(here) if step == 0 and here else scale
         new = (gradient @ point - here) / size * gradient
         change = float(np.linalg.norm(new - point))

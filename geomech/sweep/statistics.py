@@ -178,7 +178,7 @@ def sensitivities(
         by_group = by_group[np.isfinite(by_group).all(axis=1)]
         if len(by_group) < _LEAST:
             raise SensitivityMissing(
-                f"{len(by_group)} whole groups of runs with an answer: sensitivities want {_LEAST}"
+                f"{len(by_group)} complete groups of runs with a result: sensitivities need {_LEAST}"
             )
         found = sobol.analyze(problem, by_group.ravel(), calc_second_order=False, seed=0)
         columns = found["S1"], found["S1_conf"], found["ST"], found["ST_conf"]
@@ -187,7 +187,7 @@ def sensitivities(
     points = np.stack([numbers(rows, name) for name in names], axis=1)[known] if names else np.empty((0, 0))
     least = max(_LEAST_SAMPLES, _A_VARIABLE * len(names))
     if known.sum() < least:
-        raise SensitivityMissing(f"{int(known.sum())} runs with an answer: sensitivities want {least}")
+        raise SensitivityMissing(f"{int(known.sum())} runs with a result: sensitivities need {least}")
     found = rbd_fast.analyze(problem, points, values[known], seed=0)
     nan = [math.nan] * len(names)
     columns = found["S1"], found["S1_conf"], nan, nan

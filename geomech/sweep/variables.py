@@ -143,7 +143,9 @@ def variable(name: str, written: Any) -> Variable:
     if called:
         return _called(name, called[1], _numbers(called[2], text), text)
     if "(" in text:
-        raise VariableError(f"{text} is no distribution", f"there are {', '.join(('log', *LAWS))}, as normal(35, 5)")
+        raise VariableError(
+            f"{text} is not a distribution", f"there are {', '.join(('log', *LAWS))}, for example normal(35, 5)"
+        )
     if re.fullmatch(r"[^,:]+(:[^,:]+){1,2}", text) and all(_is_number(part) for part in text.split(":")):
         return _listed(name, _range([float(part) for part in text.split(":")], text))
     return _listed(name, [_value(part) for part in text.strip("[]").split(",") if part.strip()])
@@ -151,9 +153,11 @@ def variable(name: str, written: Any) -> Variable:
 
 def _listed(name: str, values: Sequence[Any]) -> Listed:
     if not values:
-        raise VariableError("no values", "write a list, as 20, 30, 40, a range, as 20:40:5, or a distribution")
+        raise VariableError(
+            "no values", "write a list, such as 20, 30, 40, a range, such as 20:40:5, or a distribution"
+        )
     if len(set(map(repr, values))) < len(values):
-        raise VariableError("a value stands twice", "write each value once: every one is run")
+        raise VariableError("a value is given twice", "write each value once: all are run")
     if any(isinstance(value, float) and not math.isfinite(value) for value in values):
         raise VariableError("a value is not finite", "write finite numbers")
     return Listed(name, tuple(values))
@@ -188,7 +192,7 @@ def _of_table(name: str, table: dict[str, Any]) -> Random:
     defaults = {"low": -math.inf, "high": math.inf}
     numbers: list[Any] = [table.get(key, defaults.get(key)) for key in names]
     if not all(isinstance(number, (int, float)) and not isinstance(number, bool) for number in numbers):
-        raise VariableError(f"the parameters of {law} are numbers", f"its keys are {', '.join(names)}")
+        raise VariableError(f"the parameters of {law} must be numbers", f"its keys are {', '.join(names)}")
     return _random(name, law, [float(number) for number in numbers])
 
 
@@ -202,20 +206,22 @@ def _random(name: str, law: str, numbers: list[float]) -> Random:
     elif law == "triangular":
         low, high = p[0], p[2]
         if not p[0] <= p[1] <= p[2]:
-            raise VariableError(f"the most likely value {p[1]:g} is not between {low:g} and {high:g}", "sort them")
+            raise VariableError(
+                f"the most likely value {p[1]:g} is not between {low:g} and {high:g}", "put them in ascending order"
+            )
     elif law == "beta":
         low, high = p[:2]
         if p[2] <= 0 or p[3] <= 0:
             raise VariableError("α and β must be > 0", "write beta(low, high, alpha, beta)")
     elif law == "normal" and p[1] <= 0:
-        raise VariableError(f"the standard deviation {p[1]:g} is not > 0", "write one > 0, or a value alone")
+        raise VariableError(f"the standard deviation {p[1]:g} is not > 0", "write one > 0, or a single value")
     elif law in ("lognormal", "exponential") and min(p) <= 0:
-        raise VariableError(f"{law} wants numbers > 0", f"write {law}({', '.join(LAWS[law])}) with numbers > 0")
+        raise VariableError(f"{law} needs numbers > 0", f"write {law}({', '.join(LAWS[law])}) with numbers > 0")
     if not low < high:
-        raise VariableError(f"it lies between {low:g} and {high:g}: nothing is left", "the lower bound stands first")
+        raise VariableError(f"no value lies between {low:g} and {high:g}", "put the lower bound first")
     made = Random(name, law, tuple(p), low, high)
     if law not in _BOUNDED and Random(name, law, tuple(p)).outside(low, high) > 1.0 - 1e-12:
-        raise VariableError(f"nothing of it lies between {low:g} and {high:g}", "cut it off farther out")
+        raise VariableError(f"its probability between {low:g} and {high:g} is zero", "truncate it farther out")
     return made
 
 
@@ -223,10 +229,10 @@ def _range(numbers: list[float], text: str) -> list[float | int]:
     first, last, *rest = numbers
     step = rest[0] if rest else 1.0
     if step == 0 or (last - first) / step < 0 or not all(map(math.isfinite, numbers)):
-        raise VariableError(f"the range {text} is empty", "write first:last:step, as 20:40:5 or 40:20:-5")
+        raise VariableError(f"the range {text} is empty", "write first:last:step, such as 20:40:5 or 40:20:-5")
     count = math.floor((last - first) / step + _ROUNDOFF) + 1
     if count > _MOST:
-        raise VariableError(f"the range {text} has {count} values", f"at most {_MOST}")
+        raise VariableError(f"the range {text} has {count} values", f"give at most {_MOST}")
     whole = all(number == int(number) for number in (first, step)) and "." not in text and "e" not in text.lower()
     return [int(first + k * step) if whole else _rounded(first + k * step, step) for k in range(count)]
 
@@ -239,17 +245,21 @@ def _rounded(value: float, step: float) -> float:
 
 def _log_range(numbers: list[float], text: str) -> list[float]:
     if len(numbers) != 3 or min(numbers[:2]) <= 0 or numbers[2] < 2 or numbers[2] != int(numbers[2]):
-        raise VariableError(f"{text} is no logarithmic range", "write log(first, last, number), as log(1e3, 1e6, 4)")
+        raise VariableError(
+            f"{text} is not a logarithmic range", "write log(first, last, number), such as log(1e3, 1e6, 4)"
+        )
     first, last, count = numbers[0], numbers[1], int(numbers[2])
     if count > _MOST or first == last:
-        raise VariableError(f"{text} is no logarithmic range", f"first and last differ, at most {_MOST} values")
+        raise VariableError(
+            f"{text} is not a logarithmic range", f"first and last must differ, with at most {_MOST} values"
+        )
     return [float(f"{value:.12g}") for value in np.geomspace(first, last, count)]
 
 
 def _numbers(text: str, whole: str) -> list[float]:
     parts = [part.strip() for part in text.split(",")]
     if not all(map(_is_number, parts)):
-        raise VariableError(f"{whole} has something else than numbers", "write numbers with commas between them")
+        raise VariableError(f"{whole} has entries that are not numbers", "write numbers separated by commas")
     return [float(part) for part in parts]
 
 

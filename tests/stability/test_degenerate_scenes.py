@@ -205,7 +205,7 @@ def test_a_run_does_not_write_over_its_scene(tmp_path, capfd):
     scene = tmp_path / "scene.toml"
     scene.write_text(plate())
     assert cli.main(["run", str(scene), "--out", str(tmp_path)]) == cli.BAD_INPUT
-    assert "write over the scene" in capfd.readouterr().err and scene.read_text() == plate()
+    assert "overwrite its own scene" in capfd.readouterr().err and scene.read_text() == plate()
 
 
 def _under_way(tmp_path) -> tuple[subprocess.Popen, Path]:

@@ -98,11 +98,14 @@ def test_a_cluster_makes_the_table_that_this_machine_makes(plane, tmp_path, clus
     assert (tmp_path / "there" / "runs.csv").read_bytes() == (tmp_path / "here" / "runs.csv").read_bytes()
     # What the workers have is looked at before anything is handed out.
     monkeypatch.setattr(clusters, "__version__", "0.0.1")
-    with pytest.raises(EngineRefused, match="has other geomech"), DaskEngine(cluster.address, scene=plan.scene):
+    with (
+        pytest.raises(EngineRefused, match="a different version of geomech"),
+        DaskEngine(cluster.address, scene=plan.scene),
+    ):
         pass
     monkeypatch.undo()
     monkeypatch.setattr(clusters, "program", lambda: "another")
-    with pytest.raises(EngineRefused, match="has other geomech's sources"), DaskEngine(cluster.address):
+    with pytest.raises(EngineRefused, match="a different version of geomech's sources"), DaskEngine(cluster.address):
         pass
     monkeypatch.undo()
     with pytest.raises(EngineRefused, match="does not see"), DaskEngine(cluster.address, folder=tmp_path / "nowhere"):

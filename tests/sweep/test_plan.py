@@ -1,4 +1,4 @@
-"""What is wrong with a sweep is said before anything runs, by name, with the place and the way out."""
+"""Errors of a sweep are reported before anything runs, with their place and remedy."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def refused(scene, given, **how) -> str:
         ({"vary": {"x": "normal(0, 1)"}, "runs": 4}, "'x' sets nothing"),
         ({"vary": {"x": "1,2"}, "derive": {COHESION: "y * 2"}}, "there is no variable 'y'"),
         ({"vary": {"x": "1,2"}, "derive": {COHESION: "open('f')"}}, "calls open"),
-        ({"vary": {FRICTION: "20,30"}, "derive": {FRICTION: "3"}}, "varies and is derived too"),
+        ({"vary": {FRICTION: "20,30"}, "derive": {FRICTION: "3"}}, "is both varied and derived"),
         ({"seeds": "0-9"}, "the scene has no joint sets"),
         ({"vary": {FRICTION: "normal(35, 5)"}, "runs": 9, "correlated": [{"between": [FRICTION, COHESION],
          "coefficient": 0.5}]},
@@ -45,8 +45,8 @@ def refused(scene, given, **how) -> str:
         ({"vary": {FRICTION: "normal(35, 5)"}, "runs": 2, "sampling": "saltelli"}, "needs groups of 3 runs"),
         ({"vary": {FRICTION: "30,35"}, "rare": "subset"}, "random variables only"),
         ({"vary": {FRICTION: "normal(35, 5)"}, "runs": 9, "rare": "subset", "fails": "mechanism == 'x'"},
-         "no comparison"),
-        ({"fails": "factor <"}, "is no expression"),
+         "not a comparison"),
+        ({"fails": "factor <"}, "is not a valid expression"),
         ({"columns": {"x": "a.b()"}}, "calls a.b"),
         ({"runs": "many"}, "--runs"),
         ({"nonsense": 1}, "unknown key 'nonsense'"),
@@ -68,7 +68,7 @@ def test_seeds_without_networks_of_their_own_number_are_refused(plane):
     plane.write_text(text.replace("[materials.rock]", f"{sets}[materials.rock]"), encoding="utf-8")
     assert len(plan_of(plane, {"seeds": "0-3"}).table) == 4
     assert "5 samples for 4 seeds" in refused(plane, {"seeds": "0-3", "runs": 5, "vary": {FRICTION: "normal(35, 5)"}})
-    assert "ascends" in refused(plane, {"seeds": "4-1"})
+    assert "ascending" in refused(plane, {"seeds": "4-1"})
 
 
 def test_a_scene_that_cannot_be_drawn_with_any_value_is_refused_as_it_would_be_alone(plane):

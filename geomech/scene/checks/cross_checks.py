@@ -137,7 +137,7 @@ def _warned(c: Check) -> None:
             )
         else:
             what, way_out = "run.events names neither", 'add "contacts" or "faces" to run.events'
-        c.refuse(("run", "stop_at"), f'"{kind}" is of contacts and crack faces, and {what}', way_out)
+        c.refuse(("run", "stop_at"), f'"{kind}" concerns contacts and crack faces, and {what}', way_out)
 
 
 def _growth_lengths(c: Check) -> None:

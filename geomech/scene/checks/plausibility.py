@@ -158,7 +158,7 @@ def _free_back(c: Check) -> None:
     c.warn(
         ("geometry",),
         f"nothing supports the back of the slope: {counted(count, 'block')} that may move {'is' if count == 1 else 'are'} free "
-        f"at x = {x:.6g} m over {height:.3g} m, and leave the rock there",
+        f"at x = {x:.6g} m over {height:.3g} m, and can move out of the model there",
         'draw fixed rock behind it ([zones.NAME] fixed = true), or call those edges "guided:y" or "fixed"',
     )
 
@@ -183,9 +183,9 @@ def _increment(c: Check) -> None:
         if increment > largest:
             c.warn(
                 ("growth", "increment_m"),
-                f"an advance of {increment:g} m is more than all of {blocks.names[b]!r}, which is {largest:.3g} m: a "
+                f"an advance of {increment:g} m is longer than {blocks.names[b]!r}, which measures {largest:.3g} m: a "
                 "tip crosses it in one step",
-                "is it in metres? Unset, it is a tenth of the shortest crack",
+                "is it in metres? If it is left out, it is a tenth of the shortest crack",
             )
             return
 
@@ -334,8 +334,8 @@ def _strain(c: Check) -> None:
         c.warn(
             ("loads", "tractions", at),
             f"its {worst / 1e6:.4g} MPa would strain {softest!r} (E = {modulus / 1e9:.4g} GPa) by "
-            f"{100 * worst / modulus:.3g} %, if the run gets that far",
-            "is the modulus, the load or the end of the run wrong?",
+            f"{100 * worst / modulus:.3g} %, should the run reach it",
+            "check the modulus, the load and the end of the run",
         )
 
 

@@ -93,7 +93,7 @@ def _loads_are_lost(c: Check, fixed: np.ndarray) -> bool:
                 c.warn(
                     ("loads", "tractions", k, "edge"),
                     f"the tractions on {traction.edge!r} cancel each other at {t.run.end_time_s:g} s",
-                    "the opposite load stands on the opposite edge",
+                    "put the opposing load on the opposite edge",
                 )
         if fixed[at].all():
             c.warn(
