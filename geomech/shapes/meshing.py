@@ -12,11 +12,16 @@ import numpy as np
 from ..model import Cracks
 from ..model.blocks.polygon import signed_area
 from .gmsh_models.session import gmsh_session
+from .narrow_places import narrow_places
 
 log = logging.getLogger(__name__)
 
 #: Triangles with a smaller angle than this are reported, rad. Gmsh keeps 20° where nothing is narrow.
 SLIVER = math.radians(1.0)
+#: Sides of triangles between cracks, or a crack and the outline, relative to their distance: angles of 5° and more.
+ACROSS = 10.0
+#: Most places that are refined for that: faces that run closer to each other, over a longer way, get flat triangles.
+MOST_PLACES = 1000
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,7 +66,8 @@ def mesh_interior(
     thousand triangles in all), ``tip_size`` that at crack tips (default a tenth of it), both in m; along cracks sides
     are half of ``size``, and all grow back to it by ``slope`` times the distance (a half: over two of its lengths).
     Nodes on cracks are doubled, at junctions one per sector, at mouths too; tips stay single. Between cracks, or a
-    crack and the outline, that are closer to each other than the sides of triangles, these are flat; those below 1° are
+    crack and the outline, that nearly touch, sides are `ACROSS` times their distance, so that no angle is below 1° but
+    where they meet at less, or run beside each other at less than a four-thousandth of the way. Such triangles are
     reported in the log with their place: fields are evaluated at nodes and are unaffected, but finite elements of
     another program would be. Raises ValueError for sizes that are not positive, RuntimeError if Gmsh cannot mesh the
     block.
@@ -118,10 +124,10 @@ def _mesh(loops, cracks: Cracks, size: float, tip_size: float, reach: float):
     with gmsh_session("interior") as gmsh:
         geo, mesh, option = gmsh.model.geo, gmsh.model.mesh, gmsh.option.setNumber
         tag_of: dict[int, int] = {}
-        rings = []
-        for loop in loops:
+        rings, rings_of = [], [_with_mouths(loop, mouths, tolerance) for loop in loops]
+        for ring in rings_of:
             tags = []
-            for point, node in _with_mouths(loop, mouths, tolerance):
+            for point, node in ring:
                 tags.append(geo.addPoint(point[0], point[1], 0.0))
                 if node >= 0:
                     tag_of[node] = tags[-1]
@@ -144,9 +150,13 @@ def _mesh(loops, cracks: Cracks, size: float, tip_size: float, reach: float):
         # well.
         option("Mesh.Smoothing", 0)
         option("Mesh.LcIntegrationPrecision", 1e-3)
-        tips = [tag_of[int(n)] for n in cracks.tips]
-        if tips and tip_size < size:
-            _refine(mesh, tips, lines, size, tip_size, reach)
+        tips = [tag_of[int(n)] for n in cracks.tips] if tip_size < size else []
+        narrow = _narrow(rings_of, cracks, size)
+        if tips or narrow:
+            _refine(gmsh.model, tips, lines, narrow, size, tip_size, reach)
+        if narrow:
+            # Coarse division of lines misses short narrow places.
+            option("Mesh.LcIntegrationPrecision", 1e-6)
         # Delaunay is the fastest algorithm that respects embedded lines; the others are for the rare block on which it
         # fails.
         for algorithm in (5, 6, 1):
@@ -180,18 +190,38 @@ def _are_edges(pairs: np.ndarray, triangles: np.ndarray, n: int) -> bool:
     return bool(np.isin(pairs[:, 0] * n + pairs[:, 1], sides[:, 0] * n + sides[:, 1]).all())
 
 
-def _refine(mesh, tips, lines, size: float, tip_size: float, reach: float) -> None:
-    """Side lengths: ``tip_size`` at tips, half of ``size`` along cracks, ``size`` at ``reach`` from both."""
-    fields = []
-    for what, items, smallest, start in (
-        ("PointsList", tips, tip_size, tip_size),
-        ("CurvesList", lines, 0.5 * size, 0.5 * size),
-    ):
-        distance = mesh.field.add("Distance")
-        mesh.field.setNumbers(distance, what, items)
+def _narrow(rings, cracks: Cracks, size: float) -> list[tuple[float, np.ndarray]]:
+    """Places where cracks, or a crack and the outline, nearly touch: (size of triangles there, points (n, 2)), in m, a
+    few sizes for all; [] where nothing does."""
+    nodes = cracks.nodes.copy()
+    sides = []
+    for ring in rings:
+        corners = np.array([point for point, _ in ring])
+        # Mouths lie on the outline to round-off; the outline is divided there.
+        for point, node in ring:
+            if node >= 0:
+                nodes[node] = point
+        sides.append(np.stack([corners, np.roll(corners, -1, axis=0)], axis=1))
+    points, sizes = narrow_places(np.concatenate([*sides, nodes[cracks.segments]]), ACROSS, 0.5 * size, MOST_PLACES)
+    level = np.floor(np.log2(sizes))
+    return [(float(sizes[level == k].min()), points[level == k]) for k in np.unique(level)]
+
+
+def _refine(model, tips, lines, narrow, size: float, tip_size: float, reach: float) -> None:
+    """Side lengths: ``tip_size`` at tips, half of ``size`` along cracks where there are tips to refine, their own at
+    ``narrow`` places, ``size`` at ``reach`` from all."""
+    places = [(small, [model.geo.addPoint(x, y, 0.0) for x, y in points.tolist()]) for small, points in narrow]
+    model.geo.synchronize()
+    near = [("PointsList", items, small, small) for small, items in places]
+    if tips:
+        near += [("PointsList", tips, tip_size, tip_size), ("CurvesList", lines, 0.5 * size, 0.5 * size)]
+    field, fields = model.mesh.field, []
+    for what, items, smallest, start in near:
+        distance = field.add("Distance")
+        field.setNumbers(distance, what, items)
         if what == "CurvesList":
-            mesh.field.setNumber(distance, "Sampling", 20)
-        threshold = mesh.field.add("Threshold")
+            field.setNumber(distance, "Sampling", 20)
+        threshold = field.add("Threshold")
         for key, value in (
             ("InField", distance),
             ("SizeMin", smallest),
@@ -199,11 +229,11 @@ def _refine(mesh, tips, lines, size: float, tip_size: float, reach: float) -> No
             ("DistMin", start),
             ("DistMax", reach),
         ):
-            mesh.field.setNumber(threshold, key, value)
+            field.setNumber(threshold, key, value)
         fields.append(threshold)
-    smaller = mesh.field.add("Min")
-    mesh.field.setNumbers(smaller, "FieldsList", fields)
-    mesh.field.setAsBackgroundMesh(smaller)
+    smaller = field.add("Min")
+    field.setNumbers(smaller, "FieldsList", fields)
+    field.setAsBackgroundMesh(smaller)
 
 
 def _torn(points: np.ndarray, triangles: np.ndarray, crack_edges: np.ndarray) -> InteriorMesh:

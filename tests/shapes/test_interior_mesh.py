@@ -7,6 +7,7 @@ import pytest
 
 from geomech.model import Cracks
 from geomech.shapes import Trace, Zone, assemble, mesh_interior, rectangle, straight_crack
+from geomech.shapes.narrow_places import narrow_places
 
 SQUARE = rectangle(0.0, 0.0, 1.0, 1.0)
 
@@ -175,15 +176,64 @@ def test_bad_sizes():
 
 
 def test_flat_triangles_between_near_cracks_are_told_with_their_place(caplog):
-    """Two parallel cracks a ten-thousandth of a side apart: triangles between them are as flat as that."""
-    near = 2e-5
+    """Two parallel cracks 2e-6 apart over 0.4: to fit between them would take half a million triangles."""
+    near = 2e-6
     with caplog.at_level("INFO", logger="geomech"):
         _, _, mesh = meshed([[[0.3, 0.5], [0.7, 0.5]], [[0.3, 0.5 + near], [0.7, 0.5 + near]]])
     angle, place = mesh.flattest()
-    assert angle < np.radians(0.2) and 0.25 < place[0] < 0.75 and abs(place[1] - 0.5) < 0.01
+    assert angle < np.radians(1.0) and 0.25 < place[0] < 0.75 and abs(place[1] - 0.5) < 0.01
     (line,) = [record.getMessage() for record in caplog.records]
     assert f"{np.degrees(angle):.2g} degrees" in line and f"({place[0]:.6g}, {place[1]:.6g})" in line
     caplog.clear()
     with caplog.at_level("INFO", logger="geomech"):
         _, _, mesh = meshed([[[0.3, 0.5], [0.7, 0.5]]])
     assert mesh.flattest()[0] > np.radians(10.0) and not caplog.records
+
+
+def near_cracks(rng, kind: str) -> list:
+    """Two lines, or a line and the outline, at a distance of 1e-5 to 1e-2, in any direction."""
+    gap, turn = 10 ** rng.uniform(-5, -2), rng.uniform(0, np.pi)
+    along = np.array([np.cos(turn), np.sin(turn)])
+    across = np.array([-along[1], along[0]])
+    middle, length = rng.uniform(0.4, 0.6, 2), rng.uniform(0.2, 0.4)
+    first = [middle - 0.5 * length * along, middle + 0.5 * length * along]
+    if kind == "parallel":
+        gap = max(gap, length / 4000)
+        return [first, [middle - 0.3 * length * along + gap * across, middle + 0.6 * length * along + gap * across]]
+    if kind == "in line":
+        ahead = first[1] + gap * along
+        return [first, [ahead, ahead + 0.1 * along]]
+    if kind == "tip at a side":
+        way = np.array([np.cos(turn + 1), np.sin(turn + 1)])
+        return [first, [middle + gap * way, middle + length * way]]
+    return [[[0.3, gap], [0.5, rng.uniform(1, 5) * gap]]]
+
+
+@pytest.mark.parametrize("kind", ["parallel", "in line", "tip at a side", "beside the outline"])
+def test_no_flat_triangles_between_near_cracks(kind):
+    """Angles were as small as 0.02 degrees. Triangles between cracks follow their distance down to a four-thousandth of
+    the way over which they run beside each other, and to the tolerance of drawings at their tips."""
+    rng = np.random.default_rng(8)
+    for _ in range(12):
+        lines = near_cracks(rng, kind)
+        _, cracks, mesh = meshed(lines, size=0.0215, tip_size=0.0215 / 15)
+        assert mesh.flattest()[0] > np.radians(1.0), lines
+        assert areas(mesh).min() > 0 and areas(mesh).sum() == pytest.approx(1.0, abs=1e-12)
+        assert len(mesh.triangles) < 20_000
+        edges = boundary_edges(mesh)
+        length = np.hypot(*(mesh.points[edges[:, 0]] - mesh.points[edges[:, 1]]).T).sum()
+        assert length == pytest.approx(4.0 + 2 * cracks.lengths.sum(), abs=1e-9)
+
+
+def test_narrow_places_have_the_size_of_their_distance():
+    """A tip above the middle of a line; lines that meet are no narrow place."""
+    lines = np.array([[[0.0, 0.0], [1.0, 0.0]], [[0.5, 0.01], [0.5, 1.0]], [[1.0, 0.0], [1.0, 0.001]]])
+    points, sizes = narrow_places(lines, 10.0, 0.2, 1000)
+    distance = np.where(points[:, 1] == 0.0, np.hypot(points[:, 0] - 0.5, 0.01), points[:, 1])
+    assert len(points) >= 3 and np.all(sizes < 0.2) and sizes.min() == pytest.approx(0.1, rel=0.1)
+    assert np.all(sizes <= 10.0 * distance * (1 + 1e-12)) and np.abs(points[:, 0] - 0.5).max() < 0.1
+    # Nothing near, nothing to do; many places are bounded in number.
+    assert not len(narrow_places(lines[:1], 10.0, 0.2, 1000)[0])
+    close = np.array([[[0.0, 0.0], [1.0, 0.0]], [[0.0, 1e-6], [1.0, 1e-6]]])
+    points, sizes = narrow_places(close, 10.0, 0.2, 100)
+    assert 20 < len(points) <= 100 and np.ptp(sizes) == 0.0

@@ -87,7 +87,7 @@ def mesh(
         (cracks.nodes[k], _layers_at(cracks, k, sides_of_rock, grading))
         for k in (np.flatnonzero(cracks.surface & (cracks.valence > 0)).tolist() if len(edges) else ())
     ]
-    corners = _corners_near_cracks(cracks, loops, settings, grading)
+    corners = _corners_near_cracks(cracks, loops, sides_of_rock, settings, grading)
     key: tuple = float(extent), tuple((*point, deep) for point, deep in [*mouths, *corners])
     if known is not None and known.sides[0] == key:
         sides = known.sides
@@ -181,20 +181,29 @@ def _with_images(half_plane: HalfPlane, ends, kind, source, touching, near: floa
     return ends, np.concatenate([kind, kind]), np.concatenate([source, source + n]), both
 
 
-def _corners_near_cracks(cracks: Cracks, loops: list[np.ndarray], settings: DdmSettings, grading: Grading):
-    """Re-entrant corners of the outline near which cracks run: (point (2,), graded layers) of each."""
+def _corners_near_cracks(
+    cracks: Cracks, loops: list[np.ndarray], edges: np.ndarray, settings: DdmSettings, grading: Grading
+):
+    """Re-entrant corners of the outline near which cracks run: (point (2,), graded layers) of each. At a corner where
+    cracks begin, the widest wedge of rock between faces is graded, if it is re-entrant."""
     if grading.target is not None or not cracks.n_segments:
         return []
     found = []
-    ends = cracks.nodes[cracks.segments]
+    ends, tips = cracks.nodes[cracks.segments], cracks.nodes[cracks.tips]
     for loop, span in zip(loops, _spans(loops)):
-        angles = interior_angles(loop)
-        for k in np.flatnonzero(angles > np.pi + KINK):
-            off = distance_to_segments(loop[k], ends)
-            # A crack that begins at the corner has its mouth there.
-            near = off.min() < NEAR_CORNER * span / settings.elements_per_side and off.min() > 1e-7 * span
-            if near:
-                found.append((loop[k], grading.near_crack(float(angles[k]))))
+        angles, size = interior_angles(loop), span / settings.elements_per_side
+        sides = np.hypot(*(np.roll(loop, -1, axis=0) - loop).T)
+        lengths = sides / np.maximum(1.0, np.ceil(sides / size - 1e-9))
+        for k in np.flatnonzero(angles > np.pi + KINK).tolist():
+            angle, off = float(angles[k]), float(distance_to_segments(loop[k], ends).min())
+            if off <= ON_EDGE * span:
+                at = np.hypot(*(cracks.nodes - loop[k]).T) <= ON_EDGE * span
+                begins = np.flatnonzero(at & cracks.surface & (cracks.valence > 0)).tolist()
+                angle = max((float(wedges(cracks, node, edges).max()) for node in begins), default=0.0)
+                off = float(np.hypot(*(tips - loop[k]).T).min(initial=np.inf))
+            if angle > np.pi + KINK and off < NEAR_CORNER * size:
+                element, reach = float(max(lengths[k - 1], lengths[k])), float(np.abs(loop[k]).max())
+                found.append((loop[k], grading.near_crack(angle, off / element, reach / element)))
     return found
 
 
@@ -414,8 +423,6 @@ def _closed(cracks: Cracks) -> np.ndarray:
 
 def _layers_at(cracks: Cracks, node: int, edges: np.ndarray, grading: Grading) -> int:
     """Graded layers at a junction or a mouth."""
-    if grading.target is None and cracks.surface[node]:
-        return grading.layers
     return grading.at_node(wedges(cracks, node, edges), "mouth" if cracks.surface[node] else "crack")
 
 

@@ -32,9 +32,17 @@ FOLD, FOLD_SHRINKS = math.radians(120), math.radians(20 / 3)
 #: with it.
 CLOSED_KINK, CLOSED_EXPONENT, CLOSED_ERROR, CLOSED_TURN = math.radians(5) - 1e-9, 0.41, 1.1e-2, math.radians(25)
 #: Re-entrant corners of the outline with a crack within this many outline elements get the layers that leave this error
-#: of K, unless no layers are wanted: three, enough elsewhere, left 1.5e-2 at a right-angled corner
-#: (`tests/ddm/mesh/test_corner_beside_crack.py`).
-NEAR_CORNER, CORNER_ERROR = 3.0, 2e-3
+#: of K, unless no layers are wanted: half that of a kink, so that it adds little to what other corners leave.
+NEAR_CORNER, CORNER_ERROR = 3.0, 0.5 * KINK_ERROR
+#: An element of length h at a re-entrant corner leaves the error A (h/r)^λ of K in cracks at the distance r, with A this
+#: value times (turn/90°)^1.5 up to right-angled corners and constant beyond. The crack counts as no farther away than
+#: `CORNER_REACH` elements of the side. Measured at corners of 200° to 350°, tips and sides of cracks 0.02 to 1 crack
+#: length away, three sizes of cracks, under tension and shear: A is 0.004, 0.012, 0.022, 0.04 at 200°, 220°, 240° and
+#: 270°, and falls to 0.009 at 350° (`tests/ddm/mesh/test_corner_beside_crack.py`).
+AT_CORNER, CORNER_REACH = 4e-2, 0.5
+#: No element there is shorter than this part of the corner's distance from the origin: collocation points are rounded
+#: (16 layers 2000 m from the origin left 7e-3, 12 layers 1e-4).
+CORNER_FINEST = 1e-10
 #: Most layers at any node; `Grading.finest` bounds the smallest element in any case.
 MOST_LAYERS = 16
 #: An element of length h at a distance r from the origin has an error 1e-13 r/h of K, because collocation points are
@@ -127,13 +135,16 @@ class Grading:
             return self.layers + 1
         return 1 if angle < math.pi - KINK and self.layers else 0
 
-    def near_crack(self, angle: float) -> int:
-        """Layers at a re-entrant corner of the outline near a crack; ``angle`` (rad) of rock."""
+    def near_crack(self, angle: float, distance: float, reach: float) -> int:
+        """Layers at a re-entrant corner of the outline near a crack; ``angle`` (rad) of rock. ``distance`` of the crack
+        and ``reach``, the corner's largest coordinate, are in units of the side's elements."""
         if self.target is not None or not self.layers:
             return self.at_corner(angle)
-        error, power = ungraded(angle, "outline")
-        wanted = self._layers_for(math.log(max(error / CORNER_ERROR, 1.0)) / power)
-        return max(self.at_corner(angle), wanted + self.layers - KINK_LAYERS)
+        error = AT_CORNER * min(1.0, (angle - math.pi) / (math.pi / 2)) ** 1.5
+        shrinking = math.log(error / CORNER_ERROR) / exponent(angle) - math.log(min(distance, CORNER_REACH))
+        wanted = self._layers_for(max(shrinking, 0.0)) + self.layers - KINK_LAYERS
+        most = min(MOST_LAYERS, math.floor(math.log(max(CORNER_FINEST * reach, 1e-300)) / math.log(self.ratio)))
+        return max(self.at_corner(angle), min(wanted, most))
 
     def at_closed_kink(self, turn: float) -> int:
         """Layers at a kink of ``turn`` (rad) of a crack drawn closed; no fewer than at an open one."""
@@ -157,7 +168,8 @@ class Grading:
     def at_node(self, wedges: np.ndarray, where: str) -> int:
         """Layers at a junction ("crack") or, for the target, at a "mouth"; ``wedges`` (n,) are the angles of rock, rad.
 
-        Without a target a junction gets as many as a kink at its widest wedge, and no fewer than any other node.
+        Without a target both get as many as a kink at their widest wedge, and no fewer than any other node. (A mouth has
+        a wedge as wide only at a re-entrant corner of the outline.)
         """
         if self.target is None:
             return max(self.layers, self.at_kink(float(max(wedges, default=0.0)) - math.pi, False))
