@@ -32,7 +32,8 @@ def _near_pairs(ends: np.ndarray, reach: float) -> tuple[np.ndarray, np.ndarray]
     for p in range(2):
         for q in range(2):
             near &= ~(ends[:, None, p] == ends[None, :, q]).all(axis=2)
-    return np.nonzero(near)
+    lines, others = np.nonzero(near)
+    return lines, others
 
 
 def _along(ends, lines, others, across: float, largest: float, least: float, most: int):
