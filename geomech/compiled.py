@@ -169,12 +169,12 @@ def _quick_inference() -> Iterator[None]:
     # A compiler's objects are in use until it is done; garbage collection would take a twentieth of the time.
     gc.disable()
     try:
-        for owner, name, ours in replaced:
-            setattr(owner, name, ours)
+        for owner, name, replacement in replaced:
+            setattr(owner, name, replacement)
         yield
     finally:
-        for owner, name, theirs in before:
-            setattr(owner, name, theirs)
+        for owner, name, original in before:
+            setattr(owner, name, original)
         if collects:
             gc.enable()
 
@@ -224,15 +224,15 @@ def _same_settings(self: TargetConfig, other: object) -> bool:
     """Whether two sets of settings are equal, decided by the values set in either; the others are defaults in both."""
     if not isinstance(other, TargetConfig):
         return NotImplemented
-    ours, theirs = self._values, other._values
-    if self is other or ours == theirs:
+    values, other_values = self._values, other._values
+    if self is other or values == other_values:
         return True
     if type(self) is not type(other):
         return self.values() == other.values()
     options = self.options
-    for name in ours.keys() | theirs.keys():
+    for name in values.keys() | other_values.keys():
         default = options[name].default
-        if ours.get(name, default) != theirs.get(name, default):
+        if values.get(name, default) != other_values.get(name, default):
             return False
     return True
 

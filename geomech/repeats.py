@@ -109,7 +109,7 @@ class Repeats:
         if error is not None or self.outcome.last is None:
             return
         base = self.outcome.values(self.problem)
-        summary["scatter"] = told = {}
+        summary["scatter"] = scatters = {}
         for kind in self.problem.run.repeat:
             log.info("repeating the run: %s", REPEATS[kind])
             outcome, failure = Outcome(), None
@@ -121,9 +121,9 @@ class Repeats:
                 return
             except Exception as raised:
                 failure = f"{type(raised).__name__}: {raised}"
-            told[kind] = scatter = _scatter(base, outcome.values(self.problem))
+            scatters[kind] = scatter = _scatter(base, outcome.values(self.problem))
             if failure is not None:
-                told[kind] = {"failed": failure}
+                scatters[kind] = {"failed": failure}
                 log.warning("the run reached its end, but did not when repeated with %s: %s", REPEATS[kind], failure)
             elif scatter["largest"] > LARGEST_SCATTER:
                 log.warning("repeated with %s, the run differs: %s", REPEATS[kind], _in_words(scatter["quantities"]))

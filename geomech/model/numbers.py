@@ -41,7 +41,7 @@ class Number:
         return bool(self.least <= value <= self.most and (self.closed or value > self.least))
 
     @property
-    def wish(self) -> str:
+    def requirement(self) -> str:
         """The requirement as words for a message, such as "must be positive"."""
         if self.whole:
             return f"must be a whole number of at least {self.least:g}"
@@ -67,9 +67,9 @@ def refuse_numbers(of: object, table: Mapping[str, Number], subject: str = "") -
         if number.holds(value):
             continue
         finite = isinstance(value, (float, np.floating)) and math.isinf(value) and value > 0 and number.most == math.inf
-        wish = f"{number.wish} and finite" if finite else number.wish
+        requirement = f"{number.requirement} and finite" if finite else number.requirement
         raise ValueError(
-            f"{f'{subject}: ' if subject else ''}{name} {wish}, got {as_text(value)} {number.unit}".rstrip()
+            f"{f'{subject}: ' if subject else ''}{name} {requirement}, got {as_text(value)} {number.unit}".rstrip()
         )
 
 

@@ -56,12 +56,12 @@ class Group:
         """Continue with the ``memories`` of another such group, each given to the first observer of its own kind."""
         left = list(memories)
         for observer in self.observers:
-            mine = next((each for each in left if each[0] == _kind(observer)), None)
-            if mine is None:
+            found = next((each for each in left if each[0] == _kind(observer)), None)
+            if found is None:
                 observer.on_start(problem, folder)
             else:
-                left.remove(mine)
-                cast(Resumed, observer).on_resume(problem, folder, mine[1])
+                left.remove(found)
+                cast(Resumed, observer).on_resume(problem, folder, found[1])
             self._started.append(observer)
 
     def memories(self) -> list[tuple[str, Any]]:

@@ -115,19 +115,19 @@ class _Parts:
         any."""
         if zones:
             self.only_in.update((len(self.joints) + k, zones) for k in range(len(read.joints)))
-        for part, mine, own in (
+        for part, present, added in (
             ("zones", self.zones, read.zones),
             ("cracks", self.traces, read.traces),
             ("edges", self.edges, getattr(read, "edges", ())),
         ):
-            for k, item in enumerate(own):
-                self.sources[part, len(mine)] = source(part, k)
-                mine.append(item)
+            for k, item in enumerate(added):
+                self.sources[part, len(present)] = source(part, k)
+                present.append(item)
         self.chords = Chords.joined([self.chords, read.chords])
-        for part, mine, own in (("joints", self.joints, read.joints), ("marks", self.marks, read.marks)):
-            for k, item in enumerate(own):
+        for part, present, added in (("joints", self.joints, read.joints), ("marks", self.marks, read.marks)):
+            for k, item in enumerate(added):
                 self.sources.setdefault((part, item.name), source(part, k))
-                mine.append(item)
+                present.append(item)
 
     def arrays(self) -> list[np.ndarray]:
         """All points of the rock and of the lines that cut it."""

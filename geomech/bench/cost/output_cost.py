@@ -81,7 +81,7 @@ def measure(quick: bool = False) -> Measured:
         "writers_s": writers, "quick": quick,
     }  # fmt: skip
     write_json(FOLDER / "output.json", record)
-    ours = writers[OURS]
+    own_time = writers[OURS]
     spent_on = {f"one file of the blocks: {name}": 1e3 * spent for name, spent in writers.items()}
     spent_on |= {"all series, a cycle": 1e3 * found.processor, "a step after sudden weight": 1e3 * moving}
     if not quick:
@@ -111,7 +111,7 @@ def measure(quick: bool = False) -> Measured:
         f"  beside the last of these steps, {last:.3g} s: {at_rest:.1%}",
         "one file of the blocks, as this project and as others write it",
     ]
-    lines += [f"  {name:<32}{1e3 * spent:9.1f} ms  {spent / ours:6.1f} times" for name, spent in writers.items()]
+    lines += [f"  {name:<32}{1e3 * spent:9.1f} ms  {spent / own_time:6.1f} times" for name, spent in writers.items()]
     return Measured.of(
         "\n".join(lines), times={"a cycle": found.processor} | {f"a file: {k}": v for k, v in writers.items()}
     )

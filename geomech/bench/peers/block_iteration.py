@@ -95,10 +95,10 @@ def block_jacobi(
     )
     count = [0]
 
-    def tell(_: np.ndarray) -> None:
+    def count_iteration(_: np.ndarray) -> None:
         count[0] += 1
 
-    x, _ = bicgstab(matrix, right, rtol=tolerance, maxiter=most, M=behind, callback=tell)
+    x, _ = bicgstab(matrix, right, rtol=tolerance, maxiter=most, M=behind, callback=count_iteration)
     return _row("block Jacobi", solver, data, right, x, count[0], spent_on())
 
 
@@ -116,9 +116,9 @@ def two_levels(
     n, rows, columns = solver.n, _rows(solver), solver.columns
     blocks = data.reshape(-1, 6, 6)
     domains = []
-    for mine in _divided(points, DOMAIN):
+    for members in _divided(points, DOMAIN):
         inside = np.zeros(n, bool)
-        inside[mine] = True
+        inside[members] = True
         core = inside.copy()
         for _ in range(OVERLAP):
             inside[columns[inside[rows]]] = True

@@ -82,9 +82,9 @@ def at_their_springs(
     With these gaps the springs inside the face, not springs at its corners, carry the prescribed resultant and moment
     of the contacts ``which``."""
     n_vertices = int(max(rows["vertex"].max(), rows["edge"].max(), placed.edge.max())) + 1
-    keys, theirs = rows["vertex"] * n_vertices + rows["edge"], placed.vertex * n_vertices + placed.edge
+    keys, placed_keys = rows["vertex"] * n_vertices + rows["edge"], placed.vertex * n_vertices + placed.edge
     order = np.argsort(keys)
-    here = order[np.minimum(np.searchsorted(keys[order], theirs), len(keys) - 1)]
+    here = order[np.minimum(np.searchsorted(keys[order], placed_keys), len(keys) - 1)]
     points = placed.points
     assert isinstance(points, FacePoints)  # contacts of blocks of higher order are found at corners
     inherited = np.zeros(len(rows), bool)

@@ -193,7 +193,7 @@ class Glue:
         begun, acting = normal(start), _face_directions(normal(angle))
         middle = 0.5 * (midpoint.points(first, owners[0]) + midpoint.points(second, owners[1]))
         jump, mean = np.zeros((n, 2, 2, max(cells.width, 6))), np.zeros((n, 2, 2, max(cells.width, 6)))
-        bears = np.zeros((n, 2))
+        borne = np.zeros((n, 2))
         for side, (owner, sign) in enumerate(zip(owners, (1.0, -1.0), strict=True)):
             matrix = midpoint.displacement(middle, owner)
             matrix[..., 2:] /= size[owner, None, None]
@@ -206,7 +206,7 @@ class Glue:
             own = traction_of(turned) @ elastic @ cells.basis.strain(faces.points[side], owner)
             mean[:, :, side, 3:6] = 0.5 * across @ elastic / size[owner, None, None]
             mean[:, :, side, 6 : 6 + m] = 0.5 * own
-            bears += 0.5 * (
+            borne += 0.5 * (
                 np.einsum("nws,ns->nw", across, state.stress[owner]) + np.einsum("nwj,nj->nw", own, padded[owner])
             )
         apart = np.einsum("nwa,na->nw", _face_directions(begun), first - second)
@@ -214,7 +214,7 @@ class Glue:
         return cls(
             faces, np.concatenate([jump - give[:, None, None, None] * mean, mean]),
             np.concatenate([faces.penalty, -give]) * np.tile(faces.weight, 2),
-            np.concatenate([apart - give[:, None] * bears, bears]),
+            np.concatenate([apart - give[:, None] * borne, borne]),
         )  # fmt: skip
 
     def blocks(self, order: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -341,9 +341,9 @@ class KeptCorners:
         tree = cKDTree(place[ends])
         for c in faces.lone.tolist():
             for e in ends[tree.query_ball_point(place[c], _SAME * size[c])].tolist():
-                for mine, theirs in ((0, 0), (0, 1), (1, 0), (1, 1)):
-                    a, b = int(both[c, mine]), int(both[e, theirs])
-                    if both[c, 1 - mine] == both[e, 1 - theirs] and _is_in(min(a, b) * n + max(a, b), self.joined):
+                for end, other_end in ((0, 0), (0, 1), (1, 0), (1, 1)):
+                    a, b = int(both[c, end]), int(both[e, other_end])
+                    if both[c, 1 - end] == both[e, 1 - other_end] and _is_in(min(a, b) * n + max(a, b), self.joined):
                         drop[c] = True
         return np.flatnonzero(~drop)
 

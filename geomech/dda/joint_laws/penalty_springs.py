@@ -131,9 +131,9 @@ def penalties(
     hold, hold_other = fixed[block] | rigid[block], fixed[other] | rigid[other]
     neither = hold & hold_other
     hold, hold_other = np.where(neither, fixed[block], hold), np.where(neither, fixed[other], hold_other)
-    own = np.where(hold, modulus[other], modulus[block])
-    theirs = np.where(hold_other, modulus[block], modulus[other])
-    both = np.minimum(np.sqrt(own * theirs), _MOST_CONTRAST * np.minimum(own, theirs))
+    of_block = np.where(hold, modulus[other], modulus[block])
+    of_other = np.where(hold_other, modulus[block], modulus[other])
+    both = np.minimum(np.sqrt(of_block * of_other), _MOST_CONTRAST * np.minimum(of_block, of_other))
     larger = np.maximum(np.where(hold, 0.0, area[block]), np.where(hold_other, 0.0, area[other]))
     return PENALTY_RATIO * both * np.maximum(1.0, 4.0 * length * length / larger)
 

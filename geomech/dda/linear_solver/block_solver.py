@@ -77,8 +77,8 @@ def _multiply_rows(first, last, data, pointer, columns, x, out):
             s3 += b[18] * v0 + b[19] * v1 + b[20] * v2 + b[21] * v3 + b[22] * v4 + b[23] * v5
             s4 += b[24] * v0 + b[25] * v1 + b[26] * v2 + b[27] * v3 + b[28] * v4 + b[29] * v5
             s5 += b[30] * v0 + b[31] * v1 + b[32] * v2 + b[33] * v3 + b[34] * v4 + b[35] * v5
-        mine = out[6 * i : 6 * i + 6]
-        mine[0], mine[1], mine[2], mine[3], mine[4], mine[5] = s0, s1, s2, s3, s4, s5
+        result = out[6 * i : 6 * i + 6]
+        result[0], result[1], result[2], result[3], result[4], result[5] = s0, s1, s2, s3, s4, s5
 
 
 @kept(fastmath=False, error_model="numpy", nogil=True)

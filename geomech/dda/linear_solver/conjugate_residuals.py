@@ -37,12 +37,12 @@ def _include(direction, product, directions, products, k, x, rest):
     """Add a new ``direction`` (m,) and its ``product`` as number ``k`` of the known ones, and minimise along it as in
     `_project`."""
     for j in range(k):
-        known, theirs, share = directions[j], products[j], 0.0
+        known, known_product, share = directions[j], products[j], 0.0
         for i in range(len(rest)):
-            share += theirs[i] * product[i]
+            share += known_product[i] * product[i]
         for i in range(len(rest)):
             direction[i] -= share * known[i]
-            product[i] -= share * theirs[i]
+            product[i] -= share * known_product[i]
     size = share = 0.0
     for i in range(len(rest)):
         size += product[i] * product[i]
@@ -50,11 +50,11 @@ def _include(direction, product, directions, products, k, x, rest):
     # A direction with zero product is useless: NaN, which the caller takes as a failure.
     scale = 1.0 / np.sqrt(size) if size > 0.0 else np.nan
     share *= scale
-    mine, its = directions[k], products[k]
+    unit, unit_product = directions[k], products[k]
     for i in range(len(rest)):
-        mine[i], its[i] = scale * direction[i], scale * product[i]
-        x[i] += share * mine[i]
-        rest[i] -= share * its[i]
+        unit[i], unit_product[i] = scale * direction[i], scale * product[i]
+        x[i] += share * unit[i]
+        rest[i] -= share * unit_product[i]
     return _largest(rest)
 
 

@@ -195,14 +195,14 @@ def _leave(front, p, m, factors, at, back):
 def _runs(met, own, begins):
     """Runs of consecutive positions among ``met`` (n,) in a front with ``own`` blocks: their starts in ``begins``,
     followed by n; returns the number of runs, and the number of positions within its own blocks."""
-    runs = mine = 0
+    runs = own_count = 0
     for v in range(len(met)):
         if v == 0 or met[v] != met[v - 1] + 1 or met[v] == own:
             begins[runs] = v
             runs += 1
-            mine += met[v] < own
+            own_count += met[v] < own
     begins[runs] = len(met)
-    return runs, mine
+    return runs, own_count
 
 
 @_part
@@ -242,7 +242,7 @@ def _gather(here, further, f, own, p, m, fronts, stack, begins, width):
     g = child[f]
     while g >= 0:
         met, n = seat[reach[g] : reach[g + 1]], 6 * (reach[g + 1] - reach[g])
-        runs, mine = _runs(met, own, begins)
+        runs, own_runs = _runs(met, own, begins)
         for u in range(len(met)):
             i, left = met[u], stack[g] + 6 * u * n
             for a in range(6):
@@ -250,7 +250,7 @@ def _gather(here, further, f, own, p, m, fronts, stack, begins, width):
                     _add_runs(here, (6 * i + a) * m, further, left + a * n, met, begins, 0, runs, width)
                 else:
                     to = p * m + (6 * (i - own) + a) * p
-                    _add_runs(here, to, further, left + a * n, met, begins, 0, mine, width)
+                    _add_runs(here, to, further, left + a * n, met, begins, 0, own_runs, width)
         g = sibling[g]
 
 
@@ -261,12 +261,12 @@ def _pass_on(further, f, own, p, b, fronts, stack, begins, width):
     g = child[f]
     while g >= 0:
         met, n = seat[reach[g] : reach[g + 1]], 6 * (reach[g + 1] - reach[g])
-        runs, mine = _runs(met, own, begins)
-        for u in range(begins[mine], len(met)):
+        runs, own_runs = _runs(met, own, begins)
+        for u in range(begins[own_runs], len(met)):
             i, left = 6 * (met[u] - own), stack[g] + 6 * u * n
             for a in range(6):
                 to = stack[f] + (i + a) * b - p
-                _add_runs(further, to, further, left + a * n, met, begins, mine, runs, width)
+                _add_runs(further, to, further, left + a * n, met, begins, own_runs, runs, width)
         g = sibling[g]
 
 
@@ -337,8 +337,8 @@ def eliminate(first, last, touched, fronts, matrix, stored, memory, space):
         if not _factor(front, p, b, (panel, cell, others, swapped), units, width):
             return False
         if p > 0:
-            left, mine = Matrix(front, p * m, p), Matrix(front, p, m)
-            _add_product(Matrix(room, stack[f], b), left, mine, Size(b, p, b), False, width, units)
+            left, upper = Matrix(front, p * m, p), Matrix(front, p, m)
+            _add_product(Matrix(room, stack[f], b), left, upper, Size(b, p, b), False, width, units)
         else:
             _clear(room[stack[f] : stack[f] + b * b])
         _leave(front, p, m, factors, at[f], back[f])

@@ -87,7 +87,7 @@ def _best_cut(order, pointer, neighbour, place, least):
         second[q + 1] -= 1
     for q in range(m):
         place[order[q]] = -1
-    price, at, mine = np.inf, m // 2, True
+    price, at, from_first = np.inf, m // 2, True
     a = b = 0
     for k in range(1, m):
         a += first[k]
@@ -96,23 +96,23 @@ def _best_cut(order, pointer, neighbour, place, least):
             off = (2.0 * k - m) / m
             here = min(a, b) * (1.0 + off * off)
             if here < price:
-                price, at, mine = here, k, a <= b
-    return price, at, mine
+                price, at, from_first = here, k, a <= b
+    return price, at, from_first
 
 
 @part(fastmath=False, error_model="numpy", nogil=True)
-def _meets(order, at, mine, pointer, neighbour, place):
-    """(m,) bool: blocks in ``order`` that belong to the first ``at`` (or, not ``mine``, to the rest) and touch one on
+def _meets(order, at, from_first, pointer, neighbour, place):
+    """(m,) bool: blocks in ``order`` that belong to the first ``at`` (or, not ``from_first``, to the rest) and touch one on
     the other side."""
     m = len(order)
     out = np.zeros(m, np.bool_)
     for q in range(m):
         place[order[q]] = q
     for q in range(m):
-        if (q < at) == mine:
+        if (q < at) == from_first:
             for e in range(pointer[order[q]], pointer[order[q] + 1]):
                 r = place[neighbour[e]]
-                out[q] = out[q] or (r >= 0 and (r < at) != mine)
+                out[q] = out[q] or (r >= 0 and (r < at) != from_first)
     for q in range(m):
         place[order[q]] = -1
     return out
@@ -161,14 +161,14 @@ def _dissected(orders, pointer, neighbour, leaf, large, least_part, across):
             fronts += 1
             continue
         least = max(1, int(least_part * m))
-        best, price, at, mine = -1, np.inf, 0, True
+        best, price, at, from_first = -1, np.inf, 0, True
         for d in range(k):
             if m >= large or across[d]:
-                here, begin, whose = _best_cut(orders[d, first:last], pointer, neighbour, place, least)
+                here, begin, of_first = _best_cut(orders[d, first:last], pointer, neighbour, place, least)
                 if here < price or best < 0:
-                    best, price, at, mine = d, here, begin, whose
+                    best, price, at, from_first = d, here, begin, of_first
         order = orders[best, first:last]
-        cut = _meets(order, at, mine, pointer, neighbour, place)
+        cut = _meets(order, at, from_first, pointer, neighbour, place)
         halves = np.zeros(3, np.int64)
         for q in range(m):
             side[order[q]] = 2 if cut[q] else (0 if q < at else 1)
@@ -368,13 +368,13 @@ def _stacked(parent: np.ndarray, size: np.ndarray, tasks: np.ndarray) -> tuple[n
     for a, b in tasks:
         top, most = [0, 0], [0, 0]
         for f in range(a, b):
-            mine = level[f] % 2
+            stack = level[f] % 2
             # If its children belong to this task, the first one lies lowest.
             if below[f] >= a:
-                top[1 - mine] = at[below[f]]
-            at[f] = top[mine]
-            top[mine] += size[f]
-            most[mine] = max(most[mine], top[mine])
+                top[1 - stack] = at[below[f]]
+            at[f] = top[stack]
+            top[stack] += size[f]
+            most[stack] = max(most[stack], top[stack])
             if parent[f] >= 0 and below[parent[f]] < a:
                 below[parent[f]] = f
         at[a:b] += np.where(level[a:b] % 2 == 1, base + most[0], base)

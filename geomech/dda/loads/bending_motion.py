@@ -136,8 +136,10 @@ class BendingMotion(PrescribedMotion):
                 if source < 0:
                     of_blocks[b] += value * row[:6] * self._scale(b)
             for number in {s for s in driven.source if s >= 0}:
-                mine = [v for v, source in zip(driven.multiplier, driven.source, strict=True) if source == number]
-                rows["force"][number] = np.array(mine) @ self._points[number].axes
+                own_multipliers = [
+                    v for v, source in zip(driven.multiplier, driven.source, strict=True) if source == number
+                ]
+                rows["force"][number] = np.array(own_multipliers) @ self._points[number].axes
         for spring in self.springs_bent:
             missing = spring.by - spring.rows @ self.reached[spring.block]
             rows["force"][spring.number] = spring.stiffness * missing @ self._points[spring.number].axes

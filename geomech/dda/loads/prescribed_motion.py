@@ -313,7 +313,9 @@ class PrescribedMotion:
                 if source < 0:
                     of_blocks[c.block] += value * row * self._scale(c.block)
             for number in {s for s in c.source if s >= 0}:
-                mine = [value for value, source in zip(multiplier, c.source, strict=True) if source == number]
-                at_points[number] += np.array(mine) @ self._points[number].axes
+                own_multipliers = [
+                    value for value, source in zip(multiplier, c.source, strict=True) if source == number
+                ]
+                at_points[number] += np.array(own_multipliers) @ self._points[number].axes
         self._rows["force"] = at_points
         return of_blocks, self._rows

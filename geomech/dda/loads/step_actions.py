@@ -107,8 +107,8 @@ class StepActions:
         if self.bolts is not None:
             pairs = self.bolts.pairs
             for side, owner in enumerate((pairs.block, pairs.other)):
-                mine = owner >= 0
-                pairs.vectors[mine, :, 6 * side : 6 * side + 6] *= ~constrained[owner[mine], None]
+                movable = owner >= 0
+                pairs.vectors[movable, :, 6 * side : 6 * side + 6] *= ~constrained[owner[movable], None]
         return constrained
 
     def settle(

@@ -55,7 +55,7 @@ class States:
     def switched(self, wrong: np.ndarray, to: States) -> States:
         """These states, replaced by those of ``to`` where ``wrong``."""
         pairs = ((self.state, to.state), (self.direction, to.direction), (self.bonded, to.bonded))
-        return States(*(np.where(wrong, theirs, mine) for mine, theirs in pairs))
+        return States(*(np.where(wrong, replacement, present) for present, replacement in pairs))
 
     def sliding(self, which: np.ndarray, shear: np.ndarray) -> States:
         """These states, with the contacts ``which`` that have no bond sliding under ``shear`` (n,) N."""

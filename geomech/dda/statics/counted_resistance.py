@@ -255,10 +255,10 @@ def hairline_faces(system: BlockSystem, state: State) -> tuple[PartedFace, ...]:
     whole = WholeFaces.of(near.block, near.other, near.geometry, near.law, cohesion)
     if whole is None:
         return ()
-    face, hair = whole.face, near.gap_before <= near.precision
+    face, is_hairline = whole.face, near.gap_before <= near.precision
     loose = (near.state == OPEN) & (face >= 0) & ~whole.touch(near.state)
     own = [np.flatnonzero(face == number) for number in np.unique(face[loose])]
-    return _faces(near, whole, [contacts for contacts in own if hair[contacts].all()])
+    return _faces(near, whole, [contacts for contacts in own if is_hairline[contacts].all()])
 
 
 def _faces(near: ContactSet, whole: WholeFaces, contacts: list[np.ndarray]) -> tuple[PartedFace, ...]:

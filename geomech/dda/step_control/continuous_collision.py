@@ -136,13 +136,13 @@ def _crossed(vertices, next_vertex, start, a, b, pressed, least, length):
             four, _, _ = _seen(vertices, next_vertex, vertices[h, 0], vertices[h, 1], e)
             if three * four >= 0.0:
                 continue
-            mine, theirs = min(abs(one), abs(two)), min(abs(three), abs(four))
+            depth_a, depth_b = min(abs(one), abs(two)), min(abs(three), abs(four))
             deep = max(max(pressed[e], pressed[f]), max(pressed[g], pressed[h]))
-            if min(mine, theirs) <= _PRESSED * deep + least + length:
+            if min(depth_a, depth_b) <= _PRESSED * deep + least + length:
                 continue
-            if mine <= theirs:
-                return (e if abs(one) <= abs(two) else f), g, mine
-            return (g if abs(three) <= abs(four) else h), e, theirs
+            if depth_a <= depth_b:
+                return (e if abs(one) <= abs(two) else f), g, depth_a
+            return (g if abs(three) <= abs(four) else h), e, depth_b
     return -1, -1, 0.0
 
 

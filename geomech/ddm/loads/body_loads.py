@@ -134,11 +134,11 @@ class BodyLoad:
             pressure = [_plus(p, q) for p, q in zip(*pair, strict=True)]
         else:
             pressure = _plus(*holes)
-        mine, others = self.displacements, other.displacements
-        if mine is None or others is None:
-            displacements = mine if others is None else others
+        own, others = self.displacements, other.displacements
+        if own is None or others is None:
+            displacements = own if others is None else others
         else:
-            displacements = [_plus(a, b) for a, b in zip(mine, others, strict=True)]
+            displacements = [_plus(a, b) for a, b in zip(own, others, strict=True)]
         return BodyLoad(
             segments=_joined(self.segments, other.segments),
             tractions=_joined(self.tractions, other.tractions),

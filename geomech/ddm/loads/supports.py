@@ -234,10 +234,10 @@ class Holds:
         (h_unknowns,)."""
         b = self.boundary
         rows = x.reshape(b.n, 2, b.per)
-        mine, free = rows[self.elements], rows.copy()
-        free[self.elements] = np.einsum("hjc,hjn->hcn", self.directions, mine * ~self.supported[:, :, None])
-        free[self.elements] += imposed.reshape(mine.shape)
-        reaction = np.einsum("hjc,hjn->hcn", self.directions, mine * self.supported[:, :, None])
+        supported_rows, free = rows[self.elements], rows.copy()
+        free[self.elements] = np.einsum("hjc,hjn->hcn", self.directions, supported_rows * ~self.supported[:, :, None])
+        free[self.elements] += imposed.reshape(supported_rows.shape)
+        reaction = np.einsum("hjc,hjn->hcn", self.directions, supported_rows * self.supported[:, :, None])
         reaction /= self.sources.length[:, None, None]
         return free.ravel(), reaction.ravel()
 

@@ -91,9 +91,9 @@ def key_blocks(
             slides = [(np.cos(pull - w), f, w) for w, f in ((low, end), (high, start)) if np.cos(pull - f) <= 1e-9]
             along, face, slide = max(slides, default=(0.0, 0.0, 0.0))
             if along > 1e-9:
-                mine = state.contacts[row[(owner == b) & (np.abs(_principal(angle - face)) <= _ONE_FACE)]]
+                own = state.contacts[row[(owner == b) & (np.abs(_principal(angle - face)) <= _ONE_FACE)]]
                 weight = materials[blocks.material[b]].density * area[b] * np.hypot(*gravity)
-                holding, way = _strength(mine, joints, max(0.0, -np.cos(pull - face)) * weight), slide
+                holding, way = _strength(own, joints, max(0.0, -np.cos(pull - face)) * weight), slide
                 factor = holding / (along * weight) if weight > 0 else np.nan
                 kind = SLIDES if factor < 1.0 else FRICTION
         if kind > out["kind"][b]:

@@ -130,13 +130,13 @@ def _loops(nodes, node, edge, start, face_of_cycle, outer, inner):
     if len(pinched):
         # The few faces with a loop that touches itself are assembled one by one.
         special = np.unique(face_of_cycle[pinched])
-        mine = np.isin(face_of_cycle[order], special)
+        is_special = np.isin(face_of_cycle[order], special)
         loops: dict[int, list[np.ndarray]] = {int(face): [] for face in special}
-        for c in order[mine].tolist():
+        for c in order[is_special].tolist():
             loops[int(face_of_cycle[c])].append(_pairs(node, edge, start, c))
         for c in pinched.tolist():
             _unpinch(nodes, loops[int(face_of_cycle[c])], _pairs(node, edge, start, c))
-        order = order[~mine]
+        order = order[~is_special]
         begin, flat = gathered(start, order)
         extra = [(face, loop) for face, own in loops.items() for loop in own]
         pairs = np.concatenate([np.stack([node[flat], edge[flat]], axis=1), *(loop for _, loop in extra)])

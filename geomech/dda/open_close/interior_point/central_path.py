@@ -147,15 +147,15 @@ class CentralPath:
         # Forces balanced by the initial motion are not loads.
         left = right - pattern.without_contacts(matrix, start)
         load = np.append(np.abs(left).max(axis=1, initial=0.0), 0.0)
-        mine, others = order[self._at[0]], order[self._at[1]]
+        block, other = order[self._at[0]], order[self._at[1]]
         # Small blocks transmit the forces of large ones. In units of a small block's own load, contact forces would be
         # negligible compared with those to be balanced, and all steps would be short.
         for _ in range(self._solver.path_load_rings):
             known = load.copy()
-            np.maximum.at(load, mine, known[others])
-            np.maximum.at(load, others, known[mine])
+            np.maximum.at(load, block, known[other])
+            np.maximum.at(load, other, known[block])
             load[-1] = 0.0
-        load = np.maximum(load[mine], load[others])
+        load = np.maximum(load[block], load[other])
         # Blocks without load get a small fraction of the mean; without any loads the unit is arbitrary.
         load = np.maximum(load, 1e-3 * load.mean()) if load.any() else np.ones(len(some))
         self._unit = load * load / self._kn

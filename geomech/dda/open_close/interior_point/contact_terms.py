@@ -59,11 +59,11 @@ class Linearised(NamedTuple):
 
 
 class Between(NamedTuple):
-    """Positions ``mine`` and ``theirs`` (n,) of a contact's blocks, −1 if fixed; its ``vectors`` (n, 2, 12) and ``lift``
+    """Positions ``block`` and ``other`` (n,) of a contact's blocks, −1 if fixed; its ``vectors`` (n, 2, 12) and ``lift``
     (n,)."""
 
-    mine: np.ndarray
-    theirs: np.ndarray
+    block: np.ndarray
+    other: np.ndarray
     vectors: np.ndarray
     lift: np.ndarray
 
@@ -127,7 +127,7 @@ def pull(first, last, goals, linearised):
 def change(first, last, unknowns, between, springs, linearised, goals, changes):
     """`Changes` of contacts (`Between`) in a step of the ``unknowns`` (6 n_blocks,). Returns the largest step length up to
     1 for which positive numbers stay positive. ``pulled`` is that of `pull`."""
-    mine, theirs, vectors, lift = between
+    block, other, vectors, lift = between
     kn, _, mu, _, rough, _ = springs
     numbers, missed, laws, pulled = linearised
     motion, changed, sheared = changes
@@ -136,12 +136,12 @@ def change(first, last, unknowns, between, springs, linearised, goals, changes):
         apart = along = 0.0
         n, t = vectors[c, 0], vectors[c, 1]
         # All six at once, so that they are vectorised.
-        if mine[c] >= 0:
-            u = unknowns[6 * mine[c] : 6 * mine[c] + 6]
+        if block[c] >= 0:
+            u = unknowns[6 * block[c] : 6 * block[c] + 6]
             apart += n[0] * u[0] + n[1] * u[1] + n[2] * u[2] + n[3] * u[3] + n[4] * u[4] + n[5] * u[5]
             along += t[0] * u[0] + t[1] * u[1] + t[2] * u[2] + t[3] * u[3] + t[4] * u[4] + t[5] * u[5]
-        if theirs[c] >= 0:
-            u = unknowns[6 * theirs[c] : 6 * theirs[c] + 6]
+        if other[c] >= 0:
+            u = unknowns[6 * other[c] : 6 * other[c] + 6]
             apart += n[6] * u[0] + n[7] * u[1] + n[8] * u[2] + n[9] * u[3] + n[10] * u[4] + n[11] * u[5]
             along += t[6] * u[0] + t[7] * u[1] + t[8] * u[2] + t[9] * u[3] + t[10] * u[4] + t[11] * u[5]
         apart -= lift[c] * along
@@ -223,14 +223,16 @@ def undecided(first, last, variables, springs, clear):
     number = 0
     for c in range(uintp(first), uintp(last)):
         normal, apart = normals[c], kn[c] * widths[c]
-        vague = clear * normal > apart and apart * clear > normal
-        if not vague and rough[c] and apart < normal:
+        unclear = clear * normal > apart and apart * clear > normal
+        if not unclear and rough[c] and apart < normal:
             strength = mu[c] * normal + base[c]
             least = LEAST_LEFT * strength
             above, below = max(strength - shear[c], least), max(strength + shear[c], least)
             back, ahead = ks[c] * slip[0, c], ks[c] * slip[1, c]
-            vague = (back < clear * above and back * clear > above) or (ahead < clear * below and ahead * clear > below)
-        number += vague
+            unclear = (back < clear * above and back * clear > above) or (
+                ahead < clear * below and ahead * clear > below
+            )
+        number += unclear
     return number
 
 
@@ -240,7 +242,7 @@ def balance(first, last, start, side, vectors, pulled, along_normal, along_edge,
     contacts, the columns ``along_normal`` and ``along_edge`` of ``pulled`` (n, k); ``start`` and ``side`` as from
     `assembly.sides_of`."""
     for b in range(uintp(first), uintp(last)):
-        here, mine = given[6 * b : 6 * b + 6], out[6 * b : 6 * b + 6]
+        here, result = given[6 * b : 6 * b + 6], out[6 * b : 6 * b + 6]
         r0, r1, r2, r3, r4, r5 = here[0], here[1], here[2], here[3], here[4], here[5]
         for q in range(uintp(start[b]), uintp(start[b + 1])):
             c, k = uintp(side[q] >> 1), 6 * (side[q] & 1)
@@ -248,4 +250,4 @@ def balance(first, last, start, side, vectors, pulled, along_normal, along_edge,
             n, t = vectors[c, 0, k : k + 6], vectors[c, 1, k : k + 6]
             r0, r1, r2 = r0 + p * n[0] + d * t[0], r1 + p * n[1] + d * t[1], r2 + p * n[2] + d * t[2]
             r3, r4, r5 = r3 + p * n[3] + d * t[3], r4 + p * n[4] + d * t[4], r5 + p * n[5] + d * t[5]
-        mine[0], mine[1], mine[2], mine[3], mine[4], mine[5] = r0, r1, r2, r3, r4, r5
+        result[0], result[1], result[2], result[3], result[4], result[5] = r0, r1, r2, r3, r4, r5

@@ -108,18 +108,18 @@ class _Step:
 
 
 class PathSteps:
-    """Steps of contacts between blocks whose unknowns have the numbers ``mine`` and ``theirs`` (n,), −1 for those
+    """Steps of contacts between blocks whose unknowns have the numbers ``block`` and ``other`` (n,), −1 for those
     without, of ``n_blocks``, with ``vectors`` (n, 2, 12) as from `assembly.contact_vectors` and ``lift`` (n,).
 
     ``numbers`` (n, 6), ``laws`` (n, 4): see `contact_terms`. ``step``: present step; ``tried``: last one computed.
     """
 
     def __init__(
-        self, n_blocks: int, mine: np.ndarray, theirs: np.ndarray, vectors: np.ndarray, lift: np.ndarray
+        self, n_blocks: int, block: np.ndarray, other: np.ndarray, vectors: np.ndarray, lift: np.ndarray
     ) -> None:
-        n, each = len(mine), np.arange(n_blocks)
-        self._fixed = tuple(Between(mine, theirs, vectors, lift))
-        self._sides = tuple(sides_of(n_blocks, np.append(each, -1), mine, theirs))
+        n, each = len(block), np.arange(n_blocks)
+        self._fixed = tuple(Between(block, other, vectors, lift))
+        self._sides = tuple(sides_of(n_blocks, np.append(each, -1), block, other))
         self._parts = np.empty((n + SHARE - 1) // SHARE)
         self.numbers, self.laws = np.empty((n, 6)), np.empty((n, 4))
         self._missed, self._pulled = np.empty((n, 2)), np.empty((n, 3))
