@@ -1,6 +1,7 @@
-"""Examples that travel with geomech: the studies and scenes of its repository, and commented scenes to begin with.
+"""Examples that are installed with geomech: the studies and scenes of its repository, and commented scenes to begin
+with.
 
-A checkout keeps them where they are worked on (``pipelines``, ``geometry``, ``outputs/gallery``); a wheel carries the
+In a checkout they are in their working folders (``pipelines``, ``geometry``, ``outputs/gallery``); a wheel contains the
 same folders in ``geomech/example_files``.
 """
 
@@ -15,17 +16,18 @@ from typing import NamedTuple
 
 HERE = Path(__file__).parent
 TEMPLATES = HERE / "templates"
-#: What geometry and models of a study are called from where it lies.
+#: Path of the geometry and models of a study, relative to it.
 _ABOVE = "../../geometry/"
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]*\Z")
 
 
 class ExampleError(ValueError):
-    """There is no such example or template, or no room for it: the message says what to do."""
+    """There is no such example or template, or the destination exists; the message says what to do."""
 
 
 class Example(NamedTuple):
-    """``place``: a study's folder, or a scene file; ``line``: what it shows; ``picture``: what came of it, or None."""
+    """``place``: a study's folder, or a scene file; ``line``: what it shows; ``picture``: a picture of its result, or
+    None."""
 
     name: str
     line: str
@@ -34,7 +36,7 @@ class Example(NamedTuple):
 
 
 def root() -> Path:
-    """The folder that holds ``pipelines`` and ``geometry``. Raises ExampleError where neither came along."""
+    """The folder that contains ``pipelines`` and ``geometry``. Raises ExampleError if this installation has neither."""
     for folder in (HERE / "example_files", HERE.parent):
         if (folder / "pipelines").is_dir() and (folder / "geometry").is_dir():
             return folder
@@ -44,7 +46,7 @@ def root() -> Path:
 
 
 def examples() -> list[Example]:
-    """All studies, then all scenes that are no study of the same name."""
+    """All studies, then all scenes that do not belong to a study of the same name."""
     folder = root()
     pictures = folder / ("gallery" if folder.name == "example_files" else "outputs/gallery")
     found = {}
@@ -58,7 +60,7 @@ def examples() -> list[Example]:
 
 
 def find(name: str) -> Example | None:
-    """The example called ``name``; None where there is none."""
+    """The example called ``name``, or None."""
     try:
         return next((example for example in examples() if example.name == name), None)
     except ExampleError:
@@ -66,8 +68,8 @@ def find(name: str) -> Example | None:
 
 
 def copy(name: str, into: Path) -> list[Path]:
-    """Copy an example, with the models that it reads, into the new folder ``into``; the files written, relative to it.
-    Raises ExampleError for an unknown name and where ``into`` exists."""
+    """Copy an example, with the models that it reads, into the new folder ``into``; returns the files written, relative
+    to it. Raises ExampleError for an unknown name and if ``into`` exists."""
     example = find(name)
     if example is None:
         names = ", ".join(one.name for one in examples())
@@ -96,7 +98,7 @@ def copy(name: str, into: Path) -> list[Path]:
 
 def new(kind: str, into: Path) -> list[Path]:
     """Write a commented scene of a ``kind`` of `kinds`, and the Gmsh model that it reads, into the new folder ``into``;
-    the files, relative to it. Raises ExampleError for another kind and where ``into`` exists."""
+    returns the files, relative to it. Raises ExampleError for another kind and if ``into`` exists."""
     if kind not in kinds():
         raise ExampleError(f"there is no start for {kind!r}; there are {', '.join(kinds())}")
     _refuse_existing(into)
@@ -107,7 +109,7 @@ def new(kind: str, into: Path) -> list[Path]:
 
 
 def kinds() -> list[str]:
-    """What scenes can be begun with `new`."""
+    """Kinds of scenes that `new` can begin."""
     return sorted(path.stem for path in TEMPLATES.glob("*.toml"))
 
 
@@ -133,7 +135,7 @@ def _picture(folder: Path, name: str) -> Path | None:
 
 
 def _models(text: str, folder: Path) -> list[Path]:
-    """The files beside or in the folder of geometry that a scene or script names."""
+    """Files that a scene or script names, next to it or in the folder of geometry."""
     names = re.findall(r'["\'](?:\.\./\.\./geometry/)([\w.-]+)["\']', text)
     found = [folder / _ABOVE / name for name in names]
     if folder.name == "geometry":

@@ -1,5 +1,5 @@
-"""Ctrl-C, SIGTERM and SIGHUP while a run lasts: the first lets the cycle end if that does not take long, the second ends
-the run at once."""
+"""Ctrl-C, SIGTERM and SIGHUP during a run: the first one lets the current cycle end if that does not take long, the
+second ends the run at once."""
 
 from __future__ import annotations
 
@@ -10,20 +10,21 @@ from contextlib import suppress
 from types import FrameType
 from typing import Any, Self
 
-#: A cycle that lasts longer than this after the first interrupt is broken off, s. What is lost is the cycle and what came
+#: A cycle that lasts longer than this after the first interrupt is broken off, s. The cycle is lost, and everything
 #: since the last checkpoint, which is written every half a minute.
 PATIENCE = 5.0
 _MESSAGE = f"stopping when this cycle is done, or in {PATIENCE:g} s; once more to stop at once"
 
 
 class Interruption:
-    """While this context lasts, a first interrupt only sets ``asked``; the next raises KeyboardInterrupt, as all do
-    outside. ``message``: the answer to a first one. ``patience`` seconds after the first one KeyboardInterrupt is raised
-    by itself, unless `wait` has been called; None: never.
+    """In this context a first interrupt only sets ``asked``; the next raises KeyboardInterrupt, as every interrupt does
+    outside. ``message``: the answer to the first one. KeyboardInterrupt is raised ``patience`` seconds after the first
+    one, unless `wait` has been called; None: never.
 
-    SIGTERM and SIGHUP are taken the same way where they raise KeyboardInterrupt already, as on the command line. What is
-    ignored stays ignored: a shell script starts its background jobs so, in order that a Ctrl-C meant for another
-    program leaves them alone. In other threads than the main one, where signals do not arrive, nothing changes.
+    SIGTERM and SIGHUP are treated in the same way if they already raise KeyboardInterrupt, as on the command line.
+    Signals that are ignored remain ignored: a shell script starts its background jobs in this way, so that a Ctrl-C
+    meant for another program does not stop them. Nothing changes in threads other than the main one, which receive no
+    signals.
     """
 
     def __init__(self, message: str = _MESSAGE, patience: float | None = PATIENCE) -> None:
@@ -38,7 +39,7 @@ class Interruption:
         return self
 
     def wait(self) -> None:
-        """What is done now may take as long as it does."""
+        """The present work may take any time."""
         if signal.SIGALRM in self._before:
             signal.setitimer(signal.ITIMER_REAL, 0.0)
 
@@ -52,7 +53,7 @@ class Interruption:
         if self.asked:
             raise KeyboardInterrupt
         self.asked = True
-        # An alarm of somebody else's is left alone.
+        # An alarm set by other code is not changed.
         if self.patience is not None and signal.getsignal(signal.SIGALRM) is signal.SIG_DFL:
             self._before[signal.SIGALRM] = signal.signal(signal.SIGALRM, self._take)
             signal.setitimer(signal.ITIMER_REAL, self.patience)

@@ -13,13 +13,13 @@ from functools import cache
 from pathlib import Path
 from typing import NamedTuple
 
-#: Environment variable with the user's choice.
+#: Environment variable with the user's folder.
 VARIABLE = "NUMBA_CACHE_DIR"
 
 
 class Place(NamedTuple):
-    """The ``folder``, and the folder that it replaces because that cannot be written (``instead_of``; None for the
-    usual one)."""
+    """The ``folder``, and the folder that it replaces because that is not writable (``instead_of``; None for the usual
+    one)."""
 
     folder: str
     instead_of: str | None = None
@@ -27,7 +27,7 @@ class Place(NamedTuple):
 
 @cache
 def kernel_place() -> Place:
-    """The user's own choice, else below ~/.cache; a temporary one where that cannot be written."""
+    """The folder that the user has set, else one below ~/.cache; a temporary one if that is not writable."""
     home = os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")
     wanted = os.environ.get(VARIABLE) or os.path.join(home, "geomech", "kernels")
     return Place(wanted) if _writable(wanted) else Place(_temporary(), wanted)
@@ -42,7 +42,8 @@ def _writable(folder: str) -> bool:
 
 
 def _temporary() -> str:
-    """One that lasts until the machine clears it, where it is this user's alone; else one for this process."""
+    """A temporary folder that is kept until the machine clears it, if only this user can write to it; else one for this
+    process."""
     import atexit
     import shutil
     import tempfile
@@ -61,12 +62,12 @@ def _temporary() -> str:
     return folder
 
 
-#: In each folder of kernels: the source file that they are of.
+#: File in each folder of kernels that names their source file.
 SOURCE = "source.txt"
 
 
 def prune(folder: Path) -> int:
-    """Remove the kernels in ``folder`` whose sources are gone; how many folders they were in."""
+    """Remove the kernels in ``folder`` whose sources no longer exist; returns the number of folders they were in."""
     import shutil
 
     removed = 0

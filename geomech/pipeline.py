@@ -1,4 +1,4 @@
-"""From a scene to a run folder: the coupling's cycles, with observers attached."""
+"""From a scene to a run folder: the cycles of the coupling, with observers."""
 
 from __future__ import annotations
 
@@ -23,13 +23,13 @@ if TYPE_CHECKING:
 
 log = logging.getLogger(__name__)
 
-#: Whether runs may replace the results of others in their folders, where their caller does not say.
+#: Whether runs may replace existing results in their folders, unless their caller specifies it.
 _OVERWRITE: ContextVar[bool] = ContextVar("overwrite", default=False)
 
 
 @contextmanager
 def overwriting(allowed: bool = True) -> Iterator[None]:
-    """While this context lasts runs may replace the results of others in their folders."""
+    """Context in which runs may replace existing results in their folders."""
     before = _OVERWRITE.set(allowed)
     try:
         yield
@@ -38,7 +38,7 @@ def overwriting(allowed: bool = True) -> Iterator[None]:
 
 
 def refuse_results(folders: Iterable[Path]) -> None:
-    """Refuse, before the first of several runs begins, folders that hold results already: raises
+    """Refuse folders that already hold results, before the first of several runs begins: raises
     `geomech.output.run_lock.FolderTaken`, unless runs may overwrite (`overwriting`)."""
     from .output import run_lock
 
@@ -68,15 +68,15 @@ def run(
     again: bool = False,
     overwrite: bool | None = None,
 ) -> dict[str, Any]:
-    """Run ``scene`` to its end and return the summary that ``summary.json`` holds.
+    """Run ``scene`` to its end and return the summary, which ``summary.json`` contains.
 
-    ``out`` is the run folder (default ``outputs/<scene's name>``); ``observers`` are called after every cycle, by default
-    the writers that the scene's ``[output]`` table asks for. ``again``: the scene is the copy that an earlier run has
-    left in ``out``. ``overwrite``: what an earlier run has left there may be replaced (None: as `overwriting` says).
-    Whatever ends the run, what was written stays readable and every observer is ended; the exception is raised again.
-    Raises SceneError on bad input or when ``out`` is where the scene itself is kept,
-    `geomech.output.run_lock.FolderRefused` where it holds the results of a run or another one is at work,
-    `geomech.dda.NotConverged` when the blocks find no consistent contact state.
+    ``out`` is the run folder (default ``outputs/<scene's name>``); ``observers`` are called after every cycle, by
+    default the writers that the scene's ``[output]`` table selects. ``again``: the scene is the copy that an earlier
+    run left in ``out``. ``overwrite``: results of an earlier run may be replaced (None: as in `overwriting`). However
+    the run ends, the files written remain readable and every observer is ended; an exception is raised again. Raises
+    SceneError for bad input or if ``out`` is the folder of the scene itself, `geomech.output.run_lock.FolderRefused` if
+    it holds the results of a run or another run is using it, and `geomech.dda.NotConverged` if no consistent contact
+    state of the blocks is found.
 
     >>> summary = geomech.run("slope.toml", out="outputs/first", observers=[])
     >>> summary["end"]
@@ -105,7 +105,7 @@ def run_problem(
     *,
     overwrite: bool | None = None,
 ) -> dict[str, Any]:
-    """The same for a problem built in Python; ``warnings`` about it are logged once the run's log is open."""
+    """As `run`, for a problem built in Python; ``warnings`` about it are logged once the run's log is open."""
     from .output.console.at_work import run_ended
     from .output.run_lock import RunLock
 
@@ -117,11 +117,11 @@ def run_problem(
 
 
 class CoupledRun:
-    """A coupled problem on its way to the end, watched by observers and stored by the first `Checkpoints` among them.
+    """A run of a coupled problem with its observers, stored by the first `Checkpoints` among them.
 
-    It begins at the start of ``problem``, or where ``stored``, the content of a checkpoint, was written (it is used
-    up), with the title and the settings of the run that ``problem`` has now. A first interrupt ends it between two
-    cycles, or in the middle of one that lasts (`geomech.interruption.PATIENCE`).
+    It begins at the start of ``problem``, or at ``stored``, the content of a checkpoint (which is used up), with the
+    present title and run settings of ``problem``. A first interrupt ends it between two cycles, or within a cycle that
+    takes long (`geomech.interruption.PATIENCE`).
     """
 
     def __init__(
@@ -144,7 +144,7 @@ class CoupledRun:
         self.before_the_last = False
 
     def go(self, warnings: Iterable[str] = ()) -> dict[str, Any]:
-        """To the end; the summary. ``warnings`` are logged once the log is open."""
+        """Run to the end; returns the summary. ``warnings`` are logged once the log is open."""
         self.began = time.perf_counter()
         summary: dict[str, Any] = {"title": self.problem.title}
         error: BaseException | None = None
@@ -231,11 +231,11 @@ class CoupledRun:
 
 
 class CracksInBlocks(ValueError):
-    """A factor of safety was asked for of blocks that rock bridges between cracks may hold together."""
+    """A factor of safety was requested for blocks that may be held together by rock bridges between cracks."""
 
 
 def cracked_and_free(problem: Problem) -> list[str]:
-    """The names of the cracks that lie in blocks that are not fixed."""
+    """The names of the cracks in blocks that are not fixed."""
     cracks = problem.cracks
     free = ~problem.blocks.fixed[cracks.block]
     return [cracks.names[k] for k in sorted(set(cracks.crack[free].tolist()))]
@@ -251,17 +251,17 @@ def factor_of_safety(
     divide: Mapping[str, float] | dda.PartialFactors | None = None,
     **search_options: Any,
 ) -> dda.FactorOfSafety:
-    """`geomech.dda.FactorOfSafety` of the blocks of ``scene``, by strength reduction under the loads of ``load_time`` s
-    (default: the scene's end). ``wishes``: fields of `geomech.dda.FactorSearch`: tolerance, watch …
+    """`geomech.dda.FactorOfSafety` of the blocks of ``scene``, by strength reduction under the loads at ``load_time`` s
+    (default: the scene's end). ``search_options``: fields of `geomech.dda.FactorSearch`, such as tolerance and watch.
 
-    ``along`` names the joint laws, or joints as they were drawn, whose strength is reduced (default: all). ``divide``
-    are partial factors on "cohesion", "friction" (tan φ) and "tension" by which all joints are divided before, as
-    design codes want it: the factor comes on top of them.
+    ``along`` names the joint laws, or joints as drawn, whose strength is reduced (default: all). ``divide`` gives
+    partial factors on "cohesion", "friction" (tan φ) and "tension", by which the strength of all joints is divided
+    first, as design codes require; the factor of safety is additional to them.
 
-    Blocks are whole. ``without_cracks``: cracks inside blocks that can move are left out, so that what rock bridges
-    hold counts as if they never broke: the answer is then a bound from above. Raises `CracksInBlocks` where there are
-    such cracks and it is not said, SceneError on bad input, `geomech.dda.NothingToReduce` where there is no strength to
-    reduce or a name is not known, `geomech.dda.NotConverged` where the blocks do not stand whatever their joints hold.
+    Blocks remain whole. With ``without_cracks`` cracks inside movable blocks are left out, as if rock bridges never
+    broke: the result is then an upper bound. Raises `CracksInBlocks` if there are such cracks and ``without_cracks`` is
+    not set, SceneError for bad input, `geomech.dda.NothingToReduce` if there is no strength to reduce or a name is
+    unknown, and `geomech.dda.NotConverged` if the blocks are unstable whatever the strength of their joints.
 
     >>> found = geomech.factor_of_safety("slope.toml")
     >>> f"{found.factor:.4f}"  # a block on a plane: tan 35° / tan 30°
@@ -318,7 +318,7 @@ def safety_report(
 
 
 def _refuse_to_overwrite_scene(scene: Scene, folder: Path) -> None:
-    """Refuse to put a run, and with it a scene.toml, where the scene itself is kept."""
+    """Refuse a run folder, and with it a new scene.toml, where the scene itself is stored."""
     kept = folder / "scene.toml"
     if kept.exists() and kept.samefile(scene.path):
         from .scene import Fault, SceneError

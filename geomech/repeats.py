@@ -1,14 +1,15 @@
-"""How far the results of a run depend on what must not matter: the run is repeated with one thing changed at a time.
+"""Sensitivity of a run's results to choices that should not matter: the run is repeated with one of them changed at a
+time.
 
-noise       every coordinate of the outlines changed by up to 1e-12 of the model's extent, as another processor, a shift or
-            a rotation of the drawing would do
+noise       every coordinate of the outlines changed by up to 1e-12 of the model's extent, as by another processor,
+            a shift or a rotation of the drawing
 steps       time steps, load steps and the motion allowed per step half as large
 increment   crack growth increments half as long
 elements    twice as many boundary elements on cracks and sides; a ``target_error`` ten times smaller
 
 The scatter of a quantity q of the run and q' of its repetition is |q' − q| / max(|q|, |q'|). It tells which digits of a
-result the scene determines. Blocks that lean on one another with friction, and cracks that may take one of two ways,
-amplify round-off as a real slope amplifies what no drawing knows: where the scatter is large, the result is one of
+result the scene determines. Blocks in mutual frictional contact, and cracks at a bifurcation of their path, amplify
+round-off, as a real slope amplifies details that no drawing contains: if the scatter is large, the result is one of
 several that the scene allows.
 """
 
@@ -32,7 +33,7 @@ log = logging.getLogger(__name__)
 NOISE = 1e-12
 #: Blocks that have moved by more than this part of their size √area count as moving.
 MOVES = 1e-3
-#: A larger scatter is warned of.
+#: A larger scatter causes a warning.
 LARGEST_SCATTER = 0.01
 #: Quantities: their key in ``summary.json``, their words in messages, and their unit there.
 QUANTITIES = {
@@ -49,7 +50,7 @@ QUANTITIES = {
 
 @dataclass
 class Outcome:
-    """What a run has come to: counts over its cycles (`add`) and its ``last`` one."""
+    """Results of a run: counts over its cycles (`add`) and its ``last`` cycle."""
 
     peak: float = 0.0
     events: Counter[str] = field(default_factory=Counter)

@@ -42,13 +42,12 @@ def resume(
     files are bitwise those of an uninterrupted run, except for times of day. Rows and files later than the checkpoint
     are dropped.
 
-    ``overrides``, as for `load_scene`, may change keys in `ALLOWED`. A later ``run.end_time_s`` lets a finished run go
-    on from before the step that its end has cut, like a run that was as long from the beginning. A run without a
-    checkpoint begins again.
-    ``observers`` are those of the run, by default the standard ones (``quiet``: they say nothing); ``tell`` is told
-    when the run begins again. Raises `Finished` when
-    there is nothing left to do, `NotResumable` when the run cannot be gone on with, `geomech.output.run_lock.FolderInUse`
-    while another process is at work in the folder, SceneError on bad input.
+    ``overrides``, as for `load_scene`, may change keys in `ALLOWED`. With a later ``run.end_time_s`` a finished run
+    continues from before the step that was shortened at its end, as if it had been that long from the beginning. A run
+    without a checkpoint begins again. ``observers`` are those of the run, by default the standard ones (``quiet``:
+    without output); ``tell`` is called with a message if the run begins again. Raises `Finished` if nothing is left to
+    do, `NotResumable` if the run cannot be continued, `geomech.output.run_lock.FolderInUse` while another process uses
+    the folder, and SceneError for bad input.
 
     >>> geomech.resume("outputs/broken_off", {"run.end_time_s": 0.3}, quiet=True)["time_s"]
     0.3
@@ -114,7 +113,7 @@ def _resumed(request: _Request) -> dict[str, Any]:
 def _refuse_other_folders(folder: Path) -> None:
     if not folder.is_dir():
         raise NotResumable(f"there is no run folder {folder}")
-    # The log is there before anything else of a run but the scene, which other folders hold as well.
+    # The log is written before every other file of a run except the scene, which other folders may contain as well.
     if not any((folder / name).exists() for name in ("run.log", "history.csv", checkpoint_file.FOLDER)):
         below = sorted(str(found.parent) for found in folder.glob("*/history.csv"))
         raise NotResumable(
@@ -179,7 +178,7 @@ def _end_reason(folder: Path) -> str | None:
 def _refuse_finished(end: str, header: Mapping[str, Any], scene: Any) -> None:
     """Raise Finished unless the scene has been changed so that the run continues."""
     settings = None if scene is None else scene.problem().run
-    # Steps to events have none to go to where nothing holds the blocks.
+    # Steps to events are impossible if nothing holds the blocks.
     no_further = end == "mechanism" and settings is not None and settings.stepping == "events"
     if settings is None or no_further or end in ("collapse", "out of sight"):
         raise Finished(f"the run has ended ({end}): there is nothing left to continue")

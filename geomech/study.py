@@ -1,7 +1,7 @@
-"""The runs of a study: one scene in several variants, each run into a folder of its own and seen by a watcher.
+"""Runs of a study: one scene in several variants, each run into a folder of its own with an observer of its own.
 
-A study tells the time left by the runs that have ended: those of `geomech.run`, `watched_runs` and sweeps count by
-themselves, others by `run_ended`.
+The time left of a study is estimated from the runs that have ended. Runs by `geomech.run`, `watched_runs` and sweeps
+are counted automatically, others by `run_ended`.
 """
 
 from __future__ import annotations
@@ -16,8 +16,8 @@ __all__ = ["Watched", "run_ended", "watched_runs"]
 
 
 class Watched(NamedTuple):
-    """One run that has ended: its variant's ``name`` (None: the scene as it stands), the ``folder`` that it has left,
-    the observer that was its ``watcher``, and its ``summary``."""
+    """A run that has ended: the ``name`` of its variant (None: the scene itself), its ``folder``, the observer that was
+    its ``watcher``, and its ``summary``."""
 
     name: str | None
     folder: Path
@@ -33,13 +33,13 @@ def watched_runs(
     overrides: Sequence[str] = (),
     quiet: bool = False,
 ) -> Iterator[Watched]:
-    """Run the scene of ``study`` (a folder, or the path of a scene) in each of its ``variants`` (none named: all that
-    it has), one by one.
+    """Run the scene of ``study`` (a folder, or the path of a scene) in each of its ``variants`` (default: all), one
+    after another.
 
-    A variant runs into ``out`` / its name, None into ``out``, with all that the scene's ``[output]`` asks for and an
-    observer of its own, ``watcher()``. All scenes are read before the first one runs: an error in the last does not
-    cost the time of the others, and neither does a folder that holds results already. Raises SceneError on bad input, and
-    what `geomech.run` raises.
+    A variant runs into ``out`` / its name, None into ``out``, with all output that the scene's ``[output]`` selects and
+    an observer of its own, ``watcher()``. All scenes are read before the first run, so that an error in the last one
+    does not cost the time of the others; folders that already hold results are refused at that time too. Raises
+    SceneError for bad input, and the exceptions of `geomech.run`.
     """
     from .output import standard_observers
     from .pipeline import refuse_results, run

@@ -1,1 +1,1 @@
-"""How geomech is built into what `pip install` installs, and what a machine lacks to run it (`doctor`)."""
+"""Building of the installable package, and checks of the installation (`doctor`)."""

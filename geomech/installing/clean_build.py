@@ -1,7 +1,7 @@
-"""How `pip install .` builds geomech: as setuptools does, with the examples, and without the ``build`` folder that it
+"""Build hooks of `pip install .`: as setuptools, with the examples, and without the ``build`` folder that setuptools
 leaves behind.
 
-A later installation would take modules from there that the sources no longer have.
+From that folder a later installation would take modules that no longer exist in the sources.
 """
 
 from __future__ import annotations
@@ -14,20 +14,20 @@ from pathlib import Path
 from setuptools import build_meta
 from setuptools.build_meta import *  # noqa: F403 (all hooks but those below)
 
-#: Below the project's folder, in which the hooks are called.
+#: Relative to the project's folder, in which the hooks are called.
 LEFT = Path("build")
 
 
-#: What the examples of a wheel are made of, and where they stand in it (`geomech.examples`).
+#: Folders of the examples, and their location in a wheel (`geomech.examples`).
 EXAMPLES = {"pipelines": "pipelines", "geometry": "geometry", "outputs/gallery": "gallery"}
 IN_THE_WHEEL = Path("geomech/example_files")
-#: What an sdist holds besides the package.
+#: Content of an sdist in addition to the package.
 SDIST = ("tests", "pipelines", "geometry", "docs", "outputs/gallery")
 
 
 @contextmanager
 def _with_examples() -> Iterator[None]:
-    """The examples' folders copied to where the package's data is taken from, while it is."""
+    """Context in which the examples' folders are copied to where the package's data are read from."""
     shutil.rmtree(IN_THE_WHEEL, ignore_errors=True)
     try:
         for name, inside in EXAMPLES.items():
@@ -41,7 +41,7 @@ def _with_examples() -> Iterator[None]:
 
 @contextmanager
 def _with_manifest() -> Iterator[None]:
-    """A MANIFEST.in, which setuptools reads and the sources need not hold."""
+    """Context with a MANIFEST.in, which setuptools reads; the sources need not contain it."""
     manifest = Path("MANIFEST.in")
     lines = [f"graft {folder}" for folder in SDIST] + ["global-exclude __pycache__ *.py[cod]", "include *.md *.cff"]
     manifest.write_text("\n".join([*lines, ""]), encoding="utf-8")
@@ -61,12 +61,12 @@ def _without_leftovers() -> Iterator[None]:
 
 
 def build_wheel(wheel_directory, config_settings=None, metadata_directory=None):
-    """The hook of PEP 517."""
+    """PEP 517 hook."""
     with _without_leftovers(), _with_examples():
         return build_meta.build_wheel(wheel_directory, config_settings, metadata_directory)
 
 
 def build_sdist(sdist_directory, config_settings=None):
-    """The hook of PEP 517: with tests, studies, drawings and the manual."""
+    """PEP 517 hook; the archive includes tests, studies, drawings and the manual."""
     with _with_manifest():
         return build_meta.build_sdist(sdist_directory, config_settings)

@@ -1,4 +1,4 @@
-"""Checks whether everything that a run needs is installed; each names what is missing and the command that installs it."""
+"""Checks that everything needed for a run is installed; each names what is missing and the command that installs it."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-#: Debian packages of the shared libraries that the wheels leave to the system.
+#: Debian packages of the shared libraries that wheels expect in the system.
 DEBIAN = {
     "libGLU.so.1": "libglu1-mesa",
     "libGL.so.1": "libgl1",
@@ -33,14 +33,14 @@ DEBIAN = {
     "libgomp.so.1": "libgomp1",
 }
 
-#: Distributions that runs and pictures import, gmsh apart, which has a check of its own.
+#: Distributions that runs and pictures import, except gmsh, which has a check of its own.
 PACKAGES = ("numpy", "scipy", "numba", "shapely", "pydantic", "tomli-w", "tqdm", "meshio", "vtk", "pyvista", "imageio",
             "matplotlib", "ezdxf")  # fmt: skip
 
 
 @dataclass(frozen=True)
 class Check:
-    """``found``: what is there, or what is wrong; ``remedy``: the command that mends it, empty when ``good``."""
+    """``found``: what is installed, or what is wrong; ``remedy``: the command that repairs it, empty if ``good``."""
 
     name: str
     good: bool
@@ -49,7 +49,8 @@ class Check:
 
 
 def examine() -> list[Check]:
-    """All checks, in the order a run meets them. Libraries that could take the process down load in another one."""
+    """All checks, in the order in which a run needs them. Libraries that could crash the process are loaded in another
+    one."""
     checks: list[Callable[[], Check]] = [_python, _packages, _gmsh, _numba, _threads]
     return [check() for check in checks]
 
@@ -78,13 +79,13 @@ def _gmsh() -> Check:
 
 
 def check_import(name: str, code: str, without: str) -> Check:
-    """Run ``code`` in a new process. Where a shared library is missing, name it and all others that are."""
+    """Run ``code`` in a new process. If a shared library is missing, it is named, with all others that are missing."""
     done = _run(code)
     if done.returncode == 0:
         return Check(name, True, done.stdout.strip())
     missing = missing_libraries(done.stderr)
     if missing:
-        # The loader stops at the first one; ldd lists the rest, so that one install is enough.
+        # The loader stops at the first missing one; ldd lists all, so that one installation is enough.
         missing = list(dict.fromkeys(missing + _also_missing(name)))
         return Check(name, False, f"missing shared libraries: {', '.join(missing)}", apt_line(missing))
     last = (done.stderr.strip().splitlines() or [f"ended with code {done.returncode}"])[-1]
@@ -92,14 +93,14 @@ def check_import(name: str, code: str, without: str) -> Check:
 
 
 def missing_libraries(message: str) -> list[str]:
-    """Shared libraries that a loader's or ldd's ``message`` says it cannot find."""
+    """Shared libraries that are missing according to a ``message`` of the loader or of ldd."""
     loader = re.findall(r"(\S+\.so[\d.]*): cannot open shared object file", message)
     ldd = re.findall(r"^\s*(\S+\.so[\d.]*) => not found", message, flags=re.MULTILINE)
     return list(dict.fromkeys([*loader, *ldd]))
 
 
 def apt_line(libraries: list[str]) -> str:
-    """The line that installs ``libraries`` on Debian and Ubuntu."""
+    """Command that installs ``libraries`` on Debian and Ubuntu."""
     known = [DEBIAN[library] for library in libraries if library in DEBIAN]
     unknown = [library for library in libraries if library not in DEBIAN]
     line = f"apt-get install -y {' '.join(dict.fromkeys(known))}" if known else ""
@@ -176,7 +177,7 @@ time_step_s = 0.01
 [run]
 end_time_s = 0.05
 """
-#: … and one with a crack that grows until it is cut in two: together they call on the kernels of ordinary scenes.
+#: … and one with a crack that grows until it is cut in two: together they use the kernels of ordinary scenes.
 TORN_PLATE = """
 [geometry]
 zones = [{ name = "rock", rectangle = [-0.03, -0.06, 0.03, 0.06] }]
@@ -208,8 +209,7 @@ stop_at = ["split"]
 
 
 def warm() -> None:
-    """Compile what ordinary scenes call on, so that the first of them need not: small ones are run, nothing is
-    kept of them but the kernels."""
+    """Compile the kernels of ordinary scenes in advance: small scenes are run, and only their kernels are kept."""
     import tempfile
 
     from ..output import standard_observers

@@ -1,4 +1,4 @@
-"""Former arguments, and former names of what packages export, accepted for one version with a DeprecationWarning."""
+"""Former arguments, and former names of exports, accepted for one version with a DeprecationWarning."""
 
 from __future__ import annotations
 
@@ -35,8 +35,8 @@ def renamed_argument(old: str, new: str) -> Callable[[_Function], _Function]:
 
 
 def gathered_arguments(new: str, record: type) -> Callable[[_Function], _Function]:
-    """Decorator: keyword arguments of a function that are fields of the dataclass ``record`` now, its argument ``new``, are
-    passed in one, with a DeprecationWarning."""
+    """Decorator: keyword arguments of a function that are now fields of the dataclass ``record``, its argument ``new``,
+    are passed in one record, with a DeprecationWarning."""
     gathered = {field.name for field in fields(record)}
 
     def decorate(function: _Function) -> _Function:
@@ -102,13 +102,13 @@ def named_argument(name: str, position: int) -> Callable[[_Function], _Function]
 
 
 def _named(function: Callable[..., Any]) -> str:
-    """What a user calls: the class, for its ``__init__``."""
+    """The name that a user calls: the class, for its ``__init__``."""
     return function.__qualname__.removesuffix(".__init__")
 
 
 def renamed_exports(module: str, renamed: Mapping[str, str], names: Mapping[str, Any]) -> Callable[[str], Any]:
-    """The ``__getattr__`` of ``module``, whose globals are ``names``: former names (the keys of ``renamed``) give what is
-    called otherwise now, with a DeprecationWarning. Other names raise AttributeError."""
+    """The ``__getattr__`` of ``module``, whose globals are ``names``: a former name (a key of ``renamed``) gives the
+    object under its present name, with a DeprecationWarning. Other names raise AttributeError."""
 
     def find(name: str) -> Any:
         if name not in renamed:

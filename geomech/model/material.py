@@ -1,4 +1,4 @@
-"""Isotropic linear elastic rock with fracture toughnesses: constants and what follows from them."""
+"""Isotropic linear elastic rock with fracture toughnesses: constants and derived quantities."""
 
 from __future__ import annotations
 

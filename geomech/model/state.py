@@ -285,7 +285,7 @@ class Cycle:
 
     @property
     def inside(self) -> dict[int, Any]:
-        """block → what knows of stress and displacement inside it: cracked blocks, and those of higher order."""
+        """block → stress and displacement inside it, for cracked blocks and those of higher order."""
         return {**self.bent, **self.bodies} if self.bent else self.bodies
 
     @cached_property

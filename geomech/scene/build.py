@@ -1,4 +1,4 @@
-"""A checked scene as the problem that the solvers take."""
+"""Converts a checked scene to the problem for the solvers."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ from .tables.entries import given
 from .tables.rock import MaterialTable
 from .unbounded_rock import endless_of
 
-#: Contacts of more blocks are watched only where that is asked for: in a wall, they change at every load.
+#: State changes of contacts are followed in larger models only on request: in a wall they occur at every load.
 MOST_WATCHED = 30
 
 
@@ -111,7 +111,7 @@ def build_problem(tables: SceneTables, drawing: Drawing, check: Check) -> Proble
 
 
 def _events(tables: SceneTables, blocks: Blocks) -> tuple[str, ...] | None:
-    """Events at which steps from event to event end, and which other steps report."""
+    """Events at which steps from event to event end, and which fixed steps report."""
     if tables.run.events is not None:
         return ("tips", *tables.run.events)
     if tables.run.stepping == "fixed":
@@ -121,12 +121,12 @@ def _events(tables: SceneTables, blocks: Blocks) -> tuple[str, ...] | None:
 
 
 def _set_of(crack: str) -> str:
-    """The joints that ``crack`` is a dead end of: "bedding" of "bedding 12"."""
+    """The joints of which ``crack`` is a dead end: "bedding" of "bedding 12"."""
     return crack.rpartition(" ")[0]
 
 
 def _crack_entry(tables: SceneTables, crack: str):
-    """What [cracks] says of a crack: by its name, as a dead end by that of its joints, or for all."""
+    """The entry of [cracks] for a crack: by its name, for a dead end by that of its joints, or the entry for all."""
     for name in (crack, _set_of(crack), "default"):
         if name in tables.cracks:
             return tables.cracks[name]
@@ -153,7 +153,7 @@ def _face_laws(
         entry = _crack_entry(tables, crack)
         law = None if entry is None or entry.joint is None else known[entry.joint]
         if law is None and entry is None:
-            # The dead end of a joint is rough as the joint is.
+            # The dead end of a joint has the joint's roughness.
             law = joint_law_of.get(JOINT + _set_of(crack))
         if law is None:
             return 0
@@ -166,7 +166,7 @@ def _face_laws(
 
 
 def _joints(tables: SceneTables, drawing: Drawing) -> tuple[tuple[JointLaw, ...], dict[tuple[str, str], int]]:
-    """Laws, the default first, and which contacts each rules."""
+    """Joint laws, the default first, and the contacts to which each applies."""
     order = sorted(tables.joints, key=lambda name: name != "default")
     laws = [JointLaw("default")] if "default" not in tables.joints else []
     joint_of: dict[tuple[str, str], int] = {}
@@ -214,8 +214,8 @@ def _loads(tables: SceneTables, check: Check) -> Loads:
     )
 
 
-#: β and γ where waves run: of second order, no energy from nowhere; Shi's scheme damps waves of 0.5 Hz at 10 ms by 5 % a
-#: wavelength, this one leaves their amplitude (`model.loads.wave_limits`).
+#: β and γ for wave propagation: of second order and without gain of energy. Shi's scheme damps waves of 0.5 Hz at 10 ms
+#: by 5 % per wavelength, this one preserves their amplitude (`model.loads.wave_limits`).
 _WAVES = (0.25, 0.5)
 
 
@@ -250,7 +250,7 @@ def _dda(tables: SceneTables) -> DdaSettings:
 
 
 def _shear_toughness(m: MaterialTable, tables: SceneTables) -> float:
-    """Infinite where cracks do not grow, also for want of a toughness in tension."""
+    """Toughness against growth in shear; infinite if cracks do not grow, also for lack of a toughness in tension."""
     grows = tables.growth.enabled and m.k_ic_pa_sqrt_m is not None
     return m.k_iic_pa_sqrt_m if grows and m.k_iic_pa_sqrt_m is not None else math.inf
 
@@ -259,7 +259,7 @@ def _growth(tables: SceneTables, cracks: Cracks) -> GrowthSettings:
     g = tables.growth
     increment = g.increment_m
     if increment is None:
-        # A tenth of the shortest crack resolves the turn of a wing crack in its first crack length.
+        # A tenth of the shortest crack resolves the curvature of a wing crack over its first crack length.
         lengths = np.bincount(cracks.crack, cracks.lengths) if cracks.n_segments else np.array([10e-3])
         increment = 0.1 * float(lengths[lengths > 0].min())
         if g.min_increment_m is not None:

@@ -25,8 +25,8 @@ _NAMED = 3
 
 
 def one_a_cause(warnings: Sequence[Fault]) -> list[Fault]:
-    """``warnings`` with one place and way out that differ in names and numbers only, merged into the first, with the
-    number of the others and some of their names."""
+    """``warnings`` with the same place and remedy that differ only in names and numbers, merged into the first one,
+    with the number of the others and some of their names."""
     kinds: dict[tuple[str, str, str], list[Fault]] = {}
     for warning in dict.fromkeys(warnings):
         kinds.setdefault((warning.place, _OWN.sub("#", warning.message), warning.way_out), []).append(warning)

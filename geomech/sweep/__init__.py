@@ -1,17 +1,17 @@
-"""Many runs of one scene: sweeps over what is not known, random joint networks, the probability of failure.
+"""Many runs of one scene: sweeps over uncertain parameters and random joint networks, and the probability of failure.
 
-``geomech.sweep(scene, vary=…, runs=…)`` is `execution.sweep`; the command line's ``geomech sweep`` does the same.
+``geomech.sweep(scene, vary=…, runs=…)`` is `execution.sweep`; the command ``geomech sweep`` does the same.
 
     variables       lists, ranges and distributions
     sampling        the table of runs
-    plan            scene, variables and measure, checked before anything runs
-    measures        one run, and the columns it gives
+    plan            scene, variables and measure, checked before any run
+    measures        one run and its columns of the table
     engine, cluster runs in processes of this machine, or on a cluster by dask.distributed
-    execution       from the plan to the table; going on with a sweep
+    execution       from the plan to the table; continuing a sweep
     results         journal and tables
     statistics      probability of failure and its interval, sensitivities
     rare_failures   subset simulation, importance sampling
-    expressions     arithmetic that scenes and command lines may ask for
+    expressions     arithmetic permitted in scenes and on the command line
 """
 
 from __future__ import annotations

@@ -104,7 +104,7 @@ def _pipe() -> tuple[int, int]:
 
 
 class LocalEngine:
-    """``workers`` processes of this machine (default: one a core that this process may use)."""
+    """``workers`` processes of this machine (default: one per core available to this process)."""
 
     def __init__(self, workers: int | None = None) -> None:
         self.workers = workers or len(os.sched_getaffinity(0))
@@ -195,7 +195,7 @@ class LocalEngine:
         yield row
 
     def _buried(self, worker: _Worker, again: deque[Job], attempts: dict[int, int]) -> Iterator[dict[str, Any]]:
-        """Handle the jobs of a worker that has ended."""
+        """Deal with the jobs of a worker that has ended."""
         worker.pipe.close()
         code = worker.process.wait()
         self._all.remove(worker)

@@ -129,15 +129,16 @@ def sweep(
     resume: bool = False,
     **settings: Any,
 ) -> Sweep:
-    """Many runs of ``scene`` (a path), one row of the table each.
+    """Many runs of ``scene`` (a path), with one row of the table each.
 
     ``vary``: key of the scene → values, range or distribution (see `geomech.sweep.variables`); ``settings`` are the
-    others of [sweep]: runs, seeds, sampling, seed, measure, fails, columns, derive, keep …; ``overrides``, ``variant``
-    and ``limit`` as on the command line. Rows go to the folder ``out`` (default outputs/NAME_sweep). Runs are made by
-    ``workers`` processes of this machine (default: one a core), by the cluster of a dask.distributed ``client``, or by
-    that of the ``scheduler`` at an address. ``resume``: go on with the sweep in ``out``.
+    other keys of [sweep]: runs, seeds, sampling, seed, measure, fails, columns, derive, keep …; ``overrides``,
+    ``variant`` and ``limit`` as on the command line. Rows are written to the folder ``out`` (default
+    outputs/NAME_sweep). Runs are made by ``workers`` processes of this machine (default: one per core), by the cluster
+    of a dask.distributed ``client``, or by that of the ``scheduler`` at an address. ``resume``: continue the sweep in
+    ``out``.
 
-    Raises SceneError naming everything that is wrong with the scene or the sweep before anything runs,
+    Raises SceneError with all errors of the scene and the sweep before any run,
     `geomech.output.run_lock.FolderRefused`, `CannotResume`, `geomech.sweep.cluster.EngineRefused`.
     """
     about = {name: settings.pop(name) for name in ("overrides", "variant", "limit", "overwrite") if name in settings}

@@ -1,8 +1,8 @@
 """Expressions of a sweep: results from columns of a run, keys of a scene from variables.
 
-They are read as Python's, but only arithmetic, comparisons, conditions and a few functions are known: no attribute of
-any object, no import, no name but those given. ``first.initiation.load_pa`` goes down through tables; what is not there
-is nan. Whole numbers are taken as floats, so that no power takes long.
+The syntax is Python's, restricted to arithmetic, comparisons, conditions and a few functions: no attributes of objects,
+no imports, and only the given names. ``first.initiation.load_pa`` is looked up through nested tables; missing entries
+are nan. Whole numbers are treated as floats, so that no power takes long.
 """
 
 from __future__ import annotations
@@ -66,7 +66,7 @@ def parsed(text: str) -> ast.expr:
 
 
 def names_in(text: str) -> set[str]:
-    """The names that an expression uses, those of functions and constants left out; of dotted ones the whole."""
+    """The names used in an expression, without functions and constants; dotted names are given in full."""
     found: set[str] = set()
 
     def walk(node: ast.AST) -> None:
@@ -84,8 +84,8 @@ def names_in(text: str) -> set[str]:
 
 
 def evaluate(text: str, names: Mapping[str, Any]) -> Any:
-    """The value of the expression ``text`` with these ``names``, tables among them; a float, True or False, or a text.
-    Raises ExpressionError."""
+    """The value of the expression ``text`` with these ``names``, which may include tables: a float, True or False, or a
+    string. Raises ExpressionError."""
     with np.errstate(all="ignore"):
         try:
             found = _value(parsed(text), names)
@@ -107,8 +107,8 @@ def evaluate(text: str, names: Mapping[str, Any]) -> Any:
 
 
 def margin_of(text: str) -> str:
-    """The expression that is negative where the comparison ``text`` holds: "a < 1" gives "(a) - (1)". Raises
-    ExpressionError where it is no single comparison of two numbers."""
+    """The expression that is negative where the comparison ``text`` is true: "a < 1" gives "(a) - (1)". Raises
+    ExpressionError if it is not a single comparison of two numbers."""
     node = parsed(text)
     if isinstance(node, ast.Compare) and len(node.ops) == 1:
         left, right = ast.unparse(node.left), ast.unparse(node.comparators[0])
@@ -190,14 +190,14 @@ def _value(node: ast.AST, names: Mapping[str, Any]) -> Any:
 
 
 def _number(value: Any) -> Any:
-    """A float, or an array of them: products of texts and long whole numbers are not made."""
+    """A float or an array of floats: products of strings and of long integers are not computed."""
     if isinstance(value, (str, Mapping)):
         raise ExpressionError(f"{str(value)[:40]!r} is not a number")
     return value if isinstance(value, np.ndarray) else float(value)
 
 
 def _looked_up(name: str, names: Mapping[str, Any]) -> Any:
-    """Names with dots may stand as a whole, or lead through tables; nan where nothing is there or it is None."""
+    """The value of a name, which may be present as a whole or lead through tables; nan if it is missing or None."""
     if name in names:
         found = names[name]
         return math.nan if found is None else found

@@ -43,9 +43,9 @@ _REASON, _WARNED = 400, 3
 
 class Job(NamedTuple):
     """A run to be made: its ``number``, the ``scene``'s path, its ``variant``, the ``changes`` "key=value", the
-    ``settings`` of [sweep], ``box`` and ``cells`` of the map of what moves (see `Plan`), the ``folder`` that its files
-    go to (None: it leaves none), whose are kept (``keep``), and whether pictures are drawn. ``program`` is the digest
-    of the sources that the sweep was begun with."""
+    ``settings`` of [sweep], ``box`` and ``cells`` of the map of moving places (see `Plan`), the ``folder`` for its
+    files (None: no files), which runs are kept (``keep``), and whether pictures are drawn. ``program`` is the digest of
+    the sources with which the sweep began."""
 
     number: int
     scene: str
@@ -61,7 +61,7 @@ class Job(NamedTuple):
 
 
 def carry_out(job: Job) -> dict[str, Any]:
-    """The row of a run: "run", "status", "reason", its columns, and its `TIMES`. Never raises but for interrupts."""
+    """The row of a run: "run", "status", "reason", its columns, and its `TIMES`. Raises interrupts only."""
     clock, processor = time.perf_counter(), time.process_time()
     row: dict[str, Any] = {"run": job.number, "status": DONE, "reason": ""}
     with _collected_warnings() as warnings_seen:
@@ -113,7 +113,7 @@ def _columns(job: Job, row: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _fails(job: Job, row: dict[str, Any]) -> bool | None:
-    """Whether the slope fails; None if the run has no answer."""
+    """Whether the slope fails; None if the run has no result."""
     if row["status"] != DONE:
         return None
     from .plan import FAILS
@@ -181,7 +181,7 @@ def _safety(job: Job) -> dict[str, Any]:
 
 
 def _of_blocks(problem: Problem, moving: np.ndarray, job: Job) -> dict[str, Any]:
-    """Number, mass (kg/m) and volume (m³/m) of the blocks ``moving``, and the places they leave."""
+    """Number, mass (kg/m) and volume (m³/m) of the blocks ``moving``, and the cells they occupy."""
     blocks = problem.blocks
     areas = np.abs(blocks.areas())
     density = np.array([material.density for material in problem.materials])[blocks.material]
@@ -333,7 +333,7 @@ def _own_folder(job: Job) -> Path:
 
 
 def _keep(job: Job, row: Mapping[str, Any]) -> None:
-    """Write into the run's folder how it was made, or remove the folder if it is not to be kept."""
+    """Write the provenance of a run into its folder, or remove the folder if it is not to be kept."""
     if job.folder is None:
         return
     wanted = job.keep == "all" or (job.keep == "failed" and (row["fails"] or row["status"] != DONE))

@@ -18,22 +18,23 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-#: g of points (n, d) → (n,); nan where a run has no answer.
+#: g of points (n, d) → (n,); nan where a run has no result.
 LimitState = Callable[[np.ndarray], np.ndarray]
-#: A level holds this part of the samples before it.
+#: Fraction of a level's samples that lie in the next level.
 _LEVEL = 0.1
-#: Levels of 0.1 each: 1e-12.
+#: Largest number of levels, each with a probability of 0.1: 1e-12.
 _LEVELS = 12
-#: Chains that accept this part of their steps mix best (Papaioannou et al. 2015).
+#: Acceptance rate at which chains mix best (Papaioannou et al. 2015).
 _ACCEPTED = 0.44
-#: The design point is found when it moves by less than this, and g is less than this part of its value at the mean.
+#: The design point has converged when it moves by less than this, and g is below this fraction of its value at the
+#: mean.
 _NEAR, _STEPS, _DIFFERENCE = 1e-2, 12, 0.05
 
 
 @dataclass(frozen=True)
 class RareProbability:
-    """``value`` with its coefficient of ``variation`` (of the method's own estimate), found by ``method`` in ``runs``
-    of which ``unanswered`` had no answer (counted as standing); ``levels`` of g, or the ``design_point`` with its
+    """``value`` with its coefficient of ``variation`` (as estimated by the method), found by ``method`` in ``runs``, of
+    which ``unanswered`` had no result (counted as stable); ``levels`` of g, or the ``design_point`` with its
     reliability index ``beta``."""
 
     method: str
@@ -47,7 +48,7 @@ class RareProbability:
 
     @property
     def interval(self) -> tuple[float, float]:
-        """95 %, of a log-normal estimate."""
+        """95 % interval of a log-normal estimate."""
         if not self.value > 0 or not math.isfinite(self.variation):
             return 0.0, 1.0
         spread = 1.96 * math.sqrt(math.log1p(self.variation**2))
@@ -62,7 +63,7 @@ class RareProbability:
 
 
 def subset_simulation(g: LimitState, dimensions: int, samples: int = 500, seed: int = 0) -> RareProbability:
-    """P(g < 0) with ``samples`` a level."""
+    """P(g < 0) by subset simulation with ``samples`` per level."""
     rng = np.random.default_rng(seed)
     kept = max(1, round(_LEVEL * samples))
     points = rng.standard_normal((samples, dimensions))
@@ -91,8 +92,8 @@ def subset_simulation(g: LimitState, dimensions: int, samples: int = 500, seed: 
 
 
 def _next_level(g, starts, at, level, samples, scale, rng):
-    """``samples`` points below ``level`` by chains from ``starts``, all chains one step at a time; the scale of their
-    steps, how many runs they took, and how many of these had no answer."""
+    """``samples`` points below ``level`` by Markov chains from ``starts``, all chains advanced together; the scale of
+    their steps, the number of runs, and the number of runs without a result."""
     points, values, made, lost = [starts], [at], 0, 0
     now, value = starts.copy(), at.copy()
     step = 0
@@ -107,13 +108,13 @@ def _next_level(g, starts, at, level, samples, scale, rng):
         now[:number][better], value[:number][better] = trial[better], found[better]
         points.append(now[:number].copy())
         values.append(value[:number].copy())
-        # Robbins & Monro: towards the acceptance at which chains mix best.
+        # Robbins & Monro: towards the acceptance rate at which chains mix best.
         scale = float(np.clip(scale * math.exp((better.mean() - _ACCEPTED) / math.sqrt(step)), 0.05, 1.0))
     return np.concatenate(points), np.concatenate(values), scale, made, lost
 
 
 def _variance(inside: np.ndarray, share: float, chain: np.ndarray | None) -> float:
-    """The square of the coefficient of variation of a level's ``share``, neighbours in its chains correlated (Au & Beck
+    """Squared coefficient of variation of a level's ``share``, with correlated neighbours in its chains (Au & Beck
     2001, equations 25 to 29)."""
     n = len(inside)
     if not 0 < share < 1:
@@ -132,7 +133,7 @@ def _variance(inside: np.ndarray, share: float, chain: np.ndarray | None) -> flo
 
 
 def importance_sampling(g: LimitState, dimensions: int, samples: int = 500, seed: int = 0) -> RareProbability:
-    """P(g < 0) by ``samples`` about the design point."""
+    """P(g < 0) by ``samples`` around the design point."""
     point, made = design_point(g, dimensions)
     rng = np.random.default_rng(seed)
     points = point + rng.standard_normal((samples, dimensions))
@@ -148,10 +149,9 @@ def importance_sampling(g: LimitState, dimensions: int, samples: int = 500, seed
 
 
 def design_point(g: LimitState, dimensions: int) -> tuple[np.ndarray, int]:
-    """The point of g = 0 that is nearest to the origin, (d,), by the iteration of Hasofer & Lind and Rackwitz &
-    Fiessler with central differences; and how many runs that took. Raises ValueError where a point on the way has no
-    answer or
-    g does not change."""
+    """The point of g = 0 nearest to the origin, (d,), by the iteration of Hasofer & Lind and Rackwitz & Fiessler with
+    central differences; and the number of runs. Raises ValueError if a point of the iteration has no result or g does
+    not change."""
     point, made, scale = np.zeros(dimensions), 0, 1.0
     for step in range(_STEPS):
         moved = _DIFFERENCE * np.eye(dimensions)
@@ -173,7 +173,7 @@ def design_point(g: LimitState, dimensions: int) -> tuple[np.ndarray, int]:
 
 
 def _answered(values: np.ndarray) -> np.ndarray:
-    """Runs without an answer stand, farther from failure than all others."""
+    """Runs without a result count as stable, farther from failure than all others."""
     found = np.array(values, dtype=float)
     return np.where(np.isnan(found), math.inf, found)
 

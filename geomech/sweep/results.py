@@ -1,10 +1,10 @@
-"""What a sweep leaves: a journal that a row is added to as each run ends, and the table made of it.
+"""Files of a sweep: a journal, to which a row is appended when a run ends, and the tables made from it.
 
-runs.jsonl     a line a run, in the order in which they ended, with times and hosts: what a sweep goes on from
-runs.csv       the table, a row a run, by number; the same whatever made the runs, and in which order
-runs.parquet   the same, where pyarrow is installed
-times.csv      what each run took, and where
-sweep.json     the plan, and what it came to
+runs.jsonl     one line per run, in the order in which they ended, with times and hosts; a sweep is continued from it
+runs.csv       the table, one row per run, by number; independent of the engine and of the order of the runs
+runs.parquet   the same, if pyarrow is installed
+times.csv      duration and host of each run
+sweep.json     the plan and the results
 """
 
 from __future__ import annotations
@@ -23,13 +23,13 @@ from ..output.console.at_work import run_ended
 from .measures import DONE, TIMES, kind_of_reason
 
 JOURNAL, TABLE, PARQUET, TOOK, PLAN = "runs.jsonl", "runs.csv", "runs.parquet", "times.csv", "sweep.json"
-#: In the journal alone.
+#: Columns of the journal only.
 _HIDDEN = ("first_warnings",)
 
 
 class Journal:
-    """The rows of a sweep in ``path``: those that are there are read, a last line that was cut off is dropped; a run
-    stands once."""
+    """The rows of a sweep in ``path``. Existing rows are read, and a last line that was cut off is dropped; every run
+    occurs once."""
 
     def __init__(self, path: Path) -> None:
         self.path = path
@@ -53,7 +53,7 @@ class Journal:
             self._file = None
 
     def add(self, row: dict[str, Any]) -> bool:
-        """Add the row of a run; False where the run is there already."""
+        """Append the row of a run; returns False if the run is already present."""
         if row["run"] in self.rows:
             return False
         self._file.write(json.dumps(row, default=str) + "\n")
@@ -64,12 +64,12 @@ class Journal:
 
 
 def read_journal(path: Path) -> dict[int, dict[str, Any]]:
-    """run → row of the whole lines in ``path``."""
+    """run → row of the complete lines in ``path``."""
     return _read(path)[0] if path.exists() else {}
 
 
 def _read(path: Path) -> tuple[dict[int, dict[str, Any]], int]:
-    """Rows, and how many bytes of the file they are."""
+    """Rows, and the number of bytes of the file they occupy."""
     rows: dict[int, dict[str, Any]] = {}
     whole = 0
     with path.open("rb") as file:
@@ -86,13 +86,13 @@ def _read(path: Path) -> tuple[dict[int, dict[str, Any]], int]:
 
 
 def columns_of(rows: Sequence[Mapping[str, Any]]) -> list[str]:
-    """The columns of the table, as they first appear."""
+    """The columns of the table, in the order of their first appearance."""
     names = dict.fromkeys(name for row in rows for name in row)
     return [name for name in names if not name.startswith("_") and name not in TIMES and name not in _HIDDEN]
 
 
 def write_tables(folder: Path, rows: Sequence[Mapping[str, Any]]) -> list[Path]:
-    """Write the tables of ``rows`` (in the order of their runs), whole or not at all."""
+    """Write the tables of ``rows`` (in the order of their runs), each one atomically."""
     names = columns_of(rows)
     written = [_write_csv(folder / TABLE, names, rows), _write_csv(folder / TOOK, ["run", *TIMES], rows)]
     try:
@@ -136,8 +136,8 @@ def _cell(value: Any) -> Any:
 
 
 def counted_by_reason(rows: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
-    """Runs without an answer: status, reason (numbers and names left out), how many, an example's run and words; the
-    most frequent first."""
+    """Runs without a result by status and reason (without numbers and names), the most frequent first: number of runs,
+    and number and text of an example."""
     kinds = Counter((row["status"], kind_of_reason(row["reason"])) for row in rows if row["status"] != DONE)
     found = []
     for (status, kind), number in sorted(kinds.items(), key=lambda each: (-each[1], each[0])):

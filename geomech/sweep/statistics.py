@@ -1,8 +1,7 @@
-"""What a sweep's rows say: the probability of failure and how sure it is, distributions, what the results depend on.
+"""Statistics of a sweep: the probability of failure with its confidence interval, distributions, and sensitivities.
 
 Sensitivities are those of SALib (Herman & Usher 2017): Sobol' indices of Saltelli's design (Saltelli et al. 2010),
-otherwise first-order indices by RBD-FAST (Tarantola, Gatelli & Mara 2006; Plischke 2010) from whatever samples there
-are.
+otherwise first-order indices by RBD-FAST (Tarantola, Gatelli & Mara 2006; Plischke 2010) from any samples.
 """
 
 from __future__ import annotations
@@ -16,20 +15,20 @@ import numpy as np
 from .measures import DONE
 from .variables import Random
 
-#: With fewer failures than this a probability of failure is little more than its order of magnitude.
+#: With fewer failures than this only the order of magnitude of a probability of failure is known.
 FEW = 10
 #: Two-sided 95 %.
 Z95 = 1.959963984540054
-#: So large a part of the samples at each end of a variable is compared in a tornado.
+#: Fraction of the samples at each end of a variable that a tornado diagram compares.
 _END = 0.2
-#: Fewer groups of Saltelli's design say nothing of sensitivities; of any samples fewer than this, and than so many a
-#: variable (RBD-FAST looks for ten harmonics, also in resamplings of half the runs).
+#: Smallest number of groups of Saltelli's design for sensitivities; smallest number of other samples, and of samples
+#: per variable (RBD-FAST fits ten harmonics, also in resamplings of half the runs).
 _LEAST, _LEAST_SAMPLES, _A_VARIABLE = 20, 100, 20
 
 
 class Probability(NamedTuple):
     """A probability of failure: ``failures`` of ``answered`` runs, of ``runs`` in all; ``value`` with its Wilson
-    interval ``low`` to ``high`` (95 %); ``least`` and ``most`` if all runs without an answer stood, or failed."""
+    interval ``low`` to ``high`` (95 %); ``least`` and ``most`` if all runs without a result were stable, or failed."""
 
     failures: int
     answered: int
@@ -42,7 +41,7 @@ class Probability(NamedTuple):
 
     @property
     def few(self) -> bool:
-        """Whether too few failed for more than an order of magnitude."""
+        """Whether too few runs failed for more than an order of magnitude."""
         return self.failures < FEW
 
     def __str__(self) -> str:
@@ -69,7 +68,7 @@ def share_text(value: float) -> str:
 
 
 def wilson(successes: int, trials: int, z: float = Z95) -> tuple[float, float]:
-    """The Wilson (1927) interval of a probability of which ``successes`` of ``trials`` were seen; (0, 1) of none."""
+    """The Wilson (1927) interval of a probability with ``successes`` in ``trials``; (0, 1) without trials."""
     if trials == 0:
         return 0.0, 1.0
     share, square = successes / trials, z * z / trials
@@ -81,7 +80,7 @@ def wilson(successes: int, trials: int, z: float = Z95) -> tuple[float, float]:
 
 
 def probability(rows: Sequence[Mapping[str, Any]]) -> Probability:
-    """The probability of failure of the ``rows`` of plain samples."""
+    """The probability of failure from the ``rows`` of independent samples."""
     answered = [row for row in rows if row["status"] == DONE and row["fails"] is not None]
     failures, runs = sum(bool(row["fails"]) for row in answered), len(rows)
     value = failures / len(answered) if answered else math.nan
@@ -91,7 +90,7 @@ def probability(rows: Sequence[Mapping[str, Any]]) -> Probability:
 
 
 def convergence(rows: Sequence[Mapping[str, Any]]) -> np.ndarray:
-    """(n, 4): number of answered runs, in the order of the table, probability of failure of those, and its interval."""
+    """(n, 4): number of runs with a result, in the order of the table, their probability of failure, and its interval."""
     fails = np.array([bool(row["fails"]) for row in rows if row["status"] == DONE and row["fails"] is not None])
     count = np.cumsum(fails)
     return np.array([(n, count[n - 1] / n, *wilson(int(count[n - 1]), n)) for n in range(1, len(fails) + 1)]).reshape(
@@ -100,22 +99,22 @@ def convergence(rows: Sequence[Mapping[str, Any]]) -> np.ndarray:
 
 
 def distribution(values: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
-    """Sorted ``values``, their shares (k − ½)/n, and the half width of the 95 % band about them that Dvoretzky, Kiefer
-    & Wolfowitz (1956) and Massart (1990) give, √(ln(2/0.05)/2n)."""
+    """Sorted ``values``, their cumulative shares (k − ½)/n, and the half width of the 95 % confidence band (Dvoretzky,
+    Kiefer & Wolfowitz 1956; Massart 1990), √(ln(2/0.05)/2n)."""
     found = np.sort(np.asarray(values, dtype=float))
     n = len(found)
     return found, (np.arange(n) + 0.5) / max(n, 1), math.sqrt(math.log(40.0) / (2.0 * max(n, 1)))
 
 
 def numbers(rows: Sequence[Mapping[str, Any]], name: str) -> np.ndarray:
-    """(n,) the column ``name``, nan where a run has no number there."""
+    """(n,) the column ``name``, nan where a run has no number."""
     found = (row.get(name) for row in rows)
     return np.array([float(v) if isinstance(v, (int, float)) else math.nan for v in found])
 
 
 class Swing(NamedTuple):
-    """The mean result where the variable ``name`` is among its lowest (``low``) and its highest fifth (``high``), with
-    their standard errors; where it takes a few values, at the lowest and the highest."""
+    """The mean result where the variable ``name`` is in its lowest (``low``) and in its highest fifth (``high``), with
+    their standard errors; for a variable with few values, at the lowest and the highest one."""
 
     name: str
     low: float
@@ -146,8 +145,8 @@ def tornado(rows: Sequence[Mapping[str, Any]], names: Sequence[str], result: str
 
 
 class Sensitivity(NamedTuple):
-    """Sobol' indices of the variable ``name``: the part of the variance of the result that it makes alone (``first``),
-    and with all others (``total``; nan where the samples do not determine it); ``*_error``: half the 95 % interval."""
+    """Sobol' indices of the variable ``name``: its share of the variance of the result, alone (``first``) and with all
+    interactions (``total``; nan if the samples do not determine it); ``*_error``: half the 95 % interval."""
 
     name: str
     first: float
@@ -195,8 +194,8 @@ def sensitivities(
 
 
 def picked(rows: Sequence[Mapping[str, Any]], result: str, worst_is_least: bool = True) -> dict[str, int]:
-    """The runs of the "worst", the "median" and the "typical" result: of those with the most frequent mechanism the one
-    that is nearest to their median."""
+    """The runs with the "worst", the "median" and the "typical" result; the last is, of the runs with the most frequent
+    mechanism, the one nearest to their median."""
     found = [
         (float(row[result]), row) for row in rows if row["status"] == DONE and isinstance(row.get(result), (int, float))
     ]

@@ -53,8 +53,7 @@ class VariableError(ValueError):
 
 @dataclass(frozen=True)
 class Listed:
-    """A variable called ``name`` (a key of the scene, or a name for expressions) that takes every one of the
-    ``values``."""
+    """A variable called ``name`` (a key of the scene, or a name for expressions) that takes each of the ``values``."""
 
     name: str
     values: tuple[Any, ...]
@@ -66,8 +65,8 @@ class Listed:
 
 @dataclass(frozen=True)
 class Random:
-    """A variable called ``name`` with the distribution ``law`` of these ``parameters``, cut off at ``low`` and
-    ``high`` (its own bounds, where it has some)."""
+    """A variable called ``name`` with the distribution ``law`` of these ``parameters``, truncated at ``low`` and
+    ``high`` (bounded distributions: their own bounds)."""
 
     name: str
     law: str

@@ -1,4 +1,4 @@
-"""Polygonal blocks as flat arrays: vertices, loops, edges, and what follows from them."""
+"""Polygonal blocks as flat arrays: vertices, loops, edges, and quantities derived from them."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from .polygon import (
     winding_number,
 )
 
-#: Of `Blocks.order`: found as the run goes.
+#: Value of `Blocks.order`: determined during the run.
 AUTO_ORDER = 0
 #: Edges are collinear when the tangent of the angle between them is below this.
 STRAIGHT = 1e-6
@@ -190,11 +190,11 @@ class Blocks:
         return [vertices[self.loop_start[k] : self.loop_start[k + 1]] for k in range(first, last)]
 
     def edges_named(self, name: str) -> np.ndarray:
-        """Indices of the edges called ``name``; empty when there are none."""
+        """Indices of the edges called ``name``; may be empty."""
         return self._edges_by_name.get(name, np.empty(0, int))
 
     def edges_that_exist(self, name: str, what: str) -> np.ndarray:
-        """As `edges_named`; raises ValueError that begins with ``what`` when there are none."""
+        """As `edges_named`; raises ValueError that begins with ``what`` if there are none."""
         edges = self.edges_named(name)
         if len(edges) == 0:
             known = ", ".join(repr(n) for n in self.edge_names if n) or "none"
@@ -372,7 +372,8 @@ def _refuse_invalid_outline(loop: np.ndarray, name: str) -> None:
 def _refuse_hole_outside(outline: np.ndarray, hole: np.ndarray, name: str) -> None:
     near, following = roundoff_of(outline, hole), np.roll(outline, -1, axis=0)
     for x, y in hole:
-        # On a corner where it touches the outline, a hole sees the outline's angle there; beside an edge, either side.
+        # At a corner where it touches the outline, a hole is checked against the outline's angle there; at an edge,
+        # against either side.
         at = np.array([x, y])
         if abs(winding_number([outline], at)) < 1e-6 and distance_to_edges(at, outline, following) > near:
             raise ValueError(f"{name}: a hole reaches out of the outline at ({x:g}, {y:g})")

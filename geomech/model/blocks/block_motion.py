@@ -31,14 +31,14 @@ class Motion:
         return cls(reference_centre, centre, gradient)
 
     def current(self, block: int, points: np.ndarray) -> np.ndarray:
-        """Where the material points ``points`` (..., 2) of ``block``, in reference coordinates, are now."""
+        """Present position of the material points ``points`` (..., 2) of ``block``, given in reference coordinates."""
         return (
             self.centre[block]
             + (np.asarray(points, dtype=float) - self.reference_centre[block]) @ self.gradient[block].T
         )
 
     def reference(self, block: int, points: np.ndarray) -> np.ndarray:
-        """Which material points, in reference coordinates, are now at ``points`` (..., 2)."""
+        """Material points, in reference coordinates, that are now at ``points`` (..., 2)."""
         (a, b), (c, d) = self.gradient[block].tolist()
         back = np.array([[d, -c], [-b, a]]) / (a * d - b * c)  # transposed
         return self.reference_centre[block] + (np.asarray(points, dtype=float) - self.centre[block]) @ back

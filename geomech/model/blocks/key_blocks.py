@@ -3,8 +3,8 @@
 A block between fixed neighbours can move in a direction s if s·n ≥ 0 for the normals n with which the touching faces
 push it. It is removable if there is such an s: its joint pyramid is not empty, and the block is finite (Goodman & Shi
 1985, Block theory, chapter 4). The resultant r of its forces decides the mode (their chapter 9): the block falls along
-r, or slides along the face whose direction is nearest to r against that face's friction and cohesion, or r presses it
-in.
+r, or slides along the face whose direction is nearest to r against that face's friction and cohesion, or is pressed
+into its neighbours by r.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ KEY_BLOCK = np.dtype(
 
 #: Faces whose normals differ by less than this (rad) are one face.
 _ONE_FACE = 0.02
-#: An open joint narrower than this part of a block's size √area counts as touching.
+#: An open joint narrower than this fraction of a block's size √area counts as touching.
 _NEAR = 1e-3
 
 
@@ -87,7 +87,7 @@ def key_blocks(
         elif 0.0 < (pull - low) % (2 * np.pi) < high - low:
             kind, way = FALLS, pull
         else:
-            # Along a face on which the pull presses: between parallel ones both ways are the same.
+            # Along a face against which the resultant presses; between parallel faces both directions are equivalent.
             slides = [(np.cos(pull - w), f, w) for w, f in ((low, end), (high, start)) if np.cos(pull - f) <= 1e-9]
             along, face, slide = max(slides, default=(0.0, 0.0, 0.0))
             if along > 1e-9:
@@ -129,7 +129,7 @@ def _rank(out: np.ndarray, blocks: Blocks, state: State, fixed: np.ndarray) -> N
     speed = state.velocity[:, :2]
     base = np.asarray(blocks.fixed, dtype=bool)
     if base.any():
-        # Where the base is shaken, fixed rock moves as one, and takes along what stands on it.
+        # Under base motion the fixed rock moves as one body, and the blocks on it move with it.
         moved, speed = moved - moved[base].mean(axis=0), speed - speed[base].mean(axis=0)
     out["displacement"] = np.hypot(moved[:, 0], moved[:, 1])
     out["speed"] = np.hypot(speed[:, 0], speed[:, 1])

@@ -44,10 +44,11 @@ def area_moments(loops: list[np.ndarray]) -> tuple[float, np.ndarray, np.ndarray
 
 
 def joined_loops(loops: list[np.ndarray]) -> list[np.ndarray]:
-    """``loops`` (each (n, 2)) that bound one polygon, those that touch in a vertex made one loop, which passes that
-    point twice: there the polygon has two corners, and no material between them.
+    """``loops`` (each (n, 2)) that bound one polygon; those that touch in a vertex are joined into one loop, which
+    passes that point twice: there the polygon has two corners, without material between them.
 
-    At such a point a loop goes on along the first edge clockwise from the one it came by, with the polygon on its left.
+    At such a point a loop continues along the first edge clockwise from the one by which it arrived, with the polygon
+    on its left.
     """
     if len(loops) < 2:
         return loops
@@ -146,7 +147,7 @@ def crossing_edges(loop: np.ndarray) -> tuple[int, int] | None:
     through = side * np.roll(side, -1, axis=1) < 0
     ends = touch | np.roll(touch, -1, axis=1)
     meet = (through & through.T) | ends | ends.T
-    # Neighbours share a corner; they fold back where the far end of one lies on the other.
+    # Neighbours share a corner; they overlap if the far end of one lies on the other.
     here = np.arange(n)
     following = (here + 1) % n
     back = touch[here, (here + 2) % n] | touch[following, here]

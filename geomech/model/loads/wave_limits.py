@@ -1,10 +1,11 @@
-"""Up to which frequency a time step, blocks of a size and damping keep a wave within a tolerance per wavelength.
+"""Largest frequency that a time step, block size and damping transmit within a tolerance per wavelength.
 
-A wave of frequency f loses in a period 1 − |λ|^(2π/arg λ) e^(−2πξ), where λ is the eigenvalue of the time scheme's
-amplification matrix at Ω = 2πf dt (Hughes 1987, chapter 9, for Newmark's scheme; Wood, Bossak & Zienkiewicz 1981 for
-theirs), and ξ = π f τ + α/(4πf) is that of a stress that lags by τ behind the strain, and of Rayleigh damping α M. In a row
-of blocks of length h, each of one strain and a rigid motion, the wave of wave number k runs at sin(kh/2)/(kh/2) of its
-speed, and the scheme changes its period by Ω/arg λ. What springs and dashpots between blocks take besides is left out.
+In one period a wave of frequency f keeps the part |λ|^(2π/arg λ) e^(−2πξ) of its amplitude. λ is the eigenvalue of the
+time scheme's amplification matrix at Ω = 2πf dt (Hughes 1987, chapter 9, for Newmark's scheme; Wood, Bossak &
+Zienkiewicz 1981 for theirs). ξ = π f τ + α/(4πf) is the damping ratio of a stress that lags by τ behind the strain, and
+of Rayleigh damping α M. In a row of blocks of length h, each with uniform strain, a wave of wave number k propagates at
+sin(kh/2)/(kh/2) of its speed, and the scheme changes its period by Ω/arg λ. Springs and dashpots between blocks are not
+included.
 """
 
 from __future__ import annotations
@@ -18,16 +19,16 @@ import numpy as np
 if TYPE_CHECKING:
     from ..problem import DdaSettings, Problem
 
-#: The scheme that is named beside the one that a scene has: the trapezoidal rule, which keeps all amplitudes. (The α-scheme
-#: of `spectral_radius` keeps them as well, but contacts of a shaken slope gained energy by it.)
+#: Scheme with which that of a scene is compared: the trapezoidal rule, which preserves all amplitudes. (The α-scheme of
+#: `spectral_radius` preserves them too, but with it contacts of a slope under base motion gained energy.)
 SECOND_ORDER = (0.25, 0.5)
-#: Frequencies are sought from this part of 1/dt on, in so many steps.
+#: Lowest frequency examined, as a fraction of 1/dt, and number of frequencies.
 _LOWEST, _STEPS = 1e-6, 600
 
 
 class WaveLimits(NamedTuple):
-    """Frequencies, Hz, up to which a wave stays within a tolerance per wavelength: by all together, and by the time
-    ``scheme``, ``damping`` and block ``size`` alone (infinite where nothing limits it)."""
+    """Frequencies, Hz, up to which a wave stays within a tolerance per wavelength: by all effects together, and by the
+    time ``scheme``, ``damping`` and block ``size`` alone (infinite without a limit)."""
 
     all: float
     scheme: float
@@ -36,7 +37,7 @@ class WaveLimits(NamedTuple):
 
 
 def scheme_eigenvalue(omega_dt: float, newmark: tuple[float, float], spectral_radius: float | None) -> complex:
-    """The eigenvalue λ of the vibrating mode in a step of an undamped oscillator with ω dt = ``omega_dt``."""
+    """The eigenvalue λ of the oscillating mode in a step of an undamped oscillator with ω dt = ``omega_dt``."""
     (beta, gamma), alpha = newmark, 0.0
     if spectral_radius is not None:
         alpha = (spectral_radius - 1) / (spectral_radius + 1)
@@ -45,7 +46,7 @@ def scheme_eigenvalue(omega_dt: float, newmark: tuple[float, float], spectral_ra
     left = np.array([[1.0, 0.0, -beta], [0.0, 1.0, -gamma], [omega_dt**2, 0.0, 1.0 - alpha]])
     right = np.array([[1.0, 1.0, 0.5 - beta], [0.0, 1.0, 1.0 - gamma], [0.0, 0.0, -alpha]])
     found = np.linalg.eigvals(np.linalg.solve(left, right))
-    # The mode that the scheme adds has a real eigenvalue.
+    # The additional mode of the scheme has a real eigenvalue.
     return complex(max(found, key=lambda value: value.imag))
 
 
@@ -53,9 +54,9 @@ def wave_limits(
     speed: float, size: float, lag: float, mass_damping: float, time_step: float,
     newmark: tuple[float, float], spectral_radius: float | None, tolerance: float = 0.05,
 ) -> WaveLimits:  # fmt: skip
-    """The limits for waves of ``speed``, m/s, in blocks of ``size``, m, whose stress lags by ``lag``, s; ``mass_damping``
-    is Rayleigh's α, 1/s, ``time_step`` in s, ``newmark`` and ``spectral_radius`` as in `DdaSettings`. ``tolerance``: part
-    of the amplitude that may be lost, and by which the speed may be off."""
+    """The limits for waves of ``speed``, m/s, in blocks of ``size``, m, whose stress lags by ``lag``, s;
+    ``mass_damping`` is Rayleigh's α, 1/s, ``time_step`` in s, ``newmark`` and ``spectral_radius`` as in `DdaSettings`.
+    ``tolerance``: admissible relative loss of amplitude, and error of the speed."""
     frequencies = np.geomspace(_LOWEST, 0.5, _STEPS) / time_step
     kept, slow = np.ones((3, _STEPS)), np.ones((3, _STEPS))
     for k, f in enumerate(frequencies.tolist()):
@@ -74,14 +75,15 @@ def wave_limits(
     found = []
     for amplitude, ratio in zip(ways, speeds, strict=True):
         off = (amplitude < 1 - tolerance) | (np.abs(ratio - 1) > tolerance)
-        # Rayleigh's α M eats slow waves: the limit is where the others begin to.
+        # Rayleigh's α M damps low frequencies: the limit is that of the other effects.
         off &= frequencies > mass_damping
         found.append(float(frequencies[np.argmax(off)]) if off.any() else math.inf)
     return WaveLimits(*found)
 
 
 def wave_lines(problem: Problem) -> list[str]:
-    """Up to which frequency waves come through a ``problem`` whose ground moves or whose edges absorb them; none of others."""
+    """The largest frequency of waves that a ``problem`` with base motion or viscous boundaries transmits, in words;
+    empty for other problems."""
     settings, blocks = problem.dda, problem.blocks
     shaken = problem.loads.base is not None or problem.loads.viscous_boundaries
     if not shaken or settings.dynamic_factor < 1.0 or problem.endless is not None:
@@ -92,7 +94,7 @@ def wave_lines(problem: Problem) -> list[str]:
         if not here.any() or rock.rigid or not rock.density:
             continue
         size = math.sqrt(areas[here].max())
-        # Shear waves are the slower, and so the shorter ones.
+        # Shear waves are slower and therefore shorter.
         speed = math.sqrt(rock.shear_modulus / rock.density)
         limits = _limits_of(settings, speed, size, rock.pressure_wave_speed)
         if worst is None or limits.all < worst[0].all:
@@ -102,10 +104,10 @@ def wave_lines(problem: Problem) -> list[str]:
         return []
     limits, size, other = worst
     parts = [("the time scheme", limits.scheme), ("damping", limits.damping), (f"blocks of {size:.3g} m", limits.size)]
-    each = ", ".join(f"{name} alone {_hertz(limit)}" for name, limit in parts)
-    lines = [f"lose 5 % and run 5 % off in a wavelength from {_hertz(limits.all)} on ({each})"]
+    each = ", ".join(f"{name} alone: {_hertz(limit)}" for name, limit in parts)
+    lines = [f"amplitude 5 % lower, or speed 5 % off, per wavelength above {_hertz(limits.all)} ({each})"]
     if settings.spectral_radius is None and other.all > 1.5 * limits.all:
-        lines.append(f"dda.newmark = {list(SECOND_ORDER)} in its place: from {_hertz(other.all)} on")
+        lines.append(f"with dda.newmark = {list(SECOND_ORDER)}: above {_hertz(other.all)}")
     return lines
 
 
@@ -119,4 +121,4 @@ def _limits_of(settings: DdaSettings, speed: float, size: float, fastest: float)
 
 
 def _hertz(frequency: float) -> str:
-    return "never" if math.isinf(frequency) else f"{frequency:.2g} Hz"
+    return "no limit" if math.isinf(frequency) else f"{frequency:.2g} Hz"

@@ -1,8 +1,9 @@
-"""Time that a run has left: from the rate at which it proceeds through its scene, or from an earlier run of that scene.
+"""Estimate of the time left of a run: from the rate at which it proceeds through its scene, or from an earlier run of
+the same scene.
 
-The rate of a run that shakes, or whose cracks grow, changes by a factor of five on its way, and one that an event ends
-stops at an unknown time. The cost of a cycle by its number, which an earlier run has left, knows both: this run's share
-of it tells how much faster or slower the machine is now.
+The rate of a run under base motion, or with growing cracks, changes by a factor of five, and a run that ends with an
+event stops at an unknown time. The recorded duration of each cycle of an earlier run accounts for both; the ratio of
+the present durations to the recorded ones gives the present speed of the machine.
 """
 
 from __future__ import annotations
@@ -22,10 +23,10 @@ import numpy as np
 
 from geomech.model import Problem
 
-#: Courses of geomech's own studies, by the name of the file in which a machine keeps its own (`python -m
+#: Courses of geomech's own studies, by the name of the file in which a machine stores its own (`python -m
 #: docs.generate.courses`).
 STUDIES = Path(__file__).with_name("courses.json")
-#: Most courses that are kept below ~/.cache (or $XDG_CACHE_HOME).
+#: Largest number of courses stored below ~/.cache (or $XDG_CACHE_HOME).
 KEPT = 500
 
 
@@ -70,8 +71,8 @@ class Pace:
 
 
 class Course:
-    """Wall time (s, from the start of the run) and scene time (s) by cycle; of a study, wall time by the runs that have
-    ended, which also stand for the time."""
+    """Wall time (s, from the start of the run) and scene time (s) by cycle; for a study, wall time by the number of
+    runs that have ended, which also takes the place of scene time."""
 
     #: Most cycles that are kept, every second one dropped beyond it. Runs shorter than `LEAST` s are not remembered; an
     #: earlier run counts while this one's scene time is as then to `SAME` of it. Until a `SHARE` of its wall time has been
@@ -93,7 +94,8 @@ class Course:
         self.time.append(time)
 
     def left_as(self, earlier: Course) -> float:
-        """Wall time left, s, if this run goes on as ``earlier`` did; inf if it does not, or too little of it is known."""
+        """Wall time left, s, if this run proceeds as ``earlier`` did; inf if it does not, or if too little of it is
+        known."""
         if not self.cycle or not earlier.cycle or self.cycle[-1] > earlier.cycle[-1]:
             return math.inf
         spent = np.interp(self.cycle, earlier.cycle, earlier.wall)
@@ -108,8 +110,8 @@ class Course:
 
     @classmethod
     def found(cls, name: str) -> Self | None:
-        """That of an earlier run of this ``name`` on this machine, else the one that comes with geomech's own studies;
-        None if there is neither."""
+        """The course of an earlier run of this ``name`` on this machine, else the one distributed with geomech's own
+        studies; None without either."""
         with suppress(OSError, ValueError, TypeError, KeyError):
             return cls._of(json.loads(_file(name).read_text(encoding="utf-8")))
         with suppress(OSError, ValueError, TypeError, KeyError):
@@ -118,7 +120,7 @@ class Course:
 
     @classmethod
     def _of(cls, stored: dict[str, list]) -> Self:
-        """As it was stored. Raises ValueError, TypeError or KeyError."""
+        """The course from its stored form. Raises ValueError, TypeError or KeyError."""
         out = cls()
         out.cycle = [int(c) for c in stored["cycle"]]
         out.wall, out.time = ([float(v) for v in stored[name]] for name in ("wall", "time"))
@@ -127,8 +129,8 @@ class Course:
         return out
 
     def keep(self, name: str) -> None:
-        """Store it for the next run of this ``name``, if it took longer than `LEAST` s. A folder that cannot be written
-        keeps nothing."""
+        """Store the course for the next run of this ``name``, if it took longer than `LEAST` s. If the folder is not
+        writable, nothing is stored."""
         if not self.wall or self.wall[-1] - self.wall[0] < self.LEAST:
             return
         with suppress(OSError):
@@ -159,12 +161,12 @@ class Compiled(logging.Handler):
 
 
 def name_of_run(problem: Problem) -> str:
-    """Name of the course of ``problem``: by what it is called and holds, and its settings of time."""
+    """Name of the course of ``problem``: from its title, content and time settings."""
     return _digest((problem.title, problem.inventory, problem.run.end_time, problem.run.stop_at, problem.dda.time_step))
 
 
 def name_of_study(folder: Path, asked: object) -> str:
-    """Name of the course of the study in ``folder``: by its scripts and scenes, and what is ``asked`` of it."""
+    """Name of the course of the study in ``folder``: from its scripts, its scenes and its arguments ``asked``."""
     files = sorted(path for path in Path(folder).iterdir() if path.suffix in (".py", ".toml", ".geo"))
     return _digest(([(path.name, path.read_bytes()) for path in files], asked))
 

@@ -157,10 +157,10 @@ class Progress:
         return round(100 * min(cycle.state.time, self._end) / self._end)
 
     def _left(self, cycle: Cycle) -> str:
-        """Wall time that the rest of the run takes; empty if it is not known.
+        """Wall time left of the run; empty if it is not known.
 
-        A run of cracks that an event ends stops long before the end of the scene, at a time that only an earlier run
-        knows: the text names the event.
+        A run with cracks that ends with an event stops long before the end of the scene, at a time known only from an
+        earlier run: the text names the event.
         """
         seconds = math.inf if self._earlier is None else self._course.left_as(self._earlier)
         event = f", until {' or '.join(self._stops)}" if self._stops and cycle.cracks.n_cracks else ""

@@ -25,7 +25,7 @@ from pathlib import Path
 from paraview import simple as pv
 
 HERE = Path(globals().get("__file__", "view.py")).resolve().parent
-#: By how much displacements are magnified; 1 is true to scale, None magnifies those too small to be seen.
+#: Magnification of displacements; 1 is true to scale, None magnifies those too small to be visible.
 SCALE = {scale!r}
 REFERENCE = {reference}
 

@@ -162,7 +162,7 @@ def _named_lines(
 
 
 def _read(path: FilePath, unit: str | None, chord_tolerance: float | None, set_property: str) -> FieldFile:
-    """The file; one of a CAD program is read in a process of its own."""
+    """The file; formats of CAD programs are read in a separate process."""
     arguments: dict[str, Any] = {"unit": unit, "chord_tolerance": chord_tolerance, "set_property": set_property}
     if path.suffix.lower() == ".dxf" and os.path.isfile(path):
         from ...shapes.gmsh_models.isolated_reader import field_file_apart

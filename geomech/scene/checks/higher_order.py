@@ -1,4 +1,5 @@
-"""Features that blocks of higher order ([zones.NAME] order) do not support yet, refused by name."""
+"""Features that blocks of higher order ([zones.NAME] order) do not support yet; each is refused with a message that
+names it."""
 
 from __future__ import annotations
 

@@ -68,7 +68,8 @@ def check_loads(c: Check) -> None:
 
 
 def _loads_are_lost(c: Check, fixed: np.ndarray) -> bool:
-    """Refuse a scene in which all loads act on fixed blocks (then True); report tractions that do, or that cancel."""
+    """Refuse a scene in which all loads act on fixed blocks (then True); report tractions that act on fixed blocks or
+    cancel."""
     t, blocks = c.tables, c.blocks
     if any(traction.edge not in blocks.edge_names for traction in t.loads.tractions):
         return False
