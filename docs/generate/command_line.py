@@ -9,7 +9,7 @@ from geomech import cli
 
 OPENING = """# Command line
 
-`geomech VERB --help` prints what stands here. Exit codes: 0 done, 1 a run failed (what was written stays readable),
+`geomech VERB --help` prints the same text. Exit codes: 0 done, 1 a run failed (its files remain readable),
 2 bad
 input, 3 interrupted (Ctrl-C or SIGTERM). `geomech --debug VERB …` shows the traceback of a failure.
 `python -m geomech` is

@@ -44,8 +44,8 @@ def _listed(paragraph: list[str]) -> list[str]:
                 out.append("")
             listing = True
             names = ", ".join(f"``{name.strip()}``" for name in columns[1].split(","))
-            said = _plain(re.sub(r"\s{2,}", " ", columns[2]))
-            out.append(f"- {names}: {said}")
+            description = _plain(re.sub(r"\s{2,}", " ", columns[2]))
+            out.append(f"- {names}: {description}")
         elif listing and line.startswith(" "):
             out.append("  " + _plain(line.strip()))
         else:

@@ -11,16 +11,16 @@ from geomech.scene.tables import SceneTables
 
 OPENING = """# Keys of a scene
 
-This page is made from the tables that check scenes, so it holds every key there is. `geomech check SCENE --keys`
+This page is made from the tables that check scenes and therefore lists all keys. `geomech check SCENE --keys`
 prints
-the same. A scene is a TOML file in SI units; angles are in degrees with the unit in the key's name. Paths are
+the same. A scene is a TOML file in SI units; angles are in degrees, and the unit is part of the key's name. Paths are
 relative to
-the scene file. TOML has no null: a key that is absent is unset. An unknown key, a missing value or one out of range
-is
-refused before anything runs, all at once, with its line and the way out.
+the scene file. TOML has no null: a key that is absent is unset. Unknown keys, missing values and values out of range
+are
+all reported before anything runs, each with its line and a remedy.
 
-`[table]` holds keys. `[[table]]` may stand several times, once for each item. `NAME` is yours to choose. Any key
-may be
+`[table]` contains keys. `[[table]]` may be repeated, once for each item. `NAME` is a name that you choose. Any key
+can be
 changed on the command line: `--set dda.time_step_s=0.01`, `--set materials.rock.density_kg_m3=2500`,
 `--set geometry.cracks.0.angle_deg=30` (items count from 0).
 """

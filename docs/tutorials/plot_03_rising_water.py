@@ -102,8 +102,8 @@ weight = (
 thrust, uplift = 0.5 * 9810 * levels**2, 0.5 * 9810 * levels * length
 normal = weight * np.cos(dip) - uplift - thrust * np.sin(dip)
 hoek = (20e3 * length + normal * np.tan(np.radians(32))) / (weight * np.sin(dip) + thrust * np.cos(dip))
-for level, ours, theirs in zip(levels, found, hoek):
-    print(f"{level:4.0f} m in the crack: factor {ours:.3f}, limit equilibrium {theirs:.3f}")
+for level, computed, closed_form in zip(levels, found, hoek):
+    print(f"{level:4.0f} m in the crack: factor {computed:.3f}, limit equilibrium {closed_form:.3f}")
 
 figure, axes = plt.subplots(figsize=(5.5, 3.4), layout="constrained")
 axes.plot(levels, hoek, "-", color="0.6", label="limit equilibrium")

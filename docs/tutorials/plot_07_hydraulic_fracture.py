@@ -33,8 +33,8 @@ along = (fault[1] - fault[0]) / np.linalg.norm(fault[1] - fault[0])
 across = np.array([-along[1], along[0]])
 tensor = np.array([[stress[0], stress[2]], [stress[2], stress[1]]])
 normal, shear = across @ tensor @ across, along @ tensor @ across
-holds = -normal * np.tan(np.radians(21))
-print(f"on the fault, MPa: {normal / 1e6:.2f} across, {shear / 1e6:.2f} along; friction holds {holds / 1e6:.2f}")
+strength = -normal * np.tan(np.radians(21))
+print(f"on the fault, MPa: {normal / 1e6:.2f} across, {shear / 1e6:.2f} along; friction resists {strength / 1e6:.2f}")
 
 # %%
 # Pressure without growth
@@ -93,16 +93,16 @@ def grow(network: Cracks, **options) -> list:
     )
 
 
-beside = grow(cracks, face_laws=laws)
-lonely = grow(Cracks.from_polylines([fracture]))
+with_fault = grow(cracks, face_laws=laws)
+without_fault = grow(Cracks.from_polylines([fracture]))
 print("length, m   pressure, MPa: beside the fault, alone, closed form for a straight crack")
-for ours, single in zip(beside, lonely):
+for coupled, single in zip(with_fault, without_fault):
     length = single.cracks.lengths.sum()
     exact = 10 + 1.2 / np.sqrt(np.pi * length / 2)
-    print(f"{length:6.1f}      {ours.load_factor:8.4f}  {single.load_factor:8.4f}  {exact:8.4f}")
+    print(f"{length:6.1f}      {coupled.load_factor:8.4f}  {single.load_factor:8.4f}  {exact:8.4f}")
 
 figure, axes = plt.subplots(figsize=(6, 4), layout="constrained")
-for steps, colour, label in ((beside, "#d7263d", "beside the fault"), (lonely, "0.6", "alone")):
+for steps, colour, label in ((with_fault, "#d7263d", "beside the fault"), (without_fault, "0.6", "alone")):
     network = steps[-1].cracks
     for k, segment in enumerate(network.segments[network.crack == 0]):
         axes.plot(*network.nodes[segment].T, color=colour, lw=2, label=label if k == 0 else None)
@@ -110,7 +110,7 @@ axes.plot(*fault.T, color="k", lw=2, label="fault")
 axes.set_aspect("equal")
 axes.set(xlabel="x, m", ylabel="y, m")
 axes.legend(frameon=False)
-for step in beside:
+for step in with_fault:
     for event in step.events:
         print(event.kind, event.detail, np.round(event.point, 2))
 

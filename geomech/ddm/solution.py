@@ -385,9 +385,9 @@ class Solution:
         x, ds = g.nodes[here], g.quadrature[here]
         total = u[:, 0, :, None] * g.tangent[here, None] + u[:, 1, :, None] * g.normal[here, None]
         total = total + self._applied.regular(x.reshape(-1, 2)).reshape(x.shape)
-        perimeter, middle, radius = outline_centroid(g.take(here))
+        perimeter, centroid, radius = outline_centroid(g.take(here))
         mean = np.einsum("ej,ejc->c", ds, total) / perimeter
-        rel = x - middle
+        rel = x - centroid
         turn = np.einsum("ej,ej->", ds, rel[..., 0] * total[..., 1] - rel[..., 1] * total[..., 0])
         turn /= perimeter * radius**2
         free = body._outside.free_motions
@@ -395,7 +395,7 @@ class Solution:
             ways = free.combinations
             *mean, turn = ways @ (ways.T @ np.array([*mean, turn * radius]))
             turn /= radius
-        arm = body.centroid - middle
+        arm = body.centroid - centroid
         return np.array([mean[0] - turn * arm[1], mean[1] + turn * arm[0], turn])
 
 

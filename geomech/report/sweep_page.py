@@ -200,8 +200,8 @@ class _Writer:
         if not swings or len(self._values()) < 3:
             return
         self.page.section("Sensitivities")
-        middle = float(self._values().mean())
-        drawn = sweep_figures.draw_tornado(swings[:_DRAWN], middle, self.label, self.place / "tornado.svg")
+        mean = float(self._values().mean())
+        drawn = sweep_figures.draw_tornado(swings[:_DRAWN], mean, self.label, self.place / "tornado.svg")
         self.page.figures(
             [
                 (

@@ -58,8 +58,8 @@ def _along(ends, lines, others, across: float, largest: float, least: float, mos
         if found + int(((size < largest) & ~here).sum()) > most:
             return np.empty((most + 1, 2)), np.empty(most + 1)
         piece, other, number = piece[halved], other[halved], number[halved]
-        middle = piece.mean(axis=1)
-        halves = [np.stack([piece[:, 0], middle], axis=1), np.stack([middle, piece[:, 1]], axis=1)]
+        midpoint = piece.mean(axis=1)
+        halves = [np.stack([piece[:, 0], midpoint], axis=1), np.stack([midpoint, piece[:, 1]], axis=1)]
         order = np.argsort(np.r_[2 * number, 2 * number + 1], kind="stable")
         piece = np.concatenate(halves)[order]
         other, number = np.concatenate([other, other])[order], np.r_[2 * number, 2 * number + 1][order]

@@ -18,5 +18,5 @@ def straight_crack(centre: Sequence[float], length: float, angle: float) -> np.n
     """(2, 2) ends of a crack of ``length`` (m) with this ``centre``, at ``angle`` (rad) counter-clockwise from x; it
     runs towards the end to which the angle points."""
     half = 0.5 * length * np.array([math.cos(angle), math.sin(angle)])
-    middle = np.asarray(centre, dtype=float)
-    return np.array([middle - half, middle + half])
+    point = np.asarray(centre, dtype=float)
+    return np.array([point - half, point + half])

@@ -85,11 +85,11 @@ class Sweep:
         values = self.column(result)
         values = values[np.isfinite(values)]
         if len(values) and self.rare is None:
-            low, middle, high = np.quantile(values, (0.05, 0.5, 0.95))
+            low, median, high = np.quantile(values, (0.05, 0.5, 0.95))
             lines.append(
                 f"  {result}: mean {values.mean():.4g}, standard deviation "
                 f"{values.std(ddof=1) if len(values) > 1 else 0:.3g}, "
-                f"5 % {low:.4g}, median {middle:.4g}, 95 % {high:.4g}"
+                f"5 % {low:.4g}, median {median:.4g}, 95 % {high:.4g}"
             )
         for each in counted_by_reason(self.rows):
             lines.append(f"  {each['runs']} {each['status']}: {each['reason'][:120]} (run {each['run']})")

@@ -327,7 +327,7 @@ class _Checker:
         try:
             seeds = seeds_of(self.settings.seeds)
         except (ValueError, TypeError) as error:
-            self.refuse(("seeds",), str(error), 'write them as "0-499", or as a list of whole numbers')
+            self.refuse(("seeds",), str(error), 'write a range such as "0-499", or a list of whole numbers')
             return ()
         if seeds and not self.base.tables.geometry.joint_sets:
             self.refuse(

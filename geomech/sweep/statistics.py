@@ -72,10 +72,10 @@ def wilson(successes: int, trials: int, z: float = Z95) -> tuple[float, float]:
     if trials == 0:
         return 0.0, 1.0
     share, square = successes / trials, z * z / trials
-    middle = (share + 0.5 * square) / (1.0 + square)
+    centre = (share + 0.5 * square) / (1.0 + square)
     half = z / (1.0 + square) * math.sqrt(share * (1.0 - share) / trials + square / (4.0 * trials))
-    return (0.0 if successes == 0 else max(0.0, middle - half)), (
-        1.0 if successes == trials else min(1.0, middle + half)
+    return (0.0 if successes == 0 else max(0.0, centre - half)), (
+        1.0 if successes == trials else min(1.0, centre + half)
     )
 
 

@@ -1,9 +1,10 @@
-"""A borehole in unequal stress: what the crack solver alone makes of its wall, without blocks.
+"""A borehole in unequal stress: growth of cracks from its wall by the crack solver alone, without blocks.
 
 Breakout: both remote stresses rise in proportion until the wall fails in shear and a chip comes off. Shear: under
-stresses somewhat above that, in rock that shears more easily than it tears, cracks whose faces rub run into the wall
-and stop where the hole no longer drives them. Mud pressure: the stresses stand, the pressure in
-the hole and in what it opens rises until the wall tears, and then only as far as the fracture lets it.
+stresses somewhat above that, in rock whose toughness is lower in shear than in tension, cracks with friction grow into
+the rock and arrest where the stress concentration of the hole no longer drives them. Mud pressure: the remote stresses
+are constant, and the pressure in the hole and in the cracks connected with it rises until the wall fails in tension,
+and then only as far as the fracture allows.
 """
 
 from __future__ import annotations
@@ -44,8 +45,8 @@ def wall(sides: int = SIDES) -> np.ndarray:
 
 def steps(variant: str, sides: int = SIDES, most: int | None = None, increment: float | None = None) -> list:
     """All steps of a ``variant``, or the first ``most``. Load factors are multiples of the remote stresses in
-    "breakout", MPa in "mud_pressure", one in "shear"; ``sides`` of the polygon for the hole; ``increment`` m, unset
-    each variant's own."""
+    "breakout", MPa in "mud_pressure", one in "shear"; ``sides`` of the polygon for the hole; ``increment`` m, by
+    default that of each variant."""
     remote = -np.array([GREATER, LESSER, 0.0])
     rock, control, options = ROCK, "toughness", {}
     if variant == "breakout":
@@ -73,11 +74,11 @@ def steps(variant: str, sides: int = SIDES, most: int | None = None, increment: 
 
 
 def last_network(run: list) -> Cracks:
-    """The cracks in the end, with what the last step added."""
+    """The cracks at the end, including the growth of the last step."""
     return run[-1].growth.cracks if run[-1].growth is not None else run[-1].cracks
 
 
 def azimuths(run: list) -> np.ndarray:
-    """Where cracks were born, degrees from σ_H, 0 to 90."""
+    """Azimuths at which cracks initiated, degrees from σ_H, 0 to 90."""
     points = np.array([event.point for step in run for event in step.events if event.kind == "birth"])
     return np.degrees(np.arctan2(np.abs(points[:, 1]), np.abs(points[:, 0])))

@@ -1,4 +1,4 @@
-"""What the borehole came to, beside closed forms and an independent solution."""
+"""Results of the borehole, compared with closed forms and an independent solution."""
 
 from __future__ import annotations
 
@@ -11,19 +11,20 @@ from borehole import ABOVE, FRICTION, GREATER, LESSER, RADIUS, ROCK, WEAK_IN_SHE
 from geomech.reference.cracks.cracked_hole import factor
 from geomech.reference.openings.borehole import breakdown_pressure, breakout_ratio
 
-#: The hoop stress of a polygon of 72 sides is right to 0.4 %; azimuths to half a side.
+#: The hoop stress of a polygon of 72 sides has an error of 0.4 %, azimuths one of half a side.
 STRESS_TOLERANCE, AZIMUTH_TOLERANCE_DEG = 0.005, 2.5
-#: Pressure in the fracture beyond σ_h: grown paths have K right to 1e-3, the polygon's wall counts a little besides.
+#: Pressure in the fracture in excess of σ_h: K of grown paths has an error of 1e-3, and the polygon for the wall adds a
+#: little.
 PRESSURE_TOLERANCE = 0.005
 
 
 def onset(run: list) -> float:
-    """Load factor of the first birth."""
+    """Load factor of the first initiation."""
     return next(step.load_factor for step in run if any(event.kind == "birth" for event in step.events))
 
 
 def fracture_pressure(length: float) -> float:
-    """Pressure, MPa, that holds two fractures of ``length`` m along σ_H at K_Ic, fluid inside, by dislocations."""
+    """Pressure, MPa, at which two fractures of ``length`` m along σ_H have K_Ic, with fluid inside, by dislocations."""
     ratio, root = length / RADIUS, math.sqrt(math.pi * length)
     shut = factor(ratio, 2, -np.array([GREATER, LESSER, 0.0])) * root
     per_mpa = factor(ratio, 2, np.zeros(3), 1e6) * root
@@ -31,8 +32,7 @@ def fracture_pressure(length: float) -> float:
 
 
 def chips(run: list) -> tuple[float, float]:
-    """Width, degrees of the wall's turn, and depth, parts of the radius, of the chip that came off first; nan while
-    none has."""
+    """Width (degrees of the wall) and depth (fraction of the radius) of the first chip; nan without one."""
     cracks = last_network(run)
     own = cracks.crack == 0
     nodes = np.unique(cracks.segments[own])
@@ -44,14 +44,14 @@ def chips(run: list) -> tuple[float, float]:
 
 
 def depth(run: list, crack: int | None = None) -> float:
-    """How far cracks, or one of them, reach into the rock, parts of the radius."""
+    """Distance to which cracks, or one of them, extend into the rock, as a fraction of the radius."""
     cracks = last_network(run)
     own = slice(None) if crack is None else cracks.crack == crack
     return float(np.hypot(*cracks.nodes[cracks.segments[own]].reshape(-1, 2).T).max() / RADIUS - 1)
 
 
 def check(runs: Mapping[str, list]) -> None:
-    """AssertionError where a closed form is missed by more than its tolerance."""
+    """AssertionError if a closed form is missed by more than its tolerance."""
     if "breakout" in runs:
         run = runs["breakout"]
         expected = breakout_ratio(GREATER, LESSER, ROCK.cohesion, ROCK.friction_angle)

@@ -1,4 +1,4 @@
-"""Stress intensity factors, initiation, paths and loads of pressed discs, beside what is known of them."""
+"""Stress intensity factors, initiation, paths and loads of Brazilian discs, compared with published results."""
 
 from __future__ import annotations
 

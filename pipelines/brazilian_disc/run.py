@@ -1,4 +1,4 @@
-"""Cracked Brazilian discs, pressed until they split, and what was published of their stress intensity factors.
+"""Cracked Brazilian discs loaded until they split, compared with published stress intensity factors.
 
 `geomech run pipelines/brazilian_disc` calls `main`; copy the folder to make a study of your own.
 """

@@ -1,4 +1,4 @@
-"""What many flaws do to a specimen, beside a closed form and what experiments say."""
+"""Effect of many flaws on a specimen, compared with a closed form and with experiments."""
 
 from __future__ import annotations
 
@@ -10,7 +10,8 @@ import numpy as np
 from specimen import FLAW, FRICTION_DEG, HEIGHT, K_IC, WIDTH, Course
 
 LENGTH = math.sqrt(math.pi * 0.5 * FLAW)
-#: A specimen as wide as six flaws lowers the first load of one by 1 to 2 %; wings are judged on the flaw as it is.
+#: The finite width of a specimen, six flaws, lowers the first load of one flaw by 1 to 2 %; wings are assessed on the
+#: discretised flaw.
 FIRST_TOLERANCE = 0.04
 
 LIMITS = """\
@@ -43,8 +44,8 @@ def scaled(load: float) -> float:
 
 
 def check(alone: Course, runs: Mapping[tuple[bool, int], list[Course]]) -> None:
-    """AssertionError where the closed form is missed, a specimen's first wing starts beyond its peak, or one of which no
-    peak was found is counted for one."""
+    """AssertionError if the closed form is missed, if a specimen's first wing starts after its peak, or if a specimen
+    without a peak is counted."""
     expected = ashby_hallam(FRICTION_DEG)
     assert abs(scaled(alone.first) / expected - 1) < FIRST_TOLERANCE, "one closed flaw starts off Ashby & Hallam's load"
     for (closed, number), courses in runs.items():
@@ -52,7 +53,7 @@ def check(alone: Course, runs: Mapping[tuple[bool, int], list[Course]]) -> None:
             assert course.first <= course.peak, f"{number} flaws start to grow beyond the peak"
             assert not course.passed or course.joined or course.load[-1] < course.peak, f"{number} flaws: no peak"
             if closed:
-                # Whatever stands beside it, no flaw is driven harder by so much that it starts at less than half of that.
+                # Whatever its neighbours, no flaw starts at less than half of that load.
                 assert scaled(course.first) > 0.5 * expected, f"{number} closed flaws start too early"
 
 

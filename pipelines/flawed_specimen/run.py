@@ -1,5 +1,6 @@
-"""What do many flaws do to a specimen's strength? Random specimens with more and more of them, open or closed with friction,
-pressed through their peak while the load follows the cracks, beside a closed form and published experiments.
+"""Effect of the number of flaws on the strength of a specimen: random specimens with more and more flaws, open or
+closed with friction, loaded past their peak with crack growth controlling the load, compared with a closed form and
+published experiments.
 
 `geomech run pipelines/flawed_specimen` calls `main`; copy the folder to make a study of your own.
 """

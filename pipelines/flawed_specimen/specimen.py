@@ -1,4 +1,4 @@
-"""Specimens with many flaws, drawn at random, and one run of each: through its peak load, the load following the cracks."""
+"""Specimens with many random flaws, and one run of each past its peak load, with crack growth controlling the load."""
 
 from __future__ import annotations
 
@@ -11,13 +11,14 @@ import numpy as np
 import geomech
 from geomech.study import run_ended
 
-#: Of each kind specimens with so many flaws, and of each number so many specimens.
+#: Numbers of flaws of the specimens of each kind, and number of specimens of each.
 NUMBERS, SEEDS = (5, 10, 20), (1, 2, 3)
 WIDTH, HEIGHT = 0.060, 0.120  # of the specimen, m
 FLAW, GAP, EDGE = 0.010, 0.004, 0.008  # length of a flaw, least distance of two of them, and to the sides, m
 FRICTION_DEG = 30.0  # of closed flaws
 K_IC, YOUNG = 1e6, 17e9  # Pa √m, Pa
-#: A specimen has passed its peak where it bears less than this part of it, once cracks have joined or come out.
+#: A specimen has passed its peak when it carries less than this fraction of it, after cracks have coalesced or reached
+#: the surface.
 PASSED = 0.85
 JOINED = {"coalescence", "daylighting", "split"}
 
@@ -84,7 +85,7 @@ class Course:
 
 
 def flaws(number: int, seed: int) -> list[np.ndarray]:
-    """(2, 2) ends of ``number`` flaws at random places and at 25 to 65° to the horizontal, either way."""
+    """(2, 2) ends of ``number`` flaws at random places and at 25° to 65° to the horizontal, in either direction."""
     rng, drawn = np.random.default_rng(seed), []
     while len(drawn) < number:
         angle = np.radians(rng.uniform(25, 65)) * rng.choice([-1, 1])
@@ -130,21 +131,21 @@ def scene(ends: Sequence[np.ndarray], closed: bool, increment: float, end: float
 def course(
     folder: Path, ends: Sequence[np.ndarray], closed: bool, increment: float = 2e-3, end: float = 100.0, most: int = 400
 ) -> Course:
-    """Run the specimen through its peak, or to ``end`` MPa or ``most`` cycles; its scene is left in ``folder``."""
+    """Run the specimen past its peak, or to ``end`` MPa or ``most`` cycles; its scene is written into ``folder``."""
     folder.mkdir(parents=True, exist_ok=True)
     path = folder / "scene.toml"
     path.write_text(scene(ends, closed, increment, end), encoding="utf-8")
-    load, strain, first, happened, joined, passed = [], [], np.nan, set(), set(), False
+    load, strain, first, event_kinds, joined, passed = [], [], np.nan, set(), set(), False
     for cycle in geomech.cycles(geomech.load_scene(path)):
         load.append(abs(cycle.load))
         strain.append(abs(cycle.strain))
         for event in cycle.events:
-            happened.add(event.kind)
+            event_kinds.add(event.kind)
             if event.kind == "initiation" and np.isnan(first):
                 first = abs(event.load)
             if event.kind == "coalescence":
                 joined.update(event.detail.split(" meets "))
-        if (happened & JOINED and load[-1] < PASSED * max(load)) or "split" in happened:
+        if (event_kinds & JOINED and load[-1] < PASSED * max(load)) or "split" in event_kinds:
             passed = True
             break
         if cycle.number >= most:

@@ -1,4 +1,5 @@
-"""Columns that break at their base, beside bending theory, the energy of bent columns, and a rigid body that turns."""
+"""Columns that break at their base, compared with bending theory, the energy of bent columns, and a rotating rigid
+body."""
 
 from __future__ import annotations
 
@@ -11,13 +12,12 @@ import numpy as np
 from geomech.model import Cycle
 from geomech.reference.slopes import flexural_toppling as published
 
-#: K of slender columns is right to 3e-3 with this mesh; with a coarse one ("topples") to 0.02, and its steps are 0.01
-#: long.
+#: Error of K of slender columns: 3e-3 with this mesh, 0.02 with a coarse one ("topples"), whose load steps are 0.01.
 LOAD_TOLERANCE, COARSE_TOLERANCE = 0.005, 0.03
-#: Columns ten times as long as thick, five of them: their shear, and what bends of the rock below, count besides.
+#: Five columns ten times as long as thick: their shear deformation and the bending of the rock below also contribute.
 STACK_TOLERANCE = 0.06
-#: Turning over the toe, as part of the angle: 5e-4 with steps of 5 ms, of first order in them (later the toe slides
-#: besides).
+#: Error of the rotation about the toe, relative to the angle: 5e-4 with steps of 5 ms, of first order in them (later
+#: the toe also slides).
 TURN_TOLERANCE = 0.002
 
 
@@ -66,7 +66,7 @@ class Watch:
 
     @property
     def limit(self) -> float:
-        """Part of gravity at which bending theory has K_I = K_Ic at the flaw."""
+        """Fraction of gravity at which bending theory gives K_I = K_Ic at the flaw."""
         ratio = float(self.flaws[0])
         return self.toughness / published.flaw_factor(self.unit_weight, self.height, 1.0, self.tilt, ratio)
 
@@ -77,8 +77,7 @@ class Watch:
         return float(k_ii.mean()), load * published.joint_end_factor(self.unit_weight, self.height, 1.0, self.tilt)
 
     def turned(self) -> tuple[float, float]:
-        """Angle (rad, clockwise) by which the piece turned from full gravity to the end, and a rigid body on its
-        toe."""
+        """Rotation (rad, clockwise) of the piece from full gravity to the end, and that of a rigid body on its toe."""
         turns = [each for each in self.turns if each[0] > 1.05 * self.ramp]
         times = np.array([each[0] for each in turns])
         angles = np.unwrap([each[1] for each in turns])
@@ -130,7 +129,7 @@ def report(runs: Mapping[str, Watch]) -> str:
 
 
 def check(runs: Mapping[str, Watch]) -> None:
-    """AssertionError when one of them is missed by more than its tolerance."""
+    """AssertionError if one of them is missed by more than its tolerance."""
     for name, run in runs.items():
         assert run.broke is not None, f"{name}: no crack grew"
         if run.single:

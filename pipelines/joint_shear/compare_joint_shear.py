@@ -1,5 +1,5 @@
-"""Shear force against the box's way, beside friction, the fracture load of a bridge and the strength of one that
-tears."""
+"""Shear force against shear displacement, compared with friction, the fracture load of a bridge, and its tensile
+strength."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from geomech.report.study_part import Part
 
 MPA = 1e6
 
-#: Forces between the halves are those of springs in a step that moves them: what is left of friction is their give.
+#: Forces between the halves are those of contact springs, whose compliance is the remaining difference from friction.
 RESIDUAL_TOLERANCE = 1e-5
-#: Events find the load of K_IIc to this; both ends are mirror images.
+#: Tolerance with which events locate the load of K_IIc; both ends are mirror images.
 TOUGHNESS_TOLERANCE, MIRROR_TOLERANCE = 2e-6, 1e-6
-#: The way in which pure shear tears, degrees.
+#: Error of the kink angle under pure shear, degrees.
 KINK_TOLERANCE_DEG = 0.01
-#: The strength of rocks is 6.88 K_Ic with a scatter of tens of per cent; two thirds of the peak or more is lost when the
-#: wings are away.
+#: The strength of rocks is 6.88 K_Ic with a scatter of tens of per cent; the force falls by two thirds of the peak or
+#: more when the wings have grown.
 LAJTAI_TOLERANCE, FALLEN = 0.2, 0.7
 
 
@@ -76,7 +76,7 @@ class Sheared:
 
     @property
     def curve(self) -> np.ndarray:
-        """(n, 2) way, m, and force, N/m."""
+        """(n, 2) displacement, m, and force, N/m."""
         return np.array([row[:2] for row in self.rows])
 
     @property
@@ -90,36 +90,36 @@ class Sheared:
 
     @property
     def residual(self) -> float:
-        """Force at the end, N/m; nan where the bridge has not parted."""
+        """Force at the end, N/m; nan if the bridge is intact."""
         return float(self.curve[-1, 1]) if self.pieces > 1 else np.nan
 
     @property
     def expected(self) -> float:
-        """Force at the start by the fracture load of a bridge between half-planes, N/m."""
+        """Force at the start of growth by the fracture load of a bridge between half-planes, N/m."""
         return published.direct_shear_strength(
             self.normal * self.width, self.law.friction_angle, self.bridge, self.toughness
         )
 
     @property
     def factor(self) -> float:
-        """The bridge's share of the force over that of the half-planes."""
+        """The bridge's share of the force relative to that of a bridge between half-planes."""
         return (self.start - self.friction) / (self.expected - self.friction)
 
     @property
     def tearing(self) -> float:
-        """Force by the tensile strength of Lajtai, of a bridge as strong as rocks of its toughness are, N/m."""
+        """Force by Lajtai's tensile strength, for a bridge with the strength typical of rock of its toughness, N/m."""
         strength = published.STRENGTH_OVER_TOUGHNESS * self.k_ic
         bridge = published.tearing_bridge(self.normal, strength) * self.bridge
         return bridge + self.friction * (1 - self.bridge / self.width)
 
     def force_at(self, grown: float) -> float:
-        """Largest force borne with cracks ``grown`` m or longer, between rows linearly, N/m."""
+        """Largest force with cracks ``grown`` m or longer, linear between rows, N/m."""
         length, force = np.array([row[2:0:-1] for row in self.rows if row[3]]).T
         return float(np.interp(grown, (length - self.length) / 2, force))
 
 
 def check(tests: Mapping[str, Sheared]) -> None:
-    """AssertionError where a test misses its closed form by more than is explained."""
+    """AssertionError if a test misses its closed form by more than can be explained."""
     for name, test in tests.items():
         assert test.k is not None, f"{name}: the bridge has not begun to break"
         assert test.k[0] == 0, f"{name}: faces in contact have K_I = 0"
@@ -133,7 +133,7 @@ def check(tests: Mapping[str, Sheared]) -> None:
             assert test.curve[-1, 1] < FALLEN * test.peak, f"{name}: the force does not fall as the wings leave"
         else:
             assert abs(test.k[1] / test.toughness - 1) < TOUGHNESS_TOLERANCE, f"{name}: it does not shear at K_IIc"
-            # The box holds the specimen's ends parallel, which half-planes do not.
+            # The box keeps the specimen's ends parallel, unlike half-planes.
             assert test.expected < test.start == test.peak, f"{name}: the bridge does not go at one load, above theirs"
             assert test.pieces == 2, f"{name}: the bridge has not parted"
             assert abs(test.residual / test.friction - 1) < RESIDUAL_TOLERANCE, f"{name}: what is left is not friction"

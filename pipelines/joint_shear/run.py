@@ -1,4 +1,4 @@
-"""Direct shear of joints with a rock bridge: what it takes to break the bridge, and what friction leaves.
+"""Direct shear of joints with a rock bridge: the force that breaks the bridge, and the residual friction.
 
 `geomech run pipelines/joint_shear` calls `main`; copy the folder to make a study of your own.
 """

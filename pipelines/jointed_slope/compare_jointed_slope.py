@@ -1,4 +1,4 @@
-"""How far the slope slid, beside Newmark's sliding block under the same record, and what the run cost, by phase."""
+"""Displacement of the slope, compared with Newmark's sliding block under the same record, and computing time by phase."""
 
 from __future__ import annotations
 
@@ -14,15 +14,16 @@ from geomech.reference.blocks.base_shaking import sliding_block
 
 #: Dip of the plane, and the friction angle on it, as the scene has them.
 DIP, PLANE = np.radians(22.0), "plane"
-#: The shaking begins, s: before that the slope takes its weight.
+#: Time at which shaking begins, s; until then the weight is applied.
 SHAKEN = 0.5
-#: How far the slip on the plane may be from a rigid block's. Found: 7 % more in the thousand blocks (the rock as a whole
-#: moves 32 % farther); in the variant "short" 9 % less in whole blocks, 25 % less where bridges break (37 % with seed 7).
+#: Admissible relative difference of the slip on the plane from that of a rigid block. Found: 7 % more with a thousand
+#: blocks (the rock as a whole moves 32 % farther); in the variant "short" 9 % less with intact blocks, 25 % less if
+#: bridges break (37 % with seed 7).
 SIMILAR = 0.3
-#: Until the base is first shaken beyond the yield acceleration, friction holds: the slip on the plane is no more than this
-#: part of the final one (1 % found). The rock above sways on its joints by several times as much.
+#: Until the base first exceeds the yield acceleration, friction prevents sliding: the slip on the plane is at most this
+#: fraction of the final one (1 % found). The rock above moves on its joints by several times as much.
 STANDS = 0.02
-#: Cracks and blocks that differ by more than this part of the strain have found no common answer.
+#: Cracks and blocks have not converged if their strains differ by more than this fraction.
 AGREED = 0.1
 INK, SOFT, COMPUTED, NEWMARK, GROWN = "#2f3136", "#8a8f98", "#1f6f8b", "#d9a441", "#c8553d"
 
@@ -77,7 +78,7 @@ class Slide:
         self.last = cycle
 
     def _slip(self, cycle: Cycle) -> float:
-        """m on the plane."""
+        """Slip on the plane, m."""
         sums = joint_sums(cycle.blocks, cycle.state.contacts, self.problem.joints)
         return float(sums[f"joint:{PLANE}"]["mean_slip"]) if f"joint:{PLANE}" in sums else 0.0
 
@@ -103,7 +104,7 @@ class Slide:
 
 
 def check(slide: Slide) -> None:
-    """AssertionError where the rock slides before limit equilibrium lets it, or, once it has slid, otherwise than
+    """AssertionError if the rock slides before limit equilibrium permits it, or if its sliding differs from that of
     Newmark's block."""
     table, expected = slide.table, slide.newmark(slide.table[:, 0])
     if expected[-1] == 0.0:
@@ -136,10 +137,10 @@ def report(slide: Slide, summary: dict) -> str:
     for time in np.arange(SHAKEN + 0.5, table[-1, 0] + 1e-9, 0.5):
         k = int(np.argmin(np.abs(table[:, 0] - time)))
         rows.append(f"{time:7.1f}{1e3 * table[k, 1]:7.1f}{1e3 * table[k, 5]:7.1f}{1e3 * expected[k]:9.1f}")
-    told = ", ".join(f"{count} × {kind}" for kind, count in sorted(slide.events.items())) or "none"
+    counts = ", ".join(f"{count} × {kind}" for kind, count in sorted(slide.events.items())) or "none"
     rows += [
         "",
-        f"events: {told}; {slide.last.cracks.n_cracks} cracks in {slide.last.blocks.n_blocks - 1} blocks at the end",
+        f"events: {counts}; {slide.last.cracks.n_cracks} cracks in {slide.last.blocks.n_blocks - 1} blocks at the end",
     ]
     if slide.settled:
         rows.append(
@@ -160,7 +161,8 @@ def report(slide: Slide, summary: dict) -> str:
 
 
 def draw(slide: Slide, path: Path) -> None:
-    """The slope at its end, blocks by how far they moved, and its slip in time beside Newmark's."""
+    """The slope at its end, with blocks coloured by displacement, and its slip against time with that of Newmark's
+    block."""
     from matplotlib.collections import LineCollection, PolyCollection
     from matplotlib.figure import Figure
 

@@ -1,4 +1,5 @@
-"""A slope of a thousand blocks with a hundred rock bridges, shaken by El Centro 1940, beside Newmark's sliding block.
+"""A slope of a thousand blocks with a hundred rock bridges under the El Centro record of 1940, compared with Newmark's
+sliding block.
 
 `geomech run pipelines/jointed_slope` calls `main`; copy the folder to make a study of your own.
 """

@@ -1,4 +1,4 @@
-"""Semicircular arches of stone: their limit thickness, their line of thrust, and how they fall."""
+"""Semicircular masonry arches: their limit thickness, line of thrust, and collapse."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from geomech.model import OPEN, Blocks, DdaSettings, History, JointLaw, Loads, M
 from geomech.reference.blocks import masonry
 
 RADIUS = 10.0  # mean radius, m
-#: Stiff stone, and joints too rough to slide: limit analysis knows neither strain nor sliding.
+#: Stiff stone, and joints too rough to slide: limit analysis excludes strain and sliding.
 STONE = Material("stone", youngs_modulus=1e11, poissons_ratio=0.2, density=2500.0)
 JOINTS = JointLaw("joints", friction_angle=np.radians(60))
 WEIGHT = Loads(gravity=History.constant([0.0, -9.81]))
@@ -46,8 +46,8 @@ def thinnest(n: int, low: float = 0.09, high: float = 0.12) -> float:
 
 @dataclass(frozen=True, eq=False)
 class Seen:
-    """Outlines of the springings and voussoirs, and at each joint from the right springing on: its inner and outer
-    corner (n + 1, 2, 2), where the thrust crosses it (n + 1, 2), nan if nothing does, and how far it has turned open,
+    """Outlines of the springings and voussoirs, and for each joint from the right springing on: its inner and outer
+    corner (n + 1, 2, 2), the point where the thrust crosses it (n + 1, 2), nan without a force, and its opening angle,
     rad (positive: open on the outside)."""
 
     outlines: list[np.ndarray]
@@ -70,7 +70,7 @@ def seen(system: dda.BlockSystem, result: dda.StepResult) -> Seen:
 
 
 def fall(system: dda.BlockSystem, seconds: float) -> dda.StepResult:
-    """The arch ``seconds`` after its centring is struck."""
+    """The arch ``seconds`` after its centring is removed."""
     state = State.at_rest(system.blocks)
     while state.time < seconds * (1 - 1e-12):
         result = system.step(state, WEIGHT)

@@ -1,4 +1,4 @@
-"""The thinnest arch beside limit analysis and Milankovitch (1907), its line of thrust, its hinges."""
+"""The thinnest stable arch, its line of thrust and its hinges, compared with limit analysis and Milankovitch (1907)."""
 
 from __future__ import annotations
 
@@ -11,7 +11,8 @@ from geomech.reference.blocks import masonry
 
 INK, STONE, BASE, THRUST, HINGE = "#2f3136", "#d8d2c4", "#a9a9a4", "#1f6f8b", "#c8553d"
 
-#: Bisection to 1e-5 and an elastic shortening of 1e-4 of the thickness; of many voussoirs, beside Milankovitch's ratio.
+#: Bisection to 1e-5 and an elastic shortening of 1e-4 of the thickness; for many voussoirs, relative to Milankovitch's
+#: ratio.
 THICKNESS_TOLERANCE, MILANKOVITCH_TOLERANCE = 3e-4, 2e-4
 
 LIMITS = """\
@@ -25,8 +26,9 @@ What this does and does not say
 
 
 def check(thinnest: dict[int, float], hinges: np.ndarray, n: int) -> None:
-    """AssertionError where an arch of ``thinnest`` is off limit analysis, or one of ``n`` voussoirs falls by other
-    ``hinges`` (degrees from the crown) than five: the crown, the joints next to Milankovitch's, the springings."""
+    """AssertionError if an arch of ``thinnest`` differs from limit analysis, or one of ``n`` voussoirs collapses with
+    other ``hinges`` (degrees from the crown) than five: at the crown, at the joints next to Milankovitch's, and at the
+    springings."""
     for number, ratio in thinnest.items():
         exact = masonry.thinnest_arch(number)
         assert abs(ratio / exact - 1) < THICKNESS_TOLERANCE, f"{number} voussoirs: off limit analysis"
@@ -54,7 +56,7 @@ def report(thinnest: dict[int, float], hinges: np.ndarray) -> str:
 
 
 def hinges(seen: Seen) -> np.ndarray:
-    """Joints (indices) that have turned by more than a tenth of the most turned one."""
+    """Joints (indices) that have opened by more than a tenth of the largest opening."""
     return np.flatnonzero(np.abs(seen.opening) > 0.1 * np.abs(seen.opening).max())
 
 
@@ -77,7 +79,7 @@ def draw(path: Path, thinnest: dict[int, float], standing: Seen, falling: Seen, 
             axes.plot(*seen.thrust.T, color=THRUST, lw=2, label="line of thrust")
         else:
             at = hinges(seen)
-            # A joint that opens outside turns about its inner corner.
+            # A joint that opens on the outside rotates about its inner corner.
             corner = seen.joints[at, (seen.opening[at] < 0).astype(int)]
             axes.plot(*corner.T, "o", ms=7, mfc="white", mec=HINGE, mew=2, label="hinge")
         axes.set(aspect="equal", title=title)

@@ -1,4 +1,4 @@
-"""What broke the bridge, beside limit equilibrium with the bridge's fracture load."""
+"""Load at which the bridge breaks, compared with limit equilibrium including the bridge's fracture load."""
 
 from __future__ import annotations
 
@@ -84,7 +84,7 @@ class BridgedPlane:
         self.at, self.k = rows[:, 0], rows[:, 1:]
 
     def excess(self, multiple: float) -> float:
-        """What the block pushes beyond the strength of its plane, were it joint all along."""
+        """Driving force of the block in excess of the strength of its plane, if all of the plane were joint."""
         return published.driving_force(
             multiple * self.weight, self.dip, self.length, self.law.cohesion, self.law.friction_angle
         )
@@ -101,27 +101,28 @@ class BridgedPlane:
 
     @property
     def factor_ratio(self) -> float:
-        """Mean |K_II| of both ends at the last load before they grew, over the formula's."""
+        """Mean |K_II| of both ends at the last load before they grew, relative to the formula's."""
         return float(self.k[-1].mean() / published.shear_factor(self.excess(self.at[-1]), self.bridge))
 
     @property
     def unlike(self) -> float:
-        """How far the ends' |K_II| are from their mean, relative."""
+        """Relative difference of the ends' |K_II| from their mean."""
         return float(np.ptp(self.k[-1]) / self.k[-1].sum())
 
     @property
     def jennings(self) -> float:
-        """Cohesion of rock, Pa, with which Jennings' plane fails at the computed load."""
+        """Cohesion of the rock, Pa, with which Jennings' plane fails at the computed load."""
         whole = self.bridge / self.length
         apparent = self.law.cohesion + self.excess(self.started) / self.length
         return published.jennings_rock_cohesion(apparent, 1 - whole, self.law.cohesion)
 
 
 def check(name: str, seen: BridgedPlane) -> None:
-    """AssertionError where a formula is missed by more than is explained."""
+    """AssertionError if a formula is missed by more than can be explained."""
     share = 100 * seen.bridge / seen.length  # per cent of the plane that is whole
     off = seen.started / seen.expected() - 1
-    # 0.1 to 0.3 % remain: elements, joint by the tension crack that does not slide, and what grows with the bridge.
+    # A difference of 0.1 to 0.3 % remains: elements, the part of the joint at the tension crack that does not slide,
+    # and effects that increase with the bridge.
     assert abs(seen.factor_ratio - 1) < 0.005, f"{name}: the bridge's K_II is off the formula's"
     assert seen.unlike < 0.005 + 0.01 * share, f"{name}: the bridge's ends differ"
     assert abs(off) < seen.unlike + abs(seen.factor_ratio - 1) + 0.002, f"{name}: the load is off by more than K_II is"
@@ -159,7 +160,8 @@ def report(runs: Mapping[str, BridgedPlane]) -> str:
 
 
 def draw(runs: Mapping[str, BridgedPlane], file: Path) -> None:
-    """The slope, its loads of failure over the bridge's length and, if it was run, the bridge whose ends tear."""
+    """The slope, its failure loads against the length of the bridge and, if it was run, the bridge whose ends fail in
+    tension."""
     from matplotlib.figure import Figure
 
     ink, rock, accent = "#2f3136", "#e6e3dc", "#c8553d"

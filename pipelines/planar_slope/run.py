@@ -1,4 +1,4 @@
-"""A sliding plane with one rock bridge: the multiple of gravity at which it breaks, against limit equilibrium and
+"""A sliding plane with one rock bridge: the multiple of gravity at which it breaks, compared with limit equilibrium and
 fracture mechanics.
 
 `geomech run pipelines/planar_slope` calls `main`; copy the folder to make a study of your own.

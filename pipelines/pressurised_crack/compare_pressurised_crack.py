@@ -1,4 +1,5 @@
-"""K of a pressurised crack below a free surface beside an independent solution and the limits for shallow and deep."""
+"""K of a pressurised crack below a free surface, compared with an independent solution and with the limits of small and
+large depth."""
 
 from __future__ import annotations
 
@@ -10,16 +11,16 @@ from geomech.model import Cracks
 from geomech.reference.cracks.crack_arrays import near_surface
 from geomech.reference.cracks.surface_crack import thin_layer
 
-#: Depths above this are within reach of the independent solution, whose kernels peak like 1/depth².
+#: Smallest depth that the independent solution resolves; its kernels peak like 1/depth².
 RESOLVED = 0.05
 GRIFFITH = np.sqrt(np.pi)
 
-#: Of |K| beside dislocations: the block's size leaves 1e-5. Of the thin layer: the second order that extrapolation
-#: leaves, 0.25 and 0.15 %.
+#: Relative to |K| by dislocations, where the block's size leaves 1e-5; and to the thin layer, where the second-order
+#: term left by extrapolation is 0.25 and 0.15 %.
 INDEPENDENT_TOLERANCE, LAYER_TOLERANCE = 3e-5, 5e-3
-#: K_I beyond Griffith's, and K_II, at five half-lengths: both fall with the square of the depth.
+#: K_I in excess of Griffith's, and K_II, at a depth of five half-lengths: both fall with the square of the depth.
 DEEP, DEEP_SHEAR = 0.03, 0.004
-#: Paths are mirror images to this part of what lies between their ends, whose increments are 0.15 m.
+#: Tolerance of the symmetry of paths, relative to the distance between their ends; increments are 0.15 m.
 MIRROR_TOLERANCE = 0.02
 
 LIMITS = """\
@@ -32,8 +33,8 @@ What this does and does not say
 
 
 def independent(depths: np.ndarray) -> np.ndarray:
-    """(n, 2) K_I, K_II at the right-hand tip by dislocations in the half-plane, pressure and half-length one; nan where
-    they are not resolved."""
+    """(n, 2) K_I, K_II at the right-hand tip by dislocations in the half-plane, for unit pressure and half-length; nan
+    if not resolved."""
     out = np.full((len(depths), 2), np.nan)
     for k, depth in enumerate(depths):
         if depth >= RESOLVED:
@@ -43,13 +44,13 @@ def independent(depths: np.ndarray) -> np.ndarray:
 
 
 def shallow_limit(depths: np.ndarray, k: np.ndarray) -> np.ndarray:
-    """(2,) ratio of K_I, K_II to the thin layer's, extrapolated to no depth from the first two ``depths``."""
+    """(2,) ratio of K_I, K_II to those of the thin layer, extrapolated to zero depth from the first two ``depths``."""
     ratio = np.array([np.abs(k[m]) / thin_layer(1.0, depths[m], 1.0) for m in (0, 1)])
     return ratio[0] + (ratio[0] - ratio[1]) * depths[0] / (depths[1] - depths[0])
 
 
 def check(depths: np.ndarray, k: np.ndarray, paths: dict[float, Cracks]) -> None:
-    """AssertionError where K or a path is missed by more than its tolerance."""
+    """AssertionError if K or a path is missed by more than its tolerance."""
     exact = independent(depths)
     off = np.abs(k - exact).max(axis=1) / np.hypot(*exact.T)
     assert np.isfinite(off).sum() == (depths >= RESOLVED).sum(), "K or its independent value is no number"
@@ -69,7 +70,7 @@ def check(depths: np.ndarray, k: np.ndarray, paths: dict[float, Cracks]) -> None
 
 
 def report(depths: np.ndarray, k: np.ndarray, paths: dict[float, Cracks]) -> str:
-    """The comparison as text; ``k`` (n, 2) at pressure and half-length one."""
+    """The comparison as text; ``k`` (n, 2) for unit pressure and half-length."""
     exact = independent(depths)
     rows = [
         "depth    K_I      K_II       relative to dislocations       relative to a thin layer",
@@ -78,9 +79,9 @@ def report(depths: np.ndarray, k: np.ndarray, paths: dict[float, Cracks]) -> str
     for depth, got, other in zip(depths, k, exact):
         off = np.abs(got - other).max() / np.hypot(*other)
         thin = np.abs(got) / thin_layer(1.0, depth, 1.0)
-        beside = f"{off:.1e}" if np.isfinite(off) else "-"
+        difference = f"{off:.1e}" if np.isfinite(off) else "-"
         rows.append(
-            f"{depth:5.2f} {got[0] / GRIFFITH:9.4f} {got[1] / GRIFFITH:9.4f}      {beside:>12}     {thin[0]:18.4f} "
+            f"{depth:5.2f} {got[0] / GRIFFITH:9.4f} {got[1] / GRIFFITH:9.4f}      {difference:>12}     {thin[0]:18.4f} "
             f"{thin[1]:7.4f}"
         )
     limit = shallow_limit(depths, k)

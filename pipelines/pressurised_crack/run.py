@@ -1,4 +1,5 @@
-"""A crack that a fluid presses open below a free surface: K against depth, and the way it turns up to the surface.
+"""A crack under fluid pressure below a free surface: K against depth, and the path by which it turns towards the
+surface.
 
 `geomech run pipelines/pressurised_crack` calls `main`; copy the folder to make a study of your own.
 """
@@ -19,7 +20,7 @@ ROCK = Material("rock", youngs_modulus=30e9, poissons_ratio=0.25, k_ic=1e6)
 
 
 def crack_below(depth: float) -> tuple[list[np.ndarray], Cracks]:
-    """A block so large that it stands for the half-plane, and in it a crack of half-length 1 m parallel to its top."""
+    """A block large enough to stand for the half-plane, with a crack of half-length 1 m parallel to its top."""
     size = 20.0 * (1.0 + depth)
     block = np.array([[-size, -2 * size], [size, -2 * size], [size, 0], [-size, 0]])
     return [block], Cracks.from_polylines([np.array([[-1, -depth], [1, -depth]])], aperture=np.inf)

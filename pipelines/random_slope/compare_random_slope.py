@@ -1,4 +1,4 @@
-"""What the sweeps of random slopes come to, beside exact and published probabilities of failure."""
+"""Results of the sweeps of random slopes, compared with exact and published probabilities of failure."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from geomech.sweep.statistics import distribution, share_text, wilson
 STUDIES = ("normal_strengths", "rare", "sau_mau_ping", "two_sets")
 #: Strengths of the first two: (mean, standard deviation) of cohesion, Pa, and of tan φ, and their correlation.
 COHESION, TANGENT, RARE_TANGENT, CORRELATION = (60e3, 9e3), (0.53, 0.05), (0.65, 0.05), -0.3
-#: The factor of every single run is limit equilibrium's to this, half the bracket that is searched for.
+#: Tolerance of the factor of every run relative to limit equilibrium: half the requested bracket.
 FACTOR_TOLERANCE = 1.5e-3
 
 LIMITS = (
@@ -57,12 +57,12 @@ def factors_off(name: str, found: Any) -> np.ndarray:
 
 
 def exact_of_samples(found: Any) -> float:
-    """The share of the samples of the Sau Mau Ping slope that limit equilibrium has fail."""
+    """Fraction of the samples of the Sau Mau Ping slope that fail by limit equilibrium."""
     return float(np.mean([limit_equilibrium("sau_mau_ping", row) < 1.0 for row in found.rows]))
 
 
 def check(found: Mapping[str, Any]) -> None:
-    """AssertionError where a study is not what it should be."""
+    """AssertionError if a study is not as expected."""
     for name, each in found.items():
         done = [row for row in each.rows if row["status"] == "done"]
         assert len(done) >= 0.98 * len(each.rows), f"{name}: {len(each.rows) - len(done)} runs have no answer"
@@ -71,17 +71,17 @@ def check(found: Mapping[str, Any]) -> None:
             assert off.max() < FACTOR_TOLERANCE, f"{name}: a factor is {off.max():.2g} off limit equilibrium"
     if "normal_strengths" in found:
         # 99.9 %: a fixed seed draws the same samples every time.
-        sure = found["normal_strengths"].probability
-        low, high = wilson(sure.failures, sure.answered, 3.29)
-        assert low < exact("normal_strengths") < high, f"{sure}, exactly {exact('normal_strengths'):.4g}"
+        estimate = found["normal_strengths"].probability
+        low, high = wilson(estimate.failures, estimate.answered, 3.29)
+        assert low < exact("normal_strengths") < high, f"{estimate}, exactly {exact('normal_strengths'):.4g}"
     if "rare" in found:
         rare = found["rare"].rare
         off = abs(rare.value / exact("rare") - 1.0)
         assert off < 3.29 * rare.variation, f"{rare}, exactly {exact('rare'):.3g}"
     if "sau_mau_ping" in found:
-        sure = found["sau_mau_ping"].probability
-        low, high = wilson(sure.failures, sure.answered, 3.29)
-        assert low < HOEK_PROBABILITY < high, f"{sure}; published {HOEK_PROBABILITY:.3g}"
+        estimate = found["sau_mau_ping"].probability
+        low, high = wilson(estimate.failures, estimate.answered, 3.29)
+        assert low < HOEK_PROBABILITY < high, f"{estimate}; published {HOEK_PROBABILITY:.3g}"
         factors = found["sau_mau_ping"].column("factor_of_safety")
         error = HOEK_DEVIATION / math.sqrt(len(factors))
         # Published to two digits.
@@ -96,9 +96,9 @@ def report(found: Mapping[str, Any]) -> str:
     """The comparison as text."""
     rows = []
     for name, each in found.items():
-        sure = each.probability
-        value = f"{each.rare.value:.3g}" if each.rare else share_text(sure.value)
-        low, high = each.rare.interval if each.rare else (sure.low, sure.high)
+        estimate = each.probability
+        value = f"{each.rare.value:.3g}" if each.rare else share_text(estimate.value)
+        low, high = each.rare.interval if each.rare else (estimate.low, estimate.high)
         interval = f"{low:.2g} to {high:.2g}" if each.rare else f"{share_text(low)} to {share_text(high)}"
         against = {
             "sau_mau_ping": f"{share_text(HOEK_PROBABILITY)} (Hoek 2007), {share_text(LOW_PROBABILITY)} (Low "
@@ -132,8 +132,8 @@ def report(found: Mapping[str, Any]) -> str:
 
 
 def draw(found: Mapping[str, Any], file: Path) -> None:
-    """Factors of the Sau Mau Ping slope, the probability of failure with normal strengths as runs are added, and where
-    slopes with two random sets move."""
+    """Factors of the Sau Mau Ping slope, the probability of failure with normal strengths against the number of runs,
+    and the places where slopes with two random sets move."""
     from matplotlib.figure import Figure
 
     ink, accent, band, fails = "#2f3136", "#1f6f8b", "#cfe0e6", "#c8553d"
@@ -173,7 +173,7 @@ def draw(found: Mapping[str, Any], file: Path) -> None:
         rows = [row for row in each.rows if row.get("_places")]
         shares = np.mean([moved_cells(row["_places"], each.plan.cells) for row in rows], axis=0)
         x0, y0, x1, y1 = each.plan.box
-        # Matplotlib draws images below areas: the rock has to be lower still.
+        # Matplotlib draws images below areas: the rock must be lower still.
         right.fill([0, 60, 60, 42, 30, 0], [0, 0, 20, 20, 40, 40], color="#efe6d5", zorder=-1)
         image = right.imshow(
             np.ma.masked_where(shares <= 0, 100 * shares),

@@ -1,5 +1,5 @@
-"""Random slopes: the probability of failure of a planar slope against the exact and the published one, a rare failure,
-and a slope with two random joint sets.
+"""Random slopes: the probability of failure of a planar slope compared with the exact and the published one, a rare
+failure, and a slope with two random joint sets.
 
 `geomech run pipelines/random_slope` calls `main`; copy the folder to make a study of your own.
 """
@@ -17,7 +17,7 @@ from compare_random_slope import STUDIES, check, draw, report
 
 
 def main(folder: Path, out: Path, overrides=(), variants=(), quiet: bool = False) -> int:
-    """``variants`` are names of studies; ``overrides`` of `sweep` change how they are sampled, as runs=64."""
+    """``variants`` are names of studies; ``overrides`` of `sweep` change how they are sampled, for example runs=64."""
     unknown = [name for name in variants if name not in STUDIES]
     if unknown:
         raise ValueError(f"no study {', '.join(unknown)}; there are {', '.join(STUDIES)}")

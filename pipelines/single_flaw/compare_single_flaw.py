@@ -1,4 +1,4 @@
-"""Wing cracks as they grew, beside what closed forms say of them."""
+"""Wing cracks during growth, compared with closed forms."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ MPA = 1e6
 #: Wing lengths that the report lists, in half-lengths of the flaw.
 LISTED = (0.2, 0.5, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0)
 
-#: What the comparison says of itself.
+#: Remarks on the comparison.
 LIMITS = (
     """The closed forms are for flaws whose faces slide, in an infinite plane; this flaw is an open slot over a third of
     the width. They share the fall of K_I with length (stable growth), not its size; from where the wings are as far
@@ -58,7 +58,7 @@ class Wings:
         self.events += cycle.events
         tips = cycle.tips[cycle.tips["end"] == 1]
         if self._open is not None:
-            # Where the last step went is known once it has been made; a wing that reached the surface has no tip.
+            # The direction of the last step is known only after it; a wing that has reached the surface has no tip.
             step = tips["point"][0] - self._open[2] if len(tips) else (np.nan, np.nan)
             self.rows.append((*self._open, float(np.degrees(np.arctan2(step[0], step[1])))))
             self._open = None
@@ -80,18 +80,18 @@ class Wings:
 
     @property
     def stable(self) -> np.ndarray:
-        """Rows, in order of wing length, at which the load had to rise further than ever for the wing to grow."""
+        """Rows, in order of wing length, at which the load had to exceed all earlier loads for the wing to grow."""
         return np.flatnonzero(self.load > np.r_[-np.inf, np.maximum.accumulate(self.load)[:-1]])
 
     @property
     def arrested(self) -> float:
-        """Length of the wing that the first burst left, m; nan when the wing never stopped."""
+        """Length of the wing after the first unstable growth, m; nan if the wing never arrested."""
         return float(self.wing[self.stable[1]]) if len(self.stable) > 1 else np.nan
 
     @property
     def run_off(self) -> int:
-        """The row of the load under which the wing then ran furthest: the last stable one before the longest burst
-        that ends near the specimen's end."""
+        """Row of the load with the longest unstable growth of the wing: the last stable row before it, if it ends near
+        the specimen's end."""
         long_enough = self.stable[self.wing[self.stable] > 0.25 * self.height] if len(self.stable) else self.stable
         if not len(long_enough):
             return len(self.load) - 1
@@ -99,7 +99,7 @@ class Wings:
         return int(long_enough[np.argmax(bursts)])
 
     def factor(self, wing: float) -> float:
-        """K_I/σ, √m, when the wing was ``wing`` m long, between rows linearly; nan beyond them."""
+        """K_I/σ, √m, at a wing length of ``wing`` m, linear between rows; nan outside them."""
         return float(np.interp(wing, self.wing, self.k[:, 0] / self.load, left=np.nan, right=np.nan))
 
     def tangent_modulus(self) -> float:
@@ -129,8 +129,8 @@ def _first_step(wings: Wings) -> Part:
     plane, factor = published.open_slot_in_plane(), published.secant_correction()
     plane_angle, _ = maximum_tangential_stress(np.array([-plane[0]]), np.array([plane[1]]))
     rows = [
-        [f"|{name}|/σ, √m", *(f"{value:.5f}" for value in (ours, theirs, p, p * factor))]
-        for name, ours, theirs, p in zip(("K_I", "K_II"), k, published.OPEN_SLOT, plane)
+        [f"|{name}|/σ, √m", *(f"{value:.5f}" for value in (computed, reference, p, p * factor))]
+        for name, computed, reference, p in zip(("K_I", "K_II"), k, published.OPEN_SLOT, plane)
     ]
     kinks = [np.degrees(abs(angle[0])), published.KINK_DEG, np.degrees(abs(plane_angle[0]))]
     rows.append(["kink, degrees", *(f"{kink:.2f}" for kink in kinks), None])
@@ -162,11 +162,13 @@ def _growth(wings: Wings) -> Part:
 def _lengths(wings: Wings) -> Part:
     a, rows = published.HALF_LENGTH, []
     for ratio in LISTED:
-        ours = wings.factor(ratio * a)
-        if np.isnan(ours):
+        computed = wings.factor(ratio * a)
+        if np.isnan(computed):
             continue
         h, s = float(published.wing_horii_nemat_nasser(ratio * a)), float(published.wing_ashby_hallam(ratio * a))
-        rows.append([f"{ratio:.1f}", f"{ours:.4f}", f"{h:.4f}", f"{ours / h:.2f}", f"{s:.4f}", f"{ours / s:.2f}"])
+        rows.append(
+            [f"{ratio:.1f}", f"{computed:.4f}", f"{h:.4f}", f"{computed / h:.2f}", f"{s:.4f}", f"{computed / s:.2f}"]
+        )
     return Part(
         "K_I/σ of the wings, √m",
         ["l/a", "computed", "Horii & Nemat-Nasser", "ratio", "Ashby & Hallam", "ratio "],
@@ -188,7 +190,7 @@ def _stiffness(wings: Wings) -> Part:
 
 
 def settings(runs: Mapping[str, Wings]) -> Part:
-    """Several runs side by side: what settings change."""
+    """Several runs side by side: the effect of settings."""
     rows = [
         [
             name,

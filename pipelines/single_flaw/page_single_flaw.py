@@ -1,5 +1,5 @@
-"""The study on one page: the wings as they grew, their stress intensity factors beside closed forms, what settings
-change."""
+"""The study on one page: wings during growth, their stress intensity factors compared with closed forms, and the effect
+of settings."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ from geomech.render.curves.studies import against
 from geomech.report.page import Page
 from geomech.report.run_page import add_curves, add_pictures, add_player, add_time, key_results
 
-#: What the sixth of a flaw's half-length is to a wing: shorter ones feel the corner they leave.
+#: A sixth of the flaw's half-length: shorter wings are influenced by the corner at which they start.
 SHORTEST = published.HALF_LENGTH / 6
 
 
 def write_page(runs: Mapping[str, Wings], places: Mapping[str, Path], out: Path) -> Path:
-    """The page of ``runs`` as ``out/report.html``: all of the first one, the others beside it. ``places`` are run
+    """The page of ``runs`` as ``out/report.html``: the first one in full, the others in comparison. ``places`` are run
     folders."""
     name, wings = next(iter(runs.items()))
     run = Run(places[name])
@@ -60,7 +60,7 @@ def write_page(runs: Mapping[str, Wings], places: Mapping[str, Path], out: Path)
 
 
 def _figures(wings: Wings, drawings: Path) -> list[tuple[Path, str]]:
-    """K_I/σ against length beside the closed forms, and the load against length."""
+    """K_I/σ against length with the closed forms, and the load against length."""
     long = wings.wing > SHORTEST
     lengths = wings.wing[long] / published.HALF_LENGTH
     if len(lengths) < 2:

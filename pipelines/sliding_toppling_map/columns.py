@@ -1,4 +1,4 @@
-"""Columns on an incline, from squat to slender, from slippery to rough: what each does when it is let go."""
+"""Columns on an incline, from squat to slender, from smooth to rough: the motion of each when it is released."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from geomech.reference.blocks.block_on_incline import MODES
 
 INCLINE = np.radians(30.0)
 GRAVITY = 9.81
-#: Stiff, so that elastic shortening is small beside the first motion; ν = 0, so that the base does not widen.
+#: Stiff, so that elastic shortening is small compared with the first motion; ν = 0, so that the base does not widen.
 ROCK = Material("rock", youngs_modulus=1e13, poissons_ratio=0.0, density=2600.0)
 WEIGHT = Loads(gravity=History.constant([0.0, -GRAVITY]))
 SETTINGS = DdaSettings(dynamic_factor=1.0, max_displacement_ratio=1.0)
 STEP = 0.005  # s: one step, in which columns tilt by 1e-4 at most
-#: What starts more slowly than this stays. It moves boundaries by a hundredth of a degree.
+#: Threshold of motion; it shifts boundaries by a hundredth of a degree.
 LEAST = 2e-4 * GRAVITY
 
 
@@ -57,7 +57,7 @@ def slides_below(slenderness: float) -> float:
 
 
 def topples_above(slenderness: float) -> float:
-    """The friction angle above which a column that slides turns over too; for δ < α."""
+    """The friction angle above which a column that slides also topples; for δ < α."""
     return boundary(lambda friction: start(slenderness, friction)[1] <= LEAST, np.radians(0.2), np.radians(60))
 
 

@@ -1,4 +1,4 @@
-"""The map of sliding and toppling beside the boundaries of statics and dynamics."""
+"""The map of sliding and toppling, compared with the boundaries by statics and dynamics."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from geomech.reference.blocks.block_on_incline import MODES, failure_mode, toe_h
 
 COLOURS = dict(zip(MODES, ("#8aa4a0", "#d9a441", "#c8553d", "#8d6a9f")))
 
-#: The threshold of motion, 2e-4 g, and elastic give: 0.01° each.
+#: The threshold of motion, 2e-4 g, and elastic compliance: 0.01° each.
 BOUNDARY_TOLERANCE_DEG = 0.02
 
 LIMITS = """\
@@ -28,8 +28,7 @@ def expected(kind: str, angle: float, incline: float) -> float:
 
 
 def check(incline: float, grid: list[tuple[float, float, str]], found: dict[str, np.ndarray]) -> None:
-    """AssertionError where a column of the ``grid`` (δ, φ, mode) does what the map does not say, or a boundary lies
-    off."""
+    """AssertionError if the motion of a column of the ``grid`` (δ, φ, mode) differs from the map, or a boundary is off."""
     for slenderness, friction, mode in grid:
         assert mode == failure_mode(slenderness, friction, incline), (
             f"δ = {np.degrees(slenderness):.1f}°, φ = {np.degrees(friction):.1f}°: {mode}"
@@ -39,7 +38,7 @@ def check(incline: float, grid: list[tuple[float, float, str]], found: dict[str,
 
 
 def report(incline: float, found: dict[str, np.ndarray]) -> str:
-    """``found``: kind → (n, 2) rad, the angle at which a boundary was sought and where it lies."""
+    """``found``: kind → (n, 2) rad, the angle at which a boundary was searched for and its location."""
     rows = ["boundary                at        found     should be       off   (degrees)"]
     for kind, table in found.items():
         for at, where in np.degrees(table):
@@ -55,7 +54,7 @@ def worst(incline: float, found: dict[str, np.ndarray]) -> float:
 
 
 def draw(path: Path, incline: float, grid: list[tuple[float, float, str]], found: dict[str, np.ndarray]) -> None:
-    """``grid``: (δ, φ, mode) of columns that were let go."""
+    """``grid``: (δ, φ, mode) of columns that were released."""
     from matplotlib.colors import ListedColormap
     from matplotlib.figure import Figure
 

@@ -1,4 +1,4 @@
-"""Does a column on an incline stand, slide, topple, or both? The whole map, compared with Yagoda-Biran & Hatzor (2013).
+"""Static, sliding or toppling columns on an incline: the whole map, compared with Yagoda-Biran & Hatzor (2013).
 
 `geomech run pipelines/sliding_toppling_map` calls `main`; copy the folder to make a study of your own.
 """
@@ -20,13 +20,13 @@ def main(folder: Path, out: Path, overrides=(), variants=(), quiet: bool = False
     if overrides or variants:
         raise ValueError("this study has no scene to override and no variants: change run.py and columns.py")
     grid = [(delta, phi, mode(delta, phi)) for delta in SLENDERNESS for phi in FRICTION]
-    sought = {
+    searches = {
         "slides": (slides_below, (4, 8, 12, 16, 20, 24, 28, 36, 44, 52)),
         "slides and topples": (topples_above, (4, 8, 12, 16, 20, 24, 28)),
         "topples": (topples_below, (36, 44, 52)),
     }
     found = {
-        kind: np.array([(at, search(at)) for at in np.radians(angles)]) for kind, (search, angles) in sought.items()
+        kind: np.array([(at, search(at)) for at in np.radians(angles)]) for kind, (search, angles) in searches.items()
     }
     text = report(INCLINE, found)
     Path(out).mkdir(parents=True, exist_ok=True)

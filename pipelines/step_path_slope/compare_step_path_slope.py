@@ -1,4 +1,4 @@
-"""The step path and its loads, beside the crack solver alone and what is published of en-echelon joints."""
+"""The step path and its loads, compared with the crack solver alone and with publications on en-echelon joints."""
 
 from __future__ import annotations
 
@@ -100,7 +100,7 @@ class StepPath:
 
     @property
     def held(self) -> float:
-        """The highest multiple of gravity at which the slope stood."""
+        """The largest multiple of gravity at which the slope was stable."""
         return max(self.multiples.values())
 
     @property
@@ -116,7 +116,8 @@ class StepPath:
 
     @property
     def all_at_once(self) -> float:
-        """Multiple of gravity at which all bridges would tear with the rock's strength (Einstein et al. 1983)."""
+        """Multiple of gravity at which all bridges would fail together by the tensile strength of the rock (Einstein et
+        al. 1983)."""
         strength = published.STRENGTH_OVER_TOUGHNESS * self.rock.k_ic
         return published.high_angle_bridges_multiplier(
             self.weight, self.dip, self.friction, float(self.steps.sum()), strength
@@ -153,7 +154,8 @@ def check(name: str, seen: StepPath) -> None:
     if not math.isnan(seen.failed):
         assert len(seen.linked) == seen.n_joints - 1, f"{name}: not all joints are part of the path"
         assert seen.started <= seen.held < seen.all_at_once, f"{name}: bridges hold more than all at once"
-        # Where a crack also comes from the next joint both turn to each other, a little past the straight way across.
+        # Where a crack also grows from the next joint, both turn towards each other, a little beyond the straight
+        # connection.
         assert (seen.links > published.KINK).all() and (seen.links < math.radians(95)).all(), (
             f"{name}: links off bounds"
         )

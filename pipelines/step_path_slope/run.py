@@ -1,4 +1,4 @@
-"""Ten en-echelon joints linked to a step path: the loads at which bridges break, and the way that cracks take through
+"""Ten en-echelon joints that link to a step path: the loads at which bridges break, and the paths of the cracks through
 them.
 
 `geomech run pipelines/step_path_slope` calls `main`; copy the folder to make a study of your own.

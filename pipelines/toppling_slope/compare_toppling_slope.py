@@ -1,4 +1,4 @@
-"""The slope at its limit beside the published table, and how it comes down with less friction."""
+"""The slope at its limit, compared with the published table, and its failure with less friction."""
 
 from __future__ import annotations
 
@@ -8,16 +8,17 @@ import numpy as np
 
 from geomech.reference.slopes import toppling_slope as published
 
-# Three steps of lightness, so that they differ in grey too.
+# Three steps of lightness, so that they also differ in grey.
 COLOURS = {"slides": "#f2d16b", "topples": "#a63c28", "stands": "#8aa4a0"}
 INK, BASE = "#2f3136", "#e6e3dc"
 
-#: Of tan φ: elastic columns, E = 100 GPa, take 0.0011 more than rigid ones; bisection to 2e-4, and what creeps past
-#: 2.5 s.
+#: Of tan φ: elastic columns, E = 100 GPa, need 0.0011 more than rigid ones; bisection to 2e-4, and creep after 2.5 s.
 LIMIT_TOLERANCE = 2.5e-3
-#: Coulomb friction leaves the forces open: weakened step by step, the slope goes some thousandths earlier.
+#: Coulomb friction does not determine the forces uniquely: with strength reduced step by step, the slope fails some
+#: thousandths earlier.
 SAFETY_TOLERANCE = 8e-3
-#: kN of 4837 and more. 11 are found, 15 from a rest that was sought in another way; blocks' lean moves as much.
+#: kN, of 4837 and more. Found: 11, and 15 from an equilibrium found in another way; the lean of the blocks has a
+#: similar effect.
 FORCE_TOLERANCE = 25
 
 LIMITS = """\
@@ -34,7 +35,7 @@ What this does and does not say
 def check(
     limit: float, table: tuple[np.ndarray, np.ndarray, np.ndarray], modes: list[str], safety: tuple[float, float]
 ) -> None:
-    """AssertionError where the published example is missed by more than its tolerance; arguments as for `report`."""
+    """AssertionError if the published example is missed by more than its tolerance; arguments as for `report`."""
     assert abs(limit - published.LIMIT_FRICTION) < LIMIT_TOLERANCE, "the least friction is not the published one"
     friction, factor = safety
     assert abs(factor * published.LIMIT_FRICTION / friction - 1) < SAFETY_TOLERANCE, (
@@ -56,8 +57,8 @@ def report(
     modes: list[str],
     safety: tuple[float, float],
 ) -> str:
-    """``table`` = (R, S, P) of the blocks at the limit, ``modes`` of what they do at ``friction``; ``safety``: tan φ of
-    a slope that stands, and its factor of safety."""
+    """``table`` = (R, S, P) of the blocks at the limit, ``modes`` of their motion at ``friction``; ``safety``: tan φ of
+    a stable slope, and its factor of safety."""
     normal, shear, push = table
     rows = [
         f"least friction that holds the slope: tan φ = {limit:.4f}",

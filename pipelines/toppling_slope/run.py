@@ -11,8 +11,8 @@ from compare_toppling_slope import check, draw, report
 from toppling import at_rest, factor_of_safety, forces, last, limit_friction, modes, run, slope, written
 
 FRICTION, SECONDS = 0.65, 3.0  # of the slope that comes down
-#: Where forces are taken, of the limit: everything that must slide does, so that friction leaves no force open, and
-#: inertia is a few ten-thousandths of the weight.
+#: Fraction of the limit at which forces are evaluated: everything that must slide does, so that friction leaves no
+#: force undetermined, and inertia is a few ten-thousandths of the weight.
 MOBILISED = 0.9975
 SAFE = 0.95  # tan φ of a slope whose factor of safety is asked for
 

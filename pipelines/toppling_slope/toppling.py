@@ -1,4 +1,4 @@
-"""The sixteen blocks of Goodman & Bray (1976): moved by the block solver, brought to rest, searched for their limit."""
+"""The sixteen blocks of Goodman & Bray (1976): motion by the block solver, equilibrium, and search for the limit."""
 
 from __future__ import annotations
 
@@ -25,11 +25,11 @@ from geomech.model import (
 from geomech.output import Group, Histories, RunFolder, SceneCopy, Series, Summary, ViewScript
 from geomech.reference.slopes import toppling_slope as published
 
-#: Stiff rock: the published calculation knows rigid blocks, and the columns lean by their elastic give.
+#: Stiff rock: the published calculation has rigid blocks, and the columns lean by elastic deformation.
 ROCK = Material("rock", youngs_modulus=1e11, poissons_ratio=0.25, density=2500.0)
 WEIGHT = Loads(gravity=History.constant([0.0, -10.0]))  # 25 kN/m³, as published
 SETTINGS = DdaSettings(time_step=0.02, dynamic_factor=1.0, max_displacement_ratio=0.01)
-#: Between 2 and 2.5 s a slope that stands moves less than this, m; one with 0.1 % less friction ten times as much.
+#: Between 2 and 2.5 s a stable slope moves less than this, m; one with 0.1 % less friction ten times as much.
 STANDS = 2e-4
 
 
@@ -45,7 +45,7 @@ def slope(friction: float, settings: DdaSettings = SETTINGS) -> dda.BlockSystem:
 
 
 def at_rest() -> State:
-    """Equilibrium under the weight with more friction than is needed: where every run begins."""
+    """Equilibrium under the weight with more friction than necessary: the start of every run."""
     system = slope(1.0)
     return dda.equilibrium(system, State.at_rest(system.blocks), WEIGHT).state
 
@@ -90,7 +90,7 @@ def creep(friction: float, rest: State) -> float:
 
 
 def limit_friction(rest: State, low: float = 0.75, high: float = 0.83) -> float:
-    """tan φ at which the slope just stands, by bisection to 2e-4."""
+    """tan φ at which the slope is just stable, by bisection to 2e-4."""
     while high - low > 2e-4:
         middle = 0.5 * (low + high)
         low, high = (low, middle) if creep(middle, rest) < STANDS else (middle, high)
@@ -124,7 +124,7 @@ def forces(result: dda.StepResult) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 
 def modes(system: dda.BlockSystem, rest: State, state: State) -> list[str]:
-    """What each of blocks 1 … 16 has done since ``rest``: "slides", "topples" or "stands"."""
+    """Motion of each of blocks 1 … 16 since ``rest``: "slides", "topples" or "stands"."""
     moved = state.vertices - rest.vertices
     most = np.hypot(*moved.T).max()
     out = []

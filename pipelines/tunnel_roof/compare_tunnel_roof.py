@@ -1,4 +1,4 @@
-"""The roof block's bridge and fall, beside statics, fracture mechanics and Newton."""
+"""The bridge of the roof block and the block's fall, compared with statics, fracture mechanics and Newton's law."""
 
 from __future__ import annotations
 
@@ -14,19 +14,20 @@ from geomech.reference.openings import roof_block as published
 from geomech.render.curves.drive import line_of
 from geomech.render.curves.plots import figure_of
 
-#: The bridge is a fortieth of the parting, not of half-planes, and the roof above it bends a little: measured 0.1 to
-#: 0.4 %. In motion cracks answer to their block's mean stress, without the mean strain of what bends them open
-#: (`geomech.coupling.crack_compliance.mean_stress_response`), and the roof's contacts share its load by 0.2 % otherwise: 0.3 and 0.6 %.
+#: The bridge is a fortieth of the parting, not one between half-planes, and the roof above it bends a little: measured
+#: 0.1 to 0.4 %. In motion cracks respond to their block's mean stress, without the mean strain due to bending
+#: (`geomech.coupling.crack_compliance.mean_stress_response`), and the distribution of the load over the roof's contacts
+#: differs by 0.2 %: 0.3 and 0.6 %.
 FORCE_TOLERANCE, IN_MOTION = 0.005, 0.008
 #: The bending of the roof shears the bridge (K_II/K_I 0.05 to 0.15): it breaks at up to 1.5 (K_II/K_I)² below the load
-#: at which K_I alone would do it (`maximum tangential stress`), which statics and K_I know nothing of.
+#: for K_I alone (`maximum tangential stress`), which statics and K_I do not include.
 LOAD_TOLERANCE = 0.04
-#: Way of a block in free fall is exact in the time scheme; sliding friction keeps five digits, less the walls' own
-#: springs.
+#: The displacement of a block in free fall is exact in the time scheme; with sliding friction five digits are exact,
+#: except for the walls' springs.
 FALL_TOLERANCE, SLIDE_TOLERANCE = 1e-6, 2e-3
-#: s, when weight and thrust have grown to their full size.
+#: s, time at which weight and thrust reach their full size.
 FULL_WEIGHT = 1.0
-#: Of a block that is held, m: what springs and rock give under a weight of 23 t.
+#: Displacement of a supported block, m: compliance of springs and rock under a weight of 23 t.
 HELD = 1e-4
 
 
@@ -74,7 +75,7 @@ class Watch:
 
     @property
     def force(self) -> float:
-        """Of the bridge, N/m, under full load, that its K_I tells."""
+        """Force in the bridge, N/m, under full load, from its K_I."""
         load, k_i, _ = self.broke
         return k_i * math.sqrt(math.pi * self.bridge) / load
 
@@ -85,12 +86,12 @@ class Watch:
 
     @property
     def breaks(self) -> float:
-        """Part of the full load at which that force gives K_I = K_Ic."""
+        """Fraction of the full load at which that force gives K_I = K_Ic."""
         return self.toughness / published.ligament_factor(self.statics, self.bridge)
 
     @property
     def fell(self) -> bool:
-        """Whether the run went on in real time."""
+        """Whether the run continued in real time."""
         return self.time[-1] > 1.2
 
     @property
@@ -102,7 +103,7 @@ class Watch:
 
     @property
     def acceleration(self) -> float:
-        """m/s², from three places at full weight: nothing of how the fall began is left in it."""
+        """m/s², from three positions under full weight, which is independent of the start of the fall."""
         end = self.time[-1]
         a, b, c = (np.interp(end - back, self.time, self.way) for back in (0.2, 0.1, 0.0))
         return float((c - 2 * b + a) / 0.1**2)
@@ -136,7 +137,7 @@ def report(runs: Mapping[str, Watch]) -> str:
 
 
 def check(runs: Mapping[str, Watch]) -> None:
-    """AssertionError when one of them is missed by more than its tolerance."""
+    """AssertionError if one of them is missed by more than its tolerance."""
     for name, run in runs.items():
         if run.broke is not None:
             assert run.parted, f"{name}: the bridge has not parted"
@@ -154,7 +155,8 @@ def check(runs: Mapping[str, Watch]) -> None:
 
 
 def draw(runs: Mapping[str, Watch], file: Path) -> None:
-    """Ways of the blocks over time, beside Newton's from full weight on, with the place and speed they have then."""
+    """Displacements of the blocks against time, with Newton's from full weight on, for the position and speed at that
+    time."""
     fallen = {name.replace("_", " "): run for name, run in runs.items() if run.fell}
     if not fallen:
         return
@@ -162,7 +164,7 @@ def draw(runs: Mapping[str, Watch], file: Path) -> None:
     axes = figure.subplots()
     for k, (name, run) in enumerate(fallen.items()):
         axes.plot(run.time, -run.way, **line_of(k), lw=2, label=name)
-        # Place and speed at the end of the loading, from the run; the acceleration after it is Newton's.
+        # Position and speed at the end of loading, from the run; the acceleration after it is Newton's.
         time = np.linspace(FULL_WEIGHT, run.time[-1], 6)
         place = np.interp(FULL_WEIGHT, run.time, run.way)
         speed = (np.interp(FULL_WEIGHT + 0.02, run.time, run.way) - place) / 0.02 - run.newton * 0.01

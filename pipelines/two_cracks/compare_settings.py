@@ -1,4 +1,4 @@
-"""What readings, crack faces and settings change: of one step of load, and of whole runs where these were made."""
+"""Effect of readings of the paper, crack faces and settings: on one load step, and on whole runs if these were made."""
 
 from __future__ import annotations
 
@@ -12,24 +12,24 @@ from first_step import FACES, READINGS, SETTINGS, first_step
 from geomech.reference.specimens.two_cracks import PHI_DEG
 from geomech.report.study_part import Part
 
-#: Beginnings of variants' names that are runs of the four specimens with something else → what that is.
+#: Prefixes of the variants that are runs of the four specimens with a change → description of the change.
 FAMILIES = {
     "closed": "closed faces, friction 30°",
     "horizontal": "φ from the horizontal",
     "quadratic": "the paper's elements, ungraded; increments of 2 mm, fixed steps",
     "paper": "the paper's: these and Kelvin's solution",
 }
-#: Beginnings of variants' names that vary one setting → what it is called; the setting stands behind the first "_".
-LADDERS = {
+#: Prefixes of the variants that vary one setting → its name; the value follows the first "_".
+VARIED_SETTINGS = {
     "increment": "increment, mm",
     "approach": "increments to what is left (0: they do not shorten)",
     "order": "order of the elements",
     "step": "time step, s (0: to the events themselves)",
 }
 
-#: Lengths, m, of a wing at which ladders' loads are compared: before any two wings meet.
+#: Lengths, m, of a wing at which loads are compared when one setting is varied: before any two wings meet.
 LENGTHS = (2e-3, 3e-3, 4e-3)
-#: Why the ways of handing forces on differ.
+#: Why the ways of transmitting forces differ.
 SPRINGS = """\
 The platens touch the specimen by springs at its corners. Spread over the face, their forces are the uniform stress of
 the test. Left at the corners, they reach the cracks unevenly. By Kelvin's solution (equations 2-4) about three quarters
@@ -40,12 +40,12 @@ times as large: a guess, no more, at how initiation stresses so low were found."
 
 
 def family(name: str) -> str:
-    """The family or ladder of a variant, by its name; "" of the study's own."""
-    return next((known for known in (*FAMILIES, *LADDERS) if name.startswith(known + "_")), "")
+    """The family or varied setting of a variant, by its name; "" of the study's own."""
+    return next((known for known in (*FAMILIES, *VARIED_SETTINGS) if name.startswith(known + "_")), "")
 
 
 def own(runs: Mapping[str, Watch]) -> dict[str, Watch]:
-    """The runs that are the study itself."""
+    """The runs of the study itself."""
     return {name: run for name, run in runs.items() if not family(name)}
 
 
@@ -54,25 +54,25 @@ def of_family(runs: Mapping[str, Watch], which: str) -> dict[str, Watch]:
 
 
 def first_steps(folder: Path, overrides: Sequence[str]) -> list[Part]:
-    """Initiation loads by reading, by faces and by settings, and what the settings do to K; all from one step of
-    load."""
+    """Initiation loads by reading, by faces and by settings, and the effect of settings on K; all from one load step."""
     found = {}
 
-    def at(phi: int, wishes: tuple) -> object:
-        if (phi, wishes) not in found:
-            found[phi, wishes] = first_step(folder, overrides, phi, wishes)
-        return found[phi, wishes]
+    def at(phi: int, changes: tuple) -> object:
+        if (phi, changes) not in found:
+            found[phi, changes] = first_step(folder, overrides, phi, changes)
+        return found[phi, changes]
 
     def loads(choices: Mapping[str, tuple]) -> list[list]:
         return [
-            [name, *(f"{at(phi, wishes).initiation / MPA:.2f}" for phi in PHI_DEG)] for name, wishes in choices.items()
+            [name, *(f"{at(phi, changes).initiation / MPA:.2f}" for phi in PHI_DEG)]
+            for name, changes in choices.items()
         ]
 
     headers = ["", *(f"φ = {phi}" for phi in PHI_DEG)]
     cases = Part(
         "Both readings of φ, open and closed faces",
         headers,
-        loads(FACES) + loads({name: wishes for name, wishes in READINGS.items() if wishes}),
+        loads(FACES) + loads({name: changes for name, changes in READINGS.items() if changes}),
         [
             (
                 "Initiation, MPa: the load at which the first tip reaches the printed toughness, by maximum tangential "
@@ -82,13 +82,13 @@ def first_steps(folder: Path, overrides: Sequence[str]) -> list[Part]:
         ],
     )
     rows = []
-    for name, wishes in SETTINGS.items():
-        if not wishes:
+    for name, changes in SETTINGS.items():
+        if not changes:
             continue
         row: list = [name]
         for phi in PHI_DEG:
-            exact, k = at(phi, ()), at(phi, wishes).k
-            off = np.abs(k / at(phi, wishes).load - exact.k / exact.load).max(axis=1)
+            exact, k = at(phi, ()), at(phi, changes).k
+            off = np.abs(k / at(phi, changes).load - exact.k / exact.load).max(axis=1)
             row += [f"{100 * part:.2g}" for part in off * exact.load / np.abs(exact.k).max(axis=1)]
         rows.append(row)
     carried = Part(
@@ -114,14 +114,14 @@ def first_steps(folder: Path, overrides: Sequence[str]) -> list[Part]:
 
 
 def whole_runs(runs: Mapping[str, Watch]) -> list[Part]:
-    """The four specimens run to their end by other readings, faces and settings, and one setting varied at a time; []
-    where no such variant was run."""
+    """The four specimens run to their end with other readings, faces and settings, and with one setting varied at a
+    time; [] if no such variant was run."""
     base = by_angle(own(runs))
     rows = []
-    for which, told in {"": "this study's", **FAMILIES}.items():
+    for which, title in {"": "this study's", **FAMILIES}.items():
         for run in (own(runs) if not which else of_family(runs, which)).values():
             if run.last is not None:
-                rows.append([told, run.phi, *_came_to(run, base.get(run.phi))])
+                rows.append([title, run.phi, *_came_to(run, base.get(run.phi))])
     headers = ["run", "φ to crack 1", "initiation, MPa", "coalescence, MPa", "line, °", "largest way apart, mm", "end"]
     found = []
     if any(of_family(runs, which) for which in FAMILIES):
@@ -130,15 +130,16 @@ def whole_runs(runs: Mapping[str, Watch]) -> list[Part]:
             "beyond a tip is left out."
         )
         found.append(Part("Whole runs by other readings, faces and settings", headers, rows, after=[note]))
-    for which, told in LADDERS.items():
+    for which, title in VARIED_SETTINGS.items():
         members = of_family(runs, which)
         if members:
-            found.append(_ladder(which, told, members))
+            found.append(_effect_of_setting(which, title, members))
     return found
 
 
 def _came_to(run: Watch, base: Watch | None) -> list:
-    """Loads, slope of the line (degrees from the horizontal), largest way from ``base``'s path, how it ended."""
+    """Loads, slope of the line (degrees from the horizontal), largest distance from ``base``'s path, and the reason for
+    the end."""
     cells: list = [f"{run.load(kind) / MPA:.2f}" if np.isfinite(run.load(kind)) else None for kind in _KINDS]
     angle = coalescence_angle_deg(run.cracks)
     away = apart(run, base) if base is not None and base is not run else np.nan
@@ -154,8 +155,8 @@ _KINDS = ("initiation", "coalescence")
 
 
 def apart(run: Watch, other: Watch) -> float:
-    """Largest distance, m, of a grown node of ``run`` from the cracks of ``other``, of those that lie beside them: what
-    is beyond a tip is longer, not elsewhere. nan where there are none."""
+    """Largest distance, m, of a grown node of ``run`` from the cracks of ``other``, of those that lie beside them:
+    growth beyond a tip is longer, not elsewhere. nan without any."""
     cracks, against = run.cracks, other.cracks
     nodes = cracks.nodes[np.unique(cracks.segments[cracks.birth_cycle > 0])]
     if not len(nodes):
@@ -175,14 +176,14 @@ def apart(run: Watch, other: Watch) -> float:
     return float(away[~beyond].max()) if not beyond.all() else np.nan
 
 
-def _ladder(which: str, told: str, members: Mapping[str, Watch]) -> Part:
-    """One setting varied: loads, what they differ by from the finest rung of the same φ, and how far paths lie
+def _effect_of_setting(which: str, title: str, members: Mapping[str, Watch]) -> Part:
+    """One setting varied: loads, their difference from the finest value at the same φ, and the distance of the paths
     apart."""
-    rungs: dict[int, dict[float, Watch]] = {}
+    by_value: dict[int, dict[float, Watch]] = {}
     for name, run in members.items():
-        rungs.setdefault(run.phi, {})[float(name.split("_")[1].replace("p", "."))] = run
+        by_value.setdefault(run.phi, {})[float(name.split("_")[1].replace("p", "."))] = run
     rows: list[list] = []
-    for phi, of_value in rungs.items():
+    for phi, of_value in by_value.items():
         # From coarse to fine.
         values = sorted(of_value, reverse=which in ("increment", "step"))
         finest = of_value[values[-1]]
@@ -201,7 +202,7 @@ def _ladder(which: str, told: str, members: Mapping[str, Watch]) -> Part:
             off = 100 * (joined / limit - 1)
             row += [f"{off:+.2f}".replace("-0.00", "0.00") if run is not finest and np.isfinite(off) else None]
             rows.append([*row, f"{run.seconds:.1f}"])
-    headers = ["φ", told, "initiation, MPa", "off, %"]
+    headers = ["φ", title, "initiation, MPa", "off, %"]
     for length in LENGTHS:
         headers += [f"{1e3 * length:.0f} mm long, MPa", "off, %"]
     headers += ["paths apart, mm", "joined, MPa", "off, %", "computed in, s"]
@@ -210,4 +211,4 @@ def _ladder(which: str, told: str, members: Mapping[str, Watch]) -> Part:
         "so long; increments, and how they shorten, run to coalescence, the others to 200 MPa. Paths apart: largest "
         "distance of a grown point from the finest one's cracks."
     )
-    return Part(f"Convergence: {told.split(',')[0].split(' (')[0]}", headers, rows, [note])
+    return Part(f"Convergence: {title.split(',')[0].split(' (')[0]}", headers, rows, [note])

@@ -1,4 +1,4 @@
-"""What the specimens came to, beside what was published about them."""
+"""Results of the specimens, compared with published ones."""
 
 from __future__ import annotations
 
@@ -22,8 +22,8 @@ COALESCENCE_LIMIT_MPA = {0: 218.68, 30: 354.54, 60: 341.0, 90: 227.85}
 @dataclass
 class Watch:
     """Observer that keeps what the comparison needs: the angle between the cracks, the first cycle of growth, the last
-    cycle, the ``cracks`` then (those too that the rock has been cut along), all events, and the curve of strain and
-    load (Pa). φ, degrees, is read off the geometry, so a variant may be called what you like."""
+    cycle, its ``cracks`` (including those along which the rock has been cut), all events, and the curve of strain and
+    load (Pa). φ, degrees, is taken from the geometry, so that variants may have any name."""
 
     phi: int = 0
     first_growth: Cycle | None = None
@@ -65,8 +65,8 @@ class Watch:
         return next((event.load for event in self.events if event.kind == kind), np.nan)
 
     def load_at(self, length: float) -> float:
-        """Load, Pa, that it takes for the wing from crack 1's upper end to grow on from ``length`` m, the largest so
-        far, between increments linearly; nan beyond the last of them."""
+        """Load, Pa, at which the wing from crack 1's upper end grows beyond a length of ``length`` m, the largest so
+        far, linear between increments; nan beyond the last of them."""
         if not self.growth:
             return np.nan
         load, grown = np.array(self.growth).T
@@ -108,14 +108,14 @@ def coalescence_line_deg(run: Watch) -> float:
 
 
 def by_angle(runs: Mapping[str, Watch]) -> dict[int, Watch]:
-    """φ → run, of those that came to a cycle, by their angle."""
+    """φ → run, of those with at least one cycle, by their angle."""
     found = {run.phi: run for run in runs.values() if run.last is not None}
     return dict(sorted(found.items()))
 
 
 def parts(runs: Mapping[str, Watch]) -> list[Part]:
-    """The comparison of the specimens in ``runs`` (a variant's name → what was watched). Parts that the runs cannot
-    fill are left out: a fit at φ = 0 needs the run with φ = 0, and what the paper says of all four needs all four."""
+    """The comparison of the specimens in ``runs`` (a variant's name → its observer). Parts for which runs are missing
+    are left out: a fit at φ = 0 needs the run with φ = 0, and the paper's statements on all four need all four."""
     by_phi = by_angle(runs)
     found = [_loads(by_phi), _lines(by_phi), _intensities(by_phi)]
     if 0 in by_phi and np.isfinite(by_phi[0].load("initiation")):
@@ -220,14 +220,14 @@ def _between(angle: float, other: float) -> float:
 
 
 def _read_exchanged() -> tuple[float, float]:
-    """The experiment's line at φ = 30 with the axes exchanged, as at φ = 90, and its slope's sign turned: slope, degrees,
-    and m beside the specimen's centre."""
+    """The experiment's line at φ = 30 with the axes exchanged, as at φ = 90, and its slope's sign reversed: slope,
+    degrees, and distance from the specimen's centre, m."""
     slope, intercept = published.COALESCENCE_LINE[30]
     return published.line_beside_centre(-slope, intercept, exchanged=True)
 
 
 def _about_30(runs: dict[int, Watch]) -> str:
-    """What the experiment's row at φ = 30 is."""
+    """Remarks on the experiment's row at φ = 30."""
     slope, intercept = published.COALESCENCE_LINE[30]
     angle, missed = published.line_beside_centre(slope, intercept)
     read, passed = _read_exchanged()
@@ -254,20 +254,20 @@ def _intensities(runs: dict[int, Watch]) -> Part:
             continue
         tips, load = run.first_growth.tips, run.first_growth.load
         per_pascal = np.concatenate([tips["k_i"], tips["k_ii"]]) / load
-        theirs = np.array(published.TABLE_4_K_I[phi] + published.TABLE_4_K_II[phi])
+        table_values = np.array(published.TABLE_4_K_I[phi] + published.TABLE_4_K_II[phi])
         if scale is None:
-            scale = np.abs(per_pascal) @ theirs / (per_pascal @ per_pascal)
+            scale = np.abs(per_pascal) @ table_values / (per_pascal @ per_pascal)
             before.append(f"Computed at {scale:.2f} MPa, the load that fits Table 4 best at φ = {phi}.")
         for name, part in (("K_I", slice(0, 4)), ("K_II", slice(4, 8))):
             rows.append(
-                [phi, name, *(f"{k:.3f}" for k in scale * per_pascal[part]), *(f"{k:.3f}" for k in theirs[part])]
+                [phi, name, *(f"{k:.3f}" for k in scale * per_pascal[part]), *(f"{k:.3f}" for k in table_values[part])]
             )
     headers = ["φ", "", *(f"tip {n}" for n in range(1, 5)), *(f"Table 4, {n}" for n in range(1, 5))]
     return Part("K_I and K_II of the first step (Table 4), MPa√m", headers, rows, before)
 
 
 def _disagreements(runs: dict[int, Watch]) -> Part:
-    """What is printed and does not follow from what else is printed; numbers from the runs."""
+    """Printed values that do not follow from the other printed ones; numbers from the runs."""
     first = min(run.load("initiation") for run in runs.values()) / MPA
 
     def listed(kind: str) -> str:

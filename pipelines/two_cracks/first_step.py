@@ -1,5 +1,4 @@
-"""What one step of load already tells of a specimen: K at its tips, and the load at which the first of them begins to
-grow."""
+"""Results of one load step of a specimen: K at its tips, and the load at which the first of them begins to grow."""
 
 from __future__ import annotations
 
@@ -13,7 +12,7 @@ from geomech.pipeline import cycles
 from geomech.reference.specimens import two_cracks as published
 from geomech.scene import load_scene
 
-#: What is compared → what it changes of the scene.
+#: Name of a comparison → its changes of the scene.
 FACES = {
     "open slots": (),
     "closed, no friction": ("cracks.default.aperture=closed",),
@@ -45,10 +44,10 @@ class FirstStep:
     springs: float
 
 
-def first_step(folder: Path, overrides: Sequence[str], phi: int, wishes: Sequence[str] = ()) -> FirstStep:
-    """The specimen with ``phi`` after its first step, with ``wishes`` in place of the scene's settings."""
+def first_step(folder: Path, overrides: Sequence[str], phi: int, changes: Sequence[str] = ()) -> FirstStep:
+    """The specimen with ``phi`` after its first step, with ``changes`` in place of the scene's settings."""
     only = ("run.end_time_s=1.0", "dda.time_step_s=1.0", "growth.enabled=false")
-    scene = load_scene(folder, [*overrides, *only, *wishes], f"phi_{phi}")
+    scene = load_scene(folder, [*overrides, *only, *changes], f"phi_{phi}")
     *_, last = cycles(scene)
     tips = last.tips
     moved = abs(last.monitors["platen"][1]) / abs(last.statistics["worst_penetration"])

@@ -1,5 +1,5 @@
-"""The study on one page: paths, tables and figures of the paper beside what was computed, and what the settings
-carry."""
+"""The study on one page: paths, tables and figures of the paper compared with computed ones, and the effect of
+settings."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
-from compare_settings import FAMILIES, LADDERS, family, first_steps, of_family, own, whole_runs
+from compare_settings import FAMILIES, VARIED_SETTINGS, family, first_steps, of_family, own, whole_runs
 from compare_two_cracks import MPA, Watch, by_angle, parts
 
 from geomech.output import Run
@@ -24,7 +24,7 @@ LOADS = "Loads and strains"
 
 
 def write_page(runs: Mapping[str, Watch], folder: Path, out: Path, overrides: Sequence[str] = ()) -> Path:
-    """The page of ``runs`` (variant → what was watched; their run folders are in ``out``) as ``out/report.html``."""
+    """The page of ``runs`` (variant → its observer; their run folders are in ``out``) as ``out/report.html``."""
     base = own(runs)
     by_phi = by_angle(base or runs)
     page = Page(
@@ -60,8 +60,8 @@ def _fill(page: Page, runs, by_phi, folder: Path, out: Path, overrides, drawings
             [(_paths(own(runs) or runs, drawings / "paths.svg"), "Paths alone, mm: slots black, what grew in colour.")],
             whole=True,
         )
-    told = parts(own(runs) or runs)
-    for part in told:
+    sections = parts(own(runs) or runs)
+    for part in sections:
         if part.title.startswith("Where"):
             continue
         part.add_to(page)
@@ -79,10 +79,10 @@ def _fill(page: Page, runs, by_phi, folder: Path, out: Path, overrides, drawings
             [(crack_paths(panels, drawings / "compared.svg"), "Paths by other readings, faces and settings, mm.")],
             whole=True,
         )
-    ladders = _rungs(runs)
-    if ladders:
+    series = _paths_by_setting(runs)
+    if series:
         page.figures(
-            [(crack_paths(ladders, drawings / "ladders.svg", 3), "Paths with one setting varied, mm.")], whole=True
+            [(crack_paths(series, drawings / "ladders.svg", 3), "Paths with one setting varied, mm.")], whole=True
         )
     if not others:
         page.section("Whole runs by other readings, faces and settings; convergence")
@@ -90,7 +90,7 @@ def _fill(page: Page, runs, by_phi, folder: Path, out: Path, overrides, drawings
             "Not made: they take some minutes. geomech run pipelines/two_cracks --variant all makes them, and adds "
             "them here."
         )
-    for part in told:
+    for part in sections:
         if part.title.startswith("Where"):
             part.add_to(page)
 
@@ -144,8 +144,8 @@ def _figures(by_phi: Mapping[int, Watch], drawings: Path) -> list[tuple[Path, st
             f"Figure 15 with one effective toughness of {fit * published.K_IC / MPA:.2f} MPa√m, fitted to the "
             "experiment's initiation at φ = 0."
         )
-        theirs = {key: span for key, span in ranges.items() if "experiment" in key}
-        made.append((against(stresses(fit), drawings / "f15b.svg", name, "axial stress, MPa", theirs), caption))
+        measured = {key: span for key, span in ranges.items() if "experiment" in key}
+        made.append((against(stresses(fit), drawings / "f15b.svg", name, "axial stress, MPa", measured), caption))
     ratio = {"σ_F/σ_c": curve("coalescence", lambda run: run.load("coalescence") / published.UNIAXIAL_STRENGTH)}
     made.append(
         (
@@ -170,20 +170,20 @@ def _compared_paths(runs: Mapping[str, Watch]) -> dict[str, dict]:
     panels: dict[str, dict] = {}
     if not any(of_family(runs, which) for which in FAMILIES):
         return panels
-    for which, told in {"": "this study's", **FAMILIES}.items():
+    for which, title in {"": "this study's", **FAMILIES}.items():
         members = own(runs) if not which else of_family(runs, which)
         for run in members.values():
             if run.last is not None:
-                panels.setdefault(f"φ = {run.phi}°", {})[told] = run.cracks
+                panels.setdefault(f"φ = {run.phi}°", {})[title] = run.cracks
     return panels
 
 
-def _rungs(runs: Mapping[str, Watch]) -> dict[str, dict]:
-    """Panel per ladder and φ → rung → cracks."""
+def _paths_by_setting(runs: Mapping[str, Watch]) -> dict[str, dict]:
+    """Panel per varied setting and φ → value → cracks."""
     panels: dict[str, dict] = {}
     for name, run in runs.items():
         which = family(name)
-        if which in LADDERS and run.last is not None:
-            rung = f"{LADDERS[which].split(' (')[0]} {name.split('_')[1].replace('p', '.')}"
-            panels.setdefault(f"{LADDERS[which].split(',')[0]}, φ = {run.phi}°", {})[rung] = run.cracks
+        if which in VARIED_SETTINGS and run.last is not None:
+            label = f"{VARIED_SETTINGS[which].split(' (')[0]} {name.split('_')[1].replace('p', '.')}"
+            panels.setdefault(f"{VARIED_SETTINGS[which].split(',')[0]}, φ = {run.phi}°", {})[label] = run.cracks
     return panels

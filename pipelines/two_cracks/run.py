@@ -1,4 +1,4 @@
-"""The two-crack specimens for φ = 0, 30, 60, 90, and the comparison with what was published about them, on one page.
+"""The two-crack specimens for φ = 0, 30, 60, 90, compared with published results, on one page.
 
 `geomech run pipelines/two_cracks` calls `main`; copy the folder to make a study of your own.
 """

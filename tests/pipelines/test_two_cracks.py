@@ -22,7 +22,7 @@ from geomech.scene import load_scene
 
 FOLDER = Path(__file__).parents[2] / "pipelines" / "two_cracks"
 sys.path.insert(0, str(FOLDER))
-from compare_settings import FAMILIES, LADDERS, apart, family
+from compare_settings import FAMILIES, VARIED_SETTINGS, apart, family
 from compare_two_cracks import (
     COALESCENCE_LIMIT_MPA,
     Watch,
@@ -215,7 +215,7 @@ def test_what_the_papers_settings_carry():
 def test_every_variant_is_the_study_or_known_to_vary_it():
     names = load_scene(FOLDER).variants
     assert [name for name in names if not family(name)] == [f"phi_{phi}" for phi in published.PHI_DEG]
-    assert {family(name) for name in names} == {"", *FAMILIES, *LADDERS}
+    assert {family(name) for name in names} == {"", *FAMILIES, *VARIED_SETTINGS}
 
 
 def test_paths_lie_apart_by_what_one_is_moved(specimens):

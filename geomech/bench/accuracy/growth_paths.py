@@ -116,8 +116,8 @@ def reference(increments: int = 80, order: int = 4) -> Run:
     found = []
     for name in ("tips", "load"):
         coarse = getattr(runs[0], name)
-        middle, fine = getattr(runs[1], name)[::2], getattr(runs[2], name)[::4]
-        once, again = 2 * middle - coarse, 2 * fine - middle
+        medium, fine = getattr(runs[1], name)[::2], getattr(runs[2], name)[::4]
+        once, again = 2 * medium - coarse, 2 * fine - medium
         found.append((4 * again - once) / 3)
     return Run(*found, runs[-1].unknowns, sum(run.seconds for run in runs))
 

@@ -125,12 +125,14 @@ def cracked_wall(n: int, n_cracked: int) -> Problem:
     blocks = wall(n)
     cracked = np.linspace(1, blocks.n_blocks - 1, n_cracked).astype(int)
     reach = np.array([0.07, 0.07])
-    middles = [blocks.area_moments(b)[1] for b in cracked.tolist()]
+    centroids = [blocks.area_moments(b)[1] for b in cracked.tolist()]
     return Problem(
         title="a wall with cracked bricks",
         blocks=blocks,
         cracks=Cracks.from_polylines(
-            [np.array([middle - reach, middle + reach]) for middle in middles], block=cracked.tolist(), aperture=np.inf
+            [np.array([centroid - reach, centroid + reach]) for centroid in centroids],
+            block=cracked.tolist(),
+            aperture=np.inf,
         ),
         materials=(replace(ROCK, k_ic=1e12),),
         joints=(JOINT,),

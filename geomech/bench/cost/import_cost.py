@@ -73,8 +73,8 @@ def table(commands: Mapping[str, Sequence[str]]) -> list[str]:
             out = (["--quiet"] * (arguments[0] == "run") + ["--out", last]) if last else []
             found = loaded([*(f"{scratch}/run" if part == RUN else part for part in arguments), *out])
             layers = sorted(found.seconds.items(), key=lambda of: -of[1])
-            told = "  ".join(f"{name} {1e3 * spent:.0f}" for name, spent in layers if spent > 1e-3)
-            lines.append(f"  {label:<30}{1e3 * sum(found.seconds.values()):6.0f} in {found.modules} modules: {told}")
+            text = "  ".join(f"{name} {1e3 * spent:.0f}" for name, spent in layers if spent > 1e-3)
+            lines.append(f"  {label:<30}{1e3 * sum(found.seconds.values()):6.0f} in {found.modules} modules: {text}")
     return lines
 
 
@@ -123,6 +123,6 @@ def kernels(scenes: Mapping[str, Sequence[str]], environment: Mapping[str, str])
                 command = [sys.executable, "-m", "geomech", *arguments, "--quiet", "--out", f"{cache}/run_{k}"]
                 spent.append(seconds(command, own))
             counts = compiled(Path(cache))
-        told = ", ".join(f"{name} {count}" for name, count in counts.items()) or "none"
-        lines.append(f"  {label:<30}{spent[0]:6.1f} s {spent[1]:6.1f} s   {told}")
+        text = ", ".join(f"{name} {count}" for name, count in counts.items()) or "none"
+        lines.append(f"  {label:<30}{spent[0]:6.1f} s {spent[1]:6.1f} s   {text}")
     return lines

@@ -84,13 +84,13 @@ def _elements(spread: float, kind: int, order: int) -> ElementSet:
     if math.isinf(spread):
         n, size = 200, 0.9 * math.pi / 200
         angle = np.linspace(0, 2 * math.pi, n, endpoint=False)
-        middle, turn = np.column_stack([np.cos(angle), np.sin(angle)]), angle + 0.5 * math.pi
+        midpoint, turn = np.column_stack([np.cos(angle), np.sin(angle)]), angle + 0.5 * math.pi
     else:
         rng = np.random.default_rng(2)
         n, size = 60, 0.3
-        middle, turn = spread * rng.random((n, 2)), 2 * math.pi * rng.random(n)
+        midpoint, turn = spread * rng.random((n, 2)), 2 * math.pi * rng.random(n)
     half = size * np.column_stack([np.cos(turn), np.sin(turn)])
-    return ElementSet(middle - half, middle + half, np.full(n, kind), np.arange(n), order, "chebyshev")
+    return ElementSet(midpoint - half, midpoint + half, np.full(n, kind), np.arange(n), order, "chebyshev")
 
 
 def _below(elements: ElementSet) -> ElementSet:

@@ -47,9 +47,9 @@ def stress_intensity(problem: CrackProblem, n_crack: int, n_side: int) -> tuple[
     right = problem.traction(0.5 * (start + end), elements.tangent, np.arange(n) < n_boundary).ravel()
     if n_boundary:
         # Translation of the whole outline is free of stress (rotation nearly so): three directions are deflated.
-        middle = 0.5 * (start + end)[:n_boundary]
+        midpoint = 0.5 * (start + end)[:n_boundary]
         t, m = elements.tangent[:n_boundary], elements.normal[:n_boundary]
-        arm = (middle - middle.mean(axis=0)) / np.ptp(middle)
+        arm = (midpoint - midpoint.mean(axis=0)) / np.ptp(midpoint)
         rigid = np.zeros((2 * n, 3))
         for k, motion in enumerate(
             (

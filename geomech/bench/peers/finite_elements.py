@@ -95,7 +95,7 @@ def _straight(
 
 def _window(problem: CrackProblem) -> Callable[[int], tuple[np.ndarray, int, float]]:
     every = np.concatenate(problem.polylines)
-    middle, half = 0.5 * (every.min(axis=0) + every.max(axis=0)), 0.5 * np.ptp(every, axis=0).max()
+    centre, half = 0.5 * (every.min(axis=0) + every.max(axis=0)), 0.5 * np.ptp(every, axis=0).max()
     mu, nu = ROCK.shear_modulus, ROCK.effective_poissons_ratio
     if len(problem.polylines) == 1:
         size = 2.5 * half
@@ -107,7 +107,7 @@ def _window(problem: CrackProblem) -> Callable[[int], tuple[np.ndarray, int, flo
 
         size = half + 0.5 * np.hypot(*np.diff(problem.polylines[0], axis=0)[0])
         rim = problem.solve(DdmSettings(order=8, elements_per_crack=4, grading_layers=6)).displacement
-    return lambda refinement: _straight(problem, rectangle(size, size) + middle, refinement, rim)
+    return lambda refinement: _straight(problem, rectangle(size, size) + centre, refinement, rim)
 
 
 def _arc(refinement: int, disc: float = 0.5) -> tuple[np.ndarray, int, float]:

@@ -51,14 +51,14 @@ class Plate:
         flat = MeshTri(np.ascontiguousarray(drawn.points.T), np.ascontiguousarray(drawn.triangles.T.astype(np.int64)))
         mesh = MeshTri2.from_mesh(flat)
         # Before the mapping, to find the sides of the outline again.
-        self.straight, places, middles = mesh.doflocs, mesh.doflocs.copy(), mesh.dofs.facet_dofs[0]
+        self.straight, places, midside_nodes = mesh.doflocs, mesh.doflocs.copy(), mesh.dofs.facet_dofs[0]
         if warp is not None:
             places = np.ascontiguousarray(warp(places.T).T)
         for tip in cracks.nodes[cracks.tips]:
             node = int(np.argmin(np.hypot(*(drawn.points - tip).T)))
             for ends in (mesh.facets, mesh.facets[::-1]):
                 at = np.flatnonzero(ends[0] == node)
-                places[:, middles[at]] = 0.75 * places[:, ends[0, at]] + 0.25 * places[:, ends[1, at]]
+                places[:, midside_nodes[at]] = 0.75 * places[:, ends[0, at]] + 0.25 * places[:, ends[1, at]]
         self.mesh = MeshTri2(places, mesh.t)
         self.outline, self.curved = outline, warp is not None
         self.basis = Basis(self.mesh, ElementVector(ElementTriP2()), intorder=ORDER)

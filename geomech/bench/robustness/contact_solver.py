@@ -201,7 +201,7 @@ def counted(problem: Problem, solver: ContactSolver, seconds: float = LIMIT) -> 
     """Cost of ``problem`` with the settings ``solver``, within ``seconds`` processor seconds."""
     count, log = Count(), logging.getLogger("geomech")
 
-    def run(_heard) -> Iterator[None]:
+    def run(_messages) -> Iterator[None]:
         problem.run(solver)
         yield
 

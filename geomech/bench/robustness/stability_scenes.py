@@ -216,10 +216,10 @@ def sliver(aspect: float, wedge: float) -> Outcome:
     h = 1.0 / aspect
     if wedge:
         # Two needles point to point make a level layer.
-        middle = [np.array([[0, 0], [1, 0], [1, h]], dtype=float), np.array([[0, 0], [1, h], [0, h]], dtype=float)]
+        between = [np.array([[0, 0], [1, 0], [1, h]], dtype=float), np.array([[0, 0], [1, h], [0, h]], dtype=float)]
     else:
-        middle = [rectangle(0, 0, 1, h)]
-    polygons = [rectangle(-1, -1, 2, 0), *middle, rectangle(0, h, 1, 1 + h)]
+        between = [rectangle(0, 0, 1, h)]
+    polygons = [rectangle(-1, -1, 2, 0), *between, rectangle(0, h, 1, 1 + h)]
     system = _system(polygons, [True] + [False] * (len(polygons) - 1), 40.0)
     total, watch = _carried(system)
     return watch.outcome(_weights_off(system, total), h)
@@ -283,6 +283,6 @@ def debris(seconds: float, count: float) -> Outcome:
     state.velocity[3:, 2] = rng.uniform(-10, 10, int(count))
     watch = _Watch(system)
     end = watch.run(state, WEIGHT, seconds, 5e-3)
-    middle = system.blocks.mean_vertices(end.vertices)[3:]
-    lost = float(np.mean((middle[:, 1] < 0) | (middle[:, 0] < 0) | (middle[:, 0] > width)))
+    centres = system.blocks.mean_vertices(end.vertices)[3:]
+    lost = float(np.mean((centres[:, 1] < 0) | (centres[:, 0] < 0) | (centres[:, 0] > width)))
     return watch.outcome(max(lost, watch.gain))

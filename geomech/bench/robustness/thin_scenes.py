@@ -98,8 +98,8 @@ def _outside(x0: float, y0: float, x1: float, y1: float, first: int) -> Callable
     """Fraction of the blocks from ``first`` on whose centres are outside a box."""
 
     def out(vertices: np.ndarray, blocks: Blocks) -> float:
-        middle = blocks.mean_vertices(vertices)[first:]
-        return float(np.mean((middle < [x0, y0]).any(axis=1) | (middle > [x1, y1]).any(axis=1)))
+        centre = blocks.mean_vertices(vertices)[first:]
+        return float(np.mean((centre < [x0, y0]).any(axis=1) | (centre > [x1, y1]).any(axis=1)))
 
     return out
 
@@ -187,8 +187,8 @@ def sticks(ratio: float, wall: float, speed: float) -> Outcome:
         state.velocity[1:, 1] = -speed
 
     def out(vertices: np.ndarray, blocks: Blocks) -> float:
-        middle = blocks.mean_vertices(vertices)[1:]
-        return float(np.mean((middle[:, 1] < 0.0) & (np.abs(middle[:, 0]) < 1.0)))
+        centre = blocks.mean_vertices(vertices)[1:]
+        return float(np.mean((centre[:, 1] < 0.0) & (np.abs(centre[:, 0]) < 1.0)))
 
     return _run(
         polygons, [True] + 8 * [False], wall, _Steps(1.0 / max(speed, 1.0), 0.01, ratio), moving=moving, out=out
@@ -202,8 +202,8 @@ def box_of_debris(ratio: float, wall: float, speed: float) -> Outcome:
     polygons.append([loop + [0.3, 1.05 + wall] for loop in _ring(0.0, 0.0, 1.0 + wall, wall)])
     for k in range(12):
         angle = np.sort(2 * math.pi * (np.arange(5) + 0.6 * rng.random(5)) / 5)
-        middle = np.array([-0.45 + 0.5 * (k % 4), 0.35 + 0.5 * (k // 4)])
-        polygons.append(middle + 0.22 * np.column_stack([np.cos(angle), np.sin(angle)]))
+        centre = np.array([-0.45 + 0.5 * (k % 4), 0.35 + 0.5 * (k // 4)])
+        polygons.append(centre + 0.22 * np.column_stack([np.cos(angle), np.sin(angle)]))
 
     def moving(state: State) -> None:
         state.velocity[1:, 1] = -speed

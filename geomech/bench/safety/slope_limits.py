@@ -87,9 +87,9 @@ def loads_on_blocks(problem: Problem) -> np.ndarray:
     """(n_blocks, 3) force x, y and moment about the origin of weight and water at the scene's end."""
     blocks, loads, time = problem.blocks, problem.loads, problem.run.end_time
     density = np.array([material.density for material in problem.materials])[blocks.material]
-    mass, middle = density * blocks.areas(), _centroids(blocks)
+    mass, mid = density * blocks.areas(), _centroids(blocks)
     force = mass[:, None] * np.asarray(loads.gravity.at(time))
-    out = np.column_stack([force, _cross(middle, force)])
+    out = np.column_stack([force, _cross(mid, force)])
     if loads.water is not None:
         _add_water(out, blocks, loads.water)
     return out
@@ -136,8 +136,8 @@ def admissible_factor(problem: Problem, open_faces: Collection[str] = (), tolera
             return math.inf
         low, high = high, 2.0 * high
     while high > low * (1 + tolerance):
-        middle = math.sqrt(low * high)
-        low, high = (middle, high) if programme.balances(middle) else (low, middle)
+        mid = math.sqrt(low * high)
+        low, high = (mid, high) if programme.balances(mid) else (low, mid)
     return math.sqrt(low * high)
 
 
@@ -310,7 +310,7 @@ def _root(surplus: Callable[[float], float]) -> float:
         if values[k] * values[k + 1] <= 0:
             high, low, at_low = float(trials[k]), float(trials[k + 1]), values[k + 1]
             while high - low > 1e-12 * high:
-                middle = 0.5 * (low + high)
-                low, high = (middle, high) if surplus(middle) * at_low > 0 else (low, middle)
+                mid = 0.5 * (low + high)
+                low, high = (mid, high) if surplus(mid) * at_low > 0 else (low, mid)
             return 0.5 * (low + high)
     return math.inf

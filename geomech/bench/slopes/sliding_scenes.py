@@ -141,11 +141,11 @@ def slab(slope: Slope, problem: Problem) -> Slab | None:
     above = blocks.vertices @ normal - lowest
     least = np.minimum.reduceat(above, blocks.vertex_start[:-1])
     most = np.maximum.reduceat(above, blocks.vertex_start[:-1])
-    middle = np.array([blocks.area_moments(b)[1] for b in range(blocks.n_blocks)])
+    centroid = np.array([blocks.area_moments(b)[1] for b in range(blocks.n_blocks)])
     top = np.maximum.reduceat(blocks.vertices[:, 1], blocks.vertex_start[:-1])
     free = ~np.asarray(blocks.fixed, bool)
     # The same plane continues below the bench, where nothing daylights: that part lies below the toe.
-    over = free & (middle @ normal > lowest) & (middle[:, 1] > TOE[1])
+    over = free & (centroid @ normal > lowest) & (centroid[:, 1] > TOE[1])
     crossed = free & (least < -_ON_BED) & (most > _ON_BED) & (top > TOE[1] + _ON_BED)
     density = np.array([material.density for material in problem.materials])[blocks.material]
     mass = float((density * blocks.areas())[over].sum())

@@ -397,9 +397,9 @@ def table(every: Sequence[Invariance]) -> Measured:
         )
     counts = Counter(each.verdict for each in every)
     lines += ["", f"{len(every)} slopes: " + "  ".join(f"{counts[verdict]} {verdict}" for verdict in VERDICTS)]
-    unsure = sum(each.verdict == WRONG and each.scatters_under_noise for each in every)
+    also_scattered = sum(each.verdict == WRONG and each.scatters_under_noise for each in every)
     lines.append(
-        f"{unsure} of the wrong ones are not the same under noise either: `geomech run --repeat noise` says so"
+        f"{also_scattered} of the wrong ones are not the same under noise either: `geomech run --repeat noise` says so"
     )
     lines.append("what must not change, worst of the slopes that are right, of all, beyond the bound in, and the bound")
     for name, each in BOUNDS.items():

@@ -120,5 +120,5 @@ def _seeds(options: argparse.Namespace) -> range:
         raise BadInput("--seeds belongs to safety, slopes and sliding: geomech bench slopes --seeds 0-299")
     first, _, last = options.seeds.partition("-")
     if not (first.isdecimal() and (last or first).isdecimal() and int(first) <= int(last or first)):
-        raise BadInput(f"--seeds takes two numbers that ascend, as 0-299, not {options.seeds!r}")
+        raise BadInput(f"--seeds takes two ascending numbers, such as 0-299, not {options.seeds!r}")
     return range(int(first), int(last or first) + 1)

@@ -37,7 +37,7 @@ def declare(verbs: Verbs) -> None:
     moment.add_argument("--time", type=float, metavar="S", help="draw this time, s")
     render.add_argument("--range", type=float, nargs=2, metavar=("LOW", "HIGH"), help="span of the colours, SI units")
     render.add_argument("--scale", type=float, metavar="X", help="factor on displacements; 1 is true to scale")
-    render.add_argument("--size", metavar="WxH", help="pixels, as 1600 or 1600x900")
+    render.add_argument("--size", metavar="WxH", help="pixels, such as 1600 or 1600x900")
     render.add_argument("--width", type=int, metavar="PX", help="width of the pictures")
     render.add_argument("--compression-positive", action="store_true", help="stresses with compression positive")
     render.add_argument("--format", choices=("png", "pdf", "svg"), help="format of a field's picture (default png)")
@@ -66,7 +66,9 @@ def _size(options: argparse.Namespace) -> tuple[int | None, int | None]:
     if options.size is not None:
         parts = options.size.lower().split("x")
         if len(parts) > 2 or not all(part.isdigit() for part in parts):
-            raise BadInput(f"--size is a width, as 1600, or width x height, as 1600x900; got {options.size!r}")
+            raise BadInput(
+                f"--size is a width, such as 1600, or width x height, such as 1600x900; got {options.size!r}"
+            )
         width, height = int(parts[0]), int(parts[1]) if len(parts) == 2 else None
     for pixels, what in ((width, "width"), (height, "height")):
         if pixels is not None and pixels < LEAST_WIDTH:

@@ -32,7 +32,7 @@ def declare(verbs: Verbs) -> None:
     safety.add_argument(
         "--divide", nargs="+", action="extend", metavar="STRENGTH=X",
         help="partial factors of a design code on cohesion, friction (tan φ) and tension (tensile strength) of all "
-             "joints, as cohesion=1.25: applied first, the factor is in addition to them",
+             "joints, such as cohesion=1.25: applied first, the factor is in addition to them",
     )  # fmt: skip
     safety.add_argument(
         "--tolerance", type=float, default=2e-3, metavar="X", help="relative width of the bracket (2e-3)"

@@ -33,7 +33,7 @@ def declare(verbs: Verbs) -> None:
              "triangular(20,30,40), beta(0,1,2,5), exponential(0.08,0,0.16); normal(35,5,15,60) is cut off "
              "(may be repeated)",
     )  # fmt: skip
-    made.add_argument("--seeds", metavar="FIRST-LAST", help="joint seeds, one run each, as 0-499")
+    made.add_argument("--seeds", metavar="FIRST-LAST", help="joint seeds, one run each, such as 0-499")
     made.add_argument("--runs", type=int, metavar="N", help="number of samples of the random variables")
     made.add_argument(
         "--sampling", choices=("monte-carlo", "latin-hypercube", "sobol", "saltelli"),
@@ -78,7 +78,7 @@ def declare(verbs: Verbs) -> None:
     made.add_argument("--variant", metavar="NAME", help="a variant of the scene")
     made.add_argument("--limit", type=int, metavar="N", help="refuse more runs than this (10 000)")
     made.add_argument("--workers", type=int, metavar="N", help="processes on this machine (default: one per core)")
-    made.add_argument("--scheduler", metavar="ADDRESS", help="a dask.distributed scheduler, as tcp://host:8786")
+    made.add_argument("--scheduler", metavar="ADDRESS", help="a dask.distributed scheduler, such as tcp://host:8786")
     made.add_argument("--out", type=Path, metavar="DIR", help="folder of the sweep (default outputs/NAME_sweep)")
     made.add_argument("--resume", action="store_true", help="continue the sweep in the folder")
     made.add_argument("--overwrite", action="store_true", help="replace the sweep in the folder")

@@ -243,13 +243,13 @@ def add_edge_force(found, of, edge, px, py, fx, fy):
     if min(place, length - place) < SAME * length:
         add_corner_force(found, of, edge if place < length / 2 else following, fx, fy)
         return couple
-    middle = on_grid(place, length)
-    middle = place if middle <= 0.0 or middle >= length else middle
-    half = min(LONE_SPREAD * length / 2, middle, length - middle)
+    centre = on_grid(place, length)
+    centre = place if centre <= 0.0 or centre >= length else centre
+    half = min(LONE_SPREAD * length / 2, centre, length - centre)
     tx, ty = fx / (2 * half), fy / (2 * half)
     # Tilted, so that the normal component acts at the point rather than at the centre of the piece.
-    tilt = 3 * (place - middle) / half * (ax * ty - ay * tx)
-    low, high = middle - half, middle + half
+    tilt = 3 * (place - centre) / half * (ax * ty - ay * tx)
+    low, high = centre - half, centre + half
     add(
         found, x + low * ax, y + low * ay, x + high * ax, y + high * ay, tx + tilt * ay, ty - tilt * ax,
         tx - tilt * ay, ty + tilt * ax,

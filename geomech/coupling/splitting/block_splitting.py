@@ -190,8 +190,8 @@ def _divide(
         polygons.append(shapely.Polygon(loops[0][0], [loop[0] for loop in loops[1:]]))
 
     # Located by its midpoint, since its ends may be on the boundary of several parts.
-    middles = shapely.points(graph.points[graph.ends].mean(axis=1))
-    apart = np.array([shapely.distance(polygon, middles) for polygon in polygons])
+    midpoints = shapely.points(graph.points[graph.ends].mean(axis=1))
+    apart = np.array([shapely.distance(polygon, midpoints) for polygon in polygons])
     return pieces, np.where(is_wall, WALL, np.where(kept, CRACK, MERGED)), apart.argmin(axis=0)
 
 

@@ -17,9 +17,9 @@ def rotated_mean_stress(solution, loops: list[np.ndarray], angle: float) -> np.n
     triangles = shapely.get_parts(shapely.constrained_delaunay_triangles(polygon))
     corners = np.array([shapely.get_coordinates(t)[:3] for t in triangles])
     for _ in range(4):  # four subdivisions into four triangles each
-        middle = (corners + np.roll(corners, -1, axis=1)) / 2
+        midpoints = (corners + np.roll(corners, -1, axis=1)) / 2
         corners = np.concatenate(
-            [np.stack([corners[:, k], middle[:, k], middle[:, k - 1]], axis=1) for k in range(3)] + [middle]
+            [np.stack([corners[:, k], midpoints[:, k], midpoints[:, k - 1]], axis=1) for k in range(3)] + [midpoints]
         )
     d, e = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
     area = np.abs(d[:, 0] * e[:, 1] - d[:, 1] * e[:, 0])

@@ -141,11 +141,11 @@ def _place(keys, key):
     """Index of ``key`` in the sorted ``keys``, −1 if absent."""
     low, high = 0, keys.shape[0]
     while low < high:
-        middle = (low + high) // 2
-        if keys[middle] < key:
-            low = middle + 1
+        mid = (low + high) // 2
+        if keys[mid] < key:
+            low = mid + 1
         else:
-            high = middle
+            high = mid
     return low if low < keys.shape[0] and keys[low] == key else -1
 
 

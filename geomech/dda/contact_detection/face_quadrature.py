@@ -157,13 +157,13 @@ class FacePoints:
         if (was.part == self.part).all():
             return out
         low, high = was.part.T
-        middle, half = 0.5 * (low + high), 0.5 * (high - low)
+        midpoint, half = 0.5 * (low + high), 0.5 * (high - low)
         on_first, on_second = shear[self.ends].T
         mean, tilt = 0.5 * (on_first + on_second), 0.5 * (on_second - on_first) / self.apart
-        a, b = np.clip((self.part.T - middle) / half, -1.0, 1.0)
+        a, b = np.clip((self.part.T - midpoint) / half, -1.0, 1.0)
         total = mean * (b - a) + tilt * (b**2 - a**2) / 2
         moment = mean * (b**2 - a**2) / 2 + tilt * (b**3 - a**3) / 3
-        first, second = (self.place.T - middle) / half
+        first, second = (self.place.T - midpoint) / half
         on_low = (second * total - moment) / (second - first)
         # A line fitted to a stress that vanishes within the part changes sign beyond.
         one_way = on_first * on_second >= 0

@@ -191,11 +191,11 @@ class Glue:
 
         first, second = faces.places(vertices, start, q)
         begun, acting = normal(start), _face_directions(normal(angle))
-        middle = 0.5 * (midpoint.points(first, owners[0]) + midpoint.points(second, owners[1]))
+        between = 0.5 * (midpoint.points(first, owners[0]) + midpoint.points(second, owners[1]))
         jump, mean = np.zeros((n, 2, 2, max(cells.width, 6))), np.zeros((n, 2, 2, max(cells.width, 6)))
         borne = np.zeros((n, 2))
         for side, (owner, sign) in enumerate(zip(owners, (1.0, -1.0), strict=True)):
-            matrix = midpoint.displacement(middle, owner)
+            matrix = midpoint.displacement(between, owner)
             matrix[..., 2:] /= size[owner, None, None]
             bent = cells.directions(faces.points[side], owner, angle)
             m = bent.shape[2]

@@ -161,8 +161,8 @@ class CurvedJoints:
         """Dilation, m per m of slip along the edge's direction; negative where a contact slides back to its start."""
         t, law = self._table, self.law
         before, after = self._slip, self._slip + plastic
-        middle = 0.5 * (before + after)
-        side = np.sign(np.where(middle != 0, middle, np.where(plastic != 0, plastic, -direction)))
+        mean_shear = 0.5 * (before + after)
+        side = np.sign(np.where(mean_shear != 0, mean_shear, np.where(plastic != 0, plastic, -direction)))
         reach, slope = t.dilation_slip[law], t.dilation[law]
         moved = plastic != 0
         gained = np.minimum(np.abs(after), reach) - np.minimum(np.abs(before), reach)

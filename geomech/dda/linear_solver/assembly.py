@@ -22,7 +22,7 @@ from ..equation_records import (
 )
 from .block_solver import RESIDUAL, BlockSolver
 from .simd import load_six, minus_product, numbers, plus_product, product, spread, store, store_six, zeros
-from .task_pool import add_at_once, await_value, crew
+from .task_pool import add_at_once, await_value, thread_team
 
 #: Number of free blocks up to which a dense factorisation is faster than a sparse one (measured on brick walls).
 DENSE_BLOCKS = 60
@@ -317,7 +317,7 @@ def assemble(
         _fill_rows(0, pattern.n, *rest)
         return
     claimed, done = np.zeros(1, np.int64), np.zeros(1, np.int64)
-    crew().share(_fill_shared, claimed, done, SHARE, *rest)
+    thread_team().share(_fill_shared, claimed, done, SHARE, *rest)
 
 
 @part(fastmath=False, error_model="numpy", nogil=True)

@@ -22,7 +22,7 @@ from ..counters import Work
 from .conjugate_residuals import Directions
 from .multifrontal import Factors
 from .nested_dissection import KEPT, Tree
-from .task_pool import add_at_once, await_value, crew
+from .task_pool import add_at_once, await_value, thread_team
 
 _jit = kept(fastmath=False, error_model="numpy", nogil=True)
 
@@ -103,7 +103,7 @@ def multiply(data: np.ndarray, pointer: np.ndarray, columns: np.ndarray, x: np.n
     if len(pointer) <= SHARED:
         _multiply_rows(0, len(pointer) - 1, *given)
     else:
-        crew().share(_multiply_shared, np.zeros(1, np.int64), np.zeros(1, np.int64), SHARE, *given)
+        thread_team().share(_multiply_shared, np.zeros(1, np.int64), np.zeros(1, np.int64), SHARE, *given)
     return out
 
 

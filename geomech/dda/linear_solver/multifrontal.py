@@ -16,7 +16,7 @@ from ...compiled import kept
 from .blas_threads import blas_threads
 from .front_elimination import eliminate, places, working_space
 from .nested_dissection import Tree, plan
-from .task_pool import add_at_once, await_value, crew
+from .task_pool import add_at_once, await_value, thread_team
 from .triangular_solve import backward, forward
 
 _jit = kept(fastmath=False, error_model="numpy", nogil=True)
@@ -203,5 +203,5 @@ class Factors:
         if len(t.rank) < least:
             work(task, *given)
         else:
-            crew().share(work, task, *given)
+            thread_team().share(work, task, *given)
         return done

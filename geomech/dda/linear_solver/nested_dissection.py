@@ -214,11 +214,11 @@ def _seat(number, front, pivots, reach, boundary):
         return number - pivots[front]
     low, high = reach[front], reach[front + 1]
     while low < high:
-        middle = (low + high) // 2
-        if boundary[middle] < number:
-            low = middle + 1
+        mid = (low + high) // 2
+        if boundary[mid] < number:
+            low = mid + 1
         else:
-            high = middle
+            high = mid
     return pivots[front + 1] - pivots[front] + low - reach[front]
 
 

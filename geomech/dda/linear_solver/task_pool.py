@@ -58,7 +58,7 @@ def await_value(array, index, value):
             _usleep(_SLEEP)
 
 
-class Crew:
+class ThreadTeam:
     """The ``number`` of threads that help the caller's thread."""
 
     def __init__(self, number: int) -> None:
@@ -87,6 +87,6 @@ class Crew:
 
 
 @cache
-def crew() -> Crew:
-    """The crew of this process: one thread per core in addition to the caller's."""
-    return Crew(len(os.sched_getaffinity(0)) - 1)
+def thread_team() -> ThreadTeam:
+    """The thread team of this process: one thread per core in addition to the caller's."""
+    return ThreadTeam(len(os.sched_getaffinity(0)) - 1)

@@ -119,8 +119,8 @@ def stand_off(
 
     one, two = direction(corners.before[v]), direction(corners.after[v])
     half = one + two
-    middle = half / np.maximum(np.hypot(half[:, 0], half[:, 1]), 1e-300)[:, None]
-    cosine = np.einsum("na,na->n", middle, one)
+    bisector = half / np.maximum(np.hypot(half[:, 0], half[:, 1]), 1e-300)[:, None]
+    cosine = np.einsum("na,na->n", bisector, one)
     leans = np.minimum(np.einsum("na,na->n", one, n), np.einsum("na,na->n", two, n))
     # A side parallel to the edge forms a face with it once they touch.
     sharp = (leans > _LEAN) & (cosine > _LEAN)
@@ -128,7 +128,7 @@ def stand_off(
         off = _FAR * corners.size[v]
     else:
         tangent = np.sqrt(np.maximum(0.0, 1.0 - cosine**2)) / np.maximum(cosine, 1e-300)
-        off = corners.rounding[v] * (np.einsum("na,na->n", middle, n) / np.maximum(cosine, 1e-300) - tangent)
+        off = corners.rounding[v] * (np.einsum("na,na->n", bisector, n) / np.maximum(cosine, 1e-300) - tangent)
     out[rows[sharp]] = np.maximum(off[sharp], 0.0)
     return out
 

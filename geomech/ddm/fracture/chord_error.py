@@ -137,8 +137,8 @@ def _halved_load(body: CrackedBody, where, value) -> list[tuple]:
     first = int(parts[:where].sum())
     if parts[where] == 1 or callable(value) or np.ndim(value) == 1:
         return [(first + k, value) for k in range(parts[where])]
-    middle = np.mean(value, axis=0)
-    return [(first, np.array([value[0], middle])), (first + 1, np.array([middle, value[1]]))]
+    mean_value = np.mean(value, axis=0)
+    return [(first, np.array([value[0], mean_value])), (first + 1, np.array([mean_value, value[1]]))]
 
 
 def _supported(body: CrackedBody) -> list:

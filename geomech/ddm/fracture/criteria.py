@@ -237,9 +237,9 @@ def _turning_points(slope: Callable, n_tips: int, grid: np.ndarray) -> tuple[np.
     tip, at = np.nonzero((values[:, :-1] > 0) & (values[:, 1:] <= 0))
     low, high = grid[at], grid[at + 1]
     for _ in range(50):  # halves a bracket of one degree to below 1e-16 rad
-        middle = 0.5 * (low + high)
-        rising = slope(tip, middle) > 0
-        low, high = np.where(rising, middle, low), np.where(rising, high, middle)
+        mid = 0.5 * (low + high)
+        rising = slope(tip, mid) > 0
+        low, high = np.where(rising, mid, low), np.where(rising, high, mid)
     # θ = 0 is often the exact root, and bisection ends next to it.
     return tip, np.where(np.abs(high) < 1e-15, 0.0, high)
 

@@ -204,11 +204,11 @@ def _on_faces(solution: Solution):
     """Both faces of the cracks, at central points only: a new crack at the end of an increment would leave a sliver."""
     c = solution.body.faces
     t = shape_functions.nodes(c.family, c.order)
-    middle = np.flatnonzero(np.abs(t) <= max(0.5, np.abs(t).min()))
-    points = np.tile(c.nodes[:, middle].reshape(-1, 2), (2, 1))
-    inward = np.concatenate([side * np.repeat(c.normal, len(middle), axis=0) for side in (1.0, -1.0)])
-    offset = np.tile(np.repeat(_BESIDE * c.length, len(middle)), 2)[:, None] * inward
-    segment = np.tile(np.repeat(c.source, len(middle)), 2)
+    central = np.flatnonzero(np.abs(t) <= max(0.5, np.abs(t).min()))
+    points = np.tile(c.nodes[:, central].reshape(-1, 2), (2, 1))
+    inward = np.concatenate([side * np.repeat(c.normal, len(central), axis=0) for side in (1.0, -1.0)])
+    offset = np.tile(np.repeat(_BESIDE * c.length, len(central)), 2)[:, None] * inward
+    segment = np.tile(np.repeat(c.source, len(central)), 2)
     return points, inward, segment, lambda which: solution.stress((points + offset)[which])
 
 

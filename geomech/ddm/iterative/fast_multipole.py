@@ -61,7 +61,7 @@ class Tree:
     def over(cls, elements: ElementSet, size: int = LEAF) -> Tree:
         """The tree of ``elements`` with at most ``size`` of them in a leaf."""
         ends = np.stack([elements.start, elements.end])
-        middle = ends.mean(axis=0)
+        midpoint = ends.mean(axis=0)
         order = np.arange(elements.n)
         first, last, child, level, centre, radius = [0], [elements.n], [], [0], [], []
         k = 0
@@ -73,8 +73,8 @@ class Tree:
             radius.append(float(np.hypot(*(ends[:, here] - about).reshape(-1, 2).T).max()))
             if len(here) > size:
                 half = len(here) // 2
-                axis = int(np.argmax(np.ptp(middle[here], axis=0)))
-                order[first[k] : last[k]] = here[np.argpartition(middle[here, axis], half)]
+                axis = int(np.argmax(np.ptp(midpoint[here], axis=0)))
+                order[first[k] : last[k]] = here[np.argpartition(midpoint[here, axis], half)]
                 child.append((len(first), len(first) + 1))
                 level += [level[k] + 1] * 2
                 first += [first[k], first[k] + half]
@@ -199,7 +199,7 @@ class Compressed:
         """(n, 4P, 2(p+1)) real: series of Φ and Ψ about the centre of the element's leaf from its nodal jumps."""
         s, n, tree = self.sources, self.terms, self.source_tree
         c, e = 0.5 * s.length, s.tangent @ np.array([1.0, 1j])
-        middle = 0.5 * (s.start + s.end) @ np.array([1.0, 1j])
+        midpoint = 0.5 * (s.start + s.end) @ np.array([1.0, 1j])
         j = np.arange(n)
         moments = shape_functions.moments()[:, j[:, None] + np.arange(s.per)] * -(j[:, None] + 1.0)
         nodal = np.einsum(
@@ -215,7 +215,7 @@ class Compressed:
         psi = (-0.5 * (j[:, None] + 2.0) * phi - 1j * slip) / (e**2)[:, None, None]
         leaf = _leaf_of(tree)
         centre, radius = tree.centre[leaf], tree.radius[leaf]
-        delta = middle - centre
+        delta = midpoint - centre
         _recentre_outer(phi, psi, -delta, c)
         shift = _outer_shift(delta / radius, c / radius, n)
         out = np.concatenate([shift @ phi, shift @ psi], axis=1)[tree.order]

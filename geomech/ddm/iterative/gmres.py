@@ -146,16 +146,16 @@ class Patches:
         self._elements, self._nu, self._tol = elements, nu, tol
         self._between = self._influence if between is None else between
         tree = Tree.over(elements, PATCH)
-        middle = 0.5 * (elements.start + elements.end) @ np.array([1.0, 1j])
+        midpoint = 0.5 * (elements.start + elements.end) @ np.array([1.0, 1j])
         at = np.argsort(crack, kind="stable")
         first = np.searchsorted(crack[at], np.arange(int(crack.max()) + 2))
         self._patches: list[tuple[np.ndarray, np.ndarray]] = []
         for leaf in tree.leaves:
             own = tree.elements(leaf)
             cut = np.concatenate([at[first[k] : first[k + 1]] for k in np.unique(crack[own])])
-            near = cut[np.abs(middle[cut] - tree.centre[leaf]) <= REACH * tree.radius[leaf]]
+            near = cut[np.abs(midpoint[cut] - tree.centre[leaf]) <= REACH * tree.radius[leaf]]
             if np.isfinite(lengths):
-                away = np.abs(middle[near][:, None] - middle[own]).min(axis=1)
+                away = np.abs(midpoint[near][:, None] - midpoint[own]).min(axis=1)
                 near = near[away <= lengths * elements.length[near]]
             whole = np.union1d(own, near)
             self._patches.append((whole, elements.unknowns(np.sort(own))))

@@ -115,8 +115,8 @@ def approximate(
         if good.all():
             break
         a, b, before = start[~good], end[~good], off[~good]
-        middle = 0.5 * (a + b)
-        start, end = np.concatenate([a, middle]), np.concatenate([middle, b])
+        midpoint = 0.5 * (a + b)
+        start, end = np.concatenate([a, midpoint]), np.concatenate([midpoint, b])
     joined = LineForces.join([*done])
     assert joined is not None
     return joined

@@ -33,13 +33,13 @@ class Anchors:
         self._forces: list[list[tuple[np.ndarray, np.ndarray]]] = []
 
     def add(
-        self, rows: np.ndarray, combinations: np.ndarray, middle: np.ndarray, radius: float, loop: np.ndarray
+        self, rows: np.ndarray, combinations: np.ndarray, centroid: np.ndarray, radius: float, loop: np.ndarray
     ) -> None:
         """Add the ``combinations`` (3, k) of translation in x, in y and rotation of the hole ``loop`` (m, 2), with
-        their ``rows`` (n, k). A unit rotation moves points at ``radius`` from ``middle`` by one."""
+        their ``rows`` (n, k). A unit rotation moves points at ``radius`` from ``centroid`` by one."""
         self.rows = rows if not self.rows.size else np.hstack([self.rows, rows])
         centre, room = _deepest_point(loop)
-        arm = middle - centre
+        arm = centroid - centre
         for x, y, turn in combinations.T:
             # Coefficients of the rigid motion: u(middle) = u(centre) + ω × arm, and ω radius.
             couple = 0.25 * room

@@ -139,10 +139,10 @@ class Holds:
     def __init__(self, boundary: ElementSet, supports: Sequence[Support], placed: np.ndarray, extent: float):
         self.boundary = boundary
         of = np.full(boundary.n, -1)
-        middle = 0.5 * (boundary.start + boundary.end)
+        midpoint = 0.5 * (boundary.start + boundary.end)
         for k, (a, b) in enumerate(placed):
             d = b - a
-            rel = middle - a
+            rel = midpoint - a
             s = rel @ d / (d @ d)
             off = np.abs(rel[:, 0] * d[1] - rel[:, 1] * d[0]) / np.hypot(*d)
             along = np.abs(boundary.tangent @ d) > 0.999 * np.hypot(*d)

@@ -68,8 +68,8 @@ class HalfPlane:
         if not len(points):
             points = np.array([self.point])
         along = self.frame(points)[:, 0]
-        middle, reach = 0.5 * (along.max() + along.min()), extents * (float(np.ptp(points, axis=0).max()) or 1.0)
-        ends = np.array([middle + reach, middle - reach])[:, None] * self.turn[0] + np.asarray(self.point)
+        centre, reach = 0.5 * (along.max() + along.min()), extents * (float(np.ptp(points, axis=0).max()) or 1.0)
+        ends = np.array([centre + reach, centre - reach])[:, None] * self.turn[0] + np.asarray(self.point)
         return ends[None]
 
     def region_above_surface(self, points: np.ndarray) -> np.ndarray:

@@ -253,13 +253,13 @@ def _thin(start, end, length, crowded) -> str:
 
 
 def _halved(start, end, kind, source, cut):
-    middle = 0.5 * (start + end)
+    midpoint = 0.5 * (start + end)
     at = np.repeat(np.arange(len(start)), np.where(cut, 2, 1))
     second = np.r_[False, at[1:] == at[:-1]]
     first = np.r_[second[1:], False]
     new_start, new_end, new_kind = start[at], end[at], kind[at]
-    new_end[first] = middle[at[first]]
-    new_start[second] = middle[at[second]]
+    new_end[first] = midpoint[at[first]]
+    new_start[second] = midpoint[at[second]]
     was = kind[at]
     starts = (was == shape_functions.TIP_START) | (was == shape_functions.TIP_BOTH)
     stops = (was == shape_functions.TIP_END) | (was == shape_functions.TIP_BOTH)

@@ -135,9 +135,9 @@ class BoundarySystem:
             means.append(holds.turned((free.T @ weights).T).T * keep)
             if k and free.shape[1] < 3:
                 blocked = np.linalg.svd(free.T)[2][free.shape[1] :].T
-                _, middle, size = outline_centroid(g.take(np.flatnonzero(loop_of == k)))
+                _, centroid, size = outline_centroid(g.take(np.flatnonzero(loop_of == k)))
                 hole = mesh.edges[mesh.edge_loop == k, 0]
-                anchors.add(motions @ blocked / self.extent, blocked, middle, size, hole)
+                anchors.add(motions @ blocked / self.extent, blocked, centroid, size, hole)
         self.rigid, self.weights = np.hstack(modes), np.concatenate(means)
         self.anchors = anchors if anchors.number else None
         return self.anchors
@@ -195,9 +195,9 @@ def outline_centroid(g: ElementSet) -> tuple[float, np.ndarray, float]:
     """Total length of ``g``, centroid (2,) of its points and their root mean square distance from it."""
     x, ds = g.nodes, g.quadrature
     perimeter = ds.sum()
-    middle = np.einsum("ej,ejc->c", ds, x) / perimeter
-    rel = x - middle
-    return perimeter, middle, float(np.sqrt(np.einsum("ej,ejc,ejc->", ds, rel, rel) / perimeter))
+    centroid = np.einsum("ej,ejc->c", ds, x) / perimeter
+    rel = x - centroid
+    return perimeter, centroid, float(np.sqrt(np.einsum("ej,ejc,ejc->", ds, rel, rel) / perimeter))
 
 
 def rigid_motions(
@@ -212,10 +212,10 @@ def rigid_motions(
     loop_of = edge_loop[g.source] if g.n else np.empty(0, int)
     for k in range(n_loops):
         here = np.flatnonzero(loop_of == k)
-        perimeter, middle, radius = outline_centroid(g.take(here))
+        perimeter, centroid, radius = outline_centroid(g.take(here))
         if about is not None:
-            middle, radius = about
-        rel, ds = g.nodes[here] - middle, g.quadrature[here]
+            centroid, radius = about
+        rel, ds = g.nodes[here] - centroid, g.quadrature[here]
         one, zero = np.ones(ds.shape), np.zeros(ds.shape)
         for m, motion in enumerate(((one, zero), (zero, one), (-rel[..., 1] / radius, rel[..., 0] / radius))):
             vector = np.stack(motion, axis=-1)

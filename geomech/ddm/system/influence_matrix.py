@@ -281,13 +281,13 @@ def project_jumps(unit: np.ndarray, targets: ElementSet, start, end, nu: float, 
     error is confined to the element's surroundings.
     """
     t, n, c, kernel = targets.tangent, targets.normal, 0.5 * targets.length, Kernel(nu, tol, side, True)
-    middle = 0.5 * (targets.start + targets.end)
+    midpoint = 0.5 * (targets.start + targets.end)
     rows = unit.reshape(targets.n, 2, targets.per, *unit.shape[1:])
     clustered, q = _clustered()
     degrees = np.arange(targets.per)
     at_nodes = np.polynomial.legendre.legvander(shape_functions.nodes(targets.family, targets.order), targets.order)
     for m, (a, b) in enumerate(zip(start, end)):
-        local = [np.stack([np.sum((p - middle) * t, axis=1), np.sum((p - middle) * n, axis=1)]) / c for p in (a, b)]
+        local = [np.stack([np.sum((p - midpoint) * t, axis=1), np.sum((p - midpoint) * n, axis=1)]) / c for p in (a, b)]
         line = (np.abs(local[0][1]) * c <= 2 * tol) & (np.abs(local[1][1]) * c <= 2 * tol)
         ends = np.stack([local[0][0], local[1][0]])
         near = np.abs(ends) < 1 - _AT_END
@@ -295,7 +295,7 @@ def project_jumps(unit: np.ndarray, targets: ElementSet, start, end, nu: float, 
             cuts = np.unique(np.concatenate([[-1.0, 1.0], ends[near[:, e], e]]))
             u = np.concatenate([lo + (hi - lo) * clustered for lo, hi in pairwise(cuts)])
             w = np.concatenate([(hi - lo) * q for lo, hi in pairwise(cuts)])
-            points = (middle[e] + c[e] * u[:, None] * t[e])[None]
+            points = (midpoint[e] + c[e] * u[:, None] * t[e])[None]
             at = _Points.of(points, t[e : e + 1])
             values = _line_forces(at, a[None], b[None], unit.shape[3] - 1, kernel, targets.half_plane)
             values = values.reshape(2, len(u), 2, -1)

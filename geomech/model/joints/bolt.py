@@ -173,9 +173,9 @@ def _pieces(blocks: Blocks, a: np.ndarray, b: np.ndarray) -> list[tuple[int, flo
     marks = marks[np.append(True, np.diff(marks) > 1e-9)]
     pieces: list[tuple[int, float, float]] = []
     for s0, s1 in zip(marks[:-1].tolist(), marks[1:].tolist()):
-        middle = a + 0.5 * (s0 + s1) * along
-        for block in _near(blocks, middle):
-            if abs(winding_number(blocks.loops(block), middle)) > 0.5:
+        midpoint = a + 0.5 * (s0 + s1) * along
+        for block in _near(blocks, midpoint):
+            if abs(winding_number(blocks.loops(block), midpoint)) > 0.5:
                 if pieces and pieces[-1][0] == block:
                     pieces[-1] = (block, pieces[-1][1], s1 * length)
                 else:

@@ -57,9 +57,9 @@ class Pace:
         if self._began is None or len(self._seen) < 5 or self._seen[-1][0] - self._began < self.LEAST:
             return math.inf, math.inf
         first, last = self._seen[0], self._seen[-1]
-        middle = min(self._seen, key=lambda seen: abs(seen[0] - 0.5 * (first[0] + last[0])))
+        halfway = min(self._seen, key=lambda seen: abs(seen[0] - 0.5 * (first[0] + last[0])))
         early, late = (
-            (b[1] - a[1]) / (b[0] - a[0]) if b[0] > a[0] else 0.0 for a, b in ((first, middle), (middle, last))
+            (b[1] - a[1]) / (b[0] - a[0]) if b[0] > a[0] else 0.0 for a, b in ((first, halfway), (halfway, last))
         )
         if not 0.0 < early <= self.UNEVEN * late <= self.UNEVEN**2 * early:
             return math.inf, math.inf

@@ -271,8 +271,8 @@ def _placed(
     asymmetric body.
     """
     share = weights / weights.sum()
-    middle = share @ points
-    arm, mean = points - middle, share @ own
+    mean_point = share @ points
+    arm, mean = points - mean_point, share @ own
     moments = arm.T @ (share[:, None] * arm)
     slope = (own - mean).T @ (share[:, None] * arm) @ np.linalg.inv(moments)
     spin = 0.5 * (slope[1, 0] - slope[0, 1])
@@ -281,5 +281,5 @@ def _placed(
     # cos − 1 = −2 sin²(turn/2) keeps the digits of small rotations.
     less = -2 * math.sin(turn / 2) ** 2
     # The body's centre moves with the block's affine motion; around it, the block rotates.
-    shift = (centre_now - centre) + (gradient - np.eye(2)) @ (middle - centre)
+    shift = (centre_now - centre) + (gradient - np.eye(2)) @ (mean_point - centre)
     return shift + arm @ np.array([[less, -s], [s, less]]).T + deforming @ np.array([[c, -s], [s, c]]).T

@@ -216,8 +216,8 @@ def _span(values: np.ndarray | None, column: int | None) -> tuple[float, float]:
         return 0.0, 1.0
     low, high = np.percentile(found, [0.7, 99.3])
     # A uniform field gets a band around its value; otherwise colours would show round-off.
-    middle, half = 0.5 * (low + high), max(0.5 * (high - low), 0.05 * max(abs(low), abs(high)))
-    return (float(middle - half), float(middle + half)) if half > 0 else (0.0, 1.0)
+    centre, half = 0.5 * (low + high), max(0.5 * (high - low), 0.05 * max(abs(low), abs(high)))
+    return (float(centre - half), float(centre + half)) if half > 0 else (0.0, 1.0)
 
 
 def _magnification(last: Mapping[str, Grid]) -> float:

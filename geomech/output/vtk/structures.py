@@ -154,9 +154,9 @@ class WaterLine:
         x = np.unique(np.concatenate([[self._low, self._high], line[0], ends]))
         x = x[(x >= self._low) & (x <= self._high)]
         points = np.stack([x, np.interp(x, *line)], axis=1)
-        middle = 0.5 * (x[1:] + x[:-1])
-        wet = np.zeros(len(middle), int)
+        midpoint = 0.5 * (x[1:] + x[:-1])
+        wet = np.zeros(len(midpoint), int)
         for pond in found:
-            wet[(middle > pond.start) & (middle < pond.end)] = 1
-        n = np.arange(len(middle))
+            wet[(midpoint > pond.start) & (midpoint < pond.end)] = 1
+        n = np.arange(len(midpoint))
         return _lines(points, np.stack([n, n + 1], axis=1), np.zeros_like(points), {"ponded": wet})

@@ -62,11 +62,11 @@ def random_cracks(number: int, seed: int = 7, length: float = 1.0, spacing: floa
         half = 0.5 * length * random.uniform(0.4, 1.0)
         angle = random.uniform(0, math.pi)
         way = half * np.array([math.cos(angle), math.sin(angle)])
-        middle = random.uniform(0, side, 2)
-        line = middle + t * way
+        centre = random.uniform(0, side, 2)
+        line = centre + t * way
         others = (c[0] + (t + 1) / 2 * (c[1] - c[0]) for c in chosen)
         if all(np.hypot(*(line[:, None] - other[None]).T).min() > 0.4 * half for other in others):
-            chosen.append(np.array([middle - way, middle + way]))
+            chosen.append(np.array([centre - way, centre + way]))
     return chosen
 
 
@@ -80,5 +80,5 @@ def cracks_in_cells(number: int, seed: int = 0, spread: float = 6.0) -> list[np.
     turn = random.uniform(0, math.pi, n)
     arm = half[:, None] * np.column_stack([np.cos(turn), np.sin(turn)])
     cell = np.stack(np.meshgrid(np.arange(number), np.arange(number)), axis=-1).reshape(-1, 2) + 0.5
-    middle = cell + random.uniform(-1, 1, (n, 2)) * (0.49 - np.abs(arm))
-    return list(np.stack([middle - arm, middle + arm], axis=1))
+    centre = cell + random.uniform(-1, 1, (n, 2)) * (0.49 - np.abs(arm))
+    return list(np.stack([centre - arm, centre + arm], axis=1))

@@ -74,7 +74,7 @@ def arc_field(
     points = np.asarray(points, dtype=float)
     z = points[:, 0] + 1j * points[:, 1]
     a, b = 1j * np.exp(-1j * half_angle), 1j * np.exp(1j * half_angle)
-    middle, d = 0.5 * (a + b), 2 * tension / (3 - np.cos(half_angle))
+    midpoint, d = 0.5 * (a + b), 2 * tension / (3 - np.cos(half_angle))
     # (z − a)/(z − b) has the same argument along the whole arc: the cut of the root is rotated onto it.
     cut = -(1j - a) / (1j - b)
 
@@ -83,10 +83,10 @@ def arc_field(
 
     x, mirrored = root(z), 1 / np.conj(z)
     phi, omega_mirrored = 0.5 * (d * x + (tension - d) * z), 0.5 * (d * root(mirrored) - (tension - d) * mirrored)
-    big_phi = 0.5 * (d * (z - middle) / x + tension - d)
-    d_big_phi = 0.5 * d * (1 / x - (z - middle) ** 2 / x**3)
+    big_phi = 0.5 * (d * (z - midpoint) / x + tension - d)
+    d_big_phi = 0.5 * d * (1 / x - (z - midpoint) ** 2 / x**3)
     # Ψ = (Φ − zΦ' − conj Ω(1/z̄))/z²;  2μ(u + iv) = κφ − ω(1/z̄) − (z − 1/z̄) conj Φ.
-    big_omega = 0.5 * (d * (mirrored - middle) / root(mirrored) - tension + d)
+    big_omega = 0.5 * (d * (mirrored - midpoint) / root(mirrored) - tension + d)
     big_psi = (big_phi - z * d_big_phi - np.conj(big_omega)) / z**2
     total, deviator = 4 * big_phi.real, 2 * (np.conj(z) * d_big_phi + big_psi)
     stress = np.column_stack([0.5 * (total - deviator.real), 0.5 * (total + deviator.real), 0.5 * deviator.imag])

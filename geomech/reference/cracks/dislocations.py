@@ -76,9 +76,9 @@ def _disc(z, t, a):
     g = e * z
     image = -b * g * (1 + e) + a * s * e + b * t * e**2
     d_image = -b * (e**2 * (1 + e) + g * s * e**2) + a * s**2 * e**2 + 2 * b * t * s * e**3
-    middle = a * s + b * t
-    rest = (image - middle + b * g - z * d_image - b * z) / z**2
-    return phi + image - middle / 2, dphi + d_image, psi + rest
+    weighted = a * s + b * t
+    rest = (image - weighted + b * g - z * d_image - b * z) / z**2
+    return phi + image - weighted / 2, dphi + d_image, psi + rest
 
 
 def stack(period: float):

@@ -19,5 +19,5 @@ def kirsch_stress(points: np.ndarray, remote: np.ndarray, radius: float = 1.0, p
     rr = mean * (1 - k) + along * (1 - 4 * k + 3 * k * k) - pressure * k
     tt = mean * (1 + k) - along * (1 + 3 * k * k) + pressure * k
     rt = across * (1 + 2 * k - 3 * k * k)
-    middle, dev = 0.5 * (rr + tt), 0.5 * (rr - tt)
-    return np.column_stack([middle + dev * c2 - rt * s2, middle - dev * c2 + rt * s2, dev * s2 + rt * c2])
+    isotropic, dev = 0.5 * (rr + tt), 0.5 * (rr - tt)
+    return np.column_stack([isotropic + dev * c2 - rt * s2, isotropic - dev * c2 + rt * s2, dev * s2 + rt * c2])

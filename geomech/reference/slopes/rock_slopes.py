@@ -59,6 +59,6 @@ def two_block_friction(
 
     low, high = passive[1], active[1]
     while high - low > 1e-13:
-        middle = 0.5 * (low + high)
-        low, high = (middle, high) if surplus(middle) > 0 else (low, middle)
+        mid = 0.5 * (low + high)
+        low, high = (mid, high) if surplus(mid) > 0 else (low, mid)
     return 0.5 * (low + high)

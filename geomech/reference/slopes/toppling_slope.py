@@ -86,8 +86,8 @@ def limit_friction() -> float:
     """tan φ at which the toe block needs no support, by bisection of `limit_equilibrium`."""
     low, high = 0.6, 0.95
     while high - low > 1e-12:
-        middle = 0.5 * (low + high)
-        low, high = (middle, high) if limit_equilibrium(middle).thrust[0] > 0 else (low, middle)
+        mid = 0.5 * (low + high)
+        low, high = (mid, high) if limit_equilibrium(mid).thrust[0] > 0 else (low, mid)
     return 0.5 * (low + high)
 
 

@@ -61,15 +61,15 @@ def crack_paths(
     axes = figure.subplots(rows, columns, squeeze=False)
     names = list(dict.fromkeys(name for runs in panels.values() for name in runs))
     for panel, (title, runs) in zip(axes.flat, panels.items()):
-        middle = (points[title].min(axis=0) + points[title].max(axis=0)) / 2
+        centre = (points[title].min(axis=0) + points[title].max(axis=0)) / 2
         if title in outlines:
             panel.fill(*(1e3 * outlines[title]).T, facecolor="#f1efe9", edgecolor="#3b3f46", lw=0.9)
         _draw_runs(panel, runs, names)
         panel.set(
             title=title,
             aspect="equal",
-            xlim=(middle[0] - width / 2, middle[0] + width / 2),
-            ylim=(middle[1] - height / 2, middle[1] + height / 2),
+            xlim=(centre[0] - width / 2, centre[0] + width / 2),
+            ylim=(centre[1] - height / 2, centre[1] + height / 2),
         )
         panel.title.set_fontsize(10)
         panel.tick_params(labelsize=7)

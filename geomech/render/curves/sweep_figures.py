@@ -89,7 +89,7 @@ def draw_convergence(table: np.ndarray, path: Path) -> Path:
 
 def draw_tornado(swings: Sequence[Any], centre: float, label: str, path: Path) -> Path:
     """One bar for each of ``swings`` (name, low, high and their errors), from its mean at low to that at high values of
-    the variable, around ``middle``."""
+    the variable, around ``centre``."""
     figure = _figure(8.6, 0.9 + 0.42 * len(swings))
     axes = figure.subplots()
     for k, each in enumerate(swings):

@@ -100,12 +100,12 @@ class Marks:
             axes.plot(*line.T, color=BOLT, lw=1.7, ls=":" if broken else "-", zorder=8.1, marker="s", ms=2.6)
         labelled: list[np.ndarray] = []
         for k in np.argsort(-np.abs(force), kind="stable"):
-            middle = lines[k].mean(axis=0)
-            near = [other for other in labelled if np.hypot(*(middle - other)) < 0.1 * self.size]
+            midpoint = lines[k].mean(axis=0)
+            near = [other for other in labelled if np.hypot(*(midpoint - other)) < 0.1 * self.size]
             if near or len(labelled) == LABELLED:
                 continue  # labels would overlap
-            labelled.append(middle)
-            axes.annotate(f"{force[k] / 1e3:.3g}".replace("-", "\N{MINUS SIGN}"), middle, xytext=(3, 3), textcoords="offset points",
+            labelled.append(midpoint)
+            axes.annotate(f"{force[k] / 1e3:.3g}".replace("-", "\N{MINUS SIGN}"), midpoint, xytext=(3, 3), textcoords="offset points",
                           fontsize=6.5, color=BOLT, zorder=9, bbox=PAPER)  # fmt: skip
         return [Line2D([], [], color=BOLT, lw=1.7, marker="s", ms=2.6, label="bolts, force in kN/m")]
 

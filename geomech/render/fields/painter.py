@@ -66,8 +66,8 @@ def view(
     start, end = frames.span()
     end = min(end, frames.cycle_time(final_cycle(run)))
     first, final = frames.grid("blocks", start), frames.grid("blocks", end)
-    middle = frames.grid("blocks", 0.5 * (start + end))
-    points = np.concatenate([drawn(grid, scale) for grid in (first, middle, final)])
+    centre = frames.grid("blocks", 0.5 * (start + end))
+    points = np.concatenate([drawn(grid, scale) for grid in (first, centre, final)])
     (x0, y0), (x1, y1) = points.min(axis=0), points.max(axis=0)
     return View(limits([run], what) if span is None else span, (x0, x1, y0, y1), scale, *size)
 
@@ -158,8 +158,8 @@ class FieldPainter:
         # Equal scales in both directions: the shorter one shows more than the model.
         metres = max(wide / across, tall / up)
         for name, k, inches in (("xlim", 0, across), ("ylim", 1, up)):
-            middle = 0.5 * (low[k] + high[k])
-            axes.set(**{name: (middle - 0.5 * metres * inches, middle + 0.5 * metres * inches)})
+            centre = 0.5 * (low[k] + high[k])
+            axes.set(**{name: (centre - 0.5 * metres * inches, centre + 0.5 * metres * inches)})
         axes.tick_params(labelsize=7, colors=SOFT, length=2.5, width=0.6)
         for side, spine in axes.spines.items():
             spine.set_visible(side in ("left", "bottom"))
@@ -305,13 +305,13 @@ class FieldPainter:
         from matplotlib.collections import LineCollection
 
         triangles = grid.cells.reshape(-1, 4)[:, 1:]
-        middle = drawn(grid, self.view.scale)[triangles].mean(axis=1)
+        centre = drawn(grid, self.view.scale)[triangles].mean(axis=1)
         data = grid.cell_data if "stress" in grid.cell_data else None
         stress = np.asarray(
             grid.cell_data["stress"] if data is not None else np.asarray(grid["stress"])[triangles].mean(axis=1)
         )
-        low = middle.min(axis=0)
-        place = np.floor((middle - low) / (self.size / _CROSSES)).astype(int)
+        low = centre.min(axis=0)
+        place = np.floor((centre - low) / (self.size / _CROSSES)).astype(int)
         rows = np.flatnonzero(use)
         _, first = np.unique(place[rows], axis=0, return_index=True)
         rows = rows[first]
@@ -322,7 +322,7 @@ class FieldPainter:
         for value, angle in ((mean + half, turn), (mean - half, turn + 0.5 * np.pi)):
             arm = 0.5 * _CROSS * self.size * np.clip(np.abs(value) / largest, 0, 1.3)[:, None]
             arm = arm * np.stack([np.cos(angle), np.sin(angle)], axis=1)
-            lines = np.stack([middle[rows] - arm, middle[rows] + arm], axis=1)
+            lines = np.stack([centre[rows] - arm, centre[rows] + arm], axis=1)
             colours = np.where(value > 0, "#c1121f", "#15161a")
             axes.add_collection(LineCollection([*lines], colors=colours, linewidths=0.8, zorder=4))
 
@@ -332,7 +332,7 @@ class FieldPainter:
 
         force = np.asarray(grid["force"], float)[:, :2]
         acts = values > 1e-3 * (self.view.limits[1] / self.unit_size)
-        middle = drawn(grid, self.view.scale)[acts]
+        centre = drawn(grid, self.view.scale)[acts]
         share = values[acts] * self.unit_size / (self.view.limits[1] or 1.0)
         arm = (
             0.5
@@ -342,7 +342,7 @@ class FieldPainter:
             * force[acts]
         )
         order = np.argsort(share)
-        lines = LineCollection([*np.stack([middle - arm, middle + arm], axis=1)[order]], array=values[acts][order],
+        lines = LineCollection([*np.stack([centre - arm, centre + arm], axis=1)[order]], array=values[acts][order],
                                linewidths=0.7 + 1.6 * share[order], zorder=4, capstyle="round", **self._style())  # fmt: skip
         return axes.add_collection(lines)
 

@@ -77,8 +77,8 @@ def draw_mechanism(
     size = float(np.ptp(np.concatenate([outlines[b] for b in np.flatnonzero(~blocks.fixed)]), axis=0).max())
     for b, name in enumerate(blocks.names):
         if name in kinds:
-            middle, way = outlines[b].mean(axis=0), _ARROW * size * np.array(kinds[name].displacement)
-            axes.annotate("", middle + way, middle, arrowprops={"arrowstyle": "-|>", "color": INK, "lw": 1.3})
+            centre, way = outlines[b].mean(axis=0), _ARROW * size * np.array(kinds[name].displacement)
+            axes.annotate("", centre + way, centre, arrowprops={"arrowstyle": "-|>", "color": INK, "lw": 1.3})
     # The moving region fills the picture; the base may extend far.
     seen = np.concatenate([outlines[b] for b in np.flatnonzero(~blocks.fixed)])
     near, far = seen.min(axis=0) - 0.35 * size, seen.max(axis=0) + 0.35 * size

@@ -50,8 +50,8 @@ class Walls:
             cracks = run.grid("cracks", number)
             lines = reference(cracks)[cracks.cells.reshape(-1, 3)[:, 1:]]
             # A segment contains several lines: the midpoint of a face decides which of them it is on.
-            middle = new.mean(axis=1, keepdims=True).repeat(2, axis=1)
-            holder = _holder(middle, lines)
+            midpoint = new.mean(axis=1, keepdims=True).repeat(2, axis=1)
+            holder = _holder(midpoint, lines)
             old = np.append(np.asarray(cracks["birth_cycle"]).astype(int), number)
             ends.append(new)
             birth.append(old[holder])

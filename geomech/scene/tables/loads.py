@@ -97,7 +97,9 @@ class ForceTable(Timed):
     """[[loads.forces]]: a force at a point."""
 
     at: Pair | None = Field(None, description="material point it acts on, [x, y], m")
-    point: str | None = Field(None, description='name of the drawn point it acts on, as "load:crane", in place of `at`')
+    point: str | None = Field(
+        None, description='name of the drawn point it acts on, such as "load:crane", in place of `at`'
+    )
     zone: str | None = Field(None, description="zone of that point, where two zones touch")
     follower: bool = Field(False, description="true: it rotates with its block (unset: it keeps its direction)")
     value_n_per_m: Pair | None = Field(None, description="constant force [x, y] per metre of thickness, N/m")
@@ -202,7 +204,7 @@ class WaterTableTable(Table):
         None, description="the water table, [[x, y], …], m, x ascending, level beyond its ends (unset: the drawing's)"
     )
     line: str | None = Field(
-        None, description='name of the drawn line that is the water table, as "water:high" (unset: "water")'
+        None, description='name of the drawn line that is the water table, such as "water:high" (unset: "water")'
     )
     unit_weight_n_per_m3: Positive = Field(9810.0, description="unit weight of water, N/m³")
     dry_edges: Names = Field((), description="names of edges that stay dry")

@@ -33,7 +33,7 @@ class SweepTable(Table):
         (), description="correlated random variables"
     )
     seeds: str | Annotated[tuple[int, ...], Strict(False)] | None = Field(
-        None, description='joint seeds, as "0-499": one run each (unset: the scene\'s own)'
+        None, description='joint seeds, such as "0-499": one run each (unset: the scene\'s own)'
     )
     runs: Annotated[int, Field(ge=1)] | None = Field(
         None, description="number of samples of the random variables (unset: as many as seeds)"
@@ -54,7 +54,7 @@ class SweepTable(Table):
         {}, description="further columns by name, expressions of other columns and of the summary"
     )
     along: Names | None = Field(None, description='for "safety": the joints to be weakened (unset: all)')
-    divide: dict[str, Positive] = Field({}, description='for "safety": partial factors, as { cohesion = 1.25 }')
+    divide: dict[str, Positive] = Field({}, description='for "safety": partial factors, such as { cohesion = 1.25 }')
     tolerance: Positive = Field(2e-3, description='for "safety": relative width of the bracket')
     at_s: NotNegative | None = Field(
         None, description=('for "safety": time at which the loads are taken, s (unset: the scene\'s end)')

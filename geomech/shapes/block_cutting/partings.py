@@ -31,8 +31,8 @@ def trimmed_away(drawn: Drawn, reach: np.ndarray, left: np.ndarray) -> list[Repa
     gone = np.flatnonzero((reach > 0) & (left == 0))
     gone = gone[gone >= drawn.n_outlines]
     # Pieces are in the order of their traces; a trace is reported at its middle one.
-    middle = (np.searchsorted(drawn.source, gone) + np.searchsorted(drawn.source, gone, "right")) // 2
-    at = 0.5 * (drawn.start[middle] + drawn.end[middle])
+    median = (np.searchsorted(drawn.source, gone) + np.searchsorted(drawn.source, gone, "right")) // 2
+    at = 0.5 * (drawn.start[median] + drawn.end[median])
     return [Repair("trimmed away", x, y, size) for (x, y), size in zip(at.tolist(), reach[gone].tolist(), strict=True)]
 
 

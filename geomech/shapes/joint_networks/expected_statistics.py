@@ -72,8 +72,8 @@ def of_discs(poles: Poles, diameter: Law, per_volume_area: float) -> dict[str, f
     length = 0.25 * math.pi * second / first
     angle = np.arctan2(pole[:, 1], pole[:, 0]) + 0.5 * math.pi
     double = np.exp(2j * angle)
-    middle = 0.5 * float(np.angle((flat * double).sum()))
-    off = 0.5 * np.angle(double * np.exp(-2j * middle))
+    mean_angle = 0.5 * float(np.angle((flat * double).sum()))
+    off = 0.5 * np.angle(double * np.exp(-2j * mean_angle))
     # Steep discs are cut more often than flat ones: each is weighted by its area projected on the section.
     spread = math.sqrt(float(np.average((off - np.average(off, weights=flat)) ** 2, weights=flat)))
     return {
@@ -81,7 +81,7 @@ def of_discs(poles: Poles, diameter: Law, per_volume_area: float) -> dict[str, f
         "p21_per_m": p21,
         "mean_length_m": length,
         "length_deviation_m": math.sqrt(max(0.0, 2 / 3 * third / first - length**2)),
-        "mean_angle_deg": math.degrees(middle),
+        "mean_angle_deg": math.degrees(mean_angle),
         "angle_deviation_deg": math.degrees(spread),
         **_scanned(p21 * float(np.average(np.cos(off), weights=flat))),
     }

@@ -123,9 +123,9 @@ def line_statistics(joint: Joint, region) -> LineStatistics:
         return LineStatistics(0, float("nan"), float("nan"), float("nan"))
     mean, off = mean_direction(ends, length)
     low, high = np.reshape(area.bounds, (2, 2))
-    middle, size = 0.5 * (low + high), float(np.hypot(*(high - low)))
+    centre, size = 0.5 * (low + high), float(np.hypot(*(high - low)))
     along, across = np.array([np.cos(mean), np.sin(mean)]), np.array([-np.sin(mean), np.cos(mean)])
-    arm = ends.mean(axis=1) - middle
+    arm = ends.mean(axis=1) - centre
     at = arm @ across - (arm @ along) * np.tan(off)
     # Position and direction of a line: short pieces cut off at a corner of the region give the latter poorly.
     order = np.argsort(at)
@@ -140,7 +140,7 @@ def line_statistics(joint: Joint, region) -> LineStatistics:
     place = np.sort(at[longest])
     between = np.diff(place)
     # Where only short parts of lines are in the region some are missed, and spacings appear too large.
-    halfway = middle + (place[:-1] + 0.5 * between)[:, None] * across
+    halfway = centre + (place[:-1] + 0.5 * between)[:, None] * across
     shown = shapely.length(
         shapely.intersection(
             shapely.linestrings(np.stack([halfway - size * along, halfway + size * along], axis=1)), area
@@ -186,10 +186,10 @@ def _scanned(lines: np.ndarray, area, angle: float, n: int) -> tuple[int, float,
     import shapely
 
     low_x, low_y, high_x, high_y = area.bounds
-    middle = np.array([0.5 * (low_x + high_x), 0.5 * (low_y + high_y)])
+    centre = np.array([0.5 * (low_x + high_x), 0.5 * (low_y + high_y)])
     radius = 0.5 * np.hypot(high_x - low_x, high_y - low_y)
     along, across = np.array([np.cos(angle), np.sin(angle)]), np.array([-np.sin(angle), np.cos(angle)])
-    at = middle + ((np.arange(n) + 0.5) / n * 2 - 1)[:, None] * radius * along
+    at = centre + ((np.arange(n) + 0.5) / n * 2 - 1)[:, None] * radius * along
     scans = shapely.intersection(
         shapely.linestrings(np.stack([at - radius * across, at + radius * across], axis=1)), area
     )

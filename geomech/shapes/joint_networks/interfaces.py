@@ -31,11 +31,11 @@ def joints_between(blocks: Blocks, known: Sequence[Joint], rock, tolerance: floa
             continue
         edges = blocks.edges_named(name)
         ends = np.stack([blocks.vertices[edges], blocks.vertices[blocks.next_vertex[edges]]], axis=1)
-        middle = shapely.points(ends.mean(axis=1))
-        new = shapely.contains_properly(rock, middle) & ~shapely.dwithin(rim, middle, tolerance)
+        midpoint = shapely.points(ends.mean(axis=1))
+        new = shapely.contains_properly(rock, midpoint) & ~shapely.dwithin(rim, midpoint, tolerance)
         lines = [shapely.LineString(line) for joint in known if joint.name == name for line in joint.lines]
         if len(lines):
-            new[shapely.STRtree(lines).query(middle, "dwithin", _MOVED * tolerance)[0]] = False
+            new[shapely.STRtree(lines).query(midpoint, "dwithin", _MOVED * tolerance)[0]] = False
         if new.any():
             # Both sides of a joint are edges: on a grid they are one.
             lines = shapely.union_all(shapely.linestrings(ends[new]), grid_size=tolerance)

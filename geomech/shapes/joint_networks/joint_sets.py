@@ -188,13 +188,13 @@ def parallel_set(
     extends right through. Each line has its own angle about its intersection with the centre line of the region. The
     persistence is length / (length + gap).
     """
-    middle, radius = _circle(region)
+    region_centre, radius = _circle(region)
     across = _unit(angle.mean + 0.5 * math.pi)
     offsets = _renewal(spacing, 2 * radius, rng) - radius
     angles = angle.sample(rng, len(offsets))
     lines: list[np.ndarray] = []
     for offset, turn in zip(offsets, angles):
-        along, centre = _unit(turn), middle + offset * across
+        along, centre = _unit(turn), region_centre + offset * across
         for a, b in _intervals(length, gap, 2 * radius, rng):
             lines.append(np.array([centre + (a - radius) * along, centre + (b - radius) * along]))
     return Joint(name, tuple(_touching(lines, region)))
@@ -266,12 +266,12 @@ def poisson_traces(
     name: str, region: np.ndarray, angle: Law | FisherAngle, length: Law, per_area: float, rng: np.random.Generator
 ) -> Joint:
     """Traces with random centres, ``per_area`` (P20, 1/m²) of them, each with its own angle and length."""
-    middle, radius = _circle(region)
+    region_centre, radius = _circle(region)
     reach = radius + 0.5 * (
         length.mean + 4 * length.deviation + (6 * length.mean if length.law == "exponential" else 0.0)
     )
     n = rng.poisson(per_area * (2 * reach) ** 2)
-    centre = middle + rng.uniform(-reach, reach, (n, 2))
+    centre = region_centre + rng.uniform(-reach, reach, (n, 2))
     return Joint(name, tuple(_touching(_centred(centre, angle.sample(rng, n), length.lengths(rng, n)), region)))
 
 
@@ -294,7 +294,7 @@ def discs(
 ) -> Joint:
     """Randomly located discs in space, ``per_volume_area`` (P32, m²/m³) of them, cut by the section of ``poles``
     (Baecher, Lanney & Einstein 1977)."""
-    middle, radius = _circle(region)
+    region_centre, radius = _circle(region)
     largest = diameter.mean + 5 * diameter.deviation + (8 * diameter.mean if diameter.law == "exponential" else 0.0)
     reach = radius + 0.5 * largest
     mean_area = 0.25 * math.pi * float(np.mean(diameter.lengths(np.random.default_rng(0), 20000) ** 2))
@@ -314,7 +314,7 @@ def discs(
     foot = centre[:, :2] + (centre[:, 2] * pole[:, 2] / flat)[:, None] * normal
     half = np.sqrt(radii**2 - (centre[:, 2] / flat) ** 2)
     along = np.column_stack([-normal[:, 1], normal[:, 0]])
-    lines = np.stack([foot - half[:, None] * along, foot + half[:, None] * along], axis=1) + middle
+    lines = np.stack([foot - half[:, None] * along, foot + half[:, None] * along], axis=1) + region_centre
     return Joint(name, tuple(_touching(lines, region)))
 
 
@@ -327,11 +327,11 @@ def poisson_lines(
     The number of lines that meet a circle of radius R is Poisson with mean 2 R P21, their distances from its centre
     uniform.
     """
-    middle, radius = _circle(region)
+    region_centre, radius = _circle(region)
     n = rng.poisson(2 * radius * per_area_length)
     turn = rng.uniform(0, math.pi, n) if angle is None else angle.sample(rng, n)
     across = np.column_stack([-np.sin(turn), np.cos(turn)])
-    centre = middle + rng.uniform(-radius, radius, n)[:, None] * across
+    centre = region_centre + rng.uniform(-radius, radius, n)[:, None] * across
     return Joint(name, tuple(_touching(_centred(centre, turn, np.full(n, 2 * radius)), region)))
 
 
@@ -339,14 +339,14 @@ def voronoi(name: str, region: np.ndarray, cell_area: float, rng: np.random.Gene
     """Edges of the Voronoi cells of random points, one per ``cell_area`` m²."""
     from scipy.spatial import Voronoi
 
-    middle, radius = _circle(region)
+    region_centre, radius = _circle(region)
     reach = radius + 4 * math.sqrt(cell_area)
     n = rng.poisson((2 * reach) ** 2 / cell_area)
     cells = Voronoi(rng.uniform(-reach, reach, (n, 2)))
     ridges = np.array(cells.ridge_vertices)
     # Infinite ridges belong to points at the outer rim, far from the region.
     ridges = ridges[(ridges >= 0).all(axis=1)]
-    return Joint(name, tuple(_touching(middle + cells.vertices[ridges], region)))
+    return Joint(name, tuple(_touching(region_centre + cells.vertices[ridges], region)))
 
 
 def terminated(joint: Joint, on: Sequence[Joint], share: float, rng: np.random.Generator) -> Joint:
@@ -376,8 +376,8 @@ def _between(line: np.ndarray, walls: np.ndarray) -> np.ndarray:
 
 def _circle(region: np.ndarray) -> tuple[np.ndarray, float]:
     """Centre and radius of a circle around ``region``."""
-    middle = 0.5 * (region.min(axis=0) + region.max(axis=0))
-    return middle, float(np.hypot(*(region - middle).T).max())
+    region_centre = 0.5 * (region.min(axis=0) + region.max(axis=0))
+    return region_centre, float(np.hypot(*(region - region_centre).T).max())
 
 
 def _unit(angle: float) -> np.ndarray:

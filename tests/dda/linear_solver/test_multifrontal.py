@@ -211,11 +211,11 @@ def test_result_does_not_depend_on_threads(monkeypatch):
     monkeypatch.setattr(multifrontal, "THREADED", 0)
     monkeypatch.setattr(multifrontal, "THREADED_SOLUTION", 0)
     for helpers in (0, 1, 5):
-        crew = task_pool.Crew(helpers)
-        monkeypatch.setattr(multifrontal, "crew", lambda crew=crew: crew)
+        team = task_pool.ThreadTeam(helpers)
+        monkeypatch.setattr(multifrontal, "thread_team", lambda team=team: team)
         for _ in range(10):
             # On a busy machine it would go on alone.
-            crew._alone.clear()
+            team._alone.clear()
             assert np.array_equal(BlockSolver(points, rows, columns).solve(data.ravel(), right), alone)
 
 
@@ -235,7 +235,7 @@ def test_tasks_stand_behind_all_they_need():
 
 
 def test_a_crew_works_alone_while_cores_are_busy(monkeypatch):
-    crew, clock = task_pool.Crew(2), [0.0]
+    team, clock = task_pool.ThreadTeam(2), [0.0]
     monkeypatch.setattr(task_pool.time, "perf_counter", lambda: clock[0])
     monkeypatch.setattr(task_pool.time, "thread_time", lambda: 0.0)
     came, here = [], threading.Barrier(3)
@@ -246,12 +246,12 @@ def test_a_crew_works_alone_while_cores_are_busy(monkeypatch):
             here.wait(60)
 
     clock[0] = 1.0
-    crew.share(work, True)
+    team.share(work, True)
     assert len(set(came)) == 3
     monkeypatch.setattr(task_pool.time, "perf_counter", lambda: clock.append(clock[-1] + 1.0) or clock[-1])
-    crew.share(work, True)
+    team.share(work, True)
     del came[:]
-    crew.share(work, False)
+    team.share(work, False)
     assert came == [threading.get_ident()]
 
 

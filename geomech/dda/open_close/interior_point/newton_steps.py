@@ -13,7 +13,7 @@ import numpy as np
 
 from ....compiled import kept
 from ...linear_solver.assembly import sides_of
-from ...linear_solver.task_pool import add_at_once, await_value, crew
+from ...linear_solver.task_pool import add_at_once, await_value, thread_team
 from .contact_terms import (
     Between,
     Changes,
@@ -190,4 +190,4 @@ class PathSteps:
         if len(self.residual) < 6 * THREADED:
             _work(*work)
         else:
-            crew().share(_work, *work)
+            thread_team().share(_work, *work)
