@@ -15,15 +15,15 @@ LENGTH = math.sqrt(math.pi * 0.5 * FLAW)
 FIRST_TOLERANCE = 0.04
 
 LIMITS = """\
-What this does and does not say
-  - Plane strain, flaws through the thickness, between greased platens; rock that has a toughness and no other strength, so
-    that specimens in which no cracks join bear more and more. Only wings grow (maximum tangential stress): shear cracks
-    between flaws, which experiments have too, are left out, and loads are the higher for it.
-  - Loads are in units of K_Ic / √(πa), a half a flaw's length.
-  - Wong, Chau, Tang & Lin (2001, Int. J. Rock Mech. Min. Sci. 38, 909) pressed rock-like specimens with three parallel
-    frictional flaws and found that their strength depends not on how many flaws there are in them but on how many take part
-    in coalescence. Here strength falls with the number of flaws, by more than it scatters among specimens with as many; two
-    or three of them have joined when the peak has passed."""
+Limits of the comparison
+  - Plane strain, flaws through the thickness, greased platens. The rock has a toughness but no other strength, so that the
+    load of specimens without coalescence rises without limit. Only wing cracks grow (maximum tangential stress); shear
+    cracks between flaws, which experiments also show, are not modelled, and loads are therefore higher.
+  - Loads are in units of K_Ic / √(πa), with a half the length of a flaw.
+  - Wong, Chau, Tang & Lin (2001, Int. J. Rock Mech. Min. Sci. 38, 909) compressed rock-like specimens with three parallel
+    frictional flaws and found that strength depends not on the number of flaws but on the number of those that coalesce.
+    Here strength falls with the number of flaws, by more than its scatter among specimens with the same number; two or
+    three flaws have coalesced once the peak has passed."""
 
 
 def ashby_hallam(friction_deg: float) -> float:

@@ -126,17 +126,23 @@ def check(tests: Mapping[str, Sheared]) -> None:
         assert test.unlike < MIRROR_TOLERANCE, f"{name}: the bridge's ends differ"
         if test.tears:
             assert abs(test.kink_deg - np.degrees(published.KINK)) < KINK_TOLERANCE_DEG, (
-                f"{name}: the wings do not leave as in pure shear"
+                f"{name}: the wings do not kink as in pure shear"
             )
             assert abs(test.peak / test.tearing - 1) < LAJTAI_TOLERANCE, f"{name}: the peak is off Lajtai's strength"
-            assert test.pieces == 1, f"{name}: a bridge that tears has parted"
-            assert test.curve[-1, 1] < FALLEN * test.peak, f"{name}: the force does not fall as the wings leave"
+            assert test.pieces == 1, f"{name}: a bridge that fails in tension has parted"
+            assert test.curve[-1, 1] < FALLEN * test.peak, f"{name}: the force does not fall as the wings grow"
         else:
-            assert abs(test.k[1] / test.toughness - 1) < TOUGHNESS_TOLERANCE, f"{name}: it does not shear at K_IIc"
+            assert abs(test.k[1] / test.toughness - 1) < TOUGHNESS_TOLERANCE, (
+                f"{name}: it does not fail in shear at K_IIc"
+            )
             # The box keeps the specimen's ends parallel, unlike half-planes.
-            assert test.expected < test.start == test.peak, f"{name}: the bridge does not go at one load, above theirs"
+            assert test.expected < test.start == test.peak, (
+                f"{name}: the bridge does not fail at one load, above theirs"
+            )
             assert test.pieces == 2, f"{name}: the bridge has not parted"
-            assert abs(test.residual / test.friction - 1) < RESIDUAL_TOLERANCE, f"{name}: what is left is not friction"
+            assert abs(test.residual / test.friction - 1) < RESIDUAL_TOLERANCE, (
+                f"{name}: the residual force is not friction"
+            )
 
 
 def report(tests: Mapping[str, Sheared]) -> str:

@@ -28,12 +28,12 @@ AGREED = 0.1
 INK, SOFT, COMPUTED, NEWMARK, GROWN = "#2f3136", "#8a8f98", "#1f6f8b", "#d9a441", "#c8553d"
 
 LIMITS = """\
-What this does and does not say
-  - Newmark's block is rigid and slides on the plane alone: what it is held against is the slip on the plane, which an
-    elastic mass of blocks that lean on each other and turn has to a quarter. Its joints give and slide too, columns at
-    its face part from it, rock bridges break: the rock as a whole moves farther (mean, lowest and highest tenth).
-  - The base is rigid: no wave leaves through it, so what shakes the slope is an upper bound.
-  - The record is the first seconds of the earthquake; later pulses would add to the slip."""
+Limits of the comparison
+  - Newmark's block is rigid and slides on the plane only. It is compared with the slip on the plane, with which an elastic
+    mass of blocks that rotate and rest on each other agrees to a quarter. In the slope joints also deform and slide, columns
+    at the face separate, and rock bridges break: the rock as a whole moves farther (mean, lowest and highest tenth).
+  - The base is rigid: no wave leaves through it, so that the shaking of the slope is an upper bound.
+  - The record contains the first seconds of the earthquake; later pulses would increase the slip."""
 
 
 @dataclass
@@ -110,8 +110,10 @@ def check(slide: Slide) -> None:
     if expected[-1] == 0.0:
         return
     stands = (table[:, 0] >= SHAKEN) & (expected == 0.0)
-    assert np.abs(table[stands, 5]).max(initial=0.0) < STANDS * expected[-1], "the slope slides before it can"
-    assert abs(table[-1, 5] / expected[-1] - 1) < SIMILAR, "the slope does not slide as Newmark has it"
+    assert np.abs(table[stands, 5]).max(initial=0.0) < STANDS * expected[-1], (
+        "the slope slides before limit equilibrium permits it"
+    )
+    assert abs(table[-1, 5] / expected[-1] - 1) < SIMILAR, "the slope does not slide like Newmark's block"
 
 
 def report(slide: Slide, summary: dict) -> str:
@@ -150,7 +152,7 @@ def report(slide: Slide, summary: dict) -> str:
         if max(slide.settled) > AGREED:
             rows.append(
                 f"in {np.sum(np.array(slide.settled) > AGREED)} cycles they differ by more than {AGREED:g} of it: "
-                "such steps can make energy, and what the cracks do to the slip is not to be trusted"
+                "such steps can create energy, and the effect of the cracks on the slip is not to be trusted"
             )
     rows += [
         "",

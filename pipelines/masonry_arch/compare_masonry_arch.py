@@ -16,13 +16,13 @@ INK, STONE, BASE, THRUST, HINGE = "#2f3136", "#d8d2c4", "#a9a9a4", "#1f6f8b", "#
 THICKNESS_TOLERANCE, MILANKOVITCH_TOLERANCE = 3e-4, 2e-4
 
 LIMITS = """\
-What this does and does not say
-  - Joints are radial, of equal angle, and too rough to slide (60°); stone does not crush. Gravity acts on the whole
-    arch at once, as when a centring is struck.
-  - Hinges form at joints only: few voussoirs stand thinner than many. With an odd number the crown's hinge splits over
-    the two joints of the keystone.
-  - Elastic shortening (E = 100 GPa) lowers the line of thrust by 1e-4 of the thickness: that much more t/R is
-    needed."""
+Limits of the comparison
+  - Joints are radial, at equal angles, and too rough to slide (60°); stone does not crush. Gravity acts on the whole
+    arch at once, as when a centring is removed.
+  - Hinges form at joints only: an arch of few voussoirs can be thinner than one of many. With an odd number the crown's
+    hinge is distributed over the two joints of the keystone.
+  - Elastic shortening (E = 100 GPa) lowers the line of thrust by 1e-4 of the thickness and increases the required t/R by
+    as much."""
 
 
 def check(thinnest: dict[int, float], hinges: np.ndarray, n: int) -> None:

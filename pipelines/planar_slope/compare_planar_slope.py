@@ -16,14 +16,15 @@ from geomech.report.study_part import Part
 G = 9.81
 
 LIMITS = (
-    """The formula takes the bridge for short, the shear on the faces beside it for uniform and the strength of the
-    whole joint for used up. Longer bridges have one end driven harder than the other (the block pushes from above and
-    is pulled at its toe), and break at its toughness: the computed load is lower, by what the table says.""",
-    """Jennings' plane has one strength of rock for bridges of all lengths. By fracture mechanics a bridge carries K
-    √(πb): the cohesion that it is worth falls with the root of its length.""",
-    """Where rock can only tear (variant "tears") both ends kink 70° out of the plane, and the wings grow stably, away
-    from the bridge, while the load rises on: at the end of the run the bridge still stands. At six times the load at
-    which they started the upper wing comes out in the face: tension takes a way of its own, not that of the joints.""",
+    """The formula assumes that the bridge is short, that the shear stress on the faces beside it is uniform, and that the
+    strength of the whole joint is mobilised. In longer bridges one end is loaded more than the other (the block pushes
+    from above and is pulled at its toe), and the bridge breaks when that end reaches the toughness: the computed load is
+    lower, by the difference in the table.""",
+    """In Jennings' plane bridges of all lengths have the same rock strength. By fracture mechanics a bridge carries K √(πb):
+    its equivalent cohesion falls with the square root of its length.""",
+    """If the rock can fail in tension only (variant "tears"), cracks kink by 70° out of the plane at both ends, and the wings
+    grow stably, away from the bridge, while the load continues to rise: at the end of the run the bridge is intact. At six
+    times the load at which they started the upper wing reaches the face: tensile cracks do not follow the joints.""",
 )
 
 
@@ -151,7 +152,7 @@ def report(runs: Mapping[str, BridgedPlane]) -> str:
     )  # fmt: skip
     first = next(iter(runs.values()))
     before = (
-        f"Without the bridge the block goes at {first.expected(toughness=0.0):.3f} g (limit equilibrium). The formula "
+        f"Without the bridge the block slides at {first.expected(toughness=0.0):.3f} g (limit equilibrium). The formula "
         "adds "
         + "the bridge's fracture load: n W (sin ψ − cos ψ tan φ) = c L + K √(πb). The last column is the cohesion of "
         "whole " + "rock with which Jennings' (1970) plane fails at the computed load.",

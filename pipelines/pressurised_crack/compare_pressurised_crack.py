@@ -24,12 +24,12 @@ DEEP, DEEP_SHEAR = 0.03, 0.004
 MIRROR_TOLERANCE = 0.02
 
 LIMITS = """\
-What this does and does not say
+Limits of the comparison
   - The half-plane is a block 40 (1 + depth) crack half-lengths wide, free on all sides.
-  - K of straight cracks depends on nothing but depth/half-length. The thin layer's error is of first order in it:
-    the first two depths extrapolated to zero give the published factors.
-  - Paths are those of a dead pressure without a fluid's weight, flow or lag: cracks turn up to the surface as sills
-    do (Pollard & Holzhausen 1979), but nothing is said of when."""
+  - K of straight cracks depends on depth/half-length only. The thin layer's error is of first order in it: the first
+    two depths extrapolated to zero give the published factors.
+  - Paths are those under a constant pressure without the fluid's weight, flow or lag: cracks turn up to the surface as
+    sills do (Pollard & Holzhausen 1979), but the computation does not predict when."""
 
 
 def independent(depths: np.ndarray) -> np.ndarray:
@@ -53,17 +53,19 @@ def check(depths: np.ndarray, k: np.ndarray, paths: dict[float, Cracks]) -> None
     """AssertionError if K or a path is missed by more than its tolerance."""
     exact = independent(depths)
     off = np.abs(k - exact).max(axis=1) / np.hypot(*exact.T)
-    assert np.isfinite(off).sum() == (depths >= RESOLVED).sum(), "K or its independent value is no number"
+    assert np.isfinite(off).sum() == (depths >= RESOLVED).sum(), "K or its independent value is not finite"
     assert np.nanmax(off) < INDEPENDENT_TOLERANCE, "K is off that of dislocations in the half-plane"
     assert np.abs(shallow_limit(depths, k) - 1).max() < LAYER_TOLERANCE, "a shallow crack does not lift a thin plate"
     beyond = k[-2:, 0] / GRIFFITH - 1
-    assert 0 < beyond[1] < DEEP, "a deep crack sees the surface"
+    assert 0 < beyond[1] < DEEP, "K of a deep crack depends on the surface"
     fall = beyond[0] / beyond[1] / (depths[-1] / depths[-2]) ** 2
-    assert abs(fall - 1) < 0.15, "the surface is not felt less by the square of the depth"
+    assert abs(fall - 1) < 0.15, "the influence of the surface does not fall with the square of the depth"
     assert abs(k[-1, 1]) < DEEP_SHEAR * k[-1, 0], "a deep crack shears"
     for depth, cracks in paths.items():
         up = cracks.nodes[cracks.surface & (cracks.valence > 0)]
-        assert len(up) == 2 and not len(cracks.tips), f"from depth {depth:g} the crack does not come up on both sides"
+        assert len(up) == 2 and not len(cracks.tips), (
+            f"from depth {depth:g} the crack does not reach the surface on both sides"
+        )
         assert np.abs(up[:, 1]).max() < 1e-9, f"from depth {depth:g} the crack does not end at the surface"
         assert abs(up[:, 0].sum()) < MIRROR_TOLERANCE * np.ptp(up[:, 0]), f"from depth {depth:g} it is not symmetric"
         assert np.ptp(up[:, 0]) > 2 * (1 + depth), f"from depth {depth:g} the crack does not lead outwards"

@@ -29,10 +29,9 @@ COHESION, TANGENT, RARE_TANGENT, CORRELATION = (60e3, 9e3), (0.53, 0.05), (0.65,
 FACTOR_TOLERANCE = 1.5e-3
 
 LIMITS = (
-    "Friction, cohesion, crack, water and shaking are drawn from distributions that are taken for known; how "
-    "well they are "
-    "known is another matter.",
-    "Two random joint sets have no exact answer: what is told is what the networks do, with its interval.",
+    "Friction, cohesion, crack, water and shaking are sampled from distributions that are assumed to be known; their "
+    "uncertainty is not included.",
+    "Two random joint sets have no exact solution: the result is the fraction of the networks that fail, with its interval.",
 )
 
 

@@ -18,13 +18,13 @@ LISTED = (0.2, 0.5, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0)
 
 #: Remarks on the comparison.
 LIMITS = (
-    """The closed forms are for flaws whose faces slide, in an infinite plane; this flaw is an open slot over a third of
-    the width. They share the fall of K_I with length (stable growth), not its size; from where the wings are as far
-    from the ends as the specimen is wide, K_I rises again and they part from them.""",
-    """The load at which wings run to the ends belongs to ends under uniform stress: a block with one strain gives its
-    ends no resistance to bending open, as stiff platens would. Under it they go through to the ends: the load of
-    daylighting is that of the last stable increment.""",
-    "Published pictures (wings that turn into the load's direction) agree in kind only: no numbers are printed.",
+    """The closed forms are for flaws with sliding faces in an infinite plane; this flaw is an open slot over a third of the
+    width. The decrease of K_I with length (stable growth) is the same, its magnitude is not. Once the distance of the wings
+    from the ends is less than the specimen's width, K_I rises again, unlike in the closed forms.""",
+    """The load at which wings run to the ends is that for ends under uniform stress: a block of uniform strain has no
+    resistance to bending at its ends, unlike one between stiff platens. At this load the wings grow through to the ends:
+    the load of daylighting is that of the last stable increment.""",
+    "Published pictures (wings that turn into the direction of the load) agree qualitatively; no numbers are printed.",
 )
 
 
@@ -114,7 +114,7 @@ def parts(wings: Wings) -> list[Part]:
     """The comparison in parts."""
     if not len(wings.load):
         return [Part(f"No tip grew ({wings.end}); modulus {wings.tangent_modulus() / 1e9:.2f} GPa")]
-    limits = Part("What this does and does not say", before=[" ".join(words.split()) for words in LIMITS])
+    limits = Part("Limits of the comparison", before=[" ".join(words.split()) for words in LIMITS])
     return [_first_step(wings), _growth(wings), _lengths(wings), _stiffness(wings), limits]
 
 
@@ -151,7 +151,7 @@ def _growth(wings: Wings) -> Part:
     opened = wings.k[1:][wings.k[1:, 0] > 0]
     shear = np.abs(opened[:, 1] / opened[:, 0]).max() if len(opened) else np.nan
     words = (
-        f"The first burst, at {load[0]:.1f} MPa, leaves wings of {mm[0]:.0f} mm; then each increment needs a higher "
+        f"The first unstable growth, at {load[0]:.1f} MPa, leaves wings of {mm[0]:.0f} mm; then each increment needs a higher "
         f"load, {len(wings.stable) - 1} times over. At {load[1]:.1f} MPa, {mm[1]:.0f} mm long and {mm[2]:.0f} mm from "
         f"the specimen's ends, they run on at that load, {wings.direction[last]:.2f} degrees from the load's "
         f"direction; |K_II|/K_I is at most {shear:.3f} after the kink. The run ended: {wings.end}."
@@ -173,7 +173,7 @@ def _lengths(wings: Wings) -> Part:
         "K_I/σ of the wings, √m",
         ["l/a", "computed", "Horii & Nemat-Nasser", "ratio", "Ashby & Hallam", "ratio "],
         rows,
-        ["Beside those of closed, frictionless flaws in an infinite plane."],
+        ["Compared with those of closed, frictionless flaws in an infinite plane."],
     )
 
 

@@ -30,7 +30,7 @@ def write_page(runs: Mapping[str, Wings], places: Mapping[str, Path], out: Path)
         "Wing cracks from a single flaw",
         "Specimen of Wong et al. (2002), 50 × 170 mm, an open flaw of half-length 10 mm at 30° from the horizontal, "
         "between frictionless platens; computed by DDA and DDM coupled, as in Khanizadeh Bahabadi et al. (2023), "
-        "Figures 10 (the specimen), 11, 12 and 14 (its cracks, alone and beside other methods').",
+        "Figures 10 (the specimen), 11, 12 and 14 (its cracks, alone and compared with other methods).",
     )
     page.facts(key_results(run))
     add_player(page, [run])
@@ -54,7 +54,7 @@ def write_page(runs: Mapping[str, Wings], places: Mapping[str, Path], out: Path)
     page.section("How to reproduce it")
     page.code(
         "geomech run pipelines/single_flaw                  # this page\n"
-        "geomech run pipelines/single_flaw --variant all    # with increments, faces and the paper's settings beside it"
+        "geomech run pipelines/single_flaw --variant all    # with increments, faces and the paper's settings for comparison"
     )
     return page.write(out / "report.html")
 
@@ -75,6 +75,6 @@ def _figures(wings: Wings, drawings: Path) -> list[tuple[Path, str]]:
     loads = {"computed": (lengths, wings.load[long] / MPA)}
     x = "length of a wing, l/a"
     return [
-        (against(factors, drawings / "k.svg", x, "K_I/σ, √m", log=True), "K_I of the right wing over the load."),
-        (against(loads, drawings / "load.svg", x, "axial stress, MPa"), "The load at which the wing grew on."),
+        (against(factors, drawings / "k.svg", x, "K_I/σ, √m", log=True), "K_I of the right wing divided by the load."),
+        (against(loads, drawings / "load.svg", x, "axial stress, MPa"), "The load at which the wing grew."),
     ]

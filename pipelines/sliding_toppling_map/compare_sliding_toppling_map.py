@@ -14,10 +14,10 @@ COLOURS = dict(zip(MODES, ("#8aa4a0", "#d9a441", "#c8553d", "#8d6a9f")))
 BOUNDARY_TOLERANCE_DEG = 0.02
 
 LIMITS = """\
-What this does and does not say
-  - One column on a rough incline, let go from rest; what it does later, on the way down, is another matter.
-  - Between toppling and toppling with sliding the boundary is dynamic: the toe of a column that starts to turn carries
-    less shear than one at rest (Bray & Goodman 1981; Sagaseta 1986). Ashby (1971) drew it at φ = α."""
+Limits of the comparison
+  - One column on a rough incline, released from rest; its later motion down the incline is not considered.
+  - The boundary between toppling and toppling with sliding is dynamic: the toe of a column that starts to rotate carries
+    less shear than that of one at rest (Bray & Goodman 1981; Sagaseta 1986). Ashby (1971) drew it at φ = α."""
 
 
 def expected(kind: str, angle: float, incline: float) -> float:

@@ -18,18 +18,17 @@ from geomech.report.study_part import Part
 G = 9.81
 
 LIMITS = (
-    """Of ten joints the first bridge, at the toe, where the block pushes out, takes all others with it under a dead
-    load: each that breaks leaves more to the next. With the load led back to what the tips just bear (variant
-    "followed") every bridge needs a load of its own, none of them more than the first. All bridges tearing at once,
-    with the strength that rock of this toughness has in a specimen (Zhang 2002), would hold many times as much: joints'
-    ends concentrate stress, and what limit equilibrium calls the strength of a bridge is not the material's but that of
-    cracks as long as joints.""",
-    """Einstein et al. let bridges of this kind tear straight across the joints' dip, at 90° to it. The cracks leave at
-    70.5°, as pure shear bids, and turn on; from end to end they lie between the two, and meet the next joint some way
-    up from its end. A bridge that cracks enter from both sides is crossed at 90°.""",
-    """The slope stands under the gravity of the whole block alone, without the stress that erosion or excavation
-    leaves. The ground reaches as deep as it is wide: blocks press on what they stand on linearly, and in shallow ground
-    that doubles K.""",
+    """With ten joints, failure of the first bridge, at the toe, where the block pushes out, makes all others fail under a
+    constant load: each bridge that breaks transfers its load to the next. If the load is reduced to what the tips just
+    carry (variant "followed"), every bridge has a load of its own, none higher than the first. If all bridges failed in
+    tension at once, with the strength of specimens of rock of this toughness (Zhang 2002), they would carry many times as
+    much: the ends of joints concentrate stress, and the strength of a bridge in limit equilibrium is not that of the
+    material but that of cracks as long as joints.""",
+    """Einstein et al. assume that such bridges fail in tension at 90° to the joints' dip. The cracks start at 70.5°, as under
+    pure shear, and turn further; the line between their ends lies between the two directions, and they meet the next joint
+    at some distance from its end. A bridge into which cracks grow from both sides is crossed at 90°.""",
+    """The only load of the slope is the weight of the whole block, without stress due to erosion or excavation. The ground is
+    as deep as it is wide: the pressure of blocks on their base is linear, which in shallow ground doubles K.""",
 )
 
 
@@ -150,10 +149,10 @@ def check(name: str, seen: StepPath) -> None:
     # %).
     assert abs(seen.started / seen.alone - 1) < 0.01, f"{name}: the first load is off that of the crack solver alone"
     # Faces in contact: K_I = 0 (a joint's end beside the face of the slope may open a little).
-    assert abs(seen.kink - published.KINK) < math.radians(2), f"{name}: the first tip does not leave as in pure shear"
+    assert abs(seen.kink - published.KINK) < math.radians(2), f"{name}: the first tip does not kink as in pure shear"
     if not math.isnan(seen.failed):
         assert len(seen.linked) == seen.n_joints - 1, f"{name}: not all joints are part of the path"
-        assert seen.started <= seen.held < seen.all_at_once, f"{name}: bridges hold more than all at once"
+        assert seen.started <= seen.held < seen.all_at_once, f"{name}: bridges carry more than all at once"
         # Where a crack also grows from the next joint, both turn towards each other, a little beyond the straight
         # connection.
         assert (seen.links > published.KINK).all() and (seen.links < math.radians(95)).all(), (

@@ -22,14 +22,14 @@ SAFETY_TOLERANCE = 8e-3
 FORCE_TOLERANCE = 25
 
 LIMITS = """\
-What this does and does not say
-  - The published calculation is limit equilibrium of rigid blocks. Elastic columns lean by their own give, which takes
-    a little more friction: tan φ = 0.790, 0.787, 0.785 for E = 10, 100 and 1000 GPa.
-  - Forces are those a quarter of a per cent below the limit, 1.5 s after the friction dropped: blocks creep, and all
-    that must slide does. Above the limit friction holds forces back, and what they are depends on how the slope came to
-    rest (100 kN and more of difference).
+Limits of the comparison
+  - The published calculation is limit equilibrium of rigid blocks. Elastic columns lean by their deformation, which
+    requires a little more friction: tan φ = 0.790, 0.787, 0.785 for E = 10, 100 and 1000 GPa.
+  - Forces are those a quarter of a per cent below the limit, 1.5 s after the friction was reduced: blocks creep, and all
+    blocks that must slide do so. Above the limit friction does not determine the forces, which depend on how the slope came
+    to rest (by 100 kN and more).
   - The printed heights step down by 6 m above the crest (5 m at the tops and 1 m at the bases), though 5.2 m is printed
-    for the tops; weights and forces of the table go with 5 m."""
+    for the tops; weights and forces of the table correspond to 5 m."""
 
 
 def check(
@@ -39,7 +39,7 @@ def check(
     assert abs(limit - published.LIMIT_FRICTION) < LIMIT_TOLERANCE, "the least friction is not the published one"
     friction, factor = safety
     assert abs(factor * published.LIMIT_FRICTION / friction - 1) < SAFETY_TOLERANCE, (
-        "the factor of safety is not what the published limit says"
+        "the factor of safety is not that of the published limit"
     )
     for got, known in zip(table, expected(), strict=True):
         assert np.abs(got - known).max() < FORCE_TOLERANCE, "a force is not the published one"

@@ -31,12 +31,12 @@ VARIED_SETTINGS = {
 LENGTHS = (2e-3, 3e-3, 4e-3)
 #: Why the ways of transmitting forces differ.
 SPRINGS = """\
-The platens touch the specimen by springs at its corners. Spread over the face, their forces are the uniform stress of
-the test. Left at the corners, they reach the cracks unevenly. By Kelvin's solution (equations 2-4) about three quarters
-of a corner's force go into the rest of the infinite plane, which is not there."""
+The platens act on the specimen by springs at its corners. Distributed over the face, their forces are the uniform stress
+of the test. As point forces at the corners, they load the cracks unevenly. In Kelvin's solution (equations 2-4) about
+three quarters of a corner's force are carried by the rest of the infinite plane, which does not exist."""
 GUESS = """\
-Were equation 4's u the motion of the boundary and not what the spring gives, forces at the loaded end would be {:.0f}
-times as large: a guess, no more, at how initiation stresses so low were found."""
+If u in equation 4 were the displacement of the boundary and not the deformation of the spring, forces at the loaded end
+would be {:.0f} times as large: a possible explanation, no more, of the low initiation stresses."""
 
 
 def family(name: str) -> str:
@@ -92,7 +92,7 @@ def first_steps(folder: Path, overrides: Sequence[str]) -> list[Part]:
             row += [f"{100 * part:.2g}" for part in off * exact.load / np.abs(exact.k).max(axis=1)]
         rows.append(row)
     carried = Part(
-        "What the paper's settings carry, before anything grows: errors of K, %",
+        "Effect of the paper's settings before growth: errors of K, %",
         ["", *(f"{k}, φ = {phi}" for phi in PHI_DEG for k in ("K_I", "K_II"))],
         rows,
         [
@@ -122,12 +122,12 @@ def whole_runs(runs: Mapping[str, Watch]) -> list[Part]:
         for run in (own(runs) if not which else of_family(runs, which)).values():
             if run.last is not None:
                 rows.append([title, run.phi, *_came_to(run, base.get(run.phi))])
-    headers = ["run", "φ to crack 1", "initiation, MPa", "coalescence, MPa", "line, °", "largest way apart, mm", "end"]
+    headers = ["run", "φ to crack 1", "initiation, MPa", "coalescence, MPa", "line, °", "largest distance, mm", "end"]
     found = []
     if any(of_family(runs, which) for which in FAMILIES):
         note = (
-            "Largest way apart: of any grown point from the path of this study's run with the same φ; what lies "
-            "beyond a tip is left out."
+            "Largest distance of any grown point from the path of this study's run with the same φ; growth beyond a "
+            "tip is not counted."
         )
         found.append(Part("Whole runs by other readings, faces and settings", headers, rows, after=[note]))
     for which, title in VARIED_SETTINGS.items():
@@ -207,8 +207,8 @@ def _effect_of_setting(which: str, title: str, members: Mapping[str, Watch]) -> 
         headers += [f"{1e3 * length:.0f} mm long, MPa", "off, %"]
     headers += ["paths apart, mm", "joined, MPa", "off, %", "computed in, s"]
     note = (
-        "Off: from the finest of the same φ. Loads it takes for the wing at crack 1's upper end to grow on when it is "
-        "so long; increments, and how they shorten, run to coalescence, the others to 200 MPa. Paths apart: largest "
-        "distance of a grown point from the finest one's cracks."
+        "Off: difference from the finest run of the same φ. Loads at which the wing at crack 1's upper end grows beyond "
+        "this length; the series of increments and of their shortening run to coalescence, the others to 200 MPa. Paths "
+        "apart: largest distance of a grown point from the cracks of the finest run."
     )
     return Part(f"Convergence: {title.split(',')[0].split(' (')[0]}", headers, rows, [note])

@@ -159,11 +159,11 @@ def _loads(runs: dict[int, Watch]) -> Part:
     headers += ["strain then, 10⁻³", "at coalescence, 10⁻³", "how the run ended"]
     limits = ", ".join(f"{limit:.1f} MPa (φ = {phi})" for phi, limit in COALESCENCE_LIMIT_MPA.items())
     after.append(
-        "Coalescence: the inner wings run towards each other and tips join what is nearer than 1 mm. With finer "
-        f"increments the load of open slots tends to {limits}, less than 1 % from what increments of 1 mm find that "
-        "shorten near the other crack, to a sixteenth of what is left; those that do not miss the peaks between them, "
-        "by 4 to 10 %: see convergence. At φ = 0 and 30 growth is unstable there, and any join length from 1 to 2 mm "
-        "gives the same. At φ = 0 both inner tips arrive at once, and cut a splinter off between them."
+        "Coalescence: the inner wings grow towards each other, and a tip joins a crack that is nearer than 1 mm. With finer "
+        f"increments the load of open slots tends to {limits}, less than 1 % from the result with increments of 1 mm that "
+        "shorten near the other crack, to a sixteenth of the remaining distance; without shortening the peaks between "
+        "increments are missed, by 4 to 10 %: see convergence. At φ = 0 and 30 growth is unstable there, and any join length from 1 to 2 mm "
+        "gives the same. At φ = 0 both inner tips arrive at the same time and cut off a sliver between them."
     )
     after.append("σ_F is taken as the stress of coalescence. The paper prints no numbers with Figures 16 and 17.")
     return Part("Loads and strains (Figures 15, 16, 17)", headers, rows, after=after)
@@ -238,8 +238,8 @@ def _about_30(runs: dict[int, Watch]) -> str:
     computed = f", computed here {found:.2f}" if np.isfinite(found) else ""
     return (
         f"The experiment at φ = 30 is printed as y = {slope:g}x + {intercept:g}, {angle:.2f}°: it passes the specimen's "
-        f"centre {1e3 * missed:.1f} mm away, and crosses the bridge between the cracks instead of following it. Read as the row φ = 90 is, with the axes exchanged, and with the sign that was lost, x = "
-        f"−{slope:g}y + {intercept:g}, it passes the centre at {1e3 * passed:.1f} mm and slopes {read:.2f}°, beside the "
+        f"centre {1e3 * missed:.1f} mm away, and crosses the bridge between the cracks instead of following it. Read like the row φ = 90, with the axes exchanged and the missing sign added, x = "
+        f"−{slope:g}y + {intercept:g}, it passes the centre at {1e3 * passed:.1f} mm and slopes {read:.2f}°, compared with the "
         f"other two ({others}{computed})."
     )
 
@@ -280,14 +280,14 @@ def _disagreements(runs: dict[int, Watch]) -> Part:
     words = (
         f"With the printed toughness of {published.K_IC / MPA:g} MPa√m no slot starts to grow below {first:.1f} MPa, "
         f"above the strength of the intact material ({published.UNIAXIAL_STRENGTH / MPA:g} MPa): the printed "
-        "initiation stresses of 2-5 MPa cannot follow from it. Loads go with toughness, so compare the normalised "
+        "initiation stresses of 2-5 MPa cannot follow from it. Loads are proportional to toughness, so compare the normalised "
         "ones. The paper finds initiation and coalescence stresses higher at φ = 30 and 60 than at 0 and 90. "
-        "Coalescence agrees, initiation does not: crack 1 is the same in all four, and is what starts first "
+        "Coalescence agrees, initiation does not: crack 1 is the same in all four, and starts first "
         f"(normalised, initiation {listed('initiation')}; coalescence {listed('coalescence')}). Table 4 prints |K_I|, "
-        "but slots under compression have K_I < 0; its zeros at φ = 30 and 60 belong to faces that touch, while its "
-        "other rows are those of open slots: one specimen cannot have both. φ is told as measured from the horizontal, "
-        "but the pairs φ = 0 with 90 and 30 with 60 in Table 4 and Figures 15 and 16 only stand where it counts from "
-        "crack 1. Table 3's lines at φ = 0 to 60 are geometry first: the straight line from tip to tip has nearly "
-        "their slopes."
+        "but slots under compression have K_I < 0; its zeros at φ = 30 and 60 are those of faces in contact, while its "
+        "other rows are those of open slots: one specimen cannot have both. φ is said to be measured from the horizontal, "
+        "but the pairs φ = 0 with 90 and 30 with 60 in Table 4 and Figures 15 and 16 agree only if it is measured from "
+        "crack 1. The lines of Table 3 at φ = 0 to 60 mainly reflect geometry: the straight line from tip to tip has "
+        "nearly their slopes."
     )
     return Part("Where the paper contradicts itself", before=[words])

@@ -30,7 +30,7 @@ def write_page(runs: Mapping[str, Watch], folder: Path, out: Path, overrides: Se
     page = Page(
         "Two cracks under uniaxial compression",
         "Specimens of Haeri et al. (2014), computed by DDA and DDM coupled as Khanizadeh Bahabadi et al. (2023) did "
-        "(KB 2023), beside what both print.",
+        "(KB 2023), compared with the printed results of both.",
     )
     facts = {f"φ = {phi}°: initiation, coalescence": _pair(run) for phi, run in by_phi.items()}
     page.facts(facts)
@@ -46,7 +46,7 @@ def write_page(runs: Mapping[str, Watch], folder: Path, out: Path, overrides: Se
     page.code(
         "geomech run pipelines/two_cracks                  # the four specimens and this page\n"
         "geomech run pipelines/two_cracks --variant all    # and readings, faces, settings, convergence\n"
-        "geomech bench boundary                            # errors of K by the way contact forces are handed on"
+        "geomech bench boundary                            # errors of K by the way contact forces are transmitted"
     )
     return page.write(out / "report.html")
 
@@ -57,7 +57,7 @@ def _fill(page: Page, runs, by_phi, folder: Path, out: Path, overrides, drawings
     add_player(page, folders[:4])
     if by_phi:
         page.figures(
-            [(_paths(own(runs) or runs, drawings / "paths.svg"), "Paths alone, mm: slots black, what grew in colour.")],
+            [(_paths(own(runs) or runs, drawings / "paths.svg"), "Paths only, mm: slots black, growth in colour.")],
             whole=True,
         )
     sections = parts(own(runs) or runs)

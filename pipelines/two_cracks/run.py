@@ -32,7 +32,7 @@ def main(folder: Path, out: Path, overrides=(), variants=(), quiet: bool = False
         except Exception:
             del watched[name]
             failed = 1
-            logging.getLogger(__name__).exception("%s failed; the others go on", name)
+            logging.getLogger(__name__).exception("%s failed; the others continue", name)
     (Path(out) / "comparison.txt").write_text(text := report(own(watched) or watched) + "\n", encoding="utf-8")
     page = write_page(watched, folder, Path(out), overrides)
     if not quiet:
