@@ -37,7 +37,7 @@ def test_lists_and_ranges(written, values):
     ("written", "said"),
     [
         ("40:20:5", "is empty"), ("20:40:0", "is empty"), ("", "no values"), ([], "no values"), ("3, 3", "twice"),
-        ("normal(3)", "1 numbers"), ("normal(3", "not a distribution"), ("gauss(3, 1)", "not a distribution"),
+        ("normal(3)", "1 numbers"), ("normal(3", "not a distribution"), ("gauss(3, 1)", "no distribution"),
         ("normal(3, 0)", "not > 0"), ("uniform(3, 3)", "no value lies"), ("triangular(1, 5, 3)", "most likely"),
         ("normal(0, 1, 60, 70)", "is zero"), ("lognormal(-1, 2)", "numbers > 0"), ("log(0, 3, 2)",
         "not a logarithmic"),
