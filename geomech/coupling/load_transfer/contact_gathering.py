@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .piecewise_traction import FACE_ANGLE, SAME, jit, line_of, place_along
+from .piecewise_traction import FACE_ANGLE, SAME, allocating, jit, line_of, place_along
 
 
 class Touches(NamedTuple):
@@ -36,7 +36,7 @@ class Touches(NamedTuple):
     against: np.ndarray
 
 
-@jit
+@allocating
 def touches_of(block, contacts, rows, holding, centre, reference_centre, gradient, c, s):
     """Contacts of ``block``: the CONTACT ``rows`` (n,) of ``contacts``. ``holding``: those that may carry tension. The
     block has moved by the affine `Motion` (``centre``, ``reference_centre``, ``gradient``) and rotated by the angle
@@ -95,7 +95,7 @@ def _touching_edge(of, vertex, nx, ny):
     return best, least
 
 
-@jit
+@allocating
 def faces_and_lone(of, touches):
     """Group contacts into joint faces with at least two distinct points.
 

@@ -17,6 +17,7 @@ from .piecewise_traction import (
     add_edge_force,
     add_on_side,
     add_row,
+    allocating,
     jit,
     line_of,
     on_grid,
@@ -40,7 +41,7 @@ class _Spread(NamedTuple):
     even: bool
 
 
-@jit
+@allocating
 def add_face(found, of, start, touches, face, number, based):
     """Add the traction of the contacts with this face ``number`` to ``found``, on the straight side that begins with
     the edge ``start``.

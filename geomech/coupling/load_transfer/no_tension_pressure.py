@@ -12,7 +12,6 @@ without a consistent state.
 
 from __future__ import annotations
 
-from ...compiled import kept
 from .piecewise_traction import jit
 
 #: Triangles have lengths of 1/n, 2/n … of the face.
@@ -22,7 +21,7 @@ TRIANGLES = 8
 NOTHING = (0.0, 0.0, 0.0, 0.0)
 
 
-@kept(error_model="numpy", nogil=True)
+@jit
 def no_pull(length, force, moment):
     """Two pieces (start, end, p_start, p_end) of a linear pressure on [0, length], which add up (one may be empty), and
     forces at the start and the end, with resultant ``force`` and ``moment`` about 0.

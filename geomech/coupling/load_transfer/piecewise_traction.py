@@ -11,11 +11,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...compiled import part
+from ...compiled import UNCOUNTED, part
 from ...model import Blocks
 
-#: For functions that only kernels call.
-jit = part(error_model="numpy", nogil=True)
+#: For functions that only kernels call; for those of them that allocate arrays.
+jit = part(error_model="numpy", nogil=True, **UNCOUNTED)
+allocating = part(error_model="numpy", nogil=True)
 
 #: Two edges belong to one joint face if their directions differ by less than this angle.
 FACE_ANGLE = math.radians(10.0)
@@ -153,7 +154,7 @@ def add_on_side(found, of, start, low, high, tax, tay, tbx, tby):
             )  # fmt: skip
 
 
-@jit
+@allocating
 def add_base(found, of, start, low, high, p_low, p_high, wx, wy):
     """Add a pressure, linear from ``p_low`` to ``p_high`` over [``low``, ``high``] of a straight side, on pieces whose
     pressures can be changed later: short at the ends, where a rigid base presses most. (wx, wy): traction per unit

@@ -118,7 +118,7 @@ class ContactShape(NamedTuple):
     stiffness: np.ndarray
 
 
-@_jit
+@kept(fastmath=False, error_model="numpy", nogil=True, **UNCOUNTED)
 def fill(rows, pairing, end, before, shape):
     """Fill CONTACT ``rows`` (n,) from plain tuples with the fields of `Pairing`, `StepEnd`, `SlipBefore` and
     `ContactShape`."""
@@ -141,7 +141,7 @@ def fill(rows, pairing, end, before, shape):
         row.tilt, row.stiffness = tilt[c], stiffness[c]
 
 
-@_jit
+@kept(fastmath=False, error_model="numpy", nogil=True, **UNCOUNTED)
 def _carry(out, rows, vertices, next_vertex):
     for k in range(len(rows)):
         out[k] = rows[k]

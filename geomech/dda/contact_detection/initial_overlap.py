@@ -6,7 +6,7 @@ import logging
 
 import numpy as np
 
-from ...compiled import kept, part
+from ...compiled import UNCOUNTED, kept, part
 from ...model import Blocks
 from ..step_control.continuous_collision import depth_inside
 from .neighbour_search import boxes, near_pairs
@@ -19,7 +19,7 @@ REFUSED = 1e-3
 REPORTED = 1e-6
 
 
-@part(fastmath=False, error_model="numpy", nogil=True)
+@part(fastmath=False, error_model="numpy", nogil=True, **UNCOUNTED)
 def _depth_crossing(vertices, next_vertex, e, f):
     """Least distance of the ends of two crossing edges from each other's line, m; 0 where they do not cross."""
     least = np.inf
@@ -36,7 +36,7 @@ def _depth_crossing(vertices, next_vertex, e, f):
     return least
 
 
-@kept(fastmath=False, error_model="numpy", nogil=True)
+@part(fastmath=False, error_model="numpy", nogil=True, **UNCOUNTED)
 def depth_of_pair(vertices, next_vertex, start, box, centroid, a, b):
     """Depth of the overlap of blocks ``a`` and ``b``, m; 0 without overlap.
 
@@ -66,7 +66,7 @@ def depth_of_pair(vertices, next_vertex, start, box, centroid, a, b):
     return depth
 
 
-@kept(fastmath=False, error_model="numpy", nogil=True)
+@kept(fastmath=False, error_model="numpy", nogil=True, **UNCOUNTED)
 def _worst_pair(vertices, next_vertex, start, box, pairs, centroid, size):
     """(block, other, depth m) of the pair of ``pairs`` (k, 2) with the largest overlap over the smaller block's size;
     (−1, −1, 0) for none."""

@@ -10,7 +10,7 @@ import time
 
 import numpy as np
 
-from ...compiled import kept
+from ...compiled import UNCOUNTED, kept
 from ..counters import Work
 
 #: Reach of the search over the contact window: enough for some steps of the largest allowed motion and many usual ones,
@@ -150,7 +150,7 @@ def _boxes(vertices, first):
     return out
 
 
-@kept(fastmath=False, error_model="numpy", nogil=True)
+@kept(fastmath=False, error_model="numpy", nogil=True, **UNCOUNTED)
 def _hold(wide, box):
     """True if each of the boxes ``wide`` (n, 4) contains that of ``box`` (n, 4)."""
     for b in range(box.shape[0]):

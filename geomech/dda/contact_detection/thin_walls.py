@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...compiled import kept, part
+from ...compiled import UNCOUNTED, kept, part
 
 #: A vertex touches an edge, rather than lies behind it, within this part of the edge's length.
 _BEHIND = 1e-9
@@ -23,7 +23,7 @@ _BEHIND = 1e-9
 _START = 1e-6
 
 
-@part(fastmath=False, error_model="numpy", nogil=True)
+@part(fastmath=False, error_model="numpy", nogil=True, **UNCOUNTED)
 def _thickness(vertices, next_vertex, edge, first, last, x, y, nx, ny, least):
     """Thickness of a block below the point (x, y) on its ``edge``, against the outward normal (nx, ny), m, and the edge
     where it ends.
@@ -49,7 +49,7 @@ def _thickness(vertices, next_vertex, edge, first, last, x, y, nx, ny, least):
     return thick, far
 
 
-@part(fastmath=False, error_model="numpy", nogil=True)
+@part(fastmath=False, error_model="numpy", nogil=True, **UNCOUNTED)
 def _convex(vertices, next_vertex, previous_vertex, i):
     """True if the corner at vertex ``i`` is convex or flat."""
     k, j = previous_vertex[i], next_vertex[i]

@@ -25,7 +25,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from ...compiled import kept, part
+from ...compiled import UNCOUNTED, kept, part
 from ..kinematics.displacement_matrix import displacement_matrix
 from .polygon_quadrature import polygon_points
 
@@ -42,7 +42,7 @@ def n_deflections(order: Orders) -> Orders:
     return (order + 1) * (order + 2) - 6
 
 
-@part(fastmath=False, error_model="numpy", nogil=True)
+@part(fastmath=False, error_model="numpy", nogil=True, **UNCOUNTED)
 def _legendre(x, order, value, slope):
     """Legendre polynomials of degree 0 to ``order`` at ``x`` and their derivatives, into ``value`` and ``slope``."""
     value[0], slope[0] = 1.0, 0.0

@@ -24,7 +24,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ...compiled import kept
+from ...compiled import UNCOUNTED, kept
 from ...model import JointLaw, State
 from ..kinematics.midpoint_configuration import MidpointConfiguration
 from ..open_close.contact_set import ContactSet
@@ -357,7 +357,7 @@ def _is_in(value: int, ascending: np.ndarray) -> bool:
 _jit = kept(fastmath={"contract"}, error_model="numpy", nogil=True)
 
 
-@_jit
+@kept(fastmath={"contract"}, error_model="numpy", nogil=True, **UNCOUNTED)
 def push_springs(right, blocks, rows, vectors, force):
     """Subtract the normal and shear ``force`` (n, 2) of each spring from ``right``."""
     block, other, order = blocks

@@ -16,7 +16,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ...compiled import kept, part
+from ...compiled import UNCOUNTED, kept, part
 from ...model import OPEN, SLIP
 from ..linear_solver import assembly
 from ..linear_solver.assembly import spring_in_state
@@ -107,7 +107,7 @@ def six_row_pattern(
     )  # fmt: skip
 
 
-@part(fastmath={"contract"}, error_model="numpy", nogil=True)
+@part(fastmath={"contract"}, error_model="numpy", nogil=True, **UNCOUNTED)
 def _add_own(data, where, first, step, rows, matrix, begin):
     """Add a block's own ``matrix``, stored from ``begin`` on, with ``rows`` rows of six."""
     size = 6 * rows
@@ -120,7 +120,7 @@ def _add_own(data, where, first, step, rows, matrix, begin):
                     data[at + k * step + m] = matrix[given + m]
 
 
-@part(fastmath={"contract"}, error_model="numpy", nogil=True)
+@part(fastmath={"contract"}, error_model="numpy", nogil=True, **UNCOUNTED)
 def add_pair(data, where, first, step, rows, others, given, along):
     """Add push ⊗ pull + drag ⊗ across of a contact.
 
@@ -137,7 +137,7 @@ def add_pair(data, where, first, step, rows, others, given, along):
                     data[at + k * step + m] += p * pull[6 * j + m] + s * across[6 * j + m]
 
 
-@_jit
+@kept(fastmath={"contract"}, error_model="numpy", nogil=True, **UNCOUNTED)
 def fill_own(data, places, step, own, order):
     """Fill the flat matrix ``data`` with the blocks' matrices: ``own`` holds them one after the other, and the start of
     each.
@@ -185,7 +185,7 @@ def fill(data, base, places, step, blocks, vectors, laws):
             add_pair(data, where, lower[c], step, rows[j], rows[i], given[1], along[0])
 
 
-@part(fastmath={"contract"}, error_model="numpy", nogil=True)
+@part(fastmath={"contract"}, error_model="numpy", nogil=True, **UNCOUNTED)
 def add_force(right, first, more, count, along, push, drag):
     """Add ``push`` normal to and ``drag`` along a face, with the rows ``along`` (2, w) of one block, to the right
     side."""

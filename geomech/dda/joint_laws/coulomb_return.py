@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...compiled import kept, part
+from ...compiled import UNCOUNTED, kept, part
 from ...model import OPEN, SLIP, STICK
 from .penalty_springs import Springs
 
@@ -25,7 +25,7 @@ _KNOWN, _OF_SLIP = 1e-9, 1e-3
 _jit = kept(fastmath={"contract"}, error_model="numpy", nogil=True)
 
 
-@part(fastmath={"contract"}, error_model="numpy", nogil=True, inline="always")
+@part(fastmath={"contract"}, error_model="numpy", nogil=True, inline="always", **UNCOUNTED)
 def _move(unknowns, block, other, order, vectors, c):
     """Motion of contact ``c`` along the normal and along the edge. (Inlined: a call takes twice as long as the
     sums.)"""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...compiled import kept
+from ...compiled import UNCOUNTED, kept
 
 #: Loads on a lone block balance when their resultant, over the sum of their sizes, is below this. Loads that balance on
 #: the undeformed block are out of balance by about its strain on the deformed one, which is less.
@@ -30,7 +30,7 @@ def with_rigid_motion(constrained: np.ndarray | None) -> np.ndarray:
     return out
 
 
-@kept(fastmath=False, error_model="numpy", nogil=True)
+@kept(fastmath=False, error_model="numpy", nogil=True, **UNCOUNTED)
 def hold(constrained, matrix, right, vectors, block, other, order):
     """Constrain the unknowns ``constrained`` (n_blocks, 6) bool to zero, in place: their rows and columns
     become diagonal.

@@ -24,7 +24,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...compiled import kept, part
+from ...compiled import UNCOUNTED, kept, part
 from .displacement_matrix import displacement_matrix
 
 
@@ -86,7 +86,7 @@ def _contacts(geometry, block, other, affine, centroid, turn, edge):
     return out
 
 
-@part(fastmath=False, error_model="numpy", nogil=True)
+@part(fastmath=False, error_model="numpy", nogil=True, **UNCOUNTED)
 def _to_start(xx, yy, xy, moment, affine, turn):
     """Generalised strain forces on the axes of the start: the symmetric part of G⁻¹ (Σ x ⊗ F) R.
 
@@ -100,7 +100,7 @@ def _to_start(xx, yy, xy, moment, affine, turn):
     return (gyy * a - gxy * d) / size, (gxx * e - gyx * b) / size, 0.5 * (gyy * b - gxy * e + gxx * d - gyx * a) / size
 
 
-@kept(fastmath=False, error_model="numpy", nogil=True)
+@kept(fastmath=False, error_model="numpy", nogil=True, **UNCOUNTED)
 def _strains_back(vectors, block, other, geometry, size, affine, turn):
     """As `MidpointConfiguration.turn_back`; ``size`` (n_blocks,) is √area, m."""
     for k in range(vectors.shape[0]):
@@ -118,7 +118,7 @@ def _strains_back(vectors, block, other, geometry, size, affine, turn):
                 v[at + 3], v[at + 4], v[at + 5] = _to_start(v[at + 3], v[at + 4], v[at + 5], moment, affine[b], turn[b])
 
 
-@kept(fastmath=False, error_model="numpy", nogil=True)
+@kept(fastmath=False, error_model="numpy", nogil=True, **UNCOUNTED)
 def _rows_back(rows, owner, affine, turn):
     """Rotate the strain columns of ``rows`` (n, 6) of the blocks ``owner`` (n,) to the axes of the start, in place."""
     for k in range(rows.shape[0]):

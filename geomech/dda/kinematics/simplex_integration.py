@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...compiled import kept
+from ...compiled import UNCOUNTED, kept
 
 
 @kept(fastmath=False, error_model="numpy", nogil=True)
@@ -42,7 +42,7 @@ def block_moments(vertices, next_vertex, vertex_start):
     return out
 
 
-@kept(fastmath=False, error_model="numpy", nogil=True)
+@kept(fastmath=False, error_model="numpy", nogil=True, **UNCOUNTED)
 def fastest_vertex(rates, vertices, vertex_start, moments):
     """Largest speed of a vertex, m/s, for blocks with ``rates`` (n_blocks, 6) of their unknowns; blocks at rest are
     skipped."""

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...compiled import kept, part
+from ...compiled import UNCOUNTED, kept, part
 from ...model import OPEN, SLIP, STICK
 from ..equation_records import (
     BlockEquations,
@@ -180,7 +180,7 @@ def sides_of(n, order, block, other):
     return ContactSides(start[: n + 1], side)
 
 
-@part(error_model="numpy", nogil=True)
+@part(error_model="numpy", nogil=True, **UNCOUNTED)
 def _put_block(where, at, stride, r0, r1, r2, r3, r4, r5):
     """Write six rows of six, ``stride`` apart."""
     store_six(where, at, r0)
@@ -191,7 +191,7 @@ def _put_block(where, at, stride, r0, r1, r2, r3, r4, r5):
     store_six(where, at + 5 * stride, r5)
 
 
-@part(error_model="numpy", nogil=True)
+@part(error_model="numpy", nogil=True, **UNCOUNTED)
 def _add_pair(room, pull, across, r0, r1, r2, r3, r4, r5):
     """Add to the rows r and the 6 × 6 block the product push ⊗ ``pull`` + drag ⊗ ``across``; push and drag begin at 0
     and 8 of ``room``."""
@@ -320,7 +320,7 @@ def assemble(
     thread_team().share(_fill_shared, claimed, done, SHARE, *rest)
 
 
-@part(fastmath=False, error_model="numpy", nogil=True)
+@part(fastmath=False, error_model="numpy", nogil=True, **UNCOUNTED)
 def spring_in_state(state, direction, normal, shear, friction, sliding, shear0):
     """Stiffness of a closed contact normal to and along the edge, the ratio of shear to normal force while it slides (0
     while it sticks), and its shear force at zero motion."""

@@ -17,7 +17,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from ...compiled import kept
+from ...compiled import UNCOUNTED, kept
 from ..counters import Work
 from .conjugate_residuals import Directions
 from .multifrontal import Factors
@@ -62,7 +62,7 @@ SINGLE_ROUGH = 150
 SHARED, SHARE = 4000, 512
 
 
-@kept(fastmath={"reassoc", "contract", "nsz"}, error_model="numpy", nogil=True)
+@kept(fastmath={"reassoc", "contract", "nsz"}, error_model="numpy", nogil=True, **UNCOUNTED)
 def _multiply_rows(first, last, data, pointer, columns, x, out):
     """A x for the rows of 6×6 blocks from ``first`` to before ``last``. (Written out, since only whole sums of six
     become vector instructions: four times as fast as loops.)"""
@@ -81,7 +81,7 @@ def _multiply_rows(first, last, data, pointer, columns, x, out):
         result[0], result[1], result[2], result[3], result[4], result[5] = s0, s1, s2, s3, s4, s5
 
 
-@kept(fastmath=False, error_model="numpy", nogil=True)
+@kept(fastmath=False, error_model="numpy", nogil=True, **UNCOUNTED)
 def _multiply_shared(claimed, done, share, data, pointer, columns, x, out):
     """The rows of ``share`` blocks at a time, shared with other threads; ``claimed`` and ``done`` (1,) as for the
     elimination of fronts."""
@@ -107,7 +107,7 @@ def multiply(data: np.ndarray, pointer: np.ndarray, columns: np.ndarray, x: np.n
     return out
 
 
-@_jit
+@kept(fastmath=False, error_model="numpy", nogil=True, **UNCOUNTED)
 def largest_terms(data, pointer, columns, x):
     """The largest Σ|A||x| of a row."""
     size = 0.0
@@ -139,7 +139,7 @@ def _changed(data, diagonal, factored, tolerance):
     return out
 
 
-@_jit
+@kept(fastmath=False, error_model="numpy", nogil=True, **UNCOUNTED)
 def _take(data, diagonal, changed, factored):
     """Copy the ``changed`` diagonal blocks of ``data`` to ``factored`` (n, 36)."""
     for b in range(len(diagonal)):

@@ -9,12 +9,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...compiled import kept
+from ...compiled import UNCOUNTED, kept, part
 
-_jit = kept(fastmath={"reassoc", "contract", "nsz"}, error_model="numpy", nogil=True)
+_FUSED = {"reassoc", "contract", "nsz"}
 
 
-@_jit
+@kept(fastmath=_FUSED, error_model="numpy", nogil=True)
 def _project(directions, products, x, rest):
     """Minimise the residual ``rest`` (m,) of ``x`` (m,) along the ``directions`` (k, m), in place; returns its largest
     entry."""
@@ -32,7 +32,7 @@ def _project(directions, products, x, rest):
     return _largest(rest)
 
 
-@_jit
+@kept(fastmath=_FUSED, error_model="numpy", nogil=True, **UNCOUNTED)
 def _include(direction, product, directions, products, k, x, rest):
     """Add a new ``direction`` (m,) and its ``product`` as number ``k`` of the known ones, and minimise along it as in
     `_project`."""
@@ -58,7 +58,7 @@ def _include(direction, product, directions, products, k, x, rest):
     return _largest(rest)
 
 
-@_jit
+@part(fastmath=_FUSED, error_model="numpy", nogil=True, **UNCOUNTED)
 def _largest(values):
     """The largest |value|; infinite where one is not a number."""
     largest, right = 0.0, True

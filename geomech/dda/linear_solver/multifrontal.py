@@ -12,14 +12,14 @@ from collections.abc import Callable
 
 import numpy as np
 
-from ...compiled import kept
+from ...compiled import UNCOUNTED, kept
 from .blas_threads import blas_threads
 from .front_elimination import eliminate, places, working_space
 from .nested_dissection import Tree, plan
 from .task_pool import add_at_once, await_value, thread_team
 from .triangular_solve import backward, forward
 
-_jit = kept(fastmath=False, error_model="numpy", nogil=True)
+_jit = kept(fastmath=False, error_model="numpy", nogil=True, **UNCOUNTED)
 
 #: Number of blocks from which they are factored, and solutions substituted, on all cores.
 THREADED, THREADED_SOLUTION = 500, 4000

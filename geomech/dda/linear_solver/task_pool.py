@@ -19,7 +19,7 @@ from numba.core import cgutils
 from numba.extending import intrinsic
 from numba.np.arrayobj import make_array
 
-from ...compiled import part
+from ...compiled import UNCOUNTED, part
 
 #: Number of checks for another thread's result before this one sleeps for this many microseconds between them: with
 #: more threads than cores the other one may not be running.
@@ -48,7 +48,7 @@ def add_at_once(typingctx, array, index, value):
     return types.int64(array, types.intp, types.int64), codegen
 
 
-@part(nogil=True)
+@part(nogil=True, **UNCOUNTED)
 def await_value(array, index, value):
     """Wait until ``array[index]`` is ``value``."""
     looks = 0

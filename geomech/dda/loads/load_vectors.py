@@ -7,7 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
-from ...compiled import kept, part
+from ...compiled import UNCOUNTED, kept, part
 from ...model import Blocks, EdgeTraction, LinearProfile, Loads, WaterTable
 from ..kinematics.displacement_matrix import material_weights
 from .force_records import EDGE_FORCE, POINT_FORCE
@@ -186,7 +186,7 @@ def generalised(points: np.ndarray, edges: np.ndarray, centroid: np.ndarray) -> 
     return out
 
 
-@part(fastmath=False, error_model="numpy", nogil=True)
+@part(fastmath=False, error_model="numpy", nogil=True, **UNCOUNTED)
 def _add(row, x, y, fx, fy):
     row[0] += fx
     row[1] += fy
@@ -196,7 +196,7 @@ def _add(row, x, y, fx, fy):
     row[5] += 0.5 * (y * fx + x * fy)
 
 
-@kept(fastmath=False, error_model="numpy", nogil=True)
+@kept(fastmath=False, error_model="numpy", nogil=True, **UNCOUNTED)
 def _gather(out, centroid, point_block, point, force, edge_block, start, end, traction):
     """Add generalised forces about ``centroid`` (n_blocks, 2) of point forces and linear tractions to ``out``
     (n_blocks, 6).

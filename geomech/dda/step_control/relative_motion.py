@@ -18,7 +18,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...compiled import kept, part
+from ...compiled import UNCOUNTED, kept, part
 from ..contact_detection.neighbour_search import NearPairs, boxes
 
 #: Two blocks may move relative to each other by this part of the geometric mean of their sizes in a step …
@@ -33,7 +33,7 @@ _WIDER = 1.1
 _AIM = 0.99
 
 
-@part(fastmath=False, error_model="numpy", nogil=True)
+@part(fastmath=False, error_model="numpy", nogil=True, **UNCOUNTED)
 def _relative(affine, centroid, a, b, x, y):
     """Magnitude of the relative displacement of blocks ``a`` and ``b`` at (x, y)."""
     ax, ay, bx, by = x - centroid[a, 0], y - centroid[a, 1], x - centroid[b, 0], y - centroid[b, 1]
@@ -43,7 +43,7 @@ def _relative(affine, centroid, a, b, x, y):
     return np.sqrt(u * u + v * v)
 
 
-@part(fastmath=False, error_model="numpy", nogil=True)
+@part(fastmath=False, error_model="numpy", nogil=True, **UNCOUNTED)
 def _motion(affine, centroid, box, a, b, more):
     """Largest relative displacement where ``a`` and ``b`` may meet, plus ``more``; −1 where they cannot meet."""
     x0, x1 = min(box[a, 0], box[b, 0]), max(box[a, 2], box[b, 2])
@@ -63,7 +63,7 @@ def _motion(affine, centroid, box, a, b, more):
     return motion
 
 
-@part(fastmath=False, error_model="numpy", nogil=True)
+@part(fastmath=False, error_model="numpy", nogil=True, **UNCOUNTED)
 def _apart(vertices, next_vertex, start, a, b):
     """Least distance, m, between the vertices of either block and the outline of the other."""
     least = np.inf
@@ -81,7 +81,7 @@ def _apart(vertices, next_vertex, start, a, b):
     return np.sqrt(least)
 
 
-@kept(fastmath=False, error_model="numpy", nogil=True)
+@kept(fastmath=False, error_model="numpy", nogil=True, **UNCOUNTED)
 def _longest(pairs, affine, turn, centroid, box, vertices, next_vertex, start, size, dt, g):
     """(time, pair): the longest step up to ``dt`` in which all ``pairs`` stay within their limits, and the limiting
     pair.

@@ -23,7 +23,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...compiled import kept, part
+from ...compiled import UNCOUNTED, kept, part
 from .shape_functions import MAX_ORDER
 from .simd import (
     WIDTH,
@@ -75,9 +75,9 @@ _ROW = _TILE + WIDTH
 _B, _D, _STEP = 2 * WIDTH, 4 * WIDTH, 6 * WIDTH
 
 _jit = kept(fastmath=False, error_model="numpy", nogil=True)
-_part = part(fastmath=False, error_model="numpy", nogil=True)
+_part = part(fastmath=False, error_model="numpy", nogil=True, **UNCOUNTED)
 #: Inlined into the calling kernel, so that products and sums are fused as if written there.
-_inlined = part(fastmath=False, error_model="numpy", nogil=True, forceinline=True)
+_inlined = part(fastmath=False, error_model="numpy", nogil=True, forceinline=True, **UNCOUNTED)
 
 
 class Elements(NamedTuple):

@@ -34,7 +34,7 @@ from numba import types
 from numba.core import cgutils
 from numba.extending import intrinsic, lower_builtin, models, register_model, type_callable
 
-from ...compiled import part
+from ...compiled import UNCOUNTED, part
 
 WIDTH = 8
 
@@ -412,7 +412,7 @@ _LN2_HIGH = 0.693147180369123816490
 _LN2_LOW = 1.90821492927058770002e-10
 
 
-@part(error_model="numpy")
+@part(error_model="numpy", **UNCOUNTED)
 def log(x):
     """Natural logarithms."""
     m, n = _parts(x)
@@ -428,7 +428,7 @@ def log(x):
     return n * _LN2_HIGH + ((2.0 * f) * (s * u) + n * _LN2_LOW + 2.0 * f)
 
 
-@part(error_model="numpy")
+@part(error_model="numpy", **UNCOUNTED)
 def log1p(x):
     """log(1 + x)."""
     whole = 1.0 + x
@@ -438,7 +438,7 @@ def log1p(x):
 _EIGHTH = math.tan(math.pi / 8)
 
 
-@part(error_model="numpy")
+@part(error_model="numpy", **UNCOUNTED)
 def angle(y, x):
     """atan2(y, x)."""
     ay, ax = size(y), size(x)

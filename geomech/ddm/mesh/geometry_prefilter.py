@@ -10,7 +10,7 @@ import math
 
 import numpy as np
 
-from ...compiled import kept, part
+from ...compiled import UNCOUNTED, kept, part
 
 #: Full checks are needed where a new segment is nearer than this part of the extent to one with which it shares no
 #: node.
@@ -20,8 +20,8 @@ SPREAD = math.cos(math.radians(11.0))
 #: Coordinate resolution relative to a segment's length: half of what the full check allows.
 DIGITS = 0.5e-5
 
-_jit = kept(error_model="numpy", nogil=True)
-_part = part(error_model="numpy", nogil=True)
+_jit = kept(error_model="numpy", nogil=True, **UNCOUNTED)
+_part = part(error_model="numpy", nogil=True, **UNCOUNTED)
 
 
 @_jit

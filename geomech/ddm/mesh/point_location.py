@@ -6,10 +6,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ...compiled import kept
+from ...compiled import UNCOUNTED, kept
 from ...model.blocks.polygon import signed_area
 
-_jit = kept(error_model="numpy", nogil=True)
+_jit = kept(error_model="numpy", nogil=True, **UNCOUNTED)
 
 
 def outlined(loops: Sequence[np.ndarray]) -> bool:

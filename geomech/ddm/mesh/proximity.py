@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...compiled import kept, part
+from ...compiled import UNCOUNTED, kept, part
 from ..kernels import shape_functions
 
 #: Largest element length relative to its distance from another element. The density still converges like 3.5^−p.
@@ -39,7 +39,7 @@ REFUSED_ABOVE = 8.0
 MOST_UNKNOWNS = 20000
 
 _jit = kept(fastmath=False, error_model="numpy", nogil=True)
-_part = part(fastmath=False, error_model="numpy", nogil=True)
+_part = part(fastmath=False, error_model="numpy", nogil=True, **UNCOUNTED)
 
 
 @_part

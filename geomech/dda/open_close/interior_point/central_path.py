@@ -23,7 +23,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from ....compiled import kept
+from ....compiled import UNCOUNTED, kept
 from ....model import OPEN, SLIP, STICK, ContactSolver
 from ...equation_records import ContactMotion, ContactStiffness
 from ...joint_laws.coulomb_return import moved
@@ -54,7 +54,7 @@ _END, _STUCK = 1e-14, 1e-3
 WITHIN = 1e-5
 
 
-@kept(fastmath={"contract"}, error_model="numpy", nogil=True)
+@kept(fastmath={"contract"}, error_model="numpy", nogil=True, **UNCOUNTED)
 def add_forces(right, block, other, order, vectors, normal, shear):
     """Add to ``right`` (6 n,) the forces ``normal`` and ``shear`` (n_contacts,) on the blocks."""
     for c in range(block.shape[0]):

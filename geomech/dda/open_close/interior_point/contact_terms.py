@@ -13,10 +13,11 @@ from typing import NamedTuple
 import numpy as np
 from numba import uintp
 
-from ....compiled import kept
+from ....compiled import UNCOUNTED, kept, part
 
 # Sums may not be reordered: otherwise LLVM vectorises across contact records, which takes three times as long.
-_jit = kept(fastmath={"contract"}, error_model="numpy", nogil=True)
+_jit = kept(fastmath={"contract"}, error_model="numpy", nogil=True, **UNCOUNTED)
+_part = part(fastmath={"contract"}, error_model="numpy", nogil=True, **UNCOUNTED)
 
 #: Largest step length, relative to that at which a force or gap vanishes.
 SHORT_OF = 0.99
@@ -76,7 +77,7 @@ class Changes(NamedTuple):
     sheared: np.ndarray
 
 
-@_jit
+@_part
 def linearise(first, last, variables, springs, linearised):
     """Linearise at the `Variables` with `PathSprings`. Fills the `Linearised`, ``pulled`` with the present forces. Returns
     the sum of the products, each in its unit."""
@@ -107,7 +108,7 @@ def linearise(first, last, variables, springs, linearised):
     return total
 
 
-@_jit
+@_part
 def pull(first, last, goals, linearised):
     """``pulled`` (n, 3) N: contact forces of a Newton step without motion of the blocks: normal force, shear force
     without and with its dependence on the normal force. ``goals`` (n, 3) J: targets of the products."""
@@ -123,7 +124,7 @@ def pull(first, last, goals, linearised):
         pulled[c, 0], pulled[c, 1], pulled[c, 2] = given, sheared, sheared + laws[c, 3] * given
 
 
-@_jit
+@_part
 def change(first, last, unknowns, between, springs, linearised, goals, changes):
     """`Changes` of contacts (`Between`) in a step of the ``unknowns`` (6 n_blocks,). Returns the largest step length up to
     1 for which positive numbers stay positive. ``pulled`` is that of `pull`."""
@@ -175,7 +176,7 @@ def products(numbers, changed, far, rough, unit):
     return total
 
 
-@_jit
+@_part
 def second_order(first, last, epsilon, unit, changed, goals):
     """``goals`` (n, 3) J: targets of the linearised products so that the products are ``epsilon`` units each, including
     the second-order terms of ``changed``."""
@@ -186,7 +187,7 @@ def second_order(first, last, epsilon, unit, changed, goals):
         goals[c, 2] = target - changed[c, 3] * changed[c, 5]
 
 
-@_jit
+@_part
 def nearer(first, last, epsilon, unit, wanted, spread, numbers, changed, goals, better):
     """``better`` (n, 3) J: ``goals`` corrected so that products which a step of length ``wanted`` would leave outside a
     factor ``spread`` of ``epsilon`` units return to that range; corrections from above are limited (Gondzio 1996)."""
@@ -199,7 +200,7 @@ def nearer(first, last, epsilon, unit, wanted, spread, numbers, changed, goals, 
             better[c, k] = goals[c, k] + max(min(max(product, low), high) - product, -high)
 
 
-@_jit
+@_part
 def go(first, last, far, changes, variables):
     """Update the `Variables` by `Changes` of length ``far``, in place."""
     motion, changed, sheared = changes
@@ -214,7 +215,7 @@ def go(first, last, far, changes, variables):
         along[c] += far * motion[c, 1]
 
 
-@_jit
+@_part
 def undecided(first, last, variables, springs, clear):
     """Number of contacts whose force and gap, or slip and remaining strength, differ by less than a factor ``clear`` in
     units of the stiffness."""

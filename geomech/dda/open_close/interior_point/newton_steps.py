@@ -11,7 +11,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from ....compiled import kept
+from ....compiled import UNCOUNTED, kept
 from ...linear_solver.assembly import sides_of
 from ...linear_solver.task_pool import add_at_once, await_value, thread_team
 from .contact_terms import (
@@ -41,7 +41,7 @@ _SPREAD, _CLEAR = 10.0, 3.0
 _NONE = np.empty(0)
 
 
-@kept(fastmath=False, error_model="numpy", nogil=True)
+@kept(fastmath=False, error_model="numpy", nogil=True, **UNCOUNTED)
 def _work(
     chunks, task, target, parts, between, springs, sides, variables, linearised, blocks, step, tried
 ):  # fmt: skip
