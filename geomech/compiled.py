@@ -10,8 +10,9 @@ belong to the kernel alone, and functions that only kernels call (`part`) are no
 
 Most of the compilation time is spent in Numba, not in LLVM. While kernels are compiled, the results of type inference
 for given argument types are cached, settings are compared by the values set, the variables of statements are listed
-without copies, and a `part` is compiled once for all integer arguments, not once for each constant. The compiler's
-call frames share one piece of memory (`_ROOM`).
+without copies, their lifetimes computed only where used, and a `part` is compiled once for all integer arguments, not
+once for each constant. Garbage is left to later collections, and the compiler's call frames share one piece of memory
+(`_ROOM`). In LLVM, code whose instructions may not be fused is optimised thoroughly once only, after linking.
 """
 
 from __future__ import annotations
@@ -30,6 +31,7 @@ from typing import Any
 
 import numpy as np
 from llvmlite import binding as llvm
+from llvmlite import ir as llvmir
 from numba import __version__ as numba_version
 from numba import config, jit, njit, types
 
@@ -39,25 +41,28 @@ log = logging.getLogger(__name__)
 
 try:
     from numba.core.caching import IndexDataCacheFile, UserProvidedCacheLocator
-    from numba.core.codegen import JITCodeLibrary
+    from numba.core.codegen import CPUCodegen, JITCodeLibrary
     from numba.core.compiler import Compiler
     from numba.core.dispatcher import Dispatcher
     from numba.core.ir import Inst, Loc, Var
     from numba.core.options import DefaultOptions
+    from numba.core.postproc import PostProcessor, VariableLifetime
     from numba.core.targetconfig import ConfigStack, TargetConfig
+    from numba.core.transforms import canonicalize_cfg
     from numba.core.types.functions import BaseFunction
     from numba.core.typing.templates import _OverloadFunctionTemplate
 except ImportError:  # logged below; classes that stand in for those that this version lacks
-    IndexDataCacheFile = UserProvidedCacheLocator = JITCodeLibrary = Compiler = object
+    IndexDataCacheFile = UserProvidedCacheLocator = CPUCodegen = JITCodeLibrary = Compiler = object
     ConfigStack = TargetConfig = DefaultOptions = _OverloadFunctionTemplate = object
-    Inst = Loc = Var = object
+    Inst = Loc = Var = PostProcessor = VariableLifetime = canonicalize_cfg = object
     BaseFunction = object  # type: ignore[misc, assignment]
     Dispatcher = type(njit(lambda: None))  # type: ignore[misc]
 
 #: Internals of Numba that are used here; they may change in any version.
 _INNER = (
     (JITCodeLibrary, ("_finalize_final_module", "_finalize_dynamic_globals", "_get_module_for_linking",
-                      "_optimize_functions", "_raise_if_finalized")),
+                      "add_ir_module", "_optimize_functions", "_raise_if_finalized")),
+    (CPUCodegen, ("_function_pass_manager",)),
     (IndexDataCacheFile, ("_load_index", "_load_data", "_save_data", "_dump", "_data_path",
                           "_open_for_write", "load", "save")),
     (Compiler, ("compile_extra",)),
@@ -65,6 +70,7 @@ _INNER = (
     (Dispatcher, ("_insert", "_compile_for_args", "get_call_template")),
     (BaseFunction, ("get_call_type",)),
     (Inst, ("_rec_list_vars", "list_vars")),
+    (PostProcessor, ("run", "_insert_var_dels")),
     (_OverloadFunctionTemplate, ("_get_impl", "_get_jit_decorator")),
     (ConfigStack, ("top_or_none", "enter")),
     (TargetConfig, ("copy", "values", "options", "__hash__")),
@@ -89,8 +95,9 @@ if kernel_place().instead_of is not None:
     )  # fmt: skip
 
 
-#: Options of `kept` and `part` for kernels that allocate no arrays, neither themselves nor in functions they call: they
-#: switch off reference counting, which takes most of the time in loops that pass arrays to many small functions.
+#: Options of `kept` and `part` for functions that allocate and return no arrays, neither themselves nor in functions they
+#: call: they switch off reference counting, which takes most of the time in loops that pass arrays to many small
+#: functions, and about a tenth of the compilation time.
 UNCOUNTED = {"_nrt": False} if hasattr(DefaultOptions, "_nrt") else {}
 
 
@@ -164,6 +171,7 @@ def _quick_inference() -> Iterator[None]:
         (TargetConfig, "__eq__", _same_settings),
         (TargetConfig, "__hash__", _hash_of_settings),
         (Inst, "_rec_list_vars", _variables_of),
+        (PostProcessor, "run", _without_entry_variables),
     )
     before, collects = [(owner, name, getattr(owner, name)) for owner, name, _ in replaced], gc.isenabled()
     # A compiler's objects are in use until it is done; garbage collection would take a twentieth of the time.
@@ -176,6 +184,11 @@ def _quick_inference() -> Iterator[None]:
         for owner, name, original in before:
             setattr(owner, name, original)
         if collects:
+            # What is left of a compiler is garbage with cycles. It joins the oldest generation, which is collected if the
+            # program goes on for long: to collect it now takes another twelfth of the time. (Memory of a slope's first run:
+            # 650 instead of 350 MB.)
+            gc.freeze()
+            gc.unfreeze()
             gc.enable()
 
 
@@ -260,6 +273,22 @@ def _find_variables(value: object, found: list) -> None:
                 _find_variables(each, found)
 
 
+_post_process: Callable = getattr(PostProcessor, "run", _refuse)
+
+
+def _without_entry_variables(self: PostProcessor, emit_dels: bool = False, extend_lifetimes: bool = False) -> None:
+    """Process statements as Numba does after each of nine passes, without the variables that may exist where a block of
+    statements begins: only generators and Python objects need these. Lifetimes of variables are computed where used."""
+    function = self.func_ir
+    if function.is_generator:
+        _post_process(self, emit_dels, extend_lifetimes)
+        return
+    function.blocks = canonicalize_cfg(function.blocks)
+    function.variable_lifetime, function.generator_info = VariableLifetime(function.blocks), None
+    if emit_dels:
+        self._insert_var_dels(extend_lifetimes=extend_lifetimes)
+
+
 @functools.cache
 def _hash_of(options: tuple[str, ...]) -> int:
     return hash(tuple(sorted(options)))
@@ -273,8 +302,12 @@ def _hash_of_settings(self: TargetConfig) -> int:
 class _Kernel(JITCodeLibrary):
     """Machine code that calls its own copies of the functions it was linked with."""
 
+    def add_ir_module(self, module: llvmir.Module) -> None:
+        self._fused = _may_be_fused(module)
+        super().add_ir_module(module)
+
     def _optimize_functions(self, module: llvm.ModuleRef) -> None:
-        _optimize_defined(self, module)
+        _optimize_defined(self, module, self._fused)
 
     def _finalize_final_module(self) -> None:
         # Other kernels are linked with the original: they must find one copy, not one for each path to it.
@@ -300,8 +333,12 @@ class _Part(JITCodeLibrary):
         """Store the Python environment of the code, for the kernels linked with it."""
         self.environment = name, environment
 
+    def add_ir_module(self, module: llvmir.Module) -> None:
+        self._fused = _may_be_fused(module)
+        super().add_ir_module(module)
+
     def _optimize_functions(self, module: llvm.ModuleRef) -> None:
-        _optimize_defined(self, module)
+        _optimize_defined(self, module, self._fused)
 
     def finalize(self) -> None:
         self._raise_if_finalized()
@@ -313,12 +350,29 @@ class _Part(JITCodeLibrary):
         self._finalized = True
 
 
-def _optimize_defined(library: JITCodeLibrary, module: llvm.ModuleRef) -> None:
-    """As `CPUCodeLibrary._optimize_functions`, without making passes for functions that are only declared."""
+#: Flags of LLVM's instructions that permit to fuse or reorder them.
+_FAST = frozenset(("fast", "reassoc", "nnan", "ninf", "nsz", "arcp", "contract", "afn"))
+
+
+def _may_be_fused(module: llvmir.Module) -> bool:
+    """Whether any instruction of a ``module`` may be fused with others or reordered."""
+    return any(
+        not _FAST.isdisjoint(instruction.flags) or not _FAST.isdisjoint(getattr(instruction, "fastmath", ()))
+        for function in module.functions
+        for block in function.blocks
+        for instruction in block.instructions
+    )
+
+
+def _optimize_defined(library: JITCodeLibrary, module: llvm.ModuleRef, fused: bool) -> None:
+    """As `CPUCodeLibrary._optimize_functions`, without passes for functions that are only declared, and at LLVM's first
+    level unless instructions may be ``fused``: `finalize` optimises all of a kernel again at the level of Numba. Where
+    they may be fused, the level before linking decides which are."""
+    level = {} if fused else {"opt": 1}
     module.data_layout = library._codegen._data_layout
     for function in module.functions:
         if not function.is_declaration:
-            passes, builder = library._codegen._function_pass_manager()
+            passes, builder = library._codegen._function_pass_manager(**level)
             passes.run(function, builder)
 
 
@@ -367,7 +421,15 @@ class _KernelCompiler(Compiler):
             self.state.library = self.library(self.state.targetctx.codegen(), function.__qualname__)
             self.state.library.enable_object_caching()
         with _quick_inference():
-            return _with_room(super().compile_extra, function)
+            result = _with_room(super().compile_extra, function)
+        self._check_uncounted(function, result.signature.return_type)
+        return result
+
+    def _check_uncounted(self, function: Callable, returned: types.Type) -> None:
+        """Refuse a function without reference counting that returns arrays: its caller would release them."""
+        state = self.state
+        if not state.flags.nrt and state.targetctx.data_model_manager[returned].contains_nrt_meminfo():
+            raise TypeError(f"{function.__qualname__} returns arrays, so it cannot be UNCOUNTED")
 
 
 class _PartCompiler(_KernelCompiler):

@@ -1,9 +1,12 @@
 """Compiled kernels must not lie in the package: what pip does not know of, it leaves behind."""
 
+import ast
+import inspect
 import math
 import os
 import subprocess
 import sys
+import textwrap
 from pathlib import Path
 
 import pytest
@@ -153,6 +156,213 @@ def test_the_run_that_compiles_gives_the_same_bits_as_later_ones(tmp_path):
         for _ in range(3)
     ]
     assert runs[0] == runs[1] == runs[2]
+
+
+#: What functions without reference counting may call besides such functions: none of it allocates or returns an array
+#: of its own. Types derived from tuples may be made, and functions of LLVM and of libraries called.
+ALLOCATES_NOTHING = {
+    "range", "len", "min", "max", "abs", "round", "int", "float", "bool", "complex", "zip", "enumerate", ".sum",
+    *(f"{module}.{name}" for module in ("np", "math") for name in (
+        "sqrt", "hypot", "cos", "sin", "atan2", "arctan2", "log", "log1p", "exp", "abs", "sign", "copysign", "isnan",
+        "isfinite", "floor", "ceil", "int64", "float64", "searchsorted")),
+}  # fmt: skip
+
+
+def compiled_functions():
+    """All kernels and parts."""
+    import importlib
+    import pkgutil
+
+    from numba.core.dispatcher import Dispatcher
+
+    for package in ("dda", "ddm", "coupling", "model"):
+        for module in pkgutil.walk_packages([str(Path(geomech.__file__).parent / package)], f"geomech.{package}."):
+            for value in vars(importlib.import_module(module.name)).values():
+                if isinstance(value, Dispatcher) and value.__module__ == module.name:
+                    yield value
+
+
+def calls_of(function):
+    """What a compiled ``function`` calls: other compiled functions, and the names of everything else that could
+    allocate."""
+    from numba.core.dispatcher import Dispatcher
+    from numba.core.types import ExternalFunction, Type
+    from numba.extending import _Intrinsic
+
+    (tree,) = ast.parse(textwrap.dedent(inspect.getsource(function.py_func))).body
+    called, names = [], set()
+    for node in (each for statement in tree.body for each in ast.walk(statement)):
+        if isinstance(node, (ast.ListComp, ast.SetComp, ast.DictComp, ast.List, ast.Set, ast.Dict)):
+            names.add(type(node).__name__)
+        elif isinstance(node, ast.Call) and isinstance(node.func, ast.Name):
+            value = function.py_func.__globals__.get(node.func.id)
+            if isinstance(value, Dispatcher):
+                called.append(value)
+            elif not (
+                isinstance(value, (_Intrinsic, ExternalFunction, Type))
+                or (isinstance(value, type) and issubclass(value, tuple))
+            ):
+                names.add(node.func.id)
+        elif isinstance(node, ast.Call):
+            of_module = isinstance(node.func.value, ast.Name) and node.func.value.id in ("np", "math")
+            names.add(ast.unparse(node.func) if of_module else f".{node.func.attr}")
+    return called, names
+
+
+def test_references_are_counted_where_arrays_are_allocated_and_only_there():
+    """Without counting, arrays that a function allocates would never be released; with it, code of functions that only
+    fill arrays takes longer to compile and to run. (That none returns an array is tested as it is compiled.)"""
+    from geomech.compiled import UNCOUNTED
+
+    calls = {function: calls_of(function) for function in compiled_functions()}
+
+    def allocates(function) -> bool:
+        called, names = calls[function]
+        return bool(names - ALLOCATES_NOTHING) or any(allocates(each) for each in called)
+
+    assert UNCOUNTED == {"_nrt": False} and len(calls) > 200
+    counted = {function for function in calls if function.targetoptions.get("_nrt", True)}
+    assert 40 < len(counted) < 100
+    assert {each.__qualname__ for each in counted} == {each.__qualname__ for each in calls if allocates(each)}
+
+
+def test_what_only_kernels_call_is_no_kernel_by_itself():
+    """A kernel that a kernel calls is compiled to machine code of its own, with a way in for Python: in vain, unless
+    Python calls it."""
+    from geomech.compiled import _KernelCompiler, _PartCompiler
+
+    functions = list(compiled_functions())
+    compiled = {(each.__module__, each.__name__) for each in functions}
+    by_python: set[str] = set()
+
+    def look(node, module):
+        if not (isinstance(node, ast.FunctionDef) and (module, node.name) in compiled):
+            by_python.update(getattr(node, key) for key in ("id", "attr") if hasattr(node, key))
+            for inner in ast.iter_child_nodes(node):
+                look(inner, module)
+
+    root = Path(geomech.__file__).parent
+    for file in (each for package in ("dda", "ddm", "coupling", "model") for each in (root / package).rglob("*.py")):
+        look(ast.parse(file.read_text()), ".".join(("geomech", *file.relative_to(root).with_suffix("").parts)))
+    kernels = [each for each in functions if issubclass(each._compiler.pipeline_class, _KernelCompiler)]
+    kernels = [each for each in kernels if not issubclass(each._compiler.pipeline_class, _PartCompiler)]
+    assert len(kernels) > 60
+    assert {each.__name__ for each in kernels} <= by_python
+
+
+def test_a_function_without_reference_counting_returns_no_array(tmp_path):
+    (tmp_path / "rows.py").write_text(
+        "from geomech.compiled import UNCOUNTED, kept, part\n"
+        "@part(nogil=True, **UNCOUNTED)\ndef same(x):\n    return x\n"
+        "@kept(nogil=True, **UNCOUNTED)\ndef total(x):\n    return same(x).sum()\n"
+        "@kept(nogil=True, **UNCOUNTED)\ndef pair(x):\n    return x[0, 0], (1.0, x[1])\n"
+    )
+    code = (
+        "import numpy as np, rows\n"
+        "for function in rows.total, rows.pair:\n"
+        "    try:\n        function(np.ones((2, 3)))\n"
+        "    except TypeError as error:\n        print(error)\n"
+    )
+    environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path / "kernels")}
+    environment["PYTHONPATH"] = os.pathsep.join([str(tmp_path), str(Path(geomech.__file__).resolve().parents[1])])
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, env=environment)
+    assert done.stdout.splitlines() == [
+        f"{name} returns arrays, so it cannot be UNCOUNTED" for name in ("same", "pair")
+    ]
+
+
+def test_the_level_of_optimisation_before_linking_changes_no_bit(tmp_path):
+    """A part of products, quotients, sums and elementary functions, and a kernel that calls it: as compiled here, and
+    with LLVM's passes before linking as Numba makes them."""
+    body = "".join(
+        f"    for i in range(len(x)):\n        y = x[i] * {k}.7 + y * x[i - 1] / (1.0 + x[i] ** 2) + np.sin(y) ** 3 * 0.1\n"
+        for k in range(4)
+    )
+    (tmp_path / "levels.py").write_text(
+        "import numpy as np\nfrom geomech.compiled import UNCOUNTED, kept, part\n"
+        f"@part(fastmath=False, error_model='numpy', **UNCOUNTED)\ndef chain(x, y):\n{body}    return y\n"
+        "@kept(fastmath=False, error_model='numpy')\ndef chained(x):\n    out = np.empty_like(x)\n"
+        "    for i in range(len(x)):\n        out[i] = chain(x[: i + 1], 0.1) * x[i] + chain(x, x[i])\n    return out\n"
+    )
+    code = (
+        "import sys, numpy as np\nfrom geomech import compiled\n"
+        "numbers = np.random.default_rng(1).normal(size=40)\n"
+        "levels, passes = [], compiled.CPUCodegen._function_pass_manager\n"
+        "def noted(self, **options):\n    levels.append(options)\n"
+        "    return passes(self, **({} if sys.argv[1:] else options))\n"
+        "compiled.CPUCodegen._function_pass_manager = noted\n"
+        "import levels as made\nprint(made.chained(numbers).tobytes().hex(), {'opt': 1} in levels)"
+    )
+    ours, numbas = (
+        subprocess.run(
+            [sys.executable, "-c", code, *given], capture_output=True, text=True, check=True,
+            env={**os.environ, "NUMBA_CACHE_DIR": str(tmp_path / f"kernels{len(given)}"), "PYTHONPATH": os.pathsep.join(
+                [str(tmp_path), str(Path(geomech.__file__).resolve().parents[1])])},
+        ).stdout
+        for given in ([], ["as Numba does"])
+    )  # fmt: skip
+    assert ours == numbas and ours.split()[1] == "True"
+
+
+@pytest.mark.parametrize(
+    ("made", "level"),
+    [
+        (lambda builder, x, y: builder.fmul(x, y), {"opt": 1}),
+        (lambda builder, x, y: builder.fma(x, y, y), {"opt": 1}),
+        (lambda builder, x, y: builder.fmul(x, y, flags=("contract",)), {}),
+        (lambda builder, x, y: builder.fneg(x, flags=("reassoc", "nsz")), {}),
+        (lambda builder, x, y: builder.call(builder.function, [x, y], fastmath=("fast",)), {}),
+        (lambda builder, x, y: builder.select(builder.fcmp_ordered("<", x, y, flags=("nnan",)), x, y), {}),
+    ],
+)
+def test_what_may_be_fused_is_optimised_before_linking_as_numba_does(monkeypatch, made, level):
+    """Flags of fast mathematics can stand in functions that ask for none: those of `ddm.kernels.simd` make them."""
+    from llvmlite import ir
+    from numba.core.registry import cpu_target
+
+    from geomech.compiled import CPUCodegen, _Part
+
+    levels, passes = [], CPUCodegen._function_pass_manager
+    monkeypatch.setattr(
+        CPUCodegen, "_function_pass_manager", lambda self, **of: (levels.append(of), passes(self, **of))[1]
+    )
+    codegen, number = cpu_target.target_context.codegen(), ir.DoubleType()
+    module = codegen._create_empty_module("made")
+    function = ir.Function(module, ir.FunctionType(number, [number, number]), "made")
+    builder = ir.IRBuilder(function.append_basic_block())
+    builder.ret(made(builder, *function.args))
+    levels.clear()
+    _Part(codegen, "made").add_ir_module(module)
+    assert levels == [level]
+
+
+def test_variables_live_as_long_as_numba_lets_them():
+    from numba.core.compiler import run_frontend
+    from numba.core.postproc import PostProcessor
+
+    from geomech.compiled import _without_entry_variables
+
+    def branching(x, n):
+        total, last = 0.0, x[0]
+        for i in range(n):
+            if x[i] > last:
+                total += x[i]
+            else:
+                last = x[i]
+                continue
+            total -= last
+        return total
+
+    def yielding(n):
+        for i in range(n):
+            yield i * i
+
+    for function in branching, yielding:
+        ours, numbas = run_frontend(function), run_frontend(function)
+        _without_entry_variables(PostProcessor(ours), emit_dels=True)
+        PostProcessor(numbas).run(emit_dels=True)
+        assert ours.dump_to_string() == numbas.dump_to_string() and "del " in ours.dump_to_string()
+        assert (ours.generator_info is None) == (numbas.generator_info is None)
 
 
 @pytest.mark.parametrize(
