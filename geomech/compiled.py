@@ -40,13 +40,16 @@ from .kernel_folder import SOURCE, kernel_place, prune
 log = logging.getLogger(__name__)
 
 try:
+    from numba.core.base import BaseContext
     from numba.core.caching import IndexDataCacheFile, UserProvidedCacheLocator
     from numba.core.codegen import CPUCodegen, JITCodeLibrary
     from numba.core.compiler import Compiler
+    from numba.core.datamodel.manager import DataModelManager
     from numba.core.dispatcher import Dispatcher
     from numba.core.ir import Inst, Loc, Var
     from numba.core.options import DefaultOptions
     from numba.core.postproc import PostProcessor, VariableLifetime
+    from numba.core.runtime.context import NRTContext
     from numba.core.targetconfig import ConfigStack, TargetConfig
     from numba.core.transforms import canonicalize_cfg
     from numba.core.types.functions import BaseFunction
@@ -54,7 +57,9 @@ try:
 except ImportError:  # logged below; classes that stand in for those that this version lacks
     IndexDataCacheFile = UserProvidedCacheLocator = CPUCodegen = JITCodeLibrary = Compiler = object
     ConfigStack = TargetConfig = DefaultOptions = _OverloadFunctionTemplate = object
-    Inst = Loc = Var = PostProcessor = VariableLifetime = canonicalize_cfg = object
+    BaseContext = DataModelManager = NRTContext = Inst = Loc = Var = PostProcessor = VariableLifetime = (
+        canonicalize_cfg
+    ) = object
     BaseFunction = object  # type: ignore[misc, assignment]
     Dispatcher = type(njit(lambda: None))  # type: ignore[misc]
 
@@ -71,6 +76,8 @@ _INNER = (
     (BaseFunction, ("get_call_type",)),
     (Inst, ("_rec_list_vars", "list_vars")),
     (PostProcessor, ("run", "_insert_var_dels")),
+    (BaseContext, ("refresh", "get_abi_sizeof")),
+    (NRTContext, ("get_meminfos",)),
     (_OverloadFunctionTemplate, ("_get_impl", "_get_jit_decorator")),
     (ConfigStack, ("top_or_none", "enter")),
     (TargetConfig, ("copy", "values", "options", "__hash__")),
@@ -120,6 +127,7 @@ def kept(**options) -> Callable:
             file.__class__ = _CacheFile
             # Differs from Numba's own name: those files have no checksums.
             file._index_path = str(Path(file._index_path).with_suffix(".summed.nbi"))
+            made.get_call_template = functools.partial(_with_any_integer, made.get_call_template)  # type: ignore[method-assign]
         return made
 
     return compiled
@@ -146,7 +154,7 @@ def _refuse(name: str, *args, **kwargs) -> None:
 
 
 def _with_any_integer(get_call_template: Callable, args: tuple, kws: dict) -> tuple:
-    """The call of a part with the types ``args`` and ``kws``, with constants replaced by the integer type."""
+    """The call of a function with the types ``args`` and ``kws``, with constants replaced by the integer type."""
     return get_call_template(
         tuple(_plain(each) for each in args), {name: _plain(each) for name, each in kws.items()}
     )  # fmt: skip
@@ -172,6 +180,9 @@ def _quick_inference() -> Iterator[None]:
         (TargetConfig, "__hash__", _hash_of_settings),
         (Inst, "_rec_list_vars", _variables_of),
         (PostProcessor, "run", _without_entry_variables),
+        (BaseContext, "refresh", _refresh_if_new),
+        (BaseContext, "get_abi_sizeof", _remembered_size),
+        (NRTContext, "get_meminfos", _counted_in),
     )
     before, collects = [(owner, name, getattr(owner, name)) for owner, name, _ in replaced], gc.isenabled()
     # A compiler's objects are in use until it is done; garbage collection would take a twentieth of the time.
@@ -287,6 +298,56 @@ def _without_entry_variables(self: PostProcessor, emit_dels: bool = False, exten
     function.variable_lifetime, function.generator_info = VariableLifetime(function.blocks), None
     if emit_dels:
         self._insert_var_dels(extend_lifetimes=extend_lifetimes)
+
+
+_refresh: Callable = getattr(BaseContext, "refresh", _refuse)
+#: By identity: registries of a context, and the number of declarations in them when they were last loaded.
+_loaded: dict[int, tuple[dict, int]] = {}
+
+
+def _refresh_if_new(self: BaseContext) -> None:
+    """Load new declarations, if there are any: Numba looks for them whenever a function has none for given types."""
+    registries, known = self._registries, _number_of_declarations(self)
+    if _loaded.get(id(registries), ({}, -1))[1] != known:
+        _refresh(self)
+        _loaded[id(registries)] = registries, _number_of_declarations(self)
+
+
+def _number_of_declarations(context: BaseContext) -> int:
+    registries = (*context._registries, *context.typing_context._registries)
+    return sum(len(each) for registry in registries for each in vars(registry).values() if isinstance(each, list))
+
+
+_size: Callable = getattr(BaseContext, "get_abi_sizeof", _refuse)
+_sizes: dict[tuple, int] = {}
+
+
+def _remembered_size(self: BaseContext, ty: llvmir.Type) -> int:
+    """The size of a type, cached by its text unless that contains names: LLVM is given a text to read for each."""
+    text = str(ty)
+    if "%" in text:
+        return _size(self, ty)
+    key = type(self), text
+    if key not in _sizes:
+        _sizes[key] = _size(self, ty)
+    return _sizes[key]
+
+
+def _counted_in(self: NRTContext, builder: llvmir.IRBuilder, ty: types.Type, value: llvmir.Value) -> list[tuple]:
+    """The (type, counted object) in a ``value``, in Numba's order; of members that contain none no code is made. (To
+    release an array, Numba takes out its shape, its strides and five other members: a seventh of all code for LLVM.)"""
+    manager = self._context.data_model_manager
+    model = manager[ty]
+    found = [(ty, model.get_nrt_meminfo(builder, value))] if model.has_nrt_meminfo() else []
+    for inner, member in model.traverse(builder):
+        if _contains_counted(manager, inner):
+            found += self.get_meminfos(builder, inner, member(value))
+    return found
+
+
+@functools.cache
+def _contains_counted(manager: DataModelManager, ty: types.Type) -> bool:
+    return manager[ty].contains_nrt_meminfo()
 
 
 @functools.cache

@@ -336,6 +336,53 @@ def test_what_may_be_fused_is_optimised_before_linking_as_numba_does(monkeypatch
     assert levels == [level]
 
 
+def test_sizes_are_those_of_numba_and_new_declarations_are_found(monkeypatch):
+    from llvmlite import ir
+    from numba.core import imputils
+    from numba.core.registry import cpu_target
+
+    from geomech import compiled
+
+    context, number = cpu_target.target_context, ir.DoubleType()
+    named = ir.global_context.get_identified_type("named")
+    named.set_body(number, number)
+    pair = ir.LiteralStructType([ir.IntType(8), ir.ArrayType(number, 3)])
+    for of in number, pair, pair.as_pointer(), ir.LiteralStructType([pair, named]), ir.IntType(1), pair:
+        assert compiled._remembered_size(context, of) == context.get_abi_sizeof(of)
+    context.refresh()
+    refreshed = []
+    monkeypatch.setattr(compiled, "_refresh", refreshed.append)
+    compiled._loaded.clear()
+    compiled._refresh_if_new(context)
+    compiled._refresh_if_new(context)
+    assert refreshed == [context]
+    monkeypatch.setattr(imputils.builtin_registry, "casts", [*imputils.builtin_registry.casts, None])
+    compiled._refresh_if_new(context)
+    assert refreshed == [context, context]
+    compiled._loaded.clear()
+
+
+def test_the_same_references_are_counted_with_less_code():
+    from llvmlite import ir
+    from numba import types
+    from numba.core.registry import cpu_target
+
+    from geomech.compiled import NRTContext, _counted_in
+
+    context, array = cpu_target.target_context, types.Array(types.float64, 2, "C")
+    codes = []
+    for given in array, types.Tuple((types.int64, array, types.UniTuple(array, 2))), types.Optional(array), types.int8:
+        counted = []
+        for of in NRTContext.get_meminfos, _counted_in:
+            module = context.codegen()._create_empty_module("counted")
+            function = ir.Function(module, ir.FunctionType(ir.VoidType(), [context.get_value_type(given)]), "counted")
+            builder = ir.IRBuilder(function.append_basic_block())
+            counted.append([(ty, str(of.type)) for ty, of in of(context.nrt, builder, given, function.args[0])])
+            codes.append(len(builder.block.instructions))
+        assert counted[0] == counted[1]
+    assert codes[::2] > codes[1::2] and codes[:2] == [11, 1]
+
+
 def test_variables_live_as_long_as_numba_lets_them():
     from numba.core.compiler import run_frontend
     from numba.core.postproc import PostProcessor
@@ -402,14 +449,11 @@ def test_a_part_is_compiled_once_for_all_constants(tmp_path):
         "@kept(nogil=True)\ndef scaled(x, n):\n    return shifted(x, 0) + shifted(x, 1) + shifted(x, n)\n"
     )
     code = (
-        "from numba.core.ir import Inst\n"
-        "from numba.core.targetconfig import TargetConfig as settings\n"
-        "from numba.core.types.functions import BaseFunction\n"
-        "before = settings.__eq__, settings.__hash__, BaseFunction.get_call_type, Inst._rec_list_vars\n"
+        "from geomech import compiled as c\n"
+        "def inner():\n    return [getattr(owner, name) for owner, names in c._INNER for name in names]\n"
+        "before = inner()\n"
         "from constants import scaled, shifted\n"
-        "print(scaled(1.0, 5), len(shifted.overloads))\n"
-        "now = settings.__eq__, settings.__hash__, BaseFunction.get_call_type, Inst._rec_list_vars\n"
-        "print(now == before)"
+        "print(scaled(1.0, 5), len(shifted.overloads), inner() == before)\n"
     )
     environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path / "kernels")}
     environment["PYTHONPATH"] = os.pathsep.join([str(tmp_path), str(Path(geomech.__file__).resolve().parents[1])])

@@ -537,7 +537,7 @@ class Attempt:
         velocity, self.kept = scheme.corrected(velocity, before, acceleration, increment[:, 2], dt)
         if self.heavier != 1.0:
             acceleration = 2.0 * self.heavier * (increment - self.begun * dt) / (dt * dt)
-        self.slid = sliding(self.vectors, self.settled.unknowns, self.order, found.block, found.other)
+        self.slid = sliding(self.vectors, self.settled.unknowns, self.order, found.block, found.other, 1)
         if actions is not None and self.n_free:
             self.slid += actions.along
         self.rubbed = 0.0
