@@ -12,6 +12,7 @@ from .. import dda
 from ..ddm.counters import Work
 from ..model import Blocks, Cracks, Motion, Problem, State
 from ..model.blocks.polygon import winding_number
+from .crack_compliance.block_stress_field import BlockStressField
 from .crack_compliance.growth_screening import GrowthScreening
 from .crack_compliance.load_extrapolation import LoadExtrapolation
 from .crack_compliance.mean_stress_response import ByMeanStress
@@ -94,6 +95,55 @@ class CrackedBlocks:
     def _take_bodies(self) -> None:
         """Make the elastic bodies of the present cracks; bodies that have not changed are kept."""
         self.bodies, self.nodes_of = self.bodies_of(self.cracks, self.bodies)
+        deflected = self.system.deflected
+        if deflected is not None:
+            fields, compliance = self.by_mean_stress.fields, self.system.compliance
+            bend = [b for b in self.bodies if deflected.order[b] > 1]
+            known = {b: fields[b] for b in bend if b in fields and fields[b].blocks is deflected}
+            more = {b: BlockStressField.of(deflected, b, compliance[b]) for b in bend if b not in known}
+            self.by_mean_stress.take_fields(known | more)
+
+    def _width(self) -> int:
+        """Number of components of the strain that cracks give a block: 3, and in blocks of higher order those of
+        deflection."""
+        deflected = self.system.deflected
+        cracked = self.cracks.n_segments or self.problem.growth.initiation
+        return 3 if deflected is None or not cracked else 3 + deflected.basis.coupling.shape[2]
+
+    def elastic(self, block: int) -> np.ndarray:
+        """(3, 3) or (3 + m, 3 + m) compliance of the rock of a cracked ``block`` (`ByMeanStress.elastic`)."""
+        return self.by_mean_stress.elastic(block, self.system.compliance[block])
+
+    def elastic_of(self, blocks: np.ndarray) -> np.ndarray:
+        """(n, w, w) of the cracked ``blocks`` (n,), padded with zeros."""
+        out = self._padded(self.system.compliance[blocks])
+        for k, known in self._fields_among(blocks):
+            out[k, : known.width, : known.width] = known.rock
+        return out
+
+    def stress_of(self, state: State, blocks: np.ndarray) -> np.ndarray:
+        """(n, w) Pa, stress of the cracked ``blocks`` (n,) in ``state``, on current axes: the mean, and that of their
+        deflection; padded with zeros."""
+        out = self._padded(state.stress[blocks])
+        for k, known in self._fields_among(blocks):
+            out[k, : known.width] = known.stress_of(state)
+        return out
+
+    def crack_strain_of(self, state: State, blocks: np.ndarray) -> np.ndarray:
+        """(n, w) as `stress_of`: the strain of their cracks."""
+        out = self._padded(state.crack_strain[blocks])
+        for k, known in self._fields_among(blocks):
+            out[k, : known.width] = known.crack_strain_of(state)
+        return out
+
+    def _padded(self, values: np.ndarray) -> np.ndarray:
+        """``values`` (n, 3, …) of mean strain with room for deflection."""
+        w = self.response.offset.shape[1]
+        return values if w == 3 else np.pad(values, [(0, 0)] + [(0, w - 3)] * (values.ndim - 1))
+
+    def _fields_among(self, blocks: np.ndarray) -> list[tuple[int, BlockStressField]]:
+        fields = self.by_mean_stress.fields
+        return [(k, fields[b]) for k, b in enumerate(blocks.tolist()) if b in fields] if fields else []
 
     def bodies_of(self, cracks: Cracks, kept: dict) -> tuple[dict, dict[int, np.ndarray]]:
         """Elastic bodies of the present blocks with these ``cracks``, and their nodes (see `elastic_bodies`)."""
@@ -129,13 +179,15 @@ class CrackedBlocks:
         )  # fmt: skip
         n = self.blocks.n_blocks
         self.nodes_of = {}
-        response = dda.CrackResponse(np.zeros((n, 3, 3)), np.zeros((n, 3)))
+        response = dda.CrackResponse.none(n, self._width())
         whole, before = np.zeros(0, int), np.zeros(0, int)
         if parent is not None:
             whole, before = np.flatnonzero(np.bincount(parent)[parent] == 1), parent
         if len(whole):
-            response.compliance[whole] = self.response.compliance[before[whole]]
-            response.offset[whole] = self.response.offset[before[whole]]
+            old = self.response
+            w = min(old.offset.shape[1], response.offset.shape[1])
+            response.compliance[whole, :w, :w] = old.compliance[before[whole], :w, :w]
+            response.offset[whole, :w] = old.offset[before[whole], :w]
         self.response = response
         self.bodies, self.solutions, self.compliances, self.solved_from = (
             {child: known[before[child]] for child in whole.tolist() if before[child] in known}

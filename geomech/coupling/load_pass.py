@@ -319,7 +319,7 @@ def _softest(now: CrackedBlocks, oscillating: set[int]) -> set[int]:
     soft blocks: they drive each other, and rounding would decide between them."""
 
     def soft(block: int) -> bool:
-        return now.by_mean_stress.soft(block, now.bodies[block], now.system.compliance[block])
+        return now.by_mean_stress.soft(block, now.bodies[block], now.elastic(block))
 
     found = {block for block in oscillating if soft(block)}
     return {block for block in now.bodies if soft(block)} if len(found) > 1 else found or oscillating
@@ -346,22 +346,23 @@ def _expected(now: CrackedBlocks, time: float) -> dda.CrackResponse:
         return now.response
     blocks = tuple(now.bodies)
     numbers = np.array(blocks)
-    known, beyond, s = now.extrapolation.at(loads_at(now.problem.loads, time), blocks, _systems(now))
+    width = now.response.offset.shape[1]
+    known, beyond, s = now.extrapolation.at(loads_at(now.problem.loads, time), blocks, _systems(now), width)
     last, grown = now.extrapolation.last(blocks), np.zeros_like(beyond)
     if last is not None:
         for b, solution in _solutions_under_last_forces(now, numbers[~known].tolist()).items():
             k = blocks.index(b)
-            known[k], s[k] = True, now.compliances[b][2]
+            known[k], s[k] = True, _stacked([now.compliances[b][2]], width)[0]
             beyond[k] = last.strain[k] - s[k] @ last.stress[k]
-            grown[k] = solution.crack_strain - last.strain[k]
-    response = dda.CrackResponse(now.response.compliance.copy(), now.response.offset.copy())
+            grown[k] = _stacked([solution.crack_strain], width)[0] - last.strain[k]
+    response = now.response.copy()
     own, began = numbers[known], now.state.rotation[numbers]
     response.compliance[own], response.offset[own] = crack_responses(
         s[known], beyond[known], np.zeros_like(beyond[known]), began[known]
     )
     if last is not None and grown.any():
-        grown = times(stress_rotations(-began).transpose(0, 2, 1), grown)
-        size = _strained(now.system.compliance[numbers], last.stress, last.strain + grown)
+        grown = times(stress_rotations(-began, grown.shape[1]).transpose(0, 2, 1), grown)
+        size = _strained(now.elastic_of(numbers), last.stress, last.strain + grown)
         if known.all():
             offset, s = response.offset[numbers], response.compliance[numbers]
             response.offset[numbers] = now.quasi_newton.next(offset, grown, s, size)
@@ -431,10 +432,23 @@ def _take_loads(now: CrackedBlocks, result: StepResult) -> None:
         still = result.vertices is now.state.vertices
         motion = now.motion(now.state) if still else Motion.of(now.blocks, result.vertices)
         now.loads = boundary_loads(now.problem, now.blocks, now.state, motion, result, now.bodies)
+        for block, known in now.by_mean_stress.fields.items() if now.system.scheme.static else ():
+            if block in now.loads:
+                load = now.loads[block]
+                # As with the mean: the stress of the load is the block's own.
+                lacking = known.stress_of(result.state)
+                lacking[:3], lacking[3:] = 0.0, lacking[3:] - known.of_load(load)
+                now.loads[block] = replace(load, intact=known.under(lacking))
 
 
 def _solve(now: CrackedBlocks, bodies: dict) -> None:
-    now.solutions = now.solve(bodies, now.loads, now.solutions)
+    """Solve ``bodies`` (block →) under their loads. In motion, tips in blocks of higher order are loaded by the stress of
+    their blocks, as their strain is: these give the energy that growth takes."""
+    by_stress = {} if now.system.scheme.static else now.by_mean_stress.fields
+    own = {block: now.by_mean_stress.solutions[block] for block in bodies if block in by_stress}
+    under_loads = {block: body for block, body in bodies.items() if block not in own}
+    solved = now.solve(under_loads, now.loads, now.solutions) if under_loads else {}
+    now.solutions = {block: own[block] if block in own else solved[block] for block in bodies}
     now.solved_from = now.history
     for block, load in now.loads.items():
         if load.bases:
@@ -452,26 +466,25 @@ def _take_response(
     with now.timed("compliance"):
         own = parallel_map(lambda of: _compliance(now, *of), list(answers.items()), threads_for(now.bodies))
         now.compliances.update(zip(answers, own))
-        again, after = (dda.CrackResponse(now.response.compliance.copy(), now.response.offset.copy()) for _ in range(2))
-        known = np.array([now.compliances[b][2] for b in answers])
-        strain = np.array([answer.crack_strain for answer in answers.values()])
+        again, after = now.response.copy(), now.response.copy()
+        width, mean = now.response.offset.shape[1], now.by_mean_stress
+        known = _stacked([now.compliances[b][2] for b in answers], width)
+        strain = _stacked([mean.crack_strain(b, answer) for b, answer in answers.items()], width)
         hang = [k for k, b in enumerate(answers) if b in now.by_mean_stress]
         if hang:
-            limits = (
-                now.by_mean_stress.limit(b, now.bodies[b], now.system.compliance[b]) for b in blocks[hang].tolist()
-            )
-            limit = np.array(list(limits))
+            limit = _stacked([mean.limit(b, now.bodies[b], now.elastic(b)) for b in blocks[hang].tolist()], width)
             turned = limit.transpose(0, 2, 1)
             known[hang], strain[hang] = turned @ known[hang] @ limit, times(turned, strain[hang])
         # A response is given in the axes of the beginning of a step and rotates with its block.
         began, ends = now.state.rotation[blocks], state.rotation[blocks]
-        stress = times(stress_rotations(began - ends), state.stress[blocks])
-        assumed = times(stress_rotations(ends - began).transpose(0, 2, 1), state.crack_strain[blocks])
+        borne = now.stress_of(state, blocks)
+        stress = times(stress_rotations(began - ends, width), borne)
+        assumed = times(stress_rotations(ends - began, width).transpose(0, 2, 1), now.crack_strain_of(state, blocks))
         again.compliance[blocks], again.offset[blocks] = crack_responses(known, strain, stress, began)
-        after.compliance[blocks], after.offset[blocks] = crack_responses(known, strain, state.stress[blocks], ends)
+        after.compliance[blocks], after.offset[blocks] = crack_responses(known, strain, borne, ends)
         found = again.offset[blocks] + times(again.compliance[blocks], stress)
         residual = found - assumed
-        size = _strained(now.system.compliance[blocks], stress, found)
+        size = _strained(now.elastic_of(blocks), stress, found)
         if not size.any():
             differences = np.zeros(len(blocks))
         else:
@@ -480,8 +493,15 @@ def _take_response(
                 before = again.offset[blocks] - residual
                 again.offset[blocks] = quasi_newton.next(before, residual, again.compliance[blocks], size)
     now.response = after
-    own_stress = times(stress_rotations(-state.rotation[blocks]), state.stress[blocks])
+    own_stress = times(stress_rotations(-state.rotation[blocks], width), borne)
     return again, differences, Answer(loads_at(now.problem.loads, state.time), _systems(now), strain, own_stress, known)
+
+
+def _stacked(values: list[np.ndarray], width: int) -> np.ndarray:
+    """(n, width, …) of n arrays (w, …) with w ≤ ``width``, padded with zeros."""
+    if all(len(one) == width for one in values):
+        return np.array(values)
+    return np.array([np.pad(one, [(0, width - len(one))] * one.ndim) for one in values])
 
 
 def _answers(now: CrackedBlocks, state: State) -> dict:
@@ -491,10 +511,11 @@ def _answers(now: CrackedBlocks, state: State) -> dict:
         if block not in now.by_mean_stress:
             return now.solutions[block]
         body, began = now.bodies[block], now.history.get(block)
+        elastic = now.elastic(block)
+        stress = now.stress_of(state, np.array([block]))[0, : len(elastic)]
         return now.by_mean_stress.answer(
-            block, body, state.stress[block], float(state.rotation[block]), now.system.compliance[block], began,
-            now.problem.run.skip,
-        )  # fmt: skip
+            block, body, stress, float(state.rotation[block]), elastic, began, now.problem.run.skip
+        )
 
     return {block: answer(block) for block in now.bodies}
 
@@ -510,6 +531,6 @@ def _compliance(now: CrackedBlocks, block: int, solution) -> tuple:
         return known
     known_before = any(each.compliances for each in now.works)
     with now.each("compliances") if known_before else nullcontext():
-        s = passive(body.compliance(solution))
+        s = passive(now.by_mean_stress.compliance(block, body, solution), now.elastic(block))
     body.work.compliances += 1
     return body.crack_system, states, s

@@ -19,20 +19,29 @@ class NotConverged(RuntimeError):
 class CrackResponse:
     """Response of cracks in blocks: mean crack strain e(σ) = ``offset`` + ``compliance`` σ, current axes.
 
-    ``compliance`` (n_blocks, 3, 3) 1/Pa, symmetric; ``offset`` (n_blocks, 3), engineering shear. Zero for an intact
-    block.
+    ``compliance`` (n_blocks, w, w) 1/Pa, symmetric; ``offset`` (n_blocks, w), engineering shear; w = 3, or more where
+    cracked blocks are of higher order: their deflection follows, in their own frames (`higher_order.crack_softening`).
+    Zero for an intact block.
     """
 
     compliance: np.ndarray
     offset: np.ndarray
 
     def __post_init__(self) -> None:
-        n = len(self.compliance)
-        if np.shape(self.compliance) != (n, 3, 3) or np.shape(self.offset) != (n, 3):
+        n, w = len(self.compliance), max(3, np.shape(self.compliance)[-1])
+        if np.shape(self.compliance) != (n, w, w) or np.shape(self.offset) != (n, w):
             raise ValueError(
-                f"a crack response needs compliance (n_blocks, 3, 3) and offset (n_blocks, 3), "
+                f"a crack response needs compliance (n_blocks, w, w) and offset (n_blocks, w) with w ≥ 3, "
                 f"got {np.shape(self.compliance)} and {np.shape(self.offset)}"
             )
+
+    @classmethod
+    def none(cls, n_blocks: int, width: int = 3) -> CrackResponse:
+        """That of whole blocks."""
+        return cls(np.zeros((n_blocks, width, width)), np.zeros((n_blocks, width)))
+
+    def copy(self) -> CrackResponse:
+        return CrackResponse(self.compliance.copy(), self.offset.copy())
 
 
 @dataclass(frozen=True, eq=False)

@@ -16,6 +16,7 @@ from .counters import Work
 from .excavation import Excavations, until_next_event
 from .higher_order.bending_step import BendingAttempt
 from .higher_order.deflected_blocks import DeflectedBlocks
+from .higher_order.face_points import at_their_points, without_remembered
 from .higher_order.glued_cells import GluedFaces, GlueStrength, KeptCorners
 from .higher_order.order_choice import OrderChoice, extended_deflection
 from .higher_order.six_row_system import SixRowPattern, six_row_pattern
@@ -270,16 +271,12 @@ class BlockSystem:
         choice, strength = self.order_choice, self.glue_strength
         if choice is None and strength is None:
             return self._step(state, loads, dt, crack, load_time, like, pseudo_inertia)[1]
-        if choice is not None:
-            self._take_orders(choice, choice.first if state.order is None else np.asarray(state.order))
-        if strength is not None:
-            self._part(np.zeros(len(strength.tension), bool) if state.parted is None else np.asarray(state.parted))
+        self.follow(state)
         while True:
             attempt, result = self._step(state, loads, dt, crack, load_time, like, pseudo_inertia)
             order = None if choice is None else choice.raised(self.order, self.deflected, attempt)
             if choice is not None and order is not None:
-                if state.deflection is not None:
-                    state = replace(state, deflection=extended_deflection(state.deflection, self.order, order))
+                state = _extended(state, self.order, order)
                 self._take_orders(choice, order)
                 continue
             parted, before = None, self._parted
@@ -293,6 +290,14 @@ class BlockSystem:
                 )
             log.info("t = %g s: %d faces between cells separate", attempt.time, int(parted.sum() - before.sum()))
             self._part(parted)
+
+    def follow(self, state: State) -> None:
+        """Continue with the orders that blocks have in ``state``, and with the glue that holds in it."""
+        choice, strength = self.order_choice, self.glue_strength
+        if choice is not None:
+            self._take_orders(choice, choice.first if state.order is None else np.asarray(state.order))
+        if strength is not None:
+            self._part(np.zeros(len(strength.tension), bool) if state.parted is None else np.asarray(state.parted))
 
     def _refuse_state_of_others(self, state: State) -> None:
         blocks = self.blocks
@@ -360,8 +365,13 @@ class BlockSystem:
             has_multipliers = bool(self.allowed_penetration)
             return self.finder.on_penalty(contacts)[0] if has_multipliers else np.zeros(len(contacts), bool)
 
+        if self.deflected is not None:
+            forces = without_remembered(forces, found, state.face_points)
         rows = inherited_rows(found, forces, self.finder.closure, on_multiplier(found))
         vertices = np.ascontiguousarray(state.vertices)
+        if self.deflected is not None:
+            stiff = self.finder.stiff_laws[found.law], self.finder.stiff_along_laws[found.law]
+            return at_their_points(rows, found, forces.which, self.deflected, state, stiff)
         placed = self.finder.find(replace(state, contacts=rows), vertices, self._standing(state, vertices))
         if placed.points is None:
             return rows
@@ -409,3 +419,10 @@ class BlockSystem:
         pattern.solver.work = self.work
         self._sparse = pairs, pattern
         return pattern
+
+
+def _extended(state: State, before: np.ndarray, order: np.ndarray) -> State:
+    """``state`` of blocks that are raised from the orders ``before`` (n_blocks,) to ``order``."""
+    known = {name: getattr(state, name) for name in ("deflection", "deflection_origin", "crack_deflection")}
+    more = {name: extended_deflection(of, before, order) for name, of in known.items() if of is not None}
+    return replace(state, **more)

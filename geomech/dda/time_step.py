@@ -145,9 +145,7 @@ class Attempt:
         # The mass is constant, whereas strain changes the area.
         self.density = system.mass / moments[:, 0]
         self.n_free = len(system.moving)
-        compliance, offset = (
-            (system.no_compliance, system.no_offset) if crack is None else (crack.compliance, crack.offset)
-        )
+        compliance, offset = self._crack_response(crack)
         self.cracks = CrackTerms(
             crack is not None, np.ascontiguousarray(state.crack_strain),
             np.ascontiguousarray(compliance, dtype=float), np.ascontiguousarray(offset, dtype=float),
@@ -175,6 +173,12 @@ class Attempt:
             if not bends or not self._update_arcs():
                 break
         self._move()
+
+    def _crack_response(self, crack: CrackResponse | None) -> tuple[np.ndarray, np.ndarray]:
+        """Compliance (n_blocks, 3, 3) and offset (n_blocks, 3) of the cracks of first-order blocks."""
+        if crack is None:
+            return self.system.no_compliance, self.system.no_offset
+        return crack.compliance[:, :3, :3], crack.offset[:, :3]
 
     def _expected_states(self) -> tuple[np.ndarray, np.ndarray]:
         """States and senses of sliding (n,) with which open–close iterations begin: those carried over, except for

@@ -477,6 +477,8 @@ class Body:
         rest = np.zeros(n_g + self.faces.n_unknowns)
         if uniform.any() and len(self.loops) == self.outlined:  # otherwise it is one of the unit loads
             rest[n_g:] = on_elements(self.faces, uniform)
+        if load.intact is not None:
+            rest[n_g:] += on_elements(self.faces, load.intact.stress(self.faces.nodes.reshape(-1, 2)))
         if not applied.plain:
             tol = 2 * OFF * self._extent
             rest[:n_g] += applied.on(self.boundary, True, self.nu, tol, self._outside.anchors)
@@ -573,14 +575,18 @@ class Body:
             closed = np.zeros(self.faces.n_unknowns, bool) if sol is None else sol.closed
             response = self.strain_weights @ uniform_stress_response_of(self, closed).jumps[:, :3]
             return 0.5 * (response + response.T)
-        right = -self.mean_stress_traction
+        response = self.strain_weights @ self.jumps_under(self.mean_stress_traction, sol)
+        return 0.5 * (response + response.T)
+
+    def jumps_under(self, traction: np.ndarray, sol: Solution | None = None) -> np.ndarray:
+        """(n_unknowns, k) slip and opening, times 2μ, per load that causes the ``traction`` (n_unknowns, k) on closed
+        faces, with the face states of ``sol`` (all open if None)."""
+        right = -traction
         try:
-            jumps = self._jumps_of(right, sol)
+            return self._jumps_of(right, sol)
         except NotSolved as failure:
             self._factor_after_all(failure)
-            jumps = self._jumps_of(right, sol)
-        response = self.strain_weights @ jumps
-        return 0.5 * (response + response.T)
+            return self._jumps_of(right, sol)
 
     def _jumps_of(self, right: np.ndarray, sol: Solution | None) -> np.ndarray:
         """(n_unknowns, k) jumps under the face loads ``right``, with the face states of ``sol``."""

@@ -110,6 +110,8 @@ class State:
                                     their rates, block by block; None: no block has any. ``vertices`` are without it
     deflection_origin (k, 2)        m, as in-situ stress leaves it: the deflection at which blocks of higher order bear
                                     their mean stress alone, and that from which displacements count; None: zero
+    crack_deflection (k,)           m, part of the deflection that is due to opening and slip of the block's cracks; None:
+                                    no such block has cracks
     face_points   FACE_POINT rows   what points of the faces of such blocks remember
     parted        (n_faces,)        True: the glue of that face of `Blocks.glued` has parted; None: all holds
     order         (n_blocks,)       order that each block has come to, where orders are found as the run goes; None: they
@@ -132,6 +134,7 @@ class State:
     order: np.ndarray | None = None
     parted: np.ndarray | None = None
     deflection_origin: np.ndarray | None = None
+    crack_deflection: np.ndarray | None = None
 
     @classmethod
     def at_rest(cls, blocks: Blocks) -> State:

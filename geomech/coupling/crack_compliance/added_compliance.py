@@ -16,14 +16,23 @@ import numpy as np
 _ROUND_OFF = 1e-12
 
 
-def stress_rotation(angle: float) -> np.ndarray:
-    """Q (3, 3): components of a stress carried along by a rotation of ``angle`` rad, σ' = Q σ."""
+def stress_rotation(angle: float, width: int = 3) -> np.ndarray:
+    """Q (width, width): components of a stress carried along by a rotation of ``angle`` rad, σ' = Q σ. Those after the
+    first three are of deflection, in the frame that rotates along, and stay."""
     c, s = math.cos(angle), math.sin(angle)
-    return np.array([[c * c, s * s, -2 * s * c], [s * s, c * c, 2 * s * c], [s * c, -s * c, c * c - s * s]])
+    turn = np.array([[c * c, s * s, -2 * s * c], [s * s, c * c, 2 * s * c], [s * c, -s * c, c * c - s * s]])
+    return turn if width == 3 else _widened(turn[None], width)[0]
 
 
-def stress_rotations(angle: np.ndarray) -> np.ndarray:
-    """(n, 3, 3) `stress_rotation` of every ``angle`` (n,)."""
+def _widened(turns: np.ndarray, width: int) -> np.ndarray:
+    """(n, width, width) of the rotations ``turns`` (n, 3, 3)."""
+    out = np.tile(np.eye(width), (len(turns), 1, 1))
+    out[:, :3, :3] = turns
+    return out
+
+
+def stress_rotations(angle: np.ndarray, width: int = 3) -> np.ndarray:
+    """(n, width, width) `stress_rotation` of every ``angle`` (n,)."""
     c, s = np.cos(angle), np.sin(angle)
     cc, ss, sc = c * c, s * s, s * c
     out = np.empty((len(c), 3, 3))
@@ -31,7 +40,7 @@ def stress_rotations(angle: np.ndarray) -> np.ndarray:
     out[:, 0, 1] = out[:, 1, 0] = ss
     out[:, 2, 0], out[:, 2, 1], out[:, 2, 2] = sc, -sc, cc - ss
     out[:, 0, 2], out[:, 1, 2] = -2 * sc, 2 * sc
-    return out
+    return out if width == 3 else _widened(out, width)
 
 
 def strain_rotation(angle: float) -> np.ndarray:
@@ -39,13 +48,22 @@ def strain_rotation(angle: float) -> np.ndarray:
     return stress_rotation(-angle).T
 
 
-def passive(compliance: np.ndarray) -> np.ndarray:
-    """The nearest positive semidefinite ``compliance`` (3, 3), independent of the axes.
+def passive(compliance: np.ndarray, elastic: np.ndarray | None = None) -> np.ndarray:
+    """The nearest positive semidefinite ``compliance`` (3, 3), independent of the axes; one of more components, which
+    differ in kind, is measured by the ``elastic`` compliance of the rock, of the same shape.
 
     Faces that slide with Coulomb friction respond to normal stress with slip, but not to shear stress with opening. The
     symmetric part of that response has a negative eigenvalue, along which a block as soft as its rock, or softer, would
     have no stiffness. The part removed stays in the offset, and the iteration finds it.
     """
+    if len(compliance) > 3 and elastic is not None:
+        root = np.linalg.cholesky(elastic)
+        back = np.linalg.inv(root)
+        values, vectors = np.linalg.eigh(back @ compliance @ back.T)
+        if values[0] >= -_ROUND_OFF * values[-1]:
+            return compliance
+        kept = root @ vectors
+        return (kept * np.maximum(values, 0.0)) @ kept.T
     size = np.array([1.0, 1.0, np.sqrt(0.5)])  # Mandel components, whose length does not depend on the axes
     values, vectors = np.linalg.eigh(size[:, None] * compliance * size)
     if values[0] >= -_ROUND_OFF * values[-1]:
@@ -67,8 +85,8 @@ def crack_response(
 def crack_responses(
     compliance: np.ndarray, crack_strain: np.ndarray, stress: np.ndarray, angle: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """`crack_response` of blocks, (n, 3, 3), (n, 3), (n, 3) and (n,)."""
-    back = stress_rotations(-angle)
+    """`crack_response` of blocks, (n, w, w), (n, w), (n, w) and (n,), w ≥ 3."""
+    back = stress_rotations(-angle, crack_strain.shape[1])
     turned = back.transpose(0, 2, 1)
     s = turned @ compliance @ back
     return s, times(turned, crack_strain) - times(s, stress)

@@ -49,19 +49,23 @@ def first_work_on_cracks(stress: np.ndarray, rotation: float, after: Solution) -
 @dataclass(frozen=True, eq=False)
 class Loaded:
     """A block with the ``solution`` of its cracks. If it responds to its mean stress alone: ``mean``, that stress in
-    its own axes, Pa, and its `ByMeanStress.limit`."""
+    its own axes, Pa, and its `ByMeanStress.limit`, and the ``strain`` of its cracks under both. A block of higher order
+    has more components than three (`block_stress_field`)."""
 
     solution: Solution
     mean: tuple[np.ndarray, np.ndarray] | None = None
+    strain: np.ndarray | None = None
 
     @classmethod
     def of(cls, block: int, solution: Solution, by_mean_stress: ByMeanStress) -> Loaded:
-        return cls(solution, by_mean_stress.stress[block] if block in by_mean_stress else None)
+        if block not in by_mean_stress:
+            return cls(solution)
+        return cls(solution, by_mean_stress.stress[block], by_mean_stress.crack_strain(block, solution))
 
     @property
     def limited(self) -> bool:
         """Whether the softness of the block is limited."""
-        return self.mean is not None and not np.array_equal(self.mean[1], np.eye(3))
+        return self.mean is not None and not np.array_equal(self.mean[1], np.eye(len(self.mean[1])))
 
     def same_geometry(self, other: Loaded) -> bool:
         """Whether no crack has grown between the two."""
@@ -81,8 +85,8 @@ def release_between(before: Loaded, after: Loaded) -> float:
         back = a.work_at_cracks(a.body.closed_traction(b.load)) if a.jumps.size else 0.0
     else:
         (stress_a, limit_a), (stress_b, limit_b) = before.mean, after.mean
-        forward = float(limit_a @ stress_a @ b.crack_strain) * b.body.area
-        back = float(limit_b @ stress_b @ a.crack_strain) * a.body.area
+        forward = float(limit_a @ stress_a @ after.strain) * b.body.area
+        back = float(limit_b @ stress_b @ before.strain) * a.body.area
     return 0.5 * (forward - back - _at_faces(a, b) + _at_faces(b, a))
 
 
@@ -92,7 +96,7 @@ def release_of_mean_stress(before: Loaded, after: Loaded) -> float:
         raise ValueError("the block does not respond to its mean stress alone")
     (stress_a, limit_a), (stress_b, limit_b) = before.mean, after.mean
     a, b = before.solution, after.solution
-    blocks = float(stress_a @ limit_b.T @ b.crack_strain - stress_b @ limit_a.T @ a.crack_strain) * b.body.area
+    blocks = float(stress_a @ limit_b.T @ after.strain - stress_b @ limit_a.T @ before.strain) * b.body.area
     return 0.5 * (blocks - _at_faces(a, b) + _at_faces(b, a))
 
 

@@ -59,16 +59,16 @@ class LoadExtrapolation:
         return self.answers[0] if self.answers and blocks == self.blocks else None
 
     def at(
-        self, loads: np.ndarray, blocks: tuple[int, ...], systems: tuple
+        self, loads: np.ndarray, blocks: tuple[int, ...], systems: tuple, width: int = 3
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Extrapolate to ``loads`` for the crack ``systems`` in ``blocks``.
 
-        Returns where a value is known (n,) bool; the crack strain beyond S σ (n, 3), on the line through the nearest
+        Returns where a value is known (n,) bool; the crack strain beyond S σ (n, ``width``), on the line through the nearest
         two solutions that are collinear with ``loads``, or that of the nearest one where they differ in S; and S (n, 3,
         3)."""
         n = len(blocks)
         if self.last(blocks) is None:
-            return np.zeros(n, bool), np.zeros((n, 3)), np.zeros((n, 3, 3))
+            return np.zeros(n, bool), np.zeros((n, width)), np.zeros((n, width, width))
         whole = [one for one in self.answers if one.is_of(systems).all()] or self.answers[:1]
         size = np.abs([loads, *(one.loads for one in whole)]).max(axis=0)
         size[size == 0.0] = 1.0

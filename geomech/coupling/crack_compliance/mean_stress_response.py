@@ -32,6 +32,7 @@ from .added_compliance import passive, stress_rotation
 if TYPE_CHECKING:
     from ...ddm import Body, FaceMemory, Solution
     from ...ddm.loads.uniform_stress_response import UniformStressSolution
+    from .block_stress_field import BlockStressField
 
 #: Softness from which a block counts as soft in statics: compliance that its cracks, all open, add in some direction,
 #: over that of its rock. (An edge crack through half of a square adds 4.)
@@ -67,6 +68,8 @@ class ByMeanStress:
     memory: dict[int, FaceMemory] = field(default_factory=dict)
     #: Mean stress of the last pass in the block's own axes, Pa, and `limit` at that time.
     stress: dict[int, tuple[np.ndarray, np.ndarray]] = field(default_factory=dict)
+    #: Of blocks of higher order, which respond to their whole stress: mean stress and what their deflection adds.
+    fields: dict[int, BlockStressField] = field(default_factory=dict)
     _softness: dict[int, _Softness] = field(default_factory=dict)
     _blocks: set[int] = field(default_factory=set)
 
@@ -80,6 +83,29 @@ class ByMeanStress:
     def take_all(self, bodies: dict[int, Body]) -> None:
         """Give all ``bodies`` (block →) this response."""
         self._blocks.update(bodies)
+
+    def take_fields(self, fields: dict[int, BlockStressField]) -> None:
+        """Give blocks of higher order (block → its stress field) this response, to all of their stress."""
+        self.fields = fields
+        self._blocks.update(fields)
+
+    def elastic(self, block: int, compliance: np.ndarray) -> np.ndarray:
+        """(3, 3) or (3 + m, 3 + m) compliance of the rock of ``block``, whose mean strain has this ``compliance``
+        (3, 3), 1/Pa."""
+        known = self.fields.get(block)
+        return compliance if known is None else known.rock
+
+    def crack_strain(self, block: int, solution: Solution | UniformStressSolution) -> np.ndarray:
+        """(3,) crack strain of ``block`` in its own axes, or (3 + m,) that of a block of higher order."""
+        known = self.fields.get(block)
+        return solution.crack_strain if known is None else known.crack_strain(solution.body, solution.jumps)
+
+    def compliance(
+        self, block: int, body: Body, solution: Solution | UniformStressSolution | None = None
+    ) -> np.ndarray:
+        """(3, 3) or (3 + m, 3 + m) S of ``block``, as in `crack_strain`, with the face states of ``solution``."""
+        known = self.fields.get(block)
+        return body.compliance(solution) if known is None else known.compliance_of(body, solution)
 
     def find(self, bodies: dict[int, Body], elastic: np.ndarray, contacts: np.ndarray) -> None:
         """Add those ``bodies`` (block →) that are soft compared with their ``elastic`` compliance (n_blocks, 3, 3) and
@@ -112,10 +138,10 @@ class ByMeanStress:
         began: FaceMemory | None = None,
         skip: bool = True,
     ) -> Solution | UniformStressSolution:
-        """Solution of ``body``, rotated by ``rotation`` rad, under its mean ``stress`` (3,), Pa, current axes, times
-        its `limit`. With ``skip``, scaled from solutions under unit stresses where that is exact. Faces start with
+        """Solution of ``body``, rotated by ``rotation`` rad, under its mean ``stress`` (3,), or its whole one (3 + m,)
+        (`fields`), Pa, current axes, times its `limit`. With ``skip``, scaled from solutions under unit stresses where that is exact. Faces start with
         their memory of such solutions, or with ``began`` where there is none. Raises `ddm.NotConverged`."""
-        own = stress_rotation(-rotation) @ stress
+        own = stress_rotation(-rotation, len(stress)) @ stress
         limit = self.limit(block, body, elastic)
         known = self._solved(block, body, limit @ own, began, skip)
         if self._changes_limit(block, body, elastic, known):
@@ -128,13 +154,14 @@ class ByMeanStress:
         self, block: int, body: Body, stress: np.ndarray, began: FaceMemory | None, skip: bool
     ) -> Solution | UniformStressSolution:
         """Solution of ``body`` under ``stress`` (3,), Pa, as in `answer`."""
+        from ...ddm import BodyLoad
         from ...ddm.loads.uniform_stress_response import scaled
 
-        before = self.solutions.get(block)
-        known = scaled(body, stress, before) if skip else None
+        before, whole = self.solutions.get(block), self.fields.get(block)
+        known = scaled(body, stress, before) if skip and whole is None else None
         if known is not None:
             return known
-        load = body.mean_stress_load(stress)
+        load = body.mean_stress_load(stress) if whole is None else BodyLoad(intact=whole.under(stress))
         return body.solve(load, warm=before, history=self.memory.get(block, began), meet_target=False)
 
     def _changes_limit(
@@ -143,13 +170,13 @@ class ByMeanStress:
         """Whether the limit of ``block`` changes with the face states of ``solution``: because they are the first since its
         cracks have grown, or softer than `SOFTEST` under the present limit."""
         known = self._known(block, body, elastic)
-        if known.open <= SOFTEST:
+        if known.open <= SOFTEST or block in self.fields:
             return False
         states = solution.closed.tobytes() if solution.memory is None else solution.face_states.key
         if states == known.states:
             return False
         first, known.states = known.states is None, states
-        compliance = passive(body.compliance(solution))
+        compliance = passive(self.compliance(block, body, solution), elastic)
         present_softness, _ = _limited(elastic, known.limit.T @ compliance @ known.limit)
         if not first and present_softness <= SOFTEST * (1.0 + _SAME):
             return False
@@ -158,13 +185,14 @@ class ByMeanStress:
 
     def limits(self, block: int) -> bool:
         """Whether the softness of ``block`` was limited in the last pass."""
-        return not np.array_equal(self.stress[block][1], np.eye(3))
+        limit = self.stress[block][1]
+        return not np.array_equal(limit, np.eye(len(limit)))
 
     def strained(self, block: int, solution: Solution | UniformStressSolution) -> tuple[np.ndarray, np.ndarray]:
-        """Mean stress of the last pass (3,), Pa, and the crack strain (3,) that ``solution`` gives the block; in its
-        own axes."""
+        """Stress of the last pass, Pa, and the crack strain that ``solution`` gives the block; in its own axes, as in
+        `crack_strain`."""
         stress, limit = self.stress[block]
-        return stress, limit.T @ solution.crack_strain
+        return stress, limit.T @ self.crack_strain(block, solution)
 
     def take_step(self) -> None:
         """Accept the step."""
@@ -178,7 +206,9 @@ class ByMeanStress:
             return {child: known[parent[child]] for child in whole.tolist() if parent[child] in known}
 
         own = {b for b in whole.tolist() if parent[b] in self._blocks}
-        return ByMeanStress(kept(self.solutions), kept(self.memory), kept(self.stress), kept(self._softness), own)
+        return ByMeanStress(
+            kept(self.solutions), kept(self.memory), kept(self.stress), _softness=kept(self._softness), _blocks=own
+        )
 
     def soft(self, block: int, body: Body, elastic: np.ndarray) -> bool:
         """Whether open cracks make ``block`` more than `SOFT` times as soft as its rock in some direction."""
@@ -192,7 +222,10 @@ class ByMeanStress:
         known = self._softness.get(block)
         if known is None or known.crack_system is not body.crack_system:
             before = None if known is None or known.states is None else known.limit
-            softness, limit = _limited(elastic, body.compliance())
+            softness, limit = _limited(elastic, self.compliance(block, body))
+            if block in self.fields:
+                # Two parts on a thin ligament turn against each other by deflection.
+                limit = np.eye(len(elastic))
             # Cracks that have grown begin with the limit of before: most of their faces stay as they are.
             known = _Softness(body.crack_system, softness, limit if before is None or softness <= SOFTEST else before)
             self._softness[block] = known
@@ -200,11 +233,11 @@ class ByMeanStress:
 
 
 def _limited(elastic: np.ndarray, compliance: np.ndarray) -> tuple[float, np.ndarray]:
-    """Largest softness of cracks of this ``compliance`` (3, 3) in rock of the ``elastic`` one (3, 3), and the `limit` P."""
+    """Largest softness of cracks of this ``compliance`` (w, w) in rock of the ``elastic`` one (w, w), and the `limit` P."""
     # C = L Lᵀ, L⁻¹ S L⁻ᵀ w = s w, v = L⁻ᵀ w.
     back = np.linalg.inv(np.linalg.cholesky(elastic))
     times, ways = np.linalg.eigh(back @ compliance @ back.T)
     ways = back.T @ ways
     part = np.sqrt(SOFTEST / np.maximum(times, SOFTEST))
-    limit = (ways * part) @ ways.T @ elastic if part[0] < 1 or part[-1] < 1 else np.eye(3)
+    limit = (ways * part) @ ways.T @ elastic if part[0] < 1 or part[-1] < 1 else np.eye(len(elastic))
     return float(times[-1]), limit

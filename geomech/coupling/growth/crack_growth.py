@@ -14,7 +14,8 @@ from ..load_transfer.elastic_bodies import tip_rows
 from ..load_transfer.unbounded_rock import loads_of, take_endless
 from ..splitting.block_splitting import divided, split_blocks
 from ..splitting.contact_initialisation import contacts_after, holds_together
-from ..splitting.part_initial_stress import initialise_moving_parts
+from ..splitting.part_deflection import inherited_deflection
+from ..splitting.part_initial_stress import initialise_moving_parts, initialise_parts_at_rest
 from ..splitting.part_mean_stress import rotated_mean_stress
 
 
@@ -131,9 +132,20 @@ def take_growth(now: CrackedBlocks, growth, state: State, solutions: dict) -> tu
         events.append(event(now, "split", state, centre, f"{now.blocks.names[b]} is cut into {len(parts)} blocks"))
     loads, stands, begun = now.loads, now.state is state, now.state
     stored = {block: of.crack_energy for block, of in now.strain_solutions().items()}
+    deflected, stresses = now.system.deflected, {}
     now.take_split(split)
+    if deflected is not None:
+        now.system.follow(now.state)
+        assert now.system.deflected is not None  # parts are of the order of the whole
+        now.state, stresses = inherited_deflection(
+            split, begun, deflected, now.system.deflected, solutions, now.system.compliance
+        )
+        split = replace(split, state=now.state)
     if now.problem.dda.dynamic_factor != 0.0:
-        initialise_moving_parts(now, split, cut, begun, stored)
+        initialise_moving_parts(now, split, cut, begun, stored, stresses)
+    else:
+        initialise_parts_at_rest(now, stresses)
+    split = replace(split, state=now.state)
     with now.timed("growth"):
         contacts = contacts_after(
             now.system, split, cut, solutions if stands else {}, loads, now.problem.loads, begun.contacts

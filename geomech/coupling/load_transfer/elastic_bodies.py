@@ -10,8 +10,9 @@ import numpy as np
 
 from ...ddm.counters import Work
 from ...ddm.crack_contact.face_laws import Released
-from ...model import TIP, Blocks, Cracks, Motion, Problem, State
+from ...model import AUTO_ORDER, TIP, Blocks, Cracks, Motion, Problem, State
 from ...model.blocks.polygon import joined_loops
+from ..crack_compliance.block_stress_field import PolynomialField
 from ..parallel_map import parallel_map
 from . import boundary_tractions
 from .boundary_tractions import BoundaryForces, BoundaryLoad
@@ -40,10 +41,7 @@ def elastic_bodies(
         cracked = cracked[~removed[cracked]]
     if not len(cracked):
         return {}, {}
-    if blocks.order is not None and (np.asarray(blocks.order)[cracked] != 1).any():
-        block = int(cracked[np.argmax(np.asarray(blocks.order)[cracked] != 1)])
-        name = blocks.names[block] if blocks.names else f"block {block}"
-        raise ValueError(f"{name!r} is of higher order: such blocks have no cracks yet, and none can begin in them")
+    _refuse_unsupported(problem, blocks, cracked)
     from ... import ddm
 
     bodies: dict[int, Body | None] = {}
@@ -74,6 +72,28 @@ def elastic_bodies(
 
     bodies.update(zip([of[0] for of in to_make], parallel_map(made, to_make)))
     return bodies, nodes_of
+
+
+def _refuse_unsupported(problem: Problem, blocks: Blocks, cracked: np.ndarray) -> None:
+    """Raise ValueError for what blocks of higher order cannot have together with cracks."""
+    if blocks.order is None:
+        return
+    order = np.asarray(blocks.order)[cracked]
+    bent = order != 1
+    glued = np.zeros(blocks.n_blocks, bool)
+    if blocks.glued is not None:
+        glued[blocks.vertex_block[np.asarray(blocks.glued).ravel()]] = True
+
+    def refuse(which: np.ndarray, why: str) -> None:
+        if which.any():
+            block = int(cracked[np.argmax(which)])
+            name = blocks.names[block] if blocks.names else f"block {block}"
+            raise ValueError(f"{name!r} is of higher order and has cracks, or may have: {why}")
+
+    refuse(order == AUTO_ORDER, 'give its order as a number, not as "auto"')
+    refuse(bent & glued[cracked], "cells glued to each other have no cracks, and none can begin in them")
+    refuse(bent & (np.diff(blocks.block_loop)[cracked] > 1), "that is not supported for a block with a hole")
+    refuse(bent & (problem.run.boundary_stress != "contacts"), 'that needs run.boundary_stress = "contacts"')
 
 
 def _loops(problem: Problem, blocks: Blocks, block: int) -> list[np.ndarray]:
@@ -203,9 +223,14 @@ _ASKED = tuple(each.name for each in fields(BoundaryLoad) if each.name not in ("
 def _same_question(body: Body, known, asked: dict[str, np.ndarray | None]) -> bool:
     """Whether ``known`` is the solution of ``body`` under the load ``asked``."""
     return known.body is body and all(
-        (of is None) == (before is None) and (of is None or np.array_equal(of, before))
+        of is before if of is None or before is None else _same(of, before)
         for of, before in ((asked[name], getattr(known.load, name)) for name in _ASKED)
     )
+
+
+def _same(of, before) -> bool:
+    """Whether a part of a load is the same as before."""
+    return of.same_as(before) if isinstance(of, PolynomialField) else np.array_equal(of, before)
 
 
 def inherited(history: dict, parent: np.ndarray, cracks: Cracks) -> dict:

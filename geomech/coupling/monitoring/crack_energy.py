@@ -248,6 +248,8 @@ class CrackEnergy:
         strain = state.crack_strain - before.crack_strain
         mean = 0.5 * (before.stress + state.stress)
         each = blocks.areas(before.vertices) * np.sum(mean * strain, axis=1)
+        for block, known in by_mean_stress.fields.items():
+            each[block] += known.work_on_cracks(before, state)
         work = float(each.sum())
         if self.static:
             gone = {block: solutions[block] for block in cut if block in solutions}

@@ -125,6 +125,7 @@ def split_blocks(
         contacts=_contacts(state.contacts, pieces),
         acceleration=None,
         removed=None if state.removed is None else state.removed[parent],
+        order=None if state.order is None else np.asarray(state.order)[parent],
     )
     lost = blocks.areas() - np.bincount(parent, weights=children_blocks.areas(), minlength=blocks.n_blocks)
     origin, edge_origin, span = (
@@ -248,7 +249,17 @@ def _assemble(blocks: Blocks, pieces: list[_Piece]) -> Blocks:
         edge_name=np.array(labels, dtype=int),
         edge_names=tuple(known),
         names=tuple(piece.name for piece in pieces),
+        order=None if blocks.order is None else np.asarray(blocks.order)[parent],
+        glued=None if blocks.glued is None else _glued(np.asarray(blocks.glued), pieces),
     )
+
+
+def _glued(glued: np.ndarray, pieces: list[_Piece]) -> np.ndarray:
+    """(n_faces, 2) the ``glued`` edges by their new numbers; cells have no cracks and are not split."""
+    origin = np.concatenate([edges for piece in pieces for edges in piece.edge_origin])
+    number = np.full(max(int(glued.max()), int(origin.max())) + 1, -1)
+    number[origin[origin >= 0]] = np.flatnonzero(origin >= 0)
+    return number[glued]
 
 
 def _velocity(blocks: Blocks, state: State, children: Blocks, vertices: np.ndarray, parent: np.ndarray) -> np.ndarray:

@@ -15,42 +15,89 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import replace
+from types import MappingProxyType
 
 import numpy as np
 
 from ...model import Blocks, State
 from ..coupled_state import CrackedBlocks
-from ..crack_compliance.added_compliance import crack_response, passive, strain_rotation
+from ..crack_compliance.added_compliance import crack_response, passive, stress_rotation
 from .block_splitting import Split
+from .part_deflection import PartStress, with_stress
 
 
 def initialise_moving_parts(
-    now: CrackedBlocks, split: Split, before: Blocks, state: State, stored: Mapping[int, float]
-) -> None:
+    now: CrackedBlocks, split: Split, before: Blocks, state: State, stored: Mapping[int, float],
+    stresses: Mapping[int, PartStress] = MappingProxyType({}),
+) -> None:  # fmt: skip
     """Set the initial stress and crack strain of the parts of ``split``, which ``now`` has accepted. ``before``: the
-    blocks before the split, in ``state``; ``stored``: energy at the cracks of each, J/m."""
+    blocks before the split, in ``state``; ``stored``: energy at the cracks of each, J/m; ``stresses`` of parts of higher
+    order."""
     is_part = np.bincount(split.parent, minlength=before.n_blocks)[split.parent] > 1
     cracked = [part for part in np.flatnonzero(is_part).tolist() if part in now.bodies]
-
-    def answer(part: int, stress: np.ndarray):
-        now.by_mean_stress.add(part)
-        turn, began = float(split.state.rotation[part]), now.history.get(part)
-        return now.by_mean_stress.answer(part, now.bodies[part], stress, turn, now.system.compliance[part], began)
-
     left = dict(stored)
     for part in cracked:
         parent = int(split.parent[part])
-        left[parent] = left.get(parent, 0.0) - answer(part, state.stress[parent]).crack_energy
-    begun = affordable_stress(split, before, state, now.system.compliance, left)
-    strain = begun.crack_strain.copy()
-    for part in cracked:
-        turn, found = float(begun.rotation[part]), answer(part, begun.stress[part])
-        limit = now.by_mean_stress.limit(part, now.bodies[part], now.system.compliance[part])
-        own = limit.T @ found.crack_strain
-        strain[part] = strain_rotation(turn) @ own
-        soft = limit.T @ passive(now.bodies[part].compliance(found)) @ limit
-        now.response.compliance[part], now.response.offset[part] = crack_response(soft, own, begun.stress[part], turn)
-    now.state = replace(begun, crack_strain=strain)
+        stress = stresses[part].whole if part in stresses else state.stress[parent]
+        left[parent] = left.get(parent, 0.0) - _answer(now, part, stress).crack_energy
+    now.state = affordable_stress(split, before, state, now.system.compliance, left)
+    taken = _affordable(now, split, stresses, left)
+    for part in sorted(set(cracked) | set(taken)):
+        _take_stress(now, part, taken.get(part, now.state.stress[part]))
+
+
+def initialise_parts_at_rest(now: CrackedBlocks, stresses: Mapping[int, PartStress]) -> None:
+    """Set the initial stress and crack strain of parts of higher order, in statics: those of the last solution."""
+    for part, of in stresses.items():
+        _take_stress(now, part, of.solution)
+
+
+def _answer(now: CrackedBlocks, part: int, stress: np.ndarray):
+    """Solution of the cracked ``part`` under its ``stress`` (w,), Pa."""
+    now.by_mean_stress.add(part)
+    turn, began = float(now.state.rotation[part]), now.history.get(part)
+    return now.by_mean_stress.answer(part, now.bodies[part], stress, turn, now.elastic(part), began)
+
+
+def _take_stress(now: CrackedBlocks, part: int, stress: np.ndarray) -> None:
+    """Give ``part`` the ``stress`` (w,), Pa, and its cracks the strain under it."""
+    mean, opened = now.by_mean_stress, None
+    if part in now.bodies:
+        turn, found, w = float(now.state.rotation[part]), _answer(now, part, stress), len(stress)
+        limit = mean.limit(part, now.bodies[part], now.elastic(part))
+        own = limit.T @ mean.crack_strain(part, found)
+        soft = limit.T @ passive(mean.compliance(part, now.bodies[part], found), now.elastic(part)) @ limit
+        opened = stress_rotation(-turn, w).T @ own
+        now.response.compliance[part, :w, :w], now.response.offset[part, :w] = crack_response(soft, own, stress, turn)
+    if part in mean.fields or len(stress) > 3:
+        assert now.system.deflected is not None
+        rock = now.system.deflected.generalised_compliance(part, now.system.compliance[part])
+        now.state = with_stress(now.state, now.system.deflected, part, rock, stress, opened)
+        return
+    strain = now.state.crack_strain.copy()
+    strain[part] = opened
+    now.state = replace(now.state, crack_strain=strain)
+
+
+def _affordable(
+    now: CrackedBlocks, split: Split, stresses: Mapping[int, PartStress], stored: Mapping[int, float]
+) -> dict[int, np.ndarray]:
+    """part → stress (3 + m,), Pa, of parts of higher order, as in `affordable_stress`."""
+    out: dict[int, np.ndarray] = {}
+    deflected = now.system.deflected
+    for block in sorted({int(split.parent[part]) for part in stresses}):
+        square = linear = 0.0
+        parts = [part for part in stresses if split.parent[part] == block]
+        for part in parts:
+            assert deflected is not None
+            rock = deflected.generalised_compliance(part, now.system.compliance[part])
+            area, whole = float(deflected.basis.area[part]), stresses[part].whole
+            change = stresses[part].solution - whole
+            square += 0.5 * area * float(change @ rock @ change)
+            linear += area * float(change @ rock @ whole)
+        share = _largest(square, linear, max(stored.get(block, 0.0), 0.0))
+        out |= {part: of.whole + share * (of.solution - of.whole) for part, of in stresses.items() if part in parts}
+    return out
 
 
 def affordable_stress(

@@ -8,9 +8,15 @@ from ...conventions import rotate_stress
 
 
 def rotated_mean_stress(solution, loops: list[np.ndarray], angle: float) -> np.ndarray:
-    """(3,) mean of the stress of ``solution`` over a polygon, rotated by ``angle`` rad: area-weighted samples of its
-    triangles. It is exact for stress linear in x, and no sample is close to a corner, where the stress before the cut
-    is singular."""
+    """(3,) mean of the stress of ``solution`` over a polygon, rotated by ``angle`` rad (`sampled_stress`)."""
+    _, area, stress = sampled_stress(solution, loops)
+    return rotate_stress(area @ stress / area.sum(), angle)
+
+
+def sampled_stress(solution, loops: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Points (n, 2) in a polygon, the area (n,) of the triangle around each, and the stress (n, 3) of ``solution`` there.
+    The sum is exact for stress linear in x, and no sample is close to a corner, where the stress before the cut is
+    singular."""
     import shapely
 
     polygon = shapely.Polygon(loops[0], loops[1:])
@@ -23,5 +29,5 @@ def rotated_mean_stress(solution, loops: list[np.ndarray], angle: float) -> np.n
         )
     d, e = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
     area = np.abs(d[:, 0] * e[:, 1] - d[:, 1] * e[:, 0])
-    stress = solution.stress(corners.mean(axis=1))
-    return rotate_stress(area @ stress / area.sum(), angle)
+    points = corners.mean(axis=1)
+    return points, 0.5 * area, solution.stress(points)

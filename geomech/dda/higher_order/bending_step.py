@@ -28,9 +28,10 @@ from ..loads.viscous_boundary import ViscousEdges
 from ..open_close.contact_set import ContactSet
 from ..open_close.equations import Unsettled
 from ..out_of_balance import imbalance
-from ..results import StepResult
+from ..results import CrackResponse, StepResult
 from ..time_step import Attempt, StepStart
-from .deflected_blocks import DeflectedBlocks
+from .crack_softening import SoftenedBlock, softened_blocks
+from .deflected_blocks import DeflectedBlocks, strain_turned_back
 from .deflection_basis import n_deflections
 from .equations import HigherOrderEquations
 from .face_points import FaceContacts
@@ -59,9 +60,7 @@ class BendingAttempt(Attempt):
         known = self.blocks.at_rest() if state.deflection is None else state.deflection
         self.deflection = np.ascontiguousarray(known[:, 0])
         #: (k,) m, deflection that strains the blocks beyond their mean stress.
-        self.strained = self.deflection
-        if state.deflection_origin is not None:
-            self.strained = self.deflection - state.deflection_origin[:, 0]
+        self.strained = self.blocks.elastic_part(state)
         #: (k,) m/s, rates of deflection at the start of the step.
         self.rates = system.settings.dynamic_factor * known[:, 1]
         if system.taken_out is not None:
@@ -69,6 +68,17 @@ class BendingAttempt(Attempt):
             self.deflection = np.where(gone, self.deflection - self.strained, self.deflection)
             self.strained, self.rates = np.where(gone, 0.0, self.strained), np.where(gone, 0.0, self.rates)
         super().__init__(system, start, dt, self._on_faces(system, state, start.vertices, found), cuts)
+
+    def _crack_response(self, crack: CrackResponse | None) -> tuple[np.ndarray, np.ndarray]:
+        compliance, offset = super()._crack_response(crack)
+        bends, state, blocks = self.blocks.bending, self.state, self.blocks
+        system = self.system
+        self.softened = softened_blocks(crack, state, blocks, system.compliance, self.strained, system.fixed)
+        if crack is not None and len(bends):
+            # The equations of first order leave the cracks of these blocks as they are.
+            compliance, offset = compliance.copy(), offset.copy()
+            compliance[bends], offset[bends] = 0.0, state.crack_strain[bends]
+        return compliance, offset
 
     def _on_faces(self, system: BendingSystem, state: State, vertices: np.ndarray, corners: ContactSet) -> FaceContacts:
         """Contacts at ``corners`` and at points along faces, with the contribution of deflection to their gaps."""
@@ -128,6 +138,19 @@ class BendingAttempt(Attempt):
         )
         self._bending = (scheme.weight + drag / dt)[:, None, None] * blocks.stiffness
         self._inertia = inertia * self.shared, inertia * self.density * blocks.basis.area
+        for softened in self.softened:
+            self._soften(softened, scheme.weight + drag[softened.block] / dt)
+
+    def _soften(self, of: SoftenedBlock, elastic: float) -> None:
+        """Replace the elasticity of a block, which acts with the factor ``elastic``, by that with its cracks."""
+        b, m, root = of.block, len(of.still) - 3, np.sqrt(self.moments[of.block, 0])
+        row, own = self.order[b], self.own_right[b, :m]
+        self.matrix[row, 3:, 3:] += elastic * (of.tangent[:3, :3] - self.tangent[b])
+        self.right[row, 3:] -= elastic * root * (of.still[:3] - self.stress0[b])
+        own -= elastic * of.size * (of.still - of.begun)[3:]
+        self.tangent[b], self.stress0[b] = of.tangent[:3, :3], of.still[:3]
+        self._bending[b, :m, :m] = elastic * of.tangent[3:, 3:]
+        self._inertia[0][b, :, :m] += elastic * (of.size / root) * of.tangent[:3, 3:]
 
     @property
     def _without_dashpots(self) -> np.ndarray:
@@ -352,9 +375,12 @@ class BendingAttempt(Attempt):
         return change
 
     def _move(self) -> None:
-        super()._move()
-        blocks, static = self.blocks, self.system.scheme.static
         change = self.bent_by = self._deflected_by()
+        for of in self.softened:
+            self.stress0[of.block] += of.shared @ change[self.blocks.basis.of_block(of.block)]
+        super()._move()
+        self._open_cracks()
+        blocks, static = self.blocks, self.system.scheme.static
         # Statics have no rates; dynamics keep those at the end of the step, in the frame of the block.
         self.new_rates = np.zeros_like(change) if static else 2.0 * change / self.dt - self.rates
         mean = blocks.padded(2.0 / self.dt**2 * (change - self.dt * self.rates))
@@ -378,6 +404,28 @@ class BendingAttempt(Attempt):
                 self.slid += self.actions.along
         self._residual_of_driven()
         self.places.take(self.state.rotation + self.increment[:, 2], self.deflection + change)
+
+    def _open_cracks(self) -> None:
+        """Crack strain and deflection of cracked blocks at the end of the step."""
+        known = self.state.crack_deflection
+        self.opened = None if known is None and not self.softened else self.blocks.at_rest()[:, 0]
+        if self.opened is not None and known is not None:
+            self.opened += known
+        #: block → Σ at the end of the step, Pa, on the axes of its start.
+        self.ended: dict[int, np.ndarray] = {}
+        for of in self.softened:
+            b, own = of.block, self.blocks.basis.of_block(of.block)
+            self.ended[b], strain = of.ended(self.increment[b, 3:], self.bent_by[own])
+            self.new_crack[b] = strain_turned_back(-self.increment[b, 2]) @ strain[:3]
+            assert self.opened is not None
+            self.opened[own] = of.size * strain[3:]
+
+    @property
+    def _opened_by(self) -> np.ndarray:
+        """(k,) m: change of the deflection due to cracks in the step."""
+        if self.opened is None:
+            return np.zeros_like(self.deflection)
+        return self.opened if self.state.crack_deflection is None else self.opened - self.state.crack_deflection
 
     def _brake(self, dashpots: BendingDashpots) -> None:
         """Add the forces of ``dashpots`` to the loads of the step."""
@@ -406,10 +454,15 @@ class BendingAttempt(Attempt):
     def _imbalance(self, right: np.ndarray, load: np.ndarray, largest: float) -> tuple[float, float]:
         found, settled, n = self.found, self.settled, self.n_free
         right = right.copy()
+        blocks = self.blocks
         inertia = 2.0 * self.heavier / self.dt**2 + self.system.scheme.mass_damping / self.dt
         bent = inertia * np.einsum("bej,bj->be", self.shared, self.blocks.padded(self.bent_by))
         moving = self.system.moving
         right[self.order[moving], 3:6] += (self.coupled_right - bent)[moving]
+        for of in self.softened:
+            m = len(of.still) - 3
+            coupling = self._inertia[0][of.block, :, :m] - inertia * self.shared[of.block, :, :m]
+            right[self.order[of.block], 3:6] -= coupling @ self.bent_by[blocks.basis.of_block(of.block)]
         for b, matrix in self.damped.items():
             own = self.bent_by[self.blocks.basis.of_block(b)]
             right[self.order[b]] -= matrix[:6, 6 : 6 + len(own)] @ own
@@ -439,8 +492,10 @@ class BendingAttempt(Attempt):
         after = blocks.kinetic(self.new_rates, self.velocity[:, 3:], end, density)
         had = blocks.kinetic(begun[:, 1], state.velocity[:, 3:], angle, density)
         kept = blocks.kinetic(self.rates, self.carried[:, 3:], angle, density)
-        u0, u1 = blocks.elastic_energy(self.strained), blocks.elastic_energy(self.strained + change)
+        ends = self.strained + change - self._opened_by
+        u0, u1 = blocks.elastic_energy(self.strained), blocks.elastic_energy(ends)
         padded = blocks.padded(change)
+        cracked = float((blocks.stiffness_times(0.5 * (self.strained + ends)) * blocks.padded(self._opened_by)).sum())
         worked = float((self.bending_load * padded).sum())
         if self.actions is not None:
             worked += self.actions.deflecting_work(padded)
@@ -459,11 +514,12 @@ class BendingAttempt(Attempt):
         inertia -= float(
             np.einsum("b,bj,bj->", spun, blocks.basis.coupling[:, 0] + blocks.basis.coupling[:, 1], padded)
         )
-        strained = float((padded * blocks.stiffness_times(self.strained + scheme.weight * change)).sum())
+        strained = (padded * blocks.stiffness_times(self.strained + scheme.weight * (ends - self.strained))).sum()
+        strained = float(strained) - cracked
         drag = scheme.stiffness_damping + 2.0 * scheme.block_damping * np.sqrt(
             self.density * self.moments[:, 0] / (12.0 * self.system.stiffness[:, 0, 0])
         )
-        bent = blocks.stiffness_times(change)
+        bent = blocks.stiffness_times(ends - self.strained)
         damped = float((drag / dt) @ (bent * padded).sum(axis=1))
         damped += scheme.mass_damping / dt * self._mass_of(change, padded, coupling, density)
         if self.glue is not None:
@@ -480,7 +536,8 @@ class BendingAttempt(Attempt):
             damping=energy.damping + damped,
             scheme=energy.scheme + lost,
             carried=energy.carried + had - kept,
-            residual=energy.residual + stored - (worked - damped - lost - (had - kept)),
+            crack_work=energy.crack_work + cracked,
+            residual=energy.residual + stored - (worked - damped - lost - cracked - (had - kept)),
         )
 
     def _mass_of(self, change: np.ndarray, padded: np.ndarray, coupling: np.ndarray, density: np.ndarray) -> float:
@@ -494,7 +551,10 @@ class BendingAttempt(Attempt):
         deflection = np.stack([self.deflection + self.bent_by, self.new_rates], axis=1)
         memory = self.found.memory(self.settled, self._end_shear(), self._points_at_the_end())
         origin = self.state.deflection_origin
-        state = replace(result.state, deflection=deflection, face_points=memory, deflection_origin=origin)
+        state = replace(
+            result.state, deflection=deflection, face_points=memory, deflection_origin=origin,
+            crack_deflection=self.opened,
+        )  # fmt: skip
         return replace(result, state=state)
 
     def _points_at_the_end(self) -> np.ndarray:

@@ -56,7 +56,7 @@ def bent_bodies(deflected: DeflectedBlocks | None, state: State, motion: Motion)
     if deflected is None:
         return {}
     known = deflected.at_rest() if state.deflection is None else state.deflection
-    beyond, since = known[:, :1].T - deflected.origin(state).T
+    beyond, since = deflected.elastic_part(state), known[:, 0] - deflected.origin(state)[:, 1]
     out = {}
     bending = deflected.bending
     if state.removed is not None:

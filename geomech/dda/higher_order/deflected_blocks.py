@@ -107,6 +107,32 @@ class DeflectedBlocks:
         known = state.deflection_origin
         return self.at_rest() if known is None else np.asarray(known)
 
+    def elastic_part(self, state: State) -> np.ndarray:
+        """(k,) m: deflections of ``state`` that strain the rock beyond its mean stress: without that at which blocks bear
+        this alone, and without that of their cracks."""
+        out = self.at_rest()[:, 0] if state.deflection is None else state.deflection[:, 0]
+        for part in (
+            None if state.deflection_origin is None else state.deflection_origin[:, 0],
+            state.crack_deflection,
+        ):
+            out = out if part is None else out - part
+        return out
+
+    def generalised_compliance(self, block: int, compliance: np.ndarray) -> np.ndarray:
+        """(3 + m, 3 + m) D⁻¹ of ``block``, 1/Pa, whose mean strain has this ``compliance`` (3, 3)
+        (`crack_softening`)."""
+        m = n_deflections(int(self.order[block]))
+        out = np.zeros((3 + m, 3 + m))
+        out[:3, :3], out[3:, 3:] = compliance, self._flexibility[block]
+        return out
+
+    @cached_property
+    def _flexibility(self) -> dict[int, np.ndarray]:
+        """block → K⁻¹ (m, m), 1/Pa."""
+        sizes = {b: n_deflections(int(self.order[b])) for b in self.bending.tolist()}
+        inverse = {b: np.linalg.inv(self.stiffness[b, :m, :m]) for b, m in sizes.items()}
+        return {b: 0.5 * (one + one.T) for b, one in inverse.items()}
+
     def padded(self, values: np.ndarray) -> np.ndarray:
         """(n_blocks, m) the unknowns ``values`` (k,) of all blocks, padded with zeros."""
         out = np.zeros((len(self.order), self.basis.coupling.shape[2]))
@@ -139,6 +165,18 @@ class DeflectedBlocks:
             self.material_points(vertices, geometry[:, 5:7], found.block),
             self.material_points(vertices, foot, found.other),
         )
+
+    def gaps(self, found: ContactSet, vertices: np.ndarray, state: State) -> np.ndarray:
+        """(n,) m: contribution of the deflections of ``state`` to the gaps of the contacts ``found``, where the blocks have
+        the strained ``vertices``."""
+        out = np.zeros(len(found))
+        if state.deflection is None or not len(found):
+            return out
+        padded, normal = self.padded(state.deflection[:, 0]), found.geometry[:, 1:3]
+        for owner, points, sign in zip((found.block, found.other), self.touching(found, vertices), (1.0, -1.0)):
+            matrix = self.directions(points, owner, state.rotation)
+            out += sign * np.einsum("na,naj,nj->n", normal, matrix, padded[owner], optimize=True)
+        return out
 
     def directions(self, points: np.ndarray, owner: np.ndarray, angle: np.ndarray) -> np.ndarray:
         """R P (n, 2, m) at undeformed ``points`` (n, 2) of blocks ``owner`` (n,) rotated by ``angle`` (n_blocks,)."""

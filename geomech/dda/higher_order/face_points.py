@@ -22,13 +22,15 @@ from typing import Any
 
 import numpy as np
 
-from ...model import CONTACT, FACE_POINT, OPEN, SLIP, STICK
+from ...model import CONTACT, FACE_POINT, OPEN, SLIP, STICK, State
 from ..contact_detection.contact_records import ContactShape, Pairing, SlipBefore, StepEnd, fill
 from ..contact_detection.face_quadrature import FacePoints
+from ..contact_detection.inherited_contacts import InheritedContacts
 from ..joint_laws.bonds import WITHOUT_GAPS, on_lines
 from ..joint_laws.penalty_springs import Springs
 from ..open_close.contact_set import ContactSet
 from ..open_close.settled_states import Settled
+from .deflected_blocks import DeflectedBlocks
 from .polygon_quadrature import lobatto_points
 
 #: History of a `ContactSet`, by the names of FACE_POINT rows.
@@ -464,4 +466,38 @@ def _nearest(
                 if apart[best] <= memory["length"][near[best]] + found.geometry[c, 4]:
                     known = int(near[best])
         out[k] = known
+    return out
+
+
+def without_remembered(forces: InheritedContacts, found: ContactSet, memory: np.ndarray | None) -> InheritedContacts:
+    """``forces`` without those on contacts of ``found`` in faces whose points have a ``memory``, FACE_POINT rows: they
+    continue with that."""
+    if memory is None or not len(memory):
+        return forces
+    ends = (
+        np.concatenate([memory["vertex"], memory["far_vertex"]]),
+        np.concatenate([memory["edge"], memory["far_edge"]]),
+    )
+    far = int(max(ends[1].max(), found.edge.max())) + 1
+    known = np.isin(found.vertex * far + found.edge, ends[0] * far + ends[1])
+    left = ~known[forces.which]
+    return replace(forces, **{field.name: getattr(forces, field.name)[left] for field in fields(forces)})
+
+
+def at_their_points(
+    rows: np.ndarray, found: ContactSet, which: np.ndarray, blocks: DeflectedBlocks, state: State,
+    by_length: tuple[np.ndarray, np.ndarray],
+) -> np.ndarray:  # fmt: skip
+    """CONTACT ``rows`` of ``found`` with the gaps at which the points of faces carry the prescribed resultant and moment
+    of the contacts ``which``, blocks being deflected as in ``state``. ``by_length`` as in `Faces.springs`."""
+    faces, vertices = Faces.of(found, blocks.order), np.ascontiguousarray(state.vertices)
+    springs, force = faces.springs(found.springs, by_length), faces.spread(rows["normal_force"])
+    out, inherited = rows.copy(), np.zeros(len(rows), bool)
+    inherited[which] = True
+    # Where only one end is prescribed, the other keeps its gap.
+    there = (inherited[faces.ends] & (rows["state"][faces.ends] != OPEN)).all(axis=1)
+    for end, point in ((0, faces.first), (1, faces.first + faces.count - 1)):
+        stiff = np.maximum(springs.normal[point[there]], np.finfo(float).tiny)
+        out["gap"][faces.ends[there, end]] = -force[point[there]] / stiff
+    out["lift"][which] = found.geometry[which, 3] + blocks.gaps(found, vertices, state)[which] - out["gap"][which]
     return out

@@ -307,11 +307,11 @@ class _FaceForces:
 
 
 def extended_deflection(deflection: np.ndarray, before: np.ndarray, order: np.ndarray) -> np.ndarray:
-    """(k, 2) the ``deflection`` of blocks raised from the orders ``before`` (n_blocks,) to ``order``: new unknowns are
+    """(k, …) the ``deflection`` of blocks raised from the orders ``before`` (n_blocks,) to ``order``: new unknowns are
     zero."""
     old, new = n_deflections(before), n_deflections(order)
     start = np.cumsum(new) - new
     kept = np.arange(int(old.sum())) - np.repeat(np.cumsum(old) - old, old) + np.repeat(start, old)
-    out = np.zeros((int(new.sum()), 2))
+    out = np.zeros((int(new.sum()), *deflection.shape[1:]))
     out[kept] = deflection
     return out

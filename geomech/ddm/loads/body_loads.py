@@ -3,6 +3,7 @@ loads."""
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
@@ -23,6 +24,27 @@ class OutOfEquilibrium(ValueError):
             f"the loads are out of equilibrium: force ({force[0]:.6g}, {force[1]:.6g}) N/m, moment {moment:.6g} N "
             f"about the centroid, {relative:.3g} of the loads' size"
         )
+
+
+class IntactField(ABC):
+    """Stress and displacement that further loads cause in a body without cracks, whatever these loads are. Their
+    tractions act on its outline."""
+
+    @abstractmethod
+    def stress(self, points: np.ndarray) -> np.ndarray:
+        """(n, 3) Pa at ``points`` (n, 2)."""
+
+    @abstractmethod
+    def displacement(self, points: np.ndarray) -> np.ndarray:
+        """(n, 2) m at ``points`` (n, 2)."""
+
+    @abstractmethod
+    def scaled(self, factor: float) -> IntactField:
+        """The field multiplied by ``factor``."""
+
+    @abstractmethod
+    def with_added(self, other: IntactField) -> IntactField:
+        """Sum of the two fields."""
 
 
 @dataclass(frozen=True)
@@ -71,6 +93,8 @@ class BodyLoad:
     points, forces       (k, 2) m and N/m: point loads inside the rock or on its boundary. They are singular, except
                          on holes and where the plane beyond the boundary contains rock: there they are distributed
                          over a hundredth of the extent
+    intact               field of further loads in the body without cracks (`IntactField`): cracks open by its stress as
+                         they do by a `remote_stress`, in a body with an outline and without holes
     kelvin               True: point loads on the boundary also are Kelvin's solution for the infinite plane. The rock
                          beyond the boundary then carries part of them, about half on an edge, three quarters at a
                          right-angled corner: no element's displacement is singular enough to correct that
@@ -92,6 +116,7 @@ class BodyLoad:
     points: np.ndarray | None = None
     forces: np.ndarray | None = None
     kelvin: bool = False
+    intact: IntactField | None = None
 
     def scaled(self, factor: float) -> BodyLoad:
         """The load multiplied by ``factor``."""
@@ -107,7 +132,8 @@ class BodyLoad:
         else:
             holes = _times(holes, factor)
         sides = [(where, _times(value, factor)) for where, value in self.sides]
-        return replace(self, **changed, displacements=displacements, hole_pressure=holes, sides=sides)
+        intact = None if self.intact is None else self.intact.scaled(factor)
+        return replace(self, **changed, displacements=displacements, hole_pressure=holes, sides=sides, intact=intact)
 
     def with_added(self, other: BodyLoad) -> BodyLoad:
         """Sum of the two loads. Raises ValueError if body forces are given about different points, or if point loads
@@ -151,6 +177,7 @@ class BodyLoad:
             displacements=displacements,
             sides=(*self.sides, *other.sides),
             kelvin=self.kelvin or other.kelvin,
+            intact=_sum_of_fields(self.intact, other.intact),
         )
 
     def hole_pressures(self, n_holes: int) -> list[Pressure]:
@@ -256,6 +283,12 @@ def _plus(a, b):
         if not callable(value) and not isinstance(value, Pressure) and np.shape(value) not in ((), (2,)):
             raise ValueError("a list of values cannot be added to a function of position")
     return lambda points: part(a, points) + part(b, points)
+
+
+def _sum_of_fields(a: IntactField | None, b: IntactField | None) -> IntactField | None:
+    if a is None or b is None:
+        return b if a is None else a
+    return a.with_added(b)
 
 
 def _number(p) -> float:

@@ -77,7 +77,8 @@ class Applied:
     def stress(self, points: np.ndarray) -> np.ndarray:
         """(n, 3) stress, Pa, of all parts except line forces."""
         points_of: list[KelvinLoad | WedgeLoad] = [*self.kelvin, *self.wedges]
-        return self.particular.stress(points) + sum(p.stress(points) for p in points_of)
+        out = self.particular.stress(points) + sum(p.stress(points) for p in points_of)
+        return out if self.load.intact is None else out + self.load.intact.stress(points)
 
     def displacement(self, points: np.ndarray) -> np.ndarray:
         """(n, 2) displacement, m, of all parts except line forces."""
@@ -85,11 +86,14 @@ class Applied:
 
     def regular(self, points: np.ndarray) -> np.ndarray:
         """(n, 2) displacement, m, that is not contained in the boundary's unknowns."""
-        return self.particular.displacement(points) + sum(p.displacement(points) for p in self.wedges)
+        out = self.particular.displacement(points) + sum(p.displacement(points) for p in self.wedges)
+        return out if self.load.intact is None else out + self.load.intact.displacement(points)
 
 
 def apply(load: BodyLoad, body: CrackedBody) -> Applied:
     """``load`` applied to ``body``. Raises ValueError naming the part that does not fit the body."""
+    if load.intact is not None and (not body.outlined or len(body.loops) > 1):
+        raise ValueError("intact: the field of a body without cracks is for bodies with an outline and without holes")
     none = np.empty((0, 2, 2))
     out = Applied(
         load,
