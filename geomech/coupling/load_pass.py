@@ -432,13 +432,6 @@ def _take_loads(now: CrackedBlocks, result: StepResult) -> None:
         still = result.vertices is now.state.vertices
         motion = now.motion(now.state) if still else Motion.of(now.blocks, result.vertices)
         now.loads = boundary_loads(now.problem, now.blocks, now.state, motion, result, now.bodies)
-        for block, known in now.by_mean_stress.fields.items() if now.system.scheme.static else ():
-            if block in now.loads:
-                load = now.loads[block]
-                # As with the mean: the stress of the load is the block's own.
-                lacking = known.stress_of(result.state)
-                lacking[:3], lacking[3:] = 0.0, lacking[3:] - known.of_load(load)
-                now.loads[block] = replace(load, intact=known.under(lacking))
 
 
 def _solve(now: CrackedBlocks, bodies: dict) -> None:

@@ -39,7 +39,7 @@ def test_loads_do_not_depend_on_what_else_is_asked_for(asked):
     numbers, blocks, forces, inertia = asked
     together = boundary_tractions.boundary_loads(*asked)
     for k in range(len(numbers)):
-        own = numbers[k : k + 1], blocks, forces, inertia.only(k)
+        own = numbers[k : k + 1], blocks, forces, inertia.only(np.array([k]))
         same(together[k], boundary_tractions.boundary_loads(*own)[0])
 
 

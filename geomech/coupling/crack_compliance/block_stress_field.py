@@ -25,10 +25,6 @@ from ...model import State
 
 if TYPE_CHECKING:
     from ...ddm import Body, Solution
-    from ..load_transfer.boundary_tractions import BoundaryLoad
-
-#: Gauss points on a piece of the outline with linear traction, exact for deflection of order 8.
-_POINTS = 6
 
 
 @dataclass(eq=False)
@@ -112,28 +108,6 @@ class BlockStressField:
         """The field of the generalised ``stress`` (3 + m,), Pa."""
         return PolynomialField(self, np.asarray(stress, dtype=float))
 
-    def of_load(self, load: BoundaryLoad) -> np.ndarray:
-        """(m,) Pa, the part of Σ that loads deflection: what ``load`` does on the unknowns of deflection, over √A."""
-        place, weight = np.polynomial.legendre.leggauss(_POINTS)
-        place, weight = 0.5 * (1.0 + place), 0.5 * weight
-        force = np.zeros(self.width - 3)
-        if len(load.segments):
-            start, along = load.segments[:, :1], load.segments[:, 1:] - load.segments[:, :1]
-            points = start + place[:, None] * along
-            first, last = load.tractions[:, :1], load.tractions[:, 1:]
-            length = np.hypot(along[..., 0], along[..., 1])
-            push = (first + place[:, None] * (last - first)) * (length * weight)[..., None]
-            force += np.einsum("naj,na->j", self._displacement(points.reshape(-1, 2)), push.reshape(-1, 2))
-        if load.points is not None and load.forces is not None:
-            force += np.einsum("naj,na->j", self._displacement(load.points), load.forces)
-        # Deflection has no momentum: the body force works by its gradient alone.
-        (xx, xy), (yx, yy) = load.body_force_gradient
-        force += np.array([xx, yy, xy + yx]) @ self.basis.coupling[self.block][:, : self.width - 3]
-        return force / self.size
-
-    def _displacement(self, points: np.ndarray) -> np.ndarray:
-        return self.basis.displacement(points, self.block)[..., : self.width - 3]
-
     def __getstate__(self) -> dict:
         return vars(self) | {"_at_faces": None}
 
@@ -164,7 +138,3 @@ class PolynomialField(IntactField):
         if not (isinstance(other, PolynomialField) and other.of is self.of):
             raise ValueError("only stress fields of the same block can be added")
         return PolynomialField(self.of, self.sizes + other.sizes)
-
-    def same_as(self, other: IntactField | None) -> bool:
-        """Whether ``other`` is the same field."""
-        return isinstance(other, PolynomialField) and other.of is self.of and np.array_equal(other.sizes, self.sizes)

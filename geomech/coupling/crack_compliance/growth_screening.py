@@ -101,7 +101,7 @@ class GrowthScreening:
         known, body, load = self._known.get(block), now.bodies[block], now.loads[block]
         if known is None or known.bound is None or known.crack_system is not body.crack_system:
             return False
-        if load.points is not None or load.bases or load.intact is not None:
+        if load.points is not None or load.bases:
             return False
         # Tips that waves reach later than one step are loaded by the mean of earlier K_eq (`wave_arrival`).
         size = float(np.ptp(now.blocks.loops(block)[0], axis=0).max())

@@ -28,7 +28,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -39,9 +39,6 @@ from .contact_gathering import faces_and_lone, on_outline, touches_of
 from .face_traction import add_face, add_lone
 from .inertia_forces import BlockInertia, BlockShape, balanced
 from .piecewise_traction import Found, add_couple, add_edge_piece, add_point_load, add_row, line_of, outlines
-
-if TYPE_CHECKING:
-    from ..crack_compliance.block_stress_field import PolynomialField
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,7 +53,6 @@ class BoundaryLoad:
     - imbalance: resultant that inertia has to balance beyond the solver's own acceleration, relative to the forces
     - bases: rows of segments whose pressure is still to be found, and the traction (2,) per unit pressure
     - crack_pressure (scalar or (n_segments,)), hole_pressure: fluid pressures in unbounded rock, Pa
-    - intact: field that a block of higher order has beyond that of these forces (`ddm.BodyLoad`)
     """
 
     segments: np.ndarray
@@ -72,7 +68,6 @@ class BoundaryLoad:
     bases: tuple[tuple[np.ndarray, np.ndarray], ...] = ()
     crack_pressure: np.ndarray | float = 0.0
     hole_pressure: float = 0.0
-    intact: PolynomialField | None = None
 
 
 @dataclass(frozen=True, eq=False)

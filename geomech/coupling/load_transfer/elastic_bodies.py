@@ -12,11 +12,11 @@ from ...ddm.counters import Work
 from ...ddm.crack_contact.face_laws import Released
 from ...model import AUTO_ORDER, TIP, Blocks, Cracks, Motion, Problem, State
 from ...model.blocks.polygon import joined_loops
-from ..crack_compliance.block_stress_field import PolynomialField
 from ..parallel_map import parallel_map
 from . import boundary_tractions
 from .boundary_tractions import BoundaryForces, BoundaryLoad
 from .inertia_forces import BlockInertia
+from .polynomial_traction import without_faces
 
 if TYPE_CHECKING:
     from ...ddm import Body
@@ -93,7 +93,6 @@ def _refuse_unsupported(problem: Problem, blocks: Blocks, cracked: np.ndarray) -
     refuse(order == AUTO_ORDER, 'give its order as a number, not as "auto"')
     refuse(bent & glued[cracked], "cells glued to each other have no cracks, and none can begin in them")
     refuse(bent & (np.diff(blocks.block_loop)[cracked] > 1), "that is not supported for a block with a hole")
-    refuse(bent & (problem.run.boundary_stress != "contacts"), 'that needs run.boundary_stress = "contacts"')
 
 
 def _loops(problem: Problem, blocks: Blocks, block: int) -> list[np.ndarray]:
@@ -120,13 +119,22 @@ def boundary_loads(
     if blocks.constrained is not None:
         keep_straight = keep_straight | blocks.constrained.any(axis=1)
     density = np.array([material.density for material in problem.materials])
+    contacts, edges = contacts_of_loaded_pairs(result.contacts, blocks.n_blocks), forces.edges
+    route, bent = problem.run.boundary_stress, np.zeros(blocks.n_blocks, bool)
+    if blocks.order is not None and route in ("contacts", "bases") and problem.dda.dynamic_factor == 0.0:
+        # (In motion the cracks of such blocks are loaded by the stress of their blocks.)
+        bent[numbers] = np.asarray(blocks.order)[numbers] > 1
+        contacts, along = without_faces(
+            blocks, result.vertices, contacts, result.state.face_points, bent, keep_straight
+        )
+        edges = np.concatenate([edges, along])
     acting = BoundaryForces(
         result.vertices,
         motion,
-        contacts_of_loaded_pairs(result.contacts, blocks.n_blocks),
-        forces.edges,
+        contacts,
+        edges,
         forces.points,
-        problem.run.boundary_stress,
+        route,
         [joint.tensile_strength for joint in problem.joints],
         keep_straight,
     )
@@ -139,8 +147,16 @@ def boundary_loads(
         reaction=None if forces.reaction is None else forces.reaction[numbers],
         overstress=None if forces.overstress is None else forces.overstress[numbers],
     )
-    loads = boundary_tractions.boundary_loads(numbers, blocks, acting, inertia)
-    return dict(zip(bodies, loads))
+    if not bent.any():
+        return dict(zip(bodies, boundary_tractions.boundary_loads(numbers, blocks, acting, inertia)))
+    loads: dict[int, BoundaryLoad] = {}
+    for rows, way in ((np.flatnonzero(~bent[numbers]), route), (np.flatnonzero(bent[numbers]), "bases")):
+        if not len(rows):
+            continue
+        own = inertia.only(rows)
+        found = boundary_tractions.boundary_loads(numbers[rows], blocks, replace(acting, route=way), own)
+        loads |= dict(zip(numbers[rows].tolist(), found))
+    return {block: loads[block] for block in bodies}
 
 
 def contacts_of_loaded_pairs(contacts: np.ndarray, n_blocks: int) -> np.ndarray:
@@ -223,14 +239,9 @@ _ASKED = tuple(each.name for each in fields(BoundaryLoad) if each.name not in ("
 def _same_question(body: Body, known, asked: dict[str, np.ndarray | None]) -> bool:
     """Whether ``known`` is the solution of ``body`` under the load ``asked``."""
     return known.body is body and all(
-        of is before if of is None or before is None else _same(of, before)
+        (of is None) == (before is None) and (of is None or np.array_equal(of, before))
         for of, before in ((asked[name], getattr(known.load, name)) for name in _ASKED)
     )
-
-
-def _same(of, before) -> bool:
-    """Whether a part of a load is the same as before."""
-    return of.same_as(before) if isinstance(of, PolynomialField) else np.array_equal(of, before)
 
 
 def inherited(history: dict, parent: np.ndarray, cracks: Cracks) -> dict:

@@ -41,11 +41,10 @@ class BlockInertia:
     reaction: np.ndarray | None = None
     overstress: np.ndarray | None = None
 
-    def only(self, k: int) -> BlockInertia:
-        """The inertia of the block in row ``k``."""
-        row = slice(k, k + 1)
-        rows = (None if of is None else of[row] for of in (self.acceleration, self.reaction, self.overstress))
-        return BlockInertia(self.rotation[row], self.density[row], self.spin[row], self.gravity, *rows)
+    def only(self, rows: np.ndarray) -> BlockInertia:
+        """The inertia of the blocks in these ``rows``."""
+        own = (None if of is None else of[rows] for of in (self.acceleration, self.reaction, self.overstress))
+        return BlockInertia(self.rotation[rows], self.density[rows], self.spin[rows], self.gravity, *own)
 
 
 def balanced(

@@ -3,6 +3,8 @@ names it."""
 
 from __future__ import annotations
 
+import numpy as np
+
 from ..validation import nearest
 from .check import Check
 
@@ -28,7 +30,7 @@ def check_orders(c: Check) -> None:
         if material is not None and material.rigid:
             refuse("a rigid material does not bend", "leave `order` out, or `rigid`")
         _check_cell_joint(c, name, zone.cell_joint)
-        _check_cracks(c, refuse)
+        _check_cracks(c, name, zone, refuse)
         _check_joints(c, refuse)
         _check_solver(c, refuse)
         if t.loads is not None and t.loads.in_situ is not None and zone.order == "auto":
@@ -51,14 +53,23 @@ def _check_cell_joint(c: Check, zone: str, joint: str | None) -> None:
         )
 
 
-def _check_cracks(c: Check, refuse) -> None:
-    t = c.tables
-    if c.drawing is not None and c.drawing.cracks is not None and c.drawing.cracks.n_segments:
-        refuse("blocks of higher order cannot be cut by cracks yet", "leave `order` out, or the cracks")
-    if t.growth is not None and t.growth.initiation:
-        refuse(
-            "cracks cannot begin in blocks of higher order yet", "set growth.initiation = false, or leave `order` out"
-        )
+def _check_cracks(c: Check, name: str, zone, refuse) -> None:
+    """Refuse what the blocks of the ``zone`` called ``name`` cannot have together with cracks."""
+    t, drawing = c.tables, c.drawing
+    begin = t.growth is not None and t.growth.initiation
+    blocks = np.zeros(0, int)
+    if drawing is not None and drawing.blocks is not None and drawing.cracks is not None:
+        own = [b for b, of in enumerate(drawing.zones) if of == name]
+        blocks = np.array(own, int) if begin else np.intersect1d(drawing.cracks.block, own)
+        if (np.diff(drawing.blocks.block_loop)[blocks] > 1).any():
+            refuse("cracks in a block of higher order with a hole are not supported", "set order = 1")
+    if not (begin or len(blocks)):
+        return
+    cracked = "cracks, or cracks that begin (growth.initiation),"
+    if zone.order == "auto":
+        refuse(f"{cracked} are not supported with it", "give the order as a number, 2 to 8")
+    if zone.mesh_size_m is not None:
+        refuse(f"{cracked} are not supported in cells", "leave `mesh_size_m` out")
 
 
 def _check_joints(c: Check, refuse) -> None:
