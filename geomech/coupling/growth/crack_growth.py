@@ -14,7 +14,7 @@ from ..load_transfer.elastic_bodies import tip_rows
 from ..load_transfer.unbounded_rock import loads_of, take_endless
 from ..splitting.block_splitting import divided, split_blocks
 from ..splitting.contact_initialisation import contacts_after, holds_together
-from ..splitting.part_deflection import inherited_deflection
+from ..splitting.part_deflection import PartStress, inherited_deflection
 from ..splitting.part_initial_stress import initialise_moving_parts, initialise_parts_at_rest
 from ..splitting.part_mean_stress import rotated_mean_stress
 
@@ -132,7 +132,7 @@ def take_growth(now: CrackedBlocks, growth, state: State, solutions: dict) -> tu
         events.append(event(now, "split", state, centre, f"{now.blocks.names[b]} is cut into {len(parts)} blocks"))
     loads, stands, begun = now.loads, now.state is state, now.state
     stored = {block: of.crack_energy for block, of in now.strain_solutions().items()}
-    deflected, stresses = now.system.deflected, {}
+    deflected, stresses = now.system.deflected, dict[int, PartStress]()
     now.take_split(split)
     if deflected is not None:
         now.system.follow(now.state)

@@ -13,7 +13,7 @@ origin.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -163,7 +163,7 @@ def _stress(
 
 def _kept(
     begun: State, old: DeflectedBlocks, new: DeflectedBlocks, parent: np.ndarray, is_part: np.ndarray
-) -> dict[str, np.ndarray]:
+) -> dict[str, Any]:
     """The arrays of ``begun`` by unknown of deflection, renumbered; zero in parts."""
     out = {}
     for name in _BY_UNKNOWN:
@@ -198,7 +198,8 @@ def _face_points(split: Split, begun: State) -> np.ndarray | None:
 def _only_heir(origin: np.ndarray, whole: np.ndarray, rows: np.ndarray) -> np.ndarray:
     """New number of each vertex or edge of before, by the ``origin`` (n,) of those of now: −1 where none of now is
     ``whole`` (n,), or several are; the last entry stands for no vertex."""
-    most = max(int(origin.max(initial=-1)), *(int(rows[name].max(initial=-1)) for name in rows.dtype.names[:4]))
+    named = (int(rows[name].max(initial=-1)) for name in ("vertex", "edge", "far_vertex", "far_edge"))
+    most = max(int(origin.max(initial=-1)), *named)
     out, here = np.full(most + 2, -1), np.flatnonzero(origin >= 0)
     count = np.bincount(origin[here], minlength=most + 2)
     here = here[whole[here] & (count[origin[here]] == 1)]
