@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Callable, Sequence
-from typing import Any
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -425,5 +425,7 @@ class BlockSystem:
 def _extended(state: State, before: np.ndarray, order: np.ndarray) -> State:
     """``state`` of blocks that are raised from the orders ``before`` (n_blocks,) to ``order``."""
     known = {name: getattr(state, name) for name in ("deflection", "deflection_origin", "crack_deflection")}
-    more: dict[str, Any] = {name: extended_deflection(of, before, order) for name, of in known.items() if of is not None}
+    more: dict[str, Any] = {
+        name: extended_deflection(of, before, order) for name, of in known.items() if of is not None
+    }
     return replace(state, **more)
