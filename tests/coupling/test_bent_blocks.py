@@ -3,14 +3,12 @@ all energy is told."""
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from scipy.linalg import eigh
 
 from geomech import ddm
-from geomech.coupling import Coupling, cycles
+from geomech.coupling import Coupling
 from geomech.model import (
     Blocks,
     Cracks,
@@ -128,10 +126,3 @@ def test_energy_of_a_cantilever_that_breaks_is_told_to_the_end(stiffness):
     assert last["fracture_energy"] > 0 and last["parting_energy"] > 0 and last["crack_elastic"] == 0.0
     # K_Ic²/E' over 0.7 m of new crack, less its last ligament.
     assert last["toughness_energy"] == pytest.approx(0.7 * 4e10 * (1 - 0.2**2) / 10e9, rel=0.1)
-
-
-def test_a_cracked_block_of_higher_order_is_refused_by_name():
-    problem = cantilever(0.3, 1e-3, 1e-3, None)
-    bent = replace(problem, blocks=replace(problem.blocks, order=np.array([1, 3])))
-    with pytest.raises(ValueError, match="is of higher order: such blocks have no cracks yet"):
-        list(cycles(bent))

@@ -56,9 +56,10 @@ class _Region:
         self._values = old.displacement(self.points, block)[..., :width]
         self._strains = old.strain(self.points, block)[..., :width]
 
-    def parted(self, q: np.ndarray, strain: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
-        """Mean motion (6,) over the part and the deflection (m,) of the part, of the field with the deflection ``q`` of
-        the whole and a further uniform ``strain`` (3,). The unknowns are those of Shi about the part's centroid."""
+    def parted(self, q: np.ndarray, moves: bool = False) -> tuple[np.ndarray, np.ndarray]:
+        """Mean motion (6,) over the part, in Shi's unknowns about its centroid, and the deflection (m,) of the part, of the
+        field with the deflection ``q`` of the whole. If it ``moves`` the part, the deflection is in the frame that the mean
+        rotation turns."""
         weights, area = self.weights, self.weights.sum()
         field, strains = self._values @ q, self._strains @ q
         mean = weights @ strains / area
@@ -67,9 +68,9 @@ class _Region:
         shift = weights @ field / area
         turn = float(weights @ (x * field[:, 1] - y * field[:, 0]) / (weights @ (x * x + y * y)))
         rest = field - shift - turn * np.column_stack([-y, x])
+        rest = rest @ rotation_of(np.array(turn)) if moves else rest
         own = self.new.displacement(self.points, self.part)[..., : self.width]
-        deflection = np.einsum("n,naj,na->j", weights, own, rest @ rotation_of(np.array(turn))) / area
-        return np.concatenate([shift, [turn], mean if strain is None else mean + strain]), deflection
+        return np.concatenate([shift, [turn], mean]), np.einsum("n,naj,na->j", weights, own, rest) / area
 
 
 def inherited_deflection(
@@ -92,7 +93,7 @@ def inherited_deflection(
         region = _Region(old.basis, block, new.basis, blocks, part)
         turn, some = rotation_of(begun.rotation[block]), blocks.vertex_block == part
         if begun.deflection is not None:
-            moved, kept["deflection"][own, 0] = region.parted(begun.deflection[was, 0])
+            moved, kept["deflection"][own, 0] = region.parted(begun.deflection[was, 0], True)
             rate, kept["deflection"][own, 1] = region.parted(begun.deflection[was, 1])
             arm = blocks.vertices[some] - new.basis.centroid[part]
             vertices[some] += _displacement(moved, arm) @ turn.T
@@ -150,9 +151,9 @@ def _stress(
     part, block, width = region.part, region.block, region.width
     angle, area = float(begun.rotation[block]), float(new.basis.area[part])
     mean = compliance @ rotate_stress(begun.stress[block], -angle)
-    motion, bent = region.parted(old.elastic_part(begun)[old.basis.of_block(block)], mean)
+    motion, bent = region.parted(old.elastic_part(begun)[old.basis.of_block(block)])
     stiffness, elastic = new.stiffness[part, :width, :width], new.elastic[part]
-    whole = np.concatenate([rotate_stress(elastic @ motion[3:], angle), stiffness @ bent / np.sqrt(area)])
+    whole = np.concatenate([rotate_stress(elastic @ (mean + motion[3:]), angle), stiffness @ bent / np.sqrt(area)])
     if solution is None:
         return PartStress(whole, whole)
     points, share, stress = sampled_stress(solution, split.blocks.loops(part))

@@ -207,7 +207,7 @@ def test_of_blocks_that_chase_their_cracks_the_soft_ones_give_way():
         for b, ratio in ((3, 0.2), (5, 0.75), (6, 0.75), (7, 0.8), (8, 0.3))
     }
     compliance = np.tile(ROCK.compliance(), (9, 1, 1))
-    now = SimpleNamespace(bodies=bodies, by_mean_stress=ByMeanStress(), system=SimpleNamespace(compliance=compliance))
+    now = SimpleNamespace(bodies=bodies, by_mean_stress=ByMeanStress(), elastic=compliance.__getitem__)
     assert _softest(now, {3, 5, 8}) == {5} and _softest(now, {5}) == {5}
     assert _softest(now, {3, 5, 6}) == {5, 6, 7}
     assert _softest(now, {3, 8}) == {3, 8} and _softest(now, set()) == set()
