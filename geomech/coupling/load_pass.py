@@ -273,7 +273,7 @@ def _passes(now: CrackedBlocks, dt: float, load_time: float | None, ways: _Ways)
         if attempt + 1 >= COMPLIANCE_PASSES and not left[-1] < 0.5 * left[-3]:
             break
         for block in sorted(give_way):
-            now.by_mean_stress.add(block)
+            now.by_mean_stress.give_way(block)
         if changed:
             # The oscillation may have caused the cut of the step.
             dt = oscillating.asked

@@ -451,6 +451,11 @@ class Attempt:
         )  # fmt: skip
         return springs, gap, weight, curved
 
+    @property
+    def _most_iterations(self) -> int:
+        """Open–close iterations after which the step is shortened."""
+        return self.system.settings.max_open_close_iterations
+
     def _settled(self, pattern, matrix, right, found, gap, vectors, springs, curved) -> Settled:
         system = self.system
         # In statics the loads at which contact states change are found to round-off.
@@ -473,7 +478,7 @@ class Attempt:
                 )  # fmt: skip
                 limits = system.settings
                 return settle(
-                    equations, limits.max_open_close_iterations, limits.contact_solver, self.bonds_give
+                    equations, self._most_iterations, limits.contact_solver, self.bonds_give
                 )  # fmt: skip
 
             return (

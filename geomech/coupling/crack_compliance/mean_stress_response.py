@@ -72,6 +72,8 @@ class ByMeanStress:
     fields: dict[int, BlockStressField] = field(default_factory=dict)
     _softness: dict[int, _Softness] = field(default_factory=dict)
     _blocks: set[int] = field(default_factory=set)
+    #: Blocks of higher order whose softness is limited.
+    _limited: set[int] = field(default_factory=set)
 
     def __contains__(self, block: int) -> bool:
         return block in self._blocks
@@ -79,6 +81,14 @@ class ByMeanStress:
     def add(self, block: int) -> None:
         """Give ``block`` this response from now on, however soft it is, until it is split."""
         self._blocks.add(block)
+
+    def give_way(self, block: int) -> None:
+        """As `add`, in statics, where passes do not converge without it: the softness of a block of higher order is limited
+        from now on as well."""
+        self._blocks.add(block)
+        if block in self.fields and block not in self._limited:
+            self._limited.add(block)
+            self._softness.pop(block, None)
 
     def take_all(self, bodies: dict[int, Body]) -> None:
         """Give all ``bodies`` (block →) this response."""
@@ -116,6 +126,9 @@ class ByMeanStress:
                 continue
             if self.soft(block, bodies[block], elastic[block]):
                 self._blocks.add(block)
+        for block in sorted(set(self.fields) - self._limited):
+            if block in bodies and self._soft(block, bodies[block], self.fields[block].rock) > SOFTEST:
+                self.give_way(block)
 
     def limit(self, block: int, body: Body, elastic: np.ndarray) -> np.ndarray:
         """P (3, 3) of ``block``, which limits its softness: its cracks respond as W(P σ), with the strain Pᵀ ε_c(P σ),
@@ -170,7 +183,7 @@ class ByMeanStress:
         """Whether the limit of ``block`` changes with the face states of ``solution``: because they are the first since its
         cracks have grown, or softer than `SOFTEST` under the present limit."""
         known = self._known(block, body, elastic)
-        if known.open <= SOFTEST or block in self.fields:
+        if known.open <= SOFTEST or (block in self.fields and block not in self._limited):
             return False
         states = solution.closed.tobytes() if solution.memory is None else solution.face_states.key
         if states == known.states:
@@ -207,8 +220,9 @@ class ByMeanStress:
 
         own = {b for b in whole.tolist() if parent[b] in self._blocks}
         return ByMeanStress(
-            kept(self.solutions), kept(self.memory), kept(self.stress), _softness=kept(self._softness), _blocks=own
-        )
+            kept(self.solutions), kept(self.memory), kept(self.stress), _softness=kept(self._softness), _blocks=own,
+            _limited={b for b in whole.tolist() if parent[b] in self._limited},
+        )  # fmt: skip
 
     def soft(self, block: int, body: Body, elastic: np.ndarray) -> bool:
         """Whether open cracks make ``block`` more than `SOFT` times as soft as its rock in some direction."""
@@ -223,7 +237,7 @@ class ByMeanStress:
         if known is None or known.crack_system is not body.crack_system:
             before = None if known is None or known.states is None else known.limit
             softness, limit = _limited(elastic, self.compliance(block, body))
-            if block in self.fields:
+            if block in self.fields and block not in self._limited:
                 # Two parts on a thin ligament turn against each other by deflection.
                 limit = np.eye(len(elastic))
             # Cracks that have grown begin with the limit of before: most of their faces stay as they are.

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from ...dda.higher_order.deflected_blocks import DeflectedBlocks
 from ...model import Event, State
 from ..coupled_state import CrackedBlocks
 from ..cycle_record import event
@@ -127,19 +128,21 @@ def take_growth(now: CrackedBlocks, growth, state: State, solutions: dict) -> tu
         return tuple(events)
     cut = now.blocks
     for b in np.flatnonzero(np.bincount(split.parent, minlength=now.blocks.n_blocks) > 1).tolist():
-        parts = np.flatnonzero(split.parent == b)
+        n_parts = int((split.parent == b).sum())
         centre = now.blocks.loops(b)[0].mean(axis=0)
-        events.append(event(now, "split", state, centre, f"{now.blocks.names[b]} is cut into {len(parts)} blocks"))
+        events.append(event(now, "split", state, centre, f"{now.blocks.names[b]} is cut into {n_parts} blocks"))
     loads, stands, begun = now.loads, now.state is state, now.state
     stored = {block: of.crack_energy for block, of in now.strain_solutions().items()}
     deflected, stresses = now.system.deflected, dict[int, PartStress]()
     now.take_split(split)
     if deflected is not None:
-        now.system.follow(now.state)
-        assert now.system.deflected is not None  # parts are of the order of the whole
-        now.state, stresses = inherited_deflection(
-            split, begun, deflected, now.system.deflected, solutions, now.system.compliance
+        system = now.system
+        system.follow(now.state)
+        # (None where all parts are of first order.)
+        parts = system.deflected or DeflectedBlocks(
+            now.blocks, system.fixed, system.density, system.stiffness, np.ones(now.blocks.n_blocks)
         )
+        now.state, stresses = inherited_deflection(split, begun, deflected, parts, solutions, system.compliance)
         split = replace(split, state=now.state)
     if now.problem.dda.dynamic_factor != 0.0:
         initialise_moving_parts(now, split, cut, begun, stored, stresses)

@@ -125,7 +125,7 @@ def split_blocks(
         contacts=_contacts(state.contacts, pieces),
         acceleration=None,
         removed=None if state.removed is None else state.removed[parent],
-        order=None if state.order is None else np.asarray(state.order)[parent],
+        order=None if state.order is None else _orders(np.asarray(state.order), pieces, logging.DEBUG),
     )
     lost = blocks.areas() - np.bincount(parent, weights=children_blocks.areas(), minlength=blocks.n_blocks)
     origin, edge_origin, span = (
@@ -249,9 +249,20 @@ def _assemble(blocks: Blocks, pieces: list[_Piece]) -> Blocks:
         edge_name=np.array(labels, dtype=int),
         edge_names=tuple(known),
         names=tuple(piece.name for piece in pieces),
-        order=None if blocks.order is None else np.asarray(blocks.order)[parent],
+        order=None if blocks.order is None else _orders(np.asarray(blocks.order), pieces),
         glued=None if blocks.glued is None else _glued(np.asarray(blocks.glued), pieces),
     )
+
+
+def _orders(order: np.ndarray, pieces: list[_Piece], level: int = logging.WARNING) -> np.ndarray:
+    """(n_blocks,) those of the parents; a part with a hole is of first order, which is logged: one of higher order could
+    have no cracks."""
+    out, seen = np.array([order[piece.parent] for piece in pieces]), [piece.parent for piece in pieces]
+    for k, piece in enumerate(pieces):
+        if len(piece.loops) > 1 and out[k] > 1 and seen.count(piece.parent) > 1:
+            _log.log(level, "%s has a hole: it continues as a block of first order, without deflection", piece.name)
+            out[k] = 1
+    return out
 
 
 def _glued(glued: np.ndarray, pieces: list[_Piece]) -> np.ndarray:

@@ -47,7 +47,7 @@ class _Region:
     def __init__(self, old: DeflectionBasis, block: int, new: DeflectionBasis, blocks: Blocks, part: int) -> None:
         self.old, self.block, self.new, self.part = old, block, new, part
         some = slice(int(blocks.vertex_start[part]), int(blocks.vertex_start[part + 1]))
-        degree = 2 * int(new.order[part])
+        degree = int(old.order[block] + new.order[part])
         end = blocks.vertices[blocks.next_vertex[some]]
         self.points, self.weights = polygon_points(blocks.vertices[some], end, new.centroid[part], degree)
         self.arm = self.points - new.centroid[part]
@@ -87,7 +87,7 @@ def inherited_deflection(
     kept = _kept(begun, old, new, parent, is_part)
     vertices, velocity, rotation = state.vertices.copy(), state.velocity.copy(), state.rotation.copy()
     stresses: dict[int, PartStress] = {}
-    for part in np.flatnonzero(is_part & (new.order > 1)).tolist():
+    for part in np.flatnonzero(is_part & (old.order[parent] > 1)).tolist():
         block, own = int(parent[part]), new.basis.of_block(part)
         was = old.basis.of_block(block)
         region = _Region(old.basis, block, new.basis, blocks, part)
@@ -99,7 +99,8 @@ def inherited_deflection(
             vertices[some] += _displacement(moved, arm) @ turn.T
             rotation[part] += moved[2]
             _add_rate(velocity[part], turn @ moved[:2], rate, float(begun.rotation[block]))
-        stresses[part] = _stress(split, begun, old, new, region, solutions.get(block), compliance[part])
+        if new.order[part] > 1:
+            stresses[part] = _stress(split, begun, old, new, region, solutions.get(block), compliance[part])
     state = replace(
         state, vertices=vertices, velocity=velocity, rotation=rotation,
         face_points=_face_points(split, begun), **kept,

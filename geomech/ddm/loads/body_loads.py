@@ -3,7 +3,7 @@ loads."""
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
+from abc import ABCMeta, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
@@ -26,7 +26,7 @@ class OutOfEquilibrium(ValueError):
         )
 
 
-class IntactField(ABC):
+class IntactField(metaclass=ABCMeta):
     """Stress and displacement that further loads cause in a body without cracks, whatever these loads are. Their
     tractions act on its outline."""
 
