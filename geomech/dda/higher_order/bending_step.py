@@ -38,7 +38,6 @@ from .face_points import FaceContacts
 from .glued_cells import Glue, GluedFaces
 from .six_row_system import SixRowPattern, fill_own, moved
 
-
 #: In statics, where blocks have cracks, this multiple of ``max_open_close_iterations`` is tried before the step is
 #: shortened: a slope of 49 blocks with 20 cracked ones settles in 60 to 100, and in shorter steps, which the inertia of
 #: the blocks makes another problem, not sooner.
