@@ -85,8 +85,8 @@ class BendingWatch:
         log.warning(
             "t = %g s: of the %.3g J/m of fracture energy, the blocks supplied %.3g (unpaid_toughness in summary.json): "
             "blocks of uniform strain store no bending energy, so that cracks opened by bending take none from the "
-            "motion, and K under an impact may be several times too high. Bond the block from smaller ones, which bend "
-            "together, or take such cracks as an upper bound",
+            "motion, and K under an impact may be several times too high. Give the zone an order of 2 to 8 "
+            "(zones.NAME.order), or take such cracks as an upper bound",
             time,
             before,
             spent,

@@ -113,7 +113,7 @@ def _statistics(
     sets = joint_statistics(scene, problem, free)
     nodes = network_of(scene).nodes
     topology = Topology.of(nodes)
-    mends = [mend._asdict() for mend in jointed.cutting.mends] if jointed else []
+    mends = [mend._asdict() for mend in jointed.cutting.repairs] if jointed else []
     low, high = blocks.vertices.min(axis=0), blocks.vertices.max(axis=0)
     sizes = block_sizes(area[free], _PASSING)
     pond = deepest_pond(scene.tables, blocks)

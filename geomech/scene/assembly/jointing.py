@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...model import Blocks, Cracks
-from ...shapes import Cutting, Joint, Mend, Trace, Zone, cut
+from ...shapes import Cutting, Joint, Repair, Trace, Zone, cut
 from ...shapes.assembly import TOLERANCE
 from ...shapes.block_cutting.crack_traces import crack_network
 from ...shapes.curves import Chords, ended_on
@@ -54,8 +54,8 @@ class Jointed:
     def repair_lines(self, others: str) -> list[str]:
         """Defects found and repaired, one line per kind, with the first places and their junctions; ``others`` says
         where the rest are listed."""
-        kinds: dict[str, list[Mend]] = {}
-        for repair in self.cutting.mends:
+        kinds: dict[str, list[Repair]] = {}
+        for repair in self.cutting.repairs:
             kinds.setdefault(repair.kind, []).append(repair)
         lines = []
         for kind, own in kinds.items():

@@ -59,8 +59,8 @@ def _check_cracks(c: Check, name: str, zone, refuse) -> None:
     begin = t.growth is not None and t.growth.initiation
     blocks = np.zeros(0, int)
     if drawing is not None and drawing.blocks is not None and drawing.cracks is not None:
-        own = [b for b, of in enumerate(drawing.zones) if of == name]
-        blocks = np.array(own, int) if begin else np.intersect1d(drawing.cracks.block, own)
+        own = np.array([b for b, of in enumerate(drawing.zones) if of == name], int)
+        blocks = own if begin else np.intersect1d(drawing.cracks.block, own)
         if (np.diff(drawing.blocks.block_loop)[blocks] > 1).any():
             refuse("cracks in a block of higher order with a hole are not supported", "set order = 1")
     if not (begin or len(blocks)):

@@ -224,7 +224,10 @@ def _shallow(c: Check) -> None:
     blocks = c.blocks
     fixed = fixed_blocks(c.tables, c.drawn)
     base = np.flatnonzero(fixed[blocks.vertex_block])
-    cracked = [b for b in np.unique(c.cracks.block).tolist() if not fixed[b]]
+    # Those of higher order have the pressure of a rigid base.
+    zones, of = c.tables.zones, c.drawn.zones
+    first = [of[b] not in zones or zones[of[b]].order == 1 for b in range(blocks.n_blocks)]
+    cracked = [b for b in np.unique(c.cracks.block).tolist() if first[b] and not fixed[b]]
     # In dynamics blocks land on corners and edges: static contact pressure is not what loads their cracks.
     if not (len(base) and cracked) or c.tables.dda.dynamic_factor > 0 or c.tables.run.boundary_stress == "bases":
         return
@@ -251,7 +254,7 @@ def _shallow(c: Check) -> None:
             f"{blocks.names[block]!r} contains cracks and lies on a fixed block with a side of {length:.3g} m, "
             f"{slenderness:.2g} times as long as the block is deep{others}: its base pressure is linear, which bends "
             "it more than a true base would; K of its cracks may be too large by a factor of two",
-            'set run.boundary_stress = "bases", or draw it deeper '
+            'give its zone an order of 2 (zones.NAME.order), set run.boundary_stress = "bases", or draw it deeper '
             f"(less than {SHALLOW:g} times as wide as deep), or cut it by joints into pieces that are",
         )
 

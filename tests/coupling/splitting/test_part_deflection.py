@@ -78,9 +78,7 @@ def test_parts_are_where_the_whole_was_and_move_as_it_did(order):
         np.testing.assert_allclose(
             places(split.blocks, after, parts, part, points), places(blocks, state, own, 0, points), atol=3e-8
         )
-    np.testing.assert_array_equal(
-        after.deflection[parts.basis.of_block(2)], state.deflection[own.basis.of_block(1)]
-    )
+    np.testing.assert_array_equal(after.deflection[parts.basis.of_block(2)], state.deflection[own.basis.of_block(1)])
     was, had = momentum_and_energy(blocks, state, own)
     now, has = momentum_and_energy(split.blocks, after, parts)
     np.testing.assert_allclose(now, was, rtol=1e-6)

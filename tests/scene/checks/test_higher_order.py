@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from small_scenes import block
+from small_scenes import PLATE, block
 
 from geomech.model import AUTO_ORDER
 from geomech.output import Run
@@ -210,3 +210,36 @@ def test_cells_have_the_joint_by_which_they_part(tmp_path):
     names = [problem.blocks.edge_names[problem.blocks.edge_name[v]] for v in (edge, mate)]
     assert names == ["cells:block", "cells:block"]
     assert problem.joints[problem.joint_index(*names)].name == "grain"
+
+
+CRACKED = BENDING.replace(
+    "[materials", 'cracks = [{ name = "flaw", points = [[1.5, 0.0], [1.5, 0.3]] }]\n[materials', 1
+).replace("density_kg_m3 = 2000", "density_kg_m3 = 2000\nk_ic_pa_sqrt_m = 1e3")
+
+
+@pytest.mark.parametrize(
+    ("new", "message"),
+    [
+        ('order = "auto"', "give the order as a number"),
+        ("order = 4\nmesh_size_m = 0.4", "are not supported in cells"),
+    ],
+)
+def test_what_cracks_do_not_go_with_is_refused(tmp_path, new, message):
+    begin = BENDING.replace("order = 4", new) + '[growth]\ninitiation = "surface"\n'
+    for text in (CRACKED.replace("order = 4", new), begin):
+        with pytest.raises(SceneError, match=message) as error:
+            load_scene(scene(tmp_path, text=text))
+        assert "zones.block.order" in str(error.value)
+
+
+def test_a_cracked_block_of_higher_order_resumes_to_the_bit(tmp_path):
+    """A plate of order 3 that is pulled until its crack has cut it in two, and the same from a checkpoint on the way."""
+    text = PLATE + "\n[zones.rock]\norder = 3\n"
+    path = scene(tmp_path, text=text)
+    whole, part = tmp_path / "whole", tmp_path / "part"
+    told = run(load_scene(path), whole)
+    assert told["crack_growth_m"] > 0.0 and told["blocks"] == 2
+    end = load_scene(path).problem().run.end_time
+    run(load_scene(path, {"run.end_time_s": 0.3 * end}), part)
+    resume(part, {"run.end_time_s": end})
+    assert (part / "history.csv").read_bytes() == (whole / "history.csv").read_bytes()

@@ -190,8 +190,11 @@ def test_how_far_linear_pressure_is_off_under_shallow_blocks(ratio, at, too_larg
     assert linear.tips["k_i"].max() / constrained.tips["k_i"].max() == pytest.approx(too_large, rel=0.01)
 
 
-@pytest.mark.parametrize(("height", "route", "told"), [(0.5, "contacts", 1), (0.7, "contacts", 0), (0.5, "bases", 0)])
-def test_shallow_cracked_blocks_on_a_fixed_base_are_told(scene_file, height, route, told):
+@pytest.mark.parametrize(
+    ("height", "route", "order", "told"),
+    [(0.5, "contacts", 1, 1), (0.7, "contacts", 1, 0), (0.5, "bases", 1, 0), (0.5, "contacts", 2, 0)],
+)
+def test_shallow_cracked_blocks_on_a_fixed_base_are_told(scene_file, height, route, order, told):
     text = f"""
 title = "a slab on its ground"
 [[geometry.zones]]
@@ -208,6 +211,8 @@ youngs_modulus_pa = 20e9
 poissons_ratio = 0.25
 density_kg_m3 = 2500
 k_ic_pa_sqrt_m = 1e6
+[zones.slab]
+order = {order}
 [zones.ground]
 fixed = true
 [joints.default]
