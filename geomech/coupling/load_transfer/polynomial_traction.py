@@ -17,7 +17,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from ...dda.higher_order.polygon_quadrature import lobatto_points
+from ...dda.kinematics.polygon_quadrature import lobatto_points
 from ...dda.loads.force_records import EDGE_FORCE
 from ...model import Blocks
 
@@ -36,7 +36,8 @@ def without_faces(
     left: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
     """CONTACT rows ``contacts`` without the faces of the blocks ``bent`` (n_blocks,) bool, and EDGE_FORCE rows with the
-    tractions along these, on both blocks. Faces on the blocks ``left`` (n_blocks,) bool are left as they are.
+    tractions along these, on both blocks. Faces on the blocks ``left`` (n_blocks,) bool are left as they are where they
+    are not bonded.
 
     ``vertices`` (n_vertices, 2) m, where forces act; ``points``: FACE_POINT rows of all faces, None without any."""
     if points is None or not len(points) or not len(contacts):
@@ -44,13 +45,13 @@ def without_faces(
     rows = {(v, e): k for k, (v, e) in enumerate(contacts[["vertex", "edge"]].tolist())}
     drop, out = np.zeros(len(contacts), bool), []
     on_face = np.flatnonzero((points["far_vertex"] >= 0) & (bent[points["block"]] | bent[points["other"]]))
-    on_face = on_face[~(left[points["block"][on_face]] | left[points["other"][on_face]])]
     starts = on_face[points["place"][on_face] == 0.0]
     for first in starts.tolist():
         n = int(np.argmax(points["place"][first:] == 1.0)) + 1
         face = points[first : first + n]
         ends = [rows.get((int(face[a][0]), int(face[b][0])), -1) for a, b in _ENDS]
-        if min(ends) < 0 or not face["normal_force"].any():
+        based = left[face["block"][0]] or left[face["other"][0]]
+        if min(ends) < 0 or (based and not (face["bonded"] > 0).all()) or not face["normal_force"].any():
             continue
         pieces = _pieces(face)
         if pieces:

@@ -20,7 +20,7 @@ import numpy as np
 from ...conventions import rotate_stress
 from ...dda.higher_order.deflected_blocks import DeflectedBlocks, rotation_of, strain_turned_back
 from ...dda.higher_order.deflection_basis import DeflectionBasis, n_deflections
-from ...dda.higher_order.polygon_quadrature import polygon_points
+from ...dda.kinematics.polygon_quadrature import polygon_points
 from ...model import Blocks, State
 from .block_splitting import Split
 from .part_mean_stress import sampled_stress

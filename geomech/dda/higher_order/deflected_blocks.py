@@ -17,10 +17,10 @@ from functools import cached_property
 import numpy as np
 
 from ...model import Blocks, InSituStress, State
+from ..kinematics.polygon_quadrature import gauss_points, polygon_points
 from ..open_close.contact_set import ContactSet
 from ..results import NotConverged
 from .deflection_basis import HIGHEST, DeflectionBasis, n_deflections
-from .polygon_quadrature import gauss_points, polygon_points
 
 log = logging.getLogger(__name__)
 

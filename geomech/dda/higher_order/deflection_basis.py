@@ -27,7 +27,7 @@ import numpy as np
 
 from ...compiled import UNCOUNTED, kept, part
 from ..kinematics.displacement_matrix import displacement_matrix
-from .polygon_quadrature import polygon_points
+from ..kinematics.polygon_quadrature import polygon_points
 
 #: The highest order of a block, and of a basis: the error estimate uses two orders more.
 HIGHEST, _HIGHEST_BASIS = 8, 10

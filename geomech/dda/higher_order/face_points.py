@@ -28,10 +28,10 @@ from ..contact_detection.face_quadrature import FacePoints
 from ..contact_detection.inherited_contacts import InheritedContacts
 from ..joint_laws.bonds import WITHOUT_GAPS, on_lines
 from ..joint_laws.penalty_springs import Springs
+from ..kinematics.polygon_quadrature import lobatto_points
 from ..open_close.contact_set import ContactSet
 from ..open_close.settled_states import Settled
 from .deflected_blocks import DeflectedBlocks
-from .polygon_quadrature import lobatto_points
 
 #: History of a `ContactSet`, by the names of FACE_POINT rows.
 _MEMORY = {"state": "state", "bonded": "bonded", "normal": "normal_force", "shear": "shear_force", "slip": "slip",

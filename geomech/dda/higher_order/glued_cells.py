@@ -27,11 +27,11 @@ import numpy as np
 from ...compiled import UNCOUNTED, kept
 from ...model import JointLaw, State
 from ..kinematics.midpoint_configuration import MidpointConfiguration
+from ..kinematics.polygon_quadrature import gauss_points
 from ..open_close.contact_set import ContactSet
 from .deflected_blocks import DeflectedBlocks, rotation_of
 from .deflection_basis import n_deflections
 from .face_points import Faces
-from .polygon_quadrature import gauss_points
 from .six_row_system import SixRowPattern, add_force, add_pair, moved
 
 #: τ over the larger λ of the two cells; above a half is stable. Displacements of a cantilever of cells hardly change

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..higher_order.deflected_blocks import DeflectedBlocks
-from ..higher_order.polygon_quadrature import gauss_points
 from ..kinematics.midpoint_configuration import MidpointConfiguration
+from ..kinematics.polygon_quadrature import gauss_points
 from .force_records import POINT_FORCE
 from .viscous_boundary import ViscousEdges
 

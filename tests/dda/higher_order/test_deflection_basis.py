@@ -14,7 +14,7 @@ from geomech import dda
 from geomech.dda import EDGE_FORCE, POINT_FORCE
 from geomech.dda.higher_order.deflected_blocks import DeflectedBlocks
 from geomech.dda.higher_order.deflection_basis import DeflectionBasis, n_deflections
-from geomech.dda.higher_order.polygon_quadrature import gauss_points, lobatto_points, polygon_points
+from geomech.dda.kinematics.polygon_quadrature import gauss_points, lobatto_points, polygon_points
 from geomech.model import Blocks, Material
 
 L_SHAPE = np.array([[0, 0], [3, 0], [3, 1], [1, 1], [1, 3], [0, 3.0]])
