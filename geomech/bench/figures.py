@@ -128,7 +128,7 @@ def times_text(spent: Mapping[str, Mapping[str, float]]) -> str:
     """Table of the time of every topic, and the total."""
     rows = [(name, took["seconds"], took["of processor"]) for name, took in spent.items()]
     rows.append(("all", sum(row[1] for row in rows), sum(row[2] for row in rows)))
-    lines = ["what the benchmarks themselves took        s   of processor"]
+    lines = ["time of the benchmarks                     s   of processor"]
     return "\n".join(lines + [f"  {name:<34}{seconds:8.1f}{own:15.1f}" for name, seconds, own in rows])
 
 
@@ -242,7 +242,7 @@ def compared(found: Sequence[Change], before: dict, path: Path) -> str:
         lines.append(f"  {title}: {len(rows) or 'nothing'}")
         lines += [f"    {c.topic:<10} {c.name}: {c.before:.3g} → {c.now:.3g} ({c.ratio:.2f} times)" for c in rows]
     other = {k: v for k, v in before["machine"].items() if k in ("processor", "python")}
-    lines.append("  that was on " + ", ".join(map(str, other.values())))
+    lines.append("  the earlier figures were measured on " + ", ".join(map(str, other.values())))
     return "\n".join(lines)
 
 

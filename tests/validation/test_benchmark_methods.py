@@ -173,7 +173,7 @@ def test_table_and_picture(tmp_path):
         500
     )
     text = precision_table.table(points, growth, goals)
-    assert "500  and then still at 1e-03; its error does not fall" in text
+    assert "500  with an error of 1e-03; its error does not decrease" in text
     # Growth is compared at an error of its own, with the quickest of this solver's curves.
     grown = [row for row in goals["time at one error over this solver's"] if row["problem"] == growth_paths.PROBLEM]
     assert [row["method"] for row in grown] == [precision_table.FEM] and grown[0]["reached"]

@@ -175,21 +175,18 @@ def table(points: Sequence[Point], growth: dict, goals: dict) -> str:
         ),
         "",
         (
-            f"time at error {ERROR:.0e} (growth {GROWTH_ERROR:.0e}) over this solver's (goal {RATIO:.0f} for constant elements): "
-            "measured, or how much more time it was"
+            f"time at error {ERROR:.0e} (growth {GROWTH_ERROR:.0e}) relative to this solver's (goal {RATIO:.0f} for constant "
+            "elements): measured,"
         ),
-        (
-            "given without coming down to it, and then what that would take if its error went on falling as it last "
-            "did and its"
-        ),
-        "time grew no faster than its unknowns (extrapolated)",
+        "or for methods that do not reach this error, the longest time measured and the time extrapolated from the last",
+        "decrease of their error, if time is proportional to the number of unknowns",
     ]
     for row in goals["time at one error over this solver's"]:
         result = f"{row['ratio']:8.0f}  measured"
         if not row["reached"]:
-            result = f"{row['ratio']:8.0f}  and then still at {row['best']:.0e}; "
+            result = f"{row['ratio']:8.0f}  with an error of {row['best']:.0e}; "
             further = row["extrapolated"]
-            still = "its error does not fall" if row["sizes"] > 1 else "of one size"
+            still = "its error does not decrease" if row["sizes"] > 1 else "one size only"
             result += still if further is None else f"{further:.1g} extrapolated"
         lines.append(f"  {row['problem']:<30}{row['method']:<36}{result}")
     return "\n".join(lines)

@@ -394,7 +394,7 @@ def _table(costs: list[Cost], exponents: dict[str, float], iterated: list[dict],
             )
     lines += [
         "",
-        "the last equations solved in other ways, with set-up but for orders of elimination (residual over right side)",
+        "the last equations solved by other methods, including set-up except elimination orders (residual / right side)",
     ]
     lines += [
         f"  {row['scene']:<13}{row['blocks']:8d}  {row['method']:<24}{row['iterations']:6d} iterations"
@@ -402,7 +402,7 @@ def _table(costs: list[Cost], exponents: dict[str, float], iterated: list[dict],
         for row in iterated
     ]
     if not pardiso_available():
-        lines.append("  PARDISO of MKL is one where it is installed: pip install 'geomech[pardiso]' (a gigabyte)")
+        lines.append("  PARDISO of MKL is included if it is installed: pip install 'geomech[pardiso]' (a gigabyte)")
     lines += ["", "errors against closed forms"]
     lines += [f"  {name:<88}{value:8.1e}" for name, value in errors.items()]
     return "\n".join(lines)

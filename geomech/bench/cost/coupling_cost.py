@@ -104,7 +104,7 @@ def measure(quick: bool = False) -> Measured:
             ("error of a stress intensity factor, better to the right", "steps, ms"), None,
         )  # fmt: skip
     lines = [
-        "Coupling beside the blocks' own cost, a pass, when nothing grows (medians)",
+        "Cost of the coupling relative to that of the blocks, per pass without growth (medians)",
         (
             f"{'blocks':>8}{'cracked':>9}{'passes':>8}{'blocks ms':>11}{'coupling ms':>13}{'ratio':>8}"
             f"{'all solved ms':>15}{'ratio':>8}   goal < {RATIO:g}"

@@ -66,7 +66,7 @@ def compiled(folder: Path) -> dict[str, int]:
 def table(commands: Mapping[str, Sequence[str]]) -> list[str]:
     """One line per command: seconds by layer, heavy libraries loaded. ``RUN`` stands for a run's folder in later
     commands."""
-    lines = ["imports by layer, ms (each module's own time, told by Python, which slows them)"]
+    lines = ["imports by layer, ms (each module's own time, as measured by Python, which slows imports)"]
     with tempfile.TemporaryDirectory() as scratch:
         for label, arguments in commands.items():
             last = f"{scratch}/{arguments[0]}" if arguments[0] in ("run", "build") else ""

@@ -189,9 +189,9 @@ def measure(quick: bool = False, blocks: int | None = None) -> Measured:
 def table(every: Sequence[Sized]) -> Measured:
     """One line per size and time step, and figures of errors and times."""
     lines = [
-        f"slopes that slide from rest for {END:g} s; work of gravity on what moves, off that in the shortest steps and "
-        "off the rigid slab's;",
-        "an iteration is the step over its open–close iterations, beside that of a brick wall of as many blocks",
+        f"slopes that slide from rest for {END:g} s; work of gravity on the moving blocks, and its difference from that in "
+        "the shortest steps and from the rigid slab's;",
+        "time of an iteration: the step divided by its open–close iterations, relative to that of a brick wall of as many blocks",
         "  blocks   dt, ms   steps  iterations a step  ms/iteration  of the wall's  s/simulated s  moved"
         "  work off shortest  off slab",
     ]

@@ -96,20 +96,20 @@ def measure(quick: bool = False) -> Measured:
         ),
         f"  the blocks' series takes {found.bytes_a_cell:.0f} bytes a cell",
         (
-            f"  {found.rate / 1e6:.0f} MB of arrays a second until all is on disk, {found.processor_rate / 1e6:.0f} MB "
-            "a second of processor"
+            f"  {found.rate / 1e6:.0f} MB of arrays per second until all is on disk, {found.processor_rate / 1e6:.0f} MB "
+            "per second of processor time"
         ),
         (
-            f"  a cycle costs {1e3 * found.processor:.1f} ms of processor, the run waits {1e3 * found.waited:.1f} ms "
+            f"  a cycle takes {1e3 * found.processor:.1f} ms of processor time, the run waits {1e3 * found.waited:.1f} ms "
             "for it"
         ),
         (
-            f"share of writing in a run, cycle over step and cycle, in seconds of processor: {share:.1%} (goal for 10 "
+            f"share of writing in a run, cycle / (step + cycle), in processor time: {share:.1%} (goal for 10 "
             f"000 blocks: below {SHARE:.0%})"
         ),
-        f"  beside a step of {1e3 * TIME_STEP:g} ms, {moving:.3g} s: median of steps 2 to {steps} after sudden weight",
-        f"  beside the last of these steps, {last:.3g} s: {at_rest:.1%}",
-        "one file of the blocks, as this project and as others write it",
+        f"  relative to a step of {1e3 * TIME_STEP:g} ms, {moving:.3g} s: median of steps 2 to {steps} after sudden weight",
+        f"  relative to the last of these steps, {last:.3g} s: {at_rest:.1%}",
+        "one file of the blocks, written by this project and by others",
     ]
     lines += [f"  {name:<32}{1e3 * spent:9.1f} ms  {spent / own_time:6.1f} times" for name, spent in writers.items()]
     return Measured.of(

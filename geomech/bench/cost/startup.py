@@ -78,7 +78,7 @@ def measure(quick: bool = False) -> Measured:
             rows.append((f"specimen φ = {phi}° to coalescence, everything written", statistics.median(times)))
     width = max(len(label) for label, _ in rows)
     lines = [
-        f"whole processes, medians of {repeats} (some of fewer): by the clock or of the processor, whichever is less"
+        f"whole processes, medians of {repeats} runs (some of fewer): wall time or processor time, whichever is less"
     ]
     lines += [f"  {label:<{width}}  {seconds:7.2f} s" for label, seconds in rows if math.isfinite(seconds)]
     lines += ["", *import_cost.table({label: COMMANDS[label] for label in (QUICK if quick else COMMANDS)})]

@@ -142,5 +142,5 @@ def measure(quick: bool = False, seconds: float | None = None) -> Measured:
             f"{seen.strain:>9.1e} {seen.gained:>14.1e} {moving:>9.1e} {spent:>8.0f} s"
         )
         errors[f"{name}: overlap over block"] = seen.overlap
-    lines.append("penetration and overlap over √area of the smallest block; energy relative to all energy converted")
+    lines.append("penetration and overlap over √area of the smallest block; energies over all energy converted")
     return Measured.of("\n".join(lines), errors=errors)
