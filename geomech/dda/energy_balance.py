@@ -287,7 +287,7 @@ def _add_contacts(out, contacts, closure):
         was, state, theta = contacts.was_state[i], contacts.state[i], contacts.theta[i]
         kn, g0, g1, limit = contacts.normal[i], contacts.gap0[i], contacts.gap[i], closure[contacts.law[i]]
         give = theta / contacts.shear[i] if contacts.shear[i] > 0.0 else 0.0
-        phi0 = phi1 = given = rubbed = drag = done = 0.0
+        phi0 = phi1 = given = frictional = drag = done = 0.0
         if was != OPEN:
             shear0 = contacts.shear_force0[i]
             phi0 = _stored(kn, g0, limit, contacts.was_bonded[i]) + 0.5 * give * shear0 * shear0
@@ -301,15 +301,15 @@ def _add_contacts(out, contacts, closure):
             lifted, slid = contacts.lifted[i], contacts.sliding[i]
             done = pushed * (g1 - g0 - contacts.arc[i] + lifted) + sheared * slid
             if state == SLIP:
-                rubbed = -sheared * (contacts.slip[i] if give > 0.0 else slid) - pushed * lifted
+                frictional = -sheared * (contacts.slip[i] if give > 0.0 else slid) - pushed * lifted
             if kn > 0.0:
                 start = g0 if was != OPEN and contacts.was_bonded[i] > 0 else min(g0, 0.0)
                 spring = -theta * _push(kn, g1, limit) - (1.0 - theta) * _push(kn, start, limit)
                 drag = -(pushed + spring) * (g1 - g0)
-        rest = given - done - (phi1 - phi0) - rubbed - drag
+        rest = given - done - (phi1 - phi0) - frictional - drag
         contact += phi1
         overlap += given
-        friction += rubbed
+        friction += frictional
         viscous += drag
         if contacts.was_bonded[i] and not contacts.bonded[i]:
             bond += rest

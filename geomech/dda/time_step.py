@@ -84,13 +84,13 @@ class Impact:
 
     without  (n_blocks, 6)   velocities without impacts
     moved    (n_blocks, 6)   displacements in addition to those of the step
-    lost, rubbed             J/m dissipated by restitution and by friction
+    lost, frictional         J/m dissipated by restitution and by friction
     """
 
     without: np.ndarray
     moved: np.ndarray
     lost: float = 0.0
-    rubbed: float = 0.0
+    frictional: float = 0.0
 
     @classmethod
     def none(cls, velocity: np.ndarray) -> Impact:
@@ -99,7 +99,7 @@ class Impact:
     def add(self, rebound: Rebound) -> None:
         self.moved[:, :3] += rebound.moved
         self.lost += rebound.lost
-        self.rubbed += rebound.rubbed
+        self.frictional += rebound.frictional
 
 
 @dataclass(frozen=True, eq=False)
@@ -421,9 +421,9 @@ class Attempt:
         self.midpoint.turn_back(vectors, *blocks, geometry)
         across, slid = (sliding(vectors, scaled, all_blocks, *blocks, way) for way in (0, 1))
         end = MidpointConfiguration.of(increment, 1.0, self.vertices, system.owner, self.moments)
-        went = end.contacts(found.geometry, *blocks, along)[:, 0] - found.geometry[:, 0]
+        travelled = end.contacts(found.geometry, *blocks, along)[:, 0] - found.geometry[:, 0]
         arc = system.finder.gaps(vertices, self.vertices, found) - found.geometry[:, 3] - across
-        self.found = self.found.along(arc, went * np.hypot(*along.T) - slid)
+        self.found = self.found.along(arc, travelled * np.hypot(*along.T) - slid)
 
     def along_edges(self, found: ContactSet) -> np.ndarray:
         """(n, 2) m: the edges of ``found``."""
@@ -549,7 +549,7 @@ class Attempt:
         self.slid = sliding(self.vectors, self.settled.unknowns, self.order, found.block, found.other, 1)
         if actions is not None and self.n_free:
             self.slid += actions.along
-        self.rubbed = 0.0
+        self.frictional = 0.0
         if imposed is not None:
             imposed.correct_velocity(velocity)
         self.increment, self.velocity, self.acceleration = increment, velocity, acceleration
@@ -597,7 +597,7 @@ class Attempt:
             return
         assert self.pattern is not None  # blocks that touch are free, or nothing is stopped
         try:
-            change, rubbed = stop(
+            change, frictional = stop(
                 stopped, unresolved, self.pattern, self.matrix, self.vectors, found, self.settled, self.dt
             )  # fmt: skip
         except np.linalg.LinAlgError as error:
@@ -610,7 +610,7 @@ class Attempt:
         rates, taken = dissipating(
             turned(rates, self.increment[:, 2]), velocity, self.moments, self.density, system.fixed
         )
-        self.velocity, self.rubbed = velocity + rates, min(max(rubbed, 0.0), taken)
+        self.velocity, self.frictional = velocity + rates, min(max(frictional, 0.0), taken)
 
     def _rebound(self, imposed) -> None:
         """Apply the impacts of blocks that collide in the step (`impacts`)."""
@@ -834,17 +834,17 @@ class Attempt:
                 kinetic=energy.kinetic + kinetic,
                 gravity_work=energy.gravity_work + fallen,
                 load_work=energy.load_work + pulled,
-                friction=energy.friction + impact.rubbed,
+                friction=energy.friction + impact.frictional,
                 impact=impact.lost,
                 # The rest: impulses act at the end of the step, and displacements are straight.
-                scheme=energy.scheme + fallen + pulled - kinetic - impact.rubbed - impact.lost,
+                scheme=energy.scheme + fallen + pulled - kinetic - impact.frictional - impact.lost,
             )
         return energy._replace(
             before=energy.before + found.unbent + found.released,
             bond=energy.bond + found.unbent,
-            friction=energy.friction + self.rubbed,
+            friction=energy.friction + self.frictional,
             # Elastic energy released where faces separate is a vibration that no step resolves.
-            scheme=energy.scheme - self.rubbed + found.released,
+            scheme=energy.scheme - self.frictional + found.released,
         )
 
     def _real_springs(self) -> tuple[np.ndarray, np.ndarray]:

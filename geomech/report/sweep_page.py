@@ -95,7 +95,7 @@ class _Writer:
                 f"mean {self.label}": float(values.mean()),
                 "standard deviation": float(values.std(ddof=1)) if len(values) > 1 else None,
             }
-        facts |= {"runs": len(self.rows), "without an answer": len(self.rows) - len(self.done)}
+        facts |= {"runs": len(self.rows), "without a result": len(self.rows) - len(self.done)}
         self.page.facts(facts)
         if not self.found.complete:
             self.page.warning(
@@ -109,7 +109,7 @@ class _Writer:
             )
         if failure.answered < failure.runs and self.found.rare is None:
             self.page.warning(
-                f"{failure.runs - failure.answered} runs have no answer and are left out of the probability of "
+                f"{failure.runs - failure.answered} runs have no result and are left out of the probability of "
                 "failure; it would be "
                 f"{share_text(failure.least)} if all of them were stable, {share_text(failure.most)} if all failed."
             )
@@ -307,7 +307,7 @@ class _Writer:
         counted = counted_by_reason(self.rows)
         if not counted:
             return
-        self.page.section("Runs without an answer")
+        self.page.section("Runs without a result")
         self.page.table(
             ["status", "runs", "reason, of the first", "run"],
             [[each["status"], each["runs"], each["reason"], each["run"]] for each in counted[:_LISTED]],

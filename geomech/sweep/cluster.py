@@ -190,7 +190,7 @@ class DaskEngine:
                 attempts[job.number] = attempts.get(job.number, 0) + (1 if len(batch) == 1 else 0)
                 if attempts[job.number] >= _ATTEMPTS or (len(batch) == 1 and type(error).__name__ == "KilledWorker"):
                     yield lost(
-                        job, f"the cluster gave it up: {type(error).__name__}: {error}"[:400], attempts[job.number]
+                        job, f"the cluster gave up the run: {type(error).__name__}: {error}"[:400], attempts[job.number]
                     )
                 else:
                     again.append([job])
@@ -202,7 +202,7 @@ class DaskEngine:
 
     def _reconnect(self) -> None:
         """Wait until the scheduler is back, and connect a new client."""
-        self.notes.append(f"the scheduler at {self.address} is gone: waiting for it")
+        self.notes.append(f"the scheduler at {self.address} has disappeared: waiting for it")
         with suppress(Exception):
             self._client.close(timeout=1)
         self._own, until = True, time.monotonic() + self.patience

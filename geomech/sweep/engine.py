@@ -207,7 +207,7 @@ class LocalEngine:
             why = f"signal {signal.Signals(-code).name}" if code < 0 else f"exit code {code}"
             if -code == signal.SIGKILL and self.workers > 1:
                 self.workers -= 1
-                self.notes.append(f"a worker was killed, as when memory runs out: {self.workers} go on")
+                self.notes.append(f"a worker was killed, as when memory runs out: {self.workers} continue")
             if attempts[job.number] < ATTEMPTS:
                 again.append(job)
             else:

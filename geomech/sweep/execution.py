@@ -32,7 +32,7 @@ log = logging.getLogger(__name__)
 
 #: Tables are rewritten after this many times the duration of writing them, and at most once in this many seconds.
 _SHARE, _SELDOM = 50.0, 5.0
-_STOPPING = "stopping when the runs under way are done; once more to stop at once"
+_STOPPING = "stopping after the runs in progress; interrupt again to stop at once"
 #: Folders of runs.
 RUNS, PICTURED = "runs", "pictured"
 
@@ -363,7 +363,7 @@ class _Runner:
         done, bad = len(self.journal.rows), sum(row["status"] != DONE for row in rows)
         failing = sum(bool(row["fails"]) for row in rows)
         text = f"{done} of {self.total} runs" if self.total else f"{done} runs"
-        text += f", {failing} fail" + (f", {bad} without an answer" if bad else "")
+        text += f", {failing} fail" + (f", {bad} without a result" if bad else "")
         if self.total and self.fresh and done < self.total:
             left = time_left(
                 self.fresh, self.total - (done - self.fresh), self.durations, self.engine.workers, self.began

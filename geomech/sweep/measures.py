@@ -4,7 +4,7 @@ safety   the factor of safety of `geomech.safety_report`, its mechanism, and the
 run      the scene run to its end: loads, growth, displacements, and its summary
 pause    a sleep, for benchmarks of the engines
 
-A run that ends in an error has a status, "refused" (its scene cannot be drawn or has no answer) or "failed" (the
+A run that ends in an error has a status, "refused" (its scene cannot be drawn or has no solution) or "failed" (the
 solvers gave up), and a reason. Masses and volumes are per metre of thickness.
 """
 
@@ -35,7 +35,7 @@ DONE, REFUSED, FAILED = "done", "refused", "failed"
 TIMES = ("seconds", "processor_seconds", "host", "process", "attempts")
 #: Quoted names and numbers, which differ between reasons of the same kind.
 _OWN = re.compile(r"'[^']*'|(?<![\w])[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?")
-#: Class names of errors for scenes without an answer.
+#: Class names of errors for scenes without a solution.
 _REFUSALS = ("SceneError", "CracksInBlocks", "NothingToReduce")
 #: Number of characters kept of a reason, and number of warnings kept of a run.
 _REASON, _WARNED = 400, 3

@@ -435,7 +435,7 @@ class _Checker:
         count *= plan.design.runs if plan.random else max(1, len(plan.seeds))
         if count > limit:
             where, message = ("sweep", "runs"), f"{count} runs, more than the limit of {limit}"
-            self.faults.append(Fault(self.place(where), message, f"ask for fewer, or say --limit {count}"))
+            self.faults.append(Fault(self.place(where), message, f"ask for fewer, or set --limit {count}"))
 
     def _check_samples(self, plan: Plan) -> None:
         """Check the numbers of runs and seeds."""

@@ -59,7 +59,7 @@ class RareProbability:
         text = (
             f"probability of failure {self.value:.3g} (95 %: {low:.2g} to {high:.2g}; {self.method}, {self.runs} runs)"
         )
-        return text + (f"; {self.unanswered} without an answer, taken as standing" if self.unanswered else "")
+        return text + (f"; {self.unanswered} without a result, counted as stable" if self.unanswered else "")
 
 
 def subset_simulation(g: LimitState, dimensions: int, samples: int = 500, seed: int = 0) -> RareProbability:

@@ -46,19 +46,19 @@ class Probability(NamedTuple):
 
     def __str__(self) -> str:
         if not self.answered:
-            return f"no probability of failure: none of {self.runs} runs has an answer"
+            return f"no probability of failure: none of {self.runs} runs has a result"
         text = (
             f"probability of failure {share_text(self.value)} ({self.failures} of {self.answered}; 95 %: "
             f"{share_text(self.low)} to {share_text(self.high)})"
         )
         if self.answered < self.runs:
             text += (
-                f"; {self.runs - self.answered} runs without an answer are left out: {share_text(self.least)} "
+                f"; {self.runs - self.answered} runs without a result are left out: {share_text(self.least)} "
                 "if all of "
-                f"them stood, {share_text(self.most)} if all failed"
+                f"them were stable, {share_text(self.most)} if all failed"
             )
         if self.few and self.failures < self.answered:
-            text += f"; fewer than {FEW} failed: more runs, or --rare subset, would be surer"
+            text += f"; fewer than {FEW} failed: more runs, or --rare subset, would reduce the uncertainty"
         return text
 
 

@@ -64,7 +64,7 @@ def check(found: Mapping[str, Any]) -> None:
     """AssertionError if a study is not as expected."""
     for name, each in found.items():
         done = [row for row in each.rows if row["status"] == "done"]
-        assert len(done) >= 0.98 * len(each.rows), f"{name}: {len(each.rows) - len(done)} runs have no answer"
+        assert len(done) >= 0.98 * len(each.rows), f"{name}: {len(each.rows) - len(done)} runs have no result"
         if name != "two_sets":
             off = np.abs(factors_off(name, each))
             assert off.max() < FACTOR_TOLERANCE, f"{name}: a factor is {off.max():.2g} off limit equilibrium"

@@ -149,7 +149,7 @@ def test_a_client_a_killed_worker_and_a_scheduler_that_restarts(plane, tmp_path,
         found = carry_out_sweep(plan, folder, engine)
     killed.join(1)
     restarted.join(1)
-    assert any("is gone" in note for note in engine.notes)
+    assert any("has disappeared" in note for note in engine.notes)
     assert found.complete and [row["run"] for row in found.rows] == list(range(300))
     assert len((folder / "runs.jsonl").read_text().splitlines()) == 300
     assert (folder / "runs.csv").read_bytes() == (tmp_path / "here" / "runs.csv").read_bytes()

@@ -74,8 +74,8 @@ def test_the_page(swept):
     page = write_sweep_page(swept.folder).read_text(encoding="utf-8")
     for told in (
         "probability of failure", "Wilson", "Convergence", "Sensitivities", "Responses", "Moving region",
-        "Mechanisms", "Typical, worst and median run", "Runs without an answer", "Computing time",
-        f"--set {FRICTION}=0", "Only 2 runs failed", "1 runs have no answer",
+        "Mechanisms", "Typical, worst and median run", "Runs without a result", "Computing time",
+        f"--set {FRICTION}=0", "Only 2 runs failed", "1 runs have no result",
     ):  # fmt: skip
         assert told in page, told
     assert page.count("data:image/svg+xml") >= 3 and page.count("data:image/png") >= 3

@@ -93,7 +93,7 @@ def test_runs_without_an_answer_are_counted_and_stand():
     found = subset_simulation(broken, 2, 1000, seed=1)
     assert found.unanswered > 300
     assert found.value == pytest.approx(0.5 * norm.sf(2.0), rel=4 * found.variation)
-    assert "without an answer" in str(found)
+    assert "without a result" in str(found)
     with pytest.raises(ValueError, match="without a result"):
         importance_sampling(lambda u: np.full(len(u), np.nan), 2, 10)
     with pytest.raises(ValueError, match="no variable changes"):

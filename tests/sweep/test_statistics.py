@@ -29,8 +29,8 @@ def test_runs_without_an_answer_are_no_successes():
     assert (found.failures, found.answered, found.runs) == (1, 3, 5)
     assert found.value == pytest.approx(1 / 3)
     assert (found.least, found.most) == (pytest.approx(0.2), pytest.approx(0.6))
-    assert "2 runs without an answer" in str(found) and "fewer than 10 failed" in str(found)
-    assert "none of 1 runs has an answer" in str(probability([row(0, None)]))
+    assert "2 runs without a result" in str(found) and "fewer than 10 failed" in str(found)
+    assert "none of 1 runs has a result" in str(probability([row(0, None)]))
 
 
 def test_convergence_ends_with_the_probability():

@@ -399,7 +399,7 @@ def table(every: Sequence[Invariance]) -> Measured:
     lines += ["", f"{len(every)} slopes: " + "  ".join(f"{counts[verdict]} {verdict}" for verdict in VERDICTS)]
     also_scattered = sum(each.verdict == WRONG and each.scatters_under_noise for each in every)
     lines.append(
-        f"{also_scattered} of the wrong ones are not the same under noise either: `geomech run --repeat noise` says so"
+        f"{also_scattered} of the wrong ones also differ under noise, which `geomech run --repeat noise` reports"
     )
     lines.append("what must not change, worst of the slopes that are right, of all, beyond the bound in, and the bound")
     for name, each in BOUNDS.items():

@@ -93,20 +93,20 @@ class QuasiNewton:
         """(n, 3) Σ γ (Δoffset + Δresidual), with γ from least squares of Σ γ Δresidual = ``residual``."""
         own = self._changes()
         left = (residual * weight).ravel()
-        ways: list[tuple[np.ndarray, np.ndarray]] = []
+        basis: list[tuple[np.ndarray, np.ndarray]] = []
         correction = np.zeros_like(residual)
         for k, (moved, changed) in enumerate(own + self._older):
             # Gram-Schmidt: the part of this change that newer ones do not span, with the offsets that belong to it.
             new, full = (changed * weight).ravel(), moved + changed
             length = float(np.linalg.norm(new))
-            for way, went in ways:
-                part = float(way @ new)
-                new, full = new - part * way, full - part * went
+            for direction, combined in basis:
+                part = float(direction @ new)
+                new, full = new - part * direction, full - part * combined
             rest = float(np.linalg.norm(new))
             if rest <= (_RANK if k < len(own) else _RANK_OLDER) * length:
                 continue
             new, full = new / rest, full / rest
-            ways.append((new, full))
+            basis.append((new, full))
             correction += float(new @ left) * full
         return correction
 

@@ -203,9 +203,9 @@ class CrackEnergy:
         )
         self._growing = {key: replace(of, block=now[of.block]) for key, of in self._growing.items() if of.block in now}
 
-    def _runs_through(self, block: int, rubbed: float = 0.0, bond: float = 0.0) -> None:
+    def _runs_through(self, block: int, frictional: float = 0.0, bond: float = 0.0) -> None:
         """In statics ``block`` is cut by tips that have grown in the present step or are about to grow. Since the start
-        of the step, ``rubbed`` J/m were dissipated by friction in it and ``bond`` released by cement. Its release has
+        of the step, ``frictional`` J/m were dissipated by friction in it and ``bond`` released by cement. Its release has
         not been entered yet."""
         own = [key for key, of in self._growing.items() if of.block == block]
         taken = self._taken.pop(block, 0.0) + sum(of.way * of.cost for of in map(self._growing.pop, own))
@@ -214,10 +214,10 @@ class CrackEnergy:
         rested = self._rested.pop(block, None)
         stored = 0.0 if rested is None else rested.solution.crack_energy + rested.solution.filling_energy
         self.stored -= stored
-        self.friction += rubbed
+        self.friction += frictional
         self.bond += bond
         self.fracture += taken
-        spent = taken + rubbed + bond
+        spent = taken + frictional + bond
         self.uneven += max(0.0, spent - stored)
         self.runaway += max(0.0, stored - spent)
 
@@ -255,14 +255,16 @@ class CrackEnergy:
             gone = {block: solutions[block] for block in cut if block in solutions}
             solutions = {block: of for block, of in solutions.items() if block not in gone}
             for block, of in gone.items():
-                rubbed, of_cement = of.dissipated_in_step
-                self._runs_through(block, rubbed, of_cement.bond)
+                frictional, of_cement = of.dissipated_in_step
+                self._runs_through(block, frictional, of_cement.bond)
                 each[block] = 0.0
         by_mean_response = {block: block in by_mean_stress for block in solutions}
         done = sum(self._work_at_rest(before, solutions, by_mean_response, each)) if self.static else work
         stored = sum(solution.crack_energy + solution.filling_energy for solution in solutions.values())
-        rubbed, released_there = zip(*(of.dissipated_in_step for of in solutions.values())) if solutions else ((), ())
-        friction, bond = sum(rubbed), sum(of.bond for of in released_there)
+        frictional, released_there = (
+            zip(*(of.dissipated_in_step for of in solutions.values())) if solutions else ((), ())
+        )
+        friction, bond = sum(frictional), sum(of.bond for of in released_there)
         if self.static:
             done += sum(of.slip_onset + of.break_onset for of in released_there)
         else:

@@ -57,12 +57,12 @@ class RigidBlocks:
 
 class Rebound(NamedTuple):
     """Result of impacts: rigid ``velocity`` (n_blocks, 3) after them, additional displacement (``moved``, (n_blocks, 3)
-    m and rad), and the energies (J/m) dissipated by restitution (``lost``) and friction (``rubbed``)."""
+    m and rad), and the energies (J/m) dissipated by restitution (``lost``) and friction (``frictional``)."""
 
     velocity: np.ndarray
     moved: np.ndarray
     lost: float
-    rubbed: float
+    frictional: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -125,15 +125,15 @@ class Striking:
             share = _without_gain(at_rest, impulse, np.where(hit[:, None], there, ended), problem, least, after)
             impulse, after = at_rest + share * (impulse - at_rest), least + share * (after - least)
         change = problem.speeds(after - blocks.velocity)
-        lost, rubbed = _works(impulse, np.where(hit[:, None], there, ended), change)
+        lost, frictional = _works(impulse, np.where(hit[:, None], there, ended), change)
         # If friction does positive work on tips that the impact turns back, restitution dissipates it.
-        lost, rubbed = lost + min(rubbed, 0.0), max(rubbed, 0.0)
+        lost, frictional = lost + min(frictional, 0.0), max(frictional, 0.0)
         moved = problem._replace(
             across=np.zeros(len(rows)), along=np.zeros(len(rows)), velocity=problem.made_by(
                 impulse * np.where(hit, dt * (1.0 - part), 0.0)[:, None]
             ),
         ).passed_on(~hit)  # fmt: skip
-        return Rebound(after, moved, lost, rubbed)
+        return Rebound(after, moved, lost, frictional)
 
     def landed(
         self, found: ContactSet, settled: Settled, struck: np.ndarray, gap: np.ndarray, blocks: RigidBlocks,

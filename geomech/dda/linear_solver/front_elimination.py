@@ -238,10 +238,10 @@ def _fill(front, f, own, p, m, matrix):
 @_part
 def _gather(here, further, f, own, p, m, fronts, stack, begins, width):
     """Add the contributions of children to the rows and columns that are eliminated in front ``f``."""
-    _, reach, seat, child, sibling = fronts
+    _, reach, position, child, sibling = fronts
     g = child[f]
     while g >= 0:
-        met, n = seat[reach[g] : reach[g + 1]], 6 * (reach[g + 1] - reach[g])
+        met, n = position[reach[g] : reach[g + 1]], 6 * (reach[g + 1] - reach[g])
         runs, own_runs = _runs(met, own, begins)
         for u in range(len(met)):
             i, left = met[u], stack[g] + 6 * u * n
@@ -257,10 +257,10 @@ def _gather(here, further, f, own, p, m, fronts, stack, begins, width):
 @_part
 def _pass_on(further, f, own, p, b, fronts, stack, begins, width):
     """Add the contributions of children to the part of front ``f`` that remains after its own blocks."""
-    _, reach, seat, child, sibling = fronts
+    _, reach, position, child, sibling = fronts
     g = child[f]
     while g >= 0:
-        met, n = seat[reach[g] : reach[g + 1]], 6 * (reach[g + 1] - reach[g])
+        met, n = position[reach[g] : reach[g + 1]], 6 * (reach[g + 1] - reach[g])
         runs, own_runs = _runs(met, own, begins)
         for u in range(begins[own_runs], len(met)):
             i, left = 6 * (met[u] - own), stack[g] + 6 * u * n
@@ -314,7 +314,7 @@ def _factor(front, p, b, space, units, width):
 def eliminate(first, last, touched, fronts, matrix, stored, memory, space):
     """Eliminate the ``touched`` (n_fronts,) fronts from ``first`` to before ``last``; False if one is singular.
 
-    ``fronts``: pivots, reach, seat, child and sibling; ``matrix``: data, entries, entry, row and column; ``stored``:
+    ``fronts``: pivots, reach, position, child and sibling; ``matrix``: data, entries, entry, row and column; ``stored``:
     positions of S (n_fronts,), and ``at`` and ``back`` of the factors; ``memory``: storage of S, factors, and the
     numbers 1 and 0; ``space`` from `working_space`.
     """

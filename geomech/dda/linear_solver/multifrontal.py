@@ -76,7 +76,7 @@ def _substitute_shared(work, out, fronts, boundary, stored, factors, passed):
     """As `_eliminate_shared`: forward through the tasks in their order, then backward in reverse order, each after its
     parent. ``stored``: ``at`` and ``back`` of factors."""
     claimed, awaited, done, tasks, above = work
-    pivots, reach, seat, child, sibling = fronts
+    pivots, reach, position, child, sibling = fronts
     at, back = stored
     k = len(tasks)
     while True:
@@ -85,7 +85,7 @@ def _substitute_shared(work, out, fronts, boundary, stored, factors, passed):
             break
         if q < k:
             await_value(awaited, q, 0)
-            forward(tasks[q, 0], tasks[q, 1], out, pivots, reach, seat, at, child, sibling, factors, passed)
+            forward(tasks[q, 0], tasks[q, 1], out, pivots, reach, position, at, child, sibling, factors, passed)
             # −1: forward pass of this task done.
             add_at_once(awaited, q, -1)
             if above[q] >= 0:
@@ -143,7 +143,7 @@ class Factors:
     @property
     def _fronts(self) -> tuple[np.ndarray, ...]:
         """As `eliminate` takes them."""
-        return self.tree.pivots, self.tree.reach, self.tree.seat, self._child, self._sibling
+        return self.tree.pivots, self.tree.reach, self.tree.position, self._child, self._sibling
 
     @property
     def single(self) -> bool:

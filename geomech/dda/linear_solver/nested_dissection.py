@@ -34,7 +34,7 @@ class Tree:
     parent        (n_fronts,)     −1 for a root
     reach         (n_fronts + 1,) first entry of every front in ``boundary``
     boundary      (…,)            blocks that a front's elimination reaches, ascending
-    seat          (…,)            position of each of them in the parent's front
+    position      (…,)            position of each of them in the parent's front
     entries       (n_fronts + 1,) first matrix block of every front in ``entry``
     entry, row, column            matrix block, and its position in the front
     kept          whether every S may have memory of its own, so that fronts can be eliminated again one by one
@@ -51,7 +51,7 @@ class Tree:
     parent: np.ndarray
     reach: np.ndarray
     boundary: np.ndarray
-    seat: np.ndarray
+    position: np.ndarray
     entries: np.ndarray
     entry: np.ndarray
     row: np.ndarray
@@ -208,7 +208,7 @@ def dissect(points: np.ndarray, pointer: np.ndarray, neighbour: np.ndarray) -> t
 
 
 @part(fastmath=False, error_model="numpy", nogil=True, **UNCOUNTED)
-def _seat(number, front, pivots, reach, boundary):
+def _position(number, front, pivots, reach, boundary):
     """Position of a block in a front: its own blocks first, then its boundary."""
     if number < pivots[front + 1]:
         return number - pivots[front]
@@ -241,7 +241,7 @@ def _sort(numbers, first, last):
 
 @kept(fastmath=False, error_model="numpy", nogil=True)
 def _reached(blocks, rank, pivots, parent, pointer, neighbour):
-    """``reach``, ``boundary`` and ``seat`` of a `Tree`; ``blocks`` (n,) in the order of elimination."""
+    """``reach``, ``boundary`` and ``position`` of a `Tree`; ``blocks`` (n,) in the order of elimination."""
     n_fronts = len(parent)
     reach, boundary, top = np.zeros(n_fronts + 1, np.int64), np.empty(4 * len(blocks) + 16, np.int64), 0
     child, sibling, met = np.full(n_fronts, -1), np.full(n_fronts, -1), np.full(len(blocks), -1)
@@ -271,11 +271,11 @@ def _reached(blocks, rank, pivots, parent, pointer, neighbour):
         reach[f + 1] = top
         if parent[f] >= 0:
             sibling[f], child[parent[f]] = child[parent[f]], f
-    seat = np.full(top, -1)
+    position = np.full(top, -1)
     for f in range(n_fronts):
         for k in range(reach[f], reach[f + 1]):
-            seat[k] = _seat(boundary[k], parent[f], pivots, reach, boundary)
-    return reach, boundary[:top].copy(), seat
+            position[k] = _position(boundary[k], parent[f], pivots, reach, boundary)
+    return reach, boundary[:top].copy(), position
 
 
 @kept(fastmath=False, error_model="numpy", nogil=True)
@@ -285,8 +285,8 @@ def _places(row, column, entry, entries, pivots, reach, boundary):
     rows, columns = np.empty(len(entry), np.int64), np.empty(len(entry), np.int64)
     for f in range(len(entries) - 1):
         for k in range(entries[f], entries[f + 1]):
-            rows[k] = _seat(row[entry[k]], f, pivots, reach, boundary)
-            columns[k] = _seat(column[entry[k]], f, pivots, reach, boundary)
+            rows[k] = _position(row[entry[k]], f, pivots, reach, boundary)
+            columns[k] = _position(column[entry[k]], f, pivots, reach, boundary)
     return rows, columns
 
 
@@ -299,7 +299,7 @@ def plan(points: np.ndarray, rows: np.ndarray, columns: np.ndarray) -> Tree:
     n_fronts = len(parent)
     rank = np.empty(n, np.int64)
     rank[blocks] = np.arange(n)
-    reach, boundary, seat = _reached(blocks, rank, pivots, parent, pointer, columns)
+    reach, boundary, position = _reached(blocks, rank, pivots, parent, pointer, columns)
     own, far = np.diff(pivots), np.diff(reach)
     row, column = rank[rows], rank[columns]
     # A front without own blocks begins at the same position as the next one: the last front that begins there owns the
@@ -317,7 +317,7 @@ def plan(points: np.ndarray, rows: np.ndarray, columns: np.ndarray) -> Tree:
         parent=parent,
         reach=reach,
         boundary=boundary,
-        seat=seat,
+        position=position,
         entries=entries,
         entry=entry,
         row=row,

@@ -62,7 +62,7 @@ def _longest(pivots, reach, first, last):
 
 
 @_part
-def forward(first, last, out, pivots, reach, seat, at, child, sibling, factors, passed):
+def forward(first, last, out, pivots, reach, position, at, child, sibling, factors, passed):
     """Forward substitution in ``out`` (6n,), in the order of elimination, through fronts from ``first`` to before
     ``last``; ``passed`` holds the contribution of each front to its parent."""
     width = BYTES // out.itemsize
@@ -77,7 +77,7 @@ def forward(first, last, out, pivots, reach, seat, at, child, sibling, factors, 
         g = child[f]
         while g >= 0:
             for u in range(reach[g], reach[g + 1]):
-                i = 6 * seat[u]
+                i = 6 * position[u]
                 store_six(x, i, plus(load_six(x, i), load_six(left, 6 * u)))
             g = sibling[g]
         here = at[f]

@@ -371,8 +371,8 @@ def _negligible(answer: Answer, found: ContactSet, number: int, solver: ContactS
     largest = np.zeros(int(max(found.block.max(), found.other.max())) + 1)
     largest_of_blocks(np.abs(answer.forces[:, 0]), found.block, found.other, largest)
     wrong = np.flatnonzero(answer.violation > 0)
-    bears = np.maximum(largest[found.block[wrong]], largest[found.other[wrong]])
-    return bool((answer.violation[wrong] <= solver.sliver_force * bears).all())
+    carried = np.maximum(largest[found.block[wrong]], largest[found.other[wrong]])
+    return bool((answer.violation[wrong] <= solver.sliver_force * carried).all())
 
 
 def _at_least_half_of_the_worst(

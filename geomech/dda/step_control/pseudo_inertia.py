@@ -70,7 +70,7 @@ def balanced_attempt(
         if (
             extrapolated is not None
             and trial is not None
-            and extrapolated.bears(trial, inertia, supported & decreases, negligible)
+            and extrapolated.confirmed_by(trial, inertia, supported & decreases, negligible)
         ):
             attempt, inertia, supported = (
                 trial,
@@ -145,7 +145,7 @@ class _Extrapolated:
             return None
         return cls(slow, ahead * slow[:, None], min(1.0, reach / max(float(far[slow].max()), 1e-300)))
 
-    def bears(self, trial: Attempt, inertia: np.ndarray, supported: np.ndarray, negligible: np.ndarray) -> bool:
+    def confirmed_by(self, trial: Attempt, inertia: np.ndarray, supported: np.ndarray, negligible: np.ndarray) -> bool:
         """Whether in the attempt ``trial``, solved about `rest`, the inertia force has decreased from ``inertia``,
         (n_blocks,) N, as expected. ``supported``: other blocks that must meet the criterion; ``negligible``: force that
         counts as zero."""

@@ -190,8 +190,10 @@ class Chords:
         with np.errstate(divide="ignore", invalid="ignore"):
             slope = (turns - self.last_turns) / (angle - self.last_angle)
         known = np.isfinite(self.kappa)
-        tells = np.isfinite(slope) & (np.abs(angle - self.last_angle) > np.where(known, DISTINCT_TRIALS, ONE_WAY))
-        return np.where(tells, -1 - np.clip(slope, *SLOPES), np.where(known, self.kappa, 0.0)), known | tells
+        informative = np.isfinite(slope) & (np.abs(angle - self.last_angle) > np.where(known, DISTINCT_TRIALS, ONE_WAY))
+        return np.where(
+            informative, -1 - np.clip(slope, *SLOPES), np.where(known, self.kappa, 0.0)
+        ), known | informative
 
 
 def corrected(

@@ -102,15 +102,15 @@ class Bordered:
         given_up = np.flatnonzero((self.at[:n_places] >= 0) & (permanent < 0))
         settled = np.zeros(elements.n, bool)
         settled[permanent[permanent >= 0]] = True
-        came, at_tip = np.flatnonzero(~settled), _at_tips(elements, settled)
-        came = np.concatenate([came[~at_tip[came]], came[at_tip[came]]])
-        n_inner = len(came) - int(at_tip[came].sum())
+        added, at_tip = np.flatnonzero(~settled), _at_tips(elements, settled)
+        added = np.concatenate([added[~at_tip[added]], added[at_tip[added]]])
+        n_inner = len(added) - int(at_tip[added].sum())
         # Places in the temporary border of unchanged elements (columns) and of elements with the same rows.
         place = np.full(self.elements.n + 1, -1)
         place[temporary] = np.arange(len(temporary))
-        column, row = place[was[came]], place[seen[came]]
-        border = self._border(elements, came, permanent, row, column, compute)
-        names = [elements.keys[k] for k in came[:n_inner].tolist()]
+        column, row = place[was[added]], place[seen[added]]
+        border = self._border(elements, added, permanent, row, column, compute)
+        names = [elements.keys[k] for k in added[:n_inner].tolist()]
         m = width * n_inner
         base, n = self.permanent, self.n_permanent
         inner, outer = _divided(border, m, self._known(row, column, width, 0, m), self._known(row, column, width, m))
@@ -122,7 +122,7 @@ class Bordered:
         if n_new:
             if base.n > n and not base.continues_with(n, n_new, names):
                 # Another body has already grown from this one in a different way.
-                if width * len(came) < TEMPORARY * n and not given_up.size:
+                if width * len(added) < TEMPORARY * n and not given_up.size:
                     inner, outer = _divided(border, 0, None, self._known(row, column, width))
                     names, n_inner, n_new = [], 0, 0
                 else:
@@ -131,10 +131,10 @@ class Bordered:
                 base.append(inner, names)
                 if not given_up.size:
                     together = border._replace(known=self._known(row, column, width)), n_new
-        at = np.concatenate([permanent, came[:n_inner], np.full(len(given_up), -1), came[n_inner:]])
+        at = np.concatenate([permanent, added[:n_inner], np.full(len(given_up), -1), added[n_inner:]])
         return Bordered(elements, base, n + n_new, at, outer, together)
 
-    def _border(self, elements, came, permanent, row, column, compute) -> Border:
+    def _border(self, elements, added, permanent, row, column, compute) -> Border:
         """Border of the new elements ``came`` (k,) to those at the places ``permanent``. ``row`` and ``column`` (k,): places
         in the temporary border that their rows and columns are copied from, −1 where these are computed."""
         width = 2 * elements.per
@@ -143,9 +143,9 @@ class Bordered:
         gone, numbers, here = (
             np.flatnonzero(permanent < 0),
             unknowns_of(np.maximum(permanent, 0), width),
-            unknowns_of(came, width),
+            unknowns_of(added, width),
         )
-        k, n = width * len(came), width * len(permanent)
+        k, n = width * len(added), width * len(permanent)
         down, right, corner = np.empty((n, k), order="F").T, np.empty((k, n)).T, np.empty((k, k), order="F")
         r_old, r_fresh, c_old, c_new = (unknowns_of(x, width) for x in (old, fresh, old_c, new_c))
         if len(old):
@@ -153,18 +153,18 @@ class Bordered:
             down[r_old], right.T[c_old] = self.temporary.down[from_r], self.temporary.right.T[from_c]
             corner[np.ix_(r_old, c_old)] = self.temporary.corner[np.ix_(from_r, from_c)]
         if len(new_c):
-            values = compute(every, came[new_c])
+            values = compute(every, added[new_c])
             # Column-major: transposed, copying runs along memory.
             right.T[c_new] = values.T[:, numbers]
             corner[:, c_new] = values[here]
         if len(fresh):
-            values = compute(came[fresh], every)
+            values = compute(added[fresh], every)
             down[r_fresh] = values[:, numbers]
             corner[np.ix_(r_fresh, c_old)] = values[:, here[c_old]]
         if len(gone):
             away = unknowns_of(gone, width)
             down[:, away], right[away] = 0.0, 0.0
-        scale = np.repeat(np.ldexp(1.0, np.frexp(elements.length[came])[1]), width)
+        scale = np.repeat(np.ldexp(1.0, np.frexp(elements.length[added])[1]), width)
         return Border(down, right, corner, scale, None)
 
     def _known(self, row: np.ndarray, column: np.ndarray, width: int, first: int = 0, end: int | None = None):
