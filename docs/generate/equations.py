@@ -14,10 +14,10 @@ ROOT = Path(__file__).parents[2]
 
 OPENING = """# Index of equations
 
-From an equation to the function that computes it, its file and line in this version, and the paper or book it comes
-from. The page is made from
-`docs/equations.toml`. A test imports every function and looks in its docstring, or that of its module, for words
-that mark the equation.
+For each equation: the function that computes it, its file and line in this version, and the paper or book from which
+it is taken. The page is made from
+`docs/equations.toml`. A test imports every function and checks that its docstring, or that of its module, contains the
+equation.
 """
 
 

@@ -1,4 +1,4 @@
-"""The page of output files: every array and column, from the tables that writers are held to."""
+"""The page of output files: every array and column, from the tables to which writers adhere."""
 
 from __future__ import annotations
 
@@ -8,9 +8,8 @@ from geomech.output import fields
 
 OPENING = """# Output files
 
-Made from the tables that writers are held to (`geomech/output/fields.py`): a writer refuses an array that is not
-declared, so this is all there
-is. What the files are for: [what comes out](../start/results.md).
+This page is made from the tables to which writers adhere (`geomech/output/fields.py`). A writer refuses an array that
+is not declared, so that the list is complete. [Results](../start/results.md) explains what the files are for.
 """
 
 CSV = {
@@ -21,13 +20,13 @@ CSV = {
     "reactions.csv": fields.REACTIONS,
 }
 ROWS = {
-    "history.csv": "A row a cycle. After these columns come the statistics of the step (`dt`, `open_close_iterations`, "
+    "history.csv": "One row per cycle. These columns are followed by the statistics of the step (`dt`, `open_close_iterations`, "
     "energies, `budget_residual`, `worst_penetration` …), displacements of monitors (`NAME_ux`, `NAME_uy`, m) and "
     "forces in bolts.",
-    "tips.csv": "A row a tip and cycle.",
-    "events.csv": "A row an event.",
-    "joints.csv": "A row a joint and cycle. A joint goes by the name of its edges, else by that of its law.",
-    "reactions.csv": "A row a fixed or guided block and cycle: what contacts put on it.",
+    "tips.csv": "One row per tip and cycle.",
+    "events.csv": "One row per event.",
+    "joints.csv": "One row per joint and cycle. A joint has the name of its edges, or else that of its law.",
+    "reactions.csv": "One row per fixed or guided block and cycle: the forces of contacts on it.",
 }
 
 
@@ -40,7 +39,7 @@ def page() -> str:
         lines.append("")
     for name, arrays in fields.SERIES.items():
         lines += [f"## {name}.pvd\n", *_arrays(arrays), ""]
-    lines.append("What `geomech build` writes:\n")
+    lines.append("Files of `geomech build`:\n")
     for name, arrays in fields.PREPARED.items():
         lines += [f"## {name}.vtu\n", *_arrays(arrays), ""]
     return "\n".join(lines) + "\n"

@@ -82,7 +82,7 @@ SERIES: dict[str, tuple[Field, ...]] = {
         Field("growth_angle", "point", "deg", "from the crack's direction to the growth direction, counter-clockwise"),
         Field("growth_direction", "point", "-", "unit vector in the growth direction of the criterion", _XYZ),
         Field("grown", "point", "m", "advance in this cycle"),
-        Field("crack_id", "point", "-", "index of the crack; the names stand in CRACK_NAMES", dtype="int32"),
+        Field("crack_id", "point", "-", "index of the crack; the names are in CRACK_NAMES", dtype="int32"),
         Field("end", "point", "-", "0 the tip at the start of its crack, 1 at its end", dtype="int32"),
         Field("tip_id", "point", "-", "node of the crack network, as in tips.csv", dtype="int32"),
         Field("block_id", "point", "-", "index of the block it lies in", dtype="int32"),
@@ -128,7 +128,7 @@ SERIES: dict[str, tuple[Field, ...]] = {
         Field("block_id", "cell", "-", "index of the block whose edge it is", dtype="int32"),
         Field("fixed", "cell", "-", "1 where the block does not move", dtype="int32"),
         Field("removed", "cell", "-", "1 where the block has been excavated", dtype="int32"),
-        Field("edge_name", "cell", "-", "index of the edge's name; the names stand in EDGE_NAMES", dtype="int32"),
+        Field("edge_name", "cell", "-", "index of the edge's name; the names are in EDGE_NAMES", dtype="int32"),
     ),
     "bolts": (
         _DISPLACEMENT,
@@ -136,7 +136,7 @@ SERIES: dict[str, tuple[Field, ...]] = {
         Field("shear_force", "cell", "N/m", "across the bolt (dowel action)"),
         Field("yielded", "cell", "m", "elongation by yielding"),
         Field("state", "cell", "-", "0 not installed yet, 1 acts, 2 yields, 3 broken", dtype="int32"),
-        Field("bolt_id", "cell", "-", "index of the bolt; the names stand in BOLT_NAMES", dtype="int32"),
+        Field("bolt_id", "cell", "-", "index of the bolt; the names are in BOLT_NAMES", dtype="int32"),
     ),
     "water": (
         _DISPLACEMENT,
