@@ -81,7 +81,7 @@ th, td { padding: .28rem .75rem .28rem 0; text-align: right; vertical-align: top
   border-bottom: 1px solid var(--line); }
 th { font-weight: 600; vertical-align: bottom; border-bottom: 1.5px solid var(--soft); }
 th.words, td.words { text-align: left; }
-td.told { text-align: left; min-width: 11rem; }
+td.long { text-align: left; min-width: 11rem; }
 .figures { display: grid; grid-template-columns: repeat(auto-fit, minmax(min(100%, var(--least, 17rem)), 1fr));
   gap: 1rem; margin: 1rem 0; }
 figure { margin: 0; min-width: 0; }
@@ -145,7 +145,7 @@ class Page:
         rows = [list(row) for row in rows]
         words = [any(isinstance(row[k], str) and not is_number(row[k]) for row in rows) for k in range(len(headers))]
         long = [any(isinstance(row[k], str) and len(row[k]) > 40 for row in rows) for k in range(len(headers))]
-        kinds = ["told" if is_long else "words" if is_text else "" for is_long, is_text in zip(long, words)]
+        kinds = ["long" if is_long else "words" if is_text else "" for is_long, is_text in zip(long, words)]
 
         def line(tag: str, cells: Sequence[Any]) -> str:
             return "".join(

@@ -111,7 +111,7 @@ class Chart {
     c.setLineDash([]);
     c.restore();
     // The cycle that is shown, and the values there.
-    const said = [];
+    const labels = [];
     for (const line of this.lines) {
       const k = line.row(cursors);
       if (k < 0 || k >= line.x.length || !Number.isFinite(line.x[k])) continue;
@@ -119,14 +119,14 @@ class Chart {
       c.strokeStyle = ink.soft; c.lineWidth = 1; c.beginPath(); c.moveTo(x, top); c.lineTo(x, top + h); c.stroke();
       if (Number.isFinite(y)) {
         c.beginPath(); c.arc(x, y, 3.4, 0, 7); c.fillStyle = ink.curves[line.colour]; c.fill();
-        said.push([withUnit(line.y[k], line.unit), ink.curves[line.colour]]);
+        labels.push([withUnit(line.y[k], line.unit), ink.curves[line.colour]]);
       }
     }
-    if (said.length && said.length <= 4) {
+    if (labels.length && labels.length <= 4) {
       c.textAlign = "right"; c.textBaseline = "top";
       let end = left + w;
-      for (const [text, colour] of said.reverse()) { c.fillStyle = this.lines.length > 1 ? colour : ink.text; c.fillText(text, end, 2); end -= c.measureText(text).width + 12; }
+      for (const [text, colour] of labels.reverse()) { c.fillStyle = this.lines.length > 1 ? colour : ink.text; c.fillText(text, end, 2); end -= c.measureText(text).width + 12; }
     }
-    this.canvas.setAttribute("aria-label", said.map(([text]) => text).join(", "));
+    this.canvas.setAttribute("aria-label", labels.map(([text]) => text).join(", "));
   }
 }

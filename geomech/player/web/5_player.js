@@ -230,7 +230,7 @@ class Player {
     this.scaleText = el("input", { type: "text", inputmode: "decimal", "aria-label": "displacements times", onchange: () => { const v = Number(this.scaleText.value); if (v >= 0 && Number.isFinite(v)) this.setScale(v); else this.writeScale(); } });
     rows.push(el("div", { class: "gm-field" }, el("span", {}, "Displacements ×"), el("div", { class: "gm-range" }, this.scaleInput, this.scaleText),
       el("div", { class: "gm-row" }, ...[["0", 0], ["1", 1]].map(([text, v]) => this.button(text, `displacements × ${text}`, () => this.setScale(v))),
-        this.button("default", "so that they are seen", () => { this.setScale(this.defaultScale()); this.scaleChosen = false; }))));
+        this.button("default", "magnified so that they are visible", () => { this.setScale(this.defaultScale()); this.scaleChosen = false; }))));
     if (has("c_gap")) {
       const joints = this.select("Joints", JOINT_FIELDS, this.joints.key, (key) => { this.joints = JOINT_FIELDS.find((f) => f.key === key); this.redraw(); });
       this.jointInput = joints.input; joints.input.dataset.role = "joints"; rows.push(joints.row);
@@ -278,10 +278,10 @@ class Player {
   // -- what is shown -------------------------------------------------------------------------------------------
   setField(key) { this.field = FIELDS.find((f) => f.key === key); this.fieldInput.value = key; this.chosen(); }
   range() {
-    const key = this.field.key, told = this.runs.map((run) => (run.ranges || {})[key]);  // as in the pictures, where they are known
+    const key = this.field.key, stored = this.runs.map((run) => (run.ranges || {})[key]);  // as in the pictures, where they are known
     if (!this.ranges.has(key)) {
-      const known = told.every(Boolean);
-      this.ranges.set(key, known ? [Math.min(...told.map((r) => r[0])), Math.max(...told.map((r) => r[1]))] : robustRange(this.runs, this.field));
+      const known = stored.every(Boolean);
+      this.ranges.set(key, known ? [Math.min(...stored.map((r) => r[0])), Math.max(...stored.map((r) => r[1]))] : robustRange(this.runs, this.field));
     }
     return this.ranges.get(this.field.key);
   }
@@ -380,12 +380,12 @@ class Player {
     }
     this.paintMilliseconds = performance.now() - began;
     const frame = this.frameOf(this.runs[0]);
-    const said = [this.times ? `t = ${digits(this.times[this.at])} s` : `${Math.round(100 * this.at / Math.max(this.count - 1, 1))} % of each run`];
+    const parts = [this.times ? `t = ${digits(this.times[this.at])} s` : `${Math.round(100 * this.at / Math.max(this.count - 1, 1))} % of each run`];
     if (this.runs.length === 1) {
-      said.push(`cycle ${frame.cycle}`);
-      if (this.runs[0].led && frame.load !== null) said.push(`load ${withUnit(Math.abs(frame.load), "Pa")}${frame.load < 0 ? " in tension" : ""}`);
+      parts.push(`cycle ${frame.cycle}`);
+      if (this.runs[0].led && frame.load !== null) parts.push(`load ${withUnit(Math.abs(frame.load), "Pa")}${frame.load < 0 ? " in tension" : ""}`);
     }
-    this.moment.textContent = said.join("  ·  ");
+    this.moment.textContent = parts.join("  ·  ");
     this.drawLegend(look);
     const cursors = new Map(this.runs.map((run) => [run, this.frameOf(run)]));
     this.chart.draw(cursors, look.ink, look.font);
@@ -527,15 +527,15 @@ class Player {
   hover(drawing, [x, y]) {
     const found = drawing.pick(x, y);
     if (!found) return this.hideTip();
-    this.tip.replaceChildren(...this.told(found, drawing.frame).map((line, k) => el(k ? "div" : "strong", {}, line)));
+    this.tip.replaceChildren(...this.describe(found, drawing.frame).map((line, k) => el(k ? "div" : "strong", {}, line)));
     this.tip.hidden = false;
     const stage = this.stage.getBoundingClientRect(), own = drawing.canvas.getBoundingClientRect();
     const left = own.left - stage.left + x, top = own.top - stage.top + y, w = this.tip.offsetWidth, h = this.tip.offsetHeight;
     this.tip.style.left = `${left + 16 + w > stage.width ? Math.max(0, left - w - 12) : left + 16}px`;
     this.tip.style.top = `${Math.max(0, Math.min(top + 14, stage.height - h))}px`;
   }
-  // What is told of a thing under the pointer, in the frame that is shown.
-  told(found, frame) {
+  // Description of the object under the pointer, in the frame shown.
+  describe(found, frame) {
     const { run, k } = found;
     if (found.kind === "tip") return [`Tip of ${run.crackName(frame.get("t_crack")[k])}, ${["start", "end"][frame.get("t_end")[k]] || ""}`,
       `K_I ${withUnit(frame.get("t_k1")[k], "Pa √m")}`, `K_II ${withUnit(frame.get("t_k2")[k], "Pa √m")}`, `K_eq ${withUnit(frame.get("t_keq")[k], "Pa √m")}`];
@@ -548,14 +548,14 @@ class Player {
       return [`Monitor ${found.point.name}`, ...["ux", "uy"].map((d) => `${d} ${withUnit((run.curves.get(`${found.point.name}_${d}`) || [])[at], "m")}`)];
     }
     if (found.kind === "bolt") return [`Bolt ${found.bolt.name}`, `force ${withUnit(boltForce(run, found.bolt.column, frame), "N/m")}`];
-    const said = [`Block ${found.id}`], field = this.field;
+    const lines = [`Block ${found.id}`], field = this.field;
     const material = found.place !== null && found.place !== undefined && frame.blocks ? run.materials[frame.blocks.material[found.place]] : null;
-    if (material) said[0] += ` · ${material}`;
-    if (field.category && found.place !== undefined && frame.blocks) { if (field.names) said.push(field.names[field.category(frame, found.place)]); }
-    else if (Number.isFinite(found.value)) said.push(`${field.label.split(" ")[0]}${field.label.includes(",") ? field.label.slice(field.label.indexOf(",")) : ""} ${withUnit(this.sign * found.value, field.unit)}`);
-    if (found.u) said.push(`moved ${withUnit(Math.hypot(...found.u), "m")}`);
-    said.push(`x ${digits(found.x + run.origin[0], 5)}, y ${digits(found.y + run.origin[1], 5)} m`);
-    return said;
+    if (material) lines[0] += ` · ${material}`;
+    if (field.category && found.place !== undefined && frame.blocks) { if (field.names) lines.push(field.names[field.category(frame, found.place)]); }
+    else if (Number.isFinite(found.value)) lines.push(`${field.label.split(" ")[0]}${field.label.includes(",") ? field.label.slice(field.label.indexOf(",")) : ""} ${withUnit(this.sign * found.value, field.unit)}`);
+    if (found.u) lines.push(`moved ${withUnit(Math.hypot(...found.u), "m")}`);
+    lines.push(`x ${digits(found.x + run.origin[0], 5)}, y ${digits(found.y + run.origin[1], 5)} m`);
+    return lines;
   }
   choose(drawing, found) {
     this.selected = null;
@@ -570,7 +570,7 @@ class Player {
         choice.input.setAttribute("aria-label", "history of"); choice.input.dataset.role = "history";
         this.history.heading.append(choice.input);
       }
-      this.historyNote.replaceChildren(...this.told(found, drawing.frame).slice(1).map((line) => el("span", {}, line)));
+      this.historyNote.replaceChildren(...this.describe(found, drawing.frame).slice(1).map((line) => el("span", {}, line)));
       this.history.set(this.selected.lines, "time", "s");
     }
     this.hint.hidden = !this.history.element.hidden;
@@ -720,7 +720,7 @@ async function watch(player, address) {
       if (answer.runs && answer.runs.some(Boolean)) await player.extend(answer.runs);
       if (lost) player.say("");
       lost = 0;
-    } catch (error) { if (++lost >= 2) player.say(error instanceof RangeError ? error.message : "The server does not answer any more: what has been read stays. Start `geomech view` again and reload the page to go on."); }
+    } catch (error) { if (++lost >= 2) player.say(error instanceof RangeError ? error.message : "The server no longer answers; the data received so far remain. To continue, start `geomech view` again and reload the page."); }
   }
 }
 begin();

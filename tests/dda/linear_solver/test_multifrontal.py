@@ -234,7 +234,7 @@ def test_tasks_stand_behind_all_they_need():
     assert (tree.above[task[~has]] == -1).all()
 
 
-def test_a_crew_works_alone_while_cores_are_busy(monkeypatch):
+def test_a_thread_works_alone_while_cores_are_busy(monkeypatch):
     team, clock = task_pool.ThreadTeam(2), [0.0]
     monkeypatch.setattr(task_pool.time, "perf_counter", lambda: clock[0])
     monkeypatch.setattr(task_pool.time, "thread_time", lambda: 0.0)

@@ -81,12 +81,12 @@ def test_steps_do_not_depend_on_threads(given, monkeypatch):
     found = []
     for helpers in (0, 1, 5):
         monkeypatch.setattr(newton_steps, "THREADED", 0 if helpers else 10**9)
-        crew = task_pool.Crew(helpers)
-        monkeypatch.setattr(newton_steps, "crew", lambda crew=crew: crew)
+        team = task_pool.ThreadTeam(helpers)
+        monkeypatch.setattr(newton_steps, "thread_team", lambda team=team: team)
         path = CentralPath(*given)
         while not path.ended:
             # On a busy machine it would go on alone.
-            crew._alone.clear()
+            team._alone.clear()
             path.advance()
         found.append((path.unknowns.copy(), path._normal.copy(), path._shear.copy()))
     for other in found[1:]:
