@@ -439,7 +439,7 @@ def test_a_changed_file_that_the_model_includes_is_refused(write, tmp_path):
     resume(out, quiet=True)
 
 
-def test_what_is_no_run_is_told(write, tmp_path, capfd):
+def test_what_is_no_run_is_reported(write, tmp_path, capfd):
     out = tmp_path / "out"
     assert cli.main(["resume", str(out)]) == cli.BAD_INPUT and "there is no run folder" in capfd.readouterr().err
     out.mkdir()

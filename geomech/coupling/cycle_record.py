@@ -90,13 +90,13 @@ class _LeftOut:
     will change."""
 
     def __init__(self, now: CrackedBlocks, solutions: dict, left_out: dict[int, Body]) -> None:
-        self._told, self._solutions, self._left_out = now.growth_screening, solutions, left_out
+        self._screening, self._solutions, self._left_out = now.growth_screening, solutions, left_out
         self._problem, self._blocks, self._nodes_of = now.problem, now.blocks, now.nodes_of
         self._order, self._loads = list(now.bodies), {block: now.loads[block] for block in left_out}
 
     def bodies(self) -> dict[int, Any]:
         """block → solution of all bodies, in their order."""
-        self._told.asked += 1
+        self._screening.asked += 1
         found = solve_bodies(self._left_out, self._loads, {}, {}, names=self._blocks.names)
         for body in self._left_out.values():
             body.work.solutions_left_out -= 1

@@ -41,7 +41,7 @@ def test_quick_is_held_against_quick_and_full_against_full(one_topic, capsys):
         assert "compare quick with quick" in capsys.readouterr().err
 
 
-def test_every_part_s_time_and_the_whole_are_told(one_topic, capsys):
+def test_every_part_s_time_and_the_whole_are_reported(one_topic, capsys):
     assert main(["bench", "many", "kernels", "--quick"]) == DONE
     said = capsys.readouterr().out
     rows = {name: float(own) for name, own in re.findall(r"^  (\w+) +[\d.]+ +([\d.]+)$", said, re.MULTILINE)}

@@ -117,7 +117,7 @@ def test_the_switch_of_a_scene_changes_nothing_but_the_work(friction):
         assert np.abs(a - b).max() <= 1e-8 * np.abs(b).max()
 
 
-def test_the_first_of_several_failures_is_told():
+def test_the_first_of_several_failures_is_reported():
     def work(item):
         if item > 1:
             raise ValueError(str(item))

@@ -80,7 +80,7 @@ def test_energy_from_nowhere_is_told_by_blocks_alone(caplog):
 
 
 @pytest.mark.parametrize(("settings", "told"), [(DdaSettings(time_step=1e-3), True), (MOVING, False)])
-def test_dashpots_that_statics_do_not_know_are_told(caplog, settings, told):
+def test_dashpots_that_statics_do_not_know_are_reported(caplog, settings, told):
     blocks = Blocks.from_polygons([BASE, SQUARE], fixed=[True, False], edge_names=[[[""] * 4], [["", "", "top", ""]]])
     loads = replace(WEIGHT, viscous_boundaries=(ViscousBoundary("top"),))
     for _ in dda.run(blocks, [ROCK], [JOINT], loads, settings, 2e-3):

@@ -90,7 +90,7 @@ def test_other_machines_need_the_token_and_other_names_are_refused(run_folder, v
         opened.close()
 
 
-def test_bad_input_is_told(run_folder, tmp_path, capsys):
+def test_bad_input_is_reported(run_folder, tmp_path, capsys):
     def refused(*arguments: str) -> str:
         assert main(["view", *arguments]) == BAD_INPUT
         return capsys.readouterr().err

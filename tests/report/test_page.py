@@ -76,7 +76,7 @@ def runs(tmp_path_factory):
     return folder
 
 
-def test_a_page_is_whole_and_escapes_what_it_is_told():
+def test_a_page_is_whole_and_escapes_what_it_is_reported():
     page = Page("A < B & C", "lead <script>alert(1)</script>")
     page.section("One")
     page.table(["name", "value"], [["<b>", 1.5], ["x", None], ["y", 12345], ["z", -2.5e-7]], "of <all>")

@@ -482,7 +482,7 @@ def test_fixing_the_loaded_specimen_is_refused_and_not_advised(scene_file):
     assert "every load acts on fixed blocks (rock)" in error.message and "zones.rock.fixed" in error.place
 
 
-def test_a_load_on_a_fixed_block_beside_a_loaded_one_is_told(scene_file):
+def test_a_load_on_a_fixed_block_beside_a_loaded_one_is_reported(scene_file):
     scene = load_scene(scene_file(GOOD + "[zones.base]\nfixed = true\n"), [
         "geometry.zones=" + RESTING,
         "geometry.edges.1.line=[[-1.0, -1.0], [2.0, -1.0]]",
@@ -490,7 +490,7 @@ def test_a_load_on_a_fixed_block_beside_a_loaded_one_is_told(scene_file):
     assert ["'load:bottom' belong to fixed blocks" in w.message for w in scene.warnings].count(True) == 1
 
 
-def test_loads_that_cancel_on_one_edge_are_told(scene_file):
+def test_loads_that_cancel_on_one_edge_are_reported(scene_file):
     scene = load_scene(scene_file(GOOD.replace('edge = "load:bottom"', 'edge = "load:top"')))
     assert "the tractions on 'load:top' cancel each other" in scene.warnings[0].message
 
@@ -542,7 +542,7 @@ def test_the_choice_that_brings_an_edge_is_named(scene_file, specimen):
     assert "edge names may depend on the model's parameters" in error.way_out
 
 
-def test_physical_curves_that_nothing_uses_are_told(scene_file, specimen):
+def test_physical_curves_that_nothing_uses_are_reported(scene_file, specimen):
     (warning,) = load_scene(scene_file(specimen)).warnings
     assert "names the edges 'contact:bottom', 'contact:top'" in warning.message and "crack:NAME" in warning.way_out
     used = specimen.replace("[joints.default]", '[joints.default]\n[joints.platens]\nedges = ["contact:*"]')

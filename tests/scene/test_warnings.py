@@ -93,7 +93,7 @@ HELD = "[[-2, -2], [60, -2], [60, 0], [0, 0], [0, 30], [-2, 30]]"
 
 
 @pytest.mark.parametrize("mirrored", [False, True])
-def test_a_slope_with_a_free_back_is_told(warnings, mirrored):
+def test_a_slope_with_a_free_back_is_reported(warnings, mirrored):
     def turned(text: str) -> str:
         from re import sub
 

@@ -226,7 +226,7 @@ def test_a_crack_from_a_round_hole_opens_into_it(tmp_path, seed):
     assert cracks.surface.sum() == 1 and len(cracks.tips) == 1
 
 
-def test_traces_that_are_trimmed_away_whole_are_told():
+def test_traces_that_are_trimmed_away_whole_are_reported():
     square = np.array([[0.0, 0.0], [10.0, 0.0], [10.0, 10.0], [0.0, 10.0]])
     joint = Joint("joint:a", (np.array([[2.0, 1.0], [2.0, 4.0]]), np.array([[0.0, 5.0], [10.0, 5.0]]),
                               np.array([[6.0, 5.0], [6.0, 7.0]]), np.array([[20.0, 5.0], [20.0, 7.0]])))  # fmt: skip

@@ -177,7 +177,7 @@ end_time_s = 1
 """
 
 
-def test_a_last_line_that_gmsh_does_not_read_is_told(tmp_path):
+def test_a_last_line_that_gmsh_does_not_read_is_reported(tmp_path):
     path = tmp_path / "model.geo"
     path.write_text(MODEL.strip())
     (warning,) = read_gmsh_model(path).warnings

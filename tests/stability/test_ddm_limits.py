@@ -187,7 +187,7 @@ def test_folds_are_right_to_the_target_of_a_bare_body(degrees):
         assert np.abs(factors(solution) - k).max() < part * target * largest(k)
 
 
-def test_an_uncertain_result_is_told(caplog):
+def test_an_uncertain_result_is_reported(caplog):
     """Constant elements on a fold."""
     solution = ddm.Body([], folded(150), ROCK, DdmSettings(order=0, grading_layers=0)).solve(MIXED)
     with caplog.at_level(logging.WARNING):

@@ -192,7 +192,7 @@ def test_bolts_and_excavations_count_at_their_time():
         assert found.upper == factor if np.isinf(factor) else found.factor == pytest.approx(factor, rel=1e-3)
 
 
-def test_what_cannot_fail_or_stand_is_told():
+def test_what_cannot_fail_or_stand_is_reported():
     blocks = Blocks.from_polygons([rectangle(-5, -1, 5, 0), rectangle(0, 0, 1, 1)], fixed=[True, False])
     law = JointLaw("joint", 0.5)
     level = dda.factor_of_safety(blocks, [ROCK], [law], WEIGHT)

@@ -111,7 +111,7 @@ def test_runs_name_sharp_toes_that_hold(caplog, dynamic):
 
 
 @pytest.mark.parametrize(("drop", "friction_deg"), [(0.5, 30), (0.5, 40), (60.0, 30), (0.0, 30)])
-def test_how_far_a_failed_block_goes_is_told(drop, friction_deg):
+def test_how_far_a_failed_block_goes_is_reported(drop, friction_deg):
     """Down a plane at 35° to a floor: drop/sin 35° with a sharp tip; farther by its rounding, by which the toe stands off;
     on, with no floor within the block's size."""
     blocks, loads = above_a_floor(drop)
@@ -307,7 +307,7 @@ def test_flat_vertices_on_the_face_of_a_shear_box_take_no_strength(step, tension
 
 
 @pytest.mark.parametrize("stiffness", [1e5, 3e5, 1e8])
-def test_a_soft_anchor_counts_with_its_yield_force_and_its_displacement_is_told(verified, stiffness):
+def test_a_soft_anchor_counts_with_its_yield_force_and_its_displacement_is_reported(verified, stiffness):
     """F = N tan φ / T of a block on a plane at 40° with the anchor at its yield force, within 1 %."""
     slope, friction, force = math.radians(40), math.radians(30), 15e3
     blocks = Blocks.from_polygons(

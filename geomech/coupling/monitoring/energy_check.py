@@ -26,13 +26,13 @@ class BudgetWatch:
     whenever it has doubled."""
 
     def __init__(self) -> None:
-        self._told = GAIN
+        self._reported = GAIN
 
     def check(self, share: float, time: float) -> None:
         """``share``: unexplained energy until ``time`` s, relative to all energy converted."""
-        if not abs(share) > self._told:
+        if not abs(share) > self._reported:
             return
-        self._told = 2.0 * abs(share)
+        self._reported = 2.0 * abs(share)
         log.warning(
             "t = %g s: %.2g of all converted energy is not accounted for (budget_residual in history.csv): reduce the "
             "time step and, where cracks grow, growth.increment_m",
@@ -73,15 +73,15 @@ class BendingWatch:
     block of uniform strain stores no bending energy, so that cracks opened by bending cost it nothing."""
 
     def __init__(self) -> None:
-        self._told, self._before = False, 0.0
+        self._reported, self._before = False, 0.0
 
     def check(self, toughness: float, spent: float, time: float) -> None:
         """Called after every step: ``toughness``, J/m: fracture energy until ``time`` s; ``spent``, J/m: what the
         blocks supplied for it. Part of the growth in a step is paid for in the next one."""
         before, self._before = self._before, toughness
-        if self._told or not before - spent > UNPAID * before:
+        if self._reported or not before - spent > UNPAID * before:
             return
-        self._told = True
+        self._reported = True
         log.warning(
             "t = %g s: of the %.3g J/m of fracture energy, the blocks supplied %.3g (unpaid_toughness in summary.json): "
             "blocks of uniform strain store no bending energy, so that cracks opened by bending take none from the "
@@ -98,13 +98,13 @@ class GrowthWatch:
     unstable."""
 
     def __init__(self) -> None:
-        self._told = False
+        self._reported = False
 
     def check(self, budget: EnergyBudget, time: float) -> None:
         """``budget`` after a load step that ends at ``time`` s."""
-        if self._told or not budget.released > GAIN * budget.turnover:
+        if self._reported or not budget.released > GAIN * budget.turnover:
             return
-        self._told = True
+        self._reported = True
         log.warning(
             "t = %g s: cracks grow unstably at constant load and have released %.3g J/m so far, which a static run does "
             "not convert to motion (growth_release in history.csv); set dda.dynamic_factor = 1 to follow the motion",

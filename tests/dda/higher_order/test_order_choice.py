@@ -86,7 +86,7 @@ def test_a_punch_presses_into_an_elastic_block(caplog):
     assert "no shorter step avoids it" not in caplog.text
 
 
-def test_a_re_entrant_block_that_converges_slowly_is_told(caplog):
+def test_a_re_entrant_block_that_converges_slowly_is_reported(caplog):
     frame = np.array([[0, 0], [1, 0], [1, 2], [3, 2], [3, 3], [0, 3.0]])
     polygons = [rectangle(-1, -1, 4, 0), frame]
     system = system_of(polygons, [1, 0], [1, AUTO_ORDER], joint=GLUE, loaded=(1, 3))

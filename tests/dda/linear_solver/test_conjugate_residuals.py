@@ -41,7 +41,7 @@ def test_what_one_right_side_took_the_next_need_not(matrices):
     assert solved(matrix, known, 3.0 * right, nearly)[1] == 0
 
 
-def test_the_oldest_make_room_and_what_leads_nowhere_is_told(matrices):
+def test_the_oldest_make_room_and_what_leads_nowhere_is_reported(matrices):
     matrix, rng, known = matrices[0], np.random.default_rng(5), Directions(60, 4)
     x, rest = np.zeros(60), rng.normal(size=60)
     for k in range(6):

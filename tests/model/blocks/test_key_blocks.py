@@ -82,7 +82,7 @@ def test_a_block_with_neighbours_all_round_is_held_and_a_loose_one_falls():
     assert rows["kind"].tolist() == [FIXED] * 4 + [HELD, FALLS]
 
 
-def test_without_gravity_only_removability_is_told():
+def test_without_gravity_only_removability_is_reported():
     rows = found(roof(0.5, 1.0), JointLaw("joint", 0.5), np.zeros(2), [True, True, False])
     assert rows["kind"][2] == SAFE
     assert np.degrees(rows["direction"][2]) == pytest.approx(-90, abs=0.01)

@@ -76,7 +76,7 @@ def kept_in_a_row(frequency: float, dt: float, damping: float, newmark, radius) 
     ("damping", "newmark", "radius"),
     [(0.0, (0.5, 1.0), None), (0.4, (0.5, 1.0), None), (0.4, (0.25, 0.5), None), (0.4, (0.5, 1.0), 0.9)],
 )
-def test_a_wave_in_blocks_falls_as_is_told(damping, newmark, radius):
+def test_a_wave_in_blocks_falls_as_is_reported(damping, newmark, radius):
     lag = 2 * damping / (math.sqrt(12.0) * SPEED)
     dt = 5e-4
     frequency = 70.0  # two wavelengths in the row, 29 steps a period

@@ -25,7 +25,7 @@ def cycle(bodies):
     return SimpleNamespace(bodies=bodies, tips=tips, blocks=SimpleNamespace(names=["base", "left", "right"]))
 
 
-def test_the_worst_block_is_told():
+def test_the_worst_block_is_reported():
     coarse, fine = solved(0.5, order=1, elements_per_side=2), solved(0.3, order=6)
     told = crack_trust(cycle({1: coarse, 2: fine}))
     assert max(coarse.residual, fine.residual) < told["residual"] == ROUND_OFF

@@ -119,7 +119,7 @@ def test_what_suits_a_run(run, tmp_path):
     assert usual_field(Run(tmp_path)) == "displacement"
 
 
-def test_wishes_that_cannot_be_met_are_told(run, tmp_path, capsys):
+def test_wishes_that_cannot_be_met_are_reported(run, tmp_path, capsys):
     with pytest.raises(UnknownField, match=r"no field 'heat'; there are displacement, .*contacts\.gap"):
         quantity(run, "heat")
     with pytest.raises(UnknownField, match=r"is a tensor: name a component, as stress\.XX"):

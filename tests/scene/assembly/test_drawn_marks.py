@@ -237,7 +237,7 @@ def test_tables_that_mean_nothing_drawn_are_refused(scene, changes, key, message
     assert key in fault.place and "scene.toml:" in fault.place and way_out in fault.way_out
 
 
-def test_drawn_things_that_no_table_means_are_told(scene):
+def test_drawn_things_that_no_table_means_are_reported(scene):
     text = '[geometry]\nmodel = "model.geo"\n' + COMMON
     model = MODEL + 'Physical Point("corner")={3};Physical Curve("water")={32};\n'
     messages = [warning.message for warning in scene(text, model=model).warnings]

@@ -129,7 +129,7 @@ def test_mistakes_are_told_at_their_place(tmp_path, change, message):
         load(tmp_path, SCENE, change)
 
 
-def test_small_blocks_spare_the_drawn_fault_and_are_told(tmp_path):
+def test_small_blocks_spare_the_drawn_fault_and_are_reported(tmp_path):
     whole = load(tmp_path)
     coarse = load(tmp_path, SCENE, ("seed = 3", "seed = 3\nsmallest_block_m2 = 3\nshortest_crack_m = 0.4"))
 

@@ -71,7 +71,7 @@ end_time_s = 1.0
 
 
 @pytest.mark.parametrize(("changes", "told"), [((), 1), (("dda.dynamic_factor=0",), 0)])
-def test_slivers_that_shorten_steps_are_told(scene_file, changes, told):
+def test_slivers_that_shorten_steps_are_reported(scene_file, changes, told):
     """A chip of 1 cm between blocks of 2 m: its place, and the setting that would merge it. In statics nothing is fast."""
     found = [w for w in load_scene(scene_file(SLIVERS), changes).warnings if "shorten the time step" in w.message]
     assert len(found) == told
@@ -80,7 +80,7 @@ def test_slivers_that_shorten_steps_are_told(scene_file, changes, told):
         assert "geometry.smallest_block_m2 = 0.04" in warning.way_out
 
 
-def test_a_rounding_that_edges_are_too_short_for_is_told(scene_file):
+def test_a_rounding_that_edges_are_too_short_for_is_reported(scene_file):
     """A base 6 m long and 1 m thick holds 25 cm; without the key, or where all edges are long enough, nothing is said."""
 
     def told(*changes):
@@ -115,7 +115,7 @@ end_time_s = 1.0
 """
 
 
-def test_a_curved_crack_of_few_chords_is_told(scene_file):
+def test_a_curved_crack_of_few_chords_is_reported(scene_file):
     """Sides that turn by 22.5°: the last one is 11° off the arc. A straight crack, or one of many sides, is not told."""
 
     def told(text):
@@ -150,7 +150,7 @@ gap_m = 0.3
         (("growth.enabled=false",), 0),
     ],
 )
-def test_sudden_weight_on_rock_bridges_is_told(scene_file, overrides, told):
+def test_sudden_weight_on_rock_bridges_is_reported(scene_file, overrides, told):
     asked = ("loads.gravity_m_s2=[0, -9.81]", "dda.dynamic_factor=1", "geometry.cracks=[]", *overrides)
     found = warnings_of(scene_file, ("[materials.rock]", BRIDGES + "[materials.rock]"), overrides=asked)
     assert sum("all weight is applied at once" in str(w) for w in found) == told
@@ -194,7 +194,7 @@ def test_how_far_linear_pressure_is_off_under_shallow_blocks(ratio, at, too_larg
     ("height", "route", "order", "told"),
     [(0.5, "contacts", 1, 1), (0.7, "contacts", 1, 0), (0.5, "bases", 1, 0), (0.5, "contacts", 2, 0)],
 )
-def test_shallow_cracked_blocks_on_a_fixed_base_are_told(scene_file, height, route, order, told):
+def test_shallow_cracked_blocks_on_a_fixed_base_are_reported(scene_file, height, route, order, told):
     text = f"""
 title = "a slab on its ground"
 [[geometry.zones]]
@@ -229,7 +229,7 @@ boundary_stress = "{route}"
         assert "'slab'" in warning.message and "cut it by joints" in warning.way_out
 
 
-def test_a_crack_that_reaches_the_outline_or_keeps_away_is_not_told(scene_file):
+def test_a_crack_that_reaches_the_outline_or_keeps_away_is_not_reported(scene_file):
     end = "points = [[0.5, 1.0], [{x}, 1.0]]"
     old = "centre = [0.5, 1.0]\nlength_m = 0.2\nangle_deg = 30"
     assert warnings_of(scene_file, (old, end.format(x=1.0))) == ()
@@ -305,7 +305,7 @@ def test_titles_name_the_variant(scene_file):
 
 
 @pytest.mark.parametrize(("ramp", "told"), [(0.0, 0), (2.0, 1)])
-def test_in_situ_stress_before_there_is_weight_is_told(scene_file, ramp, told):
+def test_in_situ_stress_before_there_is_weight_is_reported(scene_file, ramp, told):
     stress = [f"loads.in_situ.{key}" for key in ("surface_m=2.0", "unit_weight_n_per_m3=25000", "k0=0.5")]
     found = warnings_of(
         scene_file, overrides=["loads.gravity_m_s2=[0, -9.81]", f"loads.gravity_ramp_s={ramp}", *stress]
@@ -349,7 +349,7 @@ end_time_s = 1.0
         (["zones.ground.fixed=false", "loads.gravity_m_s2=[0, 0]"], []),
     ],
 )
-def test_weight_that_nothing_bears_is_told(scene_file, overrides, told):
+def test_weight_that_nothing_bears_is_reported(scene_file, overrides, told):
     found = load_scene(scene_file(STANDING.format(x=0.5)), overrides).warnings
     assert [w.message[-len(message) :] for w, message in zip(found, told, strict=True)] == told
 
@@ -360,14 +360,14 @@ def test_blocks_that_nothing_bears_are_refused_by_name(scene_file):
 
 
 @pytest.mark.parametrize(("x", "told"), [(0.5, 0), (500.0, 1)])
-def test_a_drawn_joint_that_is_nowhere_in_the_rock_is_told(scene_file, x, told):
+def test_a_drawn_joint_that_is_nowhere_in_the_rock_is_reported(scene_file, x, told):
     found = load_scene(scene_file(STANDING.format(x=x))).warnings
     assert ["'joint:seam' cuts nothing" in w.message for w in found] == [True] * told
     assert all(w.place.endswith("geometry.joints[0]") for w in found)
 
 
 @pytest.mark.parametrize(("increment", "told"), [(1.9, 0), (2.1, 1)])
-def test_an_advance_longer_than_the_rock_is_told(scene_file, increment, told):
+def test_an_advance_longer_than_the_rock_is_reported(scene_file, increment, told):
     """The plate is 1 × 2 m."""
     found = warnings_of(scene_file, overrides=[f"growth.increment_m={increment}"])
     assert ["crosses it in one step" in w.message for w in found] == [True] * told

@@ -197,7 +197,7 @@ CURVES = "Point(5)={0.2,0.5,0};Point(6)={0.4,0.6,0};Point(7)={0.6,0.5,0};Line(5)
 
 
 @pytest.mark.parametrize("embedded", ["Line{5, 6} In Surface{1};", ""])
-def test_curves_inside_a_surface_that_are_no_cracks_are_told(tmp_path, embedded):
+def test_curves_inside_a_surface_that_are_no_cracks_are_reported(tmp_path, embedded):
     (warning,) = read_gmsh_model(written(tmp_path, SQUARE + CURVES + embedded)).warnings
     assert "curves 5, 6 lie inside zone 'rock'" in warning[0] and 'Physical Curve("crack:NAME")' in warning[1]
     (warning,) = read_gmsh_model(
@@ -209,7 +209,7 @@ def test_curves_inside_a_surface_that_are_no_cracks_are_told(tmp_path, embedded)
     ).warnings
 
 
-def test_a_curve_that_a_boolean_operation_put_into_the_rock_is_told(tmp_path):
+def test_a_curve_that_a_boolean_operation_put_into_the_rock_is_reported(tmp_path):
     model = (
         'SetFactory("OpenCASCADE");Rectangle(1)={-2,-2,0,4,4};Disk(2)={0,0,0,0.5};'
         "BooleanDifference(3)={Surface{1};Delete;}{Surface{2};Delete;};"
@@ -236,7 +236,7 @@ def test_models_of_this_folder_lose_nothing(model, platens):
     assert read_gmsh_model(GEOMETRY / f"{model}.geo", {"platens": platens}).warnings == ()
 
 
-def test_points_off_the_plane_are_told(tmp_path):
+def test_points_off_the_plane_are_reported(tmp_path):
     (warning,) = read_gmsh_model(written(tmp_path, SQUARE.replace("Point(2)={1,0,0}", "Point(2)={1,0,0.1}"))).warnings
     assert "point 2 has z ≠ 0 (up to 0.1 m)" in warning[0]
 

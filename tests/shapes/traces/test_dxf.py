@@ -124,7 +124,7 @@ def test_blocks_are_exploded_turned_mirrored_and_nested(drawing):
     assert [line.points[0, 0] for line in lines[4::2]] == pytest.approx([0, 5, 10])
 
 
-def test_hidden_layers_and_what_is_no_trace_are_told(drawing):
+def test_hidden_layers_and_what_is_no_trace_are_reported(drawing):
     document, space, read = drawing
     for name, hide in (("off", "off"), ("frozen", "freeze")):
         getattr(document.layers.add(name), hide)()

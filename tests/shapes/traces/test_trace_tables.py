@@ -118,7 +118,7 @@ def test_what_cannot_be_read_is_refused_with_its_line(tmp_path, text, name, mess
         read(tmp_path, text, name)
 
 
-def test_a_missing_file_is_told(tmp_path):
+def test_a_missing_file_is_reported(tmp_path):
     with pytest.raises(FieldFileError, match="there is no file"):
         read_field_file(tmp_path / "none.csv")
 
