@@ -443,7 +443,8 @@ class Body:
         _log.info("%s; solved by factorization instead", failure)
         before = copy(self)
         self.compressed, self._factored_after_all = False, True
-        vars(self).pop("face_equations", None)
+        for name in ("face_equations", "opens"):
+            vars(self).pop(name, None)
         self._assemble(before, self._outside.holds, False)
 
     def _solved(
@@ -454,8 +455,8 @@ class Body:
         history: Solution | FaceMemory | None,
     ) -> Solution:
         applied, units, rest, imposed = self.decompose(load, equilibrium_tolerance)
-        # Faces with friction have other equations, for which S⁻¹ is of no use.
-        opening = np.zeros_like if self.rough else self.crack_system.opened
+        # Faces with friction, and many that may close, have other equations, for which S⁻¹ is of no use.
+        opening = self.crack_system.opened if self.opens else np.zeros_like
         g, r, y, reduced, opened = self._loads.add(units, rest, self._outside, self._cg, opening)
         pressure = load.face_pressure(self.faces.nodes, self.faces.source, self.cracks.n_segments)
         answer = settle_faces(self, reduced, opened, pressure, warm, history)
@@ -510,6 +511,11 @@ class Body:
         if self._functionals is None or self._functionals[0][0] != key[0] or self._functionals[0][1] is not began:
             self._functionals = key, TipFunctionals(self, solution)
         return self._functionals[1]
+
+    @cached_property
+    def opens(self) -> bool:
+        """Whether solutions begin with those for open faces, S⁻¹ times the load."""
+        return not self.rough and not (self.crack_system.by_free_unknowns and self.closing[1].any())
 
     @cached_property
     def laws(self) -> FaceLaws:

@@ -94,6 +94,9 @@ class CrackedBody(Protocol):
     def tip_elements(self) -> tuple[np.ndarray, ...]: ...
 
     @property
+    def opens(self) -> bool: ...
+
+    @property
     def closing(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]: ...
 
     @property

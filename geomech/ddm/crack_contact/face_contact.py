@@ -51,8 +51,8 @@ def settle_faces(
     history: SolvedBody | FaceMemory | None = None,
 ) -> FaceSolution:
     """Contact state of the faces of ``body``. ``load_traction`` (n_unknowns,): of the loads on closed faces;
-    ``opened``: S⁻¹ of it; ``pressure`` (n_elements, p+1): of fluid at the nodes. ``warm`` and ``history`` as in
-    `Body.solve`."""
+    ``opened``: S⁻¹ of it, if the body `opens`; ``pressure`` (n_elements, p+1): of fluid at the nodes. ``warm`` and
+    ``history`` as in `Body.solve`."""
     c = body.faces
     n = c.n_unknowns
     if n == 0:
@@ -63,14 +63,16 @@ def settle_faces(
     right = applied - load_traction
     if body.rough:
         return _rough(body, right, applied, warm, history)
-    opened = body.crack_system.opened(applied) - opened if applied.any() else -opened
+    start: np.ndarray | None = None
+    if body.opens:
+        start = body.crack_system.opened(applied) - opened if applied.any() else -opened
     aperture, can_close, fixed = body.closing
     stress_scale = max(float(np.abs(right).max()), np.finfo(float).tiny)
     gap_scale = stress_scale * float(c.length.max())
     state: dict[str, np.ndarray] = {}
 
     def respond(closed):
-        w, reaction = body.crack_system.constrained(right, closed, fixed, opened)
+        w, reaction = body.crack_system.constrained(right, closed, fixed, start)
         state["w"], state["traction"] = w, applied - reaction
         return (w + aperture) / gap_scale, reaction / stress_scale
 

@@ -129,6 +129,9 @@ class IterativeCrackSystem:
         self._coarse = CoarseLevel(elements, crack, nu, tol)
         self._last: tuple[np.ndarray, np.ndarray] | None = None
 
+    #: Solutions begin with those for open faces (`CrackSystem`).
+    by_free_unknowns = False
+
     def opened(self, right: np.ndarray) -> np.ndarray:
         """Zeros: no inverse is available at no cost."""
         return np.zeros_like(right)

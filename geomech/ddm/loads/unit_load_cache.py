@@ -20,8 +20,11 @@ if TYPE_CHECKING:
     from ..interfaces import LoadParts
     from .hole_supports import Anchors
 
-#: Number of different segments whose loads are cached.
+#: Number of different segments whose loads are cached; …
 _REMEMBERED = 400
+#: … above so many numbers in all, only those of so many of the last loads. Blocks in motion slide, and most segments never
+#: come back: 150 steps of a slope of 48 cracked blocks kept 2 GB of them.
+_NUMBERS, _LAST_LOADS = 500_000, 3
 #: Number of edges or segments whose forces are computed at a time: those of a large boundary on itself would fill
 #: memory.
 _AT_ONCE = 256
@@ -30,10 +33,9 @@ _AT_ONCE = 256
 class UnitLoad:
     """Response to unit loads, one per column of ``applied``: tractions g on the boundary above r on the cracks.
 
-    Loads that recur are ``answered`` once and then scaled: (g, r, y, r' = r − A_CΓ y, S⁻¹ r') with y = A_ΓΓ⁻¹ g. Of
-    these, ``eliminated`` holds y, the part that growth leaves valid. ``segment`` is where tractions act, ``against``
-    whether they were given against the boundary's direction; alternatively ``densities`` (m, 2, 3, columns) act on the
-    m edges of the body.
+    Loads that recur are answered once and then scaled: ``eliminated`` holds y = A_ΓΓ⁻¹ g, which growth leaves valid, and
+    ``answered`` r' = r − A_CΓ y above S⁻¹ r'. ``segment`` is where tractions act, ``against`` whether they were given
+    against the boundary's direction; alternatively ``densities`` (m, 2, 3, columns) act on the m edges of the body.
     """
 
     def __init__(
@@ -47,6 +49,12 @@ class UnitLoad:
         self.eliminated: np.ndarray | None = None
         self.answered: np.ndarray | None = None
         self.used = False
+        self.turn = 0
+
+    @property
+    def numbers(self) -> int:
+        """How many numbers it holds."""
+        return sum(array.size for array in (self.applied, self.eliminated, self.answered) if array is not None)
 
 
 class Eliminated:
@@ -101,6 +109,7 @@ class UnitLoads:
         self._segments: dict[bytes, UnitLoad] = {}
         self._on_edges: dict[str | int, UnitLoad] = {}
         self._recent: list[bytes] = []
+        self._turn = 0
         self._last: Eliminated | None = None
 
     def inherit(self, old: UnitLoads, c_old: np.ndarray) -> None:
@@ -119,7 +128,7 @@ class UnitLoads:
             applied = np.empty((n_g + self.faces.n_unknowns, before.applied.shape[1]))
             applied[:n_g], applied[to], applied[at] = before.applied[:n_g], before.applied[fro], on_new
             unit = UnitLoad(applied, before.segment, before.against, before.densities)
-            unit.eliminated = before.eliminated
+            unit.eliminated, unit.turn = before.eliminated, before.turn
             return unit
 
         for name, before in old._on_edges.items():
@@ -131,7 +140,7 @@ class UnitLoads:
         straight = np.array([old._segments[key].segment for key in keys])
         for key, on_new in zip(keys, self._linear_forces(added, straight)):
             self._segments[key] = grown(old._segments[key], on_new)
-        self._recent = keys
+        self._recent, self._turn = keys, old._turn
 
     def of(self, applied: LoadParts) -> list[tuple[UnitLoad, np.ndarray]]:
         """The unit loads that make up ``applied``, without functions and point loads, and their sizes."""
@@ -179,7 +188,10 @@ class UnitLoads:
             if unit.answered is None:
                 rest = rest + unit.applied @ size
             else:
-                total += unit.answered @ size
+                assert unit.eliminated is not None
+                total[:n] += unit.applied @ size
+                total[n : n + n_g] += unit.eliminated @ size
+                total[n + n_g :] += unit.answered @ size
         if rest.any():
             if self._last is None or not np.array_equal(self._last.load, rest[:n_g]):
                 y = boundary.solve(rest[:n_g])
@@ -196,7 +208,7 @@ class UnitLoads:
         for unit in units:
             assert unit.eliminated is not None
             reduced = unit.applied[n_g:] - cg @ unit.eliminated
-            unit.answered = np.concatenate([unit.applied, unit.eliminated, reduced, opened(reduced)])
+            unit.answered = np.concatenate([reduced, opened(reduced)])
 
     def _eliminate(self, units: list[UnitLoad], boundary: BoundarySystem) -> None:
         """Compute y of those ``units`` that have none."""
@@ -204,7 +216,7 @@ class UnitLoads:
         if fresh:
             y = boundary.solve(np.hstack([unit.applied[:n_g] for unit in fresh]))
             for unit, part in zip(fresh, np.split(y, np.cumsum([u.applied.shape[1] for u in fresh])[:-1], axis=1)):
-                unit.eliminated = part
+                unit.eliminated = np.ascontiguousarray(part)
 
     def answers(
         self, segments: np.ndarray, boundary: BoundarySystem, cg: np.ndarray | KeptRows
@@ -228,10 +240,10 @@ class UnitLoads:
             raise ValueError("load segments need a body with an outline, a hole or a free surface")
         keys = [segment.tobytes() for segment in segments]
         missing = [k for k, key in enumerate(keys) if key not in self._segments]
+        self._turn += 1
         if missing:
-            if len(self._segments) > _REMEMBERED:
-                self._segments.clear()
-                return self._unit_segments(segments, tractions)
+            self._forget()
+            missing = [k for k, key in enumerate(keys) if key not in self._segments]
             placed = [onto_boundary(edges, segments[k], f"load segment {k}", self.extent)[:2] for k in missing]
             for first in range(0, len(missing), _AT_ONCE):
                 here = placed[first : first + _AT_ONCE]
@@ -241,7 +253,18 @@ class UnitLoads:
                     self._segments[keys[k]] = UnitLoad(np.concatenate(rows), segment, against)
         self._recent = keys
         units = [self._segments[key] for key in keys]
+        for unit in units:
+            unit.turn = self._turn
         return [(u, (ends[::-1] if u.against else ends).ravel()) for u, ends in zip(units, tractions)]
+
+    def _forget(self) -> None:
+        """Remove segments where too many are cached: those that the last loads do not have, or all."""
+        numbers = sum(unit.numbers for unit in self._segments.values())
+        if numbers > _NUMBERS:
+            since = self._turn - _LAST_LOADS
+            self._segments = {key: unit for key, unit in self._segments.items() if unit.turn >= since}
+        if len(self._segments) > _REMEMBERED:
+            self._segments.clear()
 
     def _linear_forces(self, targets: ElementSet, segments: np.ndarray) -> np.ndarray:
         """(n_unknowns, 4 m) traction from unit forces along x and y at the start, then at the end, of straight

@@ -23,6 +23,9 @@ from .influence_matrix import ElementSet, influence, reuse
 
 #: Once OFTEN bodies have used the same boundary, the inverse is computed, for up to INVERTED unknowns.
 OFTEN, INVERTED = 8, 800
+#: Above so many unknowns A_ΓΓ is factored in its own memory, not beside a copy: it is computed again (in a third of the time
+#: that its factors take) for residuals, and when cracks divide the boundary.
+KEPT_BESIDE_FACTORS = 800
 
 
 class BoundarySystem:
@@ -31,7 +34,7 @@ class BoundarySystem:
         elements      the boundary elements
         holds         the supported ones, or None
         matrix        (n, n) traction, seen from outside, from displacement (times 2μ) or reaction of the boundary;
-                      an operator if ``iterated``
+                      an operator if ``iterated``; above `KEPT_BESIDE_FACTORS` unknowns it is computed when asked for
         known         (n, h) the same from the displacement of supported elements
         rigid         (n, k) rigid motions of each loop that no support resists, nodal values
         weights       (k, n) their mean over the loop
@@ -48,7 +51,6 @@ class BoundarySystem:
     elements: ElementSet
     holds: Holds | None
     extent: float
-    matrix: np.ndarray | Compressed | SupportedBoundaryMatrix
     known: np.ndarray | PrescribedJumps
     rigid: np.ndarray
     weights: np.ndarray
@@ -82,7 +84,7 @@ class BoundarySystem:
         ):
             self.generation, self.unchanged = previous.generation + 1, True
             self.elements, self.holds, self.extent = previous.elements, previous.holds, previous.extent
-            self.matrix, self.known, self.factor = previous.matrix, previous.known, previous.factor
+            self._matrix, self.known, self.factor = previous._matrix, previous.known, previous.factor
             self.rigid, self.weights, self.free_motions = previous.rigid, previous.weights, previous.free_motions
             self.anchors = previous.anchors
             return
@@ -90,32 +92,60 @@ class BoundarySystem:
         if self.iterated:
             self.rigid, self.weights = rigid_motions(g, mesh.edge_loop)
             self.known, self.free_motions, self.anchors = np.empty((g.n_unknowns, 0)), None, None
-            self.matrix = jumps = Compressed(g, g, nu, tol)
+            operator: Compressed | SupportedBoundaryMatrix
+            operator = jumps = Compressed(g, g, nu, tol)
             if holds is not None:
                 self._constrain_rigid_motions(mesh, holds)
-                self.matrix, self.known = SupportedBoundaryMatrix(jumps, holds, nu, tol), PrescribedJumps(jumps, holds)
+                operator, self.known = SupportedBoundaryMatrix(jumps, holds, nu, tol), PrescribedJumps(jumps, holds)
+            self._matrix = operator
 
             def between(elements: np.ndarray) -> np.ndarray:
                 return self.influence_on(g.take(elements), elements)
 
-            self.factor = IteratedBoundary(g, self.matrix, self.rigid, self.weights, extent, nu, tol, between)
+            self.factor = IteratedBoundary(g, operator, self.rigid, self.weights, extent, nu, tol, between)
             return
         # With anchored holes, the old matrix contains the anchors' terms besides tractions.
-        before = previous.matrix if previous is not None and previous.anchors is None else None
+        before = previous._matrix if previous is not None and previous.anchors is None else None
         dense = before if isinstance(before, np.ndarray) else None
         matrix = reuse(dense, at_old, at_old, g, g, lambda r, k: self.influence_on(g.take(r), k))
-        known = np.empty((g.n_unknowns, 0)) if holds is None else holds.known(g, nu, tol)
-        self.matrix, self.known = matrix, known
+        self.known = known = np.empty((g.n_unknowns, 0)) if holds is None else holds.known(g, nu, tol)
         self.rigid, self.weights = rigid_motions(g, mesh.edge_loop)
         self.free_motions = self.anchors = None
         if holds is not None:
             anchors = self._constrain_rigid_motions(mesh, holds)
             if anchors is not None:
-                self.anchored(matrix, holds.mixed(anchors.of_jumps(g), anchors.of_shapes(holds.sources)))
+                self.anchored(matrix, self._anchoring)
                 self.anchored(known, anchors.of_jumps(holds.sources))
-        # Column-major like the matrix: adding arrays of different order takes several times as long.
-        regularisation = (self.weights.T @ self.rigid.T).T / extent
-        self.factor = Factor(matrix + regularisation, "the boundary equations are singular")
+        self._matrix = matrix if g.n_unknowns <= KEPT_BESIDE_FACTORS else None
+        self.factor = Factor(*self._regular(matrix), in_place=self._matrix is None)
+
+    def _regular(self, matrix: np.ndarray) -> tuple[np.ndarray, str]:
+        """``matrix`` without its rigid motions, in its own memory if it is not kept, and what is wrong if it is
+        singular."""
+        what = "the boundary equations are singular"
+        if self._matrix is not None:
+            # Column-major like the matrix: adding arrays of different order takes several times as long.
+            return matrix + (self.weights.T @ self.rigid.T).T / self.extent, what
+        from scipy.linalg.blas import dgemm
+
+        matrix = np.asfortranarray(matrix)
+        return dgemm(1.0 / self.extent, self.rigid, self.weights, 1.0, matrix, overwrite_c=True), what
+
+    @property
+    def matrix(self) -> np.ndarray | Compressed | SupportedBoundaryMatrix:
+        """See above."""
+        if self._matrix is not None:
+            return self._matrix
+        g = self.elements
+        out = self.influence_on(g, np.arange(g.n))
+        return out if self.anchors is None else self.anchored(out, self._anchoring)
+
+    @property
+    def _anchoring(self) -> np.ndarray:
+        """Motions of supported holes by the unknowns of the boundary."""
+        assert self.anchors is not None and self.holds is not None
+        of = self.anchors.of_jumps(self.elements), self.anchors.of_shapes(self.holds.sources)
+        return self.holds.mixed(*of)
 
     def _constrain_rigid_motions(self, mesh: Mesh, holds: Holds) -> Anchors | None:
         """Keep the free rigid motions; anchor holes against the others. Returns the anchors, None without any."""

@@ -7,27 +7,33 @@ from functools import cached_property
 import numpy as np
 
 
+#: Columns whose absolute values are summed at a time where the factors take the memory of a large matrix.
+_AT_ONCE = 256
+
+
 class Factor:
-    """LU of a square ``matrix`` (left unchanged), with its rows scaled to equal size. Raises LinAlgError, with the text
-    ``what``, when it is singular.
+    """LU of a square ``matrix``, with its rows scaled to equal size. ``in_place``: a column-major matrix is replaced by
+    its factors, which take its memory; otherwise it is left unchanged. Raises LinAlgError, with the text ``what``, when
+    it is singular.
 
     Tractions on an element are proportional to one over its length: without scaling, elements of very different lengths
     would look singular. The scales are powers of two and therefore add no round-off.
     """
 
-    def __init__(self, matrix: np.ndarray, what: str):
+    def __init__(self, matrix: np.ndarray, what: str, in_place: bool = False):
         from scipy.linalg import lapack
 
         self.n = len(matrix)
         if self.n == 0:
             self.rcond, self.scale = 1.0, np.empty(0)
             return
-        size = np.abs(matrix).sum(axis=1)
+        in_place = in_place and matrix.flags.f_contiguous
+        size = _row_sums(matrix) if in_place else np.abs(matrix).sum(axis=1)
         if not np.isfinite(size).all():
             raise np.linalg.LinAlgError(f"{what} (not finite)")
         self.scale = np.ldexp(1.0, -np.frexp(size)[1])
         # LAPACK is column-major: a row-major matrix is the transpose in the same memory, which is factored instead.
-        scaled = matrix * self.scale[:, None]
+        scaled = np.multiply(matrix, self.scale[:, None], out=matrix if in_place else None)
         self._transposed = 0 if scaled.flags.f_contiguous else 1
         self._lu, self._pivots, info = lapack.dgetrf(scaled.T if self._transposed else scaled, overwrite_a=True)
         norm = (size * self.scale).max()
@@ -69,3 +75,11 @@ class Factor:
         """(n, n) inverse, for many solutions of a few columns each: a product takes half the time of two triangular
         solutions."""
         return self.solve(np.eye(self.n, order="F"))
+
+
+def _row_sums(matrix: np.ndarray) -> np.ndarray:
+    """(n,) sums of the absolute values of each row of a column-major ``matrix`` (n, n), without a copy of it."""
+    out = np.zeros(len(matrix))
+    for first in range(0, matrix.shape[1], _AT_ONCE):
+        out += np.abs(matrix[:, first : first + _AT_ONCE]).sum(axis=1)
+    return out

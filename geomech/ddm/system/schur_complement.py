@@ -3,7 +3,9 @@ adjoints.
 
 S = A_CC − A_CΓ A_ΓΓ⁻¹ A_ΓC is the Schur complement for slip and opening (`body`). It is factored once for all contact
 states: prescribing k unknowns takes a k × k system in columns of S⁻¹. If cracks cut off a part that only closed faces
-support, S is singular, and the equations of the free unknowns are factored instead.
+support, S is singular, and the equations of the free unknowns are factored instead. So they are where many faces of many
+unknowns are closed: columns of S⁻¹ for them would take as much memory as S, and each state the factors of k unknowns;
+factors of other states give those of the next (`updated_factor`).
 """
 
 from __future__ import annotations
@@ -31,6 +33,9 @@ _KEPT = 8
 _BASES = 3
 
 
+AnyFactor = Factor | BorderedFactor | ClosedFaceFactor | UpdatedFactor
+
+
 class CrackSystem:
     """Solves with S = ``matrix``; factors and columns of S⁻¹ are computed on first use and kept. ``before``: the system
     before the last growth, whose factors are reused; ``was`` (n_elements,): element numbers there, −1 where new."""
@@ -52,6 +57,7 @@ class CrackSystem:
         self._column_at = np.full(self.n, -1)
         self._columns = np.empty((self.n, 0))
         self._prescribed_factor: tuple[bytes, np.ndarray, Factor] | None = None
+        self._shut: tuple[bytes, np.ndarray, AnyFactor] | None = None
 
     def opened(self, right: np.ndarray) -> np.ndarray:
         """S⁻¹ ``right``; zeros if there is no `open_factor`."""
@@ -69,6 +75,8 @@ class CrackSystem:
         Raises LinAlgError when cracks cut off a part that closed faces do not support.
         """
         at = np.flatnonzero(closed)
+        if self.by_free_unknowns and len(at) >= MOST_PRESCRIBED * self.n:
+            return self._with_free(right, closed, fixed)
         reaction = np.zeros_like(right)
         if self.open_factor is not None:
             w = self.opened(right) if opened is None else opened.copy()
@@ -86,7 +94,28 @@ class CrackSystem:
         reaction[at] = (right - self.matrix @ w)[at]
         return w, reaction
 
-    def changed(self, rows: Rows) -> tuple[np.ndarray, Factor | BorderedFactor | ClosedFaceFactor | UpdatedFactor]:
+    @property
+    def by_free_unknowns(self) -> bool:
+        """Whether solutions with many closed faces do without S⁻¹ times the load."""
+        return self.n >= WORTHWHILE
+
+    def _with_free(self, right: np.ndarray, closed: np.ndarray, fixed: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """As `constrained`, by the equations of the unknowns that are free."""
+        key = closed.tobytes()
+        if self._shut is None or self._shut[0] != key:
+            none = np.zeros(self.n)
+            self._shut = key, *self.changed(Rows(closed, none, none, self.matrix.elements.per))
+        _, free, factor = self._shut
+        w = np.zeros_like(right, order="F")
+        w[closed] = fixed[closed]
+        known = right - self.matrix @ w if fixed[closed].any() else right
+        w[free] = factor.solve(np.asfortranarray(known[free]))
+        self._work.back_substitutions += 1 if right.ndim == 1 else right.shape[1]
+        reaction = np.zeros_like(right)
+        reaction[closed] = (right - self.matrix @ w)[closed]
+        return w, reaction
+
+    def changed(self, rows: Rows) -> tuple[np.ndarray, AnyFactor]:
         """Indices of the unknowns that ``rows`` leave free, and factors of their equations."""
         free, moving = np.flatnonzero(~rows.prescribed), np.flatnonzero(rows.mixed)
         if len(free) == self.n and not len(moving) and not rows.spring.any() and self.open_factor is not None:
