@@ -25,6 +25,7 @@ from ..model import Cracks, DdmSettings, JointLaw, Material
 from ..model.blocks.polygon import area_moments
 from ..model.former_names import folded_argument, gathered_arguments
 from .adaptivity import finer, for_target
+from .condensation import Condensed, Operators, influence_on_boundary
 from .counters import Work
 from .crack_contact.face_contact import settle_faces
 from .crack_contact.face_equations import FaceEquations
@@ -35,7 +36,7 @@ from .fracture.tip_elements import tip_elements
 from .fracture.weight_functions import TipFunctionals
 from .interfaces import CrackedBody
 from .iterative.boundary_gmres import IteratedBoundary, is_iterated
-from .iterative.crack_gmres import FACTORABLE, BoundaryResponse, IterativeCrackSystem, compressed, is_compressed
+from .iterative.crack_gmres import FACTORABLE, IterativeCrackSystem, compressed, is_compressed
 from .iterative.gmres import NotSolved
 from .loads.body_loads import BodyLoad
 from .loads.load_vectors import Applied, apply, check_equilibrium
@@ -47,12 +48,11 @@ from .mesh.elements import Mesh, mesh, outline_edges
 from .mesh.geometry_checks import check_cracks, check_outline, new_segments
 from .mesh.half_plane import HalfPlane, without_outline
 from .mesh.point_location import outlined
-from .solution import Solution
+from .solution import LoadTractions, Solution
 from .system.bordered_factor import SMALLEST_BORDERED, Bordered, WholeMatrix
 from .system.boundary_system import BoundarySystem
 from .system.displacement_jumps import closing, strain_weights
 from .system.influence_matrix import ElementSet, influence, reuse
-from .system.row_store import KeptRows, TransposedRows
 from .system.schur_complement import CrackSystem
 
 _log = logging.getLogger(__name__)
@@ -102,8 +102,7 @@ class Body:
     _reach: float
     _factored_after_all: bool
     _outside: BoundarySystem
-    _cg: np.ndarray | KeptRows
-    _w: BoundaryResponse | TransposedRows
+    condensation: Condensed | Operators
 
     @folded_argument("half_plane", "loops", without_outline)
     @gathered_arguments("reuse", Reuse)
@@ -297,8 +296,8 @@ class Body:
     def _assemble(self, previous: Body | None, holds: Holds | None, iterated: bool) -> None:
         nu, tol = self.nu, self._tol
         c, old = self.faces, previous
-        before = old._outside if old else None
-        system = BoundarySystem(self.mesh, nu, tol, self._extent, holds, before, work=self.work, iterated=iterated)
+        outside = old._outside if old else None
+        system = BoundarySystem(self.mesh, nu, tol, self._extent, holds, outside, work=self.work, iterated=iterated)
         self._outside = system
         self.boundary = g = system.elements
         g_old, same_boundary = system.at_old, system.unchanged
@@ -313,13 +312,6 @@ class Body:
         self.work.elements_assembled += self.counts["elements_new"]
         self.work.bodies += 1
 
-        cg = old._cg if old else None
-        if same_boundary and isinstance(cg, KeptRows) and not self.compressed:
-            self._cg = cg.grown(c, c_seen, lambda r: system.influence_on(c.take(r), np.arange(g.n)))
-        else:
-            known_rows = cg.dense if isinstance(cg, KeptRows) else cg
-            rows = reuse(known_rows, c_seen, g_old, c, g, lambda r, k: system.influence_on(c.take(r), k), "C")
-            self._cg = rows if self.compressed else KeptRows.whole(rows, c)
         if system.holds is not None:
             self._c_known = system.holds.known(c, nu, tol)
         self._loads = UnitLoads(
@@ -328,33 +320,26 @@ class Body:
         if old is not None and same_boundary:
             self._loads.inherit(old._loads, c_seen)
 
-        def gc(k: np.ndarray) -> np.ndarray:
-            rows = influence(g, c.take(k), nu, tol)
-            return rows if system.anchors is None else system.anchored(rows, system.anchors.of_jumps(c.take(k)))
-
         if (self.compressed or iterated) and not (old and (old.compressed or old._outside.iterated)):
             of = [f"{g.n_unknowns} on the boundary"] * iterated + [f"{c.n_unknowns} on cracks"] * self.compressed
             _log.info("solved iteratively instead of by factorization: %s", ", ".join(of))
         if self.compressed:
-            on_boundary, crack = gc(np.arange(c.n)), self.cracks.crack[c.source]
+            known_rows = old.condensation.on_cracks if old and isinstance(old.condensation, Operators) else None
+            rows = reuse(known_rows, c_seen, g_old, c, g, lambda r, k: system.influence_on(c.take(r), k), "C")
+            on_boundary, crack = influence_on_boundary(system, c, np.arange(c.n)), self.cracks.crack[c.source]
             on_both = system.factor if isinstance(system.factor, IteratedBoundary) else None
-            assert isinstance(self._cg, np.ndarray)
-            self._w, self.crack_system = compressed(c, crack, system.solve, on_boundary, self._cg, nu, tol, on_both)
+            following, self.crack_system = compressed(c, crack, system.solve, on_boundary, rows, nu, tol, on_both)
+            self.condensation = Operators(system, c, following, rows)
             return
-        # W = A_ΓΓ⁻¹ A_ΓC and S are extended by the columns and rows of new elements. A_ΓC and A_CC are not kept: they
-        # are cheaper to recompute if the boundary changes than to carry along.
+        # G, A_ΓC and S are extended by the rows and columns of new elements. A_CΓ and A_CC are not kept: they are
+        # cheaper to recompute if the boundary changes than to carry along.
         kept = old if old is not None and same_boundary and not old.compressed else None
-
-        def follow(k: np.ndarray) -> np.ndarray:
-            return system.solve_few(gc(k)).T
-
-        every = np.arange(c.n)
-        if kept is not None and isinstance(kept._w, TransposedRows):
-            w = kept._w.rows.grown(c, c_old, follow)
+        before = None if kept is None else kept.condensation
+        if isinstance(before, Condensed):
+            self.condensation = both = Condensed(system, c, before, c_old, c_seen)
         else:
-            w = KeptRows.whole(system.solve(gc(every)).T, c)
-        self._w, cg = w.T, self._cg
-        assert isinstance(cg, KeptRows)
+            self.condensation = both = Condensed(system, c)
+        w, cg = both.columns, both.rows
 
         def schur(r: np.ndarray, k: np.ndarray) -> np.ndarray:
             direct = influence(c.take(r), c.take(k), nu, tol)
@@ -457,14 +442,14 @@ class Body:
         applied, units, rest, imposed = self.decompose(load, equilibrium_tolerance)
         # Faces with friction, and many that may close, have other equations, for which S⁻¹ is of no use.
         opening = self.crack_system.opened if self.opens else np.zeros_like
-        g, r, y, reduced, opened = self._loads.add(units, rest, self._outside, self._cg, opening)
+        g, r, reduced, opened = self._loads.add(units, rest, self.condensation, opening, self._outside.iterated)
         pressure = load.face_pressure(self.faces.nodes, self.faces.source, self.cracks.n_segments)
         answer = settle_faces(self, reduced, opened, pressure, warm, history)
         self.work.solutions += 1
         self.work.contact_solves += answer.solves
         on_edges = [unit.densities @ size for unit, size in units if unit.densities is not None]
         edge_density = sum(on_edges) if on_edges else None
-        return Solution(self, applied, y, answer, g, r, imposed, edge_density)
+        return Solution(self, applied, answer, LoadTractions(g, r, reduced), imposed, edge_density)
 
     def decompose(
         self, load: BodyLoad, equilibrium_tolerance: float = np.inf
@@ -496,12 +481,39 @@ class Body:
         _, units, rest, _ = self.decompose(load)
         total = rest + sum(unit.applied @ size for unit, size in units)
         n_g = self.boundary.n_unknowns
-        return total[n_g:] - self._cg @ self._outside.solve(total[:n_g]) if n_g else total
+        reduction = self.condensation
+        return total[n_g:] - reduction.then(reduction.first(total[:n_g])) if n_g else total
 
     def unit_responses(self, segments: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Responses to forces of 1 N/m at the ends of ``segments`` (m, 2, 2): A_ΓΓ⁻¹ g (n_boundary_unknowns, 4 m) and
-        traction on closed faces (n_crack_unknowns, 4 m); columns as in `UnitLoad`."""
-        return self._loads.answers(segments, self._outside, self._cg)
+        """Tractions of forces of 1 N/m at the ends of ``segments`` (m, 2, 2), on the boundary (n_boundary_unknowns, 4 m)
+        and on closed faces (n_crack_unknowns, 4 m); columns as in `UnitLoad`."""
+        return self._loads.answers(segments, self.condensation)
+
+    def boundary_unknowns(self, load: np.ndarray, jumps: np.ndarray) -> np.ndarray:
+        """(n_boundary_unknowns,) or (…, k): 2μ times displacement, or reactions where supported, under tractions ``load``
+        (n_boundary_unknowns,) on the boundary and ``jumps`` (n_crack_unknowns,) at the cracks; or (…, k) each."""
+        return -self._outside.solve(load + self.condensation.moved_by(jumps) if self.faces.n else load)
+
+    def reduced_transposed(self, on_faces: np.ndarray) -> np.ndarray:
+        """(n_boundary_unknowns, k): the action of tractions on the boundary on what ``on_faces`` (n_crack_unknowns, k)
+        measures of those on closed faces."""
+        return self.condensation.transposed(on_faces)
+
+    def tractions(self, unknowns: np.ndarray, jumps: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Tractions (n_boundary_unknowns,) on the boundary, seen from outside, and (n_crack_unknowns,) on the cracks due
+        to the boundary ``unknowns`` and the ``jumps`` at the cracks."""
+        own = self._outside.matrix @ unknowns
+        if not self.faces.n:
+            return own, np.zeros(0)
+        # A_CC w follows from S, which is kept.
+        of, moved = self.condensation, self.condensation.moved_by(jumps)
+        crack = self.crack_system.matrix @ jumps + of.then(of.first(moved))
+        return own + moved, crack + of.influence_on(np.arange(self.faces.n)) @ unknowns
+
+    def release(self) -> None:
+        """Give up large matrices that loads do not need, but growth and fields inside the body do: these compute them
+        again."""
+        self.condensation.release()
 
     def k_functionals(self, solution: Solution | None = None) -> TipFunctionals:
         """K_I and K_II of all tips as linear functions of the load, for the face states of ``solution`` (all open if

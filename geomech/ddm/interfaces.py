@@ -62,7 +62,6 @@ class CrackedBody(Protocol):
     on_bases: dict[bytes, tuple[np.ndarray, ...]]
     work: Work
     _outside: BoundarySystem
-    _cg: Any
     _c_known: np.ndarray
     _extent: float
     _reach: float
@@ -103,9 +102,6 @@ class CrackedBody(Protocol):
     def strain_weights(self) -> np.ndarray: ...
 
     @property
-    def _w(self) -> Multiplied: ...
-
-    @property
     def limits(self) -> list[np.ndarray]: ...
 
     @property
@@ -118,6 +114,12 @@ class CrackedBody(Protocol):
     def with_rounded_walls(self) -> CrackedBody | None: ...
 
     def remeshed(self, settings: DdmSettings) -> CrackedBody: ...
+
+    def boundary_unknowns(self, load: np.ndarray, jumps: np.ndarray) -> np.ndarray: ...
+
+    def reduced_transposed(self, on_faces: np.ndarray) -> np.ndarray: ...
+
+    def tractions(self, unknowns: np.ndarray, jumps: np.ndarray) -> tuple[np.ndarray, np.ndarray]: ...
 
     def decompose(self, load: BodyLoad) -> tuple[Any, list[Any], np.ndarray, np.ndarray]: ...
 

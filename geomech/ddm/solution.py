@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -35,6 +35,15 @@ WORTH_A_WARNING = 1e-3
 _log = logging.getLogger(__name__)
 
 
+class LoadTractions(NamedTuple):
+    """Tractions of a load, Pa: ``on_boundary`` (n_boundary_unknowns,), seen from outside; ``on_faces`` and
+    ``on_closed`` (n_crack_unknowns,), where the boundary was at rest, and where it moves with faces closed."""
+
+    on_boundary: np.ndarray
+    on_faces: np.ndarray
+    on_closed: np.ndarray
+
+
 class Solution:
     """A body under a load; results are computed on first use.
 
@@ -48,19 +57,16 @@ class Solution:
         self,
         body: CrackedBody,
         applied: Applied,
-        eliminated: np.ndarray,
         answer: FaceSolution,
-        boundary_load: np.ndarray,
-        face_load: np.ndarray,
+        loads: LoadTractions,
         imposed: np.ndarray,
         edge_density: np.ndarray | None,
     ):
         self.body, self.load, self.solves = body, applied.load, answer.solves
         self.closed, self.memory, self.began = answer.closed, answer.memory, answer.began
-        self._applied, self._eliminated = applied, eliminated
+        self._applied, self._loads = applied, loads
         self.jumps, self.face_traction = answer.jumps, answer.traction
-        self._boundary_load, self.face_load, self._imposed = boundary_load, face_load, imposed
-        self._edge_density = edge_density
+        self.face_load, self._imposed, self._edge_density = loads.on_faces, imposed, edge_density
         self._tip_errors: np.ndarray | None = None
 
     @property
@@ -71,15 +77,14 @@ class Solution:
     def scaled(self, load: BodyLoad, factor: float) -> Solution:
         """The solution for ``load``, which is ``factor`` (positive) times this one; valid if it `scales`."""
         answer = FaceSolution(factor * self.jumps, factor * self.face_traction, self.closed, 0)
-        on_boundary, on_faces, imposed = (factor * x for x in (self._boundary_load, self.face_load, self._imposed))
+        loads = LoadTractions(*(factor * x for x in self._loads))
         edge_density = None if self._edge_density is None else factor * self._edge_density
-        applied, eliminated = apply(load, self.body), factor * self._eliminated
-        return Solution(self.body, applied, eliminated, answer, on_boundary, on_faces, imposed, edge_density)
+        return Solution(self.body, apply(load, self.body), answer, loads, factor * self._imposed, edge_density)
 
     @cached_property
     def _x(self) -> np.ndarray:
         """(n_unknowns,) boundary unknowns: 2μ times displacement, or reactions where supported."""
-        return -self._eliminated - self.body._w @ self.jumps
+        return self.body.boundary_unknowns(self._loads.on_boundary, self.jumps)
 
     @cached_property
     def _u(self) -> np.ndarray:
@@ -232,7 +237,7 @@ class Solution:
     @property
     def closed_traction(self) -> np.ndarray:
         """(n_crack_unknowns,) Pa: t₀ of this load (`Body.closed_traction`)."""
-        return self.face_load - self.body._cg @ self._eliminated if self.jumps.size else np.zeros(0)
+        return self._loads.on_closed
 
     def work_at_cracks(self, closed: np.ndarray) -> float:
         """J/m, ∫ t₀·[u] ds with t₀ = ``closed`` (n_crack_unknowns,), the traction of some load on closed faces: by
@@ -244,12 +249,8 @@ class Solution:
         """Largest residual traction at the collocation nodes, relative to the largest acting traction (`_acting`). It
         is mostly due to discretised loads that are not exactly in equilibrium. Logs a warning above 1e-3."""
         body = self.body
-        # A_ΓC w and A_CC w follow from W and S, which the body keeps.
-        follows = body._w @ self.jumps if self.jumps.size else np.zeros_like(self._u)
-        on_boundary = body._outside.times(self._x + follows, rigid_part=follows) + self._boundary_load
-        on_faces = (
-            body.crack_system.matrix @ self.jumps + body._cg @ (self._x + follows) + self.face_load - self.face_traction
-        )
+        on_boundary, on_faces = body.tractions(self._x, self.jumps)
+        on_boundary, on_faces = on_boundary + self._loads.on_boundary, on_faces + self.face_load - self.face_traction
         scale = self._acting
         left = max((float(np.abs(x).max()) for x in (on_boundary, on_faces) if x.size), default=0.0)
         residual = left / scale if scale else left
@@ -262,7 +263,7 @@ class Solution:
         """Pa: largest traction of loads at the collocation nodes of boundary and cracks and of fluid and contact on
         crack faces, or the stress 2μ u/L of a prescribed displacement u over the body's extent L."""
         body, imposed = self.body, self._imposed
-        on_boundary, on_faces = self._boundary_load, self.face_load
+        on_boundary, on_faces = self._loads.on_boundary, self.face_load
         if imposed.size:
             # The loads include prescribed displacements, whose jump at the supports' ends gives a traction that grows
             # as elements shrink.
@@ -276,7 +277,7 @@ class Solution:
         """Estimated condition number of the worse of the two matrices, rows scaled to equal size."""
         body = self.body
         cracks = body.crack_system.rcond(self.closed) if not body.rough else body.face_equations.rcond(self.face_states)
-        return 1.0 / min(cracks, body._outside.factor.rcond)
+        return 1.0 / min(cracks, body._outside.rcond)
 
     def stress(self, points: np.ndarray, side: float = 1.0) -> np.ndarray:
         """(n, 3) total stress at ``points`` (n, 2), Pa.

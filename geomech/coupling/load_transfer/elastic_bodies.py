@@ -22,6 +22,11 @@ if TYPE_CHECKING:
     from ...ddm import Body
 
 
+#: Number of new bodies from which each gives up large matrices that only growth and fields inside it need. (Factors of
+#: the sides of 48 blocks of a trace map took 1.1 GB, and cracks grew in a few.)
+MANY = 8
+
+
 def elastic_bodies(
     problem: Problem, blocks: Blocks, cracks: Cracks, kept: dict, works: list[Work], removed: np.ndarray | None = None
 ) -> tuple[dict[int, Body], dict[int, np.ndarray]]:
@@ -61,7 +66,16 @@ def elastic_bodies(
             continue
         to_make.append((b, own, material, old, work))
 
+    # The first load needs more of few bodies, as growth at once; of many it is growth in few.
+    lean = len(to_make) >= MANY
+
     def made(of: tuple) -> Body:
+        body = assembled(of)
+        if lean and of[3] is None:
+            body.release()
+        return body
+
+    def assembled(of: tuple) -> Body:
         b, own, material, old, work = of
         own_loops, reuse, laws = _loops(problem, blocks, b), ddm.Reuse(old, work), problem.face_laws
         if problem.endless is None:

@@ -52,7 +52,7 @@ class TipFunctionals:
             by_node[element[k], 1, :, 0, k] = by_node[element[k], 0, :, 1, k] = factor * lead[k]
         weights = by_node.reshape(c.n_unknowns, 2 * n)
         self.on_faces = equations.adjoint(weights, states)
-        self.on_boundary = body._outside.solve(body._cg.T @ self.on_faces, transposed=True)
+        self.on_boundary = body.reduced_transposed(self.on_faces)
         at_rest, _ = equations.solve(np.zeros(c.n_unknowns), states, memory)
         self.constant = weights.T @ at_rest
         rigid = np.isinf(body.laws.normal).reshape(c.n, c.per)[element, last]

@@ -44,13 +44,13 @@ class BoundaryResponse:
     """
 
     def __init__(self, solve: Callable[..., np.ndarray], influence: np.ndarray):
-        self._solve, self._influence = solve, influence
+        self._solve, self.influence = solve, influence
 
     def __matmul__(self, w: np.ndarray) -> np.ndarray:
-        return self._solve(self._influence @ w)
+        return self._solve(self.influence @ w)
 
     def transposed_times(self, v: np.ndarray) -> np.ndarray:
-        return self._solve(v, transposed=True) @ self._influence
+        return self._solve(v, transposed=True) @ self.influence
 
 
 class Reduced:

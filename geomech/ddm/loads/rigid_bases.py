@@ -166,7 +166,7 @@ class _Faces:
         changes from step to step."""
         body, n = self.body, int(self.first[-1])
         rows = np.concatenate([base.rows for base in self.bases])
-        y, reduced = body.unit_responses(self.segments[rows])
+        applied, reduced = body.unit_responses(self.segments[rows])
         of_nodes = np.zeros((len(rows), 4, 2, n))
         done = 0
         for k, base in enumerate(self.bases):
@@ -176,9 +176,7 @@ class _Faces:
                 of_nodes[here, axis, axis, node] = of_nodes[here, 2 + axis, axis, node + 1] = 1.0
             done += m
         mix = of_nodes.reshape(4 * len(rows), 2 * n)
-        moves = -(y @ mix)
-        if body.faces.n:
-            moves -= body._w @ body._jumps_of(-(reduced @ mix), solution)
+        moves = body.boundary_unknowns(applied @ mix, body._jumps_of(-(reduced @ mix), solution))
         return self.weights @ moves / (2 * body.material.shear_modulus)
 
     def moved(self, solution: Solution) -> np.ndarray:

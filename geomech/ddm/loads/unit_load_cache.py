@@ -4,7 +4,7 @@ only."""
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
@@ -12,9 +12,7 @@ from ...model import Material
 from ..kernels.body_force_fields import DepthDependentStress, Particular, edge_densities
 from ..mesh.edge_location import OFF, onto_boundary, sides_for
 from ..mesh.elements import Mesh
-from ..system.boundary_system import BoundarySystem
 from ..system.influence_matrix import ElementSet, line_forces, project_jumps
-from ..system.row_store import KeptRows
 
 if TYPE_CHECKING:
     from ..interfaces import LoadParts
@@ -33,9 +31,9 @@ _AT_ONCE = 256
 class UnitLoad:
     """Response to unit loads, one per column of ``applied``: tractions g on the boundary above r on the cracks.
 
-    Loads that recur are answered once and then scaled: ``eliminated`` holds y = A_ΓΓ⁻¹ g, which growth leaves valid, and
-    ``answered`` r' = r − A_CΓ y above S⁻¹ r'. ``segment`` is where tractions act, ``against`` whether they were given
-    against the boundary's direction; alternatively ``densities`` (m, 2, 3, columns) act on the m edges of the body.
+    Loads that recur are answered once and then scaled: ``answered`` holds the traction r' = r − A_CΓ A_ΓΓ⁻¹ g on closed
+    faces above S⁻¹ r'. ``segment`` is where tractions act, ``against`` whether they were given against the boundary's
+    direction; alternatively ``densities`` (m, 2, 3, columns) act on the m edges of the body.
     """
 
     def __init__(
@@ -46,7 +44,6 @@ class UnitLoad:
         densities: np.ndarray | None = None,
     ):
         self.applied, self.segment, self.against, self.densities = applied, segment, against, densities
-        self.eliminated: np.ndarray | None = None
         self.answered: np.ndarray | None = None
         self.used = False
         self.turn = 0
@@ -54,17 +51,25 @@ class UnitLoad:
     @property
     def numbers(self) -> int:
         """How many numbers it holds."""
-        return sum(array.size for array in (self.applied, self.eliminated, self.answered) if array is not None)
+        return self.applied.size + (0 if self.answered is None else self.answered.size)
+
+
+class Reduction(Protocol):
+    """What tractions on the boundary do to closed crack faces, A_CΓ A_ΓΓ⁻¹, in two steps."""
+
+    def first(self, load: np.ndarray) -> np.ndarray:
+        """What growth leaves valid, of ``load`` (n,) or (n, k)."""
+
+    def then(self, done: np.ndarray, elements: np.ndarray | None = None) -> np.ndarray:
+        """The result, of that step, on all crack elements or on some."""
 
 
 class Eliminated:
-    """The parts that growth leaves valid: ``y`` = A_ΓΓ⁻¹ load and A_CΓ y ``on_faces`` (n_elements, width).
+    """The parts that growth leaves valid: the first step ``done`` of the reduction of ``load`` (n,), tractions on the
+    boundary, and the result ``on_faces`` (n_elements, width); still to be computed for the elements ``new``."""
 
-    ``load`` (n,) acts on the boundary; ``new`` are the elements for which A_CΓ y is still to be computed.
-    """
-
-    def __init__(self, load: np.ndarray, y: np.ndarray, on_faces: np.ndarray, new: np.ndarray | None = None):
-        self.load, self.y, self.on_faces = load, y, on_faces
+    def __init__(self, load: np.ndarray, done: np.ndarray, on_faces: np.ndarray, new: np.ndarray | None = None):
+        self.load, self.done, self.on_faces = load, done, on_faces
         self.new = np.empty(0, int) if new is None else new
 
     def grown(self, was: np.ndarray) -> Eliminated:
@@ -73,15 +78,13 @@ class Eliminated:
         missing[-1] = missing[self.new] = True  # index −1 refers to its end
         at = np.where(missing[was], 0, was)
         on_faces = self.on_faces[at] if len(self.on_faces) else np.empty((len(was), self.on_faces.shape[1]))
-        return Eliminated(self.load, self.y, on_faces, np.flatnonzero(missing[was]))
+        return Eliminated(self.load, self.done, on_faces, np.flatnonzero(missing[was]))
 
-    def complete(self, cg: np.ndarray | KeptRows, faces: ElementSet) -> None:
-        """Compute missing entries, with A_CΓ ``cg``."""
-        if not len(self.new):
-            return
-        rows = cg.of(self.new) if isinstance(cg, KeptRows) else cg[faces.unknowns(self.new)]
-        self.on_faces[self.new] = (rows @ self.y).reshape(len(self.new), 2 * faces.per)
-        self.new = self.new[:0]
+    def complete(self, reduction: Reduction) -> None:
+        """Compute missing entries."""
+        if len(self.new):
+            self.on_faces[self.new] = reduction.then(self.done, self.new).reshape(len(self.new), -1)
+            self.new = self.new[:0]
 
 
 class UnitLoads:
@@ -128,7 +131,7 @@ class UnitLoads:
             applied = np.empty((n_g + self.faces.n_unknowns, before.applied.shape[1]))
             applied[:n_g], applied[to], applied[at] = before.applied[:n_g], before.applied[fro], on_new
             unit = UnitLoad(applied, before.segment, before.against, before.densities)
-            unit.eliminated, unit.turn = before.eliminated, before.turn
+            unit.turn = before.turn
             return unit
 
         for name, before in old._on_edges.items():
@@ -165,71 +168,47 @@ class UnitLoads:
         self,
         units: list[tuple[UnitLoad, np.ndarray]],
         rest: np.ndarray,
-        boundary: BoundarySystem,
-        cg: np.ndarray | KeptRows,
+        reduction: Reduction,
         opened: Callable[[np.ndarray], np.ndarray],
+        together: bool,
     ) -> tuple[np.ndarray, ...]:
-        """g, r, y, r' and S⁻¹ r' (see `UnitLoad`) of the ``units`` and of ``rest`` (n,), tractions on boundary and
+        """g, r, r' and S⁻¹ r' (see `UnitLoad`) of the ``units`` and of ``rest`` (n,), tractions on boundary and
         cracks.
 
-        ``cg`` is A_CΓ, ``opened`` applies S⁻¹.
+        ``opened`` applies S⁻¹; ``together``: each part of a unit load is a load of its own, and where each needs an
+        iterative solution, their sum needs only one.
         """
         n_g, n_c = self.boundary.n_unknowns, self.faces.n_unknowns
         n = n_g + n_c
-        # Each part of a unit load is a load of its own; where each needs an iterative solution, their sum needs only
-        # one.
-        worth = not boundary.iterated
-        again = [unit for unit, _ in units if unit.used and unit.answered is None and worth]
-        if again:
-            self._answer(again, boundary, cg, opened)
-        total = np.zeros(2 * n + n_c)
+        for unit in [unit for unit, _ in units if unit.used and unit.answered is None and not together]:
+            reduced = unit.applied[n_g:] - reduction.then(reduction.first(unit.applied[:n_g]))
+            unit.answered = np.concatenate([reduced, opened(reduced)])
+        total = np.zeros(n + 2 * n_c)
         for unit, size in units:
             unit.used = True
             if unit.answered is None:
                 rest = rest + unit.applied @ size
             else:
-                assert unit.eliminated is not None
                 total[:n] += unit.applied @ size
-                total[n : n + n_g] += unit.eliminated @ size
-                total[n + n_g :] += unit.answered @ size
+                total[n:] += unit.answered @ size
         if rest.any():
             if self._last is None or not np.array_equal(self._last.load, rest[:n_g]):
-                y = boundary.solve(rest[:n_g])
-                self._last = Eliminated(rest[:n_g].copy(), y, (cg @ y).reshape(self.faces.n, 2 * self.faces.per))
-            self._last.complete(cg, self.faces)
-            y, reduced = self._last.y, rest[n_g:] - self._last.on_faces.ravel()
-            total += np.concatenate([rest, y, reduced, opened(reduced)])
-        return total[:n_g], total[n_g:n], total[n : n + n_g], total[n + n_g : 2 * n], total[2 * n :]
+                done = reduction.first(rest[:n_g].copy())
+                on_faces = reduction.then(done).reshape(self.faces.n, 2 * self.faces.per)
+                self._last = Eliminated(rest[:n_g].copy(), done, on_faces)
+            self._last.complete(reduction)
+            reduced = rest[n_g:] - self._last.on_faces.ravel()
+            total += np.concatenate([rest, reduced, opened(reduced)])
+        return total[:n_g], total[n_g:n], total[n : n + n_c], total[n + n_c :]
 
-    def _answer(self, units: list[UnitLoad], boundary: BoundarySystem, cg: np.ndarray | KeptRows, opened) -> None:
-        """Compute the responses to the ``units``."""
-        n_g = self.boundary.n_unknowns
-        self._eliminate(units, boundary)
-        for unit in units:
-            assert unit.eliminated is not None
-            reduced = unit.applied[n_g:] - cg @ unit.eliminated
-            unit.answered = np.concatenate([reduced, opened(reduced)])
-
-    def _eliminate(self, units: list[UnitLoad], boundary: BoundarySystem) -> None:
-        """Compute y of those ``units`` that have none."""
-        n_g, fresh = self.boundary.n_unknowns, [unit for unit in units if unit.eliminated is None]
-        if fresh:
-            y = boundary.solve(np.hstack([unit.applied[:n_g] for unit in fresh]))
-            for unit, part in zip(fresh, np.split(y, np.cumsum([u.applied.shape[1] for u in fresh])[:-1], axis=1)):
-                unit.eliminated = np.ascontiguousarray(part)
-
-    def answers(
-        self, segments: np.ndarray, boundary: BoundarySystem, cg: np.ndarray | KeptRows
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """y (n_boundary_unknowns, 4 m) and r' (n_crack_unknowns, 4 m), see `UnitLoad`, of ``segments`` (m, 2, 2)."""
+    def answers(self, segments: np.ndarray, reduction: Reduction) -> tuple[np.ndarray, np.ndarray]:
+        """g (n_boundary_unknowns, 4 m) and r' (n_crack_unknowns, 4 m), see `UnitLoad`, of ``segments`` (m, 2, 2)."""
         units = [unit for unit, _ in self._unit_segments(segments, np.zeros((len(segments), 2, 2)))]
-        self._eliminate(units, boundary)
         # The ends of a segment given against the boundary's direction are swapped.
         order = [[2, 3, 0, 1] if unit.against else [0, 1, 2, 3] for unit in units]
-        eliminated = [unit.eliminated for unit in units if unit.eliminated is not None]
-        y = np.hstack([part[:, columns] for part, columns in zip(eliminated, order, strict=True)])
-        direct = [unit.applied[self.boundary.n_unknowns :, columns] for unit, columns in zip(units, order)]
-        return y, np.hstack(direct) - cg @ y
+        applied = np.hstack([unit.applied[:, columns] for unit, columns in zip(units, order)])
+        on_boundary, on_faces = np.split(applied, [self.boundary.n_unknowns])
+        return on_boundary, on_faces - reduction.then(reduction.first(on_boundary))
 
     def _unit_segments(self, segments: np.ndarray, tractions: np.ndarray) -> list[tuple[UnitLoad, np.ndarray]]:
         """The unit loads of the ``segments`` (m, 2, 2) and their (4,) tractions."""

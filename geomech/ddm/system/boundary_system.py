@@ -40,7 +40,8 @@ class BoundarySystem:
         weights       (k, n) their mean over the loop
         free_motions  those of the whole body; None without supports
         anchors       of supported holes, or None: terms added to the boundary rows of ``matrix`` and of all loads
-        factor        of ``matrix`` with the rigid motions removed
+        factor        of ``matrix`` with the rigid motions removed; `released` ones are computed again when asked for
+        rcond         their reciprocal condition
         unchanged     whether everything equals ``previous``
         at_old        (n_elements,) element numbers in ``previous``, −1 where new
 
@@ -56,7 +57,9 @@ class BoundarySystem:
     weights: np.ndarray
     free_motions: FreeMotions | None
     anchors: Anchors | None
-    factor: Factor | IteratedBoundary
+    rcond: float
+    _matrix: np.ndarray | Compressed | SupportedBoundaryMatrix | None
+    _factor: Factor | IteratedBoundary | None
 
     def __init__(
         self,
@@ -72,10 +75,12 @@ class BoundarySystem:
     ):
         g = mesh.boundary
         self.iterated = iterated
-        self._nu, self._tol, self.work = nu, tol, work
+        self.nu, self.tol, self.work = nu, tol, work
         self.at_old = at_old = g.found_in(previous.elements if previous else None)
         #: Number of successive bodies that have used this boundary unchanged.
         self.generation, self.unchanged = 0, False
+        #: How often released factors have been computed again.
+        self._again = 0
         if (
             previous is not None
             and previous.iterated == self.iterated
@@ -84,7 +89,8 @@ class BoundarySystem:
         ):
             self.generation, self.unchanged = previous.generation + 1, True
             self.elements, self.holds, self.extent = previous.elements, previous.holds, previous.extent
-            self._matrix, self.known, self.factor = previous._matrix, previous.known, previous.factor
+            self._matrix, self.known = previous._matrix, previous.known
+            self._factor, self.rcond = previous.kept_factor(), previous.rcond
             self.rigid, self.weights, self.free_motions = previous.rigid, previous.weights, previous.free_motions
             self.anchors = previous.anchors
             return
@@ -102,7 +108,8 @@ class BoundarySystem:
             def between(elements: np.ndarray) -> np.ndarray:
                 return self.influence_on(g.take(elements), elements)
 
-            self.factor = IteratedBoundary(g, operator, self.rigid, self.weights, extent, nu, tol, between)
+            self._factor = IteratedBoundary(g, operator, self.rigid, self.weights, extent, nu, tol, between)
+            self.rcond = self._factor.rcond
             return
         # With anchored holes, the old matrix contains the anchors' terms besides tractions.
         before = previous._matrix if previous is not None and previous.anchors is None else None
@@ -117,25 +124,53 @@ class BoundarySystem:
                 self.anchored(matrix, self._anchoring)
                 self.anchored(known, anchors.of_jumps(holds.sources))
         self._matrix = matrix if g.n_unknowns <= KEPT_BESIDE_FACTORS else None
-        self.factor = Factor(*self._regular(matrix), in_place=self._matrix is None)
+        self._factor = factor = self._factored(matrix)
+        self.rcond = factor.rcond
 
-    def _regular(self, matrix: np.ndarray) -> tuple[np.ndarray, str]:
-        """``matrix`` without its rigid motions, in its own memory if it is not kept, and what is wrong if it is
-        singular."""
+    def _factored(self, matrix: np.ndarray) -> Factor:
+        """Factors of ``matrix`` without its rigid motions, in its own memory if it is not kept."""
         what = "the boundary equations are singular"
         if self._matrix is not None:
             # Column-major like the matrix: adding arrays of different order takes several times as long.
-            return matrix + (self.weights.T @ self.rigid.T).T / self.extent, what
+            return Factor(matrix + (self.weights.T @ self.rigid.T).T / self.extent, what)
         from scipy.linalg.blas import dgemm
 
         matrix = np.asfortranarray(matrix)
-        return dgemm(1.0 / self.extent, self.rigid, self.weights, 1.0, matrix, overwrite_c=True), what
+        return Factor(dgemm(1.0 / self.extent, self.rigid, self.weights, 1.0, matrix, overwrite_c=True), what, True)
+
+    @property
+    def factor(self) -> Factor | IteratedBoundary:
+        """See above."""
+        if self._factor is not None:
+            return self._factor
+        self._again += 1
+        # Asked for once, they need not be kept; fields inside a block, for instance, take them again and again.
+        return self._factored(self._whole()) if self._again == 1 else self.kept_factor()
+
+    def kept_factor(self) -> Factor | IteratedBoundary:
+        """`factor`, kept from now on if it had been released."""
+        if self._factor is None:
+            self._factor = self._factored(self._whole())
+        return self._factor
+
+    def release(self) -> None:
+        """Give up factors of a large boundary. Loads need none: what the boundary does to cracks is in A_CΓ A_ΓΓ⁻¹
+        (`body`)."""
+        if self._matrix is None:
+            self._factor = None
+
+    @property
+    def large(self) -> bool:
+        """Whether factors take much more memory than the rest."""
+        return not self.iterated and self.elements.n_unknowns > KEPT_BESIDE_FACTORS
 
     @property
     def matrix(self) -> np.ndarray | Compressed | SupportedBoundaryMatrix:
         """See above."""
-        if self._matrix is not None:
-            return self._matrix
+        return self._whole() if self._matrix is None else self._matrix
+
+    def _whole(self) -> np.ndarray:
+        """A_ΓΓ, computed again."""
         g = self.elements
         out = self.influence_on(g, np.arange(g.n))
         return out if self.anchors is None else self.anchored(out, self._anchoring)
@@ -155,7 +190,7 @@ class BoundarySystem:
         whole, _ = rigid_motions(g, np.zeros_like(mesh.edge_loop), (centre, radius))
         self.free_motions = FreeMotions(centre, radius, holds.free_motions(whole))
         keep = ~holds.unknowns
-        modes, means, anchors = [], [], Anchors(self._nu, self.extent)
+        modes, means, anchors = [], [], Anchors(self.nu, self.extent)
         for k in range(int(mesh.edge_loop.max()) + 1):
             motions, weights = self.rigid[:, 3 * k : 3 * k + 3], self.weights[3 * k : 3 * k + 3]
             # The outline moves with the whole body; the motions of a hole's own boundary are free unless a support of
@@ -181,25 +216,22 @@ class BoundarySystem:
 
     def influence_on(self, targets: ElementSet, elements: np.ndarray) -> np.ndarray:
         """(targets.n_unknowns, …) traction on ``targets`` from the unknowns of the boundary ``elements``."""
-        matrix = influence(targets, self.elements.take(elements), self._nu, self._tol)
-        return matrix if self.holds is None else self.holds.swapped(targets, elements, matrix, self._nu, self._tol)
+        matrix = influence(targets, self.elements.take(elements), self.nu, self.tol)
+        return matrix if self.holds is None else self.holds.swapped(targets, elements, matrix, self.nu, self.tol)
 
     def solve(self, right: np.ndarray, transposed: bool = False) -> np.ndarray:
         """A_ΓΓ⁻¹ ``right`` (n,) or (n, k), without rigid motions; A_ΓΓ⁻ᵀ ``right`` if ``transposed``."""
         self.work.back_substitutions += 1 if right.ndim == 1 else right.shape[1]
         return self.factor.solve(np.asfortranarray(right), transposed)
 
-    def solve_few(self, right: np.ndarray) -> np.ndarray:
-        """`solve` for the few columns (n, k) of new elements."""
+    def carried(self, rows: np.ndarray) -> np.ndarray:
+        """(k, n) ``rows`` A_ΓΓ⁻¹, row-major: the action of tractions on the boundary by its influence ``rows`` (k, n) on
+        crack elements."""
         factor = self.factor
+        self.work.back_substitutions += len(rows)
         if not isinstance(factor, Factor) or self.generation <= OFTEN or self.elements.n_unknowns > INVERTED:
-            return self.solve(right)
-        self.work.back_substitutions += right.shape[1]
-        return np.matmul(factor.inverse, np.asfortranarray(right), out=np.empty(right.shape, order="F"))
-
-    def times(self, u: np.ndarray, rigid_part: np.ndarray) -> np.ndarray:
-        """A_ΓΓ ``u``, plus the terms that remove the rigid motions, applied to ``rigid_part``."""
-        return self.matrix @ u + self.rigid @ (self.weights @ rigid_part) / self.extent
+            return factor.solve(np.asfortranarray(rows.T), transposed=True).T
+        return np.matmul(np.ascontiguousarray(rows), factor.inverse)
 
 
 @dataclass(frozen=True, eq=False)

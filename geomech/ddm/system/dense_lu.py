@@ -6,7 +6,6 @@ from functools import cached_property
 
 import numpy as np
 
-
 #: Columns whose absolute values are summed at a time where the factors take the memory of a large matrix.
 _AT_ONCE = 256
 
