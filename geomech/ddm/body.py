@@ -204,6 +204,11 @@ class Body:
             )
 
     @property
+    def n_unknowns(self) -> int:
+        """Unknowns on boundary and cracks."""
+        return self.boundary.n_unknowns + self.faces.n_unknowns
+
+    @property
     def nu(self) -> float:
         return self.material.effective_poissons_ratio
 

@@ -11,12 +11,17 @@ only u does, and the rows of G of new elements when cracks grow.
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from .iterative.crack_gmres import BoundaryResponse
 from .system.boundary_system import BoundarySystem
 from .system.influence_matrix import ElementSet, influence
 from .system.row_store import KeptRows
+
+#: Crack elements whose rows are computed at a time beside a large boundary.
+AT_ONCE = 32
 
 
 def influence_on_boundary(system: BoundarySystem, faces: ElementSet, elements: np.ndarray) -> np.ndarray:
@@ -50,10 +55,21 @@ class Condensed:
             self._columns = before.columns.grown(faces, was, self._influence)
 
     def _carried(self, elements: np.ndarray) -> np.ndarray:
-        return self.system.carried(self.influence_on(elements))
+        return self._by_parts(elements, lambda part: self.system.carried(self.influence_on(part)))
 
     def _influence(self, elements: np.ndarray) -> np.ndarray:
-        return influence_on_boundary(self.system, self.faces, elements).T
+        return self._by_parts(elements, lambda part: influence_on_boundary(self.system, self.faces, part).T)
+
+    def _by_parts(self, elements: np.ndarray, rows: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
+        """``rows`` of the ``elements``; beside a large boundary of some at a time, without copies of all."""
+        if not self.system.large or len(elements) <= AT_ONCE:
+            return rows(elements)
+        width = 2 * self.faces.per
+        out = np.empty((width * len(elements), self.system.elements.n_unknowns))
+        for first in range(0, len(elements), AT_ONCE):
+            part = elements[first : first + AT_ONCE]
+            out[width * first : width * (first + len(part))] = rows(part)
+        return out
 
     def influence_on(self, elements: np.ndarray) -> np.ndarray:
         """Rows of A_CΓ of some of the crack elements."""

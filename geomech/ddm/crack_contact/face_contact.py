@@ -100,6 +100,8 @@ def _by_path(body: CrackedBody, right: np.ndarray, closed: np.ndarray, disputed:
     states = FaceStates(closed[at], np.zeros(n, np.int8), np.zeros(n, bool))
     out = np.zeros(len(closed), bool)
     out[at] = confinement_path(problem, states, disputed[at]).states.closed
+    # Nothing else asks for these equations of smooth faces, and paths hardly ever come to the same states.
+    body.face_equations.forget()
     return out
 
 

@@ -104,6 +104,10 @@ class FaceEquations:
         reaction[t[slipping]] = -(shear + slides[:, None] * reaction[a])[slipping]
         return w, reaction
 
+    def forget(self) -> None:
+        """Give up the factors of all states."""
+        self._factors, self._last, self._pull = {}, [], None
+
     def _pull_of(self, w: np.ndarray) -> np.ndarray:
         """S ``w`` of prescribed jumps; updated incrementally, since few of them change between states."""
         if self._pull is not None and not isinstance(self.system, IterativeCrackSystem):

@@ -20,9 +20,12 @@ if TYPE_CHECKING:
 
 #: Number of different segments whose loads are cached; …
 _REMEMBERED = 400
-#: … above so many numbers in all, only those of so many of the last loads. Blocks in motion slide, and most segments never
-#: come back: 150 steps of a slope of 48 cracked blocks kept 2 GB of them.
-_NUMBERS, _LAST_LOADS = 500_000, 3
+#: … above so many numbers in all, only those of the last load. Blocks in motion slide, and most segments never come
+#: back: those of 48 blocks of a trace map took 1.6 GB after twenty steps.
+_NUMBERS = 500_000
+#: A unit load is answered when it is used again; where A_CΓ has more numbers, after so many loads: the responses to its four
+#: columns take as long as those to fifty loads.
+_WORTH_WAITING, _WAITS = 400_000, 10
 #: Number of edges or segments whose forces are computed at a time: those of a large boundary on itself would fill
 #: memory.
 _AT_ONCE = 256
@@ -45,7 +48,7 @@ class UnitLoad:
     ):
         self.applied, self.segment, self.against, self.densities = applied, segment, against, densities
         self.answered: np.ndarray | None = None
-        self.used = False
+        self.uses = 0
         self.turn = 0
 
     @property
@@ -180,12 +183,11 @@ class UnitLoads:
         """
         n_g, n_c = self.boundary.n_unknowns, self.faces.n_unknowns
         n = n_g + n_c
-        for unit in [unit for unit, _ in units if unit.used and unit.answered is None and not together]:
-            reduced = unit.applied[n_g:] - reduction.then(reduction.first(unit.applied[:n_g]))
-            unit.answered = np.concatenate([reduced, opened(reduced)])
+        wait = 1 if self.boundary.n_unknowns * n_c < _WORTH_WAITING else _WAITS
+        self._answer([u for u, _ in units if u.uses >= wait and u.answered is None and not together], reduction, opened)
         total = np.zeros(n + 2 * n_c)
         for unit, size in units:
-            unit.used = True
+            unit.uses += 1
             if unit.answered is None:
                 rest = rest + unit.applied @ size
             else:
@@ -200,6 +202,17 @@ class UnitLoads:
             reduced = rest[n_g:] - self._last.on_faces.ravel()
             total += np.concatenate([rest, reduced, opened(reduced)])
         return total[:n_g], total[n_g:n], total[n : n + n_c], total[n + n_c :]
+
+    def _answer(self, units: list[UnitLoad], reduction: Reduction, opened: Callable[[np.ndarray], np.ndarray]) -> None:
+        """Compute the responses to the ``units``."""
+        if not units:
+            return
+        ends = np.cumsum([0] + [unit.applied.shape[1] for unit in units])
+        n_g, applied = self.boundary.n_unknowns, np.hstack([unit.applied for unit in units])
+        reduced = applied[n_g:] - reduction.then(reduction.first(applied[:n_g]))
+        responses = np.concatenate([reduced, opened(reduced)])
+        for unit, first, end in zip(units, ends, ends[1:]):
+            unit.answered = np.ascontiguousarray(responses[:, first:end])
 
     def answers(self, segments: np.ndarray, reduction: Reduction) -> tuple[np.ndarray, np.ndarray]:
         """g (n_boundary_unknowns, 4 m) and r' (n_crack_unknowns, 4 m), see `UnitLoad`, of ``segments`` (m, 2, 2)."""
@@ -240,8 +253,8 @@ class UnitLoads:
         """Remove segments where too many are cached: those that the last loads do not have, or all."""
         numbers = sum(unit.numbers for unit in self._segments.values())
         if numbers > _NUMBERS:
-            since = self._turn - _LAST_LOADS
-            self._segments = {key: unit for key, unit in self._segments.items() if unit.turn >= since}
+            last = self._turn - 1
+            self._segments = {key: unit for key, unit in self._segments.items() if unit.turn >= last}
         if len(self._segments) > _REMEMBERED:
             self._segments.clear()
 

@@ -259,6 +259,13 @@ class WholeMatrix:
             self._grown = Bordered(self.elements, permanent, n, np.arange(self.elements.n), none)
         return self._grown.grown(elements, was, seen, compute)
 
+    def release(self) -> bool:
+        """Give up the factors, unless cracks have grown from here; returns whether they were given up."""
+        if self._factor is None or self._grown is not None:
+            return False
+        self._factor = None
+        return True
+
     def entries(self, rows: np.ndarray, columns: np.ndarray) -> np.ndarray:
         """See `Bordered.entries`."""
         return _entries(self.dense, rows, columns)

@@ -101,11 +101,7 @@ class CrackSystem:
 
     def _with_free(self, right: np.ndarray, closed: np.ndarray, fixed: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """As `constrained`, by the equations of the unknowns that are free."""
-        key = closed.tobytes()
-        if self._shut is None or self._shut[0] != key:
-            none = np.zeros(self.n)
-            self._shut = key, *self.changed(Rows(closed, none, none, self.matrix.elements.per))
-        _, free, factor = self._shut
+        free, factor = self._held(closed)
         w = np.zeros_like(right, order="F")
         w[closed] = fixed[closed]
         known = right - self.matrix @ w if fixed[closed].any() else right
@@ -114,6 +110,20 @@ class CrackSystem:
         reaction = np.zeros_like(right)
         reaction[closed] = (right - self.matrix @ w)[closed]
         return w, reaction
+
+    def _held(self, closed: np.ndarray) -> tuple[np.ndarray, AnyFactor]:
+        """`changed` with the unknowns ``closed`` (n,) bool prescribed; that of the last ones is kept, and factors of open
+        faces, if they have not grown, are given up for them."""
+        key = closed.tobytes()
+        if self._shut is None or self._shut[0] != key:
+            none = np.zeros(self.n)
+            self._shut = key, *self.changed(Rows(closed, none, none, self.matrix.elements.per))
+            if isinstance(self.matrix, WholeMatrix) and self.matrix.release():
+                vars(self).pop("open_factor", None)
+                self._column_at[:] = -1
+                self._columns = np.empty((self.n, 0))
+                self._prescribed_factor = None
+        return self._shut[1:]
 
     def changed(self, rows: Rows) -> tuple[np.ndarray, AnyFactor]:
         """Indices of the unknowns that ``rows`` leave free, and factors of their equations."""
@@ -155,6 +165,8 @@ class CrackSystem:
 
     def rcond(self, closed: np.ndarray) -> float:
         """Reciprocal condition of the matrix that is factored when the unknowns ``closed`` (n,) bool are prescribed."""
+        if self.by_free_unknowns and np.count_nonzero(closed) >= MOST_PRESCRIBED * self.n:
+            return self._held(closed)[1].rcond
         return (self.open_factor or self._free_factor(closed)[1]).rcond
 
     @cached_property

@@ -11,6 +11,9 @@ from geomech.model import Cycle
 
 #: Number of bodies whose K are solved for on a finer mesh, those with the hardest driven tips: it doubles their cost.
 ESTIMATED = 10
+#: Unknowns up to which they are, where there are more bodies: a finer mesh takes half a GB, which a run of many cracked
+#: blocks would need for its summary alone.
+ESTIMATED_UP_TO = 4000
 #: Smaller residuals are round-off, whose last digits depend on the location of arrays in memory.
 ROUND_OFF = 1e-12
 _log = logging.getLogger(__name__)
@@ -25,13 +28,16 @@ def crack_trust(cycle: Cycle) -> dict[str, Any]:
     """Worst values over the cracked blocks of ``cycle``.
 
     ``residual`` of equilibrium relative to the largest traction (at least `ROUND_OFF`), ``condition`` of the equations,
-    and the estimated error of K relative to the largest K of its block, with that block.
+    and the estimated error of K relative to the largest K of its block, with that block (of many blocks, the
+    `ESTIMATED` with the hardest driven tips among those of up to `ESTIMATED_UP_TO` unknowns).
     """
     summary: dict[str, Any] = {
         "residual": _three_digits(max(ROUND_OFF, *(float(body.residual) for body in cycle.bodies.values()))),
         "condition": _three_digits(max(float(body.condition) for body in cycle.bodies.values())),
     }
-    drive = {b: float(cycle.tips["k_eq"][cycle.tips["block"] == b].max(initial=0.0)) for b in cycle.bodies}
+    few = len(cycle.bodies) <= ESTIMATED
+    asked = [b for b, body in cycle.bodies.items() if few or body.body.n_unknowns <= ESTIMATED_UP_TO]
+    drive = {b: float(cycle.tips["k_eq"][cycle.tips["block"] == b].max(initial=0.0)) for b in asked}
     for block in sorted(drive, key=lambda b: (-drive[b], b))[:ESTIMATED]:
         body = cycle.bodies[block]
         largest = float(np.hypot(body.tips["k_i"], body.tips["k_ii"]).max(initial=0.0))
