@@ -1,8 +1,10 @@
 """Memory and time that the cracked blocks of a problem need, estimated from their numbers of elements.
 
-A block with m unknowns on its outline and n on its cracks stores A_ΓΓ and its factors (2 m² numbers), A_CΓ and A_ΓΓ⁻¹ A_ΓC
-(2 m n), S and factors of its states (4 n²), and takes ⅔ m³ + 2 m² n + 2 m n² + ⅔ n³ multiplications to set up. Memory
-and time of iterative solutions are proportional to m + n (`ddm.iterative.gmres`, `ddm.iterative.boundary_gmres`).
+A block with m unknowns on its outline and n on its cracks stores A_CΓ A_ΓΓ⁻¹ (m n numbers), S and factors of its states
+(4 n²); while its cracks grow, factors of A_ΓΓ and A_ΓC as well (m² + m n), and S and its factors with room for more (4 n²).
+Up to `KEPT_BESIDE_FACTORS` unknowns on an outline, and of few blocks, factors and A_ΓC are always kept. It takes ⅔ m³ +
+2 m² n + 2 m n² + ⅔ n³ multiplications to set up. Memory and time of iterative solutions are proportional to m + n
+(`ddm.iterative.gmres`, `ddm.iterative.boundary_gmres`).
 """
 
 from __future__ import annotations
@@ -14,7 +16,9 @@ import numpy as np
 from ..ddm.iterative.boundary_gmres import CROSSOVER as MANY_ON_SIDES
 from ..ddm.iterative.crack_gmres import CROSSOVER as MANY_ON_CRACKS
 from ..ddm.mesh.elements import mesh
+from ..ddm.system.boundary_system import KEPT_BESIDE_FACTORS
 from ..model import Problem, counted
+from .load_transfer.elastic_bodies import MANY
 
 #: Multiplications per second of dense factorisation, and bytes and seconds per unknown of iterative solutions; rough
 #: values for one thread, good to a factor of two or three.
@@ -27,13 +31,15 @@ FINE = 5
 
 class CrackCost(NamedTuple):
     """Cracked ``blocks`` (numbers), their unknowns ``on_sides`` and ``on_cracks`` and numbers of ``sides``, (n,) each;
-    ``memory`` in bytes and ``seconds`` of processor time to set them up."""
+    ``memory`` in bytes, what they need ``growing`` besides if cracks grow in all of them, and ``seconds`` of processor
+    time to set them up."""
 
     blocks: np.ndarray
     on_sides: np.ndarray
     on_cracks: np.ndarray
     sides: np.ndarray
     memory: float
+    growing: float
     seconds: float
 
 
@@ -44,7 +50,7 @@ def crack_cost(problem: Problem) -> CrackCost:
     rigid = np.array([material.rigid for material in problem.materials], bool)
     cracked = np.unique(cracks.block) if problem.endless is None else np.zeros(0, int)
     cracked = cracked[~(blocks.fixed | rigid[blocks.material])[cracked]]
-    counts, memory, seconds = np.zeros((len(cracked), 3), int), 0.0, 0.0
+    counts, memory, growing, seconds = np.zeros((len(cracked), 3), int), 0.0, 0.0, 0.0
     for k, block in enumerate(cracked.tolist()):
         loops = blocks.loops(block)
         made = mesh(loops, cracks.take(np.flatnonzero(cracks.block == block)), problem.ddm)
@@ -52,10 +58,16 @@ def crack_cost(problem: Problem) -> CrackCost:
         counts[k] = m, n, sum(map(len, loops))
         dense = [(m, MANY_ON_SIDES), (n, MANY_ON_CRACKS)]
         a, b = (size if size < many or problem.ddm.solver == "dense" else 0 for size, many in dense)
-        memory += 8.0 * (2 * a * a + 2 * a * b + 4 * b * b) + BYTES * (m + n - a - b)
+        memory += 8.0 * (a * b + 4 * b * b) + BYTES * (m + n - a - b)
+        beside = 8.0 * (a * a * (1 if a > KEPT_BESIDE_FACTORS else 2) + a * b)
+        if a > KEPT_BESIDE_FACTORS and len(cracked) >= MANY:
+            growing += beside
+        else:
+            memory += beside
+        growing += 8.0 * 4 * b * b
         seconds += (2 * a**3 / 3 + 2 * a * a * b + 2 * a * b * b + 2 * b**3 / 3) / RATE + SECONDS * (m + n - a - b)
     on_sides, on_cracks, sides = counts.T
-    return CrackCost(cracked, on_sides, on_cracks, sides, memory, seconds)
+    return CrackCost(cracked, on_sides, on_cracks, sides, memory, growing, seconds)
 
 
 def cost_lines(problem: Problem) -> list[str]:
@@ -70,8 +82,8 @@ def cost_lines(problem: Problem) -> list[str]:
     each = f" (most in {name}: {cost.on_sides[most]} and {cost.on_cracks[most]})" if len(cost.blocks) > 1 else ""
     lines = [
         f"{counted(len(cost.blocks), 'cracked block')}, {cost.on_sides.sum()} unknowns on sides, {cost.on_cracks.sum()} "
-        f"on cracks{each}: about {cost.memory / 1e9:.2g} GB, {cost.seconds:.2g} s of processor time to set up, a part of "
-        "which again for every change of cracks"
+        f"on cracks{each}: about {cost.memory / 1e9:.2g} GB, up to {cost.growing / 1e9:.2g} GB besides where cracks grow, "
+        f"{cost.seconds:.2g} s of processor time to set up, a part of which again for every change of cracks"
     ]
     per_block = 4 * FINE * problem.ddm.elements_per_side
     if cost.on_sides[most] + cost.on_cracks[most] > LARGE and cost.sides[most] > per_block:

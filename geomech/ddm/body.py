@@ -53,7 +53,7 @@ from .system.bordered_factor import SMALLEST_BORDERED, Bordered, WholeMatrix
 from .system.boundary_system import BoundarySystem
 from .system.displacement_jumps import closing, strain_weights
 from .system.influence_matrix import ElementSet, influence, reuse
-from .system.schur_complement import CrackSystem
+from .system.schur_complement import WORTHWHILE, CrackSystem
 
 _log = logging.getLogger(__name__)
 
@@ -103,6 +103,7 @@ class Body:
     _factored_after_all: bool
     _outside: BoundarySystem
     condensation: Condensed | Operators
+    lean: bool
 
     @folded_argument("half_plane", "loops", without_outline)
     @gathered_arguments("reuse", Reuse)
@@ -334,7 +335,7 @@ class Body:
             on_boundary, crack = influence_on_boundary(system, c, np.arange(c.n)), self.cracks.crack[c.source]
             on_both = system.factor if isinstance(system.factor, IteratedBoundary) else None
             following, self.crack_system = compressed(c, crack, system.solve, on_boundary, rows, nu, tol, on_both)
-            self.condensation = Operators(system, c, following, rows)
+            self.condensation, self.lean = Operators(system, c, following, rows), False
             return
         # G, A_ΓC and S are extended by the rows and columns of new elements. A_CΓ and A_CC are not kept: they are
         # cheaper to recompute if the boundary changes than to carry along.
@@ -358,12 +359,26 @@ class Body:
         before_growth = None if kept is None else kept.crack_system
         assert not isinstance(before_growth, IterativeCrackSystem)
         known = None if before_growth is None else before_growth.matrix
-        if known is None or not known.n or c.n_unknowns < SMALLEST_BORDERED:
+        self.lean = old is not None and old.lean
+        if self.lean:
+            both.release_columns()
+            if isinstance(before, Condensed):
+                before.release_columns()
+        # Where many faces close, the equations of open ones are hardly asked for.
+        alone = self.lean and c.n_unknowns >= WORTHWHILE and not self.rough and bool(self.closing[1].any())
+        if known is None or not known.n or c.n_unknowns < SMALLEST_BORDERED or alone:
             whole = reuse(None if known is None else known.dense, c_old, c_old, c, c, schur)
             matrix: Bordered | WholeMatrix = Bordered.whole(c, whole)
         else:
             matrix = known.grown(c, c_old, c_seen, schur)
         self.crack_system = CrackSystem(matrix, self.work, before_growth, c_old)
+
+    def retire(self) -> None:
+        """Give up what only further loads need, once a body with grown cracks has taken this one's place."""
+        if self.lean and isinstance(self.crack_system, CrackSystem):
+            self.condensation.release()
+            self.crack_system.retire()
+            self._loads.forget()
 
     def _imposed(self, applied: Applied) -> np.ndarray:
         """(h_unknowns,) 2μ times the displacement that supports prescribe, minus that of particular fields."""
@@ -517,7 +532,8 @@ class Body:
 
     def release(self) -> None:
         """Give up large matrices that loads do not need, but growth and fields inside the body do: these compute them
-        again."""
+        again. Bodies that grow from this one keep no room for further growth."""
+        self.lean = self._outside.large
         self.condensation.release()
 
     def k_functionals(self, solution: Solution | None = None) -> TipFunctionals:

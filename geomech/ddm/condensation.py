@@ -85,8 +85,12 @@ class Condensed:
     def release(self) -> None:
         """Give up what only growth and the boundary's displacement need, where that is much."""
         if self.system.large:
-            self._columns = None
+            self.release_columns()
             self.system.release()
+
+    def release_columns(self) -> None:
+        """Give up A_ΓC, which takes less time to compute again than factors do."""
+        self._columns = None
 
     def first(self, load: np.ndarray) -> np.ndarray:
         """See `unit_load_cache.Reduction`."""

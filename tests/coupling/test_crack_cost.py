@@ -26,8 +26,9 @@ def test_unknowns_are_those_of_the_solver(problem):
     )
     m, n = body.boundary.n_unknowns, body.faces.n_unknowns
     assert (cost.on_sides[0], cost.on_cracks[0]) == (m, n)
-    # A_ΓΓ and its factors, A_CΓ and A_ΓΓ⁻¹ A_ΓC, S and its factors with those of other states.
+    # A_ΓΓ and its factors, A_CΓ A_ΓΓ⁻¹ and A_ΓC, S and its factors with those of other states; these with room to grow.
     assert cost.memory == pytest.approx(8 * (2 * m * m + 2 * m * n + 4 * n * n))
+    assert cost.growing == pytest.approx(8 * 4 * n * n)
     assert cost.seconds > 0
 
 

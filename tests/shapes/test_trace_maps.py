@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 import shapely
 
+from geomech.coupling.crack_cost import crack_cost
 from geomech.output.tables.joint_statistics import joint_statistics
 from geomech.scene import load_scene
 from geomech.shapes import Joint, Zone, cut
@@ -75,6 +76,16 @@ def test_statistics_are_those_that_fractopo_publishes(tmp_path, name):
     lines = 0.5 * (published["i_nodes"] + published["y_nodes"])
     assert entry["p20_per_m2"] == pytest.approx(lines / published["area_m2"], rel=0.005)
     assert entry["mean_length_m"] == pytest.approx(entry["p21_per_m"] * published["area_m2"] / lines, rel=0.005)
+
+
+def test_memory_of_many_cracked_blocks(tmp_path):
+    """KB11 has 139 cracked blocks: 17 GB as long as each kept A_ΓΓ and its factors; now 7, and 9 more if cracks grew in
+    all of them."""
+    _, scene = loaded("kb11", tmp_path)
+    cost = crack_cost(scene.problem())
+    m, n = cost.on_sides.astype(float), cost.on_cracks.astype(float)
+    assert len(cost.blocks) == 139
+    assert cost.memory < 0.45 * 8 * np.sum(2 * m * m + 2 * m * n + 4 * n * n)
 
 
 def test_the_rock_of_many_blocks_has_no_seams():

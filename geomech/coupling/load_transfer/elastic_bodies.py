@@ -71,7 +71,9 @@ def elastic_bodies(
 
     def made(of: tuple) -> Body:
         body = assembled(of)
-        if lean and of[3] is None:
+        if of[3] is not None:
+            of[3].retire()
+        elif lean:
             body.release()
         return body
 

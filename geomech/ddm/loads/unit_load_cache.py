@@ -249,6 +249,10 @@ class UnitLoads:
             unit.turn = self._turn
         return [(u, (ends[::-1] if u.against else ends).ravel()) for u, ends in zip(units, tractions)]
 
+    def forget(self) -> None:
+        """Remove all segments."""
+        self._segments, self._recent = {}, []
+
     def _forget(self) -> None:
         """Remove segments where too many are cached: those that the last loads do not have, or all."""
         numbers = sum(unit.numbers for unit in self._segments.values())

@@ -125,6 +125,10 @@ class CrackSystem:
                 self._prescribed_factor = None
         return self._shut[1:]
 
+    def retire(self) -> None:
+        """Give up the factors of contact states."""
+        self.bases, self._factors, self._shut, self._prescribed_factor = [], {}, None, None
+
     def changed(self, rows: Rows) -> tuple[np.ndarray, AnyFactor]:
         """Indices of the unknowns that ``rows`` leave free, and factors of their equations."""
         free, moving = np.flatnonzero(~rows.prescribed), np.flatnonzero(rows.mixed)

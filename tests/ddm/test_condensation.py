@@ -1,0 +1,75 @@
+"""Bodies without the factors of their boundary: loads and K take A_CΓ A_ΓΓ⁻¹ alone; growth and fields inside compute the
+factors again."""
+
+from __future__ import annotations
+
+import pickle
+
+import numpy as np
+import pytest
+
+from geomech import ddm
+from geomech.ddm.system.boundary_system import KEPT_BESIDE_FACTORS
+from geomech.model import Cracks, DdmSettings, Material
+
+ROCK = Material("rock", 17e9, 0.21, k_ic=2e6)
+SQUARE = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
+FINE = DdmSettings(elements_per_side=24)
+INSIDE = np.array([[0.5, 0.5], [-0.3, -0.7], [0.1, 0.4]])
+
+
+def crack(half: float, aperture: float) -> Cracks:
+    return Cracks.from_polylines([np.array([[-0.3, -0.05], [half, 0.1]])], aperture=aperture)
+
+
+def sheared(body: ddm.Body) -> ddm.Solution:
+    return body.solve(ddm.BodyLoad(remote_stress=[-1e6, 2e5, 5e5]))
+
+
+def factors(solution: ddm.Solution) -> np.ndarray:
+    return np.concatenate([solution.tips["k_i"], solution.tips["k_ii"]])
+
+
+def size(body: ddm.Body) -> int:
+    """Bytes that a body holds."""
+    return len(pickle.dumps(body))
+
+
+@pytest.mark.parametrize("aperture", [np.inf, 0.0])
+def test_released_bodies_are_loaded_alike(aperture):
+    body = ddm.Body([SQUARE], crack(0.3, aperture), ROCK, FINE)
+    n = body.boundary.n_unknowns
+    assert n > KEPT_BESIDE_FACTORS
+    before = sheared(body)
+    at, inside = factors(before), before.displacement(INSIDE)
+    held = size(body)
+    assert held < 1.5 * 8 * n * n  # factors, no matrix beside them
+    body.release()
+    assert size(body) < held - 8 * n * n
+    again = sheared(body)
+    assert np.array_equal(factors(again), at) and np.array_equal(again.displacement(INSIDE), inside)
+    assert again.residual < 1e-9 and again.condition == before.condition
+
+
+def test_released_bodies_grow_alike():
+    """K and displacement as of a body made for the grown crack, to round-off; the factors are then kept."""
+    body = ddm.Body([SQUARE], crack(0.3, np.inf), ROCK, FINE)
+    body.release()
+    nodes = np.concatenate([body.cracks.nodes, [[0.34, 0.12]]])
+    longer = Cracks(
+        nodes=nodes,
+        segments=np.array([[0, 1], [1, 2]]),
+        crack=np.zeros(2, int),
+        block=np.zeros(2, int),
+        birth_cycle=np.array([0, 1]),
+        aperture=np.full(2, np.inf),
+        surface=np.zeros(3, bool),
+        names=body.cracks.names,
+    )
+    grown = ddm.Body([SQUARE], longer, ROCK, FINE, ddm.Reuse(body))
+    assert grown.counts["boundary_factorisations"] == 0 and grown._outside._factor is not None
+    fresh = ddm.Body([SQUARE], longer, ROCK, FINE)
+    one, other = sheared(grown), sheared(fresh)
+    assert np.abs(factors(one) - factors(other)).max() < 1e-11 * np.abs(factors(other)).max()
+    moved = other.displacement(INSIDE)
+    assert np.abs(one.displacement(INSIDE) - moved).max() < 1e-11 * np.abs(moved).max()
