@@ -432,8 +432,13 @@ class Coupling:
         """Add to the crack energy balance a step to ``state`` with the block ``budget`` after it; ``cut`` are the
         blocks that split."""
         now = self.now
-        # Energy of excavated rock is not released by splitting.
         set_free = now.budget.split - budget.split if now.budget.is_cut else 0.0
+        if now.budget.is_cut and state.removed is not None:
+            # Rock that is excavated in the same step takes its energy along; splitting has not released that.
+            gone = state.removed if now.state.removed is None else state.removed & ~now.state.removed
+            stress = np.where(gone[:, None], now.state.stress, 0.0)
+            stored = 0.5 * np.einsum("bi,bij,bj->b", stress, now.system.compliance, stress)
+            set_free -= float(now.blocks.areas(now.state.vertices) @ stored)
         now.crack_energy.after(now.state, state, now.blocks, now.strain_solutions(), now.by_mean_stress, set_free, cut)
 
     def _strain_solutions(self) -> tuple:
@@ -443,9 +448,11 @@ class Coupling:
     def _excavated(self) -> tuple[Event, ...]:
         """Remove the blocks that are excavated at the present time; one event for each."""
         now = self.now
+        gone = now.take_out()
+        now.crack_energy.take_out(gone)
         return tuple(
             event(now, "excavation", now.state, now.blocks.area_moments(b)[1], f"{now.blocks.names[b]} is excavated")
-            for b in now.take_out()
+            for b in gone
         )
 
     def _still(self, events: tuple[Event, ...], growth_pass: int = 0) -> Cycle:

@@ -152,8 +152,9 @@ class Attempt:
         )  # fmt: skip
         self.stress = np.array(state.stress)
         if system.taken_out is not None:
-            # The stored energy of excavated blocks is removed in the first step without them.
+            # The stored energy of excavated blocks, and of their cracks, is removed in the first step without them.
             self.stress[system.taken_out] = 0.0
+            self.cracks = self.cracks.without(system.taken_out)
         self.iterations = 0
         #: J/m, kinetic energy of the mean velocity of a static step, which is not carried over.
         self.dropped = 0.0

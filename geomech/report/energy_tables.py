@@ -39,6 +39,7 @@ TAKEN = {
     "fracture_energy": "new crack",
     "runaway_loss": "released by unstable growth in excess of the fracture energy",
     "parting_energy": "last ligaments, and block faces that were cracks",
+    "excavated_crack_energy": "stored around cracks of excavated blocks, which take it along",
     "crack_residual": "unexplained",
 }
 

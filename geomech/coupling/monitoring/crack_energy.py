@@ -56,6 +56,14 @@ def _keys(tips: np.ndarray) -> list[_Key]:
     return list(zip(tips["crack"].tolist(), tips["end"].tolist()))
 
 
+def _stored_and_lost(before: Solution, after: Solution) -> float:
+    """J/m taken up by cracks that have not grown: stored, dissipated by friction and released by cement, without the
+    onsets of slip and breaking, which `CrackEnergy.after` adds."""
+    frictional, released = after.dissipated_in_step
+    stored = after.crack_energy + after.filling_energy - before.crack_energy - before.filling_energy
+    return stored + frictional + released.bond - released.slip_onset - released.break_onset
+
+
 def _add(sums: dict[int, float], block: int, energy: float) -> None:
     sums[block] = sums.get(block, 0.0) + energy
 
@@ -88,8 +96,9 @@ class CrackEnergy:
                edges now, the energy of blocks minus that of their parts (and new contacts); and where cracks are cut
                into stressed rock
     set_free   by the blocks themselves as they split
-    residual   work + uneven + set_free − stored − friction − bond − fracture − runaway − parting: the error of
-               increments and steps
+    excavated  stored around the cracks of excavated blocks, which take it along
+    residual   work + uneven + set_free − stored − friction − bond − fracture − runaway − parting − excavated: the error
+               of increments and steps
     """
 
     static: bool = False
@@ -103,6 +112,7 @@ class CrackEnergy:
     toughness: float = 0.0
     parting: float = 0.0
     set_free: float = 0.0
+    excavated: float = 0.0
     residual: float = 0.0
     #: block → released in the present step, and the part of it beyond the fracture energy, J/m.
     _released: dict[int, float] = field(default_factory=dict)
@@ -203,6 +213,19 @@ class CrackEnergy:
         )
         self._growing = {key: replace(of, block=now[of.block]) for key, of in self._growing.items() if of.block in now}
 
+    def take_out(self, blocks: Collection[int]) -> None:
+        """The ``blocks`` are excavated at the end of the last step: they take along what their cracks store. Their tips no
+        longer grow."""
+        for block in blocks:
+            for sums in (self._released, self._lost, self._taken, self._along, self._last, self._by_mean_response):
+                sums.pop(block, None)
+            rested = self._rested.pop(block, None)
+            if rested is not None:
+                gone = rested.solution.crack_energy + rested.solution.filling_energy
+                self.stored -= gone
+                self.excavated += gone
+        self._growing = {key: of for key, of in self._growing.items() if of.block not in blocks}
+
     def _runs_through(self, block: int, frictional: float = 0.0, bond: float = 0.0) -> None:
         """In statics ``block`` is cut by tips that have grown in the present step or are about to grow. Since the start
         of the step, ``frictional`` J/m were dissipated by friction in it and ``bond`` released by cement. Its release has
@@ -250,6 +273,8 @@ class CrackEnergy:
         each = blocks.areas(before.vertices) * np.sum(mean * strain, axis=1)
         for block, known in by_mean_stress.fields.items():
             each[block] += known.work_on_cracks(before, state)
+        if state.removed is not None:
+            each[state.removed] = 0.0
         work = float(each.sum())
         if self.static:
             gone = {block: solutions[block] for block in cut if block in solutions}
@@ -270,9 +295,12 @@ class CrackEnergy:
         else:
             # Moving blocks have already spent this on their cracks.
             bond -= sum(of.break_onset for of in released_there)
-        # A block that starts to respond to its mean stress, or has been split, stored energy in another way.
+        # A block that starts to respond to its mean stress as its cracks grow, or has been split, stored energy in
+        # another way.
         self._parted |= any(
-            by_mean_response.get(block) != was for block, was in self._by_mean_response.items() if block not in cut
+            by_mean_response.get(block) != was
+            for block, was in self._by_mean_response.items()
+            if block not in cut and not self._still(block, solutions)
         )
         # Cracks cut into stressed rock open against less than the stress they replace: the difference is released.
         new = [block for block, of in solutions.items() if block not in self._by_mean_response and of.jumps.size]
@@ -325,6 +353,13 @@ class CrackEnergy:
             self._released[block] = released
             self._lost[block] = max(0.0, released - self._taken.get(block, 0.0)) if self.static else 0.0
 
+    def _still(self, block: int, solutions: dict[int, Solution]) -> bool:
+        """Whether, in statics, no crack of the ``block`` has grown in the present step."""
+        began, of = self._rested.get(block), solutions.get(block)
+        if not self.static or began is None or of is None:
+            return False
+        return of.body.crack_system is began.solution.body.crack_system
+
     def _work_at_rest(
         self, before: State, solutions: dict[int, Solution], by_mean_response: dict[int, bool], by_mean: np.ndarray
     ) -> Iterator[float]:
@@ -332,13 +367,16 @@ class CrackEnergy:
         stress, which is all of it where a block ``by_mean_response`` and where no forces act on its cracks."""
         for block, of in solutions.items():
             began = self._rested.get(block)
-            if by_mean_response[block] or self._by_mean_response.get(block, False):
+            was, now = self._by_mean_response.get(block, False), by_mean_response[block]
+            if began is not None and self._still(block, solutions) and not (was and now):
+                # The loads do what cracks store and lose, also where faces close or open on the way: these move under no
+                # traction, whereas the mean of both loads has half of that of the closed faces. From the step on in
+                # which a block responds to its mean stress alone, the uneven work is that of this stress.
+                yield _stored_and_lost(began.solution, of)
+            elif was or now:
                 yield float(by_mean[block])
             elif began is None:
                 yield first_work_on_cracks(before.stress[block], float(before.rotation[block]), of)
-            elif of.memory is None and of.body.crack_system is began.solution.body.crack_system:
-                # Without friction and growth the loads have a potential, also where faces close or open on the way.
-                yield of.crack_energy - began.solution.crack_energy
             else:
                 yield work_on_cracks(began.solution, of)
         yield float(sum(by_mean[block] for block in range(len(by_mean)) if block not in solutions))
@@ -354,6 +392,7 @@ class CrackEnergy:
             "toughness_energy": self.toughness,
             "parting_energy": self.parting,
             "set_free_energy": self.set_free,
+            "excavated_crack_energy": self.excavated,
             **at_rest,
             "crack_residual": self.residual,
         }

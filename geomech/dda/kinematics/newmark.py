@@ -84,6 +84,13 @@ class CrackTerms(NamedTuple):
     compliance: np.ndarray
     offset: np.ndarray
 
+    def without(self, blocks: np.ndarray) -> CrackTerms:
+        """The same with no cracks in ``blocks`` (n_blocks,) bool."""
+        strain, compliance, offset = self.strain.copy(), self.compliance.copy(), self.offset.copy()
+        for of in (strain, compliance, offset):
+            of[blocks] = 0.0
+        return CrackTerms(self.given, strain, compliance, offset)
+
 
 class BlockLoads(NamedTuple):
     """Effective ``gravity`` (2,) m/s², and generalised forces ``load`` (n_blocks, 6) of all other loads, N and N m."""

@@ -75,7 +75,7 @@ def energy_summary(cycle: Cycle) -> dict[str, float]:
         "split_energy", "energy_residual",
         "growth_release",
         "uneven_work", "set_free_energy", "crack_elastic", "crack_friction", "crack_bond_loss", "fracture_energy",
-        "runaway_loss", "parting_energy", "toughness_energy", "crack_residual", "budget_residual",
+        "runaway_loss", "parting_energy", "excavated_crack_energy", "toughness_energy", "crack_residual", "budget_residual",
     )  # fmt: skip
     found = {name: float(cycle.statistics[name]) for name in names if name in cycle.statistics}
     if found.get("toughness_energy") and "runaway_loss" not in found:

@@ -1,0 +1,184 @@
+"""The energy balance of a tunnel driven in two stages through jointed rock with cracks, bolted in between: what is
+excavated takes along what it and its cracks store, and nothing is left over."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import geomech
+from geomech.scene import load_scene
+
+TUNNEL = """
+[geometry]
+seed = 3
+dead_ends = "trim"
+smallest_block_m2 = 0.3
+
+[[geometry.zones]]
+name = "rock"
+polygon = [[0, 0], [20, 0], [20, 16], [0, 16]]
+holes = [[[7.5, 5], [12.5, 5], [12.5, 10], [7.5, 10]]]
+[[geometry.zones]]
+name = "heading"
+polygon = [[7.5, 7.5], [12.5, 7.5], [12.5, 10], [7.5, 10]]
+[[geometry.zones]]
+name = "bench"
+polygon = [[7.5, 5], [12.5, 5], [12.5, 7.5], [7.5, 7.5]]
+[[geometry.zones]]
+name = "frame"
+polygon = [[-1, -1], [21, -1], [21, 16], [20, 16], [20, 0], [0, 0], [0, 16], [-1, 16]]
+
+[[geometry.joint_sets]]
+name = "left"
+angle_deg = 65
+spacing_m = 3.1
+zones = ["rock"]
+[[geometry.joint_sets]]
+name = "flat"
+angle_deg = 4
+spacing_m = 2.7
+zones = ["rock"]
+
+[[geometry.cracks]]
+name = "crown"
+points = [[8.6, 11.0], [10.4, 11.4]]
+[[geometry.cracks]]
+name = "wall"
+points = [[6.2, 6.4], [6.9, 8.0]]
+[[geometry.cracks]]
+name = "right"
+points = [[13.2, 6.2], [13.9, 8.2]]
+[[geometry.cracks]]
+name = "inside"             # of rock that is excavated
+points = [[9.0, 8.4], [11.0, 9.0]]
+
+FACES
+[materials.rock]
+youngs_modulus_pa = 10e9
+poissons_ratio = 0.25
+density_kg_m3 = 2600
+k_ic_pa_sqrt_m = 0.5e6
+
+[zones.frame]
+fixed = true
+
+[joints.default]
+friction_angle_deg = 35
+
+[loads]
+gravity_m_s2 = [0, -9.81]
+[[loads.excavations]]
+time_s = 0.006
+zones = ["heading"]
+[[loads.excavations]]
+time_s = 0.02
+zones = ["bench"]
+[[loads.bolts]]
+name = "roof 1"
+start = [9, 9.9]
+end = [8.5, 13.5]
+axial_stiffness_n = 65e6
+active_length_m = 0.5
+pretension_n_per_m = 50e3
+start_s = 0.014
+[[loads.bolts]]
+name = "roof 2"
+start = [11, 9.9]
+end = [11.5, 13.5]
+axial_stiffness_n = 65e6
+active_length_m = 0.5
+pretension_n_per_m = 50e3
+start_s = 0.014
+IN_SITU
+[dda]
+dynamic_factor = FACTOR
+time_step_s = 0.002
+equilibrium = "START"
+
+[growth]
+enabled = GROWTH
+
+[run]
+end_time_s = 0.032
+stop_at = []
+"""
+ROUGH = """
+[cracks.default]
+joint = "faces"
+[joints.faces]
+friction_angle_deg = 30
+"""
+#: 200 m below the surface: the rock stores 170 kJ/m, gravity and bolts do less than 1 kJ/m.
+DEEP = """
+[loads.in_situ]
+surface_m = 216
+unit_weight_n_per_m3 = 25506
+k0 = 0.8
+"""
+
+
+def steps(tmp_path, *, factor=0.0, deep=True, faces="", growth=False) -> list:
+    text = TUNNEL.replace("FACTOR", str(factor)).replace("IN_SITU", DEEP if deep else "").replace("FACES", faces)
+    text = text.replace("START", "" if deep else "start").replace("GROWTH", "true" if growth else "false")
+    (tmp_path / "tunnel.toml").write_text(text)
+    return [cycle for cycle in geomech.cycles(load_scene(tmp_path / "tunnel.toml")) if cycle.statistics]
+
+
+def excavations(cycles: list) -> list[tuple]:
+    """(the cycle before, that of the first step without the rock) of both stages."""
+    return [
+        (before, after)
+        for before, after in zip(cycles, cycles[1:])
+        if any(event.kind == "excavation" for event in after.events)
+    ]
+
+
+@pytest.mark.parametrize(
+    ("factor", "deep", "faces", "within"),
+    [
+        (0.0, True, "", 5e-5),
+        (1.0, True, "", 1e-4),
+        (1.0, True, ROUGH, 4e-4),
+        (0.0, False, "", 2e-6),
+        (0.0, False, ROUGH, 2e-6),
+    ],
+)
+def test_the_balance_closes_in_every_step(tmp_path, factor, deep, faces, within):
+    """Relative to all energy converted; 1e-4 and 5e-4 were left in the step of an excavation, in which the crack of the
+    heading kept a stress that it no longer had, and 30 % of what opening cracks had taken there counted as released by
+    blocks that part. In motion what remains is the work of the mean stress on crack strains in steps in which crack
+    faces open, close or start to slip: in proportion to the step."""
+    cycles = steps(tmp_path, factor=factor, deep=deep, faces=faces)
+    stages = excavations(cycles)
+    assert len(stages) == 2
+    assert max(abs(cycle.statistics["budget_residual"]) for cycle in cycles) < within
+    for before, after in stages:
+        one, other = before.statistics, after.statistics
+        # What was stored has gone with the rock, cracks and contacts, and is no residual.
+        assert other["split_energy"] < one["split_energy"] - (1e3 if deep else 1.0)
+        assert abs(other["budget_residual"] - one["budget_residual"]) < within
+        # Nothing has been cut: no other account takes up what is left.
+        assert other["parting_energy"] == one["parting_energy"]
+        assert other["set_free_energy"] == one["set_free_energy"] == 0.0
+    assert abs(cycles[-1].statistics["load_work"]) > 0.0
+
+
+def test_cracks_of_excavated_rock_take_along_what_they_store(tmp_path):
+    """As much as the last step before the excavation says of the block, which has one crack; none afterwards."""
+    cycles = steps(tmp_path)
+    (before, after), (_, last) = excavations(cycles)
+    assert before.statistics["excavated_crack_energy"] == 0.0
+    gone = after.statistics["excavated_crack_energy"]
+    heading = before.blocks.names.index("heading")
+    assert gone == pytest.approx(before.inside[heading].crack_energy, rel=1e-9) and gone > 1.0
+    assert last.statistics["excavated_crack_energy"] == gone
+    assert not np.any(after.state.crack_strain[heading])
+    assert heading not in after.bodies
+
+
+def test_the_balance_closes_where_cracks_grow_and_blocks_split(tmp_path):
+    """In motion: growth, splits and both excavations. (4e-5 at half the step.)"""
+    cycles = steps(tmp_path, factor=1.0, deep=False, growth=True)
+    assert {event.kind for cycle in cycles for event in cycle.events} >= {"excavation", "initiation", "split"}
+    assert max(abs(cycle.statistics["budget_residual"]) for cycle in cycles) < 3e-4
