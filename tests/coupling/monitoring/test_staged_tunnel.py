@@ -3,6 +3,9 @@ excavated takes along what it and its cracks store, and nothing is left over."""
 
 from __future__ import annotations
 
+from itertools import pairwise
+from typing import NamedTuple
+
 import numpy as np
 import pytest
 
@@ -98,6 +101,7 @@ equilibrium = "START"
 
 [growth]
 enabled = GROWTH
+increment_m = 0.1
 
 [run]
 end_time_s = 0.032
@@ -118,20 +122,35 @@ k0 = 0.8
 """
 
 
-def steps(tmp_path, *, factor=0.0, deep=True, faces="", growth=False) -> list:
+class Step(NamedTuple):
+    """What is looked at of a cycle: its statistics and events, and of the cracked block `heading` the energy of its
+    cracks (None: it has no body) and their mean strain."""
+
+    statistics: dict
+    events: set
+    energy: float | None
+    strain: np.ndarray
+
+
+def steps(tmp_path, *, factor=0.0, deep=True, faces="", growth=False) -> list[Step]:
     text = TUNNEL.replace("FACTOR", str(factor)).replace("IN_SITU", DEEP if deep else "").replace("FACES", faces)
     text = text.replace("START", "" if deep else "start").replace("GROWTH", "true" if growth else "false")
     (tmp_path / "tunnel.toml").write_text(text)
-    return [cycle for cycle in geomech.cycles(load_scene(tmp_path / "tunnel.toml")) if cycle.statistics]
+    out = []
+    for cycle in geomech.cycles(load_scene(tmp_path / "tunnel.toml")):
+        if not cycle.statistics:
+            continue
+        heading = cycle.blocks.names.index("heading")
+        body = cycle.inside.get(heading)
+        kinds = {event.kind for event in cycle.events}
+        energy = None if body is None else body.crack_energy
+        out.append(Step(dict(cycle.statistics), kinds, energy, cycle.state.crack_strain[heading].copy()))
+    return out
 
 
-def excavations(cycles: list) -> list[tuple]:
-    """(the cycle before, that of the first step without the rock) of both stages."""
-    return [
-        (before, after)
-        for before, after in zip(cycles, cycles[1:])
-        if any(event.kind == "excavation" for event in after.events)
-    ]
+def excavations(found: list[Step]) -> list[tuple[Step, Step]]:
+    """(the step before, the first one without the rock) of both stages."""
+    return [(before, after) for before, after in pairwise(found) if "excavation" in after.events]
 
 
 @pytest.mark.parametrize(
@@ -145,40 +164,37 @@ def excavations(cycles: list) -> list[tuple]:
     ],
 )
 def test_the_balance_closes_in_every_step(tmp_path, factor, deep, faces, within):
-    """Relative to all energy converted; 1e-4 and 5e-4 were left in the step of an excavation, in which the crack of the
-    heading kept a stress that it no longer had, and 30 % of what opening cracks had taken there counted as released by
-    blocks that part. In motion what remains is the work of the mean stress on crack strains in steps in which crack
-    faces open, close or start to slip: in proportion to the step."""
-    cycles = steps(tmp_path, factor=factor, deep=deep, faces=faces)
-    stages = excavations(cycles)
+    """Relative to all energy converted. In the step of an excavation 1e-4 was left, of a stress that the crack of the
+    heading kept, and with rough faces up to 3e-3; and what other cracks took up there counted as parting of blocks (2 %
+    of all energy). In motion there remains the work of the mean stress in steps in which faces open, close or begin to
+    slip: 3e-4, 9e-5 and 8e-5 with rough faces in steps of dt, dt/2 and dt/4."""
+    found = steps(tmp_path, factor=factor, deep=deep, faces=faces)
+    stages = excavations(found)
     assert len(stages) == 2
-    assert max(abs(cycle.statistics["budget_residual"]) for cycle in cycles) < within
+    assert max(abs(step.statistics["budget_residual"]) for step in found) < within
     for before, after in stages:
         one, other = before.statistics, after.statistics
         # What was stored has gone with the rock, cracks and contacts, and is no residual.
         assert other["split_energy"] < one["split_energy"] - (1e3 if deep else 1.0)
-        assert abs(other["budget_residual"] - one["budget_residual"]) < within
+        assert abs(other["budget_residual"] - one["budget_residual"]) < 1e-6
         # Nothing has been cut: no other account takes up what is left.
         assert other["parting_energy"] == one["parting_energy"]
         assert other["set_free_energy"] == one["set_free_energy"] == 0.0
-    assert abs(cycles[-1].statistics["load_work"]) > 0.0
+    assert abs(found[-1].statistics["load_work"]) > 0.0
 
 
 def test_cracks_of_excavated_rock_take_along_what_they_store(tmp_path):
-    """As much as the last step before the excavation says of the block, which has one crack; none afterwards."""
-    cycles = steps(tmp_path)
-    (before, after), (_, last) = excavations(cycles)
-    assert before.statistics["excavated_crack_energy"] == 0.0
+    """As much as the block's own solution says in the last step before the excavation; none is left afterwards."""
+    (before, after), (_, last) = excavations(steps(tmp_path, deep=False))
     gone = after.statistics["excavated_crack_energy"]
-    heading = before.blocks.names.index("heading")
-    assert gone == pytest.approx(before.inside[heading].crack_energy, rel=1e-9) and gone > 1.0
+    assert before.statistics["excavated_crack_energy"] == 0.0 and before.energy is not None
+    assert gone == pytest.approx(before.energy, rel=1e-9) and gone > 0.0
     assert last.statistics["excavated_crack_energy"] == gone
-    assert not np.any(after.state.crack_strain[heading])
-    assert heading not in after.bodies
+    assert after.energy is None and np.any(before.strain) and not np.any(after.strain)
 
 
 def test_the_balance_closes_where_cracks_grow_and_blocks_split(tmp_path):
     """In motion: growth, splits and both excavations. (4e-5 at half the step.)"""
-    cycles = steps(tmp_path, factor=1.0, deep=False, growth=True)
-    assert {event.kind for cycle in cycles for event in cycle.events} >= {"excavation", "initiation", "split"}
-    assert max(abs(cycle.statistics["budget_residual"]) for cycle in cycles) < 3e-4
+    found = steps(tmp_path, factor=1.0, deep=False, growth=True)
+    assert set().union(*(step.events for step in found)) >= {"excavation", "initiation", "split"}
+    assert max(abs(step.statistics["budget_residual"]) for step in found) < 3e-4
