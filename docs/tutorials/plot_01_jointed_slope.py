@@ -96,7 +96,7 @@ terminal("geomech build my_slope.toml --picture shown/blocks.png")
 #
 # 4. Run
 # ------
-# The first run on a machine compiles the solvers, which takes about a minute. After that this run takes a few seconds.
+# The first run on a machine compiles the solvers, which takes about 20 s. After that this run takes a few seconds.
 
 terminal("geomech run my_slope.toml")
 
