@@ -12,7 +12,7 @@ from ...ddm.counters import Work
 from ...ddm.crack_contact.face_laws import Released
 from ...model import AUTO_ORDER, TIP, Blocks, Cracks, Motion, Problem, State
 from ...model.blocks.polygon import joined_loops
-from ..parallel_map import parallel_map
+from ..parallel_map import parallel_map, return_free_memory
 from . import boundary_tractions
 from .boundary_tractions import BoundaryForces, BoundaryLoad
 from .inertia_forces import BlockInertia
@@ -87,6 +87,8 @@ def elastic_bodies(
         return ddm.Body(outline, own, material, problem.ddm, reuse, holes=own_loops, face_laws=laws)
 
     bodies.update(zip([of[0] for of in to_make], parallel_map(made, to_make)))
+    if lean:
+        return_free_memory()
     return bodies, nodes_of
 
 
@@ -227,6 +229,8 @@ def solve_bodies(
             raise ddm.TargetMissed(failure.solution, failure.target, f"{_called(b, names)}: ") from failure
 
     solutions = dict(zip(bodies, parallel_map(solved, list(bodies), threads_for(bodies))))
+    if any(body.lean for body in bodies.values()):
+        return_free_memory()
     if any(body.requested.target_error is not None for body in bodies.values()):
         # Solutions that meet the target error may belong to refined bodies.
         bodies.update((b, solution.body) for b, solution in solutions.items())
