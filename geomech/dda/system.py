@@ -358,25 +358,27 @@ class BlockSystem:
         start = StepStart(state, vertices, np.zeros_like(state.velocity), moments, np.zeros(2))
         return windows_of(self, start, 0.0)
 
-    def inherited_contacts(self, state: State, found: ContactSet, forces: InheritedContacts) -> np.ndarray:
-        """CONTACT rows of ``found``, the contacts near ``state``, with the inherited ``forces``: contacts of a `State`
-        with which the next step starts."""
+    def with_inherited_contacts(self, state: State, found: ContactSet, forces: InheritedContacts) -> State:
+        """``state`` with the contacts ``found`` near it and the inherited ``forces``, from which the next step starts."""
 
         def on_multiplier(contacts: ContactSet) -> np.ndarray:
             has_multipliers = bool(self.allowed_penetration)
             return self.finder.on_penalty(contacts)[0] if has_multipliers else np.zeros(len(contacts), bool)
 
+        closure = self.finder.closure
         if self.deflected is not None:
             forces = without_remembered(forces, found, state.face_points)
-        rows = inherited_rows(found, forces, self.finder.closure, on_multiplier(found))
-        vertices = np.ascontiguousarray(state.vertices)
-        if self.deflected is not None:
             stiff = self.finder.stiff_laws[found.law], self.finder.stiff_along_laws[found.law]
-            return at_their_points(rows, found, forces.which, self.deflected, state, stiff)
+            rows = inherited_rows(found, forces, closure, on_multiplier(found))
+            rows, points = at_their_points(rows, found, forces.which, self.deflected, state, stiff)
+            known = [] if state.face_points is None else [state.face_points]
+            return replace(state, contacts=rows, face_points=np.concatenate([*known, points]))
+        rows = inherited_rows(found, forces, closure, on_multiplier(found))
+        vertices = np.ascontiguousarray(state.vertices)
         placed = self.finder.find(replace(state, contacts=rows), vertices, self._standing(state, vertices))
-        if placed.points is None:
-            return rows
-        return at_their_springs(rows, placed, forces.which, self.finder.closure, on_multiplier(placed))
+        if placed.points is not None:
+            rows = at_their_springs(rows, placed, forces.which, closure, on_multiplier(placed))
+        return replace(state, contacts=rows)
 
     def _refuse_unsupported(self, loads: Loads, time: float) -> None:
         """Refuse a static run under gravity without any fixed block."""

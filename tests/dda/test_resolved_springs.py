@@ -83,7 +83,7 @@ def test_forces_that_new_faces_inherit_are_kept_as_their_springs_are_eased():
     assert np.array_equal(found.vertex, rows["vertex"])
     which = np.arange(len(rows))
     forces = dda.InheritedContacts(which, rows["normal_force"], rows["shear_force"], rows["gap"], rows["slip"])
-    state = replace(state, contacts=still.inherited_contacts(state, found, forces))
+    state = still.with_inherited_contacts(state, found, forces)
     result = moving.step(state, WEIGHT)
     pressed = rows["state"] != OPEN
     assert (result.contacts["stiffness"][pressed] < 0.02 * rows["stiffness"][pressed]).all()

@@ -150,10 +150,9 @@ def take_growth(now: CrackedBlocks, growth, state: State, solutions: dict) -> tu
         initialise_parts_at_rest(now, stresses)
     split = replace(split, state=now.state)
     with now.timed("growth"):
-        contacts = contacts_after(
+        now.state = contacts_after(
             now.system, split, cut, solutions if stands else {}, loads, now.problem.loads, begun.contacts
         )
-    now.state = replace(now.state, contacts=contacts)
     return tuple(events)
 
 

@@ -152,8 +152,8 @@ def contacts_after(
     loads: dict[int, BoundaryLoad],
     acting: Loads,
     contacts: np.ndarray,
-) -> np.ndarray:
-    """CONTACT rows of the blocks of ``split``, whose next step starts with the forces at the end of the last one.
+) -> State:
+    """The state of ``split`` with contacts whose next step starts with the forces at the end of the last one.
 
     ``system``: block system of the new blocks; ``before``: the blocks before the split; ``solutions`` and boundary
     ``loads`` (block →) of the last pass at ``split.state``; ``acting``: loads on the blocks; ``contacts``: CONTACT rows
@@ -165,7 +165,7 @@ def contacts_after(
     parts = np.bincount(split.parent, minlength=before.n_blocks)
     cut = [b for b in np.flatnonzero(parts > 1).tolist() if b in solutions]
     if not len(found) or (found is near and not cut):
-        return state.contacts
+        return state
     inherited = _Inherited.none(len(found))
     loaded = {load.edge_name for load in acting.edge_tractions}
     wet = np.zeros(0, EDGE_FORCE)
@@ -175,7 +175,7 @@ def contacts_after(
     for parent in cut:
         _inherit_along_walls(inherited, found, split, parent, solutions[parent], float(state.rotation[parent]))
         _inherit_along_divided_edges(inherited, found, split, before, parent, loads[parent], loaded, wet)
-    return system.inherited_contacts(
+    return system.with_inherited_contacts(
         state, found, _contacts(system, found, inherited, blocks, np.isin(split.parent, cut))
     )
 

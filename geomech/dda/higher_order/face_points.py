@@ -487,17 +487,41 @@ def without_remembered(forces: InheritedContacts, found: ContactSet, memory: np.
 def at_their_points(
     rows: np.ndarray, found: ContactSet, which: np.ndarray, blocks: DeflectedBlocks, state: State,
     by_length: tuple[np.ndarray, np.ndarray],
-) -> np.ndarray:  # fmt: skip
-    """CONTACT ``rows`` of ``found`` with the gaps at which the points of faces carry the prescribed resultant and moment
-    of the contacts ``which``, blocks being deflected as in ``state``. ``by_length`` as in `Faces.springs`."""
-    faces, vertices = Faces.of(found, blocks.order), np.ascontiguousarray(state.vertices)
-    springs, force = faces.springs(found.springs, by_length), faces.spread(rows["normal_force"])
-    out, inherited = rows.copy(), np.zeros(len(rows), bool)
-    inherited[which] = True
-    # Where only one end is prescribed, the other keeps its gap.
-    there = (inherited[faces.ends] & (rows["state"][faces.ends] != OPEN)).all(axis=1)
-    for end, point in ((0, faces.first), (1, faces.first + faces.count - 1)):
-        stiff = np.maximum(springs.normal[point[there]], np.finfo(float).tiny)
-        out["gap"][faces.ends[there, end]] = -force[point[there]] / stiff
-    out["lift"][which] = found.geometry[which, 3] + blocks.gaps(found, vertices, state)[which] - out["gap"][which]
-    return out
+) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
+    """CONTACT ``rows`` of ``found`` with the gaps that inherited contacts, those in ``which``, have where blocks are
+    deflected as in ``state``; and FACE_POINT rows of faces that they close, whose points carry the resultant and moment of
+    their ends. ``by_length`` as in `Faces.springs`."""
+    vertices, out = np.ascontiguousarray(state.vertices), rows.copy()
+    closed = rows["state"] != OPEN
+    # (Open contacts that keep the gap that was found keep its lift.)
+    moved = which[closed[which] | (rows["gap"][which] != found.gap[which])]
+    out["lift"][moved] = found.geometry[moved, 3] + blocks.gaps(found, vertices, state)[moved] - rows["gap"][moved]
+    own = {name: np.array(rows[name]) for name in ("state", "bonded", "slip", "wear")}
+    corners = replace(found, **own, normal=rows["normal_force"], shear=rows["shear_force"], lift=out["lift"])
+    every = FaceContacts.along_faces(corners, blocks.order, None, by_length)
+    faces, inherited = every.on_faces, np.zeros(len(rows), bool)
+    inherited[which] = closed[which]
+    # Where only one end is inherited, the other keeps its gap.
+    some = np.flatnonzero(inherited[faces.ends].all(axis=1))
+    push, drag = every.normal.copy(), every.shear.copy()
+    for face in some.tolist():
+        own_points = slice(int(faces.first[face]), int(faces.first[face] + faces.count[face]))
+        if push[own_points].min() < 0.0 and not (every.bonded[own_points] > 0).all():
+            # The linear stress would pull: the ends carry their forces alone.
+            for values, name in ((push, "normal_force"), (drag, "shear_force")):
+                values[own_points] = 0.0
+                values[[own_points.start, own_points.stop - 1]] = rows[name][faces.ends[face]]
+    points = np.flatnonzero(np.isin(faces.face, some))
+    stiff = np.maximum(every.springs.normal[points], np.finfo(float).tiny)
+    told = np.zeros(len(points), FACE_POINT)
+    told["vertex"], told["edge"] = every.vertex[points], every.edge[points]
+    told["block"], told["other"] = every.block[points], every.other[points]
+    told["far_vertex"], told["far_edge"] = faces.far_ends(corners)[points].T
+    told["place"], told["point"] = faces.place[points], every.geometry[points, 5:7]
+    told["length"], told["bonded"] = every.geometry[points, 4], every.bonded[points]
+    told["state"] = np.where((push[points] > 0.0) | (every.bonded[points] > 0), every.state[points], OPEN)
+    told["normal_force"], told["shear_force"] = push[points], drag[points]
+    told["slip"], told["wear"], told["gap"] = every.slip[points], every.wear[points], -push[points] / stiff
+    apart = every.geometry[points, 3] + blocks.gaps(every, vertices, state)[points]
+    told["lift"] = apart - told["gap"]
+    return out, told

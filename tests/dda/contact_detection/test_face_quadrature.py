@@ -113,7 +113,7 @@ def test_faces_that_do_not_fit_each_other_press_where_they_meet(eccentricity):
     some, none = np.flatnonzero(found.geometry[:, 4] > 0), np.zeros(2)
     assert len(some) == 2
     told = dda.InheritedContacts(which=some, normal=np.full(2, 1.0), shear=none, gap=none, slip=none)
-    state = replace(state, contacts=system.inherited_contacts(state, found, told))
+    state = system.with_inherited_contacts(state, found, told)
     loads = Loads(
         point_loads=(
             PointLoad(1, (1.0 + eccentricity, askew * (1.0 + eccentricity)), History.constant([0.0, -THRUST])),
