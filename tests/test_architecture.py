@@ -290,7 +290,7 @@ def test_no_folder_holds_more_than_twelve_files():
 #: Most arguments of a function, and of one that is compiled.
 MOST_ARGUMENTS, MOST_OF_KERNELS = 8, 12
 #: Decorators of compiled functions.
-COMPILED = {"kept", "part", "njit", "jit", "_jit", "_part", "_inlined", "intrinsic"}
+COMPILED = {"kept", "part", "allocating", "njit", "jit", "_jit", "_part", "_inlined", "intrinsic"}
 
 
 def too_many_arguments(path, tree):

@@ -164,7 +164,7 @@ def contacts_after(
     found = from_their_faces(near, state.contacts, contacts, split.parent)
     parts = np.bincount(split.parent, minlength=before.n_blocks)
     cut = [b for b in np.flatnonzero(parts > 1).tolist() if b in solutions]
-    if not len(found) or (found is near and not cut):
+    if not len(found) or (found is near and not cut and system.deflected is None):
         return state
     inherited = _Inherited.none(len(found))
     loaded = {load.edge_name for load in acting.edge_tractions}

@@ -502,9 +502,17 @@ def at_their_points(
     faces, inherited = every.on_faces, np.zeros(len(rows), bool)
     inherited[which] = closed[which]
     # Where only one end is inherited, the other keeps its gap.
-    some = np.flatnonzero(inherited[faces.ends].all(axis=1))
+    pressed = inherited[faces.ends].all(axis=1)
+    apart = every.geometry[:, 3] + blocks.gaps(every, vertices, state)
+    # Parts may overlap by the square of the deflection, or by what a part of first order has lost of it.
+    overlaps = (every.state == OPEN) & (apart - every.lift < 0.0)
+    alone = np.flatnonzero(overlaps[: len(faces.lone)])
+    out["lift"][faces.lone[alone]] = apart[alone]
+    overlapping = np.zeros(len(pressed), bool)
+    overlapping[faces.face[overlaps & (faces.face >= 0)]] = True
+    some = np.flatnonzero(pressed | overlapping)
     push, drag = every.normal.copy(), every.shear.copy()
-    for face in some.tolist():
+    for face in np.flatnonzero(pressed).tolist():
         own_points = slice(int(faces.first[face]), int(faces.first[face] + faces.count[face]))
         if push[own_points].min() < 0.0 and not (every.bonded[own_points] > 0).all():
             # The linear stress would pull: the ends carry their forces alone.
@@ -521,7 +529,8 @@ def at_their_points(
     told["length"], told["bonded"] = every.geometry[points, 4], every.bonded[points]
     told["state"] = np.where((push[points] > 0.0) | (every.bonded[points] > 0), every.state[points], OPEN)
     told["normal_force"], told["shear_force"] = push[points], drag[points]
-    told["slip"], told["wear"], told["gap"] = every.slip[points], every.wear[points], -push[points] / stiff
-    apart = every.geometry[points, 3] + blocks.gaps(every, vertices, state)[points]
-    told["lift"] = apart - told["gap"]
+    told["slip"], told["wear"] = every.slip[points], every.wear[points]
+    gap = np.where(overlaps[points], 0.0, apart[points] - every.lift[points])
+    told["gap"] = np.where(pressed[faces.face[points]], -push[points] / stiff, gap)
+    told["lift"] = apart[points] - told["gap"]
     return out, told
