@@ -176,8 +176,15 @@ def contacts_after(
         _inherit_along_walls(inherited, found, split, parent, solutions[parent], float(state.rotation[parent]))
         _inherit_along_divided_edges(inherited, found, split, before, parent, loads[parent], loaded, wet)
     return system.with_inherited_contacts(
-        state, found, _contacts(system, found, inherited, blocks, np.isin(split.parent, cut))
+        state, found, _contacts(system, found, inherited, blocks, np.isin(split.parent, cut) | _stiffer(split, before))
     )
+
+
+def _stiffer(split: Split, before: Blocks) -> np.ndarray:
+    """(n_blocks,) bool: parts of a lower order than the whole, which have lost its deflection."""
+    if before.order is None or split.blocks.order is None:
+        return np.zeros(split.blocks.n_blocks, bool)
+    return np.asarray(split.blocks.order) < np.asarray(before.order)[split.parent]
 
 
 def _contacts(
