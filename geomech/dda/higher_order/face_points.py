@@ -474,14 +474,17 @@ def without_remembered(forces: InheritedContacts, found: ContactSet, memory: np.
     continue with that."""
     if memory is None or not len(memory):
         return forces
-    ends = (
-        np.concatenate([memory["vertex"], memory["far_vertex"]]),
-        np.concatenate([memory["edge"], memory["far_edge"]]),
-    )
-    far = int(max(ends[1].max(), found.edge.max())) + 1
-    known = np.isin(found.vertex * far + found.edge, ends[0] * far + ends[1])
-    left = ~known[forces.which]
+    left = ~_remembered(found, memory)[forces.which]
     return replace(forces, **{field.name: getattr(forces, field.name)[left] for field in fields(forces)})
+
+
+def _remembered(found: ContactSet, memory: np.ndarray | None) -> np.ndarray:
+    """(n,) bool: contacts of ``found`` that are ends of faces in ``memory``, FACE_POINT rows."""
+    if memory is None or not len(memory) or not len(found):
+        return np.zeros(len(found), bool)
+    vertex, edge = (np.concatenate([memory[name], memory[f"far_{name}"]]) for name in ("vertex", "edge"))
+    far = int(max(edge.max(), found.edge.max())) + 1
+    return np.isin(found.vertex * far + found.edge, vertex * far + edge)
 
 
 def at_their_points(
@@ -501,8 +504,11 @@ def at_their_points(
     every = FaceContacts.along_faces(corners, blocks.order, None, by_length)
     faces, inherited = every.on_faces, np.zeros(len(rows), bool)
     inherited[which] = closed[which]
-    # Where only one end is inherited, the other keeps its gap.
-    pressed = inherited[faces.ends].all(axis=1)
+    # Where only one end is inherited, the other keeps its gap. Faces that are new as such continue with what their
+    # corners bear.
+    memory = state.face_points
+    new = ~_remembered(found, None if memory is None else memory[memory["far_vertex"] >= 0])
+    pressed = inherited[faces.ends].all(axis=1) | (closed & new)[faces.ends].all(axis=1)
     apart = every.geometry[:, 3] + blocks.gaps(every, vertices, state)
     # Parts may overlap by the square of the deflection, or by what a part of first order has lost of it.
     overlaps = (every.state == OPEN) & (apart - every.lift < 0.0)
@@ -533,4 +539,9 @@ def at_their_points(
     gap = np.where(overlaps[points], 0.0, apart[points] - every.lift[points])
     told["gap"] = np.where(pressed[faces.face[points]], -push[points] / stiff, gap)
     told["lift"] = apart[points] - told["gap"]
+    for name in ("gap", "lift"):
+        by_point = np.zeros(len(apart))
+        by_point[points] = told[name]
+        out[name][faces.ends[some, 0]] = by_point[faces.first[some]]
+        out[name][faces.ends[some, 1]] = by_point[(faces.first + faces.count - 1)[some]]
     return out, told
