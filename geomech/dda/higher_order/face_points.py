@@ -499,7 +499,7 @@ def at_their_points(
     # (Open contacts that keep the gap that was found keep its lift.)
     moved = which[closed[which] | (rows["gap"][which] != found.gap[which])]
     out["lift"][moved] = found.geometry[moved, 3] + blocks.gaps(found, vertices, state)[moved] - rows["gap"][moved]
-    own = {name: np.array(rows[name]) for name in ("state", "bonded", "slip", "wear")}
+    own: dict[str, Any] = {name: np.array(rows[name]) for name in ("state", "bonded", "slip", "wear")}
     corners = replace(found, **own, normal=rows["normal_force"], shear=rows["shear_force"], lift=out["lift"])
     every = FaceContacts.along_faces(corners, blocks.order, None, by_length)
     faces, inherited = every.on_faces, np.zeros(len(rows), bool)
