@@ -185,6 +185,7 @@ class CoupledRun:
 
     def _cycles(self) -> None:
         from .coupling import Coupling
+        from .dda.linear_solver.blas_threads import asked_for, blas_threads
 
         if self.stored is None:
             coupling = Coupling(self.problem)
@@ -199,7 +200,10 @@ class CoupledRun:
             return
         for cycle in begun:
             self.stopping += [event.kind for event in cycle.events if event.kind in self.stops_at]
-            self.group.on_cycle(cycle)
+            # Fields inside cracked blocks are solved for as they are written: with as many threads as the rest, whose
+            # number changes the last digits.
+            with blas_threads(asked_for()):
+                self.group.on_cycle(cycle)
         self.ended = True
         if self._stores and not self.before_the_last:
             self._store(coupling)

@@ -71,7 +71,7 @@ def test_energy_of_a_swinging_cracked_cantilever(order):
     assert max(one["compliance_passes"] for one in told[1:]) == 1
 
 
-@pytest.mark.parametrize("stiffness", [None, GLUE])
+@pytest.mark.parametrize("stiffness", [None, pytest.param(GLUE, marks=pytest.mark.slow)])
 def test_a_beam_that_breaks_pays_for_its_fracture(stiffness):
     """The crack runs through, the end of the beam falls. In every cycle energies add up to the columns of the history, and
     what growth and the last ligament take is K_Ic²/E' of the crack's length, from the beam: a block of uniform strain pays
@@ -204,6 +204,7 @@ def dropped(tmp_path, order: int, k_ic: float, end: float, more: str = "", crack
     return [cycle for cycle in cycles(load_scene(path).problem()) if cycle.number]
 
 
+@pytest.mark.slow
 def test_k_of_a_notched_beam_that_drops_is_that_of_its_bending_moment(tmp_path):
     """The largest K against 6 M √(πa) F / W² (Tada, Paris & Irwin 2000, pure bending) with the largest moment of the same
     beam without a notch: 20 %, as far as the notch does not change the vibration. Of first order K is 3.5 times too
