@@ -157,9 +157,9 @@ def excavations(found: list[Step]) -> list[tuple[Step, Step]]:
     ("factor", "deep", "faces", "within"),
     [
         (0.0, True, "", 5e-5),
-        (1.0, True, "", 1e-4),
+        pytest.param(1.0, True, "", 1e-4, marks=pytest.mark.slow),
         (1.0, True, ROUGH, 4e-4),
-        (0.0, False, "", 2e-6),
+        pytest.param(0.0, False, "", 2e-6, marks=pytest.mark.slow),
         (0.0, False, ROUGH, 2e-6),
     ],
 )
