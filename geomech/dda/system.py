@@ -368,12 +368,12 @@ class BlockSystem:
         closure = self.finder.closure
         if self.deflected is not None:
             forces = without_remembered(forces, found, state.face_points)
+        rows = inherited_rows(found, forces, closure, on_multiplier(found))
+        if self.deflected is not None:
             stiff = self.finder.stiff_laws[found.law], self.finder.stiff_along_laws[found.law]
-            rows = inherited_rows(found, forces, closure, on_multiplier(found))
             rows, points = at_their_points(rows, found, forces.which, self.deflected, state, stiff)
             known = [] if state.face_points is None else [state.face_points]
             return replace(state, contacts=rows, face_points=np.concatenate([*known, points]))
-        rows = inherited_rows(found, forces, closure, on_multiplier(found))
         vertices = np.ascontiguousarray(state.vertices)
         placed = self.finder.find(replace(state, contacts=rows), vertices, self._standing(state, vertices))
         if placed.points is not None:

@@ -20,6 +20,7 @@ import numpy as np
 from ...conventions import rotate_stress
 from ...dda.higher_order.deflected_blocks import DeflectedBlocks, rotation_of, strain_turned_back
 from ...dda.higher_order.deflection_basis import DeflectionBasis, n_deflections
+from ...dda.kinematics.displacement_matrix import displacement_matrix
 from ...dda.kinematics.polygon_quadrature import polygon_points
 from ...model import Blocks, State
 from .block_splitting import Split
@@ -95,8 +96,7 @@ def inherited_deflection(
         if begun.deflection is not None:
             moved, kept["deflection"][own, 0] = region.parted(begun.deflection[was, 0], True)
             rate, kept["deflection"][own, 1] = region.parted(begun.deflection[was, 1])
-            arm = blocks.vertices[some] - new.basis.centroid[part]
-            vertices[some] += _displacement(moved, arm) @ turn.T
+            vertices[some] += displacement_matrix(blocks.vertices[some], new.basis.centroid[part]) @ moved @ turn.T
             rotation[part] += moved[2]
             _add_rate(velocity[part], turn @ moved[:2], rate, float(begun.rotation[block]))
         if new.order[part] > 1:
@@ -124,12 +124,6 @@ def with_stress(
     return replace(
         state, stress=mean, crack_strain=strain, deflection=known, deflection_origin=origin, crack_deflection=by_cracks
     )
-
-
-def _displacement(motion: np.ndarray, arm: np.ndarray) -> np.ndarray:
-    x, y = arm.T
-    u, v, turn, xx, yy, shear = motion
-    return np.column_stack([u - turn * y + xx * x + 0.5 * shear * y, v + turn * x + yy * y + 0.5 * shear * x])
 
 
 def _add_rate(velocity: np.ndarray, shift: np.ndarray, rate: np.ndarray, angle: float) -> None:

@@ -97,11 +97,7 @@ class BendingAttempt(Attempt):
 
     def _gaps(self, normal: np.ndarray, found: ContactSet, angle: np.ndarray, q: np.ndarray) -> np.ndarray:
         """(n,) m: contribution of deflections ``q`` (k,) to the gaps of contacts with the normals ``normal`` (n, 2)."""
-        padded, out = self.blocks.padded(q), np.zeros(len(found))
-        for owner, points, sign in zip((found.block, found.other), self.touching, (1.0, -1.0), strict=True):
-            matrix = self.blocks.directions(points, owner, angle)
-            out += sign * np.einsum("na,naj,nj->n", normal, matrix, padded[owner], optimize=True)
-        return out
+        return self.blocks.apart(normal, found, self.touching, angle, q)
 
     def _actions(self, loads: Loads, end: float) -> BendingActions | None:
         system, state = self.system, self.state
@@ -421,11 +417,9 @@ class BendingAttempt(Attempt):
         self.opened = None if known is None and not self.softened else self.blocks.at_rest()[:, 0]
         if self.opened is not None and known is not None:
             self.opened += known
-        #: block → Σ at the end of the step, Pa, on the axes of its start.
-        self.ended: dict[int, np.ndarray] = {}
         for of in self.softened:
             b, own = of.block, self.blocks.basis.of_block(of.block)
-            self.ended[b], strain = of.ended(self.increment[b, 3:], self.bent_by[own])
+            strain = of.crack_strain(self.increment[b, 3:], self.bent_by[own])
             self.new_crack[b] = strain_turned_back(-self.increment[b, 2]) @ strain[:3]
             assert self.opened is not None
             self.opened[own] = of.size * strain[3:]

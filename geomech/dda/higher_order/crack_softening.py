@@ -26,7 +26,6 @@ class SoftenedBlock:
     """One ``block`` with cracks in a step, with m unknowns of deflection.
 
     size      √A, m
-    elastic   (3 + m, 3 + m) D⁻¹, 1/Pa
     softness  (3 + m, 3 + m) S, 1/Pa
     offset    (3 + m,) crack strain without stress
     begun     (3 + m,) Σ₀, Pa
@@ -36,7 +35,6 @@ class SoftenedBlock:
 
     block: int
     size: float
-    elastic: np.ndarray
     softness: np.ndarray
     offset: np.ndarray
     begun: np.ndarray
@@ -48,11 +46,10 @@ class SoftenedBlock:
         """(3, m) mean stress per unit of deflection, Pa/m."""
         return self.tangent[:3, 3:] / self.size
 
-    def ended(self, strain: np.ndarray, change: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Σ₁ (3 + m,), Pa, and the crack strain (3 + m,) after the ``strain`` (3,) of the step and the ``change`` (m,) of
-        deflection, m."""
+    def crack_strain(self, strain: np.ndarray, change: np.ndarray) -> np.ndarray:
+        """(3 + m,) strain of the cracks after the ``strain`` (3,) of the step and the ``change`` (m,) of deflection, m."""
         stress = self.still + self.tangent @ np.concatenate([strain, change / self.size])
-        return stress, self.offset + self.softness @ stress
+        return self.offset + self.softness @ stress
 
 
 def softened_blocks(
@@ -79,5 +76,5 @@ def softened_blocks(
         begun = np.concatenate([state.stress[b], blocks.stiffness[b, : n - 3, : n - 3] @ strained[own] / size])
         tangent = np.linalg.inv(elastic + softness)
         still = tangent @ (strain + known - offset)
-        out.append(SoftenedBlock(b, size, elastic, softness, offset, begun, still, tangent))
+        out.append(SoftenedBlock(b, size, softness, offset, begun, still, tangent))
     return out

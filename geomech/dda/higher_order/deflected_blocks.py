@@ -169,12 +169,20 @@ class DeflectedBlocks:
     def gaps(self, found: ContactSet, vertices: np.ndarray, state: State) -> np.ndarray:
         """(n,) m: contribution of the deflections of ``state`` to the gaps of the contacts ``found``, where the blocks have
         the strained ``vertices``."""
-        out = np.zeros(len(found))
         if state.deflection is None or not len(found):
-            return out
-        padded, normal = self.padded(state.deflection[:, 0]), found.geometry[:, 1:3]
-        for owner, points, sign in zip((found.block, found.other), self.touching(found, vertices), (1.0, -1.0)):
-            matrix = self.directions(points, owner, state.rotation)
+            return np.zeros(len(found))
+        touching, normal = self.touching(found, vertices), found.geometry[:, 1:3]
+        return self.apart(normal, found, touching, state.rotation, state.deflection[:, 0])
+
+    def apart(
+        self, normal: np.ndarray, found: ContactSet, touching: tuple[np.ndarray, np.ndarray], angle: np.ndarray,
+        q: np.ndarray,
+    ) -> np.ndarray:  # fmt: skip
+        """(n,) m: by how much deflections ``q`` (k,) move the blocks of the contacts ``found`` apart along ``normal`` (n, 2),
+        rotated by ``angle`` (n_blocks,); ``touching`` as from that function."""
+        padded, out = self.padded(q), np.zeros(len(found))
+        for owner, points, sign in zip((found.block, found.other), touching, (1.0, -1.0), strict=True):
+            matrix = self.directions(points, owner, angle)
             out += sign * np.einsum("na,naj,nj->n", normal, matrix, padded[owner], optimize=True)
         return out
 

@@ -527,21 +527,21 @@ def at_their_points(
                 values[[own_points.start, own_points.stop - 1]] = rows[name][faces.ends[face]]
     points = np.flatnonzero(np.isin(faces.face, some))
     stiff = np.maximum(every.springs.normal[points], np.finfo(float).tiny)
-    told = np.zeros(len(points), FACE_POINT)
-    told["vertex"], told["edge"] = every.vertex[points], every.edge[points]
-    told["block"], told["other"] = every.block[points], every.other[points]
-    told["far_vertex"], told["far_edge"] = faces.far_ends(corners)[points].T
-    told["place"], told["point"] = faces.place[points], every.geometry[points, 5:7]
-    told["length"], told["bonded"] = every.geometry[points, 4], every.bonded[points]
-    told["state"] = np.where((push[points] > 0.0) | (every.bonded[points] > 0), every.state[points], OPEN)
-    told["normal_force"], told["shear_force"] = push[points], drag[points]
-    told["slip"], told["wear"] = every.slip[points], every.wear[points]
+    point_rows = np.zeros(len(points), FACE_POINT)
+    point_rows["vertex"], point_rows["edge"] = every.vertex[points], every.edge[points]
+    point_rows["block"], point_rows["other"] = every.block[points], every.other[points]
+    point_rows["far_vertex"], point_rows["far_edge"] = faces.far_ends(corners)[points].T
+    point_rows["place"], point_rows["point"] = faces.place[points], every.geometry[points, 5:7]
+    point_rows["length"], point_rows["bonded"] = every.geometry[points, 4], every.bonded[points]
+    point_rows["state"] = np.where((push[points] > 0.0) | (every.bonded[points] > 0), every.state[points], OPEN)
+    point_rows["normal_force"], point_rows["shear_force"] = push[points], drag[points]
+    point_rows["slip"], point_rows["wear"] = every.slip[points], every.wear[points]
     gap = np.where(overlaps[points], 0.0, apart[points] - every.lift[points])
-    told["gap"] = np.where(pressed[faces.face[points]], -push[points] / stiff, gap)
-    told["lift"] = apart[points] - told["gap"]
+    point_rows["gap"] = np.where(pressed[faces.face[points]], -push[points] / stiff, gap)
+    point_rows["lift"] = apart[points] - point_rows["gap"]
     for name in ("gap", "lift"):
         by_point = np.zeros(len(apart))
-        by_point[points] = told[name]
+        by_point[points] = point_rows[name]
         out[name][faces.ends[some, 0]] = by_point[faces.first[some]]
         out[name][faces.ends[some, 1]] = by_point[(faces.first + faces.count - 1)[some]]
-    return out, told
+    return out, point_rows
