@@ -220,7 +220,7 @@ class _Search:
 
     def _by_patch(self, answer: Answer, wrong: np.ndarray, number: int) -> bool:
         """Whether the few inconsistent contacts could be solved on the blocks around them alone, from the best states
-        so far."""
+        so far: where their number does not decrease any more, or Newton's method overshoots."""
         solver, effort = self.solver, self.effort
         if (
             not solver.patches
@@ -231,9 +231,10 @@ class _Search:
             or self.patched >= solver.patch_tries
         ):
             return False
-        if (self.falls and not self.proposed) or self.fewest > solver.patch_wrong * len(self.found):
-            return False
         assert self.best is not None
+        goes_on = self.falls and not self.proposed and not self._overshoots(self.best[1])
+        if goes_on or self.fewest > solver.patch_wrong * len(self.found):
+            return False
         states, of, which = self.best
         within = replace(effort, within_patch=True, in_order=True)
         proposal, spent = settled_in_patch(
