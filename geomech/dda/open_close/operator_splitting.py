@@ -39,7 +39,7 @@ _RELAXATION = 1.7
 #: Number of iterations between checks of how many states have changed.
 _LOOK = 10
 #: Iterations after which ρ is adapted to the states, if more than this fraction of them has changed since.
-_FOLLOWS, _MANY = (20, 40), 0.05
+_FOLLOWS, _MANY = (20, 40, 80), 0.05
 #: Cost of an iteration and of a factorisation, in Newton iterations.
 _TURN, _FACTORS = 0.1, 1.0
 
