@@ -404,7 +404,7 @@ class BlockSystem:
         if self.deflected is not None:
             known = None if self._sparse is None else self._sparse[1]
             assert known is None or isinstance(known, SixRowPattern)
-            rows = six_row_pattern(self.free, self.deflected.rows, block, other, moments[:, 1:3], known)
+            rows = six_row_pattern(self.free, self.deflected.sizes, block, other, moments[:, 1:3], known)
             if rows.solver is not None:
                 rows.solver.work = self.work
             self._sparse = np.zeros((2, 0)), rows

@@ -251,6 +251,7 @@ class BendingAttempt(Attempt):
             self.actions.project(contacts.block, contacts.other, rows)
         base = np.empty(pattern.size)
         fill_own(base, pattern.places, pattern.step, (own, self.own_at), pattern.order)
+        base[pattern.spare] = np.abs(base).max(initial=1.0)
         if glue is not None:
             glue.push(full.ravel(), pattern)
             n_bolts = 0 if self.actions is None else self.actions.n_bolts
@@ -308,7 +309,7 @@ class BendingAttempt(Attempt):
     def _deflection_at(self, pattern) -> np.ndarray:
         """(k,) positions of the unknowns of deflection of blocks that are there among all unknowns."""
         there = self.blocks.present
-        return 6 * pattern.more[self.blocks.owner[there]] + self.blocks.which[there]
+        return pattern.unknown[pattern.at[self.blocks.owner[there]] + 6 + self.blocks.which[there]]
 
     def _rows(self, found: ContactSet, vectors: np.ndarray) -> np.ndarray:
         """(n, 2, 2, w): direction, side, relative motion per unit of the unknowns of the side's block."""
@@ -404,7 +405,7 @@ class BendingAttempt(Attempt):
             pattern = self._six_rows
             self.slid = moved(
                 self.settled.unknowns.ravel(), (found.block, found.other, pattern.order),
-                (pattern.more, pattern.rows), rows,
+                pattern.unknowns, rows,
             )[:, 1]  # fmt: skip
             if self.actions is not None:
                 self.slid += self.actions.along

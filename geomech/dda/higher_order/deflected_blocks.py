@@ -83,7 +83,7 @@ class DeflectedBlocks:
         #: (k,) the block of each unknown, and its number within the block.
         self.owner = np.repeat(np.arange(blocks.n_blocks), np.diff(self.basis.start))
         self.which = np.arange(self.n_unknowns) - self.basis.start[self.owner]
-        self._rows = self.rows
+        self._sizes = np.where(fixed, 0, 6 + n_deflections(self.order)).astype(np.int64)
         self.take_out(None)
 
     @property
@@ -93,7 +93,8 @@ class DeflectedBlocks:
     def take_out(self, removed: np.ndarray | None) -> None:
         """Continue without the blocks ``removed`` (n_blocks,): they keep their unknowns in all arrays, but have no
         equations."""
-        self.rows = self._rows if removed is None else np.where(removed, 0, self._rows)
+        #: (n_blocks,) number of unknowns of each block; 0 for blocks that are fixed or not there.
+        self.sizes = self._sizes if removed is None else np.where(removed, 0, self._sizes)
         #: The unknowns of blocks that are there.
         self.present = np.arange(self.n_unknowns) if removed is None else np.flatnonzero(~removed[self.owner])
 

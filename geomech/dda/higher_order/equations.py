@@ -7,9 +7,11 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ...model import OPEN, STICK
+from ..equation_records import ContactStiffness
 from ..joint_laws.penalty_springs import Springs
+from ..linear_solver.block_solver import RESIDUAL
 from ..open_close.equations import Equations
-from .six_row_system import SixRowPattern, fill, moved, springs_in_states
+from .six_row_system import SixRowPattern, differing, fill, moved, springs_in_states, take_change
 
 
 @dataclass(eq=False)
@@ -25,33 +27,56 @@ class HigherOrderEquations(Equations):
     first_order = False
 
     def __post_init__(self) -> None:
-        self._data, self._side = np.empty(self.pattern.size), np.empty(6 * self.pattern.n)
-        self._near: np.ndarray | None = None
-        self._held = None
-        self._force = float(np.abs(self.right).max(initial=0.0))
+        super().__post_init__()
+        self._laws: tuple[np.ndarray, ...] = ()
+        self._motion, self._rest = np.zeros((0, 2)), None
 
     def _assembled(self, state: np.ndarray, direction: np.ndarray, springs: Springs, gap: np.ndarray):
-        pattern, found = self.pattern, self.found
-        assert isinstance(pattern, SixRowPattern)
+        pattern, found, held = self._six_rows, self.found, self._held is not None
+        before = self._laws, self._side.copy()
         self._side[:] = self.right.ravel()
         blocks = found.block, found.other, pattern.order
         *laws, symmetric = springs_in_states(
-            self._side, blocks, (pattern.more, pattern.rows), self.rows, (state, direction, gap, found.shear),
+            self._side, blocks, pattern.unknowns, self.rows, (state, direction, gap, found.shear),
             (springs.normal, springs.shear, springs.friction, springs.sliding, springs.lift),
         )  # fmt: skip
-        fill(
-            self._data, self.base, pattern.places, pattern.step, blocks, self.rows,
-            (*laws, springs.lift),
-        )  # fmt: skip
-        return symmetric, None
+        self._laws = (*laws, springs.lift)
+        n = len(self.sides.start) - 1
+        which = differing(blocks, n, self._laws, before[0]) if held else np.ones(n, np.bool_)
+        self._rest = self._rest_after(*before) if held else None
+        if not held:
+            self._data[:] = self.base
+        matrix = self._data, self.base
+        fill(which, matrix, pattern.places, pattern.step, blocks, tuple(self.sides), self.rows, self._laws)
+        return symmetric, ContactStiffness(*self._laws)
+
+    def _rest_after(self, laws: tuple[np.ndarray, ...], side: np.ndarray) -> np.ndarray | None:
+        """(6 n,) residual of the last solution with the present laws and right side, from that with the ``laws`` and
+        right ``side`` before: only contacts in other states change it."""
+        pattern, found = self._six_rows, self.found
+        assert pattern.solver is not None
+        if pattern.solver.rest is None or self._near is None:
+            return None
+        rest = pattern.solver.rest + (self._side - side)
+        blocks = found.block, found.other, pattern.order
+        take_change(rest, blocks, pattern.unknowns, self.rows, self._motion, laws, self._laws)
+        return rest
+
+    def _rest_of_near(self, within: float) -> np.ndarray | None:
+        return self._rest if within > RESIDUAL else None
+
+    @property
+    def _six_rows(self) -> SixRowPattern:
+        assert isinstance(self.pattern, SixRowPattern)
+        return self.pattern
 
     def _forces(
         self, unknowns: np.ndarray, state: np.ndarray, direction: np.ndarray, springs: Springs, gap: np.ndarray
     ) -> np.ndarray:
-        pattern, found = self.pattern, self.found
-        assert isinstance(pattern, SixRowPattern)
+        pattern, found = self._six_rows, self.found
         blocks = found.block, found.other, pattern.order
-        across, along = moved(unknowns, blocks, (pattern.more, pattern.rows), self.rows).T
+        self._motion = moved(unknowns, blocks, pattern.unknowns, self.rows)
+        across, along = self._motion.T
         out = np.zeros((len(found), 4))
         out[:, 2], out[:, 3] = gap + across - springs.lift * along, along
         closed = state != OPEN

@@ -227,7 +227,7 @@ class Glue:
         push_springs(
             right,
             self.blocks(pattern.order),
-            (pattern.more, pattern.rows),
+            pattern.unknowns,
             self.vectors,
             self.springs[:, None] * self.before,
         )
@@ -242,7 +242,7 @@ class Glue:
 
     def change(self, unknowns: np.ndarray, pattern: SixRowPattern) -> np.ndarray:
         """(2 n, 2) elongation of the springs due to all ``unknowns`` (6 n,) of the step."""
-        return moved(unknowns, self.blocks(pattern.order), (pattern.more, pattern.rows), self.vectors)
+        return moved(unknowns, self.blocks(pattern.order), pattern.unknowns, self.vectors)
 
     def forces(self, change: np.ndarray, n_blocks: int) -> np.ndarray:
         """(n_blocks, 6) N: bond forces on the solver's first six unknowns after the elongation ``change`` (2 n, 2)."""
@@ -358,22 +358,22 @@ _jit = kept(fastmath={"contract"}, error_model="numpy", nogil=True)
 
 
 @kept(fastmath={"contract"}, error_model="numpy", nogil=True, **UNCOUNTED)
-def push_springs(right, blocks, rows, vectors, force):
+def push_springs(right, blocks, unknowns, vectors, force):
     """Subtract the normal and shear ``force`` (n, 2) of each spring from ``right``."""
     block, other, order = blocks
-    more, count = rows
+    unknown, at, size = unknowns
     for c in range(len(block)):
         for side in range(2):
             b = block[c] if side == 0 else other[c]
             if order[b] >= 0:
-                add_force(right, order[b], more[b], 6 * count[b], vectors[c, :, side], -force[c, 0], -force[c, 1])
+                add_force(right, unknown, at[b], size[b], vectors[c, :, side], -force[c, 0], -force[c, 1])
 
 
 @_jit
 def stiffen_springs(data, places, step, at, blocks, vectors, springs):
     """Add ``springs`` (n,), of equal normal and shear stiffness, to the flat matrix; ``at`` (n,) are pairs of the
     pattern."""
-    where, own_at, upper, lower, rows = places
+    where, own_at, upper, lower, size = places
     block, other, order = blocks
     given = np.empty((2, 2, vectors.shape[3]))
     for c in range(len(block)):
@@ -384,9 +384,9 @@ def stiffen_springs(data, places, step, at, blocks, vectors, springs):
         i, j, pair = block[c], other[c], at[c]
         one, two = vectors[c, :, 0], vectors[c, :, 1]
         if order[i] >= 0:
-            add_pair(data, where, own_at[i], step, rows[i], rows[i], given[0], one)
+            add_pair(data, where, own_at[i], step, size[i], size[i], given[0], one)
         if order[j] >= 0:
-            add_pair(data, where, own_at[j], step, rows[j], rows[j], given[1], two)
+            add_pair(data, where, own_at[j], step, size[j], size[j], given[1], two)
         if order[i] >= 0 and order[j] >= 0:
-            add_pair(data, where, upper[pair], step, rows[i], rows[j], given[0], two)
-            add_pair(data, where, lower[pair], step, rows[j], rows[i], given[1], one)
+            add_pair(data, where, upper[pair], step, size[i], size[j], given[0], two)
+            add_pair(data, where, lower[pair], step, size[j], size[i], given[1], one)

@@ -381,9 +381,9 @@ def assemble_contacts(
 
 def solve(
     pattern: Pattern, data: np.ndarray, right: np.ndarray, symmetric: bool, force: float = 0.0, alternate: bool = False,
-    near: np.ndarray | None = None, within: float = RESIDUAL,
+    near: tuple[np.ndarray | None, np.ndarray | None] = (None, None), within: float = RESIDUAL,
 ) -> np.ndarray:  # fmt: skip
-    """Unknowns (6 n,) in the pattern's order; ``force``, ``near``, ``within`` and ``alternate`` as for
+    """Unknowns (6 n,) in the pattern's order; ``force``, ``near`` with its residual, ``within`` and ``alternate`` as for
     `BlockSolver.solve`. Overwrites ``data`` when dense. Raises numpy.linalg.LinAlgError."""
     pattern.add_links(data)
     if pattern.solver is None:
@@ -399,4 +399,4 @@ def solve(
             raise np.linalg.LinAlgError(f"the step's matrix is singular (unknown {info - 1})")
         return x
     solver = pattern.solver.alternate if alternate else pattern.solver
-    return solver.solve(data, right, within, force, near)
+    return solver.solve(data, right, within, force, *near)

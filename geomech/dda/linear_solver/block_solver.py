@@ -154,17 +154,20 @@ class BlockSolver:
 
     ``points`` (n, 2) m: positions of the blocks; ``rows`` and ``columns`` (n_entries,) of the matrix blocks, both
     triangles and the diagonal, sorted by row, then column. The order of elimination is internal, or that of a ``tree``
-    planned for the same pattern. ``counts``: operations of this solver; ``work``: counters shared with other solvers.
+    planned for the same pattern. ``single``: number of blocks from which factors are in single precision. ``counts``:
+    operations of this solver; ``work``: counters shared with other solvers.
     ``single_only``: a matrix that single-precision factors cannot solve is given up, not factored in double.
     """
 
-    def __init__(self, points: np.ndarray, rows: np.ndarray, columns: np.ndarray, tree: Tree | None = None):
-        self.n = len(points)
+    def __init__(
+        self, points: np.ndarray, rows: np.ndarray, columns: np.ndarray, tree: Tree | None = None, single: int = SINGLE
+    ):  # fmt: skip
+        self.n, self._single_from = len(points), single
         self.keys = rows * self.n + columns
         self.pointer, self.columns = np.searchsorted(rows, np.arange(self.n + 1)), columns
         self._diagonal = np.flatnonzero(rows == columns)
         self._pattern = points, rows, columns
-        self._factors = Factors(points, rows, columns, np.float32 if self.n >= SINGLE else np.float64, tree)
+        self._factors = Factors(points, rows, columns, np.float32 if self.n >= single else np.float64, tree)
         self._factored = np.empty((self.n, 36))
         self._has_factors = False
         self._rough: Factors | None = None
@@ -173,6 +176,8 @@ class BlockSolver:
         self._make_room_for_directions()
         #: Largest entry of the residual of the last solution.
         self.left = 0.0
+        #: (6n,) the residual, where it is known.
+        self.rest: np.ndarray | None = None
         #: ``shares``: number of factorisations, partial ones counted by their share.
         self.work = Work()
         self.counts = {"factorisations": 0, "shares": 0.0, "substitutions": 0}
@@ -196,7 +201,7 @@ class BlockSolver:
         if not self.in_parts or 2 * self._factors.tree.own_room_size > KEPT:
             return self
         if self._alternate is None:
-            self._alternate = BlockSolver(*self._pattern, self._factors.tree)
+            self._alternate = BlockSolver(*self._pattern, self._factors.tree, self._single_from)
             self._alternate.work, self._alternate.counts = self.work, self.counts
         return self._alternate
 
@@ -218,25 +223,27 @@ class BlockSolver:
 
     def solve(
         self, data: np.ndarray, right: np.ndarray, within: float = RESIDUAL, force: float = 0.0,
-        near: np.ndarray | None = None,
+        near: np.ndarray | None = None, rest: np.ndarray | None = None,
     ) -> np.ndarray:  # fmt: skip
         """x (6n,) for the blocks ``data`` (36 n_entries,), each row by row. The residual is below ``within`` times
         ``right`` (or a larger ``force`` that others balance in it), or is round-off. ``near`` (6n,): a known
-        approximation of x. Raises numpy.linalg.LinAlgError."""
+        approximation of x; ``rest`` (6n,): its residual, if it is known: that of x is then not computed again but
+        carried along. Raises numpy.linalg.LinAlgError."""
+        self.rest = None
         largest = float(np.abs(right).max(initial=0.0))
         target = within * max(force, largest)
         if largest > 0.0:
             within = target / largest
         if self._factors.single:
             try:
-                x = self._solved(data, right, within, target, near)
+                x = self._solved(data, right, within, target, (near, rest))
             except np.linalg.LinAlgError:
                 x = None
             if x is not None:
                 return x
             # Not solvable in single precision, as for many contact states that are far from the right ones.
             self._go_on_in_double()
-        x = self._solved(data, right, within, target, near)
+        x = self._solved(data, right, within, target, (near, rest))
         assert x is not None  # in double precision there is always an answer, or an error
         return x
 
@@ -326,8 +333,9 @@ class BlockSolver:
         return self._rough
 
     def _solved(
-        self, data: np.ndarray, right: np.ndarray, within: float, target: float, near: np.ndarray | None
-    ) -> np.ndarray | None:
+        self, data: np.ndarray, right: np.ndarray, within: float, target: float,
+        near: tuple[np.ndarray | None, np.ndarray | None],
+    ) -> np.ndarray | None:  # fmt: skip
         """`solve` with the present factors, to residuals of ``target``; None if single precision does not suffice."""
         if self._has_factors:
             fresh = self._bring(data, 0 if self._factors.tree.kept else FEW)
@@ -339,7 +347,7 @@ class BlockSolver:
         self.factor(data)
         if self._factors.single:
             return self._iterate(data, right, within, target, self._factors, near)
-        x, at_roundoff = self.substitute(right), False
+        x, at_roundoff, self.rest = self.substitute(right), False, None
         for _ in range(REFINEMENTS):
             rest = right - self.multiply(data, x)
             self.left = largest = float(np.abs(rest).max())
@@ -395,24 +403,28 @@ class BlockSolver:
 
     def _iterate(
         self, data: np.ndarray, right: np.ndarray, within: float, target: float, factors: Factors,
-        near: np.ndarray | None = None, tries: int = TRIES, fresh: bool = True,
+        near: tuple[np.ndarray | None, np.ndarray | None], tries: int = TRIES, fresh: bool = True,
     ) -> np.ndarray | None:  # fmt: skip
-        """x (6n,) with a residual of ``target``, by ``factors`` of nearly the same matrix, starting from ``near`` if
-        given; None if it takes more than ``tries`` solutions with them, or, for ``fresh`` single-precision factors of
+        """x (6n,) with a residual of ``target``, by ``factors`` of nearly the same matrix, starting from ``near`` and its
+        residual if given; None if it takes more than ``tries`` solutions with them, or, for ``fresh`` single-precision factors of
         this matrix, more than `CYCLES` times that."""
         known, at_roundoff = self._directions, False
         known.forget()
-        x = self.substitute(right, factors) if near is None else near.copy()
+        x = self.substitute(right, factors) if near[0] is None else near[0].copy()
+        carried = near[1] is not None
         for cycle in range(CYCLES):
-            rest = right - self.multiply(data, x)
+            rest = near[1].copy() if near[1] is not None and not cycle else right - self.multiply(data, x)
             largest = float(np.abs(rest).max(initial=0.0))
             # The round-off is computed only where it may decide, and once; a coarse solution need not know it.
-            if largest > target and not at_roundoff and (cycle or within <= COARSE):
+            if largest > target and not at_roundoff and (cycle or (within <= COARSE and not carried)):
                 target, at_roundoff = max(target, self._round_off(data, x)), True
-            self.left = largest
+            self.left, self.rest = largest, rest
             if largest <= target:
                 return x
             enough = self._follow(data, x, rest, largest, target, factors, known, tries)
+            if enough and carried:
+                self.left = float(np.abs(rest).max())
+                return x
             if not (enough or (fresh and factors.single and np.abs(rest).max() <= FALLS * largest)):
                 return None
         return None

@@ -194,9 +194,10 @@ def _dissected(orders, pointer, neighbour, leaf, large, least_part, across):
     return blocks, begins[: fronts + 1].copy(), parent[:fronts].copy()
 
 
-def dissect(points: np.ndarray, pointer: np.ndarray, neighbour: np.ndarray) -> tuple[np.ndarray, ...]:
+def dissect(points: np.ndarray, pointer: np.ndarray, neighbour: np.ndarray, leaf: int = LEAF) -> tuple[np.ndarray, ...]:
     """The blocks (n,) front by front, the start of each front among them (n_fronts + 1,), and its parent (n_fronts,),
-    in postorder. ``points`` (n, 2): positions of the blocks; ``pointer`` and ``neighbour``: which blocks meet.
+    in postorder. ``points`` (n, 2): positions of the blocks; ``pointer`` and ``neighbour``: which blocks meet; ``leaf``:
+    blocks in a leaf.
 
     A part is cut across the direction in which the separator, the smaller of the two rows of blocks along the cut, is
     smallest: bricks, for example, are many per metre upwards and few along a course.
@@ -204,7 +205,7 @@ def dissect(points: np.ndarray, pointer: np.ndarray, neighbour: np.ndarray) -> t
     directions = _MANY if len(points) >= _LARGE else _TWO
     across = np.abs(directions).max(axis=0) > 1.0 - 1e-9
     orders = np.ascontiguousarray(np.argsort(points @ directions, axis=0, kind="stable").T)
-    return _dissected(orders, pointer, neighbour, LEAF, _LARGE, _LEAST, across)
+    return _dissected(orders, pointer, neighbour, leaf, _LARGE, _LEAST, across)
 
 
 @part(fastmath=False, error_model="numpy", nogil=True, **UNCOUNTED)
@@ -290,12 +291,12 @@ def _places(row, column, entry, entries, pivots, reach, boundary):
     return rows, columns
 
 
-def plan(points: np.ndarray, rows: np.ndarray, columns: np.ndarray) -> Tree:
+def plan(points: np.ndarray, rows: np.ndarray, columns: np.ndarray, cut: tuple[np.ndarray, ...] | None = None) -> Tree:
     """The tree for matrix blocks at (``rows``, ``columns``), both triangles and the diagonal, sorted by row then
-    column."""
+    column; with the fronts of ``cut`` if given, as from `dissect`."""
     n = len(points)
     pointer = np.searchsorted(rows, np.arange(n + 1))
-    blocks, pivots, parent = dissect(points, pointer, columns)
+    blocks, pivots, parent = dissect(points, pointer, columns) if cut is None else cut
     n_fronts = len(parent)
     rank = np.empty(n, np.int64)
     rank[blocks] = np.arange(n)

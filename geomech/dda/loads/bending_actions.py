@@ -97,7 +97,7 @@ class BendingActions(StepActions):
         push = (at_rest - stiffness * self.bolts.pairs.shift).T.ravel()
         block, other, rows = self._springs()
         force = np.stack([-push, np.zeros_like(push)], axis=1)
-        push_springs(right, (block, other, pattern.order), (pattern.more, pattern.rows), rows, force)
+        push_springs(right, (block, other, pattern.order), pattern.unknowns, rows, force)
         at = n_contacts + np.tile(np.arange(len(self.bolts.number)), 2)
         stiffen_springs(
             data, pattern.places, pattern.step, at, (block, other, pattern.order), rows, stiffness.T.ravel()
@@ -154,7 +154,7 @@ class BendingActions(StepActions):
             settled = settle(pattern, matrix, right, found, gap)
             block, other, rows = self._springs()
             along = moved(
-                settled.unknowns.ravel(), (block, other, pattern.order), (pattern.more, pattern.rows), rows
+                settled.unknowns.ravel(), (block, other, pattern.order), pattern.unknowns, rows
             )[:, 0]  # fmt: skip
             self._motion = self.bolts.pairs.shift + along.reshape(2, -1).T
             if self.bolts.take_states(self._motion):

@@ -164,8 +164,9 @@ class Equations:
         state, direction, bonded = states.state, states.direction, states.bonded
         try:
             unknowns = assembly.solve(
-                pattern, self._data, self._side, symmetric, self._force, near=self._near, within=within
-            )
+                pattern, self._data, self._side, symmetric, self._force, near=(self._near, self._rest_of_near(within)),
+                within=within,
+            )  # fmt: skip
         except np.linalg.LinAlgError as error:
             raise Unsettled(str(error)) from error
         if not np.isfinite(unknowns).all():
@@ -185,6 +186,11 @@ class Equations:
             faces, before = tuple(FaceBonds.of(found.faces)), (found.normal, found.shear)
             check_faces(faces, forces, before, tried, strengths, self.slack, tuple(called), violation)
         return Answer(unknowns, forces, States(*called), violation, missed, slip, springs, gap)
+
+    def _rest_of_near(self, within: float) -> np.ndarray | None:
+        """(6 n,) residual of the last solution in the present equations, if it is known accurately enough for a solution
+        to ``within``."""
+        return None
 
     def first_bonds(self, states: States, answer: Answer, which: np.ndarray) -> np.ndarray:
         """(n,) bool: those of the bonds ``which`` (n,) bool that break first on the faces of their blocks under a load
