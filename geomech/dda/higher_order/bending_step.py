@@ -258,7 +258,8 @@ class BendingAttempt(Attempt):
             glue.stiffen(base, pattern, len(contacts) + n_bolts, self.system.scheme.weight)
         if self.actions is not None:
             self.actions.add(full.ravel(), base, pattern, len(contacts))
-        return {"right": full, "base": base, "rows": rows}
+        alone = glue is None and (self.actions is None or not self.actions.n_bolts)
+        return {"right": full, "base": base, "rows": rows, "own": (own, self.own_at) if alone else None}
 
     def _drive(self, own: np.ndarray, right: np.ndarray, pattern: SixRowPattern) -> Glue | None:
         """Impose prescribed motion on the blocks' matrices ``own`` and on ``right`` (6 n,), in place; returns the glue as it

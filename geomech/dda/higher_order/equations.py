@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -11,7 +12,7 @@ from ..equation_records import ContactStiffness
 from ..joint_laws.penalty_springs import Springs
 from ..linear_solver.block_solver import RESIDUAL
 from ..open_close.equations import Equations
-from .six_row_system import SixRowPattern, differing, fill, moved, springs_in_states, take_change
+from .six_row_system import SixRowPattern, differing, fill, moved, springs_in_states, take_change, times
 
 
 @dataclass(eq=False)
@@ -19,11 +20,12 @@ class HigherOrderEquations(Equations):
     """As `Equations`, for all unknowns (`six_row_system`).
 
     ``base`` is the flat matrix without contacts; ``right`` (n, 6) and ``rows`` (n_contacts, 2, 2, w) refer to all
-    unknowns.
+    unknowns. ``own``: the blocks' own matrices and their starts (`six_row_system.fill_own`), if ``base`` has nothing else.
     """
 
     base: np.ndarray = field(default_factory=lambda: np.empty(0))
     rows: np.ndarray = field(default_factory=lambda: np.empty((0, 2, 2, 6)))
+    own: tuple[np.ndarray, np.ndarray] | None = None
     first_order = False
 
     def __post_init__(self) -> None:
@@ -64,6 +66,22 @@ class HigherOrderEquations(Equations):
 
     def _rest_of_near(self, within: float) -> np.ndarray | None:
         return self._rest if within > RESIDUAL else None
+
+    @property
+    def _product(self) -> Callable[[np.ndarray], np.ndarray] | None:
+        """Multiplies with blocks and contacts one by one, which are fewer numbers than the matrix has: for 1 000 blocks of
+        order 3 these do not fit the cache."""
+        if self.own is None:
+            return None
+        pattern, found, own = self._six_rows, self.found, self.own
+        blocks = found.block, found.other, pattern.order
+
+        def product(x: np.ndarray) -> np.ndarray:
+            out = np.zeros(len(x))
+            out[pattern.unknown] = times(x[pattern.unknown], own, pattern.unknowns[1:], blocks, self.rows, self._laws)
+            return out
+
+        return product
 
     @property
     def _six_rows(self) -> SixRowPattern:

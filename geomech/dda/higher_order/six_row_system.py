@@ -22,10 +22,24 @@ from ..linear_solver import assembly
 from ..linear_solver.assembly import spring_in_state
 from ..linear_solver.block_solver import BlockSolver
 from ..linear_solver.nested_dissection import LEAF, dissect, plan
+from ..linear_solver.simd import (
+    BYTES,
+    load_first,
+    numbers,
+    plus_product,
+    spread,
+    store,
+    store_first,
+    sums,
+    zeros,
+)
 
 #: Number of rows of six from which factors are in single precision: with four rows a block they take half the time of
 #: double ones, and a solution two substitutions more (`geomech bench order`: walls of 1 000 blocks).
 SINGLE_ROWS = 500
+
+#: Numbers in a register.
+LANES = BYTES // 8
 
 _jit = kept(fastmath={"contract"}, error_model="numpy", nogil=True)
 
@@ -372,6 +386,82 @@ def take_change(rest, blocks, unknowns, vectors, motion, before, laws):
                 b = block[c] if side == 0 else other[c]
                 if order[b] >= 0:
                     add_force(rest, unknown, at[b], size[b], vectors[c, :, side], -push, -drag)
+
+
+@part(fastmath=False, error_model="numpy", nogil=True, **UNCOUNTED)
+def _six_rows(rows, at, apart, x, begin, n):
+    """Products of six ``rows`` of n numbers, from ``at`` on and this far ``apart``, with ``x``: a register."""
+    s0 = s1 = s2 = s3 = s4 = s5 = zeros(rows)
+    for j in range(0, n, LANES):
+        k, r = min(LANES, n - j), at + j
+        v = load_first(x, begin + j, k)
+        s0, s1 = plus_product(s0, load_first(rows, r, k), v), plus_product(s1, load_first(rows, r + apart, k), v)
+        s2 = plus_product(s2, load_first(rows, r + 2 * apart, k), v)
+        s3 = plus_product(s3, load_first(rows, r + 3 * apart, k), v)
+        s4 = plus_product(s4, load_first(rows, r + 4 * apart, k), v)
+        s5 = plus_product(s5, load_first(rows, r + 5 * apart, k), v)
+    return sums(s0, s1, s2, s3, s4, s5)
+
+
+@part(fastmath=False, error_model="numpy", nogil=True, **UNCOUNTED)
+def _add_motion(across, along, rows, at, apart, x, begin, n):
+    """Add to the registers of the motion ``across`` and ``along`` a face that of one block, whose ``rows`` begin at ``at``,
+    this far ``apart``."""
+    for j in range(0, n, LANES):
+        k = min(LANES, n - j)
+        v = load_first(x, begin + j, k)
+        across = plus_product(across, load_first(rows, at + j, k), v)
+        along = plus_product(along, load_first(rows, at + apart + j, k), v)
+    return across, along
+
+
+@part(fastmath=False, error_model="numpy", nogil=True, **UNCOUNTED)
+def _add_forces(out, begin, rows, at, apart, n, room):
+    """Add the forces normal to and along a face, which stand in ``room``, to ``out``; other arguments as in `_add_motion`."""
+    push, drag = spread(room, 0), spread(room, 1)
+    for j in range(0, n, LANES):
+        k = min(LANES, n - j)
+        total = plus_product(load_first(out, begin + j, k), push, load_first(rows, at + j, k))
+        store_first(out, begin + j, plus_product(total, drag, load_first(rows, at + apart + j, k)), k)
+
+
+@_jit
+def times(x, own, unknowns, blocks, vectors, laws):
+    """(m,) product of the matrix with ``x`` (m,), the unknowns block after block.
+
+    ``own`` as in `fill_own`; ``unknowns``: where those of each block begin, and their number; other arguments as in
+    `fill`."""
+    matrices, begins = own
+    at, size = unknowns
+    block, other, order = blocks
+    normal, shear, slope, lift = laws
+    out, buffer, width = np.zeros(len(x)), np.zeros(LANES), vectors.shape[3]
+    given, taken, room, own_rows, rows = numbers(x), numbers(out), numbers(buffer), numbers(matrices), numbers(vectors)
+    for b in range(len(size)):
+        if order[b] >= 0:
+            n, row = size[b], (size[b] + 5) // 6 * 6
+            for i in range(0, n, 6):
+                six = _six_rows(own_rows, begins[b] + i * row, row, given, at[b], n)
+                store_first(taken, at[b] + i, six, min(6, n - i))
+    for c in range(len(block)):
+        if normal[c] == 0.0 and shear[c] == 0.0:
+            continue
+        here, one, two, b = 4 * width * c, zeros(room), zeros(room), block[c]
+        if order[b] >= 0:
+            one, two = _add_motion(one, two, rows, here, 2 * width, given, at[b], size[b])
+        b = other[c]
+        if order[b] >= 0:
+            one, two = _add_motion(one, two, rows, here + width, 2 * width, given, at[b], size[b])
+        store(room, 0, sums(one, two, one, two, one, two))
+        across, along = buffer[0], buffer[1]
+        buffer[0] = normal[c] * (across - lift[c] * along)
+        buffer[1] = buffer[0] * slope[c] + shear[c] * along
+        for side in range(2):
+            b = block[c] if side == 0 else other[c]
+            if order[b] >= 0:
+                _add_forces(taken, at[b], rows, here + side * width, 2 * width, size[b], room)
+    # Keeps the arrays alive, which are addressed by pointers above.
+    return out[: len(x) + 0 * (len(matrices) + len(vectors) + len(buffer))]
 
 
 @part(fastmath={"contract"}, error_model="numpy", nogil=True, **UNCOUNTED)

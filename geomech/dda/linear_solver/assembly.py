@@ -6,6 +6,7 @@ Fixed blocks have no unknowns.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -382,9 +383,10 @@ def assemble_contacts(
 def solve(
     pattern: Pattern, data: np.ndarray, right: np.ndarray, symmetric: bool, force: float = 0.0, alternate: bool = False,
     near: tuple[np.ndarray | None, np.ndarray | None] = (None, None), within: float = RESIDUAL,
+    product: Callable[[np.ndarray], np.ndarray] | None = None,
 ) -> np.ndarray:  # fmt: skip
-    """Unknowns (6 n,) in the pattern's order; ``force``, ``near`` with its residual, ``within`` and ``alternate`` as for
-    `BlockSolver.solve`. Overwrites ``data`` when dense. Raises numpy.linalg.LinAlgError."""
+    """Unknowns (6 n,) in the pattern's order; ``force``, ``near`` with its residual, ``within``, ``product`` and
+    ``alternate`` as for `BlockSolver.solve`. Overwrites ``data`` when dense. Raises numpy.linalg.LinAlgError."""
     pattern.add_links(data)
     if pattern.solver is None:
         from scipy.linalg.lapack import dgesv, dposv
@@ -399,4 +401,4 @@ def solve(
             raise np.linalg.LinAlgError(f"the step's matrix is singular (unknown {info - 1})")
         return x
     solver = pattern.solver.alternate if alternate else pattern.solver
-    return solver.solve(data, right, within, force, *near)
+    return solver.solve(data, right, within, force, *near, product)

@@ -178,6 +178,7 @@ class BlockSolver:
         self.left = 0.0
         #: (6n,) the residual, where it is known.
         self.rest: np.ndarray | None = None
+        self._product: Callable[[np.ndarray], np.ndarray] | None = None
         #: ``shares``: number of factorisations, partial ones counted by their share.
         self.work = Work()
         self.counts = {"factorisations": 0, "shares": 0.0, "substitutions": 0}
@@ -224,12 +225,14 @@ class BlockSolver:
     def solve(
         self, data: np.ndarray, right: np.ndarray, within: float = RESIDUAL, force: float = 0.0,
         near: np.ndarray | None = None, rest: np.ndarray | None = None,
+        product: Callable[[np.ndarray], np.ndarray] | None = None,
     ) -> np.ndarray:  # fmt: skip
         """x (6n,) for the blocks ``data`` (36 n_entries,), each row by row. The residual is below ``within`` times
         ``right`` (or a larger ``force`` that others balance in it), or is round-off. ``near`` (6n,): a known
         approximation of x; ``rest`` (6n,): its residual, if it is known: that of x is then not computed again but
-        carried along. Raises numpy.linalg.LinAlgError."""
-        self.rest = None
+        carried along. ``product``: function that multiplies with the matrix, if there is a faster one. Raises
+        numpy.linalg.LinAlgError."""
+        self.rest, self._product = None, product
         largest = float(np.abs(right).max(initial=0.0))
         target = within * max(force, largest)
         if largest > 0.0:
@@ -399,6 +402,8 @@ class BlockSolver:
 
     def multiply(self, data: np.ndarray, x: np.ndarray) -> np.ndarray:
         """The product with the matrix of ``data``."""
+        if self._product is not None:
+            return self._product(x)
         return multiply(data, self.pointer, self.columns, x)
 
     def _iterate(

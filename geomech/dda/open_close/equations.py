@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -165,7 +166,7 @@ class Equations:
         try:
             unknowns = assembly.solve(
                 pattern, self._data, self._side, symmetric, self._force, near=(self._near, self._rest_of_near(within)),
-                within=within,
+                within=within, product=self._product,
             )  # fmt: skip
         except np.linalg.LinAlgError as error:
             raise Unsettled(str(error)) from error
@@ -186,6 +187,11 @@ class Equations:
             faces, before = tuple(FaceBonds.of(found.faces)), (found.normal, found.shear)
             check_faces(faces, forces, before, tried, strengths, self.slack, tuple(called), violation)
         return Answer(unknowns, forces, States(*called), violation, missed, slip, springs, gap)
+
+    @property
+    def _product(self) -> Callable[[np.ndarray], np.ndarray] | None:
+        """A function that multiplies with the matrix faster than its entries do."""
+        return None
 
     def _rest_of_near(self, within: float) -> np.ndarray | None:
         """(6 n,) residual of the last solution in the present equations, if it is known accurately enough for a solution
