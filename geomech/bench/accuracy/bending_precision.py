@@ -5,6 +5,9 @@ elastic energy, half the work of the load: for a cantilever of slenderness 8 wit
 smooth except at the ends, and for Cook's membrane, whose stress is singular at the upper corner of the clamp. The
 reference is finite elements (`geomech.bench.peers.quadratic_quads`) with 66 690 unknowns, for the membrane extrapolated
 to four digits. Everything is timed in one run of one process, from given blocks or a given grid to the energy.
+
+A wall under sudden weight shows what an open–close iteration of many blocks costs at orders 2 and 3. Steps of all orders
+alternate, so that other work on the machine slows all of them.
 """
 
 from __future__ import annotations
@@ -15,6 +18,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ...model import Blocks, DdaSettings, EdgeTraction, History, JointLaw, Loads, Material, State
+from ..cost import block_scenes
+from ..cost.block_cost import TIME_STEP
 from ..figures import Measured, Point, stopwatch
 from ..peers import finite_elements
 
@@ -24,6 +29,9 @@ ONE, CELLS, STRAINED, FEM = "one block", "cells", "sub-blocks of first order, gl
 _CLAMP = 1e6
 #: Number of repetitions, of which the shortest counts.
 _TIMES = 3
+#: Bricks of the wall, in a quick and in a full run, and its steps. Those of order 1 are as many times as many.
+_BRICKS, _STEPS, _MORE = (100, 1000), 4, 4
+WALL_ORDERS = 1, 2, 3
 
 
 @dataclass(frozen=True)
@@ -71,9 +79,60 @@ def measure(quick: bool = False) -> Measured:
     """The table; ``quick`` takes two sizes of each."""
     points = list(_points(2 if quick else 4))
     named = [(f"{p.problem}, {p.method}: {p.size:g}", p) for p in points]
-    return Measured.of(
-        table(points), errors={name: p.error for name, p in named}, times={name: p.seconds for name, p in named}
-    )
+    bricks = _BRICKS[not quick]
+    costs = wall_iterations(bricks)
+    times = {name: p.seconds for name, p in named}
+    times |= {f"wall of {bricks} bricks, order {order}: iteration": cost for order, cost in costs.items()}
+    text = f"{table(points)}\n{wall_table(bricks, costs)}"
+    return Measured.of(text, errors={name: p.error for name, p in named}, times=times)
+
+
+def wall_iterations(bricks: int, steps: int = _STEPS) -> dict[int, float]:
+    """order → CPU seconds of an open–close iteration of a wall of ``bricks`` under sudden weight, all work of the first
+    ``steps`` steps included."""
+    small = {order: _Wall(100, order) for order in WALL_ORDERS}
+    walls = {order: _Wall(bricks, order) for order in WALL_ORDERS}
+    for order in WALL_ORDERS:  # compiles
+        small[order].step()
+        small[order].step()
+    for _ in range(steps):
+        for order, wall in walls.items():
+            for _ in range(_MORE if order == 1 else 1):
+                wall.step()
+    return {order: wall.seconds / wall.iterations for order, wall in walls.items()}
+
+
+class _Wall:
+    """A wall of about ``bricks`` of this ``order``; ``seconds`` and ``iterations`` of its steps so far."""
+
+    def __init__(self, bricks: int, order: int) -> None:
+        from ...dda import BlockSystem
+
+        blocks = block_scenes.wall(bricks)
+        if order > 1:
+            blocks = replace(blocks, order=np.where(blocks.fixed, 1, order))
+        self.system = BlockSystem(
+            blocks, [block_scenes.ROCK], [block_scenes.JOINT], settings=block_scenes.settings(TIME_STEP)
+        )
+        self.state, self.seconds, self.iterations = State.at_rest(blocks), 0.0, 0.0
+
+    def step(self) -> None:
+        work = self.system.work
+        known, spent_on = work.factorisations + work.factorisations_kept, stopwatch()
+        result = self.system.step(self.state, block_scenes.WEIGHT)
+        self.seconds += spent_on()
+        iterations = result.statistics["open_close_iterations"]
+        if result.statistics["step_cuts"]:
+            # Attempts that were cut count too.
+            iterations = max(iterations, work.factorisations + work.factorisations_kept - known)
+        self.iterations += iterations
+        self.state = result.state
+
+
+def wall_table(bricks: int, costs: dict[int, float]) -> str:
+    """Cost of an iteration of each order, and its ratio to that of order 1."""
+    row = "   ".join(f"{order}: {1e3 * cost:.1f} ({cost / costs[1]:.1f})" for order, cost in costs.items())
+    return f"open-close iteration of a wall of {bricks} bricks: order: ms (times that of order 1)\n  {row}"
 
 
 def energy(panel: Panel, n: int, order: int, *, glued: bool = True) -> float:

@@ -31,7 +31,8 @@ class HigherOrderEquations(Equations):
     def __post_init__(self) -> None:
         super().__post_init__()
         self._laws: tuple[np.ndarray, ...] = ()
-        self._motion, self._rest = np.zeros((0, 2)), None
+        self._motion = np.zeros((0, 2))
+        self._rest: np.ndarray | None = None
 
     def _assembled(self, state: np.ndarray, direction: np.ndarray, springs: Springs, gap: np.ndarray):
         pattern, found, held = self._six_rows, self.found, self._held is not None

@@ -154,20 +154,21 @@ class BlockSolver:
 
     ``points`` (n, 2) m: positions of the blocks; ``rows`` and ``columns`` (n_entries,) of the matrix blocks, both
     triangles and the diagonal, sorted by row, then column. The order of elimination is internal, or that of a ``tree``
-    planned for the same pattern. ``single``: number of blocks from which factors are in single precision. ``counts``:
+    planned for the same pattern. ``single``: number of blocks from which factors are in single precision, else `SINGLE`. ``counts``:
     operations of this solver; ``work``: counters shared with other solvers.
     ``single_only``: a matrix that single-precision factors cannot solve is given up, not factored in double.
     """
 
     def __init__(
-        self, points: np.ndarray, rows: np.ndarray, columns: np.ndarray, tree: Tree | None = None, single: int = SINGLE
+        self, points: np.ndarray, rows: np.ndarray, columns: np.ndarray, tree: Tree | None = None,
+        single: int | None = None,
     ):  # fmt: skip
-        self.n, self._single_from = len(points), single
+        self.n, self._single_from = len(points), SINGLE if single is None else single
         self.keys = rows * self.n + columns
         self.pointer, self.columns = np.searchsorted(rows, np.arange(self.n + 1)), columns
         self._diagonal = np.flatnonzero(rows == columns)
         self._pattern = points, rows, columns
-        self._factors = Factors(points, rows, columns, np.float32 if self.n >= single else np.float64, tree)
+        self._factors = Factors(points, rows, columns, np.float32 if self.n >= self._single_from else np.float64, tree)
         self._factored = np.empty((self.n, 36))
         self._has_factors = False
         self._rough: Factors | None = None
