@@ -381,12 +381,12 @@ def assemble_contacts(
 
 
 def solve(
-    pattern: Pattern, data: np.ndarray, right: np.ndarray, symmetric: bool, force: float = 0.0, alternate: bool = False,
+    pattern: Pattern, data: np.ndarray, right: np.ndarray, symmetric: bool, force: float = 0.0,
     near: tuple[np.ndarray | None, np.ndarray | None] = (None, None), within: float = RESIDUAL,
     product: Callable[[np.ndarray], np.ndarray] | None = None,
 ) -> np.ndarray:  # fmt: skip
-    """Unknowns (6 n,) in the pattern's order; ``force``, ``near`` with its residual, ``within``, ``product`` and
-    ``alternate`` as for `BlockSolver.solve`. Overwrites ``data`` when dense. Raises numpy.linalg.LinAlgError."""
+    """Unknowns (6 n,) in the pattern's order; ``force``, ``near`` with its residual, ``within`` and ``product`` as for
+    `BlockSolver.solve`. Overwrites ``data`` when dense. Raises numpy.linalg.LinAlgError."""
     pattern.add_links(data)
     if pattern.solver is None:
         from scipy.linalg.lapack import dgesv, dposv
@@ -400,5 +400,4 @@ def solve(
         if info != 0:
             raise np.linalg.LinAlgError(f"the step's matrix is singular (unknown {info - 1})")
         return x
-    solver = pattern.solver.alternate if alternate else pattern.solver
-    return solver.solve(data, right, within, force, *near, product)
+    return pattern.solver.solve(data, right, within, force, *near, product)

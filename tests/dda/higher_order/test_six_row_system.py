@@ -71,7 +71,7 @@ def test_what_iterations_carry_along_is_what_they_would_compute(orders, monkeypa
             seen["again"] += 1
         return out
 
-    def solved(pattern, data, right, symmetric, force=0.0, alternate=False, near=(None, None), **named):
+    def solved(pattern, data, right, symmetric, force=0.0, near=(None, None), **named):
         if pattern.solver is not None:
             x = np.random.default_rng(1).normal(size=len(right))
             x[np.setdiff1d(np.arange(len(right)), pattern.unknown)] = 0.0
@@ -83,7 +83,7 @@ def test_what_iterations_carry_along_is_what_they_would_compute(orders, monkeypa
                 size = block_solver.largest_terms(data, pattern.solver.pointer, pattern.solver.columns, near[0])
                 np.testing.assert_allclose(near[1], rest, rtol=0, atol=1e-13 * size)
                 seen["carried"] += 1
-        return solve(pattern, data, right, symmetric, force, alternate, near, **named)
+        return solve(pattern, data, right, symmetric, force, near, **named)
 
     monkeypatch.setattr(HigherOrderEquations, "_assembled", checked)
     monkeypatch.setattr(assembly, "solve", solved)
