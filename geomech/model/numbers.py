@@ -10,6 +10,14 @@ from typing import Any
 import numpy as np
 
 
+class FieldError(ValueError):
+    """A value that does not go with the others of its object; ``field`` is its name."""
+
+    def __init__(self, field: str, message: str) -> None:
+        super().__init__(message)
+        self.field = field
+
+
 @dataclass(frozen=True)
 class Number:
     """A range of numbers from ``least`` to ``most``; nan is never in it.

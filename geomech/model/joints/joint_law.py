@@ -5,8 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import NoReturn
 
-from ..numbers import Number, refuse_numbers
+from ..numbers import FieldError, Number, refuse_numbers
 
 #: Largest total friction angle of a rough joint at low normal stress (Barton & Choubey 1977), rad.
 STEEPEST = math.radians(70.0)
@@ -48,9 +49,8 @@ class Roughness:
             if value is not None and not (value > 0 and math.isfinite(value)):
                 raise ValueError(f"{what} of a rough joint must be positive, got {value!r} m")
         if self.length is not None and self.length < self.sample_length:
-            raise ValueError(
-                f"length of a rough joint must be at least its sample's, {self.sample_length:g} m, got {self.length!r} m"
-            )
+            why = f"must be at least its sample's, {self.sample_length:g} m, got {self.length!r} m"
+            raise FieldError("length", f"length of a rough joint {why}")
 
     @property
     def _scale(self) -> float:
@@ -130,28 +130,34 @@ class JointLaw:
             value = getattr(self, what)
             if value is not None and not 0 <= value < math.pi / 2:
                 radians = " (angles are in radians here)" if value > 1.6 else ""
-                self._refuse(f"{what.replace('_', ' ')} must lie in [0°, 90°), got {math.degrees(value):g}°{radians}")
+                self._refuse(
+                    what, f"{what.replace('_', ' ')} must lie in [0°, 90°), got {math.degrees(value):g}°{radians}"
+                )
         refuse_numbers(self, _NUMBERS, f"joint {self.name!r}")
         if math.isinf(self.cohesion) and self.softening_slip:
-            self._refuse("an infinite cohesion does not fall over a softening_slip")
+            self._refuse("softening_slip", "an infinite cohesion does not fall over a softening_slip")
         if self.residual_friction_angle is not None and self.residual_friction_angle > self.friction_angle:
             self._refuse(
+                "residual_friction_angle",
                 f"the residual friction angle ({math.degrees(self.residual_friction_angle):g}°) is above the peak "
-                f"({math.degrees(self.friction_angle):g}°)"
+                f"({math.degrees(self.friction_angle):g}°)",
             )
         if self.residual_cohesion > self.cohesion:
             self._refuse(
-                f"the residual cohesion ({self.residual_cohesion:g} Pa) is above the peak ({self.cohesion:g} Pa)"
+                "residual_cohesion",
+                f"the residual cohesion ({self.residual_cohesion:g} Pa) is above the peak ({self.cohesion:g} Pa)",
             )
         if self.dilation_angle > self.friction_angle:
             self._refuse(
+                "dilation_angle",
                 f"the dilation angle ({math.degrees(self.dilation_angle):g}°) is above the friction angle "
-                f"({math.degrees(self.friction_angle):g}°): sliding would yield work"
+                f"({math.degrees(self.friction_angle):g}°): sliding would yield work",
             )
         if self.max_closure is not None and self.normal_stiffness is None:
-            self._refuse("max_closure needs a normal_stiffness, the initial one")
+            self._refuse("max_closure", "max_closure needs a normal_stiffness, the initial one")
         if self.restitution is not None and self.normal_stiffness is not None:
-            self._refuse("restitution does not go with a normal_stiffness, whose spring gives an impact its rebound")
+            why = "restitution does not go with a normal_stiffness, whose spring gives an impact its rebound"
+            self._refuse("restitution", why)
         if self.roughness is not None:
             plain = JointLaw.__dataclass_fields__
             for what in (
@@ -159,14 +165,15 @@ class JointLaw:
                 "dilation_angle", "dilation_slip",
             ):  # fmt: skip
                 if getattr(self, what) != plain[what].default:
-                    self._refuse(f"{what} does not go with roughness, which has its own")
+                    self._refuse(what, f"{what} does not go with roughness, which has its own")
             if self.roughness.from_peak_slip and self.shear_stiffness is not None:
-                self._refuse("shear_stiffness is given, and is to follow from the slip of the peak as well")
+                why = "shear_stiffness is given, and is to follow from the slip of the peak as well"
+                self._refuse("shear_stiffness", why)
             if self.friction_angle >= STEEPEST:
-                self._refuse("the residual friction angle of a rough joint must be below 70°")
+                self._refuse("friction_angle", "the residual friction angle of a rough joint must be below 70°")
 
-    def _refuse(self, why: str) -> None:
-        raise ValueError(f"joint {self.name!r}: {why}")
+    def _refuse(self, field: str, why: str) -> NoReturn:
+        raise FieldError(field, f"joint {self.name!r}: {why}")
 
     @property
     def friction(self) -> float:

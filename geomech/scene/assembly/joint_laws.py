@@ -5,38 +5,40 @@ from __future__ import annotations
 import math
 
 from ...model import JointLaw, Roughness
+from ...model.numbers import FieldError
 from ..checks.check import Check
 from ..tables.entries import given
 from ..tables.rock import JointTable
 
 #: Keys of a rough joint that need its roughness.
 _OF_ROUGHNESS = ("joint_length_m", "sample_length_m", "stiffness_from_peak_slip")
-#: Text of a refused law → the key concerned, and the way out.
-_FAULTS = (
-    ("residual friction angle (", "residual_friction_angle_deg", "make it at most friction_angle_deg"),
-    ("residual cohesion (", "residual_cohesion_pa", "make it at most cohesion_pa"),
-    ("dilation angle (", "dilation_angle_deg", "make it at most friction_angle_deg"),
-    ("max_closure needs", "max_closure_m", "add normal_stiffness_pa_per_m, the stiffness where closure begins"),
-    ("cohesion does not go", "cohesion_pa", "leave it out, or leave out jrc and jcs_pa"),
-    ("tensile_strength does not go", "tensile_strength_pa", "leave it out, or leave out jrc and jcs_pa"),
-    ("residual_friction_angle does not", "residual_friction_angle_deg", "friction_angle_deg is the residual one"),
-    ("residual_cohesion does not go", "residual_cohesion_pa", "leave it out, or leave out jrc and jcs_pa"),
-    ("softening_slip does not go", "softening_slip_m", "leave it out: the roughness degrades anyway"),
-    ("dilation_angle does not go", "dilation_angle_deg", "leave it out: the roughness causes dilation anyway"),
-    ("dilation_slip does not go", "dilation_slip_m", "leave it out: the roughness causes dilation anyway"),
-    ("restitution does not go", "restitution", "leave it out, or leave out normal_stiffness_pa_per_m"),
-    ("shear_stiffness is given", "shear_stiffness_pa_per_m", "leave it out, or stiffness_from_peak_slip"),
-    ("below 70°", "friction_angle_deg", "with jrc it is the residual angle, without roughness"),
-    (
-        "length of a rough joint must be at least",
-        "joint_length_m",
-        "leave it out: the values of the sample are used then",
-    ),
-)
+_UNLESS_ROUGH = "leave it out, or leave out jrc and jcs_pa"
+#: Field of a law → its key, and the way out where its value does not go with those of other keys.
+_KEYS = {
+    "cohesion": ("cohesion_pa", _UNLESS_ROUGH),
+    "tensile_strength": ("tensile_strength_pa", _UNLESS_ROUGH),
+    "residual_friction_angle": ("residual_friction_angle_deg", "make it at most friction_angle_deg"),
+    "residual_cohesion": ("residual_cohesion_pa", "make it at most cohesion_pa"),
+    "softening_slip": ("softening_slip_m", "leave it out, or give a finite cohesion_pa"),
+    "dilation_angle": ("dilation_angle_deg", "make it at most friction_angle_deg"),
+    "max_closure": ("max_closure_m", "add normal_stiffness_pa_per_m, the stiffness where closure begins"),
+    "restitution": ("restitution", "leave it out, or leave out normal_stiffness_pa_per_m"),
+    "shear_stiffness": ("shear_stiffness_pa_per_m", "leave it out, or stiffness_from_peak_slip"),
+    "length": ("joint_length_m", "leave it out: the values of the sample are used then"),
+}
+#: The same for rough joints, where it differs.
+_KEYS_IF_ROUGH = _KEYS | {
+    "friction_angle": ("friction_angle_deg", "with jrc it is the residual angle, without roughness"),
+    "residual_friction_angle": ("residual_friction_angle_deg", "friction_angle_deg is the residual one"),
+    "residual_cohesion": ("residual_cohesion_pa", _UNLESS_ROUGH),
+    "softening_slip": ("softening_slip_m", "leave it out: the roughness degrades anyway"),
+    "dilation_angle": ("dilation_angle_deg", "leave it out: the roughness causes dilation anyway"),
+    "dilation_slip": ("dilation_slip_m", "leave it out: the roughness causes dilation anyway"),
+}
 
 
 def joint_law(name: str, joint: JointTable) -> JointLaw:
-    """The law of table ``joint``. Raises ValueError for inconsistent values."""
+    """The law of table ``joint``. Raises ValueError, for values that do not go together `FieldError`."""
     rough = None
     if joint.jrc is not None:
         rough = Roughness(
@@ -83,8 +85,9 @@ def check_joints(c: Check) -> None:
         try:
             laws[name] = joint_law(name, joint)
         except ValueError as error:
-            key, way = next(((key, way) for fragment, key, way in _FAULTS if fragment in str(error)), ("", ""))
-            c.refuse(("joints", name, key) if key else ("joints", name), str(error), way)
+            field = error.field if isinstance(error, FieldError) else ""
+            key, way_out = (_KEYS if joint.jrc is None else _KEYS_IF_ROUGH).get(field, ("", ""))
+            c.refuse(("joints", name, key) if key else ("joints", name), str(error), way_out)
     for name, crack in (c.tables.cracks or {}).items():
         if crack.joint in laws and not laws[crack.joint].straight:
             c.refuse(
