@@ -4,6 +4,7 @@ Every step solves M ā = (weight, loads, centrifugal force) + contacts − elast
 displacement d of the step, this is a balance of works. Each work equals a change of stored energy plus a loss:
 
     kinetic    d·M ā      = ΔT + (loss of the time scheme; none where d = ½ (v + v′) dt, as in Shi's)
+    loads      F̄·d        = ½ (F + F′)·d + (θ − ½) ΔF·d (`mean_loads`)
     elastic    A σ̄·Δε     = ΔU + ½ A (σ + σ′)·Δe_c (the strain of cracks) + (θ − ½) A Δσ·Δε
     contact   −N̄ Δn − S̄ Δs = ΔΦ + friction + dashpots + broken bonds + (θ − ½) k Δg² + (θ − ½) ΔS²/kₛ …
 
@@ -52,6 +53,7 @@ class StepEnergy(NamedTuple):
     residual         of the balance within the step: round-off
     impact           dissipated normal to the contact in impacts with a coefficient of restitution (`impacts`); their
                      friction is part of ``friction``
+    beyond_mean      work of the loads that the step takes beyond that of their mean, part of ``scheme`` (`mean_loads`)
     """
 
     kinetic: float
@@ -69,6 +71,7 @@ class StepEnergy(NamedTuple):
     overlap: float
     residual: float
     impact: float = 0.0
+    beyond_mean: float = 0.0
 
     @property
     def stored(self) -> float:
@@ -160,6 +163,7 @@ class ContactStep(NamedTuple):
     slip, sliding         plastic slip, and motion along the edge, m
     normal_force          acting over the step, N
     shear_force0, shear_force, end_shear    at its start, acting over it, and at its end, N
+    rubbing_normal, rubbing_shear           forces with which friction is computed, N (`mean_of_slip`)
     normal                stiffness without dashpot, N/m
     shear                 stiffness in the step (``theta`` times that of the spring), N/m. Both are 0 for multipliers,
                           which store no energy
@@ -181,10 +185,19 @@ class ContactStep(NamedTuple):
     shear_force0: np.ndarray
     shear_force: np.ndarray
     end_shear: np.ndarray
+    rubbing_normal: np.ndarray
+    rubbing_shear: np.ndarray
     normal: np.ndarray
     shear: np.ndarray
     theta: np.ndarray
     law: np.ndarray
+
+
+def mean_of_slip(before: np.ndarray, after: np.ndarray, whole: np.ndarray) -> np.ndarray:
+    """(n,) N: mean force of the slip of contacts in a static step between the forces ``before`` and ``after`` it, as that
+    of the loads; the latter where a bond has been lost (``whole`` (n,) bool is False). Where the force has changed its
+    sign, slip began when it was nearly at its end."""
+    return np.where(whole & (before * after >= 0.0), 0.5 * (before + after), after)
 
 
 #: Positions of the terms of `StepEnergy` in the sums of a step.
@@ -301,7 +314,8 @@ def _add_contacts(out, contacts, closure):
             lifted, slid = contacts.lifted[i], contacts.sliding[i]
             done = pushed * (g1 - g0 - contacts.arc[i] + lifted) + sheared * slid
             if state == SLIP:
-                frictional = -sheared * (contacts.slip[i] if give > 0.0 else slid) - pushed * lifted
+                frictional = -contacts.rubbing_shear[i] * (contacts.slip[i] if give > 0.0 else slid)
+                frictional -= contacts.rubbing_normal[i] * lifted
             if kn > 0.0:
                 start = g0 if was != OPEN and contacts.was_bonded[i] > 0 else min(g0, 0.0)
                 spring = -theta * _push(kn, g1, limit) - (1.0 - theta) * _push(kn, start, limit)
@@ -348,7 +362,8 @@ class EnergyBudget:
     start      stored at the start of the first step
     stored     stored now
     split      change of stored energy due to splitting or excavation of blocks (`cut`)
-    released   negative losses of the time scheme while cracks grew at constant load: energy released by growth
+    released   energy released by growth at constant load: negative losses of the time scheme while cracks grew, with the
+               loads at the end of each step; ``unpaid``: the same with their mean, as in ``losses``
     residual   stored + losses − work − overlap − split − start: energy added (> 0) or removed by updating the geometry
                between steps, and round-off
     turnover   energy converted: |gravity_work| + |load_work|, or the largest energy stored, whichever is larger
@@ -365,6 +380,7 @@ class EnergyBudget:
     warned: float = GAIN
     drawn: float = 0.0
     released: float = 0.0
+    unpaid: float = 0.0
 
     def after(self, step: StepEnergy, time: float = float("nan"), *, growing: bool = False) -> EnergyBudget:
         """The budget with one more step; logs a warning with the ``time`` when blocks have gained energy without work.
@@ -378,9 +394,10 @@ class EnergyBudget:
         work = abs(float(totals[_SUMS["gravity_work"]])) + abs(float(totals[_SUMS["load_work"]]))
         turnover = max(self.turnover, step.stored, step.before, work)
         warned = self.warned
-        released = self.released + (max(0.0, -step.scheme) if growing else 0.0)
+        released = self.released + (max(0.0, -step.scheme - step.beyond_mean) if growing else 0.0)
+        unpaid = self.unpaid + (max(0.0, -step.scheme) if growing else 0.0)
         # A negative loss of the scheme is a gain.
-        gain = residual - min(0.0, float(totals[_SUMS["scheme"]]) + released)
+        gain = residual - min(0.0, float(totals[_SUMS["scheme"]]) + unpaid)
         if gain > warned * turnover:
             log.warning(
                 "t = %g s: the blocks have gained %.3g J/m without work, %.2g of all converted energy: shorten the "
@@ -390,7 +407,7 @@ class EnergyBudget:
             warned = 2.0 * gain / turnover
         drawn = step.overlap if first else self.drawn
         return EnergyBudget(
-            self.steps + 1, step, start, totals, split, residual, turnover, False, warned, drawn, released
+            self.steps + 1, step, start, totals, split, residual, turnover, False, warned, drawn, released, unpaid
         )
 
     def cut(self) -> EnergyBudget:
@@ -398,7 +415,7 @@ class EnergyBudget:
         residual."""
         return EnergyBudget(
             self.steps, self.last, self.start, self.totals, self.split, self.residual, self.turnover,
-            self.last is not None, self.warned, self.drawn, self.released,
+            self.last is not None, self.warned, self.drawn, self.released, self.unpaid,
         )  # fmt: skip
 
     def __getattr__(self, name: str) -> float:

@@ -20,6 +20,7 @@ from .energy_balance import (
     StepEnergy,
     StepMotion,
     StepStress,
+    mean_of_slip,
     sliding,
     step_energies,
 )
@@ -45,6 +46,7 @@ from .kinematics.roundoff import undecided_gaps, warn_of_roundoff
 from .kinematics.simplex_integration import block_moments, mass_matrix
 from .linear_solver import assembly
 from .loads.load_vectors import AppliedForces, Inertia, generalised
+from .loads.mean_loads import BeyondMean, beyond_mean
 from .loads.prescribed_motion import MovedBlocks
 from .loads.step_actions import StepActions, effective_gravity
 from .loads.viscous_boundary import ViscousEdges
@@ -224,6 +226,7 @@ class Attempt:
         )
         self.points, self.edges = system.load_map.rows(loads, acting, midpoint.vertices, state.rotation + self.turn)
         self.load = midpoint.loads_back(generalised(self.points, self.edges, midpoint.centroid))
+        self._taken = loads, acting, (self.gravity, self.points, self.edges)
         self.actions = self._actions(loads, self.time if load_time is None else load_time)
 
     def _actions(self, loads: Loads, end: float) -> StepActions | None:
@@ -804,15 +807,20 @@ class Attempt:
     def _energy(self, load: np.ndarray, end_shear: np.ndarray) -> StepEnergy:
         """Terms of the energy balance under the generalised ``load``; contacts end the step with ``end_shear`` (n,)."""
         system, scheme, found, settled = self.system, self.system.scheme, self.found, self.settled
+        self.beyond_mean = self._beyond_mean()
         weight = self.weight if isinstance(self.weight, np.ndarray) else np.full(len(found), self.weight)
         impact, velocity = self.impact, self.velocity if self.impact is None else self.impact.without
         normal, shear = self._real_springs()
+        rubbing = settled.normal_force, settled.shear_force
+        if scheme.static:
+            whole = settled.bonded == found.bonded
+            rubbing = mean_of_slip(found.normal, rubbing[0], whole), mean_of_slip(found.shear, rubbing[1], whole)
         motion = StepMotion(self.increment, self.state.velocity, self.carried, velocity, self.acceleration, load)
         stress = StepStress(self.stress, self.tangent, self.stress0, system.compliance, system.stiffness)
         contacts = ContactStep(
             found.state, settled.state, found.bonded, settled.bonded, found.gap_before, settled.gap,
             found.arc + np.zeros(len(found)), settled.lifted, settled.slip, self.slid, settled.normal_force,
-            found.shear, settled.shear_force, end_shear, normal, shear, weight, found.law,
+            found.shear, settled.shear_force, end_shear, *rubbing, normal, shear, weight, found.law,
         )  # fmt: skip
         energies = step_energies(
             tuple(motion), tuple(stress), tuple(self._mass), tuple(scheme.terms(self.dt)), self.gravity, tuple(contacts),
@@ -840,12 +848,35 @@ class Attempt:
                 # The rest: impulses act at the end of the step, and displacements are straight.
                 scheme=energy.scheme + fallen + pulled - kinetic - impact.frictional - impact.lost,
             )
+        energy = self._at_mean_loads(energy)
         return energy._replace(
             before=energy.before + found.unbent + found.released,
             bond=energy.bond + found.unbent,
             friction=energy.friction + self.frictional,
             # Elastic energy released where faces separate is a vibration that no step resolves.
             scheme=energy.scheme - self.frictional + found.released,
+        )
+
+    def _beyond_mean(self) -> BeyondMean | None:
+        """The loads that the step takes beyond their mean over it."""
+        loads, acting, taken = self._taken
+        at = self.midpoint.vertices, self.state.rotation + self.turn
+        span = self.state.time, acting, self.dt
+        return beyond_mean(loads, span, self.system.scheme.static, taken, self.system.load_map, at)
+
+    def _at_mean_loads(self, energy: StepEnergy) -> StepEnergy:
+        """``energy`` with the work of the mean loads of the step; the rest of the work belongs to the scheme."""
+        if self.beyond_mean is None:
+            return energy
+        system, midpoint, free = self.system, self.midpoint, ~self.system.fixed
+        fallen = float(system.mass[free] @ (self.increment[free, :2] @ self.beyond_mean.gravity))
+        load = midpoint.loads_back(self.beyond_mean.load(midpoint.centroid))
+        pulled = float((load * self.increment).sum())
+        return energy._replace(
+            gravity_work=energy.gravity_work - fallen,
+            load_work=energy.load_work - pulled,
+            scheme=energy.scheme - fallen - pulled,
+            beyond_mean=energy.beyond_mean + fallen + pulled,
         )
 
     def _real_springs(self) -> tuple[np.ndarray, np.ndarray]:

@@ -532,7 +532,9 @@ class BendingAttempt(Attempt):
             u0 += self.glue.energy()
             u1 += self.glue.energy(self.glue_change)
             strained += self.glue.work(self.glue_change, scheme.weight)
-        lost = inertia - (after - kept) + strained - (u1 - u0)
+        beyond = self._work_beyond_mean(padded)
+        worked -= beyond
+        lost = inertia - (after - kept) + strained - (u1 - u0) - beyond
         stored = after + u1 - had - u0
         return energy._replace(
             kinetic=energy.kinetic + after,
@@ -541,10 +543,21 @@ class BendingAttempt(Attempt):
             load_work=energy.load_work + worked,
             damping=energy.damping + damped,
             scheme=energy.scheme + lost,
+            beyond_mean=energy.beyond_mean + beyond,
             carried=energy.carried + had - kept,
             crack_work=energy.crack_work + cracked,
             residual=energy.residual + stored - (worked - damped - lost - cracked - (had - kept)),
         )
+
+    def _work_beyond_mean(self, padded: np.ndarray) -> float:
+        """J/m: work of the loads beyond their mean over the step on the deflections ``padded`` (n_blocks, m)."""
+        if self.beyond_mean is None:
+            return 0.0
+        loads = [
+            factor * self.blocks.loads(points, edges, self.midpoint.vertices, self.angle)
+            for factor, points, edges in self.beyond_mean.parts
+        ]
+        return float(sum((load * padded).sum() for load in loads))
 
     def _mass_of(self, change: np.ndarray, padded: np.ndarray, coupling: np.ndarray, density: np.ndarray) -> float:
         """Δuᵀ M Δu of deflection, with its coupling to strains counted twice."""
