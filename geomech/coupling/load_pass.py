@@ -4,7 +4,7 @@ DDA steps the blocks with an assumed crack response ε_c(σ) = offset + S σ of 
 that step become tractions on the elastic bodies of the cracked blocks, DDM solves these, and their crack opening and
 slip give a new response. The iteration ends when assumed and computed crack strain agree:
 
-    max |ε_c,found − ε_c,assumed| / (|C σ| + |ε_c|) < tolerance
+    |ε_c,found − ε_c,assumed| / (|C σ| + |ε_c|) < tolerance
 
 Static iterations are accelerated by a quasi-Newton update of the offsets (`quasi_newton`) and start from an
 extrapolation in the loads (`load_extrapolation`).
@@ -25,7 +25,7 @@ from ..model import TIP, Motion, State
 from .coupled_state import CrackedBlocks
 from .crack_compliance.added_compliance import crack_responses, passive, stress_rotations, times
 from .crack_compliance.load_extrapolation import Answer
-from .crack_compliance.quasi_newton import QuasiNewton
+from .crack_compliance.quasi_newton import QuasiNewton, strain_size
 from .load_path import loads_at
 from .load_transfer.elastic_bodies import boundary_loads, threads_for, tip_rows
 from .parallel_map import parallel_map
@@ -374,7 +374,7 @@ def _expected(now: CrackedBlocks, time: float) -> dda.CrackResponse:
 def _strained(elastic: np.ndarray, stress: np.ndarray, strain: np.ndarray) -> np.ndarray:
     """(n,) strain scale of blocks with ``elastic`` compliance (n, 3, 3) under ``stress`` (n, 3) with crack ``strain``
     (n, 3): |C σ| + |ε_c|."""
-    size = np.abs(times(elastic, stress)).max(axis=1) + np.abs(strain).max(axis=1)
+    size = strain_size(times(elastic, stress)) + strain_size(strain)
     return np.maximum(size, STILL * size.max())
 
 
@@ -481,7 +481,7 @@ def _take_response(
         if not size.any():
             differences = np.zeros(len(blocks))
         else:
-            differences = np.abs(residual).max(axis=1) / size
+            differences = strain_size(residual) / size
             if differences.max() >= tolerance:
                 before = again.offset[blocks] - residual
                 again.offset[blocks] = quasi_newton.next(before, residual, again.compliance[blocks], size)

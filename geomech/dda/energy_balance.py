@@ -163,7 +163,7 @@ class ContactStep(NamedTuple):
     slip, sliding         plastic slip, and motion along the edge, m
     normal_force          acting over the step, N
     shear_force0, shear_force, end_shear    at its start, acting over it, and at its end, N
-    rubbing_normal, rubbing_shear           forces with which friction is computed, N (`mean_of_slip`)
+    mean_normal, mean_shear                 in statics the means of those at its start and at its end; in motion those acting
     normal                stiffness without dashpot, N/m
     shear                 stiffness in the step (``theta`` times that of the spring), N/m. Both are 0 for multipliers,
                           which store no energy
@@ -185,19 +185,19 @@ class ContactStep(NamedTuple):
     shear_force0: np.ndarray
     shear_force: np.ndarray
     end_shear: np.ndarray
-    rubbing_normal: np.ndarray
-    rubbing_shear: np.ndarray
+    mean_normal: np.ndarray
+    mean_shear: np.ndarray
     normal: np.ndarray
     shear: np.ndarray
     theta: np.ndarray
     law: np.ndarray
 
 
-def mean_of_slip(before: np.ndarray, after: np.ndarray, whole: np.ndarray) -> np.ndarray:
-    """(n,) N: mean force of the slip of contacts in a static step between the forces ``before`` and ``after`` it, as that
-    of the loads; the latter where a bond has been lost (``whole`` (n,) bool is False). Where the force has changed its
-    sign, slip began when it was nearly at its end."""
-    return np.where(whole & (before * after >= 0.0), 0.5 * (before + after), after)
+@part(fastmath=False, error_model="numpy", nogil=True, **UNCOUNTED)
+def _rubbing(before, after, mean, lost):
+    """Shear force (N) with which a contact slips in a step: the ``mean``, but that at the end of the step where the force
+    has changed its sign or has fallen with its bond (``lost``), and slip began thereafter."""
+    return after if before * after < 0.0 or (lost and abs(before) > abs(after)) else mean
 
 
 #: Positions of the terms of `StepEnergy` in the sums of a step.
@@ -300,7 +300,8 @@ def _add_contacts(out, contacts, closure):
         was, state, theta = contacts.was_state[i], contacts.state[i], contacts.theta[i]
         kn, g0, g1, limit = contacts.normal[i], contacts.gap0[i], contacts.gap[i], closure[contacts.law[i]]
         give = theta / contacts.shear[i] if contacts.shear[i] > 0.0 else 0.0
-        phi0 = phi1 = given = frictional = drag = done = 0.0
+        lost = contacts.was_bonded[i] > 0 and contacts.bonded[i] == 0
+        phi0 = phi1 = given = frictional = drag = done = beyond = 0.0
         if was != OPEN:
             shear0 = contacts.shear_force0[i]
             phi0 = _stored(kn, g0, limit, contacts.was_bonded[i]) + 0.5 * give * shear0 * shear0
@@ -312,10 +313,12 @@ def _add_contacts(out, contacts, closure):
             phi1 = _stored(kn, g1, limit, contacts.bonded[i]) + 0.5 * give * end * end
             # Forces act along the straight motion: the difference of the work along the arc belongs to the scheme.
             lifted, slid = contacts.lifted[i], contacts.sliding[i]
-            done = pushed * (g1 - g0 - contacts.arc[i] + lifted) + sheared * slid
+            across = g1 - g0 - contacts.arc[i] + lifted
+            done = pushed * across + sheared * slid
+            beyond = (pushed - contacts.mean_normal[i]) * across + (sheared - contacts.mean_shear[i]) * slid
             if state == SLIP:
-                frictional = -contacts.rubbing_shear[i] * (contacts.slip[i] if give > 0.0 else slid)
-                frictional -= contacts.rubbing_normal[i] * lifted
+                rubbing = _rubbing(contacts.shear_force0[i], sheared, contacts.mean_shear[i], lost)
+                frictional = -rubbing * (contacts.slip[i] if give > 0.0 else slid) - contacts.mean_normal[i] * lifted
             if kn > 0.0:
                 start = g0 if was != OPEN and contacts.was_bonded[i] > 0 else min(g0, 0.0)
                 spring = -theta * _push(kn, g1, limit) - (1.0 - theta) * _push(kn, start, limit)
@@ -325,8 +328,9 @@ def _add_contacts(out, contacts, closure):
         overlap += given
         friction += frictional
         viscous += drag
-        if contacts.was_bonded[i] and not contacts.bonded[i]:
-            bond += rest
+        if lost:
+            bond += rest + beyond
+            scheme_loss -= beyond
         else:
             scheme_loss += rest
     out[_BEFORE], out[_DAMPING], out[_SCHEME] = before, viscous, scheme_loss
@@ -363,7 +367,7 @@ class EnergyBudget:
     stored     stored now
     split      change of stored energy due to splitting or excavation of blocks (`cut`)
     released   energy released by growth at constant load: negative losses of the time scheme while cracks grew, with the
-               loads at the end of each step; ``unpaid``: the same with their mean, as in ``losses``
+               loads at the end of each step
     residual   stored + losses − work − overlap − split − start: energy added (> 0) or removed by updating the geometry
                between steps, and round-off
     turnover   energy converted: |gravity_work| + |load_work|, or the largest energy stored, whichever is larger
@@ -380,7 +384,6 @@ class EnergyBudget:
     warned: float = GAIN
     drawn: float = 0.0
     released: float = 0.0
-    unpaid: float = 0.0
 
     def after(self, step: StepEnergy, time: float = float("nan"), *, growing: bool = False) -> EnergyBudget:
         """The budget with one more step; logs a warning with the ``time`` when blocks have gained energy without work.
@@ -395,9 +398,9 @@ class EnergyBudget:
         turnover = max(self.turnover, step.stored, step.before, work)
         warned = self.warned
         released = self.released + (max(0.0, -step.scheme - step.beyond_mean) if growing else 0.0)
-        unpaid = self.unpaid + (max(0.0, -step.scheme) if growing else 0.0)
-        # A negative loss of the scheme is a gain.
-        gain = residual - min(0.0, float(totals[_SUMS["scheme"]]) + unpaid)
+        # A negative loss of the scheme is a gain. Where contacts open or close within a static step, the work of its loads
+        # lies between that of their mean and that of the loads at its end.
+        gain = residual - min(0.0, float(totals[_SUMS["scheme"]] + totals[_SUMS["beyond_mean"]]) + released)
         if gain > warned * turnover:
             log.warning(
                 "t = %g s: the blocks have gained %.3g J/m without work, %.2g of all converted energy: shorten the "
@@ -407,7 +410,7 @@ class EnergyBudget:
             warned = 2.0 * gain / turnover
         drawn = step.overlap if first else self.drawn
         return EnergyBudget(
-            self.steps + 1, step, start, totals, split, residual, turnover, False, warned, drawn, released, unpaid
+            self.steps + 1, step, start, totals, split, residual, turnover, False, warned, drawn, released
         )
 
     def cut(self) -> EnergyBudget:
@@ -415,7 +418,7 @@ class EnergyBudget:
         residual."""
         return EnergyBudget(
             self.steps, self.last, self.start, self.totals, self.split, self.residual, self.turnover,
-            self.last is not None, self.warned, self.drawn, self.released, self.unpaid,
+            self.last is not None, self.warned, self.drawn, self.released,
         )  # fmt: skip
 
     def __getattr__(self, name: str) -> float:

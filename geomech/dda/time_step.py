@@ -20,7 +20,6 @@ from .energy_balance import (
     StepEnergy,
     StepMotion,
     StepStress,
-    mean_of_slip,
     sliding,
     step_energies,
 )
@@ -811,16 +810,15 @@ class Attempt:
         weight = self.weight if isinstance(self.weight, np.ndarray) else np.full(len(found), self.weight)
         impact, velocity = self.impact, self.velocity if self.impact is None else self.impact.without
         normal, shear = self._real_springs()
-        rubbing = settled.normal_force, settled.shear_force
+        means = settled.normal_force, settled.shear_force
         if scheme.static:
-            whole = settled.bonded == found.bonded
-            rubbing = mean_of_slip(found.normal, rubbing[0], whole), mean_of_slip(found.shear, rubbing[1], whole)
+            means = 0.5 * (found.normal + means[0]), 0.5 * (found.shear + means[1])
         motion = StepMotion(self.increment, self.state.velocity, self.carried, velocity, self.acceleration, load)
         stress = StepStress(self.stress, self.tangent, self.stress0, system.compliance, system.stiffness)
         contacts = ContactStep(
             found.state, settled.state, found.bonded, settled.bonded, found.gap_before, settled.gap,
             found.arc + np.zeros(len(found)), settled.lifted, settled.slip, self.slid, settled.normal_force,
-            found.shear, settled.shear_force, end_shear, *rubbing, normal, shear, weight, found.law,
+            found.shear, settled.shear_force, end_shear, *means, normal, shear, weight, found.law,
         )  # fmt: skip
         energies = step_energies(
             tuple(motion), tuple(stress), tuple(self._mass), tuple(scheme.terms(self.dt)), self.gravity, tuple(contacts),

@@ -12,6 +12,7 @@ from block_problems import rectangle, turned
 
 from geomech import dda
 from geomech.model import (
+    SLIP,
     Blocks,
     DdaSettings,
     EdgeTraction,
@@ -182,6 +183,29 @@ def test_the_work_of_weight_and_loads_does_not_depend_on_the_number_of_static_st
         works.append([budget.gravity_work, budget.load_work, budget.last.stored])
         assert abs(budget.scheme + budget.carried) < 1e-3 * np.abs(works[-1]).max()
     assert np.array(works[1:]) == pytest.approx(np.array([works[0]] * 2), rel=1e-3)
+
+
+@pytest.mark.parametrize("cohesion", [0.0, 1.0])
+def test_friction_under_a_growing_load_does_not_depend_on_the_number_of_static_steps(cohesion):
+    """A wedge in a notch grows heavier and slides down both flanks as it is compressed: force and slip grow together (once
+    a cohesion of 1 Pa is overcome), and half of their product is lost."""
+    polygons = [
+        np.array([[-2.0, 2.0], [0.0, 0.0], [2.0, 2.0]]),
+        np.array([[-3.0, -1.0], [0.0, -1.0], [0.0, 0.0], [-2.0, 2.0], [-3.0, 2.0]]),
+        np.array([[0.0, -1.0], [3.0, -1.0], [3.0, 2.0], [2.0, 2.0], [0.0, 0.0]]),
+    ]
+    blocks = Blocks.from_polygons(polygons, fixed=[False, True, True])
+    law = JointLaw("joint", friction_angle=0.2, cohesion=cohesion, tensile_strength=cohesion)
+    losses = []
+    for n in (1, 2, 8):
+        system = dda.BlockSystem(blocks, [ROCK], [law], settings=DdaSettings(max_displacement_ratio=1.0))
+        loads = Loads(gravity=History.ramp([0.0, -GRAVITY]))
+        state, budget = marched(system, State.at_rest(blocks), loads, 1.0 / n, 1.0)
+        slid = np.abs(state.contacts["shear_force"] * state.contacts["slip"])[state.contacts["state"] == SLIP].sum()
+        assert budget.friction == pytest.approx(0.5 * float(slid), rel=1e-3)
+        assert abs(budget.scheme) + abs(budget.bond) < 1e-3 * budget.friction
+        losses.append(budget.friction)
+    assert losses[1:] == pytest.approx([losses[0]] * 2, rel=1e-3)
 
 
 def test_broken_bonds_release_what_they_held():

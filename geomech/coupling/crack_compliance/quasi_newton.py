@@ -30,6 +30,19 @@ _SAME = 1e-6
 _LEAST = 0.05
 
 
+def strain_weights(width: int) -> np.ndarray:
+    """(width,) factors of the components of a strain (γxy is the third; of higher order: deflections behind it) with
+    which the sum of their squares is ε : ε, the same in all axes. Passes then do not depend on the axes of the scene."""
+    weights = np.ones(width)
+    weights[2] = np.sqrt(0.5)
+    return weights
+
+
+def strain_size(strain: np.ndarray) -> np.ndarray:
+    """(n,) √(ε : ε) of every strain (n, 3), or (n, 3 + m) with deflections."""
+    return np.sqrt(((strain * strain_weights(strain.shape[1])) ** 2).sum(axis=1))
+
+
 class QuasiNewton:
     """Computes the next offset of the crack strains from earlier offsets and residuals.
 
@@ -77,8 +90,8 @@ class QuasiNewton:
         if known is None or np.abs(known - compliance).max() > _SAME * np.abs(compliance).max():
             self._offsets, self._residuals, self._compliance = [], [], compliance
         self._offsets, self._residuals = self._offsets[-DEPTH:] + [offset], self._residuals[-DEPTH:] + [residual]
-        weight = 1.0 / size[:, None]
-        worst = float(np.abs(residual * weight).max())
+        weight = strain_weights(residual.shape[1]) / size[:, None]
+        worst = float((strain_size(residual) / size).max())
         if self._led is not None and worst > self._led:
             self._older = []
         self._led = None
@@ -113,12 +126,12 @@ class QuasiNewton:
     def _relaxation(self, residual: np.ndarray) -> np.ndarray:
         """(n,) Aitken's factor of each block whose ``residual`` (n, 3) has changed its sign since the last pass, else
         1."""
-        factor = np.ones(len(residual))
+        factor, square = np.ones(len(residual)), strain_weights(residual.shape[1]) ** 2
         if self._last is not None:
             before, used = self._last
             change = residual - before
-            back = (residual * before).sum(axis=1) < 0
-            size = np.where(back, (change**2).sum(axis=1), 1.0)
-            factor = np.where(back, np.clip(-used * (before * change).sum(axis=1) / size, _LEAST, 1.0), factor)
+            back = (square * residual * before).sum(axis=1) < 0
+            size = np.where(back, (square * change**2).sum(axis=1), 1.0)
+            factor = np.where(back, np.clip(-used * (square * before * change).sum(axis=1) / size, _LEAST, 1.0), factor)
         self._last = residual, factor
         return factor

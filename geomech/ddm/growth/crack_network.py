@@ -253,11 +253,13 @@ class Network:
         self._at[row.end].remove(row)
         self._gone.add(row)
 
-    def freeze(self) -> Cracks:
-        """The present network without unused nodes."""
+    def freeze(self, order: Sequence[int] | None = None) -> Cracks:
+        """The present network without unused nodes; ``order``: all nodes in the order in which they are numbered, if that
+        is not the order in which they were added."""
         segments = np.array([(row.start, row.end) for row in self.rows], dtype=int).reshape(-1, 2)
-        used = np.array([bool(rows) for rows in self._at], dtype=bool)
-        renumbered = np.cumsum(used) - 1
+        used = [node for node in (range(len(self.nodes)) if order is None else order) if self._at[node]]
+        renumbered = np.zeros(len(self.nodes), dtype=int)
+        renumbered[used] = np.arange(len(used))
         return Cracks(
             nodes=np.array(self.nodes, dtype=float).reshape(-1, 2)[used],
             segments=renumbered[segments],

@@ -24,7 +24,7 @@ from ...model import Cracks, GrowthSettings
 from ..mesh.shared_mouths import chain_between, own_mouth_at, part_mouths, point_along_edge
 from .approach_limit import longest_advance
 from .crack_network import Network, Obstacle, Point, Row, nearest_on, passage
-from .tie_tolerance import ONE_WAY, in_order, reached
+from .tie_tolerance import ONE_WAY, TIED, in_order, reached
 
 #: Shortest segment, as a fraction of the shortest increment: ends snap to what they nearly touch.
 SLIVER = 0.1
@@ -109,7 +109,8 @@ def advance(
     new segments. The increment is settings.increment times (K_eq/K_Ic) over its largest value, but no less than
     settings.min_increment, and no more than ``longest`` (n_tips,) m; where that is 0 the tip stands. Near other cracks
     it is shorter (`approach_limit`). New segments carry aperture 0 and continue their crack's direction and place in
-    the list. Tips are served in the order given. Raises ValueError for a tip row that is no tip of the network, or
+    the list. Where tips meet each other, the most highly driven one goes first, whatever the order in which they are given;
+    of equally driven ones (`tie_tolerance`) the first given. Raises ValueError for a tip row that is no tip of the network, or
     whose angle is not finite.
     """
     k_ic = np.broadcast_to(np.asarray(k_ic, dtype=float), (len(tips),))
@@ -144,11 +145,18 @@ def advance(
         )
     work = _Work(Network(cracks, loops_of, cycle), settings)
     met = _join_approaching_tips(work, steps, grown)
-    for step in steps:
+    network, first = work.network, len(work.network.nodes)
+    #: Row of the tip for which each node after ``first`` was added: nodes are numbered in the order of the tips.
+    added: list[int] = []
+    drives = dict(zip(growing.tolist(), drive.tolist()))
+    for k in in_order([-drives[step.row] for step in steps], TIED * float(drive.max())):
+        step = steps[k]
         # A tip that another one has joined is no longer a tip.
-        if step.row not in met and work.network.is_tip(step.node):
+        if step.row not in met and network.is_tip(step.node):
             _advance_one(work, step, grown)
-    return Growth(work.network.freeze(), grown, tuple(work.joins))
+        added += [step.row] * (len(network.nodes) - first - len(added))
+    order = [*range(first), *(first + k for k in sorted(range(len(added)), key=added.__getitem__))]
+    return Growth(network.freeze(order), grown, tuple(work.joins))
 
 
 class _Work:

@@ -119,6 +119,21 @@ def test_steps_are_shorter_near_another_crack(gap, steps, length):
     assert growth.grown[tips["k_eq"] > 0] == pytest.approx([length, length], rel=1e-12)
 
 
+@pytest.mark.parametrize("first", [0, 1])
+def test_the_most_driven_tip_goes_first_in_whatever_order_cracks_are_listed(first):
+    """Two tips run at the same rock from two sides: where they meet does not depend on which crack is listed first."""
+    lines = [np.array([[-3.0, 0.0], [-0.2, 0.0]]), np.array([[0.3, -3.0], [0.3, -0.4]])]
+    cracks = Cracks.from_polylines([lines[first], lines[1 - first]], block=[0, 0])
+    tips = only(tips_of(cracks), (-0.2, 0.0), (0.3, -0.4))
+    tips["k_eq"][tips["k_eq"] > 0] = np.where(tips["point"][tips["k_eq"] > 0][:, 1] == 0.0, 1.5, 1.2)
+    growth = grow(cracks, tips)
+    ends = sorted(map(tuple, np.round(growth.cracks.nodes, 12).tolist()))
+    (join,) = growth.joins
+    # The tip at (−0.2, 0) runs 1 m on; the other one, which would be past (0.3, 0) by then, ends at its path.
+    assert ends == [(-3.0, 0.0), (-0.2, 0.0), (0.3, -3.0), (0.3, -0.4), (0.3, 0.0), (0.8, 0.0)]
+    assert join.point == pytest.approx((0.3, 0.0), abs=1e-12)
+
+
 def test_aperture_and_law_are_kept_by_the_slot_and_its_halves():
     lines = [[[-2, 0], [2, 0]], [[0, 3], [0, 0.7]]]
     cracks = Cracks.from_polylines(lines, aperture=[math.inf, 1e-3], law=[1, 2])
