@@ -13,6 +13,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 
@@ -316,27 +317,34 @@ def _with_mouths(edge, fractions, mouths, grading, span, extent) -> np.ndarray:
         off = abs(rel[0] * along[1] - rel[1] * along[0]) / length
         # At a corner there is no element to divide.
         if off <= 1e-7 * span and 1e-7 * span < f * length < length - 1e-7 * span:
+            same = [k for k, (other, _, _) in enumerate(here) if abs(other - f) * length <= 1e-7 * span]
+            layers = max([layers, *(here.pop(k)[2] for k in same)])
             here.append((f, mouth, layers))
-    for f, mouth, layers in sorted(here, key=lambda mark: mark[0]):
-        k = int(np.searchsorted(fractions, f))
-        cell = fractions[k] - fractions[k - 1]
-        for end in (k, k - 1):
-            if abs(fractions[end] - f) < SLIVER * cell and 0 < end < len(fractions) - 1:
-                del fractions[end], points[end]
-                k = int(np.searchsorted(fractions, f))
-                break
-        before, after = fractions[k - 1], fractions[k]
-        left, right = (
-            [
-                f + way * g
-                for g in grading.fractions(layers, grading.finest(mouth, length, extent) / (abs(way) * length))
-            ]
-            for way in (before - f, after - f)
-        )
-        left.reverse()
-        fractions[k:k] = [*left, f, *right]
-        points[k:k] = [*((1 - q) * a + q * b for q in left), mouth, *((1 - q) * a + q * b for q in right)]
-    return np.array(points)
+    if not here:
+        return np.array(points)
+    at = np.array([f for f, _, _ in here])
+    kept = [0, *(k for k in range(1, len(fractions) - 1) if not _beside_mouth(fractions, k, at)), len(fractions) - 1]
+    # All mouths are placed before the elements beside them are divided: the elements do not depend on the sense of the edge.
+    nodes = sorted([*((fractions[k], points[k], 0) for k in kept), *here], key=lambda node: node[0])
+    out = [points[0]]
+    for (low, start, first), (high, end, last) in pairwise(nodes):
+        middle = [0.5 * (low + high)] if first and last else []
+        way = (middle[0] if middle else high) - low
+        least = [grading.finest(point, length, extent) / (way * length) for point in (start, end)]
+        inner = [low + way * g for g in grading.fractions(first, least[0])]
+        inner += [*middle, *([high - way * g for g in grading.fractions(last, least[1])][::-1])]
+        out += [*((1 - q) * a + q * b for q in inner), end]
+    return np.array(out)
+
+
+def _beside_mouth(fractions: list[float], k: int, mouths: np.ndarray) -> bool:
+    """Whether node ``k`` of an edge is so close to one of the ``mouths`` (n,) that the element between would be a sliver."""
+    for cell in (k, k + 1):
+        low, high = fractions[cell - 1], fractions[cell]
+        inside = mouths[(mouths > low) & (mouths < high)]
+        if (np.abs(fractions[k] - inside) < SLIVER * (high - low)).any():
+            return True
+    return bool((mouths == fractions[k]).any())
 
 
 def _cracks(cracks: Cracks, settings: DdmSettings, grading: Grading, extent: float, edges: np.ndarray):
