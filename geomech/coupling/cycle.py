@@ -39,6 +39,7 @@ from .load_transfer.unbounded_rock import out_of_sight, solved_pass
 from .monitoring.collapse import collapse_in_situ, lost, relax, unsupported
 from .monitoring.energy_check import BendingWatch, BudgetWatch, GrowthWatch, check_dissipation
 from .monitoring.mechanism import Mechanism
+from .monitoring.pass_agreement import AgreementWatch
 
 if TYPE_CHECKING:
     from ..ddm.growth.tip_advance import Growth
@@ -142,7 +143,7 @@ class Coupling:
         self.tips = None if self.static else DynamicTips(problem)
         self.range, self.balance, self.mechanism = dda.ElasticRange(), LoadBalance(), Mechanism()
         self.energy, self.bending, self.overlaps = BudgetWatch(), BendingWatch(), OverlapWatch()
-        self.unstable = GrowthWatch()
+        self.unstable, self.agreement = GrowthWatch(), AgreementWatch()
         self.under_way: UnderWay | None = None
         #: Time at which the present load step began, s.
         self.began = self.now.state.time
@@ -302,6 +303,7 @@ class Coupling:
             if now.bodies:
                 self.balance.check(now.loads, now.blocks, strain, result.state.time)
         if self.static:
+            self.agreement.check([now.blocks.names[b] for b in now.bodies], found.mismatch, result.state.time)
             # All passes of a static step have the same load, also when one of them takes a shorter step.
             step.load_time = result.state.time
         elif step.until is None:

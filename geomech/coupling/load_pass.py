@@ -70,13 +70,14 @@ HALVINGS = 4
 class Balance:
     """Result of a pass: the step of the blocks (``result``), the DDM ``solutions`` (block → `ddm.Solution`), the TIP
     rows ``tips`` with kink angle and K_eq, and ``statistics``. ``left_out`` (block → body): bodies that were not solved
-    because their cracks cannot grow."""
+    because their cracks cannot grow. ``mismatch`` (n_cracked,): remaining relative mismatch of crack strain."""
 
     result: StepResult
     solutions: dict
     tips: np.ndarray
     statistics: dict[str, float] = field(default_factory=dict)
     left_out: dict = field(default_factory=dict)
+    mismatch: np.ndarray = field(default_factory=lambda: np.zeros(0))
 
 
 def balanced(now: CrackedBlocks, dt: float, load_time: float | None) -> Balance:
@@ -99,7 +100,7 @@ def balanced(now: CrackedBlocks, dt: float, load_time: float | None) -> Balance:
             now.history, now.by_mean_stress.memory = memories
         lost = np.flatnonzero(differences > FAILED)
         if not len(lost):
-            return found
+            return replace(found, mismatch=differences)
         dt = dt if static else 0.5 * found.result.dt
     blocks = [now.blocks.names[b] for b in np.array(list(now.bodies), int)[lost]]
     raise dda.NotConverged(

@@ -194,10 +194,10 @@ class ContactStep(NamedTuple):
 
 
 @part(fastmath=False, error_model="numpy", nogil=True, **UNCOUNTED)
-def _rubbing(before, after, mean, lost):
-    """Shear force (N) with which a contact slips in a step: the ``mean``, but that at the end of the step where the force
-    has changed its sign or has fallen with its bond (``lost``), and slip began thereafter."""
-    return after if before * after < 0.0 or (lost and abs(before) > abs(after)) else mean
+def _rubbing(shear, normal, mean):
+    """Mean shear force (N) of the slip of a contact that ends the step with ``shear`` and ``normal``: its strength grows
+    with the normal force, whose ``mean`` is given, also where it began to slip within the step."""
+    return shear * max(mean, 0.0) / normal if normal > 0.0 else shear
 
 
 #: Positions of the terms of `StepEnergy` in the sums of a step.
@@ -317,7 +317,7 @@ def _add_contacts(out, contacts, closure):
             done = pushed * across + sheared * slid
             beyond = (pushed - contacts.mean_normal[i]) * across + (sheared - contacts.mean_shear[i]) * slid
             if state == SLIP:
-                rubbing = _rubbing(contacts.shear_force0[i], sheared, contacts.mean_shear[i], lost)
+                rubbing = _rubbing(sheared, pushed, contacts.mean_normal[i])
                 frictional = -rubbing * (contacts.slip[i] if give > 0.0 else slid) - contacts.mean_normal[i] * lifted
             if kn > 0.0:
                 start = g0 if was != OPEN and contacts.was_bonded[i] > 0 else min(g0, 0.0)

@@ -92,13 +92,16 @@ BOUNDS = {
         )
     },
 }
-#: Words of warnings in which a run says that its result is unreliable.
+#: Words of warnings in which a run says that its result is unreliable. (Events end steps at loads that differ between
+#: variants by rounding: where unsupported blocks move in them, positions depend on it.)
 WARNED = (
     "nothing holds",
+    "static steps have dissipated",
+    "of their strain only",
     *sorted({words for invariant in INVARIANTS.values() for words in invariant.reported}),
 )
 #: The same of results that depend on the time step, not on the place.
-WARNED_OF_STEPS = ("does not resolve vibrations", "static steps have dissipated")
+WARNED_OF_STEPS = ("does not resolve vibrations",)
 _MODULES = (
     "drawn_slopes", "limited_runs", "moved_mass", "random_slopes", "refusals", "slope_invariance", "slope_invariants",
 )  # fmt: skip

@@ -16,9 +16,9 @@ UNPAID = 0.25
 DISSIPATED = 0.05
 #: … and their kinetic energy as a fraction of it. Blocks that have come to rest have rightly lost their energy.
 IN_MOTION = 0.01
-#: Fraction of it that static steps may take. Half of the work of a suddenly applied load is dissipated; a much larger
-#: fraction means that unsupported blocks have moved.
-UNHELD = 0.8
+#: Fraction of it that static steps may take. Half of the work of a suddenly applied load is dissipated, and nothing of that
+#: of a load that grows with the steps; a larger fraction means that unsupported blocks have moved.
+UNHELD = 0.6
 
 
 class BudgetWatch:
@@ -50,8 +50,8 @@ def check_dissipation(budget: EnergyBudget, time: float, static: bool) -> None:
             log.warning(
                 "t = %g s: static steps have dissipated %.2g of all converted energy (scheme_loss in history.csv): some "
                 "blocks moved without support, under a load that acts before the weight or the rock that resists it, "
-                "or as a mechanism; their final position depends on the time step. Apply weight and water "
-                "together, or follow the motion with dda.dynamic_factor = 1",
+                "or as a mechanism; their final position depends on the time step, and on rounding where events end the "
+                "steps. Apply weight and water together, or follow the motion with dda.dynamic_factor = 1",
                 time,
                 budget.scheme / turnover,
             )

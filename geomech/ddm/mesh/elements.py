@@ -310,7 +310,7 @@ def _with_mouths(edge, fractions, mouths, grading, span, extent) -> np.ndarray:
     points = [((1 - f) * a + f * b) for f in fractions]
     points[0], points[-1] = a, b
     fractions = list(fractions)
-    here = []
+    here: list[tuple[float, np.ndarray, int]] = []
     for mouth, layers in mouths:
         rel = mouth - a
         f = float(rel @ along) / length**2

@@ -5,15 +5,18 @@ from __future__ import annotations
 import logging
 import re
 from dataclasses import replace
-from itertools import pairwise
+from itertools import islice, pairwise
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import geomech
+from geomech.bench.slopes.drawn_slopes import drawn, problem_of
+from geomech.bench.slopes.random_slopes import scene_text
 from geomech.coupling import cycles
 from geomech.coupling.monitoring.energy_check import UNPAID, BendingWatch, BudgetWatch
+from geomech.coupling.monitoring.pass_agreement import DISAGREES, AgreementWatch
 from geomech.dda.energy_balance import GAIN, EnergyBudget, StepEnergy
 from geomech.model import (
     Blocks,
@@ -41,6 +44,28 @@ def test_a_share_beyond_the_bound_is_told_and_again_when_it_has_doubled(caplog):
     first, second = [record.getMessage() for record in caplog.records]
     assert first.startswith("t = 3 s: -0.015 of all converted energy") and "reduce the time step" in first
     assert second.startswith("t = 5 s: 20 of all converted energy")
+
+
+def test_passes_that_do_not_agree_are_told_of_and_again_when_it_has_doubled(caplog):
+    watch = AgreementWatch()
+    with caplog.at_level(logging.WARNING):
+        for time, mismatch in ((1.0, []), (2.0, [0.0, 0.9 * DISAGREES]), (3.0, [0.01, 0.05]), (4.0, [0.09, 0.0])):
+            watch.check(["foot", "head"][: len(mismatch)], np.array(mismatch), time)
+        watch.check(["foot", "head"], np.array([0.2, 0.0]), 5.0)
+    first, second = [record.getMessage() for record in caplog.records]
+    assert first.startswith("t = 3 s: head and its cracks agree to 0.05 of their strain only")
+    assert second.startswith("t = 5 s: foot and its cracks agree to 0.2 ")
+
+
+def test_a_random_slope_whose_blocks_and_cracks_do_not_agree_says_so(caplog):
+    """As bonds break, contact states alternate from pass to pass: forty passes leave 6 % of the strain."""
+    with caplog.at_level(logging.WARNING):
+        first = islice(cycles(problem_of(drawn(scene_text(15)))), 3)
+        mismatch = [cycle.statistics.get("compliance_mismatch", 0.0) for cycle in first]
+    lines = [record.getMessage() for record in caplog.records]
+    told = [re.search(r"cracks agree to (\S+) of their strain", line) for line in lines]
+    (share,) = [float(each[1]) for each in told if each]
+    assert share == pytest.approx(max(mismatch), rel=0.01) and share > DISAGREES
 
 
 def test_cracks_that_blocks_did_not_pay_for_are_told_of_once(caplog):
