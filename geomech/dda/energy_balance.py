@@ -4,7 +4,7 @@ Every step solves M ā = (weight, loads, centrifugal force) + contacts − elast
 displacement d of the step, this is a balance of works. Each work equals a change of stored energy plus a loss:
 
     kinetic    d·M ā      = ΔT + (loss of the time scheme; none where d = ½ (v + v′) dt, as in Shi's)
-    loads      F̄·d        = ½ (F + F′)·d + (θ − ½) ΔF·d (`mean_loads`)
+    loads      F̄·d        = ½ (F + F′)·d + (θ − ½) ΔF·d (`step_actions`)
     elastic    A σ̄·Δε     = ΔU + ½ A (σ + σ′)·Δe_c (the strain of cracks) + (θ − ½) A Δσ·Δε
     contact   −N̄ Δn − S̄ Δs = ΔΦ + friction + dashpots + broken bonds + (θ − ½) k Δg² + (θ − ½) ΔS²/kₛ …
 
@@ -53,7 +53,7 @@ class StepEnergy(NamedTuple):
     residual         of the balance within the step: round-off
     impact           dissipated normal to the contact in impacts with a coefficient of restitution (`impacts`); their
                      friction is part of ``friction``
-    beyond_mean      work of the loads that the step takes beyond that of their mean, part of ``scheme`` (`mean_loads`)
+    beyond_mean      work of the loads that the step takes beyond that of their mean, part of ``scheme`` (`step_actions`)
     """
 
     kinetic: float

@@ -45,9 +45,8 @@ from .kinematics.roundoff import undecided_gaps, warn_of_roundoff
 from .kinematics.simplex_integration import block_moments, mass_matrix
 from .linear_solver import assembly
 from .loads.load_vectors import AppliedForces, Inertia, generalised
-from .loads.mean_loads import BeyondMean, beyond_mean
 from .loads.prescribed_motion import MovedBlocks
-from .loads.step_actions import StepActions, effective_gravity
+from .loads.step_actions import BeyondMean, StepActions, beyond_mean, effective_gravity
 from .loads.viscous_boundary import ViscousEdges
 from .open_close.augmented_lagrangian import settle_augmented
 from .open_close.contact_set import ContactSet
