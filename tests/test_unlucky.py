@@ -155,8 +155,18 @@ def test_kernels_of_sources_that_are_gone_are_removed(tmp_path):
     assert sorted(path.name for path in tmp_path.iterdir()) == ["here", "other"]
 
 
-@pytest.mark.parametrize("suffix", [".nbi", ".nbc"])
-@pytest.mark.parametrize("damage", [lambda data: data[: len(data) // 2], lambda data: b"x" + data[1:]])
+HALF, BYTE = lambda data: data[: len(data) // 2], lambda data: b"x" + data[1:]
+
+
+@pytest.mark.parametrize(
+    ("suffix", "damage"),
+    [
+        (".nbi", HALF),
+        (".nbc", BYTE),
+        pytest.param(".nbi", BYTE, marks=pytest.mark.slow),
+        pytest.param(".nbc", HALF, marks=pytest.mark.slow),
+    ],
+)
 def test_a_damaged_kernel_is_compiled_anew(tmp_path, suffix, damage):
     (tmp_path / "scaling.py").write_text(
         "from geomech.compiled import kept\n@kept(nogil=True)\ndef scaled(x):\n    return 2.0 * x\n"

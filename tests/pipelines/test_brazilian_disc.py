@@ -51,7 +51,7 @@ def holds(disc: Pressed) -> None:
     assert disc.kink_deg == pytest.approx(disc.expected_kink_deg, abs=0.1)
 
 
-@pytest.mark.parametrize("name", ["shear", "closing"])
+@pytest.mark.parametrize("name", [pytest.param("shear", marks=pytest.mark.slow), "closing"])
 def test_factors_and_initiation(verified, tmp_path, name):
     disc = run_pipeline(tmp_path, name, wishes=("run.stop_at=['initiation']",))[name]
     holds(disc)

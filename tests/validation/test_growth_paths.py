@@ -47,7 +47,10 @@ def test_first_angle_of_a_slanted_crack_in_tension(beta):
     np.testing.assert_allclose(maximum_tangential_stress(tips["k_i"], tips["k_ii"])[0], root, atol=1e-9)
 
 
-@pytest.mark.parametrize(("degrees", "load", "aperture"), [(60, TENSION, math.inf), (45, COMPRESSION, 0.0)])
+@pytest.mark.parametrize(
+    ("degrees", "load", "aperture"),
+    [(60, TENSION, math.inf), pytest.param(45, COMPRESSION, 0.0, marks=pytest.mark.slow)],
+)
 def test_paths_do_not_depend_on_the_increment(degrees, load, aperture):
     """How far the end of a 16 mm wing moves when the increment is halved from 8 to 0.5 mm (printed with ``-s``),
     without bends to 1 mm; in compression the crack and parts of its wings are closed. Bent steps are of order 3/2 at

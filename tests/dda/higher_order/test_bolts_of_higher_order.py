@@ -146,7 +146,7 @@ def test_a_beam_that_swings_on_a_bolt_keeps_its_energy():
     system = cantilever(5, dynamic_factor=1.0, newmark=(0.25, 0.5), damping=0.0, time_step=2e-3)
     bolt = Bolt(1, (LENGTH, 0.0), GROUND, (LENGTH, 10.0), TIP, pretension=1e4, compression=True)
     state, budget, tips = State.at_rest(system.blocks), EnergyBudget(), []
-    for _ in range(400):
+    for _ in range(200):
         result = system.step(state, Loads(bolts=(bolt,)))
         state, budget = result.state, budget.after(result.energy, result.state.time)
         tips.append(float(moved(system, state, 1, np.array([LENGTH, 0.0]))[1]))

@@ -111,7 +111,7 @@ def shaken(frame: str, order: int = 3) -> tuple[np.ndarray, np.ndarray]:
     return np.array(top), np.array(base)
 
 
-@pytest.mark.parametrize("order", [2, 5])
+@pytest.mark.parametrize("order", [2, pytest.param(5, marks=pytest.mark.slow)])
 def test_a_column_on_a_shaken_base_moves_alike_in_both_frames(order):
     seen, still = shaken("base", order)
     there, base = shaken("ground", order)

@@ -181,6 +181,7 @@ def check_slip(state_figure, strength, found, exact, order, share):
     assert found[1] == pytest.approx(exact[1], abs=share)
 
 
+@pytest.mark.slow
 def test_a_slipping_joint_passes_a_clipped_shear_wave(verified):
     found, exact, budget = slipping(0.5, 40.0, 20, 2, 4e-4)
     check_slip(verified, 0.5, found, exact, 2, 0.01)
@@ -269,7 +270,7 @@ def tunnel(friction: float, angle_deg: float, from_wall: bool = False, order: in
     return float(np.sqrt((error**2).mean())) / (3 * ACROSS - ALONG), np.concatenate(slid)
 
 
-@pytest.mark.parametrize("from_wall", [False, True])
+@pytest.mark.parametrize("from_wall", [pytest.param(False, marks=pytest.mark.slow), True])
 def test_a_joint_along_a_principal_stress_changes_nothing_about_a_tunnel(from_wall):
     """Through the middle of the tunnel a plane of weakness along a principal stress bears no shear: Kirsch's stress, even
     without friction (Brady & Brown 2004, Rock Mechanics for Underground Mining, sec. 7.5)."""
@@ -278,7 +279,7 @@ def test_a_joint_along_a_principal_stress_changes_nothing_about_a_tunnel(from_wa
     assert error < 0.01
 
 
-@pytest.mark.parametrize(("tangent", "slips"), [(0.38, False), (0.345, True)])
+@pytest.mark.parametrize(("tangent", "slips"), [pytest.param(0.38, False, marks=pytest.mark.slow), (0.345, True)])
 def test_a_joint_slips_about_a_tunnel_where_kirsch_says(tangent, slips):
     """On a radius at 45° between the principal stresses shear over pressure is (d/m)(1 − s)(1 + 3s)/(1 + s), s = a²/r²,
     with the half difference d and the mean m of the stresses: 1.072 d/m at most, where r = 2.54 a, and d/m far away.
