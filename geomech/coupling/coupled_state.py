@@ -33,8 +33,8 @@ class CrackedBlocks:
 
     ``state`` is the state at the start of the step; ``problem`` has the loads on the present blocks. ``number`` and
     ``load_step`` count cycles and load steps. Of the last pass: ``bodies`` (block → elastic body), ``nodes_of`` (block
-    → its nodes in the whole crack network), ``solutions``, ``loads`` and ``compliances``; ``response``: the crack
-    response that the blocks assume; ``by_mean_stress``: blocks whose cracks respond to the mean stress alone;
+    → its nodes in the whole crack network), ``solutions``, ``loads`` and ``compliances``; ``earlier``: the last solutions
+    of bodies that were left out; ``response``: the crack response that the blocks assume; ``by_mean_stress``: blocks whose cracks respond to the mean stress alone;
     ``acted``: statistics of the last step, with the work and forces of prescribed motion.
     """
 
@@ -53,6 +53,7 @@ class CrackedBlocks:
         self.works: list[Work] = []
         self.bodies: dict[int, Any] = {}
         self.solutions: dict[int, Any] = {}
+        self.earlier: dict[int, Any] = {}
         self.loads: dict[int, BoundaryLoad] = {}
         self.compliances: dict[int, tuple] = {}
         self.by_mean_stress = ByMeanStress()
@@ -189,9 +190,9 @@ class CrackedBlocks:
             response.compliance[whole, :w, :w] = old.compliance[before[whole], :w, :w]
             response.offset[whole, :w] = old.offset[before[whole], :w]
         self.response = response
-        self.bodies, self.solutions, self.compliances, self.solved_from = (
+        self.bodies, self.solutions, self.earlier, self.compliances, self.solved_from = (
             {child: known[before[child]] for child in whole.tolist() if before[child] in known}
-            for known in (self.bodies, self.solutions, self.compliances, self.solved_from)
+            for known in (self.bodies, self.solutions, self.earlier, self.compliances, self.solved_from)
         )
         self.by_mean_stress = self.by_mean_stress.inherited(before, whole) if len(whole) else ByMeanStress()
         self.growth_screening.renumber(parent, whole)

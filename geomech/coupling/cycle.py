@@ -33,6 +33,7 @@ from .growth.crack_growth import births, blocks_to_split, growth_of_tips, initia
 from .growth.dynamic_tips import DynamicTips
 from .growth.event_stepping import SETTLED, TOGETHER, EventSteps
 from .growth.first_state_change import FirstChange
+from .growth.wave_arrival import LeftOut
 from .load_pass import Balance, balanced, toughness
 from .load_transfer.load_imbalance import LoadBalance
 from .load_transfer.unbounded_rock import out_of_sight, solved_pass
@@ -384,7 +385,7 @@ class Coupling:
         self.under_way = None
         self.length.after(result, step.dt)
         if self.tips is not None:
-            self.tips.end(found.tips, now.blocks, step.whole, now.loads)
+            self.tips.end(found.tips, now.blocks, step.whole, now.loads, self._left_out(found))
         now.take_step(result.state, energies.budget)
         if grown.growth is not None:
             if self.events is not None:
@@ -392,6 +393,14 @@ class Coupling:
             self._brought = take_growth(now, grown.growth, result.state, found.solutions)
         elif self.events is not None:
             self.events.after(now, found)
+
+    def _left_out(self, found: Balance) -> dict[int, LeftOut]:
+        """block → its tips, of the bodies that were left out of the pass ``found``."""
+        now = self.now
+        return {
+            block: LeftOut(now.problem, now.blocks, block, body, now.loads[block], now.nodes_of[block])
+            for block, body in found.left_out.items()
+        }
 
     def _longest(self, step: _LoadStep, tips: np.ndarray) -> np.ndarray | float:
         """Largest growth of each tip in the step, m; infinite in statics."""

@@ -422,7 +422,7 @@ def _solve_what_may_grow(now: CrackedBlocks, result: StepResult) -> dict:
     _take_loads(now, result)
     with now.timed("ddm solve"):
         # While tips grow, the energy they release is found from all solutions before and after.
-        idle = set() if now.crack_energy.grows else now.growth_screening.among(now, result.dt)
+        idle = set() if now.crack_energy.grows else now.growth_screening.among(now)
     _solve(now, {block: body for block, body in now.bodies.items() if block not in idle})
     return {block: body for block, body in now.bodies.items() if block in idle}
 
@@ -441,7 +441,9 @@ def _solve(now: CrackedBlocks, bodies: dict) -> None:
     by_stress = {} if now.system.scheme.static else now.by_mean_stress.fields
     own = {block: now.by_mean_stress.solutions[block] for block in bodies if block in by_stress}
     under_loads = {block: body for block, body in bodies.items() if block not in own}
-    solved = now.solve(under_loads, now.loads, now.solutions) if under_loads else {}
+    solved = now.solve(under_loads, now.loads, now.earlier | now.solutions) if under_loads else {}
+    # Bodies that are left out keep the face states of their last solution as a first guess of the next.
+    now.earlier = {b: of for b, of in (now.earlier | now.solutions).items() if b in now.bodies and b not in bodies}
     now.solutions = {block: own[block] if block in own else solved[block] for block in bodies}
     now.solved_from = now.history
     for block, load in now.loads.items():

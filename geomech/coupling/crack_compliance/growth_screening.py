@@ -9,6 +9,7 @@ for example by a table of all tips, nothing is skipped.
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Protocol
 
@@ -17,12 +18,13 @@ import numpy as np
 if TYPE_CHECKING:
     from ...ddm import Body, BodyLoad
     from ...ddm.fracture.sif_bound import TipBound
+    from ...ddm.fracture.sif_change_bound import ChangeBound
     from ...model import Blocks, Problem
 
 #: Number of solutions of a body before its bound is computed, which takes about as long as twenty solutions …
 STOOD = 5
-#: … and largest K_eq/K_Ic at which it is: bounds are several times K.
-FAR = 0.1
+#: … and largest K_eq/K_Ic at which it is: bounds are several times K, or of the order of K as long as loads change.
+FAR, FAR_AT_REST = 0.1, 0.5
 #: Fraction of the toughness that the bound must not reach.
 BELOW = 1.0 - 1e-6
 
@@ -44,7 +46,7 @@ class _Known:
 
     crack_system: object
     solved: int = 0
-    bound: TipBound | None = None
+    bound: TipBound | ChangeBound | None = None
     per_factor: np.ndarray | float = 0.0
     never: bool = False
 
@@ -58,12 +60,12 @@ class GrowthScreening:
     asked: int = 0
     _known: dict[int, _Known] = field(default_factory=dict)
 
-    def among(self, now: CoupledBlocks, dt: float) -> set[int]:
-        """Blocks that need no solution under the present loads in a step of ``dt`` s."""
+    def among(self, now: CoupledBlocks) -> set[int]:
+        """Blocks that need no solution under the present loads."""
         problem = now.problem
         if not _may_leave_out(problem) or 2 * self.asked > self.passes:
             return set()
-        found = {block for block in now.bodies if self._cannot(now, block, dt)}
+        found = {block for block in now.bodies if self._cannot(now, block)}
         self.passes += bool(found)
         return found
 
@@ -71,15 +73,20 @@ class GrowthScreening:
         """Take note of new solutions with these ``tips`` (TIP rows) and their ``toughness`` (n_tips,)."""
         if not _may_leave_out(now.problem):
             return
-        near = set(tips["block"][tips["k_eq"] > FAR * toughness].tolist())
-        for block in now.solutions:
+        from ...ddm.fracture.sif_change_bound import ChangeBound
+
+        near, nearer = (set(tips["block"][tips["k_eq"] > f * toughness].tolist()) for f in (FAR, FAR_AT_REST))
+        for block, solution in now.solutions.items():
             body = now.bodies[block]
             known = self._known.get(block)
             if known is None or known.crack_system is not body.crack_system:
                 known = self._known[block] = _Known(body.crack_system)
-            known.solved = 0 if block in near else known.solved + 1
+            known.solved = 0 if block in (nearer if _can_close(body) else near) else known.solved + 1
             if known.solved == STOOD and known.bound is None and not known.never:
                 self._bound(now, block, known)
+            load = now.loads[block]
+            if isinstance(known.bound, ChangeBound) and load.points is None:
+                known.bound.refer(load, solution)
 
     def renumber(self, parent: np.ndarray | None, whole: np.ndarray) -> None:
         """Renumber the blocks: of ``whole`` (k,) new numbers, the data of their ``parent`` (n_blocks,) are kept."""
@@ -90,25 +97,29 @@ class GrowthScreening:
 
     def _bound(self, now: CoupledBlocks, block: int, known: _Known) -> None:
         from ...ddm.fracture.sif_bound import TipBound, is_bounded, largest_k_eq_per_k
+        from ...ddm.fracture.sif_change_bound import ChangeBound, changes_are_bounded
 
         body = now.bodies[block]
-        known.never = not is_bounded(body)
-        if not known.never:
+        known.per_factor = largest_k_eq_per_k(now.problem.growth.criterion, body.material)
+        if is_bounded(body):
             known.bound = TipBound(body)
-            known.per_factor = largest_k_eq_per_k(now.problem.growth.criterion, body.material)
+        elif changes_are_bounded(body):
+            with suppress(np.linalg.LinAlgError):
+                known.bound = ChangeBound(body)
+        known.never = known.bound is None
 
-    def _cannot(self, now: CoupledBlocks, block: int, dt: float) -> bool:
+    def _cannot(self, now: CoupledBlocks, block: int) -> bool:
         known, body, load = self._known.get(block), now.bodies[block], now.loads[block]
         if known is None or known.bound is None or known.crack_system is not body.crack_system:
             return False
         if load.points is not None or load.bases:
             return False
-        # Tips that waves reach later than one step are loaded by the mean of earlier K_eq (`wave_arrival`).
-        size = float(np.ptp(now.blocks.loops(block)[0], axis=0).max())
-        if np.sqrt(2.0) * size > body.material.pressure_wave_speed * dt:
-            return False
         k = known.bound.at_most(load)
         return bool((known.per_factor * k < BELOW * body.material.k_ic).all())
+
+
+def _can_close(body: Body) -> bool:
+    return bool(body.closing[1].any())
 
 
 def _may_leave_out(problem: Problem) -> bool:

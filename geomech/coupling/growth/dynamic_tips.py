@@ -11,7 +11,7 @@ from ...ddm.growth.tie_tolerance import reached
 from ...model import Blocks, Problem
 from ..load_transfer.boundary_tractions import BoundaryLoad
 from .tip_speed_limit import TipSpeed
-from .wave_arrival import WaveTime
+from .wave_arrival import LeftOut, WaveTime
 
 
 class DynamicTips:
@@ -31,10 +31,23 @@ class DynamicTips:
         """Record the growth (``grown``) of ``tips`` in a pass of the present step."""
         self.speed.record_growth(tips)
 
-    def end(self, tips: np.ndarray, blocks: Blocks, dt: float, loads: Mapping[int, BoundaryLoad]) -> None:
-        """The step of ``dt`` s ends with ``tips``."""
+    def end(
+        self,
+        tips: np.ndarray,
+        blocks: Blocks,
+        dt: float,
+        loads: Mapping[int, BoundaryLoad],
+        left_out: Mapping[int, LeftOut],
+    ) -> None:
+        """The step of ``dt`` s ends with ``tips``, and those of blocks ``left_out`` (block →)."""
         self.speed.end(tips, blocks, dt, self._driven(tips, blocks, dt, loads))
-        self.waves.end(tips, blocks, dt, loads)
+        self.waves.end(tips, blocks, dt, loads, left_out)
 
     def _driven(self, tips: np.ndarray, blocks: Blocks, dt: float, loads: Mapping[int, BoundaryLoad]) -> np.ndarray:
-        return reached(self.waves.drive(tips, blocks, dt, loads), self._k_ic[blocks.material[tips["block"]]])
+        k_ic = self._k_ic[blocks.material[tips["block"]]]
+        # The drive is no more than K_eq of the step itself.
+        at = np.flatnonzero(reached(tips["k_eq"], k_ic))
+        out = np.zeros(len(tips), bool)
+        if len(at):
+            out[at] = reached(self.waves.drive(tips[at], blocks, dt, loads), k_ic[at])
+        return out

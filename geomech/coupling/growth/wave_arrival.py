@@ -8,21 +8,58 @@ on their springs cause such peaks in every step. Where steps are shorter than th
 boundary, a tip therefore grows by the mean of K_eq over τ, the incubation-time criterion of Petrov & Morozov (1994):
 
     (1/τ) ∫ K dt ≥ K_Ic over the last τ.
+
+Blocks whose cracks could not grow in a step were not solved in it (`growth_screening`). If one of their tips reaches
+its toughness within τ, they are solved for that step after all.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass, field
 from types import MappingProxyType
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ...model import Blocks, Problem
 from ...model.blocks.polygon import distance_to_edges
 from ..load_transfer.boundary_tractions import BoundaryLoad
+from ..load_transfer.elastic_bodies import solve_bodies, tip_rows
+
+if TYPE_CHECKING:
+    from ...ddm import Body
 
 _NONE: Mapping[int, BoundaryLoad] = MappingProxyType({})
 _Key = tuple[int, int]
+
+
+@dataclass(eq=False)
+class LeftOut:
+    """The tips of a ``block`` (numbered in ``blocks``) in a step in which its ``body`` was not solved under its
+    ``load``: it is when they are asked for. ``nodes``: its nodes in the whole network."""
+
+    problem: Problem
+    blocks: Blocks
+    block: int
+    body: Body
+    load: BoundaryLoad
+    nodes: np.ndarray
+    _k_eq: dict[_Key, float] = field(default_factory=dict)
+
+    @property
+    def keys(self) -> list[_Key]:
+        """Crack and end of each tip."""
+        return _keys(self.body.tip_elements[0])
+
+    def k_eq(self, key: _Key) -> float:
+        """K_eq of the tip ``key``, Pa √m."""
+        if not self._k_eq:
+            solved = solve_bodies({self.block: self.body}, {self.block: self.load}, {}, {}, names=self.blocks.names)
+            tips = tip_rows(self.problem, self.blocks, solved, {self.block: self.nodes})
+            self._k_eq = dict(zip(_keys(tips), tips["k_eq"].tolist()))
+        return self._k_eq[key]
+
 
 #: Fraction of the largest traction on a block below which a part of its boundary counts as not loaded: what balancing
 #: the loads leaves there is round-off.
@@ -35,7 +72,7 @@ class WaveTime:
     def __init__(self, problem: Problem) -> None:
         self._speed = np.array([m.pressure_wave_speed for m in problem.materials])
         #: (dt, K_eq) of the last steps, the latest first, as far back as they count.
-        self._past: dict[_Key, list[tuple[float, float]]] = {}
+        self._past: dict[_Key, list[tuple[float, float | LeftOut]]] = {}
 
     def drive(
         self, tips: np.ndarray, blocks: Blocks, dt: float, loads: Mapping[int, BoundaryLoad] = _NONE
@@ -46,28 +83,45 @@ class WaveTime:
         for row, time in self._longer(tips, blocks, dt, loads):
             tip = tips[row]
             total, rest = float(tip["k_eq"]) * dt, time - dt
-            for step, k_eq in self._past.get((int(tip["crack"]), int(tip["end"])), ()):
-                total += k_eq * min(step, rest)
+            key = (int(tip["crack"]), int(tip["end"]))
+            for step, k_eq in self._past.get(key, ()):
+                total += (k_eq.k_eq(key) if isinstance(k_eq, LeftOut) else k_eq) * min(step, rest)
                 rest -= step
                 if rest <= 0:
                     break
             driven[row] = min(driven[row], total / time)
         return driven
 
-    def end(self, tips: np.ndarray, blocks: Blocks, dt: float, loads: Mapping[int, BoundaryLoad] = _NONE) -> None:
-        """The step of ``dt`` s ends with ``tips``."""
-        past = {}
+    def end(
+        self,
+        tips: np.ndarray,
+        blocks: Blocks,
+        dt: float,
+        loads: Mapping[int, BoundaryLoad] = _NONE,
+        left_out: Mapping[int, LeftOut] = MappingProxyType({}),
+    ) -> None:
+        """The step of ``dt`` s ends with ``tips``, and those of blocks ``left_out`` (block →)."""
+        past: dict[_Key, list[tuple[float, float | LeftOut]]] = {}
         for row, time in self._longer(tips, blocks, dt, loads):
-            tip = tips[row]
-            key = (int(tip["crack"]), int(tip["end"]))
-            kept, length = [(dt, float(tip["k_eq"]))], dt
-            for step in self._past.get(key, ()):
-                if length >= time:
-                    break
-                kept.append(step)
-                length += step[0]
-            past[key] = kept
+            key = (int(tips["crack"][row]), int(tips["end"][row]))
+            past[key] = self._last(key, (dt, float(tips["k_eq"][row])), time)
+        for block, of in left_out.items():
+            # No way in the block is longer.
+            time = np.sqrt(2.0) * float(np.ptp(blocks.loops(block)[0], axis=0).max())
+            time /= float(self._speed[blocks.material[block]])
+            if time > dt:
+                past |= {key: self._last(key, (dt, of), time) for key in of.keys}
         self._past = past
+
+    def _last(self, key: _Key, now: tuple[float, float | LeftOut], time: float) -> list[tuple[float, float | LeftOut]]:
+        """The step ``now`` and those before it that reach back ``time`` s."""
+        kept, length = [now], now[0]
+        for step in self._past.get(key, ()):
+            if length >= time:
+                break
+            kept.append(step)
+            length += step[0]
+        return kept
 
     def _longer(
         self, tips: np.ndarray, blocks: Blocks, dt: float, loads: Mapping[int, BoundaryLoad]
@@ -101,3 +155,7 @@ def _outline(blocks: Blocks, block: int) -> np.ndarray:
     """(n, 2, 2) m, all edges of ``block``, reference coordinates."""
     own = np.arange(blocks.vertex_start[block], blocks.vertex_start[block + 1])
     return np.stack([blocks.vertices[own], blocks.vertices[blocks.next_vertex[own]]], axis=1)
+
+
+def _keys(tips: np.ndarray) -> list[_Key]:
+    return list(zip(tips["crack"].tolist(), tips["end"].tolist()))
