@@ -30,6 +30,7 @@ from .counters import Work
 from .crack_contact.face_contact import settle_faces
 from .crack_contact.face_equations import FaceEquations
 from .crack_contact.face_laws import SMOOTH, FaceLaws, FaceMemory, all_smooth, check_laws
+from .crack_contact.uniform_contact import UniformContact, condenses
 from .fracture.chord_error import with_halved_chords
 from .fracture.target_error import refined_to_target
 from .fracture.tip_elements import tip_elements
@@ -41,7 +42,7 @@ from .iterative.gmres import NotSolved
 from .loads.body_loads import BodyLoad
 from .loads.load_vectors import Applied, apply, check_equilibrium
 from .loads.supports import Holds, Support, called, marks, place, values_at
-from .loads.uniform_stress_response import UniformStressResponse, scales, uniform_stress_response_of
+from .loads.uniform_stress_response import Response, scales, uniform_stress_response_of
 from .loads.unit_load_cache import UnitLoad, UnitLoads, on_elements
 from .mesh.edge_location import OFF
 from .mesh.elements import Mesh, mesh, outline_edges
@@ -56,6 +57,10 @@ from .system.influence_matrix import ElementSet, influence, reuse
 from .system.schur_complement import WORTHWHILE, CrackSystem
 
 _log = logging.getLogger(__name__)
+
+#: Number of solutions under uniform stress from which the contact of cracks that have grown is condensed, which takes as
+#: long as three solutions.
+WORTH_CONDENSING = 5
 
 
 @dataclass(frozen=True, eq=False)
@@ -183,7 +188,13 @@ class Body:
         #: Bodies with trial kinks (`f_criterion`), by kink length and direction number.
         self.trials: dict[float, dict[int, Body]] = {}
         #: Responses to uniform stress, by the states of the crack faces (`uniform_stress_response`).
-        self.uniform_responses: dict[bytes, UniformStressResponse] = {}
+        self.uniform_responses: dict[bytes, Response] = {}
+        #: Whether it is one of many bodies; number of solutions under uniform stress; its `condensed_contact`, if looked
+        #: for.
+        self.in_number = False if previous is None else previous.in_number
+        self._grown = previous is not None
+        self.uniform_solutions = 0
+        self._condensed: tuple[UniformContact | None] | None = None
         #: Where faces stand on bases, and how unit tractions move them by the states of the cracks (`rigid_bases`).
         self.on_bases: dict[bytes, tuple[np.ndarray, ...]] = {}
         self._assemble(previous, holds, many)
@@ -379,6 +390,12 @@ class Body:
             self.condensation.release()
             self.crack_system.retire()
             self._loads.forget()
+            self._condensed = (None,)
+
+    def forget_states(self) -> None:
+        """Give up the factors of contact states of one of many bodies: these take as much memory as its matrices."""
+        if self.in_number and not self._grown and isinstance(self.crack_system, CrackSystem):
+            self.crack_system.retire()
 
     def _imposed(self, applied: Applied) -> np.ndarray:
         """(h_unknowns,) 2μ times the displacement that supports prescribe, minus that of particular fields."""
@@ -533,7 +550,7 @@ class Body:
     def release(self) -> None:
         """Give up large matrices that loads do not need, but growth and fields inside the body do: these compute them
         again. Bodies that grow from this one keep no room for further growth."""
-        self.lean = self._outside.large
+        self.lean, self.in_number = self._outside.large, True
         self.condensation.release()
 
     def k_functionals(self, solution: Solution | None = None) -> TipFunctionals:
@@ -559,6 +576,19 @@ class Body:
     def initial_memory(self) -> FaceMemory:
         """Memory of faces that have never been loaded."""
         return FaceMemory.none(self.faces)
+
+    def condensed_contact(self, closed: np.ndarray | None = None) -> UniformContact | None:
+        """The contact of faces under uniform stress, condensed (`uniform_contact`), first with the unknowns ``closed``
+        (n_crack_unknowns,) bool; without them, only if it is known. None where it is not worth its memory or cannot be
+        done: of few bodies, and of cracks that have just grown."""
+        if not self.in_number or (self._grown and self.uniform_solutions < WORTH_CONDENSING):
+            return None
+        if self._condensed is None and closed is not None:
+            try:
+                self._condensed = (UniformContact(self, closed) if condenses(self) else None,)
+            except np.linalg.LinAlgError:
+                self._condensed = (None,)
+        return None if self._condensed is None else self._condensed[0]
 
     @cached_property
     def face_equations(self) -> FaceEquations:
@@ -612,7 +642,7 @@ class Body:
             return np.zeros((3, 3))
         if scales(self):
             closed = np.zeros(self.faces.n_unknowns, bool) if sol is None else sol.closed
-            response = self.strain_weights @ uniform_stress_response_of(self, closed).jumps[:, :3]
+            response = uniform_stress_response_of(self, closed).compliance()
             return 0.5 * (response + response.T)
         response = self.strain_weights @ self.jumps_under(self.mean_stress_traction, sol)
         return 0.5 * (response + response.T)

@@ -64,6 +64,7 @@ class CrackedBody(Protocol):
     _outside: BoundarySystem
     _c_known: np.ndarray
     _extent: float
+    _loads: Any
     _reach: float
     _second: np.ndarray
     _tol: float
@@ -79,6 +80,8 @@ class CrackedBody(Protocol):
 
     @property
     def uniform_responses(self) -> dict[bytes, Any]: ...
+
+    def condensed_contact(self, closed: np.ndarray | None = None) -> Any: ...
 
     @property
     def initial_memory(self) -> FaceMemory: ...

@@ -174,8 +174,16 @@ class ByMeanStress:
         known = scaled(body, stress, before) if skip and whole is None else None
         if known is not None:
             return known
+        if whole is None:
+            body.uniform_solutions += 1
+            condensed = body.condensed_contact(None if before is None else before.closed) if skip else None
+            known = None if condensed is None else condensed.solve(stress)
+            if known is not None:
+                return known
         load = body.mean_stress_load(stress) if whole is None else BodyLoad(intact=whole.under(stress))
-        return body.solve(load, warm=before, history=self.memory.get(block, began), meet_target=False)
+        found = body.solve(load, warm=before, history=self.memory.get(block, began), meet_target=False)
+        body.forget_states()
+        return found
 
     def _changes_limit(
         self, block: int, body: Body, elastic: np.ndarray, solution: Solution | UniformStressSolution

@@ -86,7 +86,10 @@ def elastic_bodies(
         outline = [] if surface is None else ddm.HalfPlane(*surface)
         return ddm.Body(outline, own, material, problem.ddm, reuse, holes=own_loops, face_laws=laws)
 
-    bodies.update(zip([of[0] for of in to_make], parallel_map(made, to_make)))
+    # The largest first, while the others take no memory yet.
+    largest_first = sorted(to_make, key=lambda of: -len(_loops(problem, blocks, of[0])[0]) - of[1].n_segments)
+    made_of = dict(zip([of[0] for of in largest_first], parallel_map(made, largest_first)))
+    bodies.update({of[0]: made_of[of[0]] for of in to_make})
     if lean:
         return_free_memory()
     return bodies, nodes_of
@@ -219,7 +222,10 @@ def solve_bodies(
 
                 bases = [Base(*base) for base in load.bases]
                 return on_bases(body, ddm.BodyLoad(**asked), bases, known, history.get(b))
-            return body.solve(ddm.BodyLoad(**asked), warm=known, history=history.get(b))
+            found = body.solve(ddm.BodyLoad(**asked), warm=known, history=history.get(b))
+            if len(bodies) >= MANY:
+                body.forget_states()
+            return found
         except (ValueError, ddm.NotConverged) as failure:
             # (Subclasses, as `ddm.OutOfEquilibrium`, carry more than a message.)
             if type(failure) not in (ValueError, ddm.NotConverged):

@@ -21,6 +21,8 @@ import numpy as np
 
 #: Largest number of states tried before the search, which begins earlier if they cycle.
 _MOST = 50
+#: Allowed violation, relative to the scales of gaps and pressures.
+TOLERANCE = 1e-10
 
 
 class NotConverged(RuntimeError):
@@ -43,7 +45,7 @@ def settle(
     can_close: np.ndarray,
     closed: np.ndarray,
     search: Callable[[np.ndarray, np.ndarray], np.ndarray],
-    tolerance: float = 1e-10,
+    tolerance: float = TOLERANCE,
 ) -> Settled:
     """Which nodes are closed.
 

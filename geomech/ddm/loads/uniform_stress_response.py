@@ -7,8 +7,9 @@ solution as long as no closed face is in tension and no open faces overlap.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
@@ -20,6 +21,22 @@ if TYPE_CHECKING:
 
 #: Number of sets of closed faces for which responses are cached.
 KEPT = 4
+
+
+class Response(Protocol):
+    """Response of a body to uniform stress with some faces ``closed`` (n,) bool; ``jumps`` (n, 4) under three unit
+    stresses and under none."""
+
+    closed: np.ndarray
+
+    @property
+    def jumps(self) -> np.ndarray: ...
+
+    def compliance(self) -> np.ndarray:
+        """(3, 3) crack strain per unit stress, 1/Pa."""
+
+    def holds(self, stress: np.ndarray) -> bool:
+        """Whether faces keep these states under ``stress`` (3,), Pa."""
 
 
 class UniformStressResponse:
@@ -44,6 +61,12 @@ class UniformStressResponse:
         # Quantities that must not be negative, row by row: gaps of open faces that can meet, pressures of closed ones.
         self._holds = np.where(closed[:, None], pressed, gap)[can_close]
 
+        self._weights = body.strain_weights
+
+    def compliance(self) -> np.ndarray:
+        """(3, 3) crack strain per unit stress, 1/Pa."""
+        return self._weights @ self.jumps[:, :3]
+
     def holds(self, stress: np.ndarray) -> bool:
         """Whether faces keep these states under ``stress`` (3,), Pa."""
         return not len(self._holds) or bool((self._holds[:, :3] @ stress + self._holds[:, 3]).min() >= 0.0)
@@ -58,7 +81,7 @@ class UniformStressSolution:
     frictional_work = filling_energy = 0.0
     dissipated_in_step = 0.0, Released()
 
-    def __init__(self, body: CrackedBody, response: UniformStressResponse, stress: np.ndarray) -> None:
+    def __init__(self, body: CrackedBody, response: Response, stress: np.ndarray) -> None:
         self.body, self.closed, self._response = body, response.closed, response
         self._stress = np.array([*stress, 1.0])
 
@@ -152,14 +175,24 @@ def scales(body: CrackedBody) -> bool:
     return body.outlined and len(body.loops) == 1 and not (body.rough or body.supports or body.compressed)
 
 
-def uniform_stress_response_of(body: CrackedBody, closed: np.ndarray) -> UniformStressResponse:
+def uniform_stress_response_of(body: CrackedBody, closed: np.ndarray) -> Response:
     """Response of a ``body`` that `scales` to uniform stress with the openings ``closed``, (n_crack_unknowns,) bool;
     cached with the body."""
+
+    def made(closed: np.ndarray) -> Response:
+        condensed = body.condensed_contact()
+        return UniformStressResponse(body, closed) if condensed is None else condensed.response(closed)
+
+    return kept_response(body, closed, made)
+
+
+def kept_response(body: CrackedBody, closed: np.ndarray, made: Callable[[np.ndarray], Response]) -> Response:
+    """The response cached for ``closed``, or the one ``made`` from it, which is cached."""
     key = np.packbits(closed).tobytes()
     if key not in body.uniform_responses:
         if len(body.uniform_responses) >= KEPT:
             body.uniform_responses.pop(next(iter(body.uniform_responses)))
-        body.uniform_responses[key] = UniformStressResponse(body, closed)
+        body.uniform_responses[key] = made(closed)
     return body.uniform_responses[key]
 
 

@@ -128,6 +128,10 @@ class CrackSystem:
     def retire(self) -> None:
         """Give up the factors of contact states."""
         self.bases, self._factors, self._shut, self._prescribed_factor = [], {}, None, None
+        self._column_at[:] = -1
+        self._columns = np.empty((self.n, 0))
+        if isinstance(self.matrix, WholeMatrix) and self.matrix.release():
+            vars(self).pop("open_factor", None)
 
     def changed(self, rows: Rows) -> tuple[np.ndarray, AnyFactor]:
         """Indices of the unknowns that ``rows`` leave free, and factors of their equations."""
