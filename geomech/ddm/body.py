@@ -109,6 +109,7 @@ class Body:
     _outside: BoundarySystem
     condensation: Condensed | Operators
     lean: bool
+    in_number: bool
 
     @folded_argument("half_plane", "loops", without_outline)
     @gathered_arguments("reuse", Reuse)
@@ -191,7 +192,7 @@ class Body:
         self.uniform_responses: dict[bytes, Response] = {}
         #: Whether it is one of many bodies; number of solutions under uniform stress; its `condensed_contact`, if looked
         #: for.
-        self.in_number = False if previous is None else previous.in_number
+        self.in_number = previous is not None and previous.in_number
         self._grown = previous is not None
         self.uniform_solutions = 0
         self._condensed: tuple[UniformContact | None] | None = None
@@ -393,9 +394,11 @@ class Body:
             self._condensed = (None,)
 
     def forget_states(self) -> None:
-        """Give up the factors of contact states of one of many bodies: these take as much memory as its matrices."""
+        """Give up the factors of contact states and the loads of one of many bodies: these take as much memory as its
+        matrices."""
         if self.in_number and not self._grown and isinstance(self.crack_system, CrackSystem):
             self.crack_system.retire()
+            self._loads.forget()
 
     def _imposed(self, applied: Applied) -> np.ndarray:
         """(h_unknowns,) 2μ times the displacement that supports prescribe, minus that of particular fields."""

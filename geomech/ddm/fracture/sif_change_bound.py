@@ -75,7 +75,11 @@ class ChangeBound:
         body = self._body
         loads, g, c = body._loads, body.boundary, body.faces
         on_boundary = body.reduced_transposed(on_faces)
-        self._start, self._end, self._length = g.start, g.end, g.length
+        # Distance from an element's line, and along it from its start, are products with a point less constants.
+        self._along = ((g.end - g.start) / g.length[:, None]).T
+        self._across = np.stack([self._along[1], -self._along[0]])
+        self._origin = (g.start.T * self._along).sum(axis=0), (g.start.T * self._across).sum(axis=0)
+        self._length = g.length
         out = np.empty((g.n, 4, on_faces.shape[1]))
         for first in range(0, g.n, _AT_ONCE):
             part = slice(first, first + _AT_ONCE)
@@ -111,11 +115,9 @@ class ChangeBound:
     def _on_ends(self, segments: np.ndarray, tractions: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
         """Boundary elements (k,) under the ``segments`` (m, 2, 2) with linear ``tractions`` (m, 2, 2), and forces at
         their ends (k, 2, 2), N/m, with which functions linear along an element are integrated exactly."""
-        along = (self._end - self._start) / self._length[:, None]
-        near = _ON_LINE * self._body._extent
-        arm = segments[:, :, None] - self._start  # (m, 2, n, 2)
-        off = np.abs(arm[..., 0] * along[:, 1] - arm[..., 1] * along[:, 0]).max(axis=1)
-        at = (arm * along).sum(axis=-1)  # (m, 2, n)
+        near, points = _ON_LINE * self._body._extent, segments.reshape(-1, 2)
+        off = np.abs(points @ self._across - self._origin[1]).reshape(len(segments), 2, -1).max(axis=1)
+        at = (points @ self._along - self._origin[0]).reshape(len(segments), 2, -1)
         low, high = np.maximum(at.min(axis=1), 0.0), np.minimum(at.max(axis=1), self._length)
         segment, element = np.nonzero((off <= near) & (high > low))
         low, high = low[segment, element], high[segment, element]
@@ -160,22 +162,26 @@ def _tip_weights(body: CrackedBody) -> np.ndarray:
 
 
 def _raised(stiffness: np.ndarray, share: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Lower Cholesky factor (n, n) of A, its diagonal scaled to one and raised, and the scales (n,)."""
+    """Cholesky factor of A, its diagonal scaled to one and raised, in the lower triangle (n, n), and the scales (n,)."""
     from scipy.linalg import lapack
 
-    energy = -share[:, None] * stiffness
-    energy = 0.5 * (energy + energy.T)
+    energy = np.multiply(stiffness, -0.5 * share[:, None], order="F")
+    energy += energy.T.copy()
     diagonal = energy.diagonal().copy()
     if not (diagonal > 0).all():
         raise np.linalg.LinAlgError("jumps at a node have no energy")
     scale = 1.0 / np.sqrt(diagonal)
-    energy *= scale * scale[:, None]
+    energy *= scale
+    energy *= scale[:, None]
     raised = 0.0
     while raised <= MOST_RAISED:
         np.fill_diagonal(energy, 1.0 + raised)
-        factor, info = lapack.dpotrf(energy, lower=True)
+        # The factor replaces the lower triangle and the diagonal alone: the upper one still has the matrix.
+        energy, info = lapack.dpotrf(energy, lower=True, clean=False, overwrite_a=True)
         if info == 0:
-            return factor, scale
+            return energy, scale
+        for column in range(len(energy)):
+            energy[column:, column] = energy[column, column:]
         raised = max(RAISED, 2 * raised)
     raise np.linalg.LinAlgError("the energy of jumps is not positive")
 
