@@ -18,7 +18,7 @@ from .crack_compliance.load_extrapolation import LoadExtrapolation
 from .crack_compliance.mean_stress_response import ByMeanStress
 from .crack_compliance.quasi_newton import QuasiNewton
 from .load_transfer.boundary_tractions import BoundaryLoad
-from .load_transfer.elastic_bodies import elastic_bodies, inherited, solve_bodies
+from .load_transfer.elastic_bodies import MANY, elastic_bodies, inherited, solve_bodies
 from .monitoring.crack_energy import CrackEnergy
 from .splitting.load_inheritance import on_children, on_moved
 from .timing import Phases
@@ -153,9 +153,11 @@ class CrackedBlocks:
 
     def solve(self, bodies: dict, loads: dict[int, BoundaryLoad], warm: dict) -> dict:
         """Solutions (block →) of ``bodies`` under ``loads``, with the face memory of the start of the step."""
+        # In motion most of many bodies are left out in the next steps.
+        forgets = not self.system.scheme.static and len(bodies) >= MANY
         with self.timed("ddm solve"):
             return solve_bodies(
-                bodies, loads, warm, self.history, self.solved_from, self.problem.run.skip, self.blocks.names
+                bodies, loads, warm, self.history, self.solved_from, self.problem.run.skip, self.blocks.names, forgets
             )
 
     def strain_solutions(self) -> dict:

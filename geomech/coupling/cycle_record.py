@@ -63,7 +63,7 @@ def record(
     del vars(cycle)["faces"]  # computed on first use
     if left_out:
         del vars(cycle)["tips"], vars(cycle)["bodies"]
-        vars(cycle)["_rest"] = _LeftOut(now, solutions, dict(left_out))
+        vars(cycle)["_rest"] = _LeftOut(now, solutions, tips, dict(left_out))
     return cycle
 
 
@@ -89,8 +89,9 @@ class _LeftOut:
     """Solves bodies left out of a pass as they would have been solved in it, from a copy of the data in ``now``, which
     will change."""
 
-    def __init__(self, now: CrackedBlocks, solutions: dict, left_out: dict[int, Body]) -> None:
+    def __init__(self, now: CrackedBlocks, solutions: dict, tips: np.ndarray, left_out: dict[int, Body]) -> None:
         self._screening, self._solutions, self._left_out = now.growth_screening, solutions, left_out
+        self._tips = tips
         self._problem, self._blocks, self._nodes_of = now.problem, now.blocks, now.nodes_of
         self._order, self._loads = list(now.bodies), {block: now.loads[block] for block in left_out}
 
@@ -104,8 +105,10 @@ class _LeftOut:
         return {block: found[block] for block in self._order}
 
     def tips(self, solutions: dict[int, Any]) -> np.ndarray:
-        """TIP rows of all bodies."""
-        return tip_rows(self._problem, self._blocks, solutions, self._nodes_of)
+        """TIP rows of all bodies; those of the pass have what its tips have grown."""
+        left_out = {block: solutions[block] for block in self._left_out}
+        known = np.concatenate([self._tips, tip_rows(self._problem, self._blocks, left_out, self._nodes_of)])
+        return np.concatenate([known[known["block"] == block] for block in self._order])
 
 
 def skips(now: CrackedBlocks, work: dict[str, int]) -> dict[str, Skip]:

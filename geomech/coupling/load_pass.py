@@ -302,12 +302,8 @@ def _step(
 
 
 def _with_tips(now: CrackedBlocks, result: StepResult, statistics: dict[str, float], left_out: dict) -> Balance:
-    """The result of the last iteration, with its tips. Bodies ``left_out`` are solved as well where any tip grows."""
+    """The result of the last iteration, with the tips of all bodies but those ``left_out``."""
     tips = _tips_with_criterion(now)
-    if left_out and (tips["k_eq"] >= toughness(now, tips)).any():
-        # The step is repeated with the growth, so all tips are needed.
-        _solve(now, now.bodies)
-        left_out, tips = {}, _tips_with_criterion(now)
     for body in left_out.values():
         body.work.solutions_left_out += 1
     if not now.system.scheme.static:
@@ -421,8 +417,7 @@ def _solve_what_may_grow(now: CrackedBlocks, result: StepResult) -> dict:
     """Solve all bodies whose cracks may grow under the step ``result``; returns the others (block →)."""
     _take_loads(now, result)
     with now.timed("ddm solve"):
-        # While tips grow, the energy they release is found from all solutions before and after.
-        idle = set() if now.crack_energy.grows else now.growth_screening.among(now)
+        idle = now.growth_screening.among(now)
     _solve(now, {block: body for block, body in now.bodies.items() if block not in idle})
     return {block: body for block, body in now.bodies.items() if block in idle}
 

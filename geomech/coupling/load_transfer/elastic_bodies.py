@@ -198,13 +198,14 @@ def solve_bodies(
     solved_from: dict | None = None,
     skip: bool = True,
     names: Sequence[str] = (),
+    forgets: bool = False,
 ) -> dict:
     """Solutions (block →) of ``bodies`` under ``loads``, in parallel.
 
     ``warm``: earlier solutions, whose face states are the first guess; ``history``: slip and damage of frictional faces
     at the start of the load step; ``solved_from``: the history with which ``warm`` were solved. With ``skip``, an
-    earlier solution of the same geometry, load and history is returned as it is. Raises what `ddm.Body.solve` raises,
-    with the name of the block (of ``names``) in front."""
+    earlier solution of the same geometry, load and history is returned as it is. ``forgets``: bodies give up what they
+    keep for similar loads. Raises what `ddm.Body.solve` raises, with the name of the block (of ``names``) in front."""
     from ... import ddm
 
     solved_from = {} if solved_from is None else solved_from
@@ -223,7 +224,7 @@ def solve_bodies(
                 bases = [Base(*base) for base in load.bases]
                 return on_bases(body, ddm.BodyLoad(**asked), bases, known, history.get(b))
             found = body.solve(ddm.BodyLoad(**asked), warm=known, history=history.get(b))
-            if len(bodies) >= MANY:
+            if forgets:
                 body.forget_states()
             return found
         except (ValueError, ddm.NotConverged) as failure:

@@ -245,11 +245,6 @@ class CrackEnergy:
         self.runaway += max(0.0, stored - spent)
 
     @property
-    def grows(self) -> bool:
-        """Whether tips have grown whose release has not been added yet."""
-        return bool(self._growing)
-
-    @property
     def under_way(self) -> bool:
         """Whether the balance has entries, even if there are no cracks any more."""
         return self.work != 0.0 or self.stored != 0.0
