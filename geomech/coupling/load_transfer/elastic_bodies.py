@@ -87,7 +87,7 @@ def elastic_bodies(
         return ddm.Body(outline, own, material, problem.ddm, reuse, holes=own_loops, face_laws=laws)
 
     # The largest first, while the others take no memory yet.
-    largest_first = sorted(to_make, key=lambda of: -len(_loops(problem, blocks, of[0])[0]) - of[1].n_segments)
+    largest_first = sorted(to_make, key=lambda of: -sum(map(len, _loops(problem, blocks, of[0]))) - of[1].n_segments)
     made_of = dict(zip([of[0] for of in largest_first], parallel_map(made, largest_first)))
     bodies.update({of[0]: made_of[of[0]] for of in to_make})
     if lean:
