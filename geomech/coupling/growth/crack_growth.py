@@ -49,7 +49,9 @@ def growth_of_tips(
         nonlocal trial
         trial, nodes_of = now.bodies_of(cracks, trial)
         loads = now.loads if now.problem.endless is None else loads_of(now, cracks, trial)
-        ahead = now.solve(trial, loads, now.solutions)
+        # Bodies that were left out of the pass and have not grown have no new ends.
+        concerned = {b: of for b, of in trial.items() if b in now.solutions or of is not now.bodies.get(b)}
+        ahead = now.solve(concerned, loads, now.solutions)
         return tip_rows(now.problem, now.blocks, ahead, nodes_of)
 
     growth = corrected(tips, grow, look_ahead, now.number, now.problem.growth.correct, now.chords)

@@ -155,7 +155,9 @@ class CrackEnergy:
             return
         if not (self._growing or (tips["grown"] > 0).any()):
             return
-        tips = straining_tips(tips, {block: of for block, of in solutions.items() if block in by_mean_stress})
+        grow = {of.block for of in self._growing.values()} | set(tips["block"][tips["grown"] > 0].tolist())
+        strained = {block: of for block, of in solutions.items() if block in grow and block in by_mean_stress}
+        tips = straining_tips(tips, strained)
         rock = blocks.material[tips["block"]]
         modulus = np.array([m.plane_modulus for m in materials])[rock]
         keys = _keys(tips)
