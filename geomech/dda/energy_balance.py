@@ -54,6 +54,8 @@ class StepEnergy(NamedTuple):
     impact           dissipated normal to the contact in impacts with a coefficient of restitution (`impacts`); their
                      friction is part of ``friction``
     beyond_mean      work of the loads that the step takes beyond that of their mean, part of ``scheme`` (`step_actions`)
+    breaking         work that the bonds which break in the step would have done with their forces at its start: when they
+                     break within the step is not known
     """
 
     kinetic: float
@@ -72,6 +74,7 @@ class StepEnergy(NamedTuple):
     residual: float
     impact: float = 0.0
     beyond_mean: float = 0.0
+    breaking: float = 0.0
 
     @property
     def stored(self) -> float:

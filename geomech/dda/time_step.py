@@ -849,10 +849,18 @@ class Attempt:
         return energy._replace(
             before=energy.before + found.unbent + found.released,
             bond=energy.bond + found.unbent,
+            breaking=self._breaking(),
             friction=energy.friction + self.frictional,
             # Elastic energy released where faces separate is a vibration that no step resolves.
             scheme=energy.scheme - self.frictional + found.released,
         )
+
+    def _breaking(self) -> float:
+        """`StepEnergy.breaking` of the step, J/m."""
+        found, settled = self.found, self.settled
+        lost = (found.bonded > 0) & (settled.bonded == 0)
+        works = found.normal * (settled.gap - found.gap_before), found.shear * self.slid
+        return float(sum(np.abs(work[lost]).sum() for work in works))
 
     def _beyond_mean(self) -> BeyondMean | None:
         """The loads that the step takes beyond their mean over it."""

@@ -98,10 +98,11 @@ WARNED = (
     "nothing holds",
     "static steps have dissipated",
     "of their strain only",
+    "before they bear it",
     *sorted({words for invariant in INVARIANTS.values() for words in invariant.reported}),
 )
 #: The same of results that depend on the time step, not on the place.
-WARNED_OF_STEPS = ("does not resolve vibrations",)
+WARNED_OF_STEPS = ("does not resolve vibrations", "bonds broke within steps")
 _MODULES = (
     "drawn_slopes", "limited_runs", "moved_mass", "random_slopes", "refusals", "slope_invariance", "slope_invariants",
 )  # fmt: skip

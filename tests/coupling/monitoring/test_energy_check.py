@@ -198,6 +198,26 @@ def test_vibrations_that_the_step_does_not_resolve_are_told_of(caplog):
         assert of_dissipation(rests, caplog)[1] is None
 
 
+def test_bonds_that_break_within_coarse_steps_are_told_of(caplog):
+    """A random slope under sudden weight and shaking, whose bonds break. The error of the work of gravity, compared with
+    steps a sixteenth as long, is that of the warning or a few times as much, and shrinks with it."""
+    problem = problem_of(drawn(scene_text(29)))
+    found = {}
+    for division in (1, 4, 16):
+        caplog.clear()
+        refined = replace(problem, dda=replace(problem.dda, time_step=problem.dda.time_step / division))
+        with caplog.at_level(logging.WARNING):
+            *_, last = cycles(refined)
+        told = [re.search(r"forces would have done (\S+) of all", record.getMessage()) for record in caplog.records]
+        found[division] = last.statistics["gravity_work"], [float(each[1]) for each in told if each]
+    fine, quiet = found[16]
+    assert not quiet
+    shares = [found[division][1][0] for division in (1, 4)]
+    errors = [abs(found[division][0] / fine - 1.0) for division in (1, 4)]
+    assert shares[1] < 0.3 * shares[0] and errors[1] < 0.6 * errors[0]
+    assert all(0.3 * share < error < 5.0 * share for share, error in zip(shares, errors))
+
+
 @pytest.mark.parametrize("together", [True, False])
 def test_static_steps_that_move_what_nothing_holds_are_told_of(together, caplog):
     """A tank that water lifts by half its weight, before the weight is there or as it comes: it floats off, and settles."""

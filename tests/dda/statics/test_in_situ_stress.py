@@ -1,6 +1,8 @@
 """Blocks under in-situ stress: at rest from the first step on, and unloaded by what is taken out."""
 
 import itertools
+import logging
+import re
 
 import numpy as np
 import pytest
@@ -56,6 +58,27 @@ def test_blocks_with_geostatic_stress_do_not_move_in_the_first_step(friction, k0
         state = result.state
         assert result.statistics["open_close_iterations"] <= 3
     assert np.abs(state.vertices - rest.blocks.vertices).max() < 2e-5 * settling
+
+
+@pytest.mark.parametrize(("k0", "slides"), [(0.2, True), (0.9, False)])
+def test_joints_that_slide_before_they_bear_the_stress_are_told_of(k0, slides, caplog):
+    """A joint at 45° bears σ_n = ½ (1 + K0) σ_v and τ = ½ (1 − K0) σ_v: with tan φ = 0.3, from K0 = 0.54 on. Below it the
+    upper block comes down, wedges itself in, and takes the stress that the joint bears."""
+    walls = [rectangle(-1, -1, 5, 0), rectangle(-1, 0, 0, 4), rectangle(4, 0, 5, 4)]
+    rock = [np.array([[0.0, 0.0], [4.0, 0.0], [4.0, 4.0]]), np.array([[0.0, 0.0], [4.0, 4.0], [0.0, 4.0]])]
+    blocks = Blocks.from_polygons(
+        [*walls, *rock], fixed=[True] * 3 + [False] * 2, names=["floor", "left", "right", "lower", "upper"]
+    )
+    with caplog.at_level(logging.WARNING):
+        dda.in_situ_state(
+            system_of(blocks, np.arctan(0.3)), InSituStress.geostatic(4.0, 2600 * 9.81, k0), Loads(gravity=GRAVITY)
+        )
+    lines = [record.getMessage() for record in caplog.records if "before they bear it" in record.getMessage()]
+    assert len(lines) == slides
+    if slides:
+        assert "lower on upper" in lines[0]
+        share = float(re.search(r"dissipate (\S+) of the elastic energy", lines[0])[1])
+        assert 0.01 < share < 2.0
 
 
 def test_a_given_tensor_with_gradients():
