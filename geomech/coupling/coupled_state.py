@@ -68,6 +68,9 @@ class CrackedBlocks:
         self.acted: dict[str, float] = {}
         self.removed: np.ndarray | None = None
         self._motion: tuple[State, Motion] | None = None
+        #: Of blocks with automatic order (block →): stress fields of higher orders, and softness of their cracks there.
+        self.fields_above: dict[int, BlockStressField] = {}
+        self.softness_above: dict[int, tuple] = {}
         self.response: dda.CrackResponse
         self._take_blocks()
         #: Result of the search for in-situ equilibrium where that ended in a collapse.
@@ -96,6 +99,10 @@ class CrackedBlocks:
     def _take_bodies(self) -> None:
         """Make the elastic bodies of the present cracks; bodies that have not changed are kept."""
         self.bodies, self.nodes_of = self.bodies_of(self.cracks, self.bodies)
+        self._take_fields()
+
+    def _take_fields(self) -> None:
+        """The stress fields of the cracked blocks of higher order."""
         deflected = self.system.deflected
         if deflected is not None:
             fields, compliance = self.by_mean_stress.fields, self.system.compliance
@@ -103,6 +110,25 @@ class CrackedBlocks:
             known = {b: fields[b] for b in bend if b in fields and fields[b].blocks is deflected}
             more = {b: BlockStressField.of(deflected, b, compliance[b]) for b in bend if b not in known}
             self.by_mean_stress.take_fields(known | more)
+
+    def take_orders(self, order: np.ndarray, begun: dda.CrackResponse, state: State | None) -> set[int]:
+        """Raise blocks to these ``order`` (n_blocks,); returns which are raised. ``begun``: crack response of before, which
+        is kept with room for more components; ``state`` with the new orders, None: the present one, with zero for what is
+        new."""
+        before = self.system.order_of(self.state)
+        state = dda.with_orders(self.state, before, order) if state is None else state
+        self.state = replace(state, order=order)
+        self.system.follow(self.state)
+        raised, w = set(np.flatnonzero(order > before).tolist()), begun.offset.shape[1]
+        for block in raised:
+            for known in (self.compliances, self.softness_above):
+                known.pop(block, None)
+        self.by_mean_stress.forget(raised)
+        self.response = dda.CrackResponse.none(len(order), max(w, self._width()))
+        self.response.compliance[:, :w, :w], self.response.offset[:, :w] = begun.compliance, begun.offset
+        self.quasi_newton, self.extrapolation = QuasiNewton(), LoadExtrapolation()
+        self._take_fields()
+        return raised
 
     def _width(self) -> int:
         """Number of components of the strain that cracks give a block: 3, and in blocks of higher order those of
@@ -180,6 +206,11 @@ class CrackedBlocks:
             self.blocks, problem.materials, problem.joints, joint_index=problem.joint_index, settings=problem.dda,
             work=self.block_work,
         )  # fmt: skip
+        # With cracks they are raised here, after passes (`order_raising`).
+        self.system.raises_orders = False
+        if self.system.order_choice is not None:
+            self.system.follow(self.state)
+        self.fields_above, self.softness_above = {}, {}
         n = self.blocks.n_blocks
         self.nodes_of = {}
         response = dda.CrackResponse.none(n, self._width())

@@ -28,6 +28,7 @@ from .crack_compliance.load_extrapolation import Answer
 from .crack_compliance.quasi_newton import QuasiNewton, strain_size
 from .load_path import loads_at
 from .load_transfer.elastic_bodies import boundary_loads, threads_for, tip_rows
+from .order_raising import raises_orders, take_orders
 from .parallel_map import parallel_map
 
 if TYPE_CHECKING:
@@ -85,8 +86,18 @@ def balanced(now: CrackedBlocks, dt: float, load_time: float | None) -> Balance:
 
     ``dt`` s is the longest step. ``load_time`` s: apply the loads of that time whatever step the blocks take, and make
     it the new time; None: the loads at the end of the step. Updates ``now.response``, ``loads``, ``solutions`` and
-    statistics. Raises `dda.NotConverged`, also where blocks and cracks agree at no step length.
+    statistics. Raises `dda.NotConverged`, also where blocks and cracks agree at no step length. Repeated with blocks of
+    higher order where these are chosen automatically and needed (`order_raising`).
     """
+    while True:
+        begun = now.response
+        found = _balanced(now, dt, load_time)
+        if not raises_orders(now, begun):
+            return found
+
+
+def _balanced(now: CrackedBlocks, dt: float, load_time: float | None) -> Balance:
+    """`balanced` with blocks of the present orders."""
     begun, static = now.response, now.system.scheme.static
     memories = now.history, now.by_mean_stress.memory
     # In statics the mean-stress response is used only where the iteration fails without it, and cement breaks in the
@@ -120,11 +131,16 @@ def at_rest(now: CrackedBlocks, load_time: float) -> dda.Equilibrium:
     moving = not now.system.scheme.static and bool(now.bodies)
     now.quasi_newton.forget()
     for _ in range(COMPLIANCE_PASSES):
+        before, now.system.raises_orders = now.system.order_of(begun), True
         with now.timed("dda"):
             found = dda.equilibrium(
                 now.system, begun, now.problem.loads, load_time=load_time, crack=response,
                 tolerance=now.problem.dda.unbalanced_tolerance,
             )  # fmt: skip
+        now.system.raises_orders, order = False, found.state.order
+        if order is not None and (order != before).any():
+            take_orders(now, np.asarray(order), response, found.state)
+            begun, response = replace(dda.with_orders(begun, before, order), order=order), now.response
         # The last of the steps to equilibrium begins in the axes of its end.
         now.state = found.state
         if not moving or found.result is None or found.collapsed:

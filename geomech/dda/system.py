@@ -19,7 +19,7 @@ from .higher_order.bending_step import BendingAttempt
 from .higher_order.deflected_blocks import DeflectedBlocks
 from .higher_order.face_points import at_their_points, without_remembered
 from .higher_order.glued_cells import GluedFaces, GlueStrength, KeptCorners
-from .higher_order.order_choice import OrderChoice, extended_deflection
+from .higher_order.order_choice import CracksAbove, OrderChoice, extended_deflection
 from .higher_order.six_row_system import SixRowPattern, six_row_pattern
 from .higher_order.unsupported import refuse_unsupported
 from .kinematics.newmark import TimeScheme
@@ -104,6 +104,9 @@ class BlockSystem:
         self.glued: GluedFaces | None = None
         #: Choice of orders during the run; None if all are given.
         self.order_choice: OrderChoice | None = None
+        #: Whether a step is repeated until its orders suffice; if not, `orders_after` returns those it needs.
+        self.raises_orders = True
+        self._last: Attempt | None = None
         #: Pairs of blocks (2, n) and pattern of the last sparse equations; None before the first ones.
         self._sparse: tuple[np.ndarray, assembly.Pattern] | None = None
         #: (n_faces,) bonded faces that have separated; None without cells.
@@ -275,9 +278,11 @@ class BlockSystem:
         self.follow(state)
         while True:
             attempt, result = self._step(state, loads, dt, crack, load_time, like, pseudo_inertia)
-            order = None if choice is None else choice.raised(self.order, self.deflected, attempt)
+            self._last = None if choice is None or self.raises_orders else attempt
+            raises = choice is not None and self.raises_orders
+            order = choice.raised(self.order, self.deflected, attempt) if raises and choice is not None else None
             if choice is not None and order is not None:
-                state = _extended(state, self.order, order)
+                state = with_orders(state, self.order, order)
                 self._take_orders(choice, order)
                 continue
             parted, before = None, self._parted
@@ -292,11 +297,25 @@ class BlockSystem:
             log.info("t = %g s: %d faces between cells separate", attempt.time, int(parted.sum() - before.sum()))
             self._part(parted)
 
+    def order_of(self, state: State) -> np.ndarray:
+        """(n_blocks,) the orders that blocks have in ``state``."""
+        if self.order_choice is None:
+            return self.order if self.deflected is not None else np.ones(self.blocks.n_blocks, np.int64)
+        return self.order_choice.first if state.order is None else np.asarray(state.order)
+
+    def orders_after(self, cracks: CracksAbove | None = None) -> np.ndarray | None:
+        """(n_blocks,) orders with which the last step must be repeated; None if its orders suffice. ``cracks``: see
+        `OrderChoice.raised`. For a system that does not repeat steps itself (``raises_orders``)."""
+        attempt, self._last = self._last, None
+        if self.order_choice is None or attempt is None:
+            return None
+        return self.order_choice.raised(self.order, self.deflected, attempt, cracks)
+
     def follow(self, state: State) -> None:
         """Continue with the orders that blocks have in ``state``, and with the glue that holds in it."""
         choice, strength = self.order_choice, self.glue_strength
         if choice is not None:
-            self._take_orders(choice, choice.first if state.order is None else np.asarray(state.order))
+            self._take_orders(choice, self.order_of(state))
         if strength is not None:
             self._part(np.zeros(len(strength.tension), bool) if state.parted is None else np.asarray(state.parted))
 
@@ -424,8 +443,8 @@ class BlockSystem:
         return pattern
 
 
-def _extended(state: State, before: np.ndarray, order: np.ndarray) -> State:
-    """``state`` of blocks that are raised from the orders ``before`` (n_blocks,) to ``order``."""
+def with_orders(state: State, before: np.ndarray, order: np.ndarray) -> State:
+    """``state`` of blocks that are raised from the orders ``before`` (n_blocks,) to ``order``: new unknowns are zero."""
     known = {name: getattr(state, name) for name in ("deflection", "deflection_origin", "crack_deflection")}
     more: dict[str, Any] = {
         name: extended_deflection(of, before, order) for name, of in known.items() if of is not None

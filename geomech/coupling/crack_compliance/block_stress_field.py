@@ -104,6 +104,16 @@ class BlockStressField:
         change = self.crack_strain_of(state) - self.crack_strain_of(before)
         return float(self.basis.area[self.block] * (stress[3:] @ change[3:]))
 
+    def widened(self, stress: np.ndarray, below: BlockStressField | None) -> np.ndarray:
+        """(3 + m,) Pa: the same field as that of the ``stress`` (w,) of the block when it had the lower order of ``below``,
+        None: order 1."""
+        out, m = np.zeros(self.width), self.width - 3
+        out[:3] = stress[:3]
+        if below is not None:
+            bent = below.rock[3:, 3:] @ stress[3:]
+            out[3:] = self.blocks.stiffness[self.block, :m, : len(bent)] @ bent
+        return out
+
     def under(self, stress: np.ndarray) -> PolynomialField:
         """The field of the generalised ``stress`` (3 + m,), Pa."""
         return PolynomialField(self, np.asarray(stress, dtype=float))
@@ -135,6 +145,9 @@ class PolynomialField(IntactField):
         return PolynomialField(self.of, factor * self.sizes)
 
     def with_added(self, other: IntactField) -> PolynomialField:
-        if not (isinstance(other, PolynomialField) and other.of is self.of):
+        if not (isinstance(other, PolynomialField) and other.of.block == self.of.block):
             raise ValueError("only stress fields of the same block can be added")
-        return PolynomialField(self.of, self.sizes + other.sizes)
+        # (The block may have been raised between the two.)
+        low, high = sorted((self, other), key=lambda one: one.of.width)
+        same = low.of.width == high.of.width
+        return PolynomialField(high.of, high.sizes + (low.sizes if same else high.of.widened(low.sizes, low.of)))

@@ -22,6 +22,7 @@ mean stress of a specimen in a shear box would put shear on its free sides: with
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
@@ -98,6 +99,13 @@ class ByMeanStress:
         """Give blocks of higher order (block → its stress field) this response, to all of their stress."""
         self.fields = fields
         self._blocks.update(fields)
+
+    def forget(self, blocks: Collection[int]) -> None:
+        """Forget what was found for ``blocks`` that have more components of stress now; the memory of their faces is
+        kept."""
+        for block in blocks:
+            for known in (self.solutions, self.stress, self._softness):
+                known.pop(block, None)
 
     def elastic(self, block: int, compliance: np.ndarray) -> np.ndarray:
         """(3, 3) or (3 + m, 3 + m) compliance of the rock of ``block``, whose mean strain has this ``compliance``

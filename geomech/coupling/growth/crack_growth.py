@@ -128,7 +128,7 @@ def take_growth(now: CrackedBlocks, growth, state: State, solutions: dict) -> tu
     if split is None:
         now.take_cracks(growth.cracks)
         return tuple(events)
-    cut = now.blocks
+    cut = now.blocks if now.state.order is None else replace(now.blocks, order=np.asarray(now.state.order))
     for b in np.flatnonzero(np.bincount(split.parent, minlength=now.blocks.n_blocks) > 1).tolist():
         n_parts = int((split.parent == b).sum())
         centre = now.blocks.loops(b)[0].mean(axis=0)

@@ -10,7 +10,7 @@ import numpy as np
 
 from ...ddm.counters import Work
 from ...ddm.crack_contact.face_laws import Released
-from ...model import AUTO_ORDER, TIP, Blocks, Cracks, Motion, Problem, State
+from ...model import TIP, Blocks, Cracks, Motion, Problem, State
 from ...model.blocks.polygon import joined_loops
 from ..parallel_map import parallel_map, return_free_memory
 from . import boundary_tractions
@@ -111,7 +111,6 @@ def _refuse_unsupported(problem: Problem, blocks: Blocks, cracked: np.ndarray) -
             name = blocks.names[block] if blocks.names else f"block {block}"
             raise ValueError(f"{name!r} is of higher order and has cracks, or may have: {why}")
 
-    refuse(order == AUTO_ORDER, 'give its order as a number, not as "auto"')
     refuse(bent & glued[cracked], "cells glued to each other have no cracks, and none can begin in them")
     refuse(bent & (np.diff(blocks.block_loop)[cracked] > 1), "that is not supported for a block with a hole")
 
@@ -142,9 +141,11 @@ def boundary_loads(
     density = np.array([material.density for material in problem.materials])
     contacts, edges = contacts_of_loaded_pairs(result.contacts, blocks.n_blocks), forces.edges
     route, bent = problem.run.boundary_stress, np.zeros(blocks.n_blocks, bool)
-    if blocks.order is not None and route in ("contacts", "bases") and problem.dda.dynamic_factor == 0.0:
+    order = blocks.order if result.state.order is None else result.state.order
+    if order is not None and route in ("contacts", "bases") and problem.dda.dynamic_factor == 0.0:
         # (In motion the cracks of such blocks are loaded by the stress of their blocks.)
-        bent[numbers] = np.asarray(blocks.order)[numbers] > 1
+        bent[numbers] = np.asarray(order)[numbers] > 1
+    if bent.any():
         contacts, along = without_faces(
             blocks, result.vertices, contacts, result.state.face_points, bent, keep_straight
         )

@@ -47,6 +47,7 @@ from ..growth.energy_release import kink_release, mean_release, straining_tips
 
 if TYPE_CHECKING:
     from ...ddm import Solution
+    from ..crack_compliance.block_stress_field import BlockStressField
     from ..crack_compliance.mean_stress_response import ByMeanStress
 
 _Key = tuple[int, int]
@@ -214,6 +215,18 @@ class CrackEnergy:
             for sums in (self._taken, self._released, self._lost)
         )
         self._growing = {key: replace(of, block=now[of.block]) for key, of in self._growing.items() if of.block in now}
+
+    def raised(self, block: int, below: BlockStressField | None, field: BlockStressField) -> None:
+        """The order of a moving ``block`` has been raised: it responds to the components of ``field`` from now on, and did
+        to those of ``below`` (None: to its mean stress)."""
+        for known in (self._rested, self._last):
+            loaded = known.get(block)
+            if loaded is not None and loaded.mean is not None:
+                stress, _ = loaded.mean
+                of = loaded.solution
+                known[block] = Loaded(
+                    of, (field.widened(stress, below), np.eye(field.width)), field.crack_strain(of.body, of.jumps)
+                )
 
     def take_out(self, blocks: Collection[int]) -> None:
         """The ``blocks`` are excavated at the end of the last step: they take along what their cracks store. Their tips no

@@ -155,7 +155,7 @@ def contacts_after(
 ) -> State:
     """The state of ``split`` with contacts whose next step starts with the forces at the end of the last one.
 
-    ``system``: block system of the new blocks; ``before``: the blocks before the split; ``solutions`` and boundary
+    ``system``: block system of the new blocks; ``before``: the blocks before the split, with the orders they had; ``solutions`` and boundary
     ``loads`` (block →) of the last pass at ``split.state``; ``acting``: loads on the blocks; ``contacts``: CONTACT rows
     before the split.
     """
@@ -182,9 +182,10 @@ def contacts_after(
 
 def _stiffer(split: Split, before: Blocks) -> np.ndarray:
     """(n_blocks,) bool: parts of a lower order than the whole, which have lost its deflection."""
-    if before.order is None or split.blocks.order is None:
+    order = split.blocks.order if split.state.order is None else split.state.order
+    if before.order is None or order is None:
         return np.zeros(split.blocks.n_blocks, bool)
-    return np.asarray(split.blocks.order) < np.asarray(before.order)[split.parent]
+    return np.asarray(order) < np.asarray(before.order)[split.parent]
 
 
 def _contacts(

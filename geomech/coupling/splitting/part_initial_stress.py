@@ -43,13 +43,13 @@ def initialise_moving_parts(
     now.state = affordable_stress(split, before, state, now.system.compliance, left)
     taken = _affordable(now, split, stresses, left)
     for part in sorted(set(cracked) | set(taken)):
-        _take_stress(now, part, taken.get(part, now.state.stress[part]))
+        take_stress(now, part, taken.get(part, now.state.stress[part]))
 
 
 def initialise_parts_at_rest(now: CrackedBlocks, stresses: Mapping[int, PartStress]) -> None:
     """Set the initial stress and crack strain of parts of higher order, in statics: those of the last solution."""
     for part, of in stresses.items():
-        _take_stress(now, part, of.solution)
+        take_stress(now, part, of.solution)
 
 
 def _answer(now: CrackedBlocks, part: int, stress: np.ndarray):
@@ -59,17 +59,10 @@ def _answer(now: CrackedBlocks, part: int, stress: np.ndarray):
     return now.by_mean_stress.answer(part, now.bodies[part], stress, turn, now.elastic(part), began)
 
 
-def _take_stress(now: CrackedBlocks, part: int, stress: np.ndarray) -> None:
+def take_stress(now: CrackedBlocks, part: int, stress: np.ndarray) -> None:
     """Give ``part`` the ``stress`` (w,), Pa, and its cracks the strain under it."""
-    mean, opened = now.by_mean_stress, None
-    if part in now.bodies:
-        turn, found, w = float(now.state.rotation[part]), _answer(now, part, stress), len(stress)
-        limit = mean.limit(part, now.bodies[part], now.elastic(part))
-        own = limit.T @ mean.crack_strain(part, found)
-        soft = limit.T @ passive(mean.compliance(part, now.bodies[part], found), now.elastic(part)) @ limit
-        opened = stress_rotation(-turn, w).T @ own
-        now.response.compliance[part, :w, :w], now.response.offset[part, :w] = crack_response(soft, own, stress, turn)
-    if part in mean.fields or len(stress) > 3:
+    opened = crack_response_under(now, part, stress) if part in now.bodies else None
+    if part in now.by_mean_stress.fields or len(stress) > 3:
         assert now.system.deflected is not None
         rock = now.system.deflected.generalised_compliance(part, now.system.compliance[part])
         now.state = with_stress(now.state, now.system.deflected, part, rock, stress, opened)
@@ -77,6 +70,18 @@ def _take_stress(now: CrackedBlocks, part: int, stress: np.ndarray) -> None:
     strain = now.state.crack_strain.copy()
     strain[part] = opened
     now.state = replace(now.state, crack_strain=strain)
+
+
+def crack_response_under(now: CrackedBlocks, block: int, stress: np.ndarray) -> np.ndarray:
+    """Strain (w,) of the cracks of ``block`` under its ``stress`` (w,), Pa, both on current axes. Sets their response
+    there."""
+    mean, body, w = now.by_mean_stress, now.bodies[block], len(stress)
+    turn, found = float(now.state.rotation[block]), _answer(now, block, stress)
+    limit = mean.limit(block, body, now.elastic(block))
+    own = limit.T @ mean.crack_strain(block, found)
+    soft = limit.T @ passive(mean.compliance(block, body, found), now.elastic(block)) @ limit
+    now.response.compliance[block, :w, :w], now.response.offset[block, :w] = crack_response(soft, own, stress, turn)
+    return stress_rotation(-turn, w).T @ own
 
 
 def _affordable(

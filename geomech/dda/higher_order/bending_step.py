@@ -427,7 +427,7 @@ class BendingAttempt(Attempt):
             self.opened[own] = of.size * strain[3:]
 
     @property
-    def _opened_by(self) -> np.ndarray:
+    def opened_by(self) -> np.ndarray:
         """(k,) m: change of the deflection due to cracks in the step."""
         if self.opened is None:
             return np.zeros_like(self.deflection)
@@ -498,10 +498,10 @@ class BendingAttempt(Attempt):
         after = blocks.kinetic(self.new_rates, self.velocity[:, 3:], end, density)
         had = blocks.kinetic(begun[:, 1], state.velocity[:, 3:], angle, density)
         kept = blocks.kinetic(self.rates, self.carried[:, 3:], angle, density)
-        ends = self.strained + change - self._opened_by
+        ends = self.strained + change - self.opened_by
         u0, u1 = blocks.elastic_energy(self.strained), blocks.elastic_energy(ends)
         padded = blocks.padded(change)
-        cracked = float((blocks.stiffness_times(0.5 * (self.strained + ends)) * blocks.padded(self._opened_by)).sum())
+        cracked = float((blocks.stiffness_times(0.5 * (self.strained + ends)) * blocks.padded(self.opened_by)).sum())
         worked = float((self.bending_load * padded).sum())
         if self.actions is not None:
             worked += self.actions.deflecting_work(padded)

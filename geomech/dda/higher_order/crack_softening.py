@@ -67,6 +67,10 @@ def softened_blocks(
         own = blocks.basis.of_block(b)
         n = 3 + own.stop - own.start
         softness, offset = crack.compliance[b, :n, :n], crack.offset[b, :n]
+        if len(offset) < n:
+            # The block has been raised since the response of its cracks was found.
+            more = (0, n - len(offset))
+            softness, offset = np.pad(softness, more), np.pad(offset, more)
         size = float(np.sqrt(blocks.basis.area[b]))
         known = np.concatenate([state.crack_strain[b], opened[own] / size])
         if absent[b] or not (softness.any() or offset.any() or known.any()):

@@ -12,14 +12,24 @@ yield to deflection, so that W is too large, by a factor of a hundred where fric
 each other. For blocks that it would raise, W is therefore computed again on a patch: K includes the springs of their
 contacts, and l the first six unknowns of the block and of its neighbours; the neighbours' other contact forces stay.
 
+Cracks soften the block, and their opening and slip deflect it by a part q_c that a block of order p cannot represent
+(`CracksInBlock`). Without contacts the block of order p + 2 would take that deflection without any stress, and without
+any effect on its lower unknowns; contacts oppose it. With the stiffness K of the cracked block and k of the springs it
+moves by x = (K + k)⁻¹ (r + K q_c), and
+
+    W = ½ xᵀ k x + ½ (x − q_c)ᵀ K (x − q_c)
+
+is the energy of the changes of contact forces and of stress: the former W without q_c.
+
 A block is raised while W exceeds a ``target`` part of the energy E of all blocks with automatic order: their elastic
-and kinetic energy, that stored in their joints, and the loss by friction. A block that bends while nothing else happens
+and kinetic energy, that stored in their joints and cracks, and the loss by friction. A block that bends while nothing else happens
 is therefore raised; one among hundreds, or one that slides by more than it is strained, is not.
 """
 
 from __future__ import annotations
 
 import logging
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -34,8 +44,41 @@ log = logging.getLogger(__name__)
 
 #: Orders above a block's own whose work is estimated: in beams every other order is zero by symmetry.
 _ORDERS_ABOVE = 2
+#: The work of blocks whose cracks soften them by the factor 1 + s under uniform stress is estimated on a patch where 1 + 4 s
+#: times that of whole rock exceeds the limit: an edge crack softens a block more in bending.
+_SOFTER_IN_BENDING = 4.0
 #: Unknowns of a patch are constrained by springs of this part of the rock's stiffness, to make its matrix regular.
 _REGULARISATION = 1e-9
+
+
+@dataclass(frozen=True, eq=False)
+class CracksInBlock:
+    """The cracks of one block with an order of an estimate, with m unknowns of deflection.
+
+    opened   (m,) m: deflection by their present opening and slip
+    stored   J/m around them
+    softer   largest compliance that they add, over that of the rock, under uniform stress
+    tangent  returns the stiffness (3 + m, 3 + m), Pa, of mean strain on current axes and deflection over √A
+             (`crack_softening`)
+    """
+
+    opened: np.ndarray
+    stored: float
+    softer: float
+    tangent: Callable[[], np.ndarray]
+
+    def beyond(self, stiffness: np.ndarray, own: int, n: int) -> np.ndarray:
+        """(n,) m: the deflection that the first ``n`` unknowns represent, less that of the first ``own``; both have the
+        forces K q of all, K the ``stiffness`` (m, m)."""
+        force = stiffness @ self.opened
+        out = np.linalg.solve(stiffness[:n, :n], force[:n])
+        if own:
+            out[:own] -= np.linalg.solve(stiffness[:own, :own], force[:own])
+        return out
+
+
+#: The cracks (block →) of blocks with automatic order, with the orders of a trial.
+CracksAbove = Callable[[DeflectedBlocks], dict[int, CracksInBlock]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,6 +116,22 @@ class _Group:
         share = np.einsum("bij,bj->bi", self.inverse, left)
         return left, 0.5 * (share**2).sum(axis=1)
 
+    def with_cracks(self, most: np.ndarray, trial: DeflectedBlocks, cracks: dict[int, CracksInBlock]) -> np.ndarray:
+        """(n,) J/m: the work ``most`` (n,) of whole rock, where blocks have ``cracks`` with an allowance for these: they
+        soften the rock, and rigid contacts take all of the deflection by their opening."""
+        if not cracks:
+            return most
+        out = most.copy()
+        for k, b in enumerate(self.blocks.tolist()):
+            if b in cracks:
+                own, m = cracks[b], self.own + self.inverse.shape[1]
+                stiffness = trial.stiffness[b, :m, :m]
+                beyond = own.beyond(stiffness, self.own, m)
+                opened = 0.5 * float(beyond @ stiffness @ beyond)
+                softer = np.sqrt((1.0 + _SOFTER_IN_BENDING * own.softer) * most[k])
+                out[k] = (softer + np.sqrt(opened)) ** 2
+        return out
+
 
 class OrderChoice:
     """Orders of the ``blocks`` of a system.
@@ -103,37 +162,40 @@ class OrderChoice:
             return None
         return DeflectedBlocks(self.blocks, self._fixed, self._density, self._elastic, order)
 
-    def raised(self, order: np.ndarray, deflected: DeflectedBlocks | None, attempt) -> np.ndarray | None:
+    def raised(
+        self, order: np.ndarray, deflected: DeflectedBlocks | None, attempt, cracks: CracksAbove | None = None
+    ) -> np.ndarray | None:  # fmt: skip
         """(n_blocks,) orders with which a step must be repeated; None where no block is to be, or can be, raised.
 
         The step ``attempt`` was made with blocks of these ``order`` (n_blocks,), the ``deflected`` ones if there are
-        any.
+        any. ``cracks`` returns those of blocks that have any.
         """
         energy, before_step = self._energy(attempt), None
         if deflected is not None:
-            ended = attempt.deflection + attempt.bent_by
+            # What cracks have opened is not strained.
+            ended = attempt.strained + attempt.bent_by - attempt.opened_by
             before_step = deflected.padded(ended)
             energy += 0.5 * float((before_step * deflected.stiffness_times(ended))[self.found].sum())
         if not energy > 0.0:
             return None
         self.judged += 1
         trial = self._trial_of(order)
-        faces = _FaceForces.of(trial, attempt)
+        faces, cracked = _FaceForces.of(trial, attempt), {} if cracks is None else cracks(trial)
         force, deflection = self._forces(trial, faces, attempt), np.zeros_like(trial.basis.coupling[:, 0])
         if before_step is not None:
             width = min(before_step.shape[1], deflection.shape[1])
             deflection[self.found, :width] = before_step[self.found, :width]
-        out, limit = order.copy(), self.target * energy
+        out, limit = order.copy(), self.target * (energy + sum(of.stored for of in cracked.values()))
         for group in self._groups:
             left, most = group.most(force, deflection)
-            for k in np.flatnonzero(most > limit).tolist():
+            for k in np.flatnonzero(group.with_cracks(most, trial, cracked) > limit).tolist():
                 b = int(group.blocks[k])
-                first, both = faces.work(trial, b, group, left[k])
+                first, both = faces.work(trial, b, group, left[k], cracked.get(b))
                 if both <= limit:
                     continue
                 out[b] = min(order[b] + (2 if both - first > limit else 1), HIGHEST)
                 if order[b] == HIGHEST:
-                    self._report(b, both / energy, attempt.time)
+                    self._report(b, both / limit * self.target, attempt.time)
         if (out == order).all():
             return None
         names = [f"{self.blocks.names[b]!r} to {out[b]}" for b in np.flatnonzero(out > order).tolist()]
@@ -269,20 +331,55 @@ class _FaceForces:
             attempt.moments[:, 0], attempt.system.fixed,
         )  # fmt: skip
 
-    def work(self, trial: DeflectedBlocks, block: int, group: _Group, left: np.ndarray) -> tuple[float, float]:
+    def work(
+        self, trial: DeflectedBlocks, block: int, group: _Group, left: np.ndarray, cracks: CracksInBlock | None = None
+    ) -> tuple[float, float]:  # fmt: skip
         """J/m: work that the next order of ``block`` (of ``group``) would take up, and the next two, on a patch.
 
-        The residual forces ``left`` (h,) act on the patch, which includes its contacts and neighbours.
+        The residual forces ``left`` (h,) act on the patch, which includes its contacts and neighbours, and the ``cracks``
+        of the block if it has any.
         """
         own, m = group.own, group.own + len(left)
+        rock, springs = self._patch(trial, block, m)
+        size = len(rock)
+        if cracks is not None:
+            # √A times mean strain, and deflection.
+            root, tangent = float(np.sqrt(self.area[block])), cracks.tangent()
+            strain, bent = slice(m + 3, m + 6), slice(0, m)
+            rock[strain, strain] += self.area[block] * (tangent[:3, :3] - trial.elastic[block])
+            rock[strain, bent], rock[bent, strain] = root * tangent[:3, 3:], root * tangent[3:, :3]
+            rock[bent, bent] = tangent[3:, 3:]
+        matrix = rock + springs
+        high = np.arange(own, m)
+        low = np.concatenate([np.arange(own), np.arange(m, size)])
+        if cracks is None:
+            shared, rest = matrix[np.ix_(high, low)], matrix[np.ix_(low, low)]
+            factor = np.linalg.cholesky(matrix[np.ix_(high, high)] - shared @ np.linalg.solve(rest, shared.T))
+            share = np.linalg.solve(factor, left)
+            return 0.5 * float(share[: group.next] @ share[: group.next]), 0.5 * float(share @ share)
+        found = []
+        for n in (own + group.next, m):
+            some = np.concatenate([low, np.arange(own, n)])
+            opened, force = np.zeros(size), np.zeros(size)
+            opened[:n] = cracks.beyond(trial.stiffness[block, :m, :m], own, n)
+            force[own:n] = left[: n - own]
+            force, opened = force[some], opened[some]
+            inside, outside = rock[np.ix_(some, some)], springs[np.ix_(some, some)]
+            moved = np.linalg.solve(inside + outside, force + inside @ opened)
+            strained = moved - opened
+            found.append(0.5 * float(moved @ outside @ moved + strained @ inside @ strained))
+        return found[0], found[1]
+
+    def _patch(self, trial: DeflectedBlocks, block: int, m: int) -> tuple[np.ndarray, np.ndarray]:
+        """Stiffness (n, n) of the rock, and of the contacts, of a patch around ``block``. Unknowns: ``m`` of deflection,
+        those to be estimated last; then six of the block and six of each neighbour."""
         holds = self.springs.any(axis=1)
         sides = [np.flatnonzero((owner == block) & holds) for owner in self.owners]
         others = [self.owners[1 - side][rows] for side, rows in enumerate(sides)]
         near = np.unique(np.concatenate(others))
         near = near[~self.fixed[near]]
-        # Unknowns: deflection, those to be estimated last; then six of the block and six of each neighbour.
         size = m + 6 + 6 * len(near)
-        matrix = np.zeros((size, size))
+        matrix, springs = np.zeros((size, size)), np.zeros((size, size))
         matrix[:m, :m] = trial.stiffness[block, :m, :m]
         for k, b in enumerate((block, *near.tolist())):
             at, stiff = m + 6 * k + np.arange(6), trial.elastic[b]
@@ -297,13 +394,8 @@ class _FaceForces:
             for c in np.flatnonzero(~self.fixed[other]).tolist():
                 first = m + 6 + 6 * int(np.searchsorted(near, other[c]))
                 motion[c, :, first : first + 6] -= self.rigid[1 - side][rows[c]]
-            matrix += np.einsum("nwi,nw,nwj->ij", motion, self.springs[rows], motion, optimize=True)
-        high = np.arange(own, m)
-        low = np.concatenate([np.arange(own), np.arange(m, size)])
-        shared, rest = matrix[np.ix_(high, low)], matrix[np.ix_(low, low)]
-        factor = np.linalg.cholesky(matrix[np.ix_(high, high)] - shared @ np.linalg.solve(rest, shared.T))
-        share = np.linalg.solve(factor, left)
-        return 0.5 * float(share[: group.next] @ share[: group.next]), 0.5 * float(share @ share)
+            springs += np.einsum("nwi,nw,nwj->ij", motion, self.springs[rows], motion, optimize=True)
+        return matrix, springs
 
 
 def extended_deflection(deflection: np.ndarray, before: np.ndarray, order: np.ndarray) -> np.ndarray:

@@ -66,8 +66,6 @@ def _check_cracks(c: Check, name: str, zone, refuse) -> None:
     if not (begin or len(blocks)):
         return
     cracked = "cracks, or cracks that begin (growth.initiation),"
-    if zone.order == "auto":
-        refuse(f"{cracked} are not supported with it", "give the order as a number, 2 to 8")
     if zone.mesh_size_m is not None:
         refuse(f"{cracked} are not supported in cells", "leave `mesh_size_m` out")
 
