@@ -116,8 +116,7 @@ class CrackedBlocks:
         is kept with room for more components; ``state`` with the new orders, None: the present one, with zero for what is
         new."""
         before = self.system.order_of(self.state)
-        state = dda.with_orders(self.state, before, order) if state is None else state
-        self.state = replace(state, order=order)
+        self.state = self.system.with_orders(self.state, order) if state is None else state
         self.system.follow(self.state)
         raised, w = set(np.flatnonzero(order > before).tolist()), begun.offset.shape[1]
         for block in raised:

@@ -92,7 +92,8 @@ def balanced(now: CrackedBlocks, dt: float, load_time: float | None) -> Balance:
     while True:
         begun = now.response
         found = _balanced(now, dt, load_time)
-        if not raises_orders(now, begun):
+        grows = found.tips["k_eq"] >= toughness(now, found.tips)
+        if not raises_orders(now, begun, found.tips["block"][grows]):
             return found
 
 
@@ -140,7 +141,7 @@ def at_rest(now: CrackedBlocks, load_time: float) -> dda.Equilibrium:
         now.system.raises_orders, order = False, found.state.order
         if order is not None and (order != before).any():
             take_orders(now, np.asarray(order), response, found.state)
-            begun, response = replace(dda.with_orders(begun, before, order), order=order), now.response
+            begun, response = now.system.with_orders(begun, np.asarray(order)), now.response
         # The last of the steps to equilibrium begins in the axes of its end.
         now.state = found.state
         if not moving or found.result is None or found.collapsed:

@@ -1,9 +1,11 @@
 """Automatic order of blocks with cracks: when it is raised, and with what the block goes on.
 
 After a pass the work that higher orders would take up is estimated with the cracks
-(`geomech.dda.higher_order.order_choice`): their jumps [u] deflect a block of order p by q_c with K q_c = A ∫ [u]·s_k n ds
-(`block_stress_field`), whatever its own order, and S of the higher order softens it. If a block is raised, the pass is
-repeated from the start of the step:
+(`geomech.dda.higher_order.order_choice`): their jumps [u] give it the deflection of `block_stress_field` with that order,
+and S softens it. If a block is raised, the pass is repeated from the start of the step.
+
+In motion a block whose cracks are about to grow has at least order `GROWS`: below, the forces on a block load its tips,
+but do no work on bending, from which the energy of growth would have to come.
 
 - Displacement, velocity and stress are kept, since the polynomials of order p are the first of those of a higher order.
 - In motion the present opening of the cracks deflects the block from its shape at that time (`with_stress`): elastic and
@@ -25,12 +27,21 @@ from .crack_compliance.added_compliance import passive, stress_rotation
 from .crack_compliance.block_stress_field import BlockStressField
 from .splitting.part_initial_stress import crack_response_under, take_stress
 
+#: Order of a moving block from which its cracks may grow.
+GROWS = 3
 
-def raises_orders(now: CrackedBlocks, begun: CrackResponse) -> bool:
+
+def raises_orders(now: CrackedBlocks, begun: CrackResponse, growing: np.ndarray) -> bool:
     """Whether the last pass must be repeated because it needs higher orders, which ``now`` then has. ``begun``: the crack
-    response at the start of the step."""
+    response at the start of the step; ``growing``: blocks with tips that have reached their toughness."""
+    choice, present = now.system.order_choice, now.system.order_of(now.state)
     order = now.system.orders_after(lambda trial: cracks_above(now, trial))
-    if order is None:
+    order = present if order is None else order
+    if choice is not None and len(growing) and not now.system.scheme.static:
+        bends = np.zeros(len(order), bool)
+        bends[growing] = choice.found[growing]
+        order = np.where(bends, np.maximum(order, GROWS), order)
+    if (order == present).all():
         return False
     take_orders(now, order, begun)
     return True

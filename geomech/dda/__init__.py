@@ -29,7 +29,7 @@ from .statics.safety_answer import FactorOfSafety
 from .statics.strength_reduction import FactorSearch, NothingToReduce, factor_of_safety
 from .step_control.adaptive_time_step import StepLength
 from .stepping import run
-from .system import BlockSystem, with_orders
+from .system import BlockSystem
 
 __all__ = [
     "EDGE_FORCE",
@@ -68,7 +68,6 @@ __all__ = [
     "run",
     "warn_of_toes",
     "warn_of_toes_at_rest",
-    "with_orders",
 ]
 
 __getattr__ = renamed_exports(__name__, {"ToldContacts": "InheritedContacts"}, globals())

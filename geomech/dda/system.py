@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ..model import Blocks, DdaSettings, JointLaw, Loads, Material, State
+from ..model import OPEN, Blocks, DdaSettings, JointLaw, Loads, Material, State
 from .contact_detection.contact_finder import ContactFinder
 from .contact_detection.inherited_contacts import InheritedContacts, at_their_springs, inherited_rows
 from .contact_detection.initial_overlap import refuse_overlap
@@ -282,8 +282,7 @@ class BlockSystem:
             raises = choice is not None and self.raises_orders
             order = choice.raised(self.order, self.deflected, attempt) if raises and choice is not None else None
             if choice is not None and order is not None:
-                state = with_orders(state, self.order, order)
-                self._take_orders(choice, order)
+                state = self.with_orders(state, order)
                 continue
             parted, before = None, self._parted
             mean = attempt.glue_traction() if isinstance(attempt, BendingAttempt) else None
@@ -296,6 +295,29 @@ class BlockSystem:
                 )
             log.info("t = %g s: %d faces between cells separate", attempt.time, int(parted.sum() - before.sum()))
             self._part(parted)
+
+    def with_orders(self, state: State, order: np.ndarray) -> State:
+        """``state`` of blocks that are raised to these orders (n_blocks,), with which the system continues: new unknowns of
+        deflection are zero. In motion the contacts of raised blocks keep their resultants: with their gaps alone, the
+        springs of more points would store more energy."""
+        before = self.order_of(state)
+        known = {name: getattr(state, name) for name in ("deflection", "deflection_origin", "crack_deflection")}
+        more: dict[str, Any] = {
+            name: extended_deflection(of, before, order) for name, of in known.items() if of is not None
+        }
+        state, raised = replace(state, order=order, **more), order > before
+        self.follow(state)
+        if self.scheme.static or not len(state.contacts) or not raised.any():
+            return state
+        memory = state.face_points
+        if memory is not None:
+            state = replace(state, face_points=memory[~(raised[memory["block"]] | raised[memory["other"]])])
+        found = self.contacts_near(state)
+        which = np.flatnonzero((found.state != OPEN) & (raised[found.block] | raised[found.other]))
+        forces = InheritedContacts(
+            which, found.normal[which], found.shear[which], found.gap[which], found.slip[which]
+        )  # fmt: skip
+        return self.with_inherited_contacts(state, found, forces)
 
     def order_of(self, state: State) -> np.ndarray:
         """(n_blocks,) the orders that blocks have in ``state``."""
@@ -441,12 +463,3 @@ class BlockSystem:
         pattern.solver.work = self.work
         self._sparse = pairs, pattern
         return pattern
-
-
-def with_orders(state: State, before: np.ndarray, order: np.ndarray) -> State:
-    """``state`` of blocks that are raised from the orders ``before`` (n_blocks,) to ``order``: new unknowns are zero."""
-    known = {name: getattr(state, name) for name in ("deflection", "deflection_origin", "crack_deflection")}
-    more: dict[str, Any] = {
-        name: extended_deflection(of, before, order) for name, of in known.items() if of is not None
-    }
-    return replace(state, **more)
