@@ -25,7 +25,8 @@ from ..model import State
 from .coupled_state import CrackedBlocks
 from .crack_compliance.added_compliance import passive, stress_rotation
 from .crack_compliance.block_stress_field import BlockStressField
-from .splitting.part_initial_stress import crack_response_under, take_stress
+from .splitting.part_deflection import with_stress
+from .splitting.part_initial_stress import crack_response_under
 
 #: Order of a moving block from which its cracks may grow.
 GROWS = 3
@@ -55,10 +56,20 @@ def take_orders(now: CrackedBlocks, order: np.ndarray, begun: CrackResponse, sta
     for block in sorted(raised & set(now.bodies)):
         stress = now.stress_of(now.state, np.array([block]))[0, : now.by_mean_stress.fields[block].width]
         if moving:
-            take_stress(now, block, stress)
-            now.crack_energy.raised(block, fields.get(block), now.by_mean_stress.fields[block])
-        else:
-            crack_response_under(now, block, stress)
+            _keep_shape(now, block, stress)
+        crack_response_under(now, block, stress)
+        now.crack_energy.raised(block, fields.get(block), now.by_mean_stress.fields[block])
+
+
+def _keep_shape(now: CrackedBlocks, block: int, stress: np.ndarray) -> None:
+    """Let the opening of the cracks of a moving ``block`` at the start of the step, before they grew in it, deflect the
+    block from its present shape, with its ``stress`` (3 + m,), Pa."""
+    field, began = now.by_mean_stress.fields[block], now.crack_energy.at_start(block)
+    opened = np.zeros(field.width)
+    if began is not None:
+        opened = field.crack_strain(began.body, began.jumps)
+    opened[:3] = now.state.crack_strain[block]
+    now.state = with_stress(now.state, field.blocks, block, field.rock, stress, opened)
 
 
 def cracks_above(now: CrackedBlocks, trial: DeflectedBlocks) -> dict[int, CracksInBlock]:

@@ -216,8 +216,13 @@ class CrackEnergy:
         )
         self._growing = {key: replace(of, block=now[of.block]) for key, of in self._growing.items() if of.block in now}
 
+    def at_start(self, block: int) -> Solution | None:
+        """The solution of the cracks of ``block`` at the beginning of the present step, if it had any."""
+        rested = self._rested.get(block)
+        return None if rested is None else rested.solution
+
     def raised(self, block: int, below: BlockStressField | None, field: BlockStressField) -> None:
-        """The order of a moving ``block`` has been raised: it responds to the components of ``field`` from now on, and did
+        """The order of ``block`` has been raised: it responds to the components of ``field`` from now on, and did
         to those of ``below`` (None: to its mean stress)."""
         for known in (self._rested, self._last):
             loaded = known.get(block)

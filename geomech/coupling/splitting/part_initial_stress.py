@@ -43,13 +43,13 @@ def initialise_moving_parts(
     now.state = affordable_stress(split, before, state, now.system.compliance, left)
     taken = _affordable(now, split, stresses, left)
     for part in sorted(set(cracked) | set(taken)):
-        take_stress(now, part, taken.get(part, now.state.stress[part]))
+        _take_stress(now, part, taken.get(part, now.state.stress[part]))
 
 
 def initialise_parts_at_rest(now: CrackedBlocks, stresses: Mapping[int, PartStress]) -> None:
     """Set the initial stress and crack strain of parts of higher order, in statics: those of the last solution."""
     for part, of in stresses.items():
-        take_stress(now, part, of.solution)
+        _take_stress(now, part, of.solution)
 
 
 def _answer(now: CrackedBlocks, part: int, stress: np.ndarray):
@@ -59,7 +59,7 @@ def _answer(now: CrackedBlocks, part: int, stress: np.ndarray):
     return now.by_mean_stress.answer(part, now.bodies[part], stress, turn, now.elastic(part), began)
 
 
-def take_stress(now: CrackedBlocks, part: int, stress: np.ndarray) -> None:
+def _take_stress(now: CrackedBlocks, part: int, stress: np.ndarray) -> None:
     """Give ``part`` the ``stress`` (w,), Pa, and its cracks the strain under it."""
     opened = crack_response_under(now, part, stress) if part in now.bodies else None
     if part in now.by_mean_stress.fields or len(stress) > 3:
