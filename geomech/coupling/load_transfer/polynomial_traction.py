@@ -82,8 +82,17 @@ def _edge_forces(blocks: Blocks, vertices: np.ndarray, ends: np.ndarray, pieces:
                 pressure, shear = (1 - at)[:, None] * values[0] + at[:, None] * values[1], sign / np.hypot(*along)
                 traction = shear * (pressure[:, :1] * normal + pressure[:, 1:] * tangent)
                 force = 0.5 * (q - p) * np.hypot(*along) * traction.sum(axis=0)
-                out.append((block, edge, start + p * along, start + q * along, traction, force))
+                first, last = _onto(blocks, vertices, edge, start + np.array([[p], [q]]) * along)
+                out.append((block, edge, first, last, traction, force))
     return out
+
+
+def _onto(blocks: Blocks, vertices: np.ndarray, edge: int, points: np.ndarray) -> np.ndarray:
+    """The points of the ``edge`` nearest to ``points`` (n, 2): strained edges in contact are apart, and the one ends before
+    the other, by what the blocks deflect."""
+    start = vertices[edge]
+    way = vertices[blocks.next_vertex[edge]] - start
+    return start + np.clip((points - start) @ way / (way @ way), 0.0, 1.0)[:, None] * way
 
 
 def _pieces(face: np.ndarray) -> list[tuple[float, float, np.ndarray]]:
