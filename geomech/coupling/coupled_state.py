@@ -71,6 +71,8 @@ class CrackedBlocks:
         #: Of blocks with automatic order (block →): stress fields of higher orders, and softness of their cracks there.
         self.fields_above: dict[int, BlockStressField] = {}
         self.softness_above: dict[int, tuple] = {}
+        #: Crack nodes and orders of the last estimate of orders.
+        self.estimated: tuple[np.ndarray, np.ndarray] | None = None
         self.response: dda.CrackResponse
         self._take_blocks()
         #: Result of the search for in-situ equilibrium where that ended in a collapse.

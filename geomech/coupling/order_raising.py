@@ -36,7 +36,7 @@ def raises_orders(now: CrackedBlocks, begun: CrackResponse, growing: np.ndarray)
     """Whether the last pass must be repeated because it needs higher orders, which ``now`` then has. ``begun``: the crack
     response at the start of the step; ``growing``: blocks with tips that have reached their toughness."""
     choice, present = now.system.order_choice, now.system.order_of(now.state)
-    order = now.system.orders_after(lambda trial: cracks_above(now, trial))
+    order = now.system.orders_after(lambda trial: cracks_above(now, trial), _new(now, present))
     order = present if order is None else order
     if choice is not None and len(growing) and not now.system.scheme.static:
         bends = np.zeros(len(order), bool)
@@ -46,6 +46,12 @@ def raises_orders(now: CrackedBlocks, begun: CrackResponse, growing: np.ndarray)
         return False
     take_orders(now, order, begun)
     return True
+
+
+def _new(now: CrackedBlocks, order: np.ndarray) -> bool:
+    """Whether cracks have grown, or the ``order`` (n_blocks,) of blocks has been raised, since the last estimate."""
+    before, now.estimated = now.estimated, (now.cracks.nodes, order)
+    return before is None or not all(np.array_equal(a, b) for a, b in zip(before, now.estimated))
 
 
 def take_orders(now: CrackedBlocks, order: np.ndarray, begun: CrackResponse, state: State | None = None) -> None:

@@ -325,11 +325,14 @@ class BlockSystem:
             return self.order if self.deflected is not None else np.ones(self.blocks.n_blocks, np.int64)
         return self.order_choice.first if state.order is None else np.asarray(state.order)
 
-    def orders_after(self, cracks: CracksAbove | None = None) -> np.ndarray | None:
+    def orders_after(self, cracks: CracksAbove | None = None, changed: bool = True) -> np.ndarray | None:
         """(n_blocks,) orders with which the last step must be repeated; None if its orders suffice. ``cracks``: see
-        `OrderChoice.raised`. For a system that does not repeat steps itself (``raises_orders``)."""
+        `OrderChoice.raised`; unless they have ``changed``, estimates of earlier steps are relied on. For a system that does
+        not repeat steps itself (``raises_orders``)."""
         attempt, self._last = self._last, None
         if self.order_choice is None or attempt is None:
+            return None
+        if self.order_choice.known(attempt) and not changed:
             return None
         return self.order_choice.raised(self.order, self.deflected, attempt, cracks)
 

@@ -13,7 +13,6 @@ from test_bent_blocks import BEAM, DENSITY, GLUE, LENGTH, PARTS, G, cantilever, 
 from geomech import ddm
 from geomech.coupling import Coupling, cycles
 from geomech.model import (
-    AUTO_ORDER,
     Blocks,
     Cracks,
     DdaSettings,
@@ -235,7 +234,6 @@ def test_the_fracture_energy_of_a_dropped_beam_comes_from_its_motion(tmp_path):
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"order": np.array([1, AUTO_ORDER])}, 'not as "auto"'),
         ({"glued": np.array([[1, 5]])}, "cells glued to each other"),
     ],
 )

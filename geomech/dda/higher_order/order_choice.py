@@ -47,6 +47,11 @@ _ORDERS_ABOVE = 2
 #: The work of blocks whose cracks soften them by the factor 1 + s under uniform stress is estimated on a patch where 1 + 4 s
 #: times that of whole rock exceeds the limit: an edge crack softens a block more in bending.
 _SOFTER_IN_BENDING = 4.0
+#: Increase of the forces on a block, or decrease of the energy, since earlier estimates by which these may be out of date:
+#: the work grows with the square of the forces. And number of steps after which they are repeated in any case.
+_MORE, _REPEATED = 1.1, 10
+#: Forces below this fraction of the largest do not count.
+_SMALL = 1e-2
 #: Unknowns of a patch are constrained by springs of this part of the rock's stiffness, to make its matrix regular.
 _REGULARISATION = 1e-9
 
@@ -133,6 +138,16 @@ class _Group:
         return out
 
 
+@dataclass(eq=False)
+class _Borne:
+    """The largest ``forces`` (n_blocks,), N, on blocks in estimates so far, their least ``energy``, J/m, and number of
+    ``steps`` since the last one."""
+
+    forces: np.ndarray
+    energy: float
+    steps: int = 0
+
+
 class OrderChoice:
     """Orders of the ``blocks`` of a system.
 
@@ -154,6 +169,7 @@ class OrderChoice:
         self._trial: DeflectedBlocks | None = None
         self._groups: list[_Group] = []
         self._reported: set[int] = set()
+        self._borne: _Borne | None = None
         self.judged = 0
 
     def deflected(self, order: np.ndarray) -> DeflectedBlocks | None:
@@ -161,6 +177,27 @@ class OrderChoice:
         if not (order > 1).any() and self.blocks.glued is None:
             return None
         return DeflectedBlocks(self.blocks, self._fixed, self._density, self._elastic, order)
+
+    def known(self, attempt) -> bool:
+        """Whether estimates of earlier steps still hold in that of ``attempt``: no block bears much more than it did, and
+        the energy with which its work is compared has not become much less."""
+        found, settled = attempt.found, attempt.settled
+        forces, push = np.zeros(len(self.found)), np.hypot(settled.normal_force, settled.shear_force)
+        for owner in (found.block, found.other):
+            np.add.at(forces, owner, push)
+        for rows in (attempt.edges, attempt.points):
+            np.add.at(forces, rows["block"], np.hypot(*rows["force"].T))
+        forces, energy, before = forces[self.found], self._energy(attempt), self._borne
+        if before is None:
+            self._borne = _Borne(forces, energy)
+            return False
+        least = _SMALL * before.forces.max(initial=0.0)
+        same = (forces <= _MORE * np.maximum(before.forces, least)).all() and _MORE * energy >= before.energy
+        before.steps += 1
+        if same and before.steps < _REPEATED:
+            return True
+        self._borne = _Borne(np.maximum(forces, before.forces), energy)
+        return False
 
     def raised(
         self, order: np.ndarray, deflected: DeflectedBlocks | None, attempt, cracks: CracksAbove | None = None
