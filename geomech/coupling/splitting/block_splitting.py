@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ...model import CONTACT, Blocks, Cracks, Motion, State
+from ...model import AUTO_ORDER, CONTACT, Blocks, Cracks, Motion, State
 from .planar_graph import BlockGraph, faces_without_slivers, steps
 
 _log = logging.getLogger(__name__)
@@ -125,7 +125,7 @@ def split_blocks(
         contacts=_contacts(state.contacts, pieces),
         acceleration=None,
         removed=None if state.removed is None else state.removed[parent],
-        order=None if state.order is None else _orders(np.asarray(state.order), pieces, logging.DEBUG),
+        order=None if state.order is None else _orders(np.asarray(state.order), pieces, np.asarray(blocks.order)),
     )
     lost = blocks.areas() - np.bincount(parent, weights=children_blocks.areas(), minlength=blocks.n_blocks)
     origin, edge_origin, span = (
@@ -254,13 +254,14 @@ def _assemble(blocks: Blocks, pieces: list[_Piece]) -> Blocks:
     )
 
 
-def _orders(order: np.ndarray, pieces: list[_Piece], level: int = logging.WARNING) -> np.ndarray:
+def _orders(order: np.ndarray, pieces: list[_Piece], given: np.ndarray | None = None) -> np.ndarray:
     """(n_blocks,) those of the parents; a part with a hole is of first order, which is logged: one of higher order could
-    have no cracks."""
+    have no cracks. ``given`` (n_parents,): orders as given, if ``order`` are those found."""
     out, seen = np.array([order[piece.parent] for piece in pieces]), [piece.parent for piece in pieces]
     for k, piece in enumerate(pieces):
-        if len(piece.loops) > 1 and out[k] > 1 and seen.count(piece.parent) > 1:
-            _log.log(level, "%s has a hole: it continues as a block of first order, without deflection", piece.name)
+        if len(piece.loops) > 1 and out[k] != 1 and seen.count(piece.parent) > 1:
+            if out[k] != AUTO_ORDER and (given is None or given[piece.parent] == AUTO_ORDER):
+                _log.warning("%s has a hole: it continues as a block of first order, without deflection", piece.name)
             out[k] = 1
     return out
 
