@@ -10,7 +10,8 @@ Which order is enough, and how is rock of arbitrary shape modelled? (`Theory <..
 # A lintel of one block
 # ---------------------
 # ``order`` is the order of the displacement polynomial of each block of the zone. ``"auto"`` begins with 1 and raises the
-# order of those blocks whose next orders would contain more than a hundredth of the energy (``dda.order_target``).
+# order of those blocks whose next orders would contain more than a hundredth of the energy (``dda.order_target``). Cracks are
+# taken into account: they soften a block, and bend it as they open.
 
 import tempfile
 from itertools import pairwise

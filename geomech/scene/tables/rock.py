@@ -55,7 +55,7 @@ class ZoneTable(Table):
         1,
         description="order of the polynomial that is the displacement of each of its blocks, 1 to 8: 1 is uniform "
         'strain, from 2 on blocks bend, and the stress varies along their faces; "auto": each block '
-        "begins with 1 and is raised where that matters (`dda.order_target`)",
+        "begins with 1 and is raised where that matters (`dda.order_target`), with its cracks",
     )
     mesh_size_m: Positive | None = Field(
         None,

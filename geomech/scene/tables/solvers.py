@@ -91,7 +91,7 @@ class DdaTable(Table):
     order_target: Annotated[float, Field(gt=0, le=1)] = Field(
         0.01,
         description='blocks of zones with order = "auto" are raised while the next orders would contain more than this part '
-        "of the energy of all such blocks: elastic and kinetic energy, and friction loss",
+        "of the energy of all such blocks: elastic and kinetic energy, that around their cracks, and friction loss",
     )
     corner_rounding: Annotated[float, Field(ge=0, le=LARGEST_CORNER)] = Field(
         0.01,
