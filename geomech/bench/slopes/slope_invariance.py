@@ -98,6 +98,7 @@ WARNED = (
     "nothing holds",
     "static steps have dissipated",
     "of their strain only",
+    "are no more accurate",
     "before they bear it",
     *sorted({words for invariant in INVARIANTS.values() for words in invariant.reported}),
 )

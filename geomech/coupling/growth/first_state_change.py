@@ -32,6 +32,8 @@ FOUND, ROUGHLY, MANY = 1e-6, 1e-3, 100
 FIRST_TRIAL = 1 / 64
 #: Largest number of trials for one change; it is then reported at the earliest time at which it has been seen.
 TRIALS = 12
+#: Bonds are looked for halfway if that is before this fraction of a step to their breaking.
+HALFWAY = 0.75
 #: A step to a change is short if it is less than this fraction of the longest step. After a short one, changes within
 #: `MORE` times (with many contacts `MUCH_MORE` times) the previous interval are taken together, otherwise within
 #: `LESS`.
@@ -96,11 +98,14 @@ class FirstChange:
         last: Balance | None = found
         within = (FOUND if len(high.key) <= MANY else ROUGHLY) * max(abs(start), abs(high.time))
         search = _Search(1 if high.time > start else -1, within, max(self._near, within), approach)
-        way = search.way
+        way, halved = search.way, False
         for look in range(TRIALS):
             aim, at = self._next_trial(look, search, changes, low, high)
             if aim is None:
-                break
+                halfway = 0.5 * (low[-1].time + high.time)
+                if halved or not _may_break_before(changes, halfway - start, high.time - start):
+                    break
+                aim, at, halved = halfway, None, True
             try:
                 last = solve(aim)
             except NotConverged as failure:
@@ -194,6 +199,12 @@ class FirstChange:
         self._reported = seen
         changes = [] if before is None else seen.changes(now, before)
         return tuple(event(now, change.kind, found.result.state, change.point, change.detail) for change in changes)
+
+
+def _may_break_before(changes: list[Change], half: float, whole: float) -> bool:
+    """Whether bonds break in ``changes`` after a step of ``whole`` s, of which no pass between ``half`` of it and its end is
+    known: bonds that break together do so before any of them is expected to, and a pass in between shows it."""
+    return abs(half) < HALFWAY * abs(whole) and any(change.kind == "debonding" for change in changes)
 
 
 def _first_of(changes: list[Change], low: list[Watched], high: Watched) -> float | None:

@@ -55,6 +55,7 @@ def warn_of_roundoff(
     light = block[c] if weight[block[c]] <= weight[other[c]] else other[c]
     log.warning(
         "%r weighs %.3g N/m; round-off of coordinates up to %.3g m from the origin changes its contact forces by %.2g of "
-        "that, and its friction is no more accurate: put the origin near, or lower dda.normal_penalty",
+        "that, and its friction, and bonds that it breaks first, are no more accurate: put the origin near, lower "
+        "dda.normal_penalty, or merge such blocks (geometry.smallest_block_m2)",
         names[light], least[c], rounding / _ROUNDING, share[c],
     )  # fmt: skip

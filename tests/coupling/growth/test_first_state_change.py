@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from geomech.coupling import cycles
+from geomech.coupling.growth import first_state_change
 from geomech.coupling.growth.event_stepping import EventSteps
 from geomech.coupling.growth.first_state_change import FirstChange
 from geomech.coupling.monitoring.state_changes import Change, Watched
@@ -264,3 +265,27 @@ def test_a_block_that_falls_tells_when_it_comes_down():
     )  # fmt: skip
     ((kind, time, _),) = told(fall)[0]
     assert kind == "closure" and 0 <= time - np.sqrt(2 * height / G) < 2 * dt
+
+
+@dataclass(frozen=True)
+class Breaks(Sticks):
+    """States of a pass in which bonds of a joint (or, of another ``kind``, contacts) change from ``since`` s on."""
+
+    kind: str = "debonding"
+
+    def changes(self, now, before):
+        changed = self.time >= self.since > before.time
+        return [Change(self.kind, True, np.zeros(0, int), False, (0.0, 0.0), "")] if changed else []
+
+
+@pytest.mark.parametrize(("kind", "at"), [("debonding", 1.42), ("slip", 2.27)])
+def test_bonds_that_break_before_they_are_expected_to_are_found_halfway(monkeypatch, kind, at):
+    """A contact is expected to change at 2.27 s, and a pass there confirms it. Bonds that break together have broken
+    before: they are looked for halfway, then enclosed; other changes are where they were expected."""
+    changes = FirstChange(("contacts",))
+    monkeypatch.setattr(Watched, "of", lambda now, found, kinds: found)
+    monkeypatch.setattr(first_state_change, "_first_of", lambda changes, low, high: 2.27 if high.time > 2.0 else None)
+    now = SimpleNamespace(state=SimpleNamespace(time=1.0))
+    changes._seen = Breaks(1.0, 1.42, kind)
+    found = changes.first(now, Breaks(4.0, 1.42, kind), lambda time: Breaks(time, 1.42, kind), lambda time: time, 10.0)
+    assert found.time == pytest.approx(at, abs=2e-3)
