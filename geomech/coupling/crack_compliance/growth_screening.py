@@ -85,7 +85,9 @@ class GrowthScreening:
             if known.solved == STOOD and known.bound is None and not known.never:
                 self._bound(now, block, known)
             load = now.loads[block]
-            if isinstance(known.bound, ChangeBound) and load.points is None:
+            # A solution that meets a target error may be that of a finer body.
+            same = solution.body.crack_system is known.crack_system
+            if isinstance(known.bound, ChangeBound) and load.points is None and same:
                 known.bound.refer(load, solution)
 
     def renumber(self, parent: np.ndarray | None, whole: np.ndarray) -> None:
