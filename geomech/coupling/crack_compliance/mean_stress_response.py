@@ -75,6 +75,8 @@ class ByMeanStress:
     _blocks: set[int] = field(default_factory=set)
     #: Blocks of higher order whose softness is limited.
     _limited: set[int] = field(default_factory=set)
+    #: Whether all bodies have this response in every pass, so that much is worth keeping for it.
+    _moves: bool = False
 
     def __contains__(self, block: int) -> bool:
         return block in self._blocks
@@ -92,8 +94,9 @@ class ByMeanStress:
             self._softness.pop(block, None)
 
     def take_all(self, bodies: dict[int, Body]) -> None:
-        """Give all ``bodies`` (block →) this response."""
+        """Give all ``bodies`` (block →) this response, in motion."""
         self._blocks.update(bodies)
+        self._moves = True
 
     def take_fields(self, fields: dict[int, BlockStressField]) -> None:
         """Give blocks of higher order (block → its stress field) this response, to all of their stress."""
@@ -182,15 +185,16 @@ class ByMeanStress:
         known = scaled(body, stress, before) if skip and whole is None else None
         if known is not None:
             return known
-        if whole is None:
+        if whole is None and skip and self._moves:
             body.uniform_solutions += 1
-            condensed = body.condensed_contact(None if before is None else before.closed) if skip else None
+            condensed = body.condensed_contact(None if before is None else before.closed)
             known = None if condensed is None else condensed.solve(stress)
             if known is not None:
                 return known
         load = body.mean_stress_load(stress) if whole is None else BodyLoad(intact=whole.under(stress))
         found = body.solve(load, warm=before, history=self.memory.get(block, began), meet_target=False)
-        body.forget_states()
+        if self._moves:
+            body.forget_states()
         return found
 
     def _changes_limit(
