@@ -13,7 +13,7 @@ from geomech.coupling.splitting.block_splitting import split_blocks
 from geomech.ddm.crack_contact.face_laws import FaceMemory
 from geomech.ddm.growth.tip_advance import advance
 from geomech.ddm.system.influence_matrix import ElementSet
-from geomech.model import CONTACT, OPEN, STICK, TIP, Blocks, Cracks, GrowthSettings, State
+from geomech.model import AUTO_ORDER, CONTACT, OPEN, STICK, TIP, Blocks, Cracks, GrowthSettings, State
 
 DENSITY = 2700.0
 SQUARE = np.array([[0.0, 0.0], [4.0, 0.0], [4.0, 3.0], [0.0, 3.0]])
@@ -216,6 +216,25 @@ def test_loop_inside_makes_an_island():
     assert np.diff(split.blocks.block_loop).tolist() == [2, 1]
     assert split.blocks.areas()[1] == pytest.approx(0.9, rel=1e-14)
     assert_conserved(blocks, state, split)
+
+
+@pytest.mark.parametrize(
+    ("given", "present", "after", "now", "reported"),
+    [
+        (3, None, [1, 3], None, 1),
+        (AUTO_ORDER, 1, [1, AUTO_ORDER], [1, 1], 0),
+        (AUTO_ORDER, 4, [1, AUTO_ORDER], [1, 4], 1),
+    ],
+)
+def test_a_part_with_a_hole_is_of_first_order(given, present, after, now, reported, caplog):
+    """Around an island; told where it loses a deflection. The island keeps the order of the whole, and may be raised."""
+    blocks = Blocks.from_polygons([SQUARE], names=["rock"], order=[given])
+    state = replace(moving(blocks), order=None if present is None else np.array([present]))
+    loop = network([[1, 1], [3, 1.2], [2, 2]], [[0, 1], [1, 2], [2, 0]])
+    split = split_blocks(blocks, state, loop)
+    assert split.blocks.order.tolist() == after
+    assert (None if split.state.order is None else split.state.order.tolist()) == now
+    assert caplog.text.count("has a hole: it continues as a block of first order") == reported
 
 
 def test_two_cuts_and_a_cross_at_once():
