@@ -99,6 +99,7 @@ WARNED = (
     "static steps have dissipated",
     "of their strain only",
     "are no more accurate",
+    "is not resolved, and friction remembers it",
     "before they bear it",
     *sorted({words for invariant in INVARIANTS.values() for words in invariant.reported}),
 )

@@ -32,6 +32,8 @@ FOUND, ROUGHLY, MANY = 1e-6, 1e-3, 100
 FIRST_TRIAL = 1 / 64
 #: Largest number of trials for one change; it is then reported at the earliest time at which it has been seen.
 TRIALS = 12
+#: Part of the time until a change, within which others are taken together with it, above which a warning is given.
+COARSE = 0.1
 #: Bonds are looked for halfway if that is before this fraction of a step to their breaking.
 HALFWAY = 0.75
 #: A step to a change is short if it is less than this fraction of the longest step. After a short one, changes within
@@ -71,6 +73,8 @@ class FirstChange:
         self._last, self._near = 0.0, 0.0
         #: Whether the last pass ended at a change.
         self.reached = False
+        #: Whether changes that are taken together over much of the load have been reported.
+        self._coarse = False
 
     def first(
         self, now: CrackedBlocks, found: Balance, solve: Callable[[float], Balance], approach: Callable[[float], float],
@@ -172,7 +176,17 @@ class FirstChange:
         return [first]
 
     def _reach(self, time: float, most: float, within: float, more: float) -> None:
-        short = abs(time - self._last) < SHORT * most
+        way = abs(time - self._last)
+        if not self._coarse and within < way <= (1 + FOUND) * self._near and way > COARSE * abs(time):
+            self._coarse = True
+            log.warning(
+                "t = %g s: contacts and crack faces change their states in such a rapid succession that the changes since t = "
+                "%g s, %.2g of the time until then, are taken together, and later ones too. The order in which they slip is "
+                "not resolved, and friction remembers it: displacements and crack paths are one of several possible "
+                "results. --repeat noise shows by how much they differ",
+                time, self._last, way / abs(time),
+            )  # fmt: skip
+        short = way < SHORT * most
         self._near = max(within, (more if short else LESS) * max(self._near, within))
         self._last, self.expected, self.reached = time, None, True
 
