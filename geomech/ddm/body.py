@@ -394,9 +394,9 @@ class Body:
             self._condensed = (None,)
 
     def forget_states(self) -> None:
-        """Give up the factors of contact states and the loads of one of many bodies: these take as much memory as its
-        matrices."""
-        if self.in_number and not self._grown and isinstance(self.crack_system, CrackSystem):
+        """Give up the factors of contact states and the loads of one of many bodies, whose contact is condensed: these take
+        as much memory as its matrices."""
+        if self.in_number and not self._grown and condenses(self) and isinstance(self.crack_system, CrackSystem):
             self.crack_system.retire()
             self._loads.forget()
 

@@ -130,8 +130,8 @@ for cycle in Coupling(problem).cycles():
 
 @pytest.mark.slow
 def test_a_second_of_a_section_in_motion(tmp_path):
-    """207 blocks, 119 cracks, 48 cracked blocks, weight applied at once, a second in 1000 steps: 168 s of processor time
-    and 1.9 GB. (5.8 GB after five steps as long as blocks kept A_ΓΓ, its factors and all loads; half an hour as long as
+    """207 blocks, 119 cracks, 48 cracked blocks, weight applied at once, a second in 1000 steps: 150 to 170 s of
+    processor time and 1.9 GB. (5.8 GB after five steps as long as blocks kept A_ΓΓ, its factors and all loads; half an hour as long as
     all blocks were solved in every step, with 300 states of crack faces and 10 factorisations a step.)"""
     loaded("kb11", tmp_path)
     path = tmp_path / "scene.toml"

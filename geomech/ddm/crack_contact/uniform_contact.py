@@ -60,7 +60,7 @@ class UniformContact:
         right[open_at, np.flatnonzero(~closed)] = -1.0
         right[:, np.flatnonzero(closed)] = -s.entries(f, c)
         right[:, k:] = self._units[f]
-        jumps = Factor(s.entries(f, f), SINGULAR).solve(right)
+        jumps = Factor(s.entries(f, f), SINGULAR, in_place=True).solve(right)
         body.work.crack_factorisations += 1
         body.work.back_substitutions += k + 3
         table = np.empty((k + 3, k + 3), order="F")
