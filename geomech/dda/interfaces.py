@@ -36,7 +36,9 @@ class SteppedSystem(Protocol):
 
     ``free`` is the row of each block in the equations, −1 if it is fixed; ``moving`` are the numbers of the blocks that
     have a row. ``next`` and ``owner`` are by vertex. ``no_compliance`` (n_blocks, 3, 3) and ``no_offset`` (n_blocks, 3)
-    are those of blocks without cracks.
+    are those of blocks without cracks. ``reach`` m: static steps are
+    solved by operator splitting (`open_close.static_splitting`), and blocks that move beyond it are given up; None: they are
+    not.
     """
 
     blocks: Blocks
@@ -64,6 +66,7 @@ class SteppedSystem(Protocol):
     rounding: float
     roundoff_reported: bool
     allowed_penetration: float
+    reach: np.ndarray | None
 
     @property
     def step_limit(self) -> float: ...

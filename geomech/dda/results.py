@@ -15,6 +15,15 @@ class NotConverged(RuntimeError):
     """No acceptable step was found at any length; the message gives the reason and the contact concerned."""
 
 
+class Unsupported(NotConverged):
+    """Blocks that nothing supports move too far in a static step: their ``motion`` (n_blocks, 3), displacement and
+    rotation, to a scale, and the ``unbalanced`` (n_blocks, 3) forces and moments on them."""
+
+    def __init__(self, reason: str, motion: np.ndarray, unbalanced: np.ndarray) -> None:
+        super().__init__(reason)
+        self.motion, self.unbalanced = motion, unbalanced
+
+
 @dataclass(frozen=True, eq=False)
 class CrackResponse:
     """Response of cracks in blocks: mean crack strain e(σ) = ``offset`` + ``compliance`` σ, current axes.

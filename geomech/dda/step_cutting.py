@@ -25,7 +25,8 @@ from .kinematics.midpoint_configuration import MidpointConfiguration
 from .kinematics.simplex_integration import block_moments
 from .open_close.contact_set import ContactSet
 from .open_close.equations import Unsettled
-from .results import NotConverged, StepResult
+from .open_close.static_splitting import KeepsMoving
+from .results import NotConverged, StepResult, Unsupported
 from .step_control.pseudo_inertia import balanced_attempt
 from .step_control.relative_motion import Windows
 from .step_control.step_limits import CROSSING, UNSETTLED, Crossed, StepLimits, Used
@@ -133,6 +134,8 @@ class StepCutting:
         try:
             attempt = make(system, self.start, self.dt, found, self.cuts)
             result = attempt.result()
+        except KeepsMoving as failure:
+            raise self._unsupported(failure) from failure
         except Unsettled as failure:
             self.failed = self.reason = f"{failure}{system.finder.where(found, failure.contact)}"
             self._cut(0.5 * self.dt, UNSETTLED, *found.blocks_of(failure.contact))
@@ -149,6 +152,16 @@ class StepCutting:
             self.last_share = used.share
             self._cut(self.dt * min(0.8, max(0.05, 0.95 / used.share)), used.why, *used.blocks)
         return None
+
+    def _unsupported(self, failure: KeepsMoving) -> Unsupported:
+        """The error for blocks that keep moving."""
+        moving, size = failure.order >= 0, np.sqrt(self.start.moments[:, 0])
+        motion, unbalanced = np.zeros((2, len(moving), 3))
+        motion[moving] = failure.motion[failure.order[moving], :3]
+        unbalanced[moving] = failure.unbalanced[failure.order[moving], :3]
+        motion[:, 2] /= size
+        unbalanced[:, 2] *= size
+        return Unsupported(f"{failure}", motion, unbalanced)
 
     def _bonds_missed(self, result: StepResult) -> bool:
         """Whether a bond has broken that corner contacts or springs at corners had been omitted for: these must act

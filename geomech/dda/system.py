@@ -30,6 +30,7 @@ from .linear_solver import assembly
 from .loads.load_checks import LoadChecks
 from .loads.load_vectors import LoadMap
 from .open_close.contact_set import ContactSet
+from .open_close.static_splitting import is_straight
 from .results import CrackResponse, StepResult
 from .step_control.relative_motion import Windows
 from .step_control.step_limits import StepLimits
@@ -136,6 +137,9 @@ class BlockSystem:
         self._refuse_massless()
         self.half_diagonal = 0.5 * float(np.hypot(*np.ptp(vertices, axis=0)))
         self.rounding, self.roundoff_reported = rounding_of(vertices), False
+        #: (n_blocks,) m: static steps are solved by operator splitting, which gives blocks up that move beyond this; None:
+        #: they are not.
+        self.reach: np.ndarray | None = None
         self.limits = StepLimits(
             self.finder, self.settings, self.half_diagonal, self.vertex_start, self.next, self.work
         )
@@ -210,6 +214,17 @@ class BlockSystem:
         if self.taken_out is not None:
             holds = holds & ~self.taken_out[every.block] & ~self.taken_out[every.other]
         self._sparse, self.bonded, self.glued = None, np.flatnonzero(holds), every.kept(holds)
+
+    @property
+    def splits_statics(self) -> bool:
+        """Whether operator splitting (`open_close.static_splitting`) can solve static steps of these blocks, and they are
+        many."""
+        plain = self.deflected is None and not self.allowed_penetration
+        return (
+            plain
+            and len(self.moving) >= self.settings.contact_solver.static_splitting
+            and all(is_straight(law) for law in self.joints)
+        )
 
     @property
     def step_limit(self) -> float:

@@ -70,7 +70,8 @@ _PLACED = 20
 _SHARED = 8
 #: Most repetitions for the gaps of rotating blocks, and accuracy of these relative to the contacts' ``precision``, in
 #: dynamics and in statics. In statics contacts store little energy, and springs of 40 E' turn an error of the gap into
-#: energy (for leaning slabs, at a tenth of the precision, as much in one step as the work of all loads).
+#: energy (for leaning slabs, at a tenth of the precision, as much in one step as the work of all loads). Operator splitting
+#: balances forces less exactly than that.
 _BENDS, _KNOWN, _KNOWN_IN_STATICS = 4, 0.1, 1e-3
 
 
@@ -156,6 +157,8 @@ class Attempt:
             self.stress[system.taken_out] = 0.0
             self.cracks = self.cracks.without(system.taken_out)
         self.iterations = 0
+        #: (6 n_free,) motion of a static step as found last, with other contact areas or arcs; None before.
+        self.earlier: np.ndarray | None = None
         #: J/m, kinetic energy of the mean velocity of a static step, which is not carried over.
         self.dropped = 0.0
         if not scheme.static and found.tried is None and len(found):
@@ -343,6 +346,8 @@ class Attempt:
                     self.pattern, self.matrix, self.right, vectors, geometry, found, gap, solve
                 )
             self.iterations += settled.iterations
+            if self.system.scheme.static:
+                self.earlier = settled.unknowns.ravel()
             if striking is not None:
                 settled = striking.back(settled, self.system.half_diagonal)
             better = found.misplaced(settled)
@@ -386,7 +391,8 @@ class Attempt:
         system, found, settled = self.system, self.found, self.settled
         if not len(found) or not self.n_free:
             return False
-        known = (_KNOWN_IN_STATICS if system.scheme.static else _KNOWN) * found.precision
+        exact = system.scheme.static and system.reach is None
+        known = (_KNOWN_IN_STATICS if exact else _KNOWN) * found.precision
         # A point that rotates by r while it moves by d deviates from its chord by at most r d.
         increment = self._increment(self.unknowns)
         if 2.0 * np.abs(increment[:, 2]).max() * system.step_limit < known.min():
@@ -497,7 +503,8 @@ class Attempt:
     def _further_equations(self, pattern, matrix, right, contacts, vectors) -> dict[str, Any]:
         """Fields of `equations` that depend on further unknowns; ``right`` (n_free, 6) is the right-hand side of the
         first six."""
-        return {"right": right, "expected": self._expected_unknowns()}
+        reach = self.system.reach if self.system.scheme.static else None
+        return {"right": right, "expected": self._expected_unknowns(), "earlier": self.earlier, "reach": reach}
 
     def _expected_unknowns(self) -> np.ndarray | None:
         """(6 n_free,) displacement of this step at its initial velocity, in the unknowns of `assembly`; None in

@@ -47,6 +47,19 @@ class ContactSolver:
                            on a slope of 1 000 blocks after an impact
     splitting_settled      … or until no more than this fraction of the states changes in ten iterations
 
+    Operator splitting in the trials of a factor of safety, continued until forces balance (`dda.open_close.static_splitting`)
+    static_splitting                number of free blocks from which it takes the place of the central path
+    static_splitting_soft           stiffness of its springs at first, relative to that of the softest contact: forces spread
+                                    over a slope of 3 400 blocks in a quarter of the iterations …
+    static_splitting_stiff          … and later, with which few contacts keep changing
+    static_splitting_begin          number of iterations with soft springs, if contacts carry nothing at first
+    static_splitting_period         number of iterations whose mean is looked at
+    static_splitting_iterations     largest number of iterations, each of one substitution
+    static_splitting_balance        largest unbalanced force on a block in the mean, relative to the largest force on it, …
+    static_splitting_cycle          … and at slivers where iterates go round in a cycle, …
+    static_splitting_cycling        … which may be this fraction of the blocks
+    static_splitting_change         largest change of the mean forces between two periods, relative to their mean
+
     Central path (`dda.open_close.interior_point`)
     central_path            whether it is used
     path_iterations         largest number of iterations in a step; successful paths take 13 to 40
@@ -90,6 +103,16 @@ class ContactSolver:
     splitting_wrong: float = 0.02
     splitting_iterations: int = 60
     splitting_settled: float = 0.001
+    static_splitting: int = 1500
+    static_splitting_soft: float = 0.005
+    static_splitting_stiff: float = 0.02
+    static_splitting_begin: int = 1250
+    static_splitting_period: int = 250
+    static_splitting_iterations: int = 8000
+    static_splitting_balance: float = 1e-3
+    static_splitting_cycle: float = 0.05
+    static_splitting_cycling: float = 3e-3
+    static_splitting_change: float = 3e-4
     central_path: bool = True
     path_iterations: int = 60
     path_undecided: int = 12

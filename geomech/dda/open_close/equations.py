@@ -81,7 +81,9 @@ class Answer:
 
 @dataclass(eq=False)
 class Equations:
-    """The equations of a step without contact states; arguments as for `settle`."""
+    """The equations of a step without contact states; arguments as for `settle`. ``earlier``: (6 n,) the motion found by
+    an earlier attempt at the same static step, if any; ``reach``: (n_blocks,) m beyond which blocks are given up
+    if operator splitting is to solve a static step."""
 
     pattern: assembly.Pattern
     matrix: np.ndarray
@@ -94,6 +96,8 @@ class Equations:
     curved: CurvedJoints | None
     statics: bool
     expected: np.ndarray | None = None
+    earlier: np.ndarray | None = None
+    reach: np.ndarray | None = None
     #: Whether patches and the central path can be used, which are for six unknowns per block.
     first_order = True
 
@@ -161,8 +165,7 @@ class Equations:
     ) -> Answer:
         """The solution of the assembled system, with linearised ``springs`` and ``gap``, to a relative residual of
         ``within``."""
-        pattern, found = self.pattern, self.found
-        state, direction, bonded = states.state, states.direction, states.bonded
+        pattern, state, direction = self.pattern, states.state, states.direction
         try:
             unknowns = assembly.solve(
                 pattern, self._data, self._side, symmetric, self._force, near=(self._near, self._rest_of_near(within)),
@@ -174,6 +177,14 @@ class Equations:
             raise Unsettled("the step's matrix is singular")
         self._near = unknowns
         forces = self._forces(unknowns, state, direction, springs, gap)
+        return self.checked(states, unknowns, forces, springs, gap, slip)
+
+    def checked(
+        self, states: States, unknowns: np.ndarray, forces: np.ndarray, springs: Springs, gap: np.ndarray,
+        slip: np.ndarray,
+    ) -> Answer:  # fmt: skip
+        """The solution ``unknowns`` (6 n,) with contact ``forces`` (n, 4), and the states that it requires."""
+        found, (state, direction, bonded) = self.found, (states.state, states.direction, states.bonded)
         known, missed = springs, None
         if self.curved is not None:
             slip = plastic_slip(forces, state, found.shear, springs)

@@ -26,6 +26,7 @@ from .equations import Answer, Equations, States, Unsettled
 from .interior_point.central_path import SLIPPED, CentralPath
 from .operator_splitting import can_split, split
 from .settled_states import Settled
+from .static_splitting import converged, converges
 
 log = logging.getLogger(__name__)
 
@@ -151,6 +152,9 @@ class _Search:
             if not self.equations.first_order:
                 self._pivot(answer, wrong, called, returned)
             elif returned or self._overshoots(answer) or self.tries > self._most_tries(number):
+                result = self._by_static_splitting()
+                if result is not None:
+                    return result
                 if not self._by_splitting():
                     self._by_path(answer)
             else:
@@ -247,6 +251,21 @@ class _Search:
         self.states = proposal
         self._restart()
         return True
+
+    def _by_static_splitting(self) -> Settled | None:
+        """The result of operator splitting continued until forces balance; None if it does not apply. Raises
+        `Unsettled`."""
+        equations, bonded = self.equations, self._bonds_on_path()
+        if self.effort.within_patch or not converges(equations, bonded, self.solver):
+            return None
+        solved = converged(equations, bonded, self.solver)
+        log.debug("operator splitting: %d iterations", solved.iterations)
+        self.spent += solved.spent
+        self.states = States(solved.state, solved.direction, self._bonds_after_path(solved.state, bonded))
+        slip = np.zeros(len(self.found))
+        return self._found(
+            equations.checked(self.states, solved.unknowns, solved.forces, equations.springs, equations.gap, slip)
+        )
 
     def _by_splitting(self) -> bool:
         """Whether operator splitting proposes states; it is used only once. Raises `Unsettled`."""

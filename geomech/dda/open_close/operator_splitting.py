@@ -52,7 +52,7 @@ class Proposal(NamedTuple):
 
 
 @kept(fastmath={"contract"}, error_model="numpy", nogil=True, **UNCOUNTED)
-def _turn(unknowns, contacts, law, rho, intact, relaxation, at_hand, states):
+def contact_turn(unknowns, contacts, law, rho, intact, relaxation, at_hand, states):
     """The contact part of one iteration, for the blocks' ``unknowns`` (6 n_free,) and ``contacts`` (`ContactMotion`).
     ``law`` (n, 6): gap, kₙ, kₛ, S₀, μ, c; ``rho`` (2, n) normal and tangential; ``intact`` (n,): unbroken bonds. ``at_hand`` (n,
     6): ζ, z and the forces ρ (2z − ζ − q), each normal and tangential; ``states``: state and direction (n,) of z."""
@@ -148,19 +148,26 @@ class _Springs:
         return True
 
 
+def linear_laws(equations: Equations, bonded: np.ndarray) -> np.ndarray:
+    """(n, 6) of the contacts with bonds ``bonded`` (n,): gap, kₙ, kₛ, S₀, μ, c."""
+    found, springs = equations.found, equations.springs
+    slides = found.state == SLIP
+    friction = np.where(slides, springs.friction, springs.peak)
+    held = springs.hold + np.where(bonded == SLIPPED, springs.cohesion, 0.0)
+    cohesion = np.where(slides, springs.sliding, held)
+    return np.stack([equations.gap, springs.normal, springs.shear, found.shear, friction, cohesion], axis=1)
+
+
 def split(equations: Equations, bonded: np.ndarray, solver: ContactSolver) -> Proposal:
     """Proposed contact states of the step with fixed bonds ``bonded`` (n,), starting from the motion at the present
     velocities and the forces carried over. Raises numpy.linalg.LinAlgError."""
-    pattern, found, springs = equations.pattern, equations.found, equations.springs
+    pattern, found = equations.pattern, equations.found
     order, vectors = pattern.order, np.ascontiguousarray(equations.vectors)
     contacts = ContactMotion(found.block, found.other, order, vectors)
     between = _Springs(equations, contacts)
 
-    slipped, slides = bonded == SLIPPED, found.state == SLIP
-    friction = np.where(slides, springs.friction, springs.peak)
-    cohesion = np.where(slides, springs.sliding, springs.hold + np.where(slipped, springs.cohesion, 0.0))
-    intact = (bonded > 0) & ~slipped
-    law = np.stack([equations.gap, springs.normal, springs.shear, found.shear, friction, cohesion], axis=1)
+    law = linear_laws(equations, bonded)
+    intact, friction, cohesion = (bonded > 0) & (bonded != SLIPPED), law[:, 4], law[:, 5]
 
     # Before the first iteration z is unknown: ζ starts as q − F/ρ.
     assert equations.expected is not None  # `split` is for motion
@@ -171,7 +178,7 @@ def split(equations: Equations, bonded: np.ndarray, solver: ContactSolver) -> Pr
     states = found.state.copy(), np.zeros(len(found))
     seen, relaxation, spent = states[0].copy(), 1.0, _FACTORS
     for taken in range(1, solver.splitting_iterations + 1):
-        _turn(unknowns, contacts, law, between.rho, intact, relaxation, at_hand, states)
+        contact_turn(unknowns, contacts, law, between.rho, intact, relaxation, at_hand, states)
         relaxation, spent = _RELAXATION, spent + _TURN
         if taken % _LOOK == 0:
             changing = np.count_nonzero(states[0] != seen) / len(found)

@@ -132,11 +132,11 @@ class AdmissibleForces:
         """Whether admissible forces exist at the ``factor``. Raises `Unsolved`."""
         return self.unbalanced(factor)[0] <= _BALANCED
 
-    def largest_factor(self, first: float = 1.0, stride: float = 1.0) -> float:
-        """The largest factor with admissible forces, searched from ``first``, and upwards from there in steps of the
-        relative length ``stride`` and four times as long each; 0 if there are none down to 1/64, inf if there are some
-        at 64. Raises `Unsolved`."""
-        low, high, factor, step = 0.0, math.inf, first, _PRECISE
+    def largest_factor(self, first: float = 1.0, stride: float = 1.0, precise: float = _PRECISE) -> float:
+        """The largest factor with admissible forces to the relative accuracy ``precise``, searched from ``first``, and
+        upwards from there in steps of the relative length ``stride`` and four times as long each; 0 if there are none
+        down to 1/64, inf if there are some at 64. Raises `Unsolved`."""
+        low, high, factor, step = 0.0, math.inf, first, precise
         while True:
             left, slope = self.unbalanced(factor)
             if left <= _BALANCED:
@@ -153,7 +153,7 @@ class AdmissibleForces:
             if high <= 1.0 / _FARTHEST:
                 return 0.0
             factor = max(1.0 / (1.0 / high - left / slope), low) if slope < 0.0 else low
-            if high - factor <= _PRECISE * high or high - low <= 2.0 * _PRECISE * high:
+            if high - factor <= precise * high or high - low <= 2.0 * precise * high:
                 return factor
             factor = factor if factor > low else 0.5 * (low + high)
 

@@ -187,7 +187,7 @@ class _Relaxation:
         self, tolerance: float, max_steps: int, watch: Callable[[StepResult, np.void], None] | None, follow: bool
     ) -> Equilibrium:
         """Step until the blocks are at rest, have collapsed, or ``max_steps`` are used up."""
-        dt, longest = _pseudo_times(self.system)
+        dt, longest = pseudo_times(self.system)
         for _ in range(max_steps):
             try:
                 self.result = result = self.system.step(
@@ -285,7 +285,7 @@ class _Relaxation:
         return Equilibrium(rest, converged, collapsed, moving, reason, rows, moved, self.result)
 
 
-def _pseudo_times(system: BlockSystem) -> tuple[float, float]:
+def pseudo_times(system: BlockSystem) -> tuple[float, float]:
     """First and longest step, s; blocks without mass do not count."""
     free = ~system.blocks.fixed & (system.density > 0)
     if not free.any():

@@ -5,6 +5,10 @@ force falls to round-off within a few steps. If it remains, the steps show the d
 unstable if no contact closes in that direction and the unbalanced force, extrapolated along the motion, lasts beyond
 the displacement that an equilibrium allows (`displacement_limit`). Undecided cases, such as a corner about to touch,
 are continued with longer steps until the blocks are at rest or have moved too far.
+
+Systems of many blocks are solved in one long step instead, by operator splitting (`open_close.static_splitting`), which
+follows blocks that keep moving until they have moved too far. The drift is then the acceleration of their motion φ under
+the unbalanced forces U, Σ U·φ / Σ m φ².
 """
 
 from __future__ import annotations
@@ -16,9 +20,10 @@ import numpy as np
 
 from ...model import OPEN, Loads, State
 from ..joint_laws.friction_arrest import contact_speeds
-from ..results import NotConverged, StepResult
+from ..results import NotConverged, StepResult, Unsupported
 from ..system import BlockSystem
 from .displacement_limit import DisplacementLimit
+from .pseudo_time_equilibrium import pseudo_times
 
 #: Free fall in one step, as a fraction of a block's size √area: long against contact vibrations, small for the
 #: geometry.
@@ -36,6 +41,8 @@ _SHORT_STEPS = 6
 _BEYOND = 5.0
 #: The motion is extrapolated to this many times the distance that blocks may move.
 _MARGIN = 2.0
+#: Most long steps of a trial of many blocks.
+_LONG_STEPS = 6
 #: A contact stops the motion if it closes by more than this fraction of the fastest block's displacement.
 _CLOSES = 1e-3
 
@@ -79,12 +86,18 @@ class TrialLoads:
         pull = max(float(np.hypot(*self.loads.gravity.at(self.time))), 1e-3)
         return math.sqrt(2.0 * _FALL * size / pull)
 
+    def at_once(self, system: BlockSystem) -> bool:
+        """Whether a trial of this ``system`` is solved in a few long steps, by operator splitting."""
+        return system.splits_statics and not self.loads.bolts and not self.loads.excavations
+
 
 def stability_trial(
     system: BlockSystem, state: State, under: TrialLoads, factor: float, limit: DisplacementLimit
 ) -> tuple[Trial, State]:
     """Whether the blocks of ``system``, with joint strengths divided by ``factor``, come to rest from ``state`` within
     the displacement ``limit``; and their final state, without velocity."""
+    if under.at_once(system):
+        return _at_once(system, state, under, factor, limit)
     blocks, way = system.blocks, _Way(system, limit)
     longest = dt = under.longest(system)
     ratios: list[float] = []
@@ -134,6 +147,49 @@ def stability_trial(
         step[:, :2] * free[:, None], step[:, 2] * free, moved, reason,
     )  # fmt: skip
     return trial, replace(state, velocity=np.zeros_like(state.velocity))
+
+
+def _at_once(
+    system: BlockSystem, state: State, under: TrialLoads, factor: float, limit: DisplacementLimit
+) -> tuple[Trial, State]:
+    """`stability_trial` in a few long steps, by operator splitting."""
+    blocks, dt, way = system.blocks, pseudo_times(system)[1], _Way(system, limit)
+    system.reach = _MARGIN * limit.farthest()
+    nothing, drift, ratio, stable = np.zeros((blocks.n_blocks, 3)), math.nan, math.nan, False
+    motion, steps, reason = nothing, 0, f"still moving after {_LONG_STEPS} steps"
+    for steps in range(1, _LONG_STEPS + 1):
+        try:
+            result = system.step(state, under.loads, dt, load_time=under.time, pseudo_inertia=True)
+        except Unsupported as failure:
+            motion, drift, ratio = _mechanism(system, failure)
+            reason = f"{failure}"
+            break
+        except NotConverged as failure:
+            reason = f"no consistent contacts: {failure}"
+            break
+        state, ratio, motion = result.state, result.statistics["unbalanced_ratio"], result.acceleration[:, :3]
+        limit.follow(result)
+        drift = float(_speeds(result)[~blocks.fixed].max())
+        too_far = len(limit.beyond(state)) > 0
+        if too_far or (steps > 1 and ratio < under.unbalanced):
+            stable = not too_far
+            reason = f"{'keeps moving' if too_far else 'at rest'} after {way.of(state)}"
+            break
+    motion = motion * ~blocks.fixed[:, None]
+    moved = limit.moved(state.vertices)
+    trial = Trial(factor, stable, steps, ratio, drift, motion[:, :2], motion[:, 2], moved, reason)
+    return trial, replace(state, velocity=np.zeros_like(state.velocity))
+
+
+def _mechanism(system: BlockSystem, failure: Unsupported) -> tuple[np.ndarray, float, float]:
+    """The motion (n_blocks, 3) of unsupported blocks, 1 m for the fastest; its acceleration, m/s²; and the largest
+    unbalanced force over the weight or mass of its block times 1 m/s²."""
+    motion, force, area = failure.motion, failure.unbalanced, system.blocks.areas()
+    motion = motion / max(float(np.hypot(motion[:, 0], motion[:, 1]).max()), 1e-300)
+    inertia = system.mass * area / 6.0
+    mass = float((system.mass * (motion[:, 0] ** 2 + motion[:, 1] ** 2) + inertia * motion[:, 2] ** 2).sum())
+    drift = float((force * motion).sum()) / mass
+    return motion, drift, float((np.hypot(force[:, 0], force[:, 1]) / system.mass)[~system.blocks.fixed].max())
 
 
 def _speeds(result: StepResult) -> np.ndarray:

@@ -62,8 +62,12 @@ _BEYOND = 1e-2
 _NEARBY, _BELOW = 0.85, 0.95
 #: Start of the search for the bound: Newton's method approaches from above, and most slopes fail below this.
 _FIRST = 2.0
+#: … and with many blocks, whose programmes take longest, from here.
+_FIRST_OF_MANY = 1.0
 #: Most cuts of one step in which failed blocks are followed: where contacts find no states, following them ends.
 _CUTS = 2
+#: Most cuts of the long steps of a trial of many blocks.
+_CUTS_AT_ONCE = 0
 #: Number of blocks that an error names.
 _NAMED = 5
 #: Distance of trials from an expected factor, in tolerances; and relative distance of a second failing trial above a
@@ -206,6 +210,9 @@ class _Search:
         """The blocks with joints whose strength is divided by the ``factor``."""
         laws = [reduced(law, factor) if law.name in self.chosen else law for law in self.joints]
         system = BlockSystem(self.blocks, self.materials, laws, self.joint_index, self.settings)
+        if self.under.at_once(system):
+            settings = replace(self.settings, max_step_cuts=min(self.settings.max_step_cuts, _CUTS_AT_ONCE))
+            system = BlockSystem(self.blocks, self.materials, laws, self.joint_index, settings)
         system.finder.toes, system.finder.whole_faces = counted.toes, counted.whole_faces
         return system
 
@@ -287,20 +294,25 @@ class _Search:
             return 0.0
         forces = AdmissibleForces.of(system, whole, self.rest, self.joints, self.chosen, self.under.loads.bolts)
         try:
-            return 0.0 if forces is None else forces.largest_factor(_FIRST)
+            if forces is None:
+                return 0.0
+            if self.under.at_once(system):
+                return forces.largest_factor(_FIRST_OF_MANY, precise=self.tolerance)
+            return forces.largest_factor(_FIRST)
         except Unsolved as failure:
             log.info("the largest factor with admissible contact forces is not known: %s", failure)
             return 0.0
 
     def _admissible_beyond(self, found: FactorOfSafety, counted: Counted) -> float | None:
         """The largest factor with admissible contact forces; None if it is unknown or hardly larger than that
-        ``found``."""
+        ``found``. With many blocks it is that of the blocks as drawn."""
         if not math.isfinite(found.upper):
             return None
-        forces = AdmissibleForces.of(
-            self.system(found.lower, counted), found.state, self.rest, self.joints, self.chosen
-        )
-        beyond = found.factor * (1.0 + _BEYOND)
+        beyond, system = found.factor * (1.0 + _BEYOND), self.system(found.lower, counted)
+        if self.under.at_once(system):
+            aim = self.aims.get(counted, 0.0)
+            return aim if aim > beyond else None
+        forces = AdmissibleForces.of(system, found.state, self.rest, self.joints, self.chosen)
         try:
             if forces is None or not forces.balance(beyond):
                 return None
@@ -476,6 +488,9 @@ def _relaxed(system: BlockSystem, under: TrialLoads, state: State) -> tuple[Stat
     """Equilibrium by relaxation from ``state``, after excavation and bolting up to the loads' time; ``state`` itself if
     none is found. And the displacement limit from there."""
     limit = DisplacementLimit(system, state, under.loads, under.time)
+    if under.at_once(system):
+        # A trial finds the equilibrium by itself.
+        return state, limit
     found = equilibrium(
         system, state, under.loads, load_time=under.time, limits=RelaxationLimits(_RELAXING, limit, follow=False)
     )
