@@ -46,6 +46,9 @@ _AT_STRENGTH = 1e-9
 #: A block moves steadily if the unbalanced forces on it in successive periods have directions with at least this cosine, and
 #: magnitudes that differ by less than this fraction.
 _STEADY, _ALIKE = 0.98, 0.2
+#: Forces are calm if they change by no more than this multiple of `ContactSolver.static_splitting_change`: blocks that move
+#: push a little on others.
+_CALM = 3.0
 #: Part of the way to where a contact closes over which motion is extrapolated.
 _NEARLY = 0.9
 #: Loads smaller than this fraction of the median of all blocks count as that large.
@@ -236,13 +239,13 @@ class _Splitting:
             period = self._period()
             left = np.linalg.norm(period.unbalanced[:, :3], axis=1) / self._carried(period.forces)
             steady = (left > solver.static_splitting_balance) & self._alike(last, period)
-            settles = self._settles(last, period)
-            if settles and self._balances(left, steady):
+            changed = self._changed(last, period)
+            if changed <= solver.static_splitting_change and self._balances(left, steady):
                 return self._result(period, taken)
             if not np.isfinite(period.unknowns).all():
                 break
             if steady.any():
-                self._follow(last, period, steady, settles)
+                self._follow(last, period, steady, changed <= _CALM * solver.static_splitting_change)
             last = period
             if taken % (_ADAPTED * solver.static_splitting_period) == 0:
                 self._take(solver.static_splitting_stiff * self._stiffest)
@@ -265,10 +268,10 @@ class _Splitting:
         few = cycling.sum() <= solver.static_splitting_cycling * len(left)
         return bool(few and not steady.any() and left.max() <= solver.static_splitting_cycle)
 
-    def _settles(self, last: _Period, period: _Period) -> bool:
-        """Whether the mean forces hardly change from period to period."""
+    def _changed(self, last: _Period, period: _Period) -> float:
+        """Change of the mean forces from period to period, relative to the mean normal force."""
         mean, change = float(period.forces[:, 0].mean()), period.forces - last.forces
-        return float(np.sqrt(np.mean(change**2))) <= self._solver.static_splitting_change * mean
+        return float(np.sqrt(np.mean(change**2))) / max(mean, 1e-300)
 
     @staticmethod
     def _alike(last: _Period, period: _Period) -> np.ndarray:
@@ -278,8 +281,8 @@ class _Splitting:
         along = np.einsum("na,na->n", one, two) > _STEADY * first * second
         return along & (np.abs(first - second) < _ALIKE * second)
 
-    def _follow(self, last: _Period, period: _Period, steady: np.ndarray, settles: bool) -> None:
-        """Once forces ``settle``, move the ``steady`` blocks (n_free,) on to where a contact closes. Raises `KeepsMoving`
+    def _follow(self, last: _Period, period: _Period, steady: np.ndarray, calm: bool) -> None:
+        """Once forces are ``calm``, move the ``steady`` blocks (n_free,) on to where a contact closes. Raises `KeepsMoving`
         if one has moved too far, or will under a force that hardly decreases."""
         equations, order = self._equations, self._equations.pattern.order
         motion = np.where(steady[:, None], (period.end - last.end).reshape(-1, 6), 0.0)
@@ -289,7 +292,7 @@ class _Splitting:
         reach[order[order >= 0]] = equations.reach[order >= 0]
         if (_farthest(period.end.reshape(-1, 6)) > reach)[steady].any():
             raise KeepsMoving(motion, unbalanced, order)
-        if not settles:
+        if not calm:
             return
         most = np.where(steady, reach / np.maximum(_farthest(motion), 1e-300), 0.0)
         stride = self._until_contact(motion, most)

@@ -66,6 +66,9 @@ _FIRST = 2.0
 _FIRST_OF_MANY = 1.0
 #: Most cuts of one step in which failed blocks are followed: where contacts find no states, following them ends.
 _CUTS = 2
+#: Relative increase of F between trials of many blocks, each solved in one step: the same step over a larger increase may
+#: find a mechanism where smaller ones find an equilibrium, and the drifts there do not predict the factor.
+_STRIDE = 0.02
 #: Most cuts of the long steps of a trial of many blocks.
 _CUTS_AT_ONCE = 0
 #: Number of blocks that an error names.
@@ -416,6 +419,7 @@ class _Bracket:
     ) -> None:
         self._search, self._counted, self._watch, self._aim = search, counted, watch, aim
         self._limit: Any = None  # DisplacementLimit of the last relaxation
+        self._at_once = search.under.at_once(search.system(1.0, counted))
         self._state = search.rest
         self.trials: list[Trial] = []
         # For each trial, the factor from whose equilibrium it started.
@@ -457,10 +461,12 @@ class _Bracket:
                     return self._answer(self.lower, None)
                 close_trial = _close_to(self._aim, self.lower, tolerance) if math.isfinite(self._aim) else None
                 factor = 2.0 * self.lower if close_trial is None else close_trial
-            elif self._aim and sum(not t.stable for t in known) == 1:
+            elif self._aim and not self._at_once and sum(not t.stable for t in known) == 1:
                 factor = upper * (1.0 + _SECOND)
             elif upper > self.lower * (1.0 + tolerance):
                 factor = _next_factor(known, self.lower, upper, tolerance)
+                if self._at_once:
+                    factor = min(2.0 * self.lower * upper / (self.lower + upper), self.lower * (1.0 + _STRIDE))
             elif self._started_far_below(known, upper, tolerance):
                 factor = upper
             else:
