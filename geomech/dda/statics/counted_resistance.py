@@ -273,24 +273,34 @@ def _faces(near: ContactSet, whole: WholeFaces, contacts: list[np.ndarray]) -> t
     return tuple(sorted(out, key=lambda each: -each.gap))
 
 
-def with_rigid_blocks(
-    blocks: Blocks, found: FactorOfSafety, loose: tuple[PartedFace, ...], rigid: FactorOfSafety
-) -> FactorOfSafety:
-    """The answer ``found`` with that of ``rigid`` blocks, and the ``loose`` faces, which are barely open in it."""
-    if loose:
-        worst, one = loose[0], len(loose) == 1
-        a, b = (blocks.names[k] if blocks.names else f"block {k}" for k in (worst.block, worst.other))
-        what = (
-            f"{'a face' if one else f'{len(loose)} faces'} with cohesion between {a!r} and {b!r}"
-            f"{'' if one else ' and others'} hold{'s' if one else ''} nothing, open by {1e3 * worst.gap:.2g} mm because "
-            "blocks have uniform strain"
-        )
-    else:
-        what = (
-            "blocks of uniform strain touch at few points of faces with cohesion, where real blocks would touch at more"
-        )
-    line = f"{what}; rigid blocks have the factor {rigid.factor:.4f}, as in limit equilibrium"
+def with_rigid_blocks(found: FactorOfSafety, rigid: FactorOfSafety) -> FactorOfSafety:
+    """The answer ``found`` of elastic blocks that touch at few points of faces with cohesion, with that of ``rigid``
+    blocks."""
+    line = (
+        "blocks of uniform strain touch at few points of faces with cohesion, where real blocks would touch at more; rigid "
+        f"blocks have the factor {rigid.factor:.4f}, as in limit equilibrium"
+    )
     return replace(found, factor_if_rigid=rigid.factor, warnings=(*found.warnings, line))
+
+
+def as_rigid_blocks(
+    blocks: Blocks, loads: Loads, found: FactorOfSafety, loose: tuple[PartedFace, ...], rigid: FactorOfSafety
+) -> FactorOfSafety:
+    """The answer of ``rigid`` blocks in place of ``found``, that of elastic blocks, whose uniform strain opens the ``loose``
+    faces by less than the precision of positions; toes are those of ``found``."""
+    worst, one = loose[0], len(loose) == 1
+    a, b = (blocks.names[k] if blocks.names else f"block {k}" for k in (worst.block, worst.other))
+    line = (
+        f"{'a face' if one else f'{len(loose)} faces'} with cohesion between {a!r} and {b!r}{'' if one else ' and others'} would "
+        f"open by {1e3 * worst.gap:.2g} mm and hold nothing, but only because blocks have uniform strain: the factor is that of "
+        f"rigid blocks, as in limit equilibrium (with uniform strain {found.factor:.4f})"
+    )
+    of_anchors = with_anchors(blocks, loads, replace(found, warnings=())).warnings
+    answer, of_toes = with_anchors(blocks, loads, rigid), found.warnings[len(of_anchors) :]
+    return replace(
+        answer, toes=found.toes, toes_hold=found.toes_hold, other_factor=found.other_factor, factor_if_rigid=rigid.factor,
+        factor_if_strained=found.factor, warnings=(*answer.warnings, *of_toes, line),
+    )  # fmt: skip
 
 
 def with_parted_faces(

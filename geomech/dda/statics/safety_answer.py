@@ -42,7 +42,9 @@ class FactorOfSafety:
     ``toes``: obstacles to the mechanism. If they are rounded and carry nothing, ``other_factor`` is the factor with
     sharp tips; if they carry load (``toes_hold``), it is the factor without them; None if unknown.
     ``factor_if_parted``: factor if open ends of faces lose their cohesion, if that differs; ``factor_if_rigid``: factor
-    of rigid blocks, if faces of elastic blocks carry nothing because they are barely open. ``travel``: how far the
+    of rigid blocks, if faces of elastic blocks carry less; it is the ``factor`` if faces would carry nothing because uniform
+    strain opens them by less than the precision of positions, and ``factor_if_strained`` is then that of elastic blocks.
+    ``travel``: how far the
     blocks go at the factor ``travels_at`` (None: not followed), and ``sharp_travel``:
     displacement of the farthest if the corner that stops it had a sharp tip (None: no corner does). ``admissible``: largest
     factor with admissible contact forces (`admissible_forces`), if it exceeds the factor by more than one per cent,
@@ -62,6 +64,7 @@ class FactorOfSafety:
     other_factor: float | None = None
     factor_if_parted: float | None = None
     factor_if_rigid: float | None = None
+    factor_if_strained: float | None = None
     travel: Travel | None = None
     sharp_travel: float | None = None
     admissible: float | None = None
@@ -150,6 +153,7 @@ class FactorOfSafety:
             "factor_without_toes" if self.toes_hold else "factor_with_sharp_toes": self.other_factor,
             "factor_if_parted_faces_lose_cohesion": self.factor_if_parted,
             "factor_of_rigid_blocks": self.factor_if_rigid,
+            "factor_of_strained_blocks": self.factor_if_strained,
             "largest_factor_with_admissible_forces": self.admissible,
             "warnings": list(self.warnings),
             "trials": [{name: getattr(t, name) for name in plain} for t in self.trials],

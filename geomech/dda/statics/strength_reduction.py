@@ -31,6 +31,7 @@ from ..results import NotConverged
 from ..system import BlockSystem
 from .admissible_forces import AdmissibleForces, Unsolved
 from .counted_resistance import (
+    as_rigid_blocks,
     bearing_toes,
     hairline_faces,
     parted_faces,
@@ -352,7 +353,10 @@ class _Search:
             rigid = replace(self, materials=[replace(material, rigid=True) for material in self.materials])
             above = found.upper * (1.0 + 2.0 * self.tolerance)
             other = rigid._otherwise(replace(counted, whole_faces=True), found.lower, above)
-            found = found if other is None else with_rigid_blocks(self.blocks, found, loose, other)
+            if other is not None and loose:
+                found = as_rigid_blocks(self.blocks, self.under.loads, found, loose, other)
+            elif other is not None:
+                found = with_rigid_blocks(found, other)
         parted = parted_faces(system, found.state)
         if not parted:
             return found
