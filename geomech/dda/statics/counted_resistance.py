@@ -40,6 +40,8 @@ _AS_RIGID = 1e-2
 _AT_YIELD = 1e-6
 #: Part of the largest displacement allowed from which on it is that which keeps a bolt from its yield force.
 _NEARLY = 0.9
+#: Blocks slide along a face if their relative motion is inclined to it by less than this (sine of 3°).
+_ALONG = 0.05
 #: Relative increase over the pretension from which a bolt without yield force counts as loaded.
 _TAKEN = 1e-3
 
@@ -229,12 +231,20 @@ def with_anchors(blocks: Blocks, loads: Loads, found: FactorOfSafety) -> FactorO
 @dataclass(frozen=True)
 class PartedFace:
     """A face between ``block`` and ``other`` whose cohesion counts although it is open by up to ``gap`` m at one end,
-    over ``length`` m."""
+    over ``length`` m. ``normal``: of the edge of ``other``."""
 
     block: int
     other: int
     gap: float
     length: float
+    normal: tuple[float, float]
+
+    def slides(self, failed: Trial | None) -> bool:
+        """Whether its blocks slide along it in the trial ``failed``, rather than part."""
+        if failed is None:
+            return False
+        way = failed.displacement[self.block] - failed.displacement[self.other]
+        return abs(float(way @ self.normal)) <= _ALONG * float(np.hypot(*way))
 
 
 def parted_faces(system: BlockSystem, state: State) -> tuple[PartedFace, ...]:
@@ -266,7 +276,7 @@ def _faces(near: ContactSet, whole: WholeFaces, contacts: list[np.ndarray]) -> t
     out = [
         PartedFace(
             int(near.block[own[0]]), int(near.other[own[0]]), float(near.gap_before[own].max()),
-            float(whole.length[own].sum()),
+            float(whole.length[own].sum()), tuple(near.geometry[own[0], 1:3].tolist()),
         )
         for own in contacts
     ]  # fmt: skip

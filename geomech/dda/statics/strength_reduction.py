@@ -353,7 +353,7 @@ class _Search:
             rigid = replace(self, materials=[replace(material, rigid=True) for material in self.materials])
             above = found.upper * (1.0 + 2.0 * self.tolerance)
             other = rigid._otherwise(replace(counted, whole_faces=True), found.lower, above)
-            if other is not None and loose:
+            if other is not None and any(face.slides(other.failed) for face in loose):
                 found = as_rigid_blocks(self.blocks, self.under.loads, found, loose, other)
             elif other is not None:
                 found = with_rigid_blocks(found, other)
