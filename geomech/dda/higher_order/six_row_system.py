@@ -366,7 +366,7 @@ def differing(blocks, n, laws, before):
     return out
 
 
-@_jit
+@kept(fastmath={"contract"}, error_model="numpy", nogil=True, **UNCOUNTED)
 def take_change(rest, blocks, unknowns, vectors, motion, before, laws):
     """Subtract from ``rest`` (6 n,) the change of the product of the matrix with the unknowns that give contacts this
     ``motion`` (n_contacts, 2), where their laws are no longer those ``before``; arguments as in `moved` and `fill`."""
