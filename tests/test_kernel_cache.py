@@ -271,6 +271,7 @@ def test_a_function_without_reference_counting_returns_no_array(tmp_path):
     ]
 
 
+@pytest.mark.slow
 def test_the_level_of_optimisation_before_linking_changes_no_bit(tmp_path):
     """A part of products, quotients, sums and elementary functions, and a kernel that calls it: as compiled here, and
     with LLVM's passes before linking as Numba makes them."""

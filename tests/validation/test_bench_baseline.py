@@ -44,7 +44,7 @@ def errors_of(measured):
         ("dda", errors_of(block_cost.errors)),
         ("ddm", errors_of(work_precision.errors)),
         ("schemes", errors_of(block_schemes.errors)),
-        ("stability", errors_of(lambda: stability.quick_shares(MAPS))),
+        pytest.param("stability", errors_of(lambda: stability.quick_shares(MAPS)), marks=pytest.mark.slow),
         pytest.param("steps", lambda: load_steps.measure(quick=True), marks=pytest.mark.slow),
         pytest.param("stability", lambda: stability.measure(quick=True), marks=pytest.mark.slow),
     ],

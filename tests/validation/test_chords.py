@@ -92,7 +92,7 @@ def test_what_is_no_curve():
     assert (chord_errors(solution) == 0).all() and factors(solution).shape == (2, 2)
 
 
-@pytest.mark.parametrize(("n", "closed"), [(10, False), (10, True), (40, False)])
+@pytest.mark.parametrize(("n", "closed"), [(10, False), pytest.param(10, True, marks=pytest.mark.slow), (40, False)])
 def test_curved_cracks_drawn_as_chords_say_how_far_k_is_off(n, closed, caplog):
     """A quarter circle of ``n`` chords against one of 320: the last chord deviates by 45°/n from it. The estimate is
     0.9 to 1.4 times the error, which was reported as 1e-5 to 3e-3 of itself."""

@@ -224,7 +224,7 @@ def test_a_corner_lifts_at_g_tan_alpha(verified, slenderness_deg):
     assert low == pytest.approx(exact.uplift_acceleration(alpha), abs=4e-4 * GRAVITY)
 
 
-@pytest.mark.parametrize("duration", [0.25, 0.5])
+@pytest.mark.parametrize("duration", [pytest.param(0.25, marks=pytest.mark.slow), 0.5])
 def test_a_pulse_overturns_as_housner_says(verified, duration):
     """A constant base acceleration that lasts for ``duration``: the least that overturns."""
     alpha, radius = np.radians(12), 1.0

@@ -54,7 +54,9 @@ def factors(degrees, ratio, stress, **settings):
     return np.column_stack([tips["k_i"], tips["k_ii"]])
 
 
-@pytest.mark.parametrize("ratio", [pytest.param(1.0, marks=pytest.mark.slow), 0.1, 0.01])
+@pytest.mark.parametrize(
+    "ratio", [pytest.param(1.0, marks=pytest.mark.slow), pytest.param(0.1, marks=pytest.mark.slow), 0.01]
+)
 def test_kinks_are_graded_for_one_error_whatever_their_turn(verified, ratio):
     """Default mesh against distributed dislocations: 5e-4 is what it is graded for, and two layers more quarter that,
     but for the short arm that is as long as an element of the long one. (Two layers for all turns: 3e-3 at 60°.)"""

@@ -381,7 +381,7 @@ def test_what_holds_blocks_that_no_strength_moves_is_named_and_blocks_that_none_
                 dda.factor_of_safety(blocks, [ROCK], [JointLaw("joint", 0.5)], WEIGHT)
 
 
-@pytest.mark.parametrize("mirror", [False, True])
+@pytest.mark.parametrize("mirror", [False, pytest.param(True, marks=pytest.mark.slow)])
 def test_a_toppling_row_does_not_remember_the_friction_that_it_began_with(verified, mirror):
     slope, heights = math.radians(20), (0.8, 2.0, 3.5, 4.2, 4.0, 3.0)
     n = len(heights)

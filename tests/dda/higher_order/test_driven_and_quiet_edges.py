@@ -62,7 +62,7 @@ def passing(system: dda.BlockSystem, quiet: bool = True) -> tuple[np.ndarray, np
     return np.array(times), np.array(speeds), budget
 
 
-@pytest.mark.parametrize(("cells", "order"), [(20, 2), (12, 3)])
+@pytest.mark.parametrize(("cells", "order"), [pytest.param(20, 2, marks=pytest.mark.slow), (12, 3)])
 def test_a_pulse_enters_and_leaves_a_bar_of_cells(cells, order):
     """What comes back to the middle is below 1 %; a free end sends all of it back."""
     times, speeds, budget = passing(bar(cells, order))

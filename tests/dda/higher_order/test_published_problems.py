@@ -270,7 +270,9 @@ def tunnel(friction: float, angle_deg: float, from_wall: bool = False, order: in
     return float(np.sqrt((error**2).mean())) / (3 * ACROSS - ALONG), np.concatenate(slid)
 
 
-@pytest.mark.parametrize("from_wall", [pytest.param(False, marks=pytest.mark.slow), True])
+@pytest.mark.parametrize(
+    "from_wall", [pytest.param(False, marks=pytest.mark.slow), pytest.param(True, marks=pytest.mark.slow)]
+)
 def test_a_joint_along_a_principal_stress_changes_nothing_about_a_tunnel(from_wall):
     """Through the middle of the tunnel a plane of weakness along a principal stress bears no shear: Kirsch's stress, even
     without friction (Brady & Brown 2004, Rock Mechanics for Underground Mining, sec. 7.5)."""

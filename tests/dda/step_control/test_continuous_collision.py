@@ -112,7 +112,7 @@ def test_a_square_lands_on_a_thin_wall(wall, ratio):
 
 
 @pytest.mark.parametrize("ratio", [*(pytest.param(ratio, marks=pytest.mark.slow) for ratio in (1e-3, 1e-2)), 1e-1])
-@pytest.mark.parametrize("rigid", [False, True])
+@pytest.mark.parametrize("rigid", [pytest.param(False, marks=pytest.mark.slow), True])
 def test_a_ring_holds_what_flies_in_it(rigid, ratio):
     """Walls of 1 mm to 10 cm at 30 m/s: below 1, nothing is deeper than half a wall, out, or driven by overlaps."""
     for wall in (1e-3, 1e-2, 1e-1):

@@ -116,6 +116,7 @@ def test_a_pressed_hole_is_fractured_across_the_least_stress():
     assert np.abs(along[:, 1]).max() < 1e-9
 
 
+@pytest.mark.slow
 def test_a_pressed_block_fails_along_coulomb_planes():
     """Uniaxial compression at 2c cos φ/(1 − sin φ): planes at 45° − φ/2 to the load."""
     strength = 2 * ROCK.cohesion * math.cos(ROCK.friction_angle) / (1 - math.sin(ROCK.friction_angle))

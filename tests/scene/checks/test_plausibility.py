@@ -248,7 +248,14 @@ def test_the_largest_load_of_a_history_counts(scene_file):
     assert "by 12 %" in warning.message
 
 
-@pytest.mark.parametrize("name", [p.name for p in sorted(PIPELINES.iterdir()) if (p / "scene.toml").is_file()])
+@pytest.mark.parametrize(
+    "name",
+    [
+        pytest.param(p.name, marks=pytest.mark.slow) if p.name in ("two_cracks", "brazilian_disc") else p.name
+        for p in sorted(PIPELINES.iterdir())
+        if (p / "scene.toml").is_file()
+    ],
+)
 def test_pipelines_have_nothing_to_be_warned_of(name):
     first = load_scene(PIPELINES / name)
     for variant in (None, *first.variants):
