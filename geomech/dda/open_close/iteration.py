@@ -26,7 +26,7 @@ from .equations import Answer, Equations, States, Unsettled
 from .interior_point.central_path import SLIPPED, CentralPath
 from .operator_splitting import can_split, split
 from .settled_states import Settled
-from .static_splitting import converged, converges
+from .static_splitting import can_split_statics, split_statics
 
 log = logging.getLogger(__name__)
 
@@ -256,9 +256,9 @@ class _Search:
         """The result of operator splitting continued until forces balance; None if it does not apply. Raises
         `Unsettled`."""
         equations, bonded = self.equations, self._bonds_on_path()
-        if self.effort.within_patch or not converges(equations, bonded, self.solver):
+        if self.effort.within_patch or not can_split_statics(equations, bonded, self.solver):
             return None
-        solved = converged(equations, bonded, self.solver)
+        solved = split_statics(equations, bonded, self.solver)
         log.debug("operator splitting: %d iterations", solved.iterations)
         self.spent += solved.spent
         self.states = States(solved.state, solved.direction, self._bonds_after_path(solved.state, bonded))

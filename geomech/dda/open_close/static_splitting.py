@@ -99,7 +99,7 @@ def is_straight(law: JointLaw) -> bool:
     )
 
 
-def converges(equations: Equations, bonded: np.ndarray, solver: ContactSolver) -> bool:
+def can_split_statics(equations: Equations, bonded: np.ndarray, solver: ContactSolver) -> bool:
     """Whether a step is to be solved in this way, and can be: a static step with a limit of motion (`Equations.reach`) of many
     blocks of first order, straight laws without dilation, and no intact bonds."""
     pattern = equations.pattern
@@ -114,7 +114,7 @@ def converges(equations: Equations, bonded: np.ndarray, solver: ContactSolver) -
     )
 
 
-def converged(equations: Equations, bonded: np.ndarray, solver: ContactSolver) -> Converged:
+def split_statics(equations: Equations, bonded: np.ndarray, solver: ContactSolver) -> Converged:
     """The solution of a static step, from the motion of an earlier attempt if there is one. Raises `Unsettled`, and
     `KeepsMoving` if blocks move beyond ``equations.reach``."""
     try:
@@ -176,7 +176,7 @@ class _Splitting:
         springs = ContactStiffness(self._rho[0], self._rho[1], none, none)
         assembly.assemble(pattern, data, equations.matrix, self._contacts, springs, sides=equations.sides)
         pattern.add_links(data)
-        assert pattern.solver is not None  # `converges`
+        assert pattern.solver is not None  # `can_split_statics`
         self._correction = pattern.solver.corrections(data)
 
     def _share(self, forces: np.ndarray) -> np.ndarray:
@@ -287,7 +287,7 @@ class _Splitting:
         equations, order = self._equations, self._equations.pattern.order
         motion = np.where(steady[:, None], (period.end - last.end).reshape(-1, 6), 0.0)
         unbalanced = np.where(steady[:, None], period.unbalanced, 0.0)
-        assert equations.reach is not None  # `converges`
+        assert equations.reach is not None  # `can_split_statics`
         reach = np.empty(len(steady))
         reach[order[order >= 0]] = equations.reach[order >= 0]
         if (_farthest(period.end.reshape(-1, 6)) > reach)[steady].any():

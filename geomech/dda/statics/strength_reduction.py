@@ -70,8 +70,6 @@ _CUTS = 2
 #: Relative increase of F between trials of many blocks, each solved in one step: the same step over a larger increase may
 #: find a mechanism where smaller ones find an equilibrium, and the drifts there do not predict the factor.
 _STRIDE = 0.02
-#: Most cuts of the long steps of a trial of many blocks.
-_CUTS_AT_ONCE = 0
 #: Number of blocks that an error names.
 _NAMED = 5
 #: Distance of trials from an expected factor, in tolerances; and relative distance of a second failing trial above a
@@ -215,7 +213,7 @@ class _Search:
         laws = [reduced(law, factor) if law.name in self.chosen else law for law in self.joints]
         system = BlockSystem(self.blocks, self.materials, laws, self.joint_index, self.settings)
         if self.under.at_once(system):
-            settings = replace(self.settings, max_step_cuts=min(self.settings.max_step_cuts, _CUTS_AT_ONCE))
+            settings = replace(self.settings, max_step_cuts=0)
             system = BlockSystem(self.blocks, self.materials, laws, self.joint_index, settings)
         system.finder.toes, system.finder.whole_faces = counted.toes, counted.whole_faces
         return system

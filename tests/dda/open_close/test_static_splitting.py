@@ -11,7 +11,7 @@ import pytest
 from geomech import dda
 from geomech.bench.safety.factor_cost import slope_of
 from geomech.dda import time_step
-from geomech.dda.open_close.static_splitting import KeepsMoving, converged, converges
+from geomech.dda.open_close.static_splitting import KeepsMoving, can_split_statics, split_statics
 from geomech.dda.statics import strength_reduction
 from geomech.model import ContactSolver, State
 
@@ -42,8 +42,10 @@ def equations_of(factor: float, monkeypatch):
 def test_forces_and_motion_are_those_of_newtons_method(monkeypatch):
     equations, settled = equations_of(0.8 * FACTOR, monkeypatch)
     bonded = np.zeros(len(equations.found), np.int64)
-    assert converges(equations, bonded, EVERY) and not converges(replace(equations, reach=None), bonded, EVERY)
-    found = converged(equations, bonded, EVERY)
+    assert can_split_statics(equations, bonded, EVERY) and not can_split_statics(
+        replace(equations, reach=None), bonded, EVERY
+    )
+    found = split_statics(equations, bonded, EVERY)
     # Blocks are balanced to a thousandth of the forces on them: measured 1e-3 of the mean force, and 2e-4 of the largest motion.
     mean = settled.normal_force.mean()
     assert np.sqrt(np.mean((found.forces[:, 0] - settled.normal_force) ** 2)) < 0.01 * mean
@@ -54,7 +56,7 @@ def test_forces_and_motion_are_those_of_newtons_method(monkeypatch):
 def test_blocks_without_support_are_named_with_their_unbalanced_forces(monkeypatch):
     equations, _ = equations_of(1.25 * FACTOR, monkeypatch)
     with pytest.raises(KeepsMoving) as moving:
-        converged(equations, np.zeros(len(equations.found), np.int64), EVERY)
+        split_statics(equations, np.zeros(len(equations.found), np.int64), EVERY)
     # They slide down the beds, to the left or to the right, under a force in the direction of their motion.
     motion, force = moving.value.motion, moving.value.unbalanced
     fastest = motion[np.hypot(motion[:, 0], motion[:, 1]).argmax(), :2]
