@@ -1,7 +1,9 @@
 """Random jointed, cracked slopes from scene file to end, what must hold of any scene held against every cycle."""
 
 import dataclasses
+import sys
 
+import numba
 import numpy as np
 import pytest
 
@@ -125,8 +127,27 @@ def test_only_named_reasons_refuse(monkeypatch):
 
 
 def test_a_slope_that_takes_long_is_cut_off_within_a_cycle():
-    found = watched(15, seconds=0.3)
+    watched(16)  # compiles what the next run calls: no run is broken off in a compilation
+    found = watched(16, seconds=0.3)
     assert found.verdict == LONG and found.seconds < 2.0 and ">" in found.message
+
+
+def test_no_run_is_broken_off_where_its_callers_would_not_hear_of_it():
+    """In a compilation, whose callbacks LLVM does not ask for errors, and where a compiled function makes a named tuple."""
+    seen = {}
+
+    def probe():
+        pass
+
+    @numba.extending.overload(probe)
+    def typed():
+        seen["compiled"] = limited_runs.breakable(sys._getframe())
+        return lambda: 1
+
+    assert numba.njit(lambda: probe())() == 1
+    exec(compile("frame = sys._getframe()", "<string>", "exec"), {"sys": sys}, seen)
+    assert not seen["compiled"] and not limited_runs.breakable(seen["frame"])
+    assert limited_runs.breakable(sys._getframe())
 
 
 def test_the_outcome_counts_every_slope_and_reason():

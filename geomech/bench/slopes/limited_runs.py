@@ -15,10 +15,15 @@ from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from types import FrameType
 
 from .refusals import reason_of
 
 RIGHT, REPORTED, REFUSED, LONG, WRONG = VERDICTS = ("right", "reported", "refused", "long", "wrong")
+
+
+#: Processor seconds after which to look again, where a run could not be broken off.
+_LOOK_AGAIN = 0.02
 
 
 class TimeUp(BaseException):
@@ -81,10 +86,23 @@ def time_up(error: BaseException | None) -> TimeUp | None:
     return error
 
 
+def breakable(frame: FrameType | None) -> bool:
+    """Whether an exception raised at ``frame`` reaches its callers. It does not while Numba compiles a function (LLVM
+    loses what its callbacks raise, and goes on without the function) or wraps its result as a named tuple (its code
+    takes the missing tuple for one: the process crashes). Files of named tuples have no name."""
+    if frame is not None and frame.f_code.co_filename.startswith("<"):
+        return False
+    while frame is not None:
+        if frame.f_globals.get("__name__", "").partition(".")[0] in ("numba", "llvmlite"):
+            return False
+        frame = frame.f_back
+    return True
+
+
 @contextmanager
 def at_most(seconds: float) -> Iterator[None]:
-    """Raises `TimeUp`, with the place, after ``seconds`` processor seconds (inf: never); on systems without timers,
-    never."""
+    """Raises `TimeUp`, with the place, after ``seconds`` processor seconds (inf: never), or later where `breakable` says
+    so; on systems without timers, never."""
     if (
         math.isinf(seconds)
         or not hasattr(signal, "setitimer")
@@ -94,6 +112,9 @@ def at_most(seconds: float) -> Iterator[None]:
         return
 
     def up(_number, frame) -> None:
+        if not breakable(frame):
+            signal.setitimer(signal.ITIMER_PROF, _LOOK_AGAIN)
+            return
         places = [f"{Path(at.filename).stem}.{at.name}" for at in traceback.extract_stack(frame)]
         raise TimeUp(" > ".join(name for name in places if not name.startswith("_"))[-300:])
 
