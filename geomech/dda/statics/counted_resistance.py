@@ -145,8 +145,10 @@ def with_toes(
     blocks: Blocks, found: FactorOfSafety, toes: tuple[Toe, ...], other: FactorOfSafety | None, hold: bool
 ) -> FactorOfSafety:
     """The answer ``found`` with its ``toes``: those that ``hold`` in it, with the ``other`` answer without them; or
-    those that would hold with sharp tips, with the ``other`` answer with sharp tips."""
-    lines = _of_toes(blocks, toes, other, hold)
+    those that would hold with sharp tips, with the ``other`` answer with sharp tips. Nothing is warned of where the
+    factor does not depend on those that hold."""
+    same = hold and other is not None and other.upper >= found.lower
+    lines = () if same else _of_toes(blocks, toes, other, hold)
     factor = None if other is None else other.factor
     return replace(found, toes=toes, toes_hold=hold, other_factor=factor, warnings=(*found.warnings, *lines))
 

@@ -151,3 +151,18 @@ def test_a_rim_that_holds_a_toe_is_named_with_the_factor_without_it(rim):
     assert found.other_factor == pytest.approx(expected, rel=1e-3)
     assert "toe of 'block 1' touches 'block 0' at x = 0" in found.warnings[0]
     assert f"without it the factor is {found.other_factor:.4f}" in found.warnings[0]
+
+
+def test_a_toe_on_which_the_factor_does_not_depend_is_listed_without_a_warning():
+    """The block behind the rim stands; another one slides on a steeper plane."""
+    foot, top = (20.0, 20.0 * math.tan(math.radians(35))), (-50.0, 1.0 + 20.0 * math.tan(math.radians(50)))
+    base = [(-60, -15), (80, -15), (80, foot[1]), foot, (0, 0), (0, 1), (-30, 1), top, (-60, top[1])]
+    held = [(0, 0), foot, (9, 22), (0, 1)]
+    along = np.array([-math.cos(math.radians(50)), math.sin(math.radians(50))])
+    slides = np.array([-30.0, 1.0]) + np.array([[5, 0], [5, 2], [10, 2], [10, 0]]) @ np.array(
+        [along, -along[::-1] * [-1, 1]]
+    )
+    blocks = Blocks.from_polygons([np.array(p, float) for p in (base, held, slides)], fixed=[True, False, False])
+    found = dda.factor_of_safety(blocks, [ROCK], [JointLaw("plane", math.radians(33))], WEIGHT)
+    assert found.factor == pytest.approx(math.tan(math.radians(33)) / math.tan(math.radians(50)), rel=2e-3)
+    assert found.toes and found.toes_hold and not [line for line in found.warnings if "the toe of" in line]
