@@ -12,8 +12,8 @@ def histories(loads: Loads) -> list[History]:
     found = [loads.gravity]
     for group in (loads.edge_tractions, loads.point_loads, loads.block_motions, loads.point_motions):
         found += [each.history for each in group]
-    if loads.water is not None and loads.water.level is not None:
-        found.append(loads.water.level)
+    if loads.water is not None:
+        found += [history for history in (loads.water.level, loads.water.share) if history is not None]
     if loads.base is not None:
         found.append(loads.base.acceleration)
     return found

@@ -8,6 +8,7 @@ import pytest
 from geomech import dda
 from geomech.bench.cost import block_scenes
 from geomech.bench.cost.block_scenes import JOINT, ROCK, WEIGHT
+from geomech.dda.kinematics.roundoff import undecided_gaps
 from geomech.dda.linear_solver import assembly
 from geomech.model import SLIP, Blocks, DdaSettings, History, JointLaw, Loads, Material, State
 
@@ -90,3 +91,13 @@ def test_a_pebble_far_from_the_origin_slides_and_is_told_of_its_rounding(caplog)
     # A few of the block's own shortenings, ρ g h²/E = 2.6e-12 m, beside 3.3 mm.
     assert abs(slid - exact) < 1e-6 * exact
     assert [r.levelname for r in caplog.records if "put the origin near" in r.message] == ["WARNING"]
+
+
+def test_round_off_that_weighs_more_than_a_sliver_does_not_let_its_contacts_pull():
+    """A block of 20 t and a sliver of 9 kg on springs of 1.5e12 N/m²; round-off of 6e-15 m makes 0.009 N."""
+    rounding, loads = 6e-15, np.zeros((2, 6))
+    loads[:, 1] = -2e5, -90.0
+    pair = np.array([0, 1]), np.array([2, 0])
+    gaps = undecided_gaps(rounding, loads, np.array([0, 1, -1]), *pair, np.full(2, 1.5e12))
+    assert gaps[0] == 4.0 * rounding
+    assert gaps[1] * 1.5e12 == pytest.approx(1e-6 * 90.0)

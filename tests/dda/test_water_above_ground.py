@@ -132,3 +132,19 @@ def test_a_scene_says_where_water_is_ponded_and_follows_the_ground_where_asked(t
     assert write_block_system(scene, tmp_path / "build")["ponded_water"] is None
     water = scene.problem().loads.water
     assert np.interp([5, 38, 44, 60], *water.line_at(1.0)) == pytest.approx([22, 22, 18, 10])
+
+
+def test_water_becomes_heavier_with_growing_gravity(tmp_path):
+    """γw = ρw g, so that buoyancy is the same part of the weight at any time (uplift of the wedge alone, without levels)."""
+    path = tmp_path / "slope.toml"
+    path.write_text(SCENE.replace("[run]", "[run]\nstop_at = []"))
+    full = load_scene(path).problem()
+    ramped = load_scene(path, overrides=["loads.gravity_ramp_s=4"]).problem()
+    assert full.loads.water.unit_weight_at(0.0) == full.loads.water.unit_weight_at(9.0) == GAMMA
+    assert [ramped.loads.water.unit_weight_at(time) for time in (0.0, 1.0, 4.0, 9.0)] == pytest.approx(
+        [0.0, GAMMA / 4, GAMMA, GAMMA]
+    )
+    whole, part = (force(problem.blocks, problem.loads.water, 1.0) for problem in (full, ramped))
+    assert part == pytest.approx(whole / 4, rel=1e-12) and whole[1] > 1e5
+    with pytest.raises(ValueError, match="the share of the weight of water"):
+        WaterTable(np.array([[0.0, 10.0]]), share=History.constant([0.5, 0.5]))

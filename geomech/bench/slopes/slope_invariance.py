@@ -319,7 +319,8 @@ def _until(problem: Problem, end: float) -> Problem:
 
 def _difference(base: _Run, run: _Run, by: Isometry) -> float | None:
     """The largest of: difference of a block's displacement, beyond that of the vertices, over the largest displacement,
-    of its position over the extent, or of an energy over the largest energy; None if the blocks are not the same."""
+    of its position over the extent, or of an energy, beyond the work of all weight over the noise, over the largest energy;
+    None if the blocks are not the same."""
     from scipy.spatial import cKDTree
 
     one, other = base.at, run.at
@@ -331,7 +332,8 @@ def _difference(base: _Run, run: _Run, by: Isometry) -> float | None:
         return None
     back = other.displacement[at] @ by.matrix
     away = max(0.0, np.hypot(*(back - one.displacement).T).max() - ABOVE_NOISE * NOISE * extent)
-    off = away, np.abs(run.energies - base.energies).max()
+    lifted = one.weight() * NOISE * extent
+    off = away, max(0.0, np.abs(run.energies - base.energies).max() - lifted)
     size = np.hypot(*one.displacement.T).max(), np.abs(base.energies).max()
     shares = [float(each / of) if of > 0 else 0.0 for each, of in zip(off, size)]
     return max(*shares, float(distance.max()) / extent)

@@ -14,8 +14,9 @@ log = logging.getLogger(__name__)
 _ROUNDING = 5e-16
 #: In dynamic steps, gaps below this many times the round-off do not decide contact states, where their forces are below
 #: that part of the loads nearby. (In walls and slopes of 1 000 to 40 000 blocks at rest, one step in one to three has a
-#: contact that exceeds the round-off, by 1.3 times it at most, and costs one more solution.)
-_WANDERS, _NOTHING = 4.0, 1e-3
+#: contact that exceeds the round-off, by 1.3 times it at most, and costs one more solution.) Of a sliver the force of the
+#: round-off alone may be more: a contact that is let pull by it moves the sliver by that part of its free fall.
+_WANDERS, _NOTHING = 4.0, 1e-6
 #: Warn of a block whose contact forces from round-off exceed this part of its weight.
 _NOTICEABLE = 1e-2
 
@@ -30,12 +31,13 @@ def undecided_gaps(
 ) -> np.ndarray:
     """(n,) gaps that do not decide contact states in dynamic steps, m.
 
-    The ``rounding`` (m), or a multiple of it where its force is negligible compared with the loads of the blocks. Contacts
-    between ``block`` and ``other`` (n,) have springs ``normal`` (n,) N/m²; ``right`` (n_free, 6) are the blocks' loads,
-    N/m, in their ``order`` (n_blocks,). A multiple everywhere would make a pebble far from the origin stick."""
+    A multiple of the ``rounding`` (m), or the gap whose force is negligible compared with the loads of the blocks, if that
+    is less: within a step, starting gaps are given numbers, whose round-off decides nothing by itself. Contacts between
+    ``block`` and ``other`` (n,) have springs ``normal`` (n,) N/m²; ``right`` (n_free, 6) are the blocks' loads, N/m, in
+    their ``order`` (n_blocks,). The round-off alone would make a pebble far from the origin stick."""
     load = np.append(np.abs(right).max(axis=1, initial=0.0), np.inf)
     least = np.minimum(load[order[block]], load[order[other]])
-    return np.clip(_NOTHING * least / np.maximum(normal, 1e-300), rounding, _WANDERS * rounding)
+    return np.minimum(_NOTHING * least / np.maximum(normal, 1e-300), _WANDERS * rounding)
 
 
 def warn_of_roundoff(

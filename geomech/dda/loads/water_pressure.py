@@ -92,7 +92,8 @@ def pressed_edges(
     with np.errstate(divide="ignore", invalid="ignore"):
         surface = s0 + d0 / (d0 - d1) * (s1 - s0)
     s0, s1 = np.where(d0 < 0, surface, s0), np.where(d1 < 0, surface, s1)
-    p0, p1 = water.unit_weight * np.maximum(d0, 0.0), water.unit_weight * np.maximum(d1, 0.0)
+    unit_weight = water.unit_weight_at(time)
+    p0, p1 = unit_weight * np.maximum(d0, 0.0), unit_weight * np.maximum(d1, 0.0)
 
     rows = np.zeros(len(row), EDGE_FORCE)
     rows["edge"] = edges[row]

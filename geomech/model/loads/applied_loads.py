@@ -90,6 +90,7 @@ class WaterTable:
     dry          names of edges that no water reaches (lined or drained)
     ground       (n, 2) m, the rock's surface from left to right: the table does not rise above it. None: water above
                  the ground is ponded and presses on it
+    share        history of the share of γw that acts: where gravity grows, water becomes heavier with it. None: 1
 
     The pressure acts on both faces of a joint: contact forces are effective forces, and a submerged block is buoyant.
     Blocks have their saturated density; their stress is the total stress.
@@ -100,6 +101,7 @@ class WaterTable:
     level: History | None = None
     dry: tuple[str, ...] = ()
     ground: np.ndarray | None = None
+    share: History | None = None
 
     def __post_init__(self) -> None:
         points = np.asarray(self.points, dtype=float)
@@ -114,6 +116,12 @@ class WaterTable:
             raise ValueError(f"the unit weight of water must be positive, got {self.unit_weight!r} N/m³")
         if self.level is not None:
             _refuse_columns("the level of a water table", self.level, 1)
+        if self.share is not None:
+            _refuse_columns("the share of the weight of water", self.share, 1)
+
+    def unit_weight_at(self, time: float) -> float:
+        """N/m³: the part of γw that acts at ``time`` s."""
+        return self.unit_weight * (1.0 if self.share is None else float(self.share.at(time)[0]))
 
     def line_at(self, time: float) -> tuple[np.ndarray, np.ndarray]:
         """Points (x ascending, y) of the table at ``time`` s, m."""

@@ -143,7 +143,10 @@ def _water(tables: SceneTables, blocks: Blocks) -> WaterTable | None:
         return None
     level = None if w.levels_m is None else History.table(given(w.level_times_s), w.levels_m)
     ground = ground_of(blocks) if w.follows_ground else None
-    return WaterTable(np.array(w.points), w.unit_weight_n_per_m3, level, w.dry_edges, ground)
+    # γw = ρw g: before rock has its weight, it would float in water that has.
+    ramp = tables.loads.gravity_ramp_s
+    share = History(np.array([0.0, ramp]), np.array([[0.0], [1.0]])) if ramp > 0 else None
+    return WaterTable(np.array(w.points), w.unit_weight_n_per_m3, level, w.dry_edges, ground, share)
 
 
 def deepest_pond(tables: SceneTables, blocks: Blocks) -> tuple[Pond, float] | None:

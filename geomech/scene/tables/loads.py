@@ -404,7 +404,9 @@ class LoadsTable(Table):
     """[loads]: all loads on the rock."""
 
     gravity_m_s2: Pair = Field((0.0, 0.0), description="acceleration of gravity [x, y], m/s²")
-    gravity_ramp_s: NotNegative = Field(0.0, description="time over which gravity grows linearly to its value, s")
+    gravity_ramp_s: NotNegative = Field(
+        0.0, description="time over which gravity, and with it the weight of water, grows linearly, s"
+    )
     leading_edge: str | None = Field(
         None,
         description="edges whose traction is the leading load of a run, positive in compression; for a zone with "
