@@ -1,9 +1,18 @@
 """Equilibrium of blocks under in-situ stress: stress and contact forces that are consistent before the run starts.
 
-A first-order block carries the mean of a linear stress field, its value at the centroid. The contact forces are found
-by relaxation: blocks with the stress, and contacts without force, relax; the contacts close by the penalty penetration,
-and the blocks lose the corresponding stress. The lost stress is added again and the blocks relax again, by a smaller
-amount, and so on. The positions reached become the reference configuration, from which displacements count.
+A first-order block carries the mean of a linear stress field, its value at the centroid. Contacts start with the tractions
+of the field on their faces, linear along each, as forces at its ends,
+
+    F₀ = ℓ (2 t₀ + t₁)/6,  F₁ = ℓ (t₀ + 2 t₁)/6,  t = −σ·n,
+
+which have the same resultant and moment: where the field balances the weight, so do these forces. Springs are closed by
+these as far as the drawing goes (`inherited_contacts`). Then the blocks relax: at free faces, and where joints open or slide
+because the field exceeds their strength. (If contacts started without force, joints would slide that bear the stress, while
+their normal forces are small, and rounding would decide which.) The positions reached become the reference configuration,
+from which displacements count.
+
+With blocks of higher order, contacts start without force: they close by the penalty penetration, and the blocks lose the
+corresponding stress. The lost stress is added again and the blocks relax again, by a smaller amount, and so on.
 
 A block of higher order also bears what the field has beyond its mean, as an initial stress: its deflection is counted
 from one at which it bears the mean alone (`State.deflection_origin`).
@@ -16,15 +25,18 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ...conventions import normal_of, traction
 from ...model import SLIP, Blocks, InSituStress, Loads, State
+from ..contact_detection.inherited_contacts import InheritedContacts
 from ..higher_order.deflected_blocks import DeflectedBlocks
+from ..joint_laws.bonds import on_lines
 from ..system import BlockSystem
 from .pseudo_time_equilibrium import Equilibrium, equilibrium
 
 log = logging.getLogger(__name__)
 
-#: Largest number of corrections of the stress. Each reduces the error by the ratio of contact to total compliance, a
-#: fortieth or less with penalty springs.
+#: Largest number of corrections of the stress of blocks of higher order. Each reduces the error by the ratio of contact to
+#: total compliance, a fortieth or less with penalty springs.
 _PASSES = 12
 #: Energy that sliding joints dissipate until the stress is borne, relative to the elastic energy of the blocks, and deviation
 #: from the given stress, above which a warning is given: energies are then uncertain by more than a thousandth.
@@ -64,10 +76,10 @@ def in_situ_state(
 ) -> InSituState:
     """The blocks of ``system`` at rest under ``stress`` and the ``loads`` of time 0 (gravity, tractions, water …).
 
-    ``tolerance`` of the unbalanced force as in `equilibrium`; the stress is corrected until its relative change is
-    below ``stress_tolerance``. If ``stress`` is inconsistent with weight and supports, the blocks end with a consistent
-    stress, and ``deviation`` gives the difference; consistent components (such as horizontal stress between walls) are
-    kept. Raises `NoInSituEquilibrium` when the blocks do not come to rest, and ValueError for blocks whose order is
+    ``tolerance`` of the unbalanced force as in `equilibrium`; the stress of blocks of higher order is corrected until its
+    relative change is below ``stress_tolerance``. If ``stress`` is inconsistent with weight and supports, the blocks end
+    with a consistent stress, and ``deviation`` gives the difference; consistent components (such as horizontal stress
+    between walls) are kept. Raises `NoInSituEquilibrium` when the blocks do not come to rest, and ValueError for blocks whose order is
     found during the run.
     """
     blocks = system.blocks
@@ -80,20 +92,11 @@ def in_situ_state(
     size = float(np.abs(given).max(initial=0.0))
     if bent is not None:
         size = max(size, float(np.abs(bent.given).max(initial=0.0)))
-    state, before = State.at_rest(blocks), None
-    for _ in range(_PASSES):
-        start = replace(state, stress=given.copy())
-        if bent is not None:
-            start = bent.stressed(start)
-        found: Equilibrium = equilibrium(system, start, loads, tolerance=tolerance)
-        if not found.converged:
-            raise NoInSituEquilibrium(f"the blocks do not come to rest under the in-situ stress: {found.reason}", found)
-        state = found.state
-        reached = state.stress if bent is None else np.concatenate([state.stress, bent.beyond_mean(state)])
-        if before is None or np.abs(reached - before).max() > stress_tolerance * max(size, 1e-300):
-            before = reached
-        else:
-            break
+    state = replace(State.at_rest(blocks), stress=given.copy())
+    if bent is None:
+        state = _at_rest(system, _pressed(system, state, stress, loads), loads, tolerance)
+    else:
+        state = bent.at_rest(system, state, loads, tolerance, stress_tolerance * max(size, 1e-300))
     moved = float(np.hypot(*(state.vertices - blocks.vertices).T).max())
     off = float(np.abs(state.stress - given)[~blocks.fixed].max(initial=0.0))
     if bent is not None:
@@ -106,6 +109,43 @@ def in_situ_state(
     if bent is not None:
         rest = bent.on(settled, rest)
     return InSituState(settled, rest, moved, off)
+
+
+def _at_rest(system: BlockSystem, state: State, loads: Loads, tolerance: float) -> State:
+    """Equilibrium from ``state``. Raises `NoInSituEquilibrium`."""
+    found: Equilibrium = equilibrium(system, state, loads, tolerance=tolerance)
+    if not found.converged:
+        raise NoInSituEquilibrium(f"the blocks do not come to rest under the in-situ stress: {found.reason}", found)
+    return found.state
+
+
+def _pressed(system: BlockSystem, state: State, stress: InSituStress, loads: Loads) -> State:
+    """``state`` of blocks as drawn, with contacts that carry the tractions of ``stress`` on their faces, less the pressure of
+    water in them."""
+    found = system.contacts_near(state)
+    which = np.flatnonzero(found.geometry[:, 4] > 0)
+    if not len(which):
+        return state
+    which, start, _ = on_lines(found.block, found.other, found.geometry, which)
+    geometry, size = found.geometry[which], np.diff(start)
+    normal, length, point = geometry[:, 1:3], geometry[:, 4], geometry[:, 5:7]
+    # The force at an end is half the length times the traction at a third of the face from it: (2 t₀ + t₁)/3.
+    first, last = np.repeat(start[:-1], size), np.repeat(start[1:] - 1, size)
+    far = np.where(np.arange(len(which)) == first, last, first)
+    share = np.where(np.repeat(size == 2, size), 1.0 / 3.0, 0.0)
+    at = point + share[:, None] * (point[far] - point)
+    force = -length[:, None] * traction(stress.at(at), normal)
+    pushes, shear = (np.einsum("na,na->n", force, axis) for axis in (normal, normal_of(normal)))
+    if loads.water is not None:
+        names = np.array(system.blocks.edge_names, dtype=object)[system.blocks.edge_name[found.edge[which]]]
+        pushes -= np.where(np.isin(names, loads.water.dry), 0.0, length * loads.water.pressure_at(at, state.time))
+    bonded = found.bonded[which] > 0
+    most = np.where(bonded, np.inf, found.springs.peak[which] * np.maximum(pushes, 0.0) + found.springs.hold[which])
+    forces = InheritedContacts(
+        which, np.where(bonded, pushes, np.maximum(pushes, 0.0)), np.clip(shear, -most, most), found.gap[which],
+        np.zeros(len(which)),
+    )  # fmt: skip
+    return system.with_inherited_contacts(state, found, forces)
 
 
 def _warn_of_sliding(system: BlockSystem, state: State, off: float) -> None:
@@ -146,6 +186,17 @@ class _Bent:
         known = self._blocks.at_rest() if state.deflection is None else state.deflection
         origin = np.stack([known[:, 0] - self._under, np.zeros(len(known))], axis=1)
         return replace(state, rotation=np.zeros_like(state.rotation), deflection=known, deflection_origin=origin)
+
+    def at_rest(self, system: BlockSystem, state: State, loads: Loads, tolerance: float, change: float) -> State:
+        """Equilibrium under the stress of ``state``, which is corrected until it changes by less than ``change``, Pa."""
+        given, before = state.stress, None
+        for _ in range(_PASSES):
+            state = _at_rest(system, self.stressed(replace(state, stress=given.copy())), loads, tolerance)
+            reached = np.concatenate([state.stress, self.beyond_mean(state)])
+            if before is not None and np.abs(reached - before).max() <= change:
+                break
+            before = reached
+        return state
 
     def beyond_mean(self, state: State) -> np.ndarray:
         """(n, 3) Pa at the corners, beyond the mean stress of each block."""

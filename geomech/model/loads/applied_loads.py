@@ -129,6 +129,10 @@ class WaterTable:
         line = x, y + (0.0 if self.level is None else float(self.level.at(time)[0]))
         return line if self.ground is None else below_ground(line, self._lowest)
 
+    def pressure_at(self, points: np.ndarray, time: float) -> np.ndarray:
+        """(n,) Pa: pressure of the water at ``points`` (n, 2) m at ``time`` s; 0 above the table."""
+        return self.unit_weight_at(time) * np.maximum(np.interp(points[:, 0], *self.line_at(time)) - points[:, 1], 0.0)
+
     @cached_property
     def _lowest(self) -> tuple[np.ndarray, np.ndarray]:
         return lowest_over(np.asarray(self.ground, dtype=float))

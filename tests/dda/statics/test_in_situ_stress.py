@@ -19,6 +19,7 @@ from geomech.model import (
     Loads,
     Material,
     State,
+    WaterTable,
 )
 
 ROCK = Material("rock", 10e9, 0.25, density=2600.0)
@@ -58,6 +59,18 @@ def test_blocks_with_geostatic_stress_do_not_move_in_the_first_step(friction, k0
         state = result.state
         assert result.statistics["open_close_iterations"] <= 3
     assert np.abs(state.vertices - rest.blocks.vertices).max() < 2e-5 * settling
+
+
+def test_water_in_the_joints_takes_its_part_of_the_stress():
+    """Total stress under a table two thirds up the ground: contacts carry the effective one, and nothing moves."""
+    blocks, water = ground(), WaterTable(np.array([[0.0, 3.2]]))
+    loads = Loads(gravity=GRAVITY, water=water)
+    rest = dda.in_situ_state(system_of(blocks, 0.6), InSituStress.geostatic(5.0, 2600 * 9.81, 0.8), loads)
+    assert rest.deviation < 1e-3 and rest.settled < 1e-3 * 5.0 * 2600 * 9.81 / ROCK.plane_modulus * 5.0
+    rows = rest.state.contacts
+    floor = (rows["other"] == 0) & (rows["block"] > 2)
+    effective = 6.0 * (5.0 * 2600 * 9.81 - 3.2 * 9810.0)
+    assert rows["normal_force"][floor].sum() == pytest.approx(effective, rel=1e-3)
 
 
 @pytest.mark.parametrize(("k0", "slides"), [(0.2, True), (0.9, False)])
