@@ -66,7 +66,8 @@ class UnderWay:
     """A load step in progress, between two of its passes.
 
     ``events`` of the last pass; ``pending`` events, from applying its growth; ``next_pass`` number of the next pass. In
-    dynamics ``until`` is the time (s) at which the last pass ended, ``whole`` the length of the step (s)."""
+    dynamics ``until`` is the time (s) at which the last pass ended, ``whole`` the length of the step (s), ``like`` the
+    step that blocks made in it."""
 
     dt: float
     load_time: float | None
@@ -75,6 +76,7 @@ class UnderWay:
     next_pass: int
     until: float | None = None
     whole: float = 0.0
+    like: dda.StepResult | None = None
 
 
 @dataclass
@@ -90,6 +92,7 @@ class _LoadStep:
     growth_pass: int
     most: int
     stops: bool
+    like: dda.StepResult | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -262,7 +265,7 @@ class Coupling:
                 now.take_step(found.result.state, energies.budget)
             step.pending = take_growth(now, grown.growth, found.result.state, found.solutions)
             self.under_way = UnderWay(
-                step.dt, step.load_time, grown.events, step.pending, growth_pass + 1, step.until, step.whole
+                step.dt, step.load_time, grown.events, step.pending, growth_pass + 1, step.until, step.whole, step.like
             )
             self.between()
         raise AssertionError("unreachable: the last pass takes no growth")
@@ -279,7 +282,7 @@ class Coupling:
         most = max(growing.max_passes, MOST_PASSES) if self.static and growing.max_passes else growing.max_passes
         stops = self._stops(begun.events)
         return _LoadStep(
-            begun.dt, begun.load_time, begun.until, begun.whole, begun.pending, begun.next_pass, most, stops
+            begun.dt, begun.load_time, begun.until, begun.whole, begun.pending, begun.next_pass, most, stops, begun.like
         )
 
     def _solved(self, step: _LoadStep) -> Balance | None:
@@ -290,7 +293,11 @@ class Coupling:
                 found = self.events.first_pass(now, self.problem.run.end_time)
                 step.dt = found.result.dt
             else:
-                found = solved_pass(now, step.dt, step.load_time) if step.until is None else self._until(step.until)
+                found = (
+                    solved_pass(now, step.dt, step.load_time)
+                    if step.until is None
+                    else self._until(step.until, step.like)
+                )
         except dda.NotConverged as failure:
             if not (step.stops or self._stops(step.pending)):
                 raise
@@ -307,8 +314,10 @@ class Coupling:
             self.agreement.check([now.blocks.names[b] for b in now.bodies], found.mismatch, result.state.time)
             # All passes of a static step have the same load, also when one of them takes a shorter step.
             step.load_time = result.state.time
-        elif step.until is None:
-            step.until, step.whole = result.state.time, result.dt
+        else:
+            step.like = result
+            if step.until is None:
+                step.until, step.whole = result.state.time, result.dt
         return found
 
     def _grown(self, step: _LoadStep, found: Balance) -> _Grown:
@@ -387,6 +396,8 @@ class Coupling:
         if self.tips is not None:
             self.tips.end(found.tips, now.blocks, step.whole, now.loads, self._left_out(found))
         now.take_step(result.state, energies.budget)
+        for body in now.bodies.values():
+            body.end_step()
         if grown.growth is not None:
             if self.events is not None:
                 self.events.grown()
@@ -415,15 +426,15 @@ class Coupling:
         longest = self._longest(step, tips)
         return bool(np.any((tips["k_eq"] >= self.enough * toughness(self.now, tips)) & (longest > 0)))
 
-    def _until(self, until: float) -> Balance:
-        """A pass of a dynamic step of which an earlier pass ended at the time ``until``, s.
+    def _until(self, until: float, like: dda.StepResult | None) -> Balance:
+        """A pass of a dynamic step of which an earlier pass ended at the time ``until``, s, after the step ``like``.
 
         Its tips have grown over that whole time. Where the blocks now need shorter steps, as many are taken as lead to
         ``until``, and all but the last are accepted."""
         now = self.now
         while True:
-            found = balanced(now, until - now.state.time, None)
-            result = found.result
+            found = balanced(now, until - now.state.time, None, like)
+            result, like = found.result, None
             if until - result.state.time <= 1e-9 * result.dt:
                 return replace(found, result=replace(result, state=replace(result.state, time=until)))
             self.range.check(now.motion(result.state), now.blocks, result.state.time)

@@ -81,23 +81,25 @@ class Balance:
     mismatch: np.ndarray = field(default_factory=lambda: np.zeros(0))
 
 
-def balanced(now: CrackedBlocks, dt: float, load_time: float | None) -> Balance:
+def balanced(now: CrackedBlocks, dt: float, load_time: float | None, like: StepResult | None = None) -> Balance:
     """Iterate DDA step, boundary tractions and DDM solutions of ``now`` until the crack strains agree.
 
     ``dt`` s is the longest step. ``load_time`` s: apply the loads of that time whatever step the blocks take, and make
-    it the new time; None: the loads at the end of the step. Updates ``now.response``, ``loads``, ``solutions`` and
+    it the new time; None: the loads at the end of the step. ``like``: the step from the same state before the cracks grew,
+    whose contact states are the first guess. Updates ``now.response``, ``loads``, ``solutions`` and
     statistics. Raises `dda.NotConverged`, also where blocks and cracks agree at no step length. Repeated with blocks of
     higher order where these are chosen automatically and needed (`order_raising`).
     """
     while True:
         begun = now.response
-        found = _balanced(now, dt, load_time)
+        found = _balanced(now, dt, load_time, like)
         grows = found.tips["k_eq"] >= toughness(now, found.tips)
         if not raises_orders(now, begun, found.tips["block"][grows]):
             return found
+        like = None
 
 
-def _balanced(now: CrackedBlocks, dt: float, load_time: float | None) -> Balance:
+def _balanced(now: CrackedBlocks, dt: float, load_time: float | None, like: StepResult | None) -> Balance:
     """`balanced` with blocks of the present orders."""
     begun, static = now.response, now.system.scheme.static
     memories = now.history, now.by_mean_stress.memory
@@ -106,7 +108,7 @@ def _balanced(now: CrackedBlocks, dt: float, load_time: float | None) -> Balance
     for ways in _AT_REST if static else (_Ways(soft_by_mean_stress=True),) * (1 + HALVINGS):
         now.response = begun
         try:
-            found, differences = _passes(now, dt, load_time, ways)
+            found, differences = _passes(now, dt, load_time, ways, like)
         finally:
             # Cement that has broken in the iteration is lost only once the step is accepted.
             now.history, now.by_mean_stress.memory = memories
@@ -245,9 +247,11 @@ class _OscillatingBlocks:
         return bool(forces or mean)
 
 
-def _passes(now: CrackedBlocks, dt: float, load_time: float | None, ways: _Ways) -> tuple[Balance, np.ndarray]:
-    """The iterations of a step of at most ``dt`` s; returns the result and the remaining relative mismatch of crack
-    strain (n_cracked,)."""
+def _passes(
+    now: CrackedBlocks, dt: float, load_time: float | None, ways: _Ways, like: StepResult | None
+) -> tuple[Balance, np.ndarray]:
+    """The iterations of a step of at most ``dt`` s, with the contact states of ``like`` as first guess; returns the result
+    and the remaining relative mismatch of crack strain (n_cracked,)."""
     static, quasi_newton = now.system.scheme.static, now.quasi_newton
     if static:
         quasi_newton.begin(tuple(now.bodies))
@@ -255,7 +259,7 @@ def _passes(now: CrackedBlocks, dt: float, load_time: float | None, ways: _Ways)
         quasi_newton.forget()  # in motion, contact changes of the last step need not recur
     tolerance = COMPLIANCE_TOLERANCE if static else DYNAMIC_TOLERANCE
     response = _expected(now, now.state.time + dt if load_time is None else load_time) if static else now.response
-    result: StepResult | None = None
+    result: StepResult | None = like
     iterations: float = 0
     oscillating = _OscillatingBlocks(static, dt, ways.cement_breaks)
     left: list[float] = []

@@ -193,7 +193,7 @@ class Body:
         #: Whether it is one of many bodies; number of solutions under uniform stress; its `condensed_contact`, if looked
         #: for.
         self.in_number = previous is not None and previous.in_number
-        self._grown = previous is not None
+        self._grown, self._steps = previous is not None, 0
         self.uniform_solutions = 0
         self._condensed: tuple[UniformContact | None] | None = None
         #: Where faces stand on bases, and how unit tractions move them by the states of the cracks (`rigid_bases`).
@@ -364,18 +364,20 @@ class Body:
             if not g.n:
                 return direct
             # Column-major like the first: subtracting arrays of different order takes several times as long.
+            if len(k) < c.n and len(r) > len(k):
+                # (Of all rows: picking most of G costs more than a product with few columns.)
+                product = cg @ w.of(k).T
+                return direct - (product if len(r) == c.n else product[c.unknowns(r)])
             if len(r) == c.n:
-                return direct - (cg @ w.of(k).T if len(k) < c.n else (w.dense @ cg.dense.T).T)
+                return direct - (w.dense @ cg.dense.T).T
             return direct - ((w @ cg.of(r).T) if len(k) == c.n else w.of(k) @ cg.of(r).T).T
 
         before_growth = None if kept is None else kept.crack_system
         assert not isinstance(before_growth, IterativeCrackSystem)
         known = None if before_growth is None else before_growth.matrix
         self.lean = old is not None and old.lean
-        if self.lean:
-            both.release_columns()
-            if isinstance(before, Condensed):
-                before.release_columns()
+        if self.lean and isinstance(before, Condensed):
+            before.release_columns()
         # Where many faces close, the equations of open ones are hardly asked for.
         alone = self.lean and c.n_unknowns >= WORTHWHILE and not self.rough and bool(self.closing[1].any())
         if known is None or not known.n or c.n_unknowns < SMALLEST_BORDERED or alone:
@@ -384,6 +386,23 @@ class Body:
         else:
             matrix = known.grown(c, c_old, c_seen, schur)
         self.crack_system = CrackSystem(matrix, self.work, before_growth, c_old)
+
+    def end_step(self) -> None:
+        """A load step ends. One of many bodies, none of whose cracks has grown in a whole step, gives up what only growth
+        needs. From then on its contact may be condensed."""
+        self._steps += 1
+        if self._steps == 2 and self.in_number and self._grown:
+            self.stop_growing()
+            self._grown = False
+
+    @property
+    def for_growth(self) -> int:
+        """Bytes that one of many bodies keeps for further growth alone: factors of the boundary, and A_ΓC."""
+        return self.condensation.for_growth if self.in_number and self._grown else 0
+
+    def stop_growing(self) -> None:
+        """Give up what is kept `for_growth`."""
+        self.condensation.release()
 
     def retire(self) -> None:
         """Give up what only further loads need, once a body with grown cracks has taken this one's place."""

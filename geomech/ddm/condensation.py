@@ -88,6 +88,14 @@ class Condensed:
             self.release_columns()
             self.system.release()
 
+    @property
+    def for_growth(self) -> int:
+        """Bytes that `release` gives up."""
+        if not self.system.large:
+            return 0
+        m, n = self.system.elements.n_unknowns, self.faces.n_unknowns
+        return 8 * m * (m * self.system.is_factored + n * (self._columns is not None))
+
     def release_columns(self) -> None:
         """Give up A_ΓC, which takes less time to compute again than factors do."""
         self._columns = None
@@ -118,6 +126,9 @@ class Operators:
 
     def __init__(self, system: BoundarySystem, faces: ElementSet, following: BoundaryResponse, on_cracks: np.ndarray):
         self.system, self.faces, self.on_cracks, self._following = system, faces, on_cracks, following
+
+    #: Bytes that `release` gives up.
+    for_growth = 0
 
     def release(self) -> None:
         """Nothing is large."""

@@ -259,9 +259,11 @@ def _growth(tables: SceneTables, cracks: Cracks) -> GrowthSettings:
     g = tables.growth
     increment = g.increment_m
     if increment is None:
-        # A tenth of the shortest crack resolves the curvature of a wing crack over its first crack length.
+        # A tenth of a crack resolves the curvature of its wing crack over its first crack length. Of many cracks the
+        # median: the shortest of a hundred traces is a remnant of a centimetre, and grows last. (Of two the shorter one.)
         lengths = np.bincount(cracks.crack, cracks.lengths) if cracks.n_segments else np.array([10e-3])
-        increment = 0.1 * float(lengths[lengths > 0].min())
+        lengths = np.sort(lengths[lengths > 0])
+        increment = 0.1 * float(lengths[(len(lengths) - 1) // 2])
         if g.min_increment_m is not None:
             increment = max(increment, g.min_increment_m)
     return GrowthSettings(

@@ -8,9 +8,12 @@ from itertools import islice
 import numpy as np
 import pytest
 
-from geomech.coupling import cycles, parallel_map
+from geomech.bench.cost.block_scenes import cracked_wall
+from geomech.coupling import cycles, load_pass, parallel_map
 from geomech.coupling.load_transfer import elastic_bodies
 from geomech.ddm import Body
+from geomech.ddm.system import boundary_system
+from geomech.ddm.system.boundary_system import BoundarySystem
 from geomech.model import (
     Blocks,
     Cracks,
@@ -115,6 +118,52 @@ def test_the_switch_of_a_scene_changes_nothing_but_the_work(friction):
     assert events == all_events and "split" in events
     for a, b in zip(kept, done):
         assert np.abs(a - b).max() <= 1e-8 * np.abs(b).max()
+
+
+@pytest.mark.parametrize("spare", [0.0, 1e9])
+def test_giving_up_what_growth_needs_changes_nothing(monkeypatch, spare):
+    """Blocks taken for some of many, with sides taken for large: what growth needs of them is kept until a load step without
+    growth, or (``spare`` bytes) not at all."""
+    given = replace(plates(False), growth=GrowthSettings(increment=5e-4))
+    kept, _, events = results(given)
+    monkeypatch.setattr(elastic_bodies, "MANY", 1)
+    monkeypatch.setattr(elastic_bodies, "FOR_GROWTH", spare)
+    monkeypatch.setattr(boundary_system, "KEPT_BESIDE_FACTORS", 10)
+    factored, made = [], BoundarySystem._factored
+    monkeypatch.setattr(BoundarySystem, "_factored", lambda system, matrix: factored.append(1) or made(system, matrix))
+    lean, work, lean_events = results(given)
+    assert lean_events == events
+    # Once for each new boundary, and again with the first grown crack, or with each of six.
+    assert len(factored) == work["boundary_factorisations"] + (1 if spare else 6)
+    for a, b in zip(lean, kept):
+        assert np.abs(a - b).max() <= 1e-8 * np.abs(b).max()
+
+
+def test_passes_of_growth_in_motion_begin_with_the_contacts_of_the_last_one(monkeypatch):
+    """Contact states of a wall, in which cracks grow through several passes of a step, as if each pass found them from
+    those at the beginning of the step, in fewer iterations."""
+    of = cracked_wall(12, 4)
+    given = replace(
+        of,
+        cracks=replace(of.cracks, aperture=np.zeros(of.cracks.n_segments)),
+        run=replace(of.run, end_time=0.02, stop_at=()),
+        materials=(replace(of.materials[0], k_ic=8e3),),
+        growth=replace(of.growth, increment=0.01),
+    )
+    runs = [[*cycles(given)]]
+    with monkeypatch.context() as alone:
+        passes = load_pass._passes
+        alone.setattr(
+            load_pass, "_passes", lambda now, dt, load_time, ways, like: passes(now, dt, load_time, ways, None)
+        )
+        runs.append([*cycles(given)])
+    later = [[cycle for cycle in run if cycle.growth_pass > 0] for run in runs]
+    assert len(later[0]) == len(later[1]) > 2
+    few, many = (sum(cycle.statistics["open_close_iterations"] for cycle in each) for each in later)
+    assert few < 0.7 * many
+    for a, b in zip(*runs):
+        assert a.cracks.nodes == pytest.approx(b.cracks.nodes, rel=0, abs=1e-8)
+        assert a.state.vertices == pytest.approx(b.state.vertices, rel=0, abs=1e-10)
 
 
 def test_the_first_of_several_failures_is_reported():

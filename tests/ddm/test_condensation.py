@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from geomech import ddm
-from geomech.ddm.system.boundary_system import KEPT_BESIDE_FACTORS
+from geomech.ddm import condensation
+from geomech.ddm.system.boundary_system import KEPT_BESIDE_FACTORS, BoundarySystem
 from geomech.model import Cracks, DdmSettings, Material
 
 ROCK = Material("rock", 17e9, 0.21, k_ic=2e6)
@@ -73,3 +74,38 @@ def test_released_bodies_grow_alike():
     assert np.abs(factors(one) - factors(other)).max() < 1e-11 * np.abs(factors(other)).max()
     moved = other.displacement(INSIDE)
     assert np.abs(one.displacement(INSIDE) - moved).max() < 1e-11 * np.abs(moved).max()
+
+
+def grown_by(n: int, aperture: float) -> Cracks:
+    """The crack with ``n`` straight increments."""
+    line = np.array([[-0.3, -0.05], [0.3, 0.1], *[[0.3 + 0.04 * k, 0.1 + 0.02 * k * k / 5] for k in range(1, n + 1)]])
+    known = Cracks.from_polylines([line], aperture=aperture)
+    return Cracks(**{name: getattr(known, name) for name in vars(known) if name != "birth_cycle"}, birth_cycle=np.arange(n + 1))  # fmt: skip
+
+
+@pytest.mark.parametrize("aperture", [np.inf, 0.0])
+def test_growth_of_one_of_many_bodies_costs_what_is_new(monkeypatch, aperture):
+    """Increment by increment, with factors of the boundary from the first one only: K is that of a body made for the grown
+    crack. After a load step without growth what growth needed is given up, and comes again with the next increment."""
+    factored, made = [], BoundarySystem._factored
+    monkeypatch.setattr(BoundarySystem, "_factored", lambda system, matrix: factored.append(1) or made(system, matrix))
+    bodies = [ddm.Body([SQUARE], grown_by(0, aperture), ROCK, FINE)]
+    bodies[0].release()
+    columns = []
+    influence = condensation.influence_on_boundary
+    monkeypatch.setattr(
+        condensation, "influence_on_boundary", lambda system, faces, of: columns.append(len(of)) or influence(system, faces, of)
+    )  # fmt: skip
+    for n in range(1, 6):
+        if n == 5:
+            bodies[-1].end_step()
+            assert bodies[-1].for_growth > 8 * bodies[-1].boundary.n_unknowns ** 2
+            bodies[-1].end_step()
+            assert bodies[-1].for_growth == 0
+        columns.clear(), factored.clear()
+        bodies.append(ddm.Body([SQUARE], grown_by(n, aperture), ROCK, FINE, ddm.Reuse(bodies[-1])))
+        assert len(factored) == (n in (1, 5)) and (sum(columns) < bodies[-1].faces.n // 2 or n in (1, 5))
+        bodies[-2].retire()
+        grown = factors(sheared(bodies[-1]))
+        fresh = factors(sheared(ddm.Body([SQUARE], grown_by(n, aperture), ROCK, FINE)))
+        assert np.abs(grown - fresh).max() < 1e-8 * np.abs(fresh).max()

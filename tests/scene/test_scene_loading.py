@@ -29,7 +29,7 @@ def test_a_short_scene_has_sensible_defaults(scene_file):
     assert problem.cracks.aperture.tolist() == [0.0]
     assert problem.load_edge == "load:top"
     assert [law.name for law in problem.joints] == ["default"] and problem.joint_of == {}
-    # A tenth of the shortest crack, and a tenth of that.
+    # A tenth of the median crack, of two the shorter one, and a tenth of that.
     assert problem.growth.increment == pytest.approx(0.02, rel=1e-9)
     assert problem.growth.min_increment == pytest.approx(0.002, rel=1e-9)
     assert problem.run.end_time == 100.0 and problem.gauge is None and problem.monitors == {}

@@ -25,6 +25,8 @@ if TYPE_CHECKING:
 STOOD = 5
 #: … and largest K_eq/K_Ic at which it is: bounds are several times K, or of the order of K as long as loads change.
 FAR, FAR_AT_REST = 0.1, 0.5
+#: Number of solutions after which it is computed in any case: as many as it costs.
+STOOD_ANYWHERE = 20
 #: Fraction of the toughness that the bound must not reach.
 BELOW = 1.0 - 1e-6
 
@@ -41,11 +43,12 @@ class CoupledBlocks(Protocol):
 
 @dataclass(eq=False)
 class _Known:
-    """Data of the body with this ``crack_system``: number of times ``solved``; the ``bound``; ``per_factor``: largest
-    K_eq per unit K; ``never``: no bound exists."""
+    """Data of the body with this ``crack_system``: number of its solutions, the last ones ``far`` from toughness and
+    ``all``; the ``bound``; ``per_factor``: largest K_eq per unit K; ``never``: no bound exists."""
 
     crack_system: object
-    solved: int = 0
+    far: int = 0
+    all: int = 0
     bound: TipBound | ChangeBound | None = None
     per_factor: np.ndarray | float = 0.0
     never: bool = False
@@ -63,6 +66,12 @@ class GrowthScreening:
     def among(self, now: CoupledBlocks) -> set[int]:
         """Blocks that need no solution under the present loads."""
         problem = now.problem
+        # What is known of cracks before they grew keeps their matrices.
+        self._known = {
+            block: known
+            for block, known in self._known.items()
+            if block in now.bodies and known.crack_system is now.bodies[block].crack_system
+        }
         if not _may_leave_out(problem) or 2 * self.asked > self.passes:
             return set()
         found = {block for block in now.bodies if self._cannot(now, block)}
@@ -81,8 +90,10 @@ class GrowthScreening:
             known = self._known.get(block)
             if known is None or known.crack_system is not body.crack_system:
                 known = self._known[block] = _Known(body.crack_system)
-            known.solved = 0 if block in (nearer if _can_close(body) else near) else known.solved + 1
-            if known.solved == STOOD and known.bound is None and not known.never:
+            known.far = 0 if block in (nearer if _can_close(body) else near) else known.far + 1
+            known.all += 1
+            enough = known.far >= STOOD or known.all >= STOOD_ANYWHERE
+            if enough and known.bound is None and not known.never:
                 self._bound(now, block, known)
             load = now.loads[block]
             # A solution that meets a target error may be that of a finer body.

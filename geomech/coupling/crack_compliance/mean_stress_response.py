@@ -51,13 +51,18 @@ _SAME = 1e-6
 
 @dataclass(eq=False)
 class _Softness:
-    """Softness of a block with this ``crack_system``: with all cracks ``open``; the present ``limit``; the face
-    ``states`` last looked at (None: not solved since the cracks have grown)."""
+    """Softness of a block with this ``crack_system``: with all cracks ``open`` (None: not asked for since the cracks have
+    grown); the present ``limit``; the face ``states`` last looked at (None: not solved since then)."""
 
     crack_system: object
-    open: float
+    open: float | None
     limit: np.ndarray
     states: object = None
+
+    @property
+    def is_settled(self) -> bool:
+        """Whether the limit is that of states under which the block has been solved, or no states need one."""
+        return self.states is not None or (self.open is not None and self.open <= SOFTEST)
 
 
 @dataclass(eq=False)
@@ -203,7 +208,8 @@ class ByMeanStress:
         """Whether the limit of ``block`` changes with the face states of ``solution``: because they are the first since its
         cracks have grown, or softer than `SOFTEST` under the present limit."""
         known = self._known(block, body, elastic)
-        if known.open <= SOFTEST or (block in self.fields and block not in self._limited):
+        small = known.open is not None and known.open <= SOFTEST
+        if small or (block in self.fields and block not in self._limited):
             return False
         states = solution.closed.tobytes() if solution.memory is None else solution.face_states.key
         if states == known.states:
@@ -250,11 +256,19 @@ class ByMeanStress:
 
     def _soft(self, block: int, body: Body, elastic: np.ndarray) -> float:
         """Largest ratio, over all directions, of the compliance of open cracks to the ``elastic`` one (3, 3)."""
-        return self._known(block, body, elastic).open
+        known = self._known(block, body, elastic)
+        if known.open is None:
+            known.open = _limited(elastic, self.compliance(block, body))[0]
+        return known.open
 
     def _known(self, block: int, body: Body, elastic: np.ndarray) -> _Softness:
         known = self._softness.get(block)
         if known is None or known.crack_system is not body.crack_system:
+            if self._moves and known is not None and known.is_settled and block not in self.fields:
+                # In motion the limit follows from the face states that are found: the equations of open cracks, of which
+                # most may be closed, are not needed.
+                known = self._softness[block] = _Softness(body.crack_system, None, known.limit)
+                return known
             before = None if known is None or known.states is None else known.limit
             softness, limit = _limited(elastic, self.compliance(block, body))
             if block in self.fields and block not in self._limited:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import fields, replace
+from threading import Lock
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -22,9 +23,13 @@ if TYPE_CHECKING:
     from ...ddm import Body
 
 
-#: Number of new bodies from which each gives up large matrices that only growth and fields inside it need. (Factors of
+#: Number of bodies from which each new one gives up large matrices that only growth and fields inside it need. (Factors of
 #: the sides of 48 blocks of a trace map took 1.1 GB, and cracks grew in a few.)
 MANY = 8
+
+#: Bytes that many bodies together keep for further growth, the largest first: those of ten blocks with 2 000 unknowns on
+#: their sides, or of one with 6 000.
+FOR_GROWTH = 3e8
 
 
 def elastic_bodies(
@@ -67,12 +72,21 @@ def elastic_bodies(
         to_make.append((b, own, material, old, work))
 
     # The first load needs more of few bodies, as growth at once; of many it is growth in few.
-    lean = len(to_make) >= MANY
+    lean = len(cracked) >= MANY
+
+    spare = FOR_GROWTH - sum(body.for_growth for body in bodies.values() if body is not None)
+    counting = Lock()
 
     def made(of: tuple) -> Body:
+        nonlocal spare
         body = assembled(of)
         if of[3] is not None:
             of[3].retire()
+            with counting:
+                enough = body.for_growth <= spare
+                spare -= body.for_growth if enough else 0
+            if not enough:
+                body.stop_growing()
         elif lean:
             body.release()
         return body
@@ -90,7 +104,7 @@ def elastic_bodies(
     largest_first = sorted(to_make, key=lambda of: -sum(map(len, _loops(problem, blocks, of[0]))) - of[1].n_segments)
     made_of = dict(zip([of[0] for of in largest_first], parallel_map(made, largest_first)))
     bodies.update({of[0]: made_of[of[0]] for of in to_make})
-    if lean:
+    if lean and to_make:
         return_free_memory()
     return bodies, nodes_of
 

@@ -160,6 +160,11 @@ class BoundarySystem:
             self._factor = None
 
     @property
+    def is_factored(self) -> bool:
+        """Whether factors are kept."""
+        return self._factor is not None
+
+    @property
     def large(self) -> bool:
         """Whether factors take much more memory than the rest."""
         return not self.iterated and self.elements.n_unknowns > KEPT_BESIDE_FACTORS

@@ -185,7 +185,7 @@ def _increment(c: Check) -> None:
                 ("growth", "increment_m"),
                 f"an advance of {increment:g} m is longer than {blocks.names[b]!r}, which measures {largest:.3g} m: a "
                 "tip crosses it in one step",
-                "is it in metres? If it is left out, it is a tenth of the shortest crack",
+                "is it in metres? If it is left out, it is a tenth of the median crack",
             )
             return
 

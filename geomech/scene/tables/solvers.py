@@ -161,7 +161,9 @@ class GrowthTable(Table):
         'strain-energy density, "f" tension and shear, each against its own toughness',
     )
     increment_m: Positive | None = Field(
-        None, description="longest advance of a tip in a cycle, m (unset: a tenth of the shortest crack)"
+        None,
+        description="longest advance of a tip in a cycle, m (unset: a tenth of the median crack length, of the shorter one "
+        "of two)",
     )
     min_increment_m: Positive | None = Field(None, description="shortest advance, m (unset: a tenth of the longest)")
     join_distance: NotNegative = Field(
