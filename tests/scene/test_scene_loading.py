@@ -36,6 +36,19 @@ def test_a_short_scene_has_sensible_defaults(scene_file):
     assert problem.loads.edge_tractions[0].history.at(10.0).tolist() == [0.0, -1e6]
 
 
+@pytest.mark.parametrize("lengths, increment", [((0.1,), 0.01), ((0.01, 0.3), 0.02), ((0.01, 0.15, 0.3), 0.015)])
+def test_the_default_increment_follows_the_median_crack(scene_file, lengths, increment):
+    """Beside a crack of 0.2 m. The shortest of many traces, a remnant, does not set the advance of all; of two cracks the
+    shorter one does."""
+    more = "".join(
+        f'[[geometry.cracks]]\nname = "more {k}"\npoints = [[0.1, {0.2 + 0.1 * k}], [{0.1 + length}, {0.2 + 0.1 * k}]]\n'
+        for k, length in enumerate(lengths)
+    )
+    growth = load_scene(scene_file(GOOD + more)).problem().growth
+    assert growth.increment == pytest.approx(increment, rel=1e-9)
+    assert growth.min_increment == pytest.approx(0.1 * increment, rel=1e-9)
+
+
 def test_defaults_are_those_of_the_model(scene_file):
     from geomech.model import DdaSettings, DdmSettings, GrowthSettings, RunSettings
 
