@@ -4,7 +4,8 @@ Where two straight sides touch, their contact stress is integrated with the Gaus
 
     ∫ f ds ≈ ℓ Σ wᵢ f(sᵢ),   exact for polynomials of degree 2n − 3 with n = p + 2 points, p the higher order of both,
 
-so that stress of degree up to p + 1 loads every deflection as its exact integral does (patch test). Joints with a
+so that stress of degree up to p + 1 loads every deflection as its exact integral does (patch test). Faces of penalty springs
+between two blocks of first order keep the two points, and springs, that they have without any block of higher order. Joints with a
 stiffness kₙ (Pa/m) have springs kₙ ℓ wᵢ. Penalty springs are proportional to wᵢ and, at both ends of a face, as stiff
 as those of a corner (`penalty_springs`): the points over which a block tips yield no more than corners do, and a corner
 that stays in contact when its face opens keeps its spring and its force. Each point opens, sticks and slides by itself.
@@ -76,8 +77,9 @@ class Faces:
     corners: np.ndarray
 
     @classmethod
-    def of(cls, found: ContactSet, order: np.ndarray) -> Faces:
-        """Faces of the contacts ``found`` at corners; ``order`` (n_blocks,) is 1 for blocks that do not bend."""
+    def of(cls, found: ContactSet, order: np.ndarray, by_length: np.ndarray | None = None) -> Faces:
+        """Faces of the contacts ``found`` at corners; ``order`` (n_blocks,) is 1 for blocks that do not bend. ``by_length``
+        (n_corners,): corners whose normal stiffness is proportional to face length; None: all."""
         geometry = found.geometry
         some = np.flatnonzero((geometry[:, 4] > 0) & (found.corner < 0))
         ends, length, inner = np.zeros((0, 2), np.int64), np.zeros(0), np.zeros((0, 3))
@@ -85,6 +87,8 @@ class Faces:
             ends, length, inner = _whole_sides(found, *on_lines(found.block, found.other, geometry, some))
         lone = np.setdiff1d(np.arange(len(found)), np.concatenate([ends.ravel(), inner[:, 0].astype(np.int64)]))
         highest = np.maximum(order[found.block], order[found.other]) + 2
+        if by_length is not None:
+            highest = np.where((highest == 3) & ~by_length, 2, highest)
         count = highest[ends[:, 0]]
         rules = {n: lobatto_points(n) for n in np.unique(highest).tolist()}
         first = len(lone) + np.cumsum(count) - count
@@ -249,7 +253,7 @@ class FaceContacts(ContactSet):
 
         ``by_length`` as in `Faces.springs`.
         """
-        faces = Faces.of(corners, order)
+        faces = Faces.of(corners, order, by_length[0])
         own: dict[str, Any] = {}
         for field in fields(ContactSet):
             value = getattr(corners, field.name)

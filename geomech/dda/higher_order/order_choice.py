@@ -10,7 +10,9 @@ would take up the work
 order p is the first part of that of order p + 2, and the Cholesky factor of S gives the part of p + 1 as well. Contacts
 yield to deflection, so that W is too large, by a factor of a hundred where friction locks uniformly strained blocks to
 each other. For blocks that it would raise, W is therefore computed again on a patch: K includes the springs of their
-contacts, and l the first six unknowns of the block and of its neighbours; the neighbours' other contact forces stay.
+contacts, and l the first six unknowns of the block and of its neighbours; the neighbours' other contact forces stay. In a
+slope the neighbours then move freely, although their own neighbours hold them: W is still two or three times too large.
+It bounds that of the whole system, with the six unknowns of all blocks (`_AllBlocks`), which decides.
 
 Cracks soften the block, and their opening and slip deflect it by a part q_c that a block of order p cannot represent
 (`CracksInBlock`). Without contacts the block of order p + 2 would take that deflection without any stress, and without
@@ -31,14 +33,19 @@ from __future__ import annotations
 import logging
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ...model import AUTO_ORDER, OPEN, STICK, Blocks
+from ...model import AUTO_ORDER, OPEN, SLIP, STICK, Blocks
 from ..kinematics.displacement_matrix import displacement_matrix
 from .deflected_blocks import DeflectedBlocks
 from .deflection_basis import HIGHEST, n_deflections
 from .face_points import FaceContacts
+
+if TYPE_CHECKING:
+    from scipy.sparse import csc_array
+    from scipy.sparse.linalg import SuperLU
 
 log = logging.getLogger(__name__)
 
@@ -52,8 +59,9 @@ _SOFTER_IN_BENDING = 4.0
 _MORE, _REPEATED = 1.1, 10
 #: Forces below this fraction of the largest do not count.
 _SMALL = 1e-2
-#: Unknowns of a patch are constrained by springs of this part of the rock's stiffness, to make its matrix regular.
-_REGULARISATION = 1e-9
+#: Unknowns of blocks are constrained by springs of this part of the rock's stiffness, to make matrices regular: small beside
+#: the rock, and so large that blocks which move freely as a group are known to 1e-10 of contacts that are a hundred times stiffer.
+_REGULARISATION = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
@@ -219,6 +227,7 @@ class OrderChoice:
         trial = self._trial_of(order)
         faces, cracked = _FaceForces.of(trial, attempt), {} if cracks is None else cracks(trial)
         force, deflection = self._forces(trial, faces, attempt), np.zeros_like(trial.basis.coupling[:, 0])
+        every: _AllBlocks | None = None
         if before_step is not None:
             width = min(before_step.shape[1], deflection.shape[1])
             deflection[self.found, :width] = before_step[self.found, :width]
@@ -228,6 +237,9 @@ class OrderChoice:
             for k in np.flatnonzero(group.with_cracks(most, trial, cracked) > limit).tolist():
                 b = int(group.blocks[k])
                 first, both = faces.work(trial, b, group, left[k], cracked.get(b))
+                if both > limit:
+                    every = every or _AllBlocks.of(faces, trial)
+                    first, both = faces.work(trial, b, group, left[k], cracked.get(b), every)
                 if both <= limit:
                     continue
                 out[b] = min(order[b] + (2 if both - first > limit else 1), HIGHEST)
@@ -347,6 +359,10 @@ class _FaceForces:
             by_length = laws.stiff_laws[found.law], laws.stiff_along_laws[found.law]
             found = FaceContacts.along_faces(corners, trial.order, None, by_length)
             normal, shear, state = found.normal, found.shear, found.state
+            # A face that is closed at one end bears the force of that end with all of its points.
+            for closed in (SLIP, STICK):
+                some = found.on_faces.between((corners.state == closed).astype(float)) > 0.0
+                state = np.where((state == OPEN) & some, closed, state)
         owners, midpoint = (found.block, found.other), attempt.midpoint
         geometry = midpoint.contacts(found.geometry, *owners, attempt.along_edges(found))
         across = geometry[:, 1:3]
@@ -369,15 +385,16 @@ class _FaceForces:
         )  # fmt: skip
 
     def work(
-        self, trial: DeflectedBlocks, block: int, group: _Group, left: np.ndarray, cracks: CracksInBlock | None = None
+        self, trial: DeflectedBlocks, block: int, group: _Group, left: np.ndarray, cracks: CracksInBlock | None = None,
+        every: _AllBlocks | None = None,
     ) -> tuple[float, float]:  # fmt: skip
-        """J/m: work that the next order of ``block`` (of ``group``) would take up, and the next two, on a patch.
+        """J/m: work that the next order of ``block`` (of ``group``) would take up, and the next two.
 
-        The residual forces ``left`` (h,) act on the patch, which includes its contacts and neighbours, and the ``cracks``
-        of the block if it has any.
+        The residual forces ``left`` (h,) act on a patch, which includes its contacts and neighbours, or on ``every`` block;
+        ``cracks`` are those of the block if it has any.
         """
         own, m = group.own, group.own + len(left)
-        rock, springs = self._patch(trial, block, m)
+        rock, springs = self._patch(trial, block, m) if every is None else self._whole(trial, block, m, every)
         size = len(rock)
         if cracks is not None:
             # √A times mean strain, and deflection.
@@ -410,29 +427,123 @@ class _FaceForces:
     def _patch(self, trial: DeflectedBlocks, block: int, m: int) -> tuple[np.ndarray, np.ndarray]:
         """Stiffness (n, n) of the rock, and of the contacts, of a patch around ``block``. Unknowns: ``m`` of deflection,
         those to be estimated last; then six of the block and six of each neighbour."""
-        holds = self.springs.any(axis=1)
-        sides = [np.flatnonzero((owner == block) & holds) for owner in self.owners]
-        others = [self.owners[1 - side][rows] for side, rows in enumerate(sides)]
-        near = np.unique(np.concatenate(others))
+        rows, side, motion = self._motion(trial, block, m)
+        other = np.where(side == 0, self.owners[1][rows], self.owners[0][rows])
+        near = np.unique(other)
         near = near[~self.fixed[near]]
         size = m + 6 + 6 * len(near)
-        matrix, springs = np.zeros((size, size)), np.zeros((size, size))
-        matrix[:m, :m] = trial.stiffness[block, :m, :m]
-        for k, b in enumerate((block, *near.tolist())):
-            at, stiff = m + 6 * k + np.arange(6), trial.elastic[b]
-            matrix[np.ix_(at[3:], at[3:])] = self.area[b] * stiff
-            # A patch that is free as a whole is unconstrained, and in equilibrium.
-            matrix[at, at] += _REGULARISATION * stiff[0, 0] * np.where(np.arange(6) < 2, 1.0, self.area[b])
-        for side, rows, other in zip((0, 1), sides, others, strict=True):
-            motion = np.zeros((len(rows), 2, size))
-            bends = trial.directions(self.points[side][rows], np.full(len(rows), block), self.angle)[..., :m]
-            motion[..., :m] = np.einsum("nwa,naj->nwj", self.directions[rows], bends)
-            motion[..., m : m + 6] = self.rigid[side][rows]
-            for c in np.flatnonzero(~self.fixed[other]).tolist():
-                first = m + 6 + 6 * int(np.searchsorted(near, other[c]))
-                motion[c, :, first : first + 6] -= self.rigid[1 - side][rows[c]]
-            springs += np.einsum("nwi,nw,nwj->ij", motion, self.springs[rows], motion, optimize=True)
-        return matrix, springs
+        matrix, moved = np.zeros((size, size)), np.zeros((len(rows), 2, size))
+        matrix[: m + 6, : m + 6], moved[..., : m + 6] = self._rock(trial, block, m), motion
+        for k, b in enumerate(near.tolist()):
+            at = m + 6 + 6 * k + np.arange(6)
+            matrix[np.ix_(at, at)] = self._strained(trial, b)
+        for c in np.flatnonzero(~self.fixed[other]).tolist():
+            first = m + 6 + 6 * int(np.searchsorted(near, other[c]))
+            moved[c, :, first : first + 6] -= self.rigid[1 - side[c]][rows[c]]
+        return matrix, np.einsum("nwi,nw,nwj->ij", moved, self.springs[rows], moved, optimize=True)
+
+    def _whole(
+        self, trial: DeflectedBlocks, block: int, m: int, every: _AllBlocks
+    ) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
+        """As `_patch`, of the block's own unknowns: all others, of ``every`` block, follow."""
+        rows, side, motion = self._motion(trial, block, m)
+        sign = np.where(side == 0, 1.0, -1.0)
+        return self._rock(trial, block, m), every.around(block, rows, sign[:, None, None] * motion)
+
+    def _motion(self, trial: DeflectedBlocks, block: int, m: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Closed contacts (k,) of ``block``, its side of them, 0 or 1, and their motion (k, 2, m + 6) with its unknowns."""
+        holds = self.springs.any(axis=1)
+        sides = [np.flatnonzero((owner == block) & holds) for owner in self.owners]
+        motion = np.zeros((sum(map(len, sides)), 2, m + 6))
+        start = 0
+        for of, rows in enumerate(sides):
+            own = motion[start : start + len(rows)]
+            bends = trial.directions(self.points[of][rows], np.full(len(rows), block), self.angle)[..., :m]
+            own[..., :m] = np.einsum("nwa,naj->nwj", self.directions[rows], bends)
+            own[..., m:] = self.rigid[of][rows]
+            start += len(rows)
+        return np.concatenate(sides), np.repeat([0, 1], [len(rows) for rows in sides]), motion
+
+    def _rock(self, trial: DeflectedBlocks, block: int, m: int) -> np.ndarray:
+        """Stiffness (m + 6, m + 6) of the rock of ``block``."""
+        out = np.zeros((m + 6, m + 6))
+        out[:m, :m], out[m:, m:] = trial.stiffness[block, :m, :m], self._strained(trial, block)
+        return out
+
+    def _strained(self, trial: DeflectedBlocks, block: int) -> np.ndarray:
+        """Stiffness (6, 6) of the rock of a ``block`` of first order."""
+        out, area = np.zeros((6, 6)), self.area[block]
+        out[3:, 3:] = area * trial.elastic[block]
+        # What is free as a whole is unconstrained, and in equilibrium.
+        np.fill_diagonal(
+            out, np.diag(out) + _REGULARISATION * trial.elastic[block, 0, 0] * np.array([1, 1, *[area] * 4])
+        )
+        return out
+
+
+@dataclass(frozen=True, eq=False)
+class _AllBlocks:
+    """The first six unknowns of all blocks that are not fixed, n in all, with their k closed contacts.
+
+    first    (n_blocks,)  of the block's unknowns; −1 for fixed ones
+    motion   (2 k, n)     of the contacts
+    springs  (2 k,)       Pa
+    place    (n_contacts,) of each contact among those that are closed
+    factor   LU factors of their stiffness
+    """
+
+    first: np.ndarray
+    motion: csc_array
+    springs: np.ndarray
+    place: np.ndarray
+    factor: SuperLU
+
+    @classmethod
+    def of(cls, faces: _FaceForces, trial: DeflectedBlocks) -> _AllBlocks:
+        from scipy.sparse import csc_array, diags_array
+        from scipy.sparse.linalg import splu
+
+        moving = np.flatnonzero(~faces.fixed)
+        first = np.full(len(faces.fixed), -1)
+        first[moving] = 6 * np.arange(len(moving))
+        closed = np.flatnonzero(faces.springs.any(axis=1))
+        place = np.cumsum(faces.springs.any(axis=1)) - 1
+        value, row, column = [], [], []
+        for owner, rigid, sign in zip(faces.owners, faces.rigid, (1.0, -1.0), strict=True):
+            some = closed[~faces.fixed[owner[closed]]]
+            shape = len(some), 2, 6
+            value.append((sign * rigid[some]).ravel())
+            row.append(np.broadcast_to((2 * place[some, None] + [0, 1])[:, :, None], shape).ravel())
+            column.append(np.broadcast_to((first[owner[some], None] + np.arange(6))[:, None], shape).ravel())
+        entries = np.concatenate(value), (np.concatenate(row), np.concatenate(column))
+        motion = csc_array(entries, shape=(2 * len(closed), 6 * len(moving)))
+        springs = faces.springs[closed].ravel()
+        rock = np.array([faces._strained(trial, b) for b in moving.tolist()])
+        at = np.broadcast_to(first[moving, None] + np.arange(6), (len(moving), 6))
+        index = np.broadcast_to(at[:, :, None], rock.shape).ravel(), np.broadcast_to(at[:, None], rock.shape).ravel()
+        matrix = csc_array((rock.ravel(), index), shape=motion.shape[1:] * 2) + motion.T @ diags_array(springs) @ motion
+        factor = splu(
+            csc_array(matrix), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True}
+        )
+        return cls(first, motion, springs, place, factor)
+
+    def around(self, block: int, rows: np.ndarray, motion: np.ndarray) -> np.ndarray:
+        """(m, m) stiffness that contacts and all other blocks have for the unknowns of ``block``.
+
+        ``motion`` (k, 2, m) is what it contributes to that of its contacts ``rows`` (k,).
+        """
+        k, m = len(rows), motion.shape[2]
+        own, at = motion.reshape(2 * k, m), (2 * self.place[rows, None] + [0, 1]).ravel()
+        pushed = self.springs[at, None] * own
+        mine = self.first[block] + np.arange(6)
+        sides = np.zeros((self.motion.shape[1], m + 6))
+        sides[:, :m] = self.motion[at].T @ pushed
+        # The block's own part of the motion of the others is none: it is held.
+        sides[mine, :m] = 0.0
+        sides[mine, m + np.arange(6)] = 1.0
+        moved = self.factor.solve(sides)
+        others = moved[:, :m] - moved[:, m:] @ np.linalg.solve(moved[mine, m:], moved[mine, :m])
+        return own.T @ pushed - sides[:, :m].T @ others
 
 
 def extended_deflection(deflection: np.ndarray, before: np.ndarray, order: np.ndarray) -> np.ndarray:
