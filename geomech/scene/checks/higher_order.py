@@ -62,12 +62,19 @@ def _check_cracks(c: Check, name: str, zone, refuse) -> None:
         own = np.array([b for b, of in enumerate(drawing.zones) if of == name], int)
         blocks = own if begin else np.intersect1d(drawing.cracks.block, own)
         if (np.diff(drawing.blocks.block_loop)[blocks] > 1).any():
-            refuse("cracks in a block of higher order with a hole are not supported", "set order = 1")
+            refuse(
+                "cracks in a block of higher order with a hole are not supported: its polynomials leave stress on the wall of "
+                "the hole, from which cracks grow",
+                "set order = 1, with which the crack solver finds the stress around the hole",
+            )
     if not (begin or len(blocks)):
         return
     cracked = "cracks, or cracks that begin (growth.initiation),"
     if zone.mesh_size_m is not None:
-        refuse(f"{cracked} are not supported in cells", "leave `mesh_size_m` out")
+        refuse(
+            f"{cracked} are not supported in cells: a crack would end at the first face between two of them",
+            "leave `mesh_size_m` out, for one block of this order, or let cells separate at the strength of a `cell_joint`",
+        )
 
 
 def _check_joints(c: Check, refuse) -> None:

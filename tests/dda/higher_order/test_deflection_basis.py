@@ -156,6 +156,16 @@ def test_the_first_vibration_of_a_bar_converges_with_the_order():
     assert error[7] < 1e-9
 
 
+def test_three_vibrations_of_a_bar():
+    """ω = n π c / L, n = 1, 2, 3, of one block of order 8."""
+    rock = Material("rock", 1e10, 0.0, 2500.0, plane="stress")
+    exact = np.arange(1, 4) * np.pi / 10.0 * np.sqrt(rock.youngs_modulus / rock.density)
+    found = frequencies(beam(10.0, 1.0), 8, rock)
+    errors = np.abs(found[:, None] / exact - 1).min(axis=0)
+    print("first three frequencies of a bar, order 8, off by", errors)
+    assert errors[0] < 1e-9 and errors[1] < 1e-6 and errors[2] < 1e-3
+
+
 def test_the_first_vibrations_of_a_beam_converge_with_the_order():
     """Free beam of slenderness 20. ω = 22.3733 √(E I / ρ A) / L² of Euler & Bernoulli (Timoshenko 1955), and 61.6728
     times that for the second, are lowered by shear and rotatory inertia, 1 % and 2.5 %; errors of lower orders are

@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scenes_of_bending import after, rectangle, system_of
-from scenes_of_cells import cells_of, columns_and_rows, stress_in
+from scenes_of_cells import cells_of, columns_and_rows, glued, stress_in
 from scenes_of_cells import system as system_with
 from test_excavation_of_higher_order import ACROSS, ALONG, INNER, OUTER, ROCK, annulus, disc, pressed
 
@@ -18,6 +18,7 @@ from geomech.dda.energy_balance import EnergyBudget
 from geomech.model import (
     SLIP,
     BlockMotion,
+    Blocks,
     EdgeTraction,
     Excavation,
     History,
@@ -300,3 +301,43 @@ def test_a_joint_slips_about_a_tunnel_where_kirsch_says(tangent, slips):
         assert inside.min() < 2.54 < inside.max() < OUTER
         # Slip reaches the end of the cells' faces in which it begins, and no farther.
         assert inside.min() - 0.7 < slid.min() and slid.max() < inside.max() + 2.0
+
+
+def test_a_joint_in_continuous_rock_slips_under_load(verified):
+    """A joint of half length 1 m in a plate twenty times as long bears τ beyond its friction: the slip of a crack under the
+    shear τ − σ tan φ, 4 (1 − ν²) (τ − σ tan φ) √(a² − x²) / E (Pollard & Segall 1987). Its ends are singular."""
+    reach, friction, press, shear, errors = 10.0, 0.3, 2e6, 1.5e6, []
+    under = np.array([0.0, 0.5, 0.85, 0.955, 1.0])
+    ahead = np.concatenate([2 - under[-2::-1], 2 + np.array([1.0, 2.8, 8.0])])
+    across = np.array([0.0, 0.045, 0.13, 0.28, 0.55, 1.0, 1.9, 3.5, 6.0, reach])
+    x, y = (np.concatenate([-half[:0:-1], half]) for half in (np.concatenate([under, ahead]), across))
+    cells = columns_and_rows(x, y)
+    ends = {"right": (0, 1), "left": (0, -1), "top": (1, 1), "bottom": (1, -1)}
+
+    def name(at: np.ndarray) -> str:
+        return next((side for side, (axis, sign) in ends.items() if abs(at[axis] - sign * reach) < 1e-9), "")
+
+    names = [[[name(at) for at in 0.5 * (cell + np.roll(cell, -1, axis=0))]] for cell in cells]
+    exact = 4 * (1 - ROCK.poissons_ratio**2) * (shear - friction * press) / ROCK.youngs_modulus
+    for order in (2, 4):
+        blocks = glued(Blocks.from_polygons(cells, order=[order] * len(cells), edge_names=names))
+        pairs = np.asarray(blocks.glued)
+        middle = 0.5 * (blocks.vertices[pairs[:, 0]] + blocks.vertices[blocks.next_vertex[pairs[:, 0]]])
+        joint = (np.abs(middle[:, 1]) < 1e-9) & (np.abs(middle[:, 0]) < 1)
+        law = JointLaw("joint", math.atan(friction), normal_stiffness=1e14, shear_stiffness=1e14)
+        system = system_with(replace(blocks, glued=pairs[~joint]), law, ROCK)
+        stress = np.array([[0.0, shear], [shear, -press]])
+        loads = Loads(
+            edge_tractions=tuple(
+                EdgeTraction(side, History.constant(tuple(sign * stress[axis]))) for side, (axis, sign) in ends.items()
+            )
+        )
+        rows = after(system, loads, 2).state.face_points
+        at, slip = rows["point"], np.abs(rows["slip"])
+        on = (np.abs(at[:, 1]) < 1e-3) & (np.abs(at[:, 0]) < 0.8)
+        errors.append(float(np.abs(slip[on] / (exact * np.sqrt(1 - at[on, 0] ** 2)) - 1).max()))
+    print(f"slip within 0.8 half lengths off by {errors}")
+    verified(
+        "joint in a plate that slips under load, cells: slip", errors, "Pollard & Segall 1987", over=("order", (2, 4))
+    )
+    assert errors[0] < 0.06 and errors[1] < 0.01
