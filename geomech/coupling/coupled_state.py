@@ -263,6 +263,20 @@ class CrackedBlocks:
         self.crack_energy.parts(split.parent)
         self._take_blocks(split.parent)
 
+    def set_free(self, budget: dda.EnergyBudget, state: State) -> float:
+        """Energy, J/m, that blocks split since the last step stored beyond that of their parts and new contacts, by the
+        ``budget`` after a step to ``state``."""
+        if not self.budget.is_cut:
+            return 0.0
+        set_free = self.budget.split - budget.split
+        if state.removed is None:
+            return set_free
+        # Rock that is excavated in the same step takes its energy along; splitting has not released that.
+        gone = state.removed if self.state.removed is None else state.removed & ~self.state.removed
+        stress = np.where(gone[:, None], self.state.stress, 0.0)
+        stored = 0.5 * np.einsum("bi,bij,bj->b", stress, self.system.compliance, stress)
+        return set_free - float(self.blocks.areas(self.state.vertices) @ stored)
+
     def take_out(self) -> list[int]:
         """Remove the elastic bodies of blocks excavated at the present time; returns these blocks."""
         removed = self.system.removed(self.problem.loads, self.state.time)

@@ -454,14 +454,9 @@ class Coupling:
         """Add to the crack energy balance a step to ``state`` with the block ``budget`` after it; ``cut`` are the
         blocks that split."""
         now = self.now
-        set_free = now.budget.split - budget.split if now.budget.is_cut else 0.0
-        if now.budget.is_cut and state.removed is not None:
-            # Rock that is excavated in the same step takes its energy along; splitting has not released that.
-            gone = state.removed if now.state.removed is None else state.removed & ~now.state.removed
-            stress = np.where(gone[:, None], now.state.stress, 0.0)
-            stored = 0.5 * np.einsum("bi,bij,bj->b", stress, now.system.compliance, stress)
-            set_free -= float(now.blocks.areas(now.state.vertices) @ stored)
-        now.crack_energy.after(now.state, state, now.blocks, now.strain_solutions(), now.by_mean_stress, set_free, cut)
+        now.crack_energy.after(
+            now.state, state, now.blocks, now.strain_solutions(), now.by_mean_stress, now.set_free(budget, state), cut
+        )
 
     def _strain_solutions(self) -> tuple:
         """The solutions that gave the crack strains, and the blocks with mean-stress response."""

@@ -17,6 +17,7 @@ change of stored energy that this causes is the residual of the budget, of the o
 from __future__ import annotations
 
 import logging
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
@@ -415,6 +416,14 @@ class EnergyBudget:
         return EnergyBudget(
             self.steps + 1, step, start, totals, split, residual, turnover, False, warned, drawn, released
         )
+
+    def at_rest(self, steps: Sequence[StepEnergy], time: float, *, excavated: bool = False) -> EnergyBudget:
+        """The budget after the static ``steps`` by which blocks came to equilibrium under the loads of ``time`` s;
+        ``excavated``: the first of them was without blocks that had been there before."""
+        budget = self.cut() if excavated else self
+        for step in steps:
+            budget = budget.after(step, time)
+        return budget
 
     def cut(self) -> EnergyBudget:
         """The budget before a step in which blocks are newly split or excavated: the change of stored energy is no

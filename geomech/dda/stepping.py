@@ -13,7 +13,7 @@ from .excavation import until_next_event
 from .kinematics.strain_limits import ElasticRange
 from .results import NotConverged, StepResult
 from .statics.counted_resistance import warn_of_toes, warn_of_toes_at_rest
-from .statics.pseudo_time_equilibrium import equilibrium
+from .statics.pseudo_time_equilibrium import Equilibrium, equilibrium
 from .step_control.adaptive_time_step import StepLength
 from .step_control.overlap_energy import Overlap, OverlapWatch
 from .system import BlockSystem
@@ -38,10 +38,10 @@ class _Watch:
         self.overlaps.check(self.budget, overlap, self.blocks.names, state.time)
         self.range.check(Motion.of(self.blocks, state.vertices), self.blocks, state.time)
 
-    def at_rest(self) -> None:
-        """Record that blocks were brought to rest outside the steps of the run: the energy stored by this is no
-        residual."""
-        self.budget = self.budget.cut()
+    def at_rest(self, before: State, found: Equilibrium, time: float) -> None:
+        """Blocks have come to equilibrium under the loads of ``time`` s."""
+        excavated = found.state.removed is not before.removed
+        self.budget = self.budget.at_rest(found.energies, time, excavated=excavated)
 
 
 def _indexed(joints: Sequence[JointLaw], index: Callable[[str, str], int | None]) -> Joints:
@@ -91,7 +91,7 @@ def run(
         log.warning("viscous boundaries have no effect in a static run")
     watched = _Watch(blocks)
     if settings.equilibrium:
-        state = _at_rest(system, state, loads, state.time)
+        state = _at_rest(system, state, loads, state.time).state
     yield state.read_only()
     length = StepLength(settings)
     at_every_load = settings.equilibrium == "loads" and system.scheme.static
@@ -99,8 +99,9 @@ def run(
         dt, load_time = min(length.dt, end_time - state.time), None
         if at_every_load:
             load_time = state.time + until_next_event(loads, state.time, dt)
-            state = _at_rest(system, state, loads, load_time)
-            watched.at_rest()
+            found = _at_rest(system, state, loads, load_time)
+            watched.at_rest(state, found, load_time)
+            state = found.state
         result = system.step(state, loads, dt, load_time=load_time)
         length.after(result, dt)
         watched.look(state, result)
@@ -113,8 +114,8 @@ def run(
         warn_of_toes_at_rest(system, state, loads)
 
 
-def _at_rest(system: BlockSystem, state: State, loads: Loads, load_time: float) -> State:
-    """``state`` brought to equilibrium under the loads of ``load_time``."""
+def _at_rest(system: BlockSystem, state: State, loads: Loads, load_time: float) -> Equilibrium:
+    """Equilibrium from ``state`` under the loads of ``load_time`` s."""
     found = equilibrium(system, state, loads, load_time=load_time, tolerance=system.settings.unbalanced_tolerance)
     if found.collapsed:
         raise NotConverged(f"t = {load_time:g} s: {found.reason}")
@@ -122,4 +123,4 @@ def _at_rest(system: BlockSystem, state: State, loads: Loads, load_time: float) 
         log.warning("t = %g s: %s; continuing from there", load_time, found.reason)
     elif state.time == load_time:
         warn_of_toes(system, state, found.state, loads, load_time)
-    return found.state
+    return found

@@ -65,6 +65,20 @@ def test_a_static_run_is_at_rest_at_every_load_whatever_its_steps():
     assert state.time == 1.0
 
 
+def test_steps_to_equilibrium_count_in_the_energy_balance():
+    """A square is loaded by its weight in four parts: it does half of what the whole weight would do at once."""
+    ramp = Loads(gravity=History.ramp([0.0, -9.81]))
+    system = dda.BlockSystem(on_incline(0.0), [ROCK], [JOINT])
+    state, budget = State.at_rest(system.blocks), dda.EnergyBudget()
+    for time in (0.25, 0.5, 0.75, 1.0):
+        found = dda.equilibrium(system, state, ramp, load_time=time)
+        state, budget = replace(found.state, time=time), budget.at_rest(found.energies, time)
+    sinks = 0.5 - state.vertices[system.vertex_start[1] :, 1].mean()
+    assert budget.gravity_work == pytest.approx(0.5 * 2600.0 * 9.81 * sinks, rel=1e-3)
+    assert budget.last.stored == pytest.approx(budget.gravity_work, rel=1e-3)
+    assert abs(budget.scheme) < 1e-3 * budget.gravity_work and abs(budget.residual) < 1e-6 * budget.gravity_work
+
+
 def test_energy_from_nowhere_is_told_by_blocks_alone(caplog):
     # Undamped and without its loss, the α-scheme keeps the push of an impact that is over within a step.
     settings = DdaSettings(time_step=1e-3, dynamic_factor=1.0, damping=0.0, spectral_radius=1.0)

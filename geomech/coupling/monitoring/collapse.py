@@ -20,8 +20,8 @@ def relax(now: CrackedBlocks, load_time: float) -> tuple[Event, ...]:
     """Bring the blocks to equilibrium under the loads of ``load_time``; a collapse event if there is none."""
     begun = now.state
     found = at_rest(now, load_time)
-    # The energy budget covers recorded steps only.
-    now.budget = now.budget.cut()
+    if load_time != begun.time:
+        _account(now, begun, found, load_time)
     if not found.collapsed:
         if not found.converged:
             log.warning("t = %g s: %s; continuing from there", load_time, found.reason)
@@ -29,6 +29,17 @@ def relax(now: CrackedBlocks, load_time: float) -> tuple[Event, ...]:
             dda.warn_of_toes(now.system, begun, found.state, now.problem.loads, load_time, now.response)
         return ()
     return _fallen(now, found, "", load_time)
+
+
+def _account(now: CrackedBlocks, begun: State, found: dda.Equilibrium, load_time: float) -> None:
+    """Add the energies of the steps from the state ``begun`` to the equilibrium ``found``."""
+    excavated = found.state.removed is not begun.removed
+    budget = now.budget.at_rest(found.energies, load_time, excavated=excavated)
+    if found.energies and now.bodies:
+        end, now.state = now.state, begun
+        set_free, now.state = now.set_free(budget, end), end
+        now.crack_energy.worked_on(begun, sum(energy.crack_work for energy in found.energies), set_free)
+    now.budget = budget
 
 
 def collapse_in_situ(now: CrackedBlocks) -> tuple[Event, ...]:

@@ -119,6 +119,10 @@ class CrackEnergy:
     _released: dict[int, float] = field(default_factory=dict)
     _lost: dict[int, float] = field(default_factory=dict)
     _asked: float = 0.0
+    #: State before the blocks came to equilibrium for the present step, and what splitting set free before, not entered
+    #: yet.
+    _begun: State | None = None
+    _set_free_at_rest: float = 0.0
     _parted: bool = False
     #: block → whether it responds to its mean stress alone.
     _by_mean_response: dict[int, bool] = field(default_factory=dict)
@@ -264,6 +268,13 @@ class CrackEnergy:
         self.uneven += max(0.0, spent - stored)
         self.runaway += max(0.0, stored - spent)
 
+    def worked_on(self, begun: State, work: float, set_free: float) -> None:
+        """Blocks have come from the state ``begun`` to equilibrium, by which they did ``work`` J/m on their cracks, and
+        had ``set_free`` some energy by splitting before. The step that follows finds the state of the cracks."""
+        self.work += work
+        self.uneven -= work
+        self._begun, self._set_free_at_rest = begun, set_free
+
     @property
     def under_way(self) -> bool:
         """Whether the balance has entries, even if there are no cracks any more."""
@@ -283,14 +294,13 @@ class CrackEnergy:
         crack strains at its end; ``by_mean_stress``: blocks that respond to their mean stress alone. Blocks that have
         split since the last step stored ``set_free`` J/m more than their parts and new contacts; those in ``cut`` split
         now."""
-        strain = state.crack_strain - before.crack_strain
-        mean = 0.5 * (before.stress + state.stress)
-        each = blocks.areas(before.vertices) * np.sum(mean * strain, axis=1)
-        for block, known in by_mean_stress.fields.items():
-            each[block] += known.work_on_cracks(before, state)
-        if state.removed is not None:
-            each[state.removed] = 0.0
+        each = self._by_mean_stress_work(before, state, blocks, by_mean_stress)
         work = float(each.sum())
+        if self._begun is not None:
+            # The cracks go all the way in this step.
+            before, self._begun = self._begun, None
+            each = self._by_mean_stress_work(before, state, blocks, by_mean_stress)
+            set_free, self._set_free_at_rest = set_free + self._set_free_at_rest, 0.0
         if self.static:
             gone = {block: solutions[block] for block in cut if block in solutions}
             solutions = {block: of for block, of in solutions.items() if block not in gone}
@@ -367,6 +377,18 @@ class CrackEnergy:
             released = shown + share * (self._released.get(block, 0.0) - along)
             self._released[block] = released
             self._lost[block] = max(0.0, released - self._taken.get(block, 0.0)) if self.static else 0.0
+
+    @staticmethod
+    def _by_mean_stress_work(before: State, state: State, blocks: Blocks, by_mean_stress: ByMeanStress) -> np.ndarray:
+        """(n_blocks,) J/m, work of the mean stress between two states on the cracks of each block."""
+        strain = state.crack_strain - before.crack_strain
+        mean = 0.5 * (before.stress + state.stress)
+        each = blocks.areas(before.vertices) * np.sum(mean * strain, axis=1)
+        for block, known in by_mean_stress.fields.items():
+            each[block] += known.work_on_cracks(before, state)
+        if state.removed is not None:
+            each[state.removed] = 0.0
+        return each
 
     def _still(self, block: int, solutions: dict[int, Solution]) -> bool:
         """Whether, in statics, no crack of the ``block`` has grown in the present step."""

@@ -19,6 +19,7 @@ import numpy as np
 
 from ...model import OPEN, Loads, State
 from ...model.former_names import gathered_arguments
+from ..energy_balance import StepEnergy
 from ..kinematics.simplex_integration import block_moments
 from ..results import CrackResponse, NotConverged, StepResult
 from ..system import BlockSystem
@@ -69,6 +70,7 @@ class Equilibrium:
     moved       (n_blocks,) m, largest displacement of each block's vertices; of blocks drawn apart from all others,
                 since they landed
     result      the final StepResult, with contact and other forces (None if no step was made)
+    energies    of each static step, J/m; the work of loads that differ from those at the time it began is that of their mean
     """
 
     state: State
@@ -79,6 +81,7 @@ class Equilibrium:
     history: np.ndarray
     moved: np.ndarray
     result: StepResult | None
+    energies: tuple[StepEnergy, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -176,6 +179,7 @@ class _Relaxation:
         self.size = np.sqrt(blocks.areas())
         self.travelled = np.zeros(blocks.n_blocks)
         self.history: list[np.void] = []
+        self.energies: list[StepEnergy] = []
         self.result: StepResult | None = None
         #: Blocks that have moved beyond the limit, and the last step in which a block was in free flight.
         self.beyond_limit: tuple[int, ...] = ()
@@ -242,6 +246,7 @@ class _Relaxation:
             RELAXATION_STEP,
         )[()]
         self.history.append(row)
+        self.energies.append(result.energy)
         return row, moved
 
     def _at_rest(self, unbalanced: float) -> Equilibrium:
@@ -282,7 +287,7 @@ class _Relaxation:
         rows = np.array(self.history, RELAXATION_STEP) if self.history else np.empty(0, RELAXATION_STEP)
         log.info("static equilibrium: %s (%d steps)", reason, len(rows))
         moved = self.limit.moved(state.vertices)
-        return Equilibrium(rest, converged, collapsed, moving, reason, rows, moved, self.result)
+        return Equilibrium(rest, converged, collapsed, moving, reason, rows, moved, self.result, tuple(self.energies))
 
 
 def pseudo_times(system: BlockSystem) -> tuple[float, float]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import textwrap
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -192,7 +193,7 @@ class FieldPainter:
 
     @staticmethod
     def _fine(bar: Any, name: str, inches: float) -> None:
-        """Ticks and labels of a legend ``inches`` tall, with long names on two lines."""
+        """Ticks and labels of a legend ``inches`` tall, with long names on several lines."""
         bar.ax.tick_params(labelsize=7, colors=SOFT, length=2.5, width=0.6)
         bar.outline.set_linewidth(0.4)
         bar.set_label(_folded(name, int(inches / _LETTER)), fontsize=7.5, color=INK)
@@ -417,10 +418,8 @@ def _edges(grid: pv.UnstructuredGrid, use: np.ndarray | None) -> np.ndarray:
 
 
 def _folded(text: str, most: int) -> str:
-    if len(text) <= most or "," not in text:
-        return text
-    head, _, tail = text.partition(", ")
-    return f"{head},\n{tail}"
+    """``text`` on lines of ``most`` letters, or of one longer word."""
+    return "\n".join(textwrap.wrap(text, max(most, 1), break_long_words=False, break_on_hyphens=False))
 
 
 def _whole_numbers() -> Any:
