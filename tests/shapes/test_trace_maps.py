@@ -162,6 +162,53 @@ def test_a_second_of_a_section_in_motion(tmp_path):
     assert states < 20 and factorised < 0.1 and solved < 8 and left_out > 47
 
 
+GROWTH = """import resource, sys
+import numpy as np
+from geomech.coupling.cycle import Coupling
+from geomech.scene import load_scene
+coupling, before = Coupling(load_scene(sys.argv[1]).problem()), {}
+for cycle in coupling.cycles():
+    of = cycle.work
+    now = [of[name] for name in ("crack_factorisations", "solutions", "solutions_left_out", "elements_assembled")]
+    if cycle.growth_pass > 6:
+        print(*(a - b for a, b in zip(now, before)), cycle.statistics["open_close_iterations"], flush=True)
+    before = now
+    if cycle.growth_pass == 12:
+        break
+(grown,) = (of for of in coupling.now.solutions.values() if of.body.cracks.birth_cycle.any())
+fresh = grown.body.remeshed(grown.body.settings).solve(grown.load, warm=grown)
+k, whole = (np.stack([of.tips["k_i"], of.tips["k_ii"]]) for of in (grown, fresh))
+print(np.abs(k - whole).max() / np.abs(whole).max())
+print(grown.body.n_unknowns, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024)
+"""
+
+
+@pytest.mark.slow
+def test_a_crack_of_a_section_grows_through_many_passes_of_a_step(tmp_path):
+    """The section with K_Ic = 1 MPa√m in increments of 1.13 mm: a crack of a block with 3 000 unknowns grows through twelve
+    passes of the first step, which solve this block three times each and leave 47 others alone (0.5 s of processor time
+    each; 2.4 s as long as the influence of all its cracks on the boundary was computed again, and contacts found from the
+    beginning of the step). K is that of the body made anew."""
+    loaded("kb11", tmp_path)
+    path = tmp_path / "scene.toml"
+    scene = SCENE.format(area=SLOPE).replace("[[geometry.traces]]\n", '[[geometry.traces]]\nzones = ["rock"]\n')
+    scene = scene.replace("[dda]\n", "[growth]\nincrement_m = 1.13e-3\n[dda]\ndynamic_factor = 1.0\n")
+    path.write_text(scene + MOVING)
+    run = subprocess.run(
+        [sys.executable, "-c", GROWTH, str(path)],
+        capture_output=True,
+        text=True,
+        env=os.environ | {"OMP_NUM_THREADS": "1"},
+        check=True,
+    )
+    *passes, (error,), (unknowns, peak) = (list(map(float, line.split())) for line in run.stdout.splitlines())
+    assert len(passes) == 6 and unknowns > 2500
+    factorised, solved, left_out, elements, iterations = np.mean(passes, axis=0)
+    assert factorised <= 3 and solved < 5 and left_out == 47 and elements < 5 and iterations < 3
+    assert error < 1e-8
+    assert peak < 2.0e9
+
+
 def test_the_rock_of_many_blocks_has_no_seams():
     """A ring cut by lines of any direction: corners lie on their neighbours' sides but for round-off, and a plain union
     keeps slits there."""
