@@ -28,6 +28,7 @@ import numpy as np
 from ...model import GROUND, Bolt, JointLaw, State
 from ..kinematics.simplex_integration import block_moments
 from ..open_close.contact_set import ContactSet
+from ..open_close.interior_point.linear_programme import smallest
 from ..results import contact_resultants
 from ..system import BlockSystem
 
@@ -102,7 +103,7 @@ class AdmissibleForces:
         """U at the ``factor``, in units of the largest load, and dU/d(1/F). The unknowns are forces along both edges of
         the friction cone of each contact, shear carried by cohesion, bolt forces, and the unbalanced remainder. Raises
         `Unsolved`."""
-        from scipy import optimize, sparse
+        from scipy import sparse
 
         share = np.where(self.reduced, 1.0 / factor, 1.0)
         n, m = len(share), len(self.loads)
@@ -117,16 +118,12 @@ class AdmissibleForces:
         low = np.concatenate([np.zeros(2 * n), -hold, self.pull[:, 0], np.zeros(2 * m)])
         high = np.concatenate([np.full(2 * n, np.inf), hold, self.pull[:, 1], np.full(2 * m, np.inf)])
         cost = np.append(np.zeros(len(low) - 2 * m), np.ones(2 * m))
-        found = optimize.linprog(
-            cost, A_eq=matrix, b_eq=self.loads, bounds=np.stack([low, high], axis=1), method="highs-ipm"
-        )
-        if found.status != 0:
-            raise Unsolved(found.message)
-        friction = self.friction * self.reduced * (found.x[:n] - found.x[n : 2 * n])
-        slope = -float(found.eqlin.marginals @ (shear @ friction))
+        found = smallest(cost, matrix, self.loads - matrix @ low, high - low)
+        friction = self.friction * self.reduced * (found.unknowns[:n] - found.unknowns[n : 2 * n])
+        slope = -float(found.of_equations @ (shear @ friction))
         bond_rows, own = slice(2 * n, 2 * n + len(bonded)), (self.cohesion * self.reduced)[bonded]
-        slope += float(own @ (found.upper.marginals[bond_rows] - found.lower.marginals[bond_rows]))
-        return float(found.fun), slope
+        slope += float(own @ (found.of_bounds - found.of_signs)[bond_rows])
+        return found.cost, slope
 
     def balance(self, factor: float) -> bool:
         """Whether admissible forces exist at the ``factor``. Raises `Unsolved`."""
@@ -156,10 +153,6 @@ class AdmissibleForces:
             if high - factor <= precise * high or high - low <= 2.0 * precise * high:
                 return factor
             factor = factor if factor > low else 0.5 * (low + high)
-
-
-class Unsolved(RuntimeError):
-    """The linear programme could not be solved."""
 
 
 @dataclass(frozen=True, eq=False)

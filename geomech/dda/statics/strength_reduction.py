@@ -27,9 +27,10 @@ from typing import Any
 from ...model import Blocks, DdaSettings, JointLaw, Loads, Material, State
 from ...model.former_names import gathered_arguments, renamed_argument
 from ..joint_laws.reduced_strength import reduced
+from ..open_close.interior_point.linear_programme import Unsolved
 from ..results import NotConverged
 from ..system import BlockSystem
-from .admissible_forces import AdmissibleForces, Unsolved
+from .admissible_forces import AdmissibleForces
 from .counted_resistance import (
     as_rigid_blocks,
     bearing_toes,
