@@ -73,12 +73,15 @@ def test_faces_in_a_blade_that_elements_do_not_resolve_find_their_states():
     assert not any("the remaining violation" in line for line in found.warnings)
 
 
-def test_bonds_and_cement_that_hold_in_no_state_break():
+@pytest.mark.parametrize(
+    ("seed", "ends"), [(159, {"debonding"}), pytest.param(64, {"debonding", "split"}, marks=pytest.mark.slow)]
+)
+def test_bonds_and_cement_that_hold_in_no_state_break(seed, ends):
     """In every state with these bonds another contact was inconsistent; cement broke while its block was stiff, and held
-    once it had given way."""
-    found = watched(159, seconds=60.0)
+    once it had given way. (159 split as well, while its contacts still began without the forces of the in-situ stress.)"""
+    found = watched(seed, seconds=60.0)
     assert found.verdict == RIGHT and not found.faults
-    assert found.events["debonding"] and found.events["split"]
+    assert ends <= set(found.events)
 
 
 def test_what_does_not_hold_is_wrong_unless_a_warning_says_so(monkeypatch):
