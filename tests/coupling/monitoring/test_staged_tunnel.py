@@ -162,7 +162,7 @@ def excavations(found: list[Step]) -> list[tuple[Step, Step]]:
         pytest.param(1.0, True, "", 1e-4, marks=pytest.mark.slow),
         (1.0, True, ROUGH, 4e-4),
         pytest.param(0.0, False, "", 2e-6, marks=pytest.mark.slow),
-        (0.0, False, ROUGH, 2e-6),
+        pytest.param(0.0, False, ROUGH, 2e-6, marks=pytest.mark.slow),
     ],
 )
 def test_the_balance_closes_in_every_step(tmp_path, factor, deep, faces, within):
