@@ -29,6 +29,19 @@ def pytest_configure(config) -> None:
     config.stash[RECORDED] = {}
 
 
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(items) -> None:
+    """Of a test marked `first_by_default(n)` the first n cases belong to the default suite; the others are slow."""
+    seen: dict[tuple, int] = {}
+    for item in items:
+        if (marker := item.get_closest_marker("first_by_default")) is None:
+            continue
+        test = item.parent, item.originalname
+        seen[test] = seen.get(test, 0) + 1
+        if seen[test] > marker.args[0]:
+            item.add_marker(pytest.mark.slow)
+
+
 def pytest_sessionfinish(session) -> None:
     """Merge what was recorded into the file, locked because each worker of pytest-xdist ends with this."""
     if not (fresh := session.config.stash[RECORDED]):

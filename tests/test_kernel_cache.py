@@ -414,6 +414,7 @@ def test_variables_live_as_long_as_numba_lets_them():
         assert (ours.generator_info is None) == (numbas.generator_info is None)
 
 
+@pytest.mark.first_by_default(1)
 @pytest.mark.parametrize(
     ("owner", "name"),
     [

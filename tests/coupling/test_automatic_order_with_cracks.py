@@ -32,6 +32,7 @@ def at_rest(ratio: float, order: int, target: float = 0.01):
     return last
 
 
+@pytest.mark.first_by_default(2)
 @pytest.mark.parametrize(("ratio", "target", "least"), [(0.2, 0.1, 3), (0.2, 0.01, 5), (0.5, 0.1, 4), (0.5, 0.01, 6)])
 def test_a_cracked_cantilever_at_rest_finds_its_order(ratio, target, least):
     """Deflection within twice the target of that of order 8, and what a beam has that has this order from the first, as far as

@@ -84,6 +84,7 @@ def path_of_one_strain(ratio: float, time: np.ndarray) -> np.ndarray:
     return (1 - np.cos(np.sqrt(square) * time[:, None])) @ (tip * pushed / square)
 
 
+@pytest.mark.first_by_default(1)
 @pytest.mark.parametrize("ratio", [0.3, 0.5])
 def test_a_bent_block_swings_as_one_of_one_strain_does_and_gains_nothing(ratio):
     """Neither is nearly cut through (0.3 and 1.8 times softer). Taken under the forces that bend it, its crack brought
@@ -108,6 +109,7 @@ PARTS = (
 )  # fmt: skip
 
 
+@pytest.mark.first_by_default(1)
 @pytest.mark.parametrize("stiffness", [None, GLUE])
 def test_energy_of_a_cantilever_that_breaks_is_told_to_the_end(stiffness):
     """The crack runs through, the end of the beam falls: weight's work = kinetic + stored + lost + spent at the crack,

@@ -81,6 +81,7 @@ ALL = {
 }
 
 
+@pytest.mark.first_by_default(9)
 @pytest.mark.parametrize("name", ALL)
 def test_equilibrium_of_a_cracked_block_closes_under_every_load(name):
     records = list(cycles(problem(ALL[name])))

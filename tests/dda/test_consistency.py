@@ -56,6 +56,7 @@ def inconsistencies(result: dda.StepResult, friction: float, stiffness: float, s
     return out
 
 
+@pytest.mark.first_by_default(1)
 @pytest.mark.parametrize(("seed", "friction_deg", "dt"), [(1, 30.0, 2e-3), (2, 0.0, 5e-3), (3, 50.0, 1e-3)])
 def test_piles_are_consistent_at_every_step(seed, friction_deg, dt):
     system = pile(seed, 3, friction_deg, dt)

@@ -14,6 +14,7 @@ from geomech.conventions import normal_of
 from geomech.model import OPEN, Bolt, JointLaw, State
 
 
+@pytest.mark.first_by_default(2)
 @pytest.mark.parametrize(
     "n, law, most",
     [

@@ -25,6 +25,7 @@ def built(path, folder):
     return json.loads((folder / "block_system.json").read_text())
 
 
+@pytest.mark.first_by_default(1)
 @pytest.mark.parametrize("angle", [0.0, 0.4, 2.0])
 def test_joints_that_fragments_turned_into_outlines_are_counted_as_those_that_cut(tmp_path, angle):
     """Three joints in a square, two across it that cross, one that ends on the first: as lines, and as what

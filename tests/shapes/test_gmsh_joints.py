@@ -65,6 +65,7 @@ def test_an_interface_of_two_surfaces_that_is_called_a_joint_is_one(tmp_path):
     assert len(cutting.blocks.edges_named("joint:fault")) == 2
 
 
+@pytest.mark.first_by_default(2)
 @pytest.mark.parametrize(
     ("name", "version", "binary"),
     [
@@ -122,6 +123,7 @@ def test_files_of_shapes_give_a_zone_a_surface(tmp_path, suffix):
     assert drawing.zones[0].name
 
 
+@pytest.mark.first_by_default(4)
 @pytest.mark.parametrize(
     ("suffix", "says", "unit", "metres"),
     [

@@ -209,6 +209,7 @@ def near_cracks(rng, kind: str) -> list:
     return [[[0.3, gap], [0.5, rng.uniform(1, 5) * gap]]]
 
 
+@pytest.mark.first_by_default(2)
 @pytest.mark.parametrize("kind", ["parallel", "in line", "tip at a side", "beside the outline"])
 def test_no_flat_triangles_between_near_cracks(kind):
     """Angles were as small as 0.02 degrees. Triangles between cracks follow their distance down to a four-thousandth of

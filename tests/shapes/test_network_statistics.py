@@ -159,6 +159,7 @@ def test_cells_between_poisson_lines_have_four_sides():
     assert areas.mean() == pytest.approx(known["area"], rel=0.24)
 
 
+@pytest.mark.first_by_default(3)
 @pytest.mark.parametrize("law", ["constant", "normal", "uniform", "lognormal", "exponential"])
 def test_lines_of_a_parallel_set_have_the_spacing_and_persistence_asked_for(law):
     region = np.array([[0, 0], [400, 0], [400, 300], [0, 300]], dtype=float)
@@ -230,6 +231,7 @@ def test_the_block_size_curve_ends_with_all_the_rock():
     assert len(passing_curve(np.arange(1.0, 5000.0))) == 200
 
 
+@pytest.mark.first_by_default(1)
 @pytest.mark.parametrize(
     ("spacing", "deviation"), [("lognormal", 12.0), ("exponential", 0.0), ("normal", 2.0), ("uniform", 3.0)]
 )

@@ -78,6 +78,7 @@ def test_cracked_stacks_make_no_energy(seed):
     makes_no_energy(*stack(seed))
 
 
+@pytest.mark.first_by_default(1)
 @pytest.mark.parametrize(
     "seed", [61, 74, *(pytest.param(s, marks=pytest.mark.slow) for s in (*DEFAULT, *MORE) if s not in (61, 74))]
 )

@@ -176,6 +176,7 @@ def test_sharp_folds(caplog):
         ddm.Body([], folded(171), ROCK)
 
 
+@pytest.mark.first_by_default(2)
 @pytest.mark.parametrize("degrees", [150, 165, 168, 169.5])
 def test_folds_are_right_to_the_target_of_a_bare_body(degrees):
     """Coarse grading left faces that nearly meet 10 % off at 165° and anything beyond, whatever the target. Measured

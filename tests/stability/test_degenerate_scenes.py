@@ -128,6 +128,7 @@ def test_a_crack_that_ends_at_the_outline_to_round_off_is_a_mouth(run, gap):
     assert code == cli.DONE and "1 crack with 1 tip:" in shown
 
 
+@pytest.mark.first_by_default(1)
 @pytest.mark.parametrize(("size", "nu"), [(1 / 120, 0.21), (1e4 / 0.12, 0.21), (1.0, 0.49)])
 def test_a_plate_splits_alike_at_any_size(run, size, nu):
     """1 mm, 10 km, nearly incompressible: K of a crack in a plate under tension goes with √size and not with ν, so
@@ -226,6 +227,7 @@ def _wait_for_cycles(process: subprocess.Popen, out: Path, count: int) -> None:
     assert process.poll() is None
 
 
+@pytest.mark.first_by_default(1)
 @pytest.mark.parametrize(
     "how", [pytest.param(signal.SIGINT, marks=pytest.mark.other_machines), signal.SIGTERM, signal.SIGKILL]
 )

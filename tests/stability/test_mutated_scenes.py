@@ -97,6 +97,7 @@ def accepted(seed: int, folder: Path):
         return None
 
 
+@pytest.mark.first_by_default(2)
 @pytest.mark.parametrize("first", range(0, 50, 10))
 def test_spoilt_scenes_are_refused_with_their_place_or_read(first, tmp_path, monkeypatch):
     monkeypatch.setattr(isolated_reader, "SECONDS", 5)

@@ -8,7 +8,14 @@ from geomech.bench.robustness.stability import thin_maps
 from geomech.bench.robustness.stability_grid import REFUSED, RIGHT, WRONG
 
 #: Maps that take long.
-LONG = ("flying in a ring, rigid", "rings in rings", "thrown on a spike, rigid", "sticks on sticks")
+LONG = (
+    "flying in a ring, rigid",
+    "flying in a ring, elastic",
+    "a box of debris",
+    "rings in rings",
+    "thrown on a spike, rigid",
+    "sticks on sticks",
+)
 MAPS = [
     pytest.param(grid, id=grid.title, marks=[pytest.mark.slow] if grid.title in LONG else [])
     for grid in thin_maps(True)

@@ -82,6 +82,7 @@ def pressed(stress):
     return ddm.BodyLoad(segments=np.array([top, bottom]), tractions=np.array([[pull, pull], [-pull, -pull]]))
 
 
+@pytest.mark.first_by_default(1)
 @pytest.mark.parametrize("platens", [True, False])
 @pytest.mark.parametrize("phi_deg", [0.0, 90.0])
 def test_coupled_stress_intensity_is_that_of_the_crack_solver_alone(platens, phi_deg):

@@ -81,6 +81,7 @@ def test_a_rigid_platen_that_is_driven_bears_what_it_presses_with(moved_by):
     assert result.state.stress[2] == pytest.approx([0.0, -force * depth / 1.0, 0.0], rel=1e-4, abs=1.0)
 
 
+@pytest.mark.first_by_default(1)
 @pytest.mark.parametrize("dt", [1e-2, 1e-3])
 def test_friction_on_an_incline_is_that_of_the_rigid_block(dt):
     slope, friction = np.radians(30), np.radians(15)

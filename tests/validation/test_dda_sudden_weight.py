@@ -40,6 +40,7 @@ def travel(system, state, down) -> float:
     return float((state.vertices - system.blocks.vertices)[4:].mean(axis=0) @ down)
 
 
+@pytest.mark.first_by_default(5)
 @pytest.mark.parametrize(
     "dt", [0.1, 0.01, 1e-3, 5e-4, 1e-4, 5e-5, *(pytest.param(dt, marks=pytest.mark.slow) for dt in (2e-5, 1e-5))]
 )

@@ -96,6 +96,7 @@ def test_the_alpha_scheme_damps_short_waves_and_not_long_ones():
     assert np.abs(np.linalg.eigvals(exact.shi_amplification(1e4))).max() == pytest.approx(1.0, abs=1e-6)
 
 
+@pytest.mark.first_by_default(1)
 @pytest.mark.parametrize(("name", "decay_order"), [("Shi", 1), ("trapezoidal", None), ("damped", 1)])
 def test_decay_and_period_of_a_block_on_a_joint_have_their_orders(name, decay_order):
     """The joint is the spring. Measured over five periods, held against λ of the scheme, and the orders of its
@@ -225,6 +226,7 @@ def test_schemes_that_keep_an_acceleration_gain_no_energy_from_a_bounce(newmark,
     assert 0 < top < 2500.0 * 9.81 * 0.001
 
 
+@pytest.mark.first_by_default(3)
 @pytest.mark.parametrize("newmark", [(0.5, 0.75), (1.0, 1.25), (0.3, 0.55)])
 @pytest.mark.parametrize("damping", [0.0, 0.4])
 def test_steps_that_do_not_resolve_a_bounce_never_throw_the_block_higher(newmark, damping):
@@ -264,6 +266,7 @@ def test_rayleigh_damping_has_the_fractions_asked_for():
         assert peaks[1] / peaks[0] == pytest.approx(np.exp(-2 * np.pi * expected / np.sqrt(1 - expected**2)), rel=5e-4)
 
 
+@pytest.mark.first_by_default(1)
 @pytest.mark.parametrize("dt", [2e-3, 4e-4])
 def test_mass_damping_gives_a_falling_block_its_final_speed(dt):
     # m v' = m g − α m v: v = g/α (1 − exp(−α t)); both schemes are of second order with damping by the mean velocity.
@@ -275,6 +278,7 @@ def test_mass_damping_gives_a_falling_block_its_final_speed(dt):
         assert -state.velocity[0, 1] == pytest.approx(9.81 / 20 * (1 - np.exp(-2.0)), rel=2 * (20 * dt) ** 2)
 
 
+@pytest.mark.first_by_default(1)
 @pytest.mark.parametrize("name", ["Shi", "trapezoidal", "damped"])
 def test_angular_momentum_in_free_flight_is_kept_to_round_off(name):
     # A scheme that keeps the last acceleration kicks the spin with that of another geometry: 1e-7 here.

@@ -113,6 +113,7 @@ def test_a_pulse_comes_back_from_a_free_end_and_a_row_is_a_continuum_to_second_o
     assert np.log2(coarse / fine) == pytest.approx(2, abs=0.1)
 
 
+@pytest.mark.first_by_default(1)
 @pytest.mark.parametrize("newmark", [(0.25, 0.5), (0.5, 1.0)])
 def test_waves_gain_no_energy(newmark):
     n, dt = 40, 1e-4

@@ -272,6 +272,7 @@ def test_stiffness_from_the_slip_of_the_peak():
     assert not slip[sticks].any() and slip[-1] > 0
 
 
+@pytest.mark.first_by_default(4)
 @pytest.mark.parametrize("stiffness", [None, 2e10])
 @pytest.mark.parametrize("contact", ["penalty", "augmented"])
 @pytest.mark.parametrize("before", [0, 1])

@@ -91,6 +91,7 @@ def test_the_load_that_follows_a_crack_across_a_tall_plate():
     assert (np.diff(tension) < 0).all() and (np.diff(displacement[ratio < 0.8]) < 0).all()
 
 
+@pytest.mark.first_by_default(1)
 @pytest.mark.parametrize("increment", [2e-3, 1e-3])
 def test_a_load_that_follows_the_crack_releases_its_fracture_energy(increment):
     """A short plate: the displacement falls (snap-back), then rises. Work less stored energy is K_Ic²/E' a metre of

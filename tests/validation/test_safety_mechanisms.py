@@ -110,6 +110,7 @@ def test_runs_name_sharp_toes_that_hold(caplog, dynamic):
     assert moved > 1e-3 and not lines
 
 
+@pytest.mark.first_by_default(2)
 @pytest.mark.parametrize(("drop", "friction_deg"), [(0.5, 30), (0.5, 40), (60.0, 30), (0.0, 30)])
 def test_how_far_a_failed_block_goes_is_reported(drop, friction_deg):
     """Down a plane at 35° to a floor: drop/sin 35° with a sharp tip; farther by its rounding, by which the toe stands off;

@@ -5,6 +5,7 @@ import pytest
 from geomech.bench.safety import factor_cost, slope_factors
 
 
+@pytest.mark.first_by_default(1)
 @pytest.mark.parametrize("seed", [16, 42, 52])
 def test_a_face_open_at_one_end_keeps_its_cohesion_on_the_way_to_contact_states(seed):
     """Blocks that strain evenly part by a micrometre at one end of a plane; where the search for contact states took

@@ -94,6 +94,7 @@ def test_asking_makes_no_difference_to_what_moves():
     )
 
 
+@pytest.mark.first_by_default(1)
 @pytest.mark.parametrize("aperture", [np.inf, 0.0], ids=["slots", "closed"])
 def test_cracks_grow_when_they_would(aperture):
     """A weight that grows until cracks do: events, ways of tips and energy are the same with blocks left out before."""

@@ -70,6 +70,7 @@ def period(ratio: float) -> float:
     return 2 * math.pi * HEIGHT * math.sqrt(ROCK.density / 3 / ROCK.plane_modulus * (1 + softness_by_k(ratio)))
 
 
+@pytest.mark.first_by_default(1)
 @pytest.mark.parametrize("ratio", [0.5, 0.75])
 def test_a_cracked_block_bounces_as_its_ligament_s_compliance_has_it(ratio):
     """An edge crack through a half or three quarters, 2 or 16 times as soft as the bar: mean and largest strain and the

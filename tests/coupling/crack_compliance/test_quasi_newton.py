@@ -15,6 +15,7 @@ from geomech.dda import BlockSystem
 from geomech.model import History, Loads, State
 
 
+@pytest.mark.first_by_default(1)
 @pytest.mark.parametrize("friction", [0.0, 30.0])
 def test_passes_settle_on_shaken_bricks_with_closed_cracks(friction):
     """Bricks that fall onto each other and are shaken by 0.3 g at 10 Hz, one in three with a closed crack: contacts

@@ -59,6 +59,7 @@ def pulled(dt: float, dynamic: float = 1.0, **growth) -> Problem:
     )  # fmt: skip
 
 
+@pytest.mark.first_by_default(2)
 @pytest.mark.parametrize("dt", [1e-4, 2e-5, 6e-6])
 def test_a_driven_tip_runs_at_the_limit_and_no_faster(dt):
     """Driven hard all the time, the tip is where the limit lets it be, to one shortest increment (the last step may go

@@ -122,6 +122,7 @@ def test_sliding_alone_adds_up_whatever_the_step(dt):
     assert abs(told["crack_residual"]) < 2e-4 * told["crack_work"]
 
 
+@pytest.mark.first_by_default(1)
 @pytest.mark.parametrize(
     ("dt", "scheme"),
     [

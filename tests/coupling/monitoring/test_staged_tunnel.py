@@ -155,6 +155,7 @@ def excavations(found: list[Step]) -> list[tuple[Step, Step]]:
     return [(before, after) for before, after in pairwise(found) if "excavation" in after.events]
 
 
+@pytest.mark.first_by_default(1)
 @pytest.mark.parametrize(
     ("factor", "deep", "faces", "within"),
     [

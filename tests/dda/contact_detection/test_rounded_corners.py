@@ -296,7 +296,7 @@ def test_corners_that_meet_aside_keep_their_momenta(which):
         assert energy[-1, 1] < 0.95 and overlap == 0.0
 
 
-@pytest.mark.parametrize("bricks", [2, 5])
+@pytest.mark.parametrize("bricks", [2, pytest.param(5, marks=pytest.mark.slow)])
 @pytest.mark.parametrize(
     "settings", [{}, {"contact": "augmented"}, {"dynamic_factor": 0.0}], ids=["springs", "multipliers", "statics"]
 )

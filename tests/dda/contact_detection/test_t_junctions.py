@@ -37,6 +37,7 @@ def _run(nodes, along, friction_deg=30.0, end=0.4):
     return budget, np.array([state.vertices[-4:] - blocks.vertices[-4:] for state in states])
 
 
+@pytest.mark.first_by_default(1)
 @pytest.mark.parametrize("along", [
     [(0.0, 0.0), (0.1, 0.0), (0.2, -10.0), (0.4, -10.0)],       # sticks, past the node by 2e-4 of the face
     [(0.0, 0.0), (0.1, 0.0), (0.2, 10.0), (0.4, 10.0)],

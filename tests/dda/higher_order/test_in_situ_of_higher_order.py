@@ -113,6 +113,7 @@ def confined(order: int, angle: float = 0.0, **settings) -> dda.BlockSystem:
     return cells_of(cells, order, below=walls, joint=JointLaw("smooth"), rock=ROCK, angle=angle, **settings)
 
 
+@pytest.mark.first_by_default(2)
 @pytest.mark.parametrize("order", [2, 3])
 @pytest.mark.parametrize("k0", [1 / 3, 1.2])
 def test_cells_between_walls_are_at_rest_under_geostatic_stress(order, k0):

@@ -52,6 +52,7 @@ def test_blocks_of_unlike_order_keep_their_places_with_the_solver():
     assert more.solver is not first.solver
 
 
+@pytest.mark.first_by_default(1)
 @pytest.mark.parametrize("orders", [[3], [1, 2, 3, 3, 6]])
 def test_what_iterations_carry_along_is_what_they_would_compute(orders, monkeypatch):
     """In two steps of a wall: rows of blocks whose contacts have not changed are those of the whole matrix, bit for bit;

@@ -68,6 +68,7 @@ def floor() -> np.ndarray:
     return rectangle(-5, -1, 6, 0)
 
 
+@pytest.mark.first_by_default(2)
 @pytest.mark.parametrize("dt", STEPS)
 def test_a_block_dropped_flat_comes_up_to_e_squared_of_its_height(dt):
     seen = Fall([floor(), rectangle(0, 0.1, 1, 1.1)], dt, 0.2, restitution=0.5, friction=0.6)
@@ -97,6 +98,7 @@ def test_without_the_key_the_step_decides():
     assert "impact_loss" in seen.budget.statistics() and seen.budget.impact == 0.0
 
 
+@pytest.mark.first_by_default(1)
 @pytest.mark.parametrize("dt", (8e-3, 2e-3))
 def test_bounces_follow_each_other_as_a_geometric_series(dt):
     height, restitution = 0.5, 0.6

@@ -11,6 +11,7 @@ from geomech.model import Blocks, DdaSettings, Loads, Material, State
 ROCK = Material("rock", 10e9, 0.2, density=2500.0)
 
 
+@pytest.mark.first_by_default(1)
 @pytest.mark.parametrize("dt", [1e-5, 1e-4, 1e-3])
 def test_with_the_crack_open_and_closed_a_step_ends_on_the_same_side(dt):
     # Both responses agree where σ_yy = 0. If the step with the open crack ended in compression and that with the closed

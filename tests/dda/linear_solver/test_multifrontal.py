@@ -112,6 +112,7 @@ def test_factors_are_the_same_where_fronts_share_room_and_then_made_anew_in_full
     assert np.array_equal(shared._factors, own._factors)
 
 
+@pytest.mark.first_by_default(1)
 @pytest.mark.parametrize("single", [False, True])
 def test_few_changed_springs_need_no_factors_where_all_would_be_made_anew(monkeypatch, single):
     # As of 100 000 blocks, whose fronts are too many for each to keep what it has passed on.
@@ -275,6 +276,7 @@ def test_every_block_is_eliminated_once_and_reaches_upwards_only():
     assert np.diff(tree.pivots) @ np.diff(tree.reach) < 2.5 * 500 * np.log2(500)
 
 
+@pytest.mark.first_by_default(1)
 @pytest.mark.parametrize("turned", [0.0, np.radians(25)])
 def test_cuts_follow_the_short_rows_of_blocks(turned):
     # Bricks in courses of twelve, thirty courses high, as wide as they are high; their beds level or inclined.

@@ -218,6 +218,7 @@ def test_the_base_moves_as_its_record_says():
     assert state.velocity[1, :2] == pytest.approx(record.integral(0.7), abs=5e-4)
 
 
+@pytest.mark.first_by_default(1)
 @pytest.mark.parametrize("slope_deg", [0.0, 15.0])
 def test_sliding_on_a_shaken_base_is_newmarks_and_the_same_from_ground_and_base(slope_deg):
     record, friction, slope = History.sinusoid([4.0, 0.0], 1.5, end=0.5 / 1.5), 0.3, np.radians(slope_deg)
@@ -314,6 +315,7 @@ def test_a_platen_drives_contacts_that_do_not_penetrate(friction):
     assert result.statistics["reaction_y:platen"] == pytest.approx(2 * stress[1], rel=5e-4)
 
 
+@pytest.mark.first_by_default(1)
 @pytest.mark.parametrize("newmark", [(0.5, 1.0), (0.25, 0.5)])
 def test_the_work_of_a_shaken_base_and_of_a_yielding_bolt_closes_the_energy_budget(newmark):
     blocks = Blocks.from_polygons(

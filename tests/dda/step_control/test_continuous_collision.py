@@ -94,6 +94,7 @@ def c_with_wall(wall, x, tilt, ratio):
     return sum(result.energy.overlap for result in results) / work, results[-1].energy.kinetic / work
 
 
+@pytest.mark.first_by_default(3)
 @pytest.mark.parametrize(
     ("wall", "ratio"),
     [

@@ -79,6 +79,7 @@ def test_what_meets_is_not_bounded():
     assert not is_bounded(ddm.Body([OUTLINE], closed, ROCK, DdmSettings()))
 
 
+@pytest.mark.first_by_default(1)
 @pytest.mark.parametrize("criterion", sorted(ddm.criteria.CRITERIA))
 def test_no_mixture_drives_harder(criterion):
     """K_eq of any mixture of modes is no more than the bound times its size."""

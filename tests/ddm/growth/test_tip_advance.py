@@ -380,6 +380,7 @@ def random_network(rng):
     return Cracks.from_polylines([np.array(line.coords) for line in lines]), loops
 
 
+@pytest.mark.first_by_default(1)
 @pytest.mark.parametrize("seed", [*range(3), *(pytest.param(k, marks=pytest.mark.slow) for k in range(3, 40))])
 def test_random_networks_stay_sound(seed):
     """45 networks (600 with the slow ones) grown by random walks until nothing moves: every invariant holds at every

@@ -39,6 +39,7 @@ def factors(solution) -> np.ndarray:
     return np.stack([solution.tips["k_i"], solution.tips["k_ii"]], axis=1)
 
 
+@pytest.mark.first_by_default(2)
 @pytest.mark.parametrize("law", [JointLaw("smooth"), JointLaw("rough", friction_angle=0.5, cohesion=1e5)])
 @pytest.mark.parametrize("stress", [[2e5, 1e6, 1e5], [-1e6, -2e7, 7e6]], ids=["open", "closed"])
 def test_iterated_boundaries_solve_as_factored_ones(few, law, stress):
@@ -131,6 +132,7 @@ HELD = {
 }
 
 
+@pytest.mark.first_by_default(2)
 @pytest.mark.parametrize("supports", HELD.values(), ids=HELD)
 def test_held_boundaries_are_solved_as_factored_ones(few, supports):
     """Pinned, on rollers, in slanted directions, free to slide; sides that move, a hole that nothing holds: the

@@ -45,6 +45,7 @@ def pressed(stress) -> ddm.BodyLoad:
     return ddm.BodyLoad(segments=segments, tractions=np.repeat(t[:, None], 2, axis=1))
 
 
+@pytest.mark.first_by_default(2)
 @pytest.mark.parametrize("stress", [[0.0, 1e6, 3e5], [2e5, -1e6, 1e5]], ids=["tension", "compression"])
 @pytest.mark.parametrize("loops", [PLANE, SQUARE], ids=["plane", "square"])
 def test_compressed_bodies_solve_as_dense_ones(loops, stress):

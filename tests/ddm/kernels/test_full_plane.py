@@ -43,6 +43,7 @@ POINTS = [
 ]  # fmt: skip
 
 
+@pytest.mark.first_by_default(1)
 @pytest.mark.parametrize("kind", WEIGHTS)
 def test_moments_hold_ten_digits_from_touching_to_a_million_lengths(kind):
     """1e-10 of each moment, the accuracy that the far series is cut for; p = 12 is the highest order there is."""

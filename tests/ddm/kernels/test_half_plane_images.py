@@ -80,6 +80,7 @@ CASES = [
 POINTS = [(0.5, -0.45), (0.9, 0.0), (-2.0, -3.0), (40.0, -9.0), (2e3, -1e3), (-3e6, -1e6)]
 
 
+@pytest.mark.first_by_default(2)
 @pytest.mark.parametrize(("kind", "force"), [*[(kind, False) for kind in WEIGHTS], (shape_functions.ORDINARY, True)])
 def test_image_holds_ten_digits(kind, force):
     """1e-10 of what the element alone does at the point, the accuracy of the kernels of the plane."""

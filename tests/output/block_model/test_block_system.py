@@ -116,6 +116,7 @@ def test_bridges_run_from_end_to_end_and_to_what_is_ahead():
     assert rock_bridges(square, Cracks.from_polylines([])).shape == (0, 2, 2)
 
 
+@pytest.mark.first_by_default(1)
 @pytest.mark.parametrize("points", ["[[0, 9], [10, 9]]", "[[0, -0.5], [10, -0.5]]"], ids=["outside", "in fixed rock"])
 def test_one_drawn_joint_that_cuts_nothing_that_moves_is_drawn_all_the_same(tmp_path, capsys, points):
     """Its angle in the rock is none, which the picture's legend has to say."""

@@ -71,6 +71,7 @@ def test_colours_follow_the_displacement(run):
     assert height == pytest.approx(painter.figure.bbox.height)
 
 
+@pytest.mark.first_by_default(5)
 @pytest.mark.parametrize(
     "field", ["slip", "opening", "force", "K", "principal", "velocity.Y", "bolts.force", "blocks.material"]
 )

@@ -103,7 +103,8 @@ def test_an_order_that_is_found_reaches_the_run(tmp_path):
     assert np.ptp(np.asarray(Run(folder).grid("interior", 3)["stress"])[:, 1]) > 0
 
 
-@pytest.mark.parametrize("shape", ["triangles", "quads"])
+@pytest.mark.first_by_default(1)
+@pytest.mark.parametrize("shape", ["quads", "triangles"])
 def test_a_zone_of_cells_runs_and_resumes(tmp_path, shape):
     """Cells keep the names of the edges they lie on, and a monitor between two of them moves as either; the run goes on from
     its checkpoint as if it had not been broken off."""
@@ -182,6 +183,7 @@ checkpoint_every = 1
     assert (folder / "history.csv").read_bytes() == (whole / "history.csv").read_bytes()
 
 
+@pytest.mark.first_by_default(1)
 @pytest.mark.parametrize("zone", ["order = 3", "order = 2\nmesh_size_m = 0.5"])
 def test_a_zone_that_bends_is_driven_and_resumes(tmp_path, zone):
     more = """[[loads.point_motions]]
@@ -226,6 +228,7 @@ def test_what_cracks_do_not_go_with_is_refused(tmp_path, new, message):
         assert "zones.block.order" in str(error.value)
 
 
+@pytest.mark.first_by_default(1)
 @pytest.mark.parametrize("order", ["3", '"auto"'])
 def test_a_cracked_block_of_higher_order_resumes_to_the_bit(tmp_path, order):
     """A plate of order 3, or of an automatic one, that is pulled until its crack has cut it in two, and the same from a checkpoint on the way."""

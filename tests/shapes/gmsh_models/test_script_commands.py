@@ -181,6 +181,7 @@ def test_what_may_take_any_time_is_read_in_another_process(tmp_path, text):
     assert is_light(written(tmp_path, 'Mesh.Order = 1; x = (1 > 2) ? 1 : 2; // For\ny = "For {1:2}";'))
 
 
+@pytest.mark.first_by_default(1)
 @pytest.mark.parametrize(
     ("text", "why"),
     [
