@@ -31,6 +31,7 @@ from .entrance_edges import (
     find_contacts,
 )
 from .face_quadrature import FaceForces, FacePoints, give_by_bending
+from .inherited_contacts import misfit_of_new
 from .neighbour_search import NearPairs
 from .t_junctions import nodes_in_faces
 from .thin_walls import from_outside
@@ -291,6 +292,7 @@ class ContactFinder:
         """
         table, geometry, lift, state = met.table, met.geometry, remembered["lift"], remembered["state"]
         block, other = self._owner[table[:, 0]], self._owner[table[:, 1]]
+        lift = lift + misfit_of_new(old, (parent < 0) & (table[:, 2] < 0), block, other, geometry)
         # A step that rounding smooths away does not count, and a vertex that is slightly behind a line that it has not
         # touched brings no energy: contacts begin without force there.
         touching_depth = _TOUCHING_DEPTH * np.sqrt(np.minimum(self._area[block], self._area[other]))

@@ -17,6 +17,8 @@ from .face_quadrature import FacePoints
 if TYPE_CHECKING:
     from ..open_close.contact_set import ContactSet
 
+#: Faces of two blocks with a smaller angle between their normals (cosine) have the same misfit.
+_ALIGNED = 0.99
 #: A contact starts as sliding when its shear force is within this part of its strength: edges have rotated by strains
 #: since the force was computed.
 _AT_STRENGTH = 1e-3
@@ -106,3 +108,28 @@ def _closed_by(force: np.ndarray, stiffness: np.ndarray, closure: np.ndarray) ->
     """(n,) closure of springs of ``stiffness`` N/m under ``force`` N, m: linear, or hyperbolic with maximum
     ``closure`` m."""
     return force / (stiffness + force / closure)
+
+
+def misfit_of_new(old: np.ndarray, new: np.ndarray, block: np.ndarray, other: np.ndarray, geometry: np.ndarray):
+    """(n,) m: lifts ≤ 0 of contacts between ``block`` and ``other`` (n,) on ``geometry`` (n, 7); 0 unless ``new`` (n,).
+
+    Faces that do not fit each other overlap by their misfit where they touch. A corner that slides into such a face, or
+    past the end of an edge, begins there with the misfit of the nearest of the ``old`` CONTACT rows between the same
+    blocks in the same direction, and so without force."""
+    lift = np.zeros(len(new))
+    at = np.flatnonzero(new)
+    if not len(at) or not (old["lift"] < 0.0).any():
+        return lift
+    first, second = np.minimum(old["block"], old["other"]), np.maximum(old["block"], old["other"])
+    n_blocks = int(max(second.max(), block.max(), other.max())) + 1
+    key = np.minimum(block, other)[at] * n_blocks + np.maximum(block, other)[at]
+    keys = first * n_blocks + second
+    at = at[np.isin(key, keys[old["lift"] < 0.0])]
+    for c in at.tolist():
+        pair = (first == min(block[c], other[c])) & (second == max(block[c], other[c]))
+        pushes = np.where(old["block"] == block[c], 1.0, -1.0) * (old["normal"] @ geometry[c, 1:3])
+        rows = np.flatnonzero(pair & (pushes > _ALIGNED))
+        if len(rows):
+            apart = old["point"][rows] - geometry[c, 5:7]
+            lift[c] = min(float(old["lift"][rows[np.argmin(np.hypot(*apart.T))]]), 0.0)
+    return lift
