@@ -156,9 +156,14 @@ def changed(problem: Problem, kind: Repeat) -> Problem:
 
 
 def with_noise(problem: Problem, size: float, rng: np.random.Generator) -> Problem:
-    """``problem`` with each vertex of each block moved by up to ``size`` of the blocks' extent along x and y."""
+    """``problem`` with each vertex of each block moved by up to ``size`` of the blocks' extent along x and y; where the
+    outline of a block touches itself, together."""
     vertices = problem.blocks.vertices
     off = size * float(np.ptp(vertices, axis=0).max()) * rng.uniform(-1, 1, vertices.shape)
+    _, first, which = np.unique(
+        np.column_stack([problem.blocks.vertex_block, vertices]), axis=0, return_index=True, return_inverse=True
+    )
+    off = off[first[which.ravel()]]
     return replace(problem, blocks=problem.blocks.with_vertices(vertices + off))
 
 

@@ -53,6 +53,8 @@ class BoundaryLoad:
     - imbalance: resultant that inertia has to balance beyond the solver's own acceleration, relative to the forces
     - bases: rows of segments whose pressure is still to be found, and the traction (2,) per unit pressure
     - crack_pressure (scalar or (n_segments,)), hole_pressure: fluid pressures in unbounded rock, Pa
+    - single: CONTACT rows that act alone, on a corner or a short piece of an edge; of_single: begin and end of the rows
+      of their segments
     """
 
     segments: np.ndarray
@@ -68,6 +70,8 @@ class BoundaryLoad:
     bases: tuple[tuple[np.ndarray, np.ndarray], ...] = ()
     crack_pressure: np.ndarray | float = 0.0
     hole_pressure: float = 0.0
+    single: np.ndarray | None = None
+    of_single: tuple[int, int] = (0, 0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -126,7 +130,7 @@ def boundary_loads(
     )  # fmt: skip
     pointed = forces.route in ("springs", "kelvin-springs")
     given = asked, outlines(blocks, forces.vertices), blocks.vertex_start, acting, pointed
-    found, ends, stretch = _with_room(given, 16 * len(contacts) + 16 * n + len(forces.edges))
+    found, (ends, stretch, single, of_single) = _with_room(given, 16 * len(contacts) + 16 * n + len(forces.edges))
     strained = motion.gradient[numbers]
     body_force, gradient, even, imbalance = balanced(found, ends, shape, inertia, turn, stretch, strained)
     overstress = inertia.overstress
@@ -137,26 +141,29 @@ def boundary_loads(
     for k, ((a, i, j), (b, to_i, to_j)) in enumerate(zip(ends[:-1].tolist(), ends[1:].tolist())):
         on = tuple((np.arange(int(m) - a, int(o) - a), np.array([x, y])) for m, o, x, y in bases[j:to_j].tolist())
         at, pull = (inside[i:to_i, :2], inside[i:to_i, 2:]) if to_i > i else (None, None)
+        begin, end = acting.contact_ends[k].tolist()
+        alone = rows[acting.contact_rows[begin:end][single[begin:end]]]
         loads.append(
             BoundaryLoad(
                 np.ascontiguousarray(segments[a:b]), np.ascontiguousarray(tractions[a:b]), body_force[k], gradient[k],
                 shape.centroid[k], float(imbalance[k]), None if remote is None else remote[k], at, pull,
-                forces.route == "kelvin-springs", on,
+                forces.route == "kelvin-springs", on, single=alone,
+                of_single=(int(of_single[k, 0]), int(of_single[k, 1])),
             )
         )  # fmt: skip
     return loads
 
 
-def _with_room(given: tuple, room: int) -> tuple[Found, np.ndarray, np.ndarray]:
-    """Run `_pieces` with ``room`` for that many pieces, again with more if it does not suffice; returns `Found`, the
-    counts per block and Σ r ⊗ f."""
+def _with_room(given: tuple, room: int) -> tuple[Found, tuple[np.ndarray, ...]]:
+    """Run `_pieces` with ``room`` for that many pieces, again with more if it does not suffice; returns `Found`, and what
+    `_pieces` returns."""
     while True:
         found = Found(np.zeros(3, np.int64), np.empty((room, 8)), np.empty((room, 4)), np.empty((room, 4)))
-        ends, stretch = _pieces(found, *given)
+        per_block = _pieces(found, *given)
         count = found.count.tolist()
         if max(count) <= room:
             rows = (each[:many] for each, many in zip((found.pieces, found.inside, found.bases), count))
-            return Found(found.count, *rows), ends, stretch
+            return Found(found.count, *rows), per_block
         room = 2 * max(count)
 
 
@@ -203,9 +210,11 @@ class _Acting(NamedTuple):
 @kept(error_model="numpy", nogil=True)
 def _pieces(found, asked, of, vertex_start, acting, pointed):
     """Append the loads of the ``asked`` blocks to ``found``. Returns the number of rows of each kind before each block
-    (n + 1, 3), and Σ r ⊗ f (n, 2, 2) that the pieces do not reproduce."""
+    (n + 1, 3), Σ r ⊗ f (n, 2, 2) that the pieces do not reproduce, which of ``acting.contact_rows`` act alone, and begin
+    and end (n, 2) of their pieces among those of each block."""
     n = len(asked.numbers)
     ends, stretch = np.zeros((n + 1, 3), np.int64), np.zeros((n, 2, 2))
+    single, of_single = np.zeros(len(acting.contact_rows), np.bool_), np.zeros((n, 2), np.int64)
     for b in range(n):
         block, couple = asked.numbers[b], 0.0
         c, s = asked.turn[b, 0], asked.turn[b, 1]
@@ -235,8 +244,11 @@ def _pieces(found, asked, of, vertex_start, acting, pointed):
                 stretch[b, 0, 1] += amount * ax * ay
                 stretch[b, 1, 0] += amount * ax * ay
                 stretch[b, 1, 1] += amount * ay * ay
+            of_single[b, 0] = found.count[0] - ends[b, 0]
             for k in lone:
                 couple += add_lone(found, of, touches, k)
+                single[acting.contact_ends[b, 0] + k] = True
+            of_single[b, 1] = found.count[0] - ends[b, 0]
         for k in range(acting.edge_ends[b, 0], acting.edge_ends[b, 1]):
             add_edge_piece(found, of, acting.edge_forces[acting.edge_rows[k]], c, s)
         first, last = vertex_start[block], vertex_start[block + 1]
@@ -247,4 +259,4 @@ def _pieces(found, asked, of, vertex_start, acting, pointed):
         add_couple(found, of, first, last, asked.area[b], couple)
         for k in range(3):
             ends[b + 1, k] = found.count[k]
-    return ends, stretch
+    return ends, stretch, single, of_single

@@ -275,7 +275,9 @@ def threads_for(bodies: dict[int, Body]) -> int | None:
 
 
 #: The fields of a `BoundaryLoad` that define the load.
-_ASKED = tuple(each.name for each in fields(BoundaryLoad) if each.name not in ("imbalance", "bases"))
+_ASKED = tuple(
+    each.name for each in fields(BoundaryLoad) if each.name not in ("imbalance", "bases", "single", "of_single")
+)
 
 
 def _same_question(body: Body, known, asked: dict[str, np.ndarray | None]) -> bool:

@@ -5,7 +5,7 @@ by breaking cement and at growing tips, or released where blocks split.
 - Stored: a body with jumps [u] whose faces carry t, where the same loads would cause t₀ on closed faces, stores
   ½ ∫ (t₀ − t)·[u] more (Clapeyron).
 - Released over an increment a of growth: ∫ G da with G = (K_I² + K_II²)/E' (Irwin 1957), from G before it, at the kink,
-  and after it, with K linear in between.
+  and after it, with K linear in between, or along a kink in √s (`mean_release`).
 
 These are computed independently and must add up; the residual is reported. K is taken under the forces that strain the
 block: under its mean stress if it responds to that alone (`mean_stress_response`).
@@ -71,12 +71,14 @@ def _add(sums: dict[int, float], block: int, energy: float) -> None:
 
 @dataclass(frozen=True)
 class _Growing:
-    """A tip in ``block`` that grows by ``way``, m, from G = ``before``; ``cost``: fracture energy, J/m²."""
+    """A tip in ``block`` that grows by ``way``, m, at the angle ``kink``, rad, from G = ``before``; ``cost``: fracture
+    energy, J/m²."""
 
     way: float
     before: float
     block: int
     cost: float
+    kink: float
 
 
 @dataclass(eq=False)
@@ -172,7 +174,7 @@ class CrackEnergy:
             taken = of.way * of.cost
             _add(self._taken, of.block, taken)
             if key in now:
-                released = of.way * mean_release(of.before, now[key])
+                released = of.way * mean_release(of.before, now[key], of.kink)
                 _add(self._released, of.block, released)
                 _add(self._lost, of.block, max(0.0, released - taken) if self.static else 0.0)
             else:
@@ -185,7 +187,11 @@ class CrackEnergy:
         cost = np.array([m.k_ic for m in materials])[rock] ** 2 / modulus
         self._growing = {
             keys[row]: _Growing(
-                float(tips["grown"][row]), float(turned[row]), int(tips["block"][row]), float(cost[row])
+                float(tips["grown"][row]),
+                float(turned[row]),
+                int(tips["block"][row]),
+                float(cost[row]),
+                float(tips["angle"][row]),
             )
             for row in grows.tolist()
         }

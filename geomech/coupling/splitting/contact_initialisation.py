@@ -48,6 +48,9 @@ _FARTHEST = 0.02
 #: and overlap by the inherited gap when they close; on a thin ligament, without inertia, faces may have opened by any
 #: amount. Half of the overlap that is refused in a drawing.
 _OPENED = 0.5 * REFUSED
+#: Vertices of contacts closer together than this fraction of the size of the smaller block are at one corner: far beyond
+#: the rounding of corners and what joints slide before a block is cut, and far below the distance of corners.
+_SAME_PLACE = 1e-3
 #: Largest mean crack strain that counts as small: the strain at failure of rock is a few thousandths.
 _SMALL_STRAIN = 0.01
 #: Forces smaller than this fraction of the largest are round-off.
@@ -175,9 +178,20 @@ def contacts_after(
     for parent in cut:
         _inherit_along_walls(inherited, found, split, parent, solutions[parent], float(state.rotation[parent]))
         _inherit_along_divided_edges(inherited, found, split, before, parent, loads[parent], loaded, wet)
+    inherited.known |= _turned_away(found, state.contacts)
     return system.with_inherited_contacts(
         state, found, _contacts(system, found, inherited, blocks, np.isin(split.parent, cut) | _stiffer(split, before))
     )
+
+
+def _turned_away(found, kept: np.ndarray) -> np.ndarray:
+    """(n,) bool: contacts of ``found`` that act in another direction than the one ``kept`` from before (CONTACT rows): at a
+    vertex in a straight side that is cut there, of which the other part bears the face now. They start without force."""
+    if not len(kept):
+        return np.zeros(len(found), bool)
+    at = {(vertex, edge): row for row, (vertex, edge) in enumerate(zip(kept["vertex"].tolist(), kept["edge"].tolist()))}
+    row = np.array([at.get(key, -1) for key in zip(found.vertex.tolist(), found.edge.tolist())], int)
+    return (row >= 0) & (np.sum(found.geometry[:, 1:3] * kept["normal"][row], axis=1) <= _ALIGNED)
 
 
 def _stiffer(split: Split, before: Blocks) -> np.ndarray:
@@ -302,7 +316,7 @@ def _inherit_along_divided_edges(
 ) -> None:
     """Give the external traction on divided edges of ``parent``, and on edges at a duplicated vertex, to the contacts
     of its parts. Water pressure (EDGE_FORCE rows ``wet``) is subtracted. Where contacts and an edge ``load`` share a
-    side the traction cannot be attributed, and nothing is inherited."""
+    side the traction cannot be attributed, and nothing is inherited. Contacts that acted alone keep their forces."""
     blocks, owner = split.blocks, split.blocks.vertex_block
     old_vertices = np.bincount(split.vertex_origin[split.vertex_origin >= 0], minlength=before.n_vertices)
     twice = old_vertices > 1
@@ -318,6 +332,7 @@ def _inherit_along_divided_edges(
         if any(before.edge_names[name] in loaded for name in names.tolist()):
             continue
         rows = _contacts_on(found, split, blocks.sides[side])
+        rows = rows[~_acted_alone(found, rows, split, load)]
         if not len(rows):
             continue
         ends = blocks.sides[side][0], blocks.sides[side][-1]
@@ -332,6 +347,26 @@ def _inherit_along_divided_edges(
         inherited.force[rows] += sign[:, None] * lumped
         inherited.slip[rows] = found.slip[rows]
         inherited.known[rows] = True
+
+
+def _acted_alone(found, rows: np.ndarray, split: Split, load: BoundaryLoad) -> np.ndarray:
+    """(n,) bool: contacts ``rows`` (n,) that acted alone on the whole block under ``load``: on a corner, which a force
+    loads by shear along both edges, so that the traction on one side does not show it, or on a short piece of an edge.
+
+    Where two corners meet, either may be the vertex of their contact: place and direction tell which one it was."""
+    alone = np.zeros(len(rows), bool)
+    if load.single is None:
+        return alone
+    pair = np.stack([split.parent[found.block[rows]], split.parent[found.other[rows]]])
+    place, size = split.state.vertices, np.sqrt(split.blocks.areas())
+    near = _SAME_PLACE * np.minimum(size[found.block[rows]], size[found.other[rows]])
+    for one in load.single:
+        (a, b), (c, d) = pair, (one["block"], one["other"])
+        same, swapped = (a == c) & (b == d), (a == d) & (b == c)
+        aligned = np.where(same, 1.0, -1.0) * (found.geometry[rows, 1:3] @ one["normal"]) > _ALIGNED
+        at = place[np.argmax(split.vertex_origin == one["vertex"])]
+        alone |= (same | swapped) & aligned & (np.hypot(*(place[found.vertex[rows]] - at).T) <= near)
+    return alone
 
 
 def _water_on(wet: np.ndarray, a: np.ndarray, b: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -378,16 +413,20 @@ def _contacts_on(found, split: Split, side: list[int]) -> np.ndarray:
     touched = np.isin(found.edge, side[:-1]) & others[found.block] & (facing > _ALIGNED)
     touching = (found.block == block) & others[found.other] & (facing < -_ALIGNED)
     touching &= np.isin(found.vertex, side)
-    return np.flatnonzero(touched | touching)
+    # An open corner that faces no length of the side may be millimetres away from it.
+    apart = (found.state == OPEN) & (found.geometry[:, 4] == 0)
+    return np.flatnonzero((touched | touching) & ~apart)
 
 
 def _loads_on(load: BoundaryLoad, a: np.ndarray, b: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Places (k,) from 0 to 1 on the edge from ``a`` to ``b``, reference coordinates, and the forces (k, 2) N/m of
-    ``load`` there."""
+    ``load`` there, without those of contacts that act alone."""
     gauss, weight = np.polynomial.legendre.leggauss(_IN_LOAD)
     places, forces = [np.zeros(0)], [np.zeros((0, 2))]
     length = float(np.hypot(*(b - a)))
-    for segment, ends in zip(load.segments, load.tractions):
+    alone = slice(*load.of_single)
+    segments, tractions = (np.delete(each, alone, axis=0) for each in (load.segments, load.tractions))
+    for segment, ends in zip(segments, tractions):
         (s0, s1), _ = _along(segment, a, b)
         off = np.abs((segment - a) @ normal_of(b - a)) / length**2
         if off.max() > _ON_SIDE or s1 == s0:

@@ -130,7 +130,8 @@ class Graph:
 
 def noded(drawn: Drawn, tolerance: float, decimals: int, repairs: list[Repair]) -> Graph:
     """The graph of ``drawn`` with everything within ``tolerance`` (m) joined; repairs are added to ``repairs``."""
-    start, end, source = drawn.start, drawn.end, drawn.source
+    start, end = _ends_on_outlines(drawn, decimals)
+    source = drawn.source
     # Parts unchanged since the previous round are not examined again.
     fresh = np.ones(len(start), bool)
     for _ in range(_ROUNDS):
@@ -149,6 +150,27 @@ def noded(drawn: Drawn, tolerance: float, decimals: int, repairs: list[Repair]) 
             )
         ]
     )
+
+
+def _ends_on_outlines(drawn: Drawn, decimals: int) -> tuple[np.ndarray, np.ndarray]:
+    """Start and end of all segments; the ends of joints that are no farther from an outline than the drawing is rounded
+    to, two ``decimals`` less, are on it. Moved later, they would bend the joint at its crossings."""
+    import shapely
+
+    start, end = drawn.start.copy(), drawn.end.copy()
+    of_joint = drawn.source >= drawn.n_outlines
+    a, b = start[~of_joint], end[~of_joint]
+    outlines = shapely.STRtree(shapely.linestrings(np.stack([a, b], axis=1)))
+    for ends in (start, end):
+        at = np.flatnonzero(of_joint)
+        near, edge = outlines.query(shapely.points(ends[at]), predicate="dwithin", distance=10.0 ** (2 - decimals))
+        at, one = np.unique(at[near], return_index=True)
+        edge = edge[one]
+        along = b[edge] - a[edge]
+        t = np.sum((ends[at] - a[edge]) * along, axis=1) / np.sum(along * along, axis=1)
+        inside = (t > 0) & (t < 1)
+        ends[at[inside]] = np.round(a[edge] + t[:, None] * along, decimals)[inside] + 0.0
+    return start, end
 
 
 def _crossed(start, end, source, fresh, n_outlines, decimals, repairs) -> tuple[Graph, np.ndarray]:

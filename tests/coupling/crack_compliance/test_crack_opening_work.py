@@ -148,6 +148,16 @@ def test_release_between_two_loads_and_lengths_is_that_of_both_k():
     assert (last - first) * mean_release(*ends_of_it) == pytest.approx(exact, rel=0.03)
 
 
+@pytest.mark.parametrize("kink", [0.0, -0.5, 1.2, 0.5 * np.pi])
+def test_the_rule_over_an_increment_has_the_terms_of_the_angle(kink):
+    """Mean of K² where K changes linearly with the length, and with its root at a kink of 90°."""
+    place, weight = np.polynomial.legendre.leggauss(20)
+    place, weight = 0.5 * (place + 1.0), 0.5 * weight
+    linear, root = (float(weight @ (2.0 - 0.7 * of) ** 2) for of in (place, np.sqrt(place)))
+    share = np.sin(kink) ** 2
+    assert mean_release(4.0, 1.3**2, kink) == pytest.approx((1 - share) * linear + share * root, rel=1e-4)
+
+
 def test_nothing_is_released_where_faces_rub_and_nothing_grows():
     """A closed crack under two pressures, of which the second makes it slide: what the loads do on the jumps of each
     other differs by what the faces do there, and nothing is released, to 1e-2 of that."""

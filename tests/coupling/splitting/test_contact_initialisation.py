@@ -252,6 +252,26 @@ def test_platens_press_on_parts_as_on_the_whole():
     assert np.abs(result.state.vertices - now.state.vertices).max() < 1e-3 * 2.0 * 1e6 / ROCK.plane_modulus
 
 
+def test_a_single_corner_presses_on_as_it_did():
+    """A lid, inclined by 1°, presses on a corner of a plate that a crack cuts through from top to bottom. The crack solver
+    loads a corner along both of its edges: on the divided top no pressure is seen, and the corner had lost its force."""
+    problem = plate((0.0, 0.0), 0.6, line=[[0.1, -1.0], [0.1, 0.0], [0.1, 0.999]], platen=True)
+    lid = np.array([[-0.6, 0.998], [0.6, 1.022], [0.6, 1.3], [-0.6, 1.3]])
+    before = problem.blocks
+    names = [[["floor", "right", "roof", "left"]], [["", "", "floor", ""]], [["roof", "", "top", ""]]]
+    given = [before.loops(0)[0], before.loops(1)[0], lid]
+    blocks = Blocks.from_polygons(given, fixed=before.fixed, constrained=before.constrained, edge_names=names)
+    pressed = EdgeTraction("top", History.constant((0.0, -5e3)))
+    loads = replace(problem.loads, gravity=History.constant((0.0, -9.81)), edge_tractions=(pressed,))
+    now = stepped(replace(problem, blocks=blocks, loads=loads))
+    (held,) = now.state.contacts[(now.state.contacts["other"] == 2) & (now.state.contacts["normal_force"] > 0)]
+    assert held["normal_force"] > 5e3
+    cut(now, end=(0.1, 1.0))
+    (after,) = now.state.contacts[(now.state.contacts["other"] == 3) & (now.state.contacts["normal_force"] > 0)]
+    assert after["normal_force"] == pytest.approx(held["normal_force"], rel=1e-12)
+    assert after_a_step(now).state.contacts["normal_force"].max() < 1e5
+
+
 def test_neighbours_press_on_where_they_did():
     """Two neighbours whose corners meet on a divided edge, one of them by 1e-5 beyond the other: forces go to the
     contacts of the one that they are under, whatever their order; nothing is lost, nor a moment."""

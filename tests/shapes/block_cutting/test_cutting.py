@@ -302,6 +302,21 @@ def test_repairs_name_the_junction_at_their_place():
     assert all(1e-6 < m.size < 1e-5 for m in cutting.repairs)
 
 
+def test_a_rotated_drawing_has_the_same_corners():
+    """Rounded to its twelve digits, an end that was drawn on an outline lies beside it; moved onto it after the crossings
+    were found, it bent its joint at the first of them, which became a corner of the block beyond."""
+    rng, turned = np.random.default_rng(2), []
+    outline = np.array([[0.0, 0.0], [13.0, 0.0], [13.0, 9.0], [0.0, 9.0]])
+    lines = [np.array([[x, 0.0], [x + rng.uniform(-6, 6), 9.0]]) for x in rng.uniform(6, 7, 4)]
+    lines += [np.array([[0.0, y], [rng.uniform(9, 12), y + rng.uniform(-4, 4)]]) for y in rng.uniform(2, 7, 3)]
+    for angle in np.radians([0.0, 10.0, 37.0, 75.0]):
+        turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+        joints = [Joint("joint:a", (line @ turn.T,)) for line in lines]
+        turned.append(cut([Zone("rock", (outline @ turn.T,))], joints, dead_ends="trim").blocks)
+    assert turned[0].n_blocks > 10
+    assert {(blocks.n_blocks, blocks.n_vertices) for blocks in turned} == {(turned[0].n_blocks, turned[0].n_vertices)}
+
+
 def fine_network(seed: int) -> tuple[np.ndarray, ...]:
     """Long traces at angles down to 1e-6° to one another, gaps of 1e-9 to 1e-6 m beside them and before them."""
     rng = np.random.default_rng(seed)
