@@ -21,7 +21,7 @@ CSV = {
 }
 ROWS = {
     "history.csv": "One row per cycle. These columns are followed by the statistics of the step (`dt`, `open_close_iterations`, "
-    "energies, `budget_residual`, `worst_penetration` …), displacements of monitors (`NAME_ux`, `NAME_uy`, m) and "
+    "energies, `budget_residual`, `worst_penetration` …; `remaining_motion`, in statics: displacement until the blocks rest, over that so far), displacements of monitors (`NAME_ux`, `NAME_uy`, m) and "
     "forces in bolts.",
     "tips.csv": "One row per tip and cycle.",
     "events.csv": "One row per event.",

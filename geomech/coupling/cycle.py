@@ -229,7 +229,7 @@ class Coupling:
         else:
             self.mechanism.warn_at_the_end(self.now.state.time)
         if not self.endless:
-            check_dissipation(self.now.budget, self.now.state.time, self.static)
+            check_dissipation(self.now.budget, self.now.state.time, self.static, self.now.crack_energy.toughness)
             if not self.problem.dda.equilibrium:
                 dda.warn_of_toes_at_rest(self.now.system, self.now.state, self.problem.loads)
 
@@ -378,6 +378,8 @@ class Coupling:
         self.overlaps.check(budget, overlap, now.blocks.names, result.state.time)
         if grown.ends or len(grown.cut):
             self.unstable.check(budget, result.state.time)
+        if self.static:
+            statistics["remaining_motion"] = self.mechanism.remaining
         if self.tips is not None and (len(found.tips) or found.left_out):
             statistics["fastest_tip"] = self.tips.speed.fastest(step.whole)
         return _EnergyBalance(budget, statistics)

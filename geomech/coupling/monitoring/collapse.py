@@ -11,7 +11,7 @@ from ...model import Event, State
 from ..coupled_state import CrackedBlocks
 from ..cycle_record import event
 from ..load_pass import at_rest
-from .mechanism import Mechanism
+from .mechanism import Mechanism, loads_are_steady
 
 log = logging.getLogger(__name__)
 
@@ -71,7 +71,8 @@ def lost(now: CrackedBlocks, state: State) -> tuple[Event, ...]:
 
 def unsupported(now: CrackedBlocks, result: dda.StepResult, mechanism: Mechanism) -> tuple[Event, ...]:
     """A mechanism event if blocks of a static run keep accelerating after the load step of ``result``."""
-    found = mechanism.check(result, now.blocks)
+    time = result.state.time
+    found = mechanism.check(result, now.blocks, loads_are_steady(now.problem.loads, time - result.dt, time))
     if found is None:
         return ()
     block, detail = found

@@ -44,9 +44,9 @@ class BudgetWatch:
         )
 
 
-def check_dissipation(budget: EnergyBudget, time: float, static: bool) -> None:
+def check_dissipation(budget: EnergyBudget, time: float, static: bool, broken: float = 0.0) -> None:
     """Warn at the end of a run, ``time`` s, if the time integration has damped vibrations that matter to its result,
-    or, in statics, a motion from one place to another."""
+    or, in statics, a motion from one place to another. ``broken``: J/m of fracture energy, of cracks that have grown."""
     energy, turnover = budget.last, budget.turnover
     if static:
         if turnover and budget.scheme > UNHELD * turnover:
@@ -59,9 +59,10 @@ def check_dissipation(budget: EnergyBudget, time: float, static: bool) -> None:
                 budget.scheme / turnover,
             )
         return
-    if energy is None or not turnover or energy.kinetic < IN_MOTION * turnover:
+    if energy is None or not turnover:
         return
-    if budget.breaking > BREAKS * turnover:
+    moves = energy.kinetic >= IN_MOTION * turnover
+    if moves and budget.breaking > BREAKS * turnover:
         log.warning(
             "t = %g s: bonds broke within steps over which their forces would have done %.2g of all converted energy, and "
             "their blocks still move: when a bond breaks is known to one step only, and the result is uncertain by that "
@@ -69,15 +70,16 @@ def check_dissipation(budget: EnergyBudget, time: float, static: bool) -> None:
             time,
             budget.breaking / turnover,
         )
-    if budget.scheme < DISSIPATED * turnover:
+    if budget.scheme < DISSIPATED * turnover or not (moves or broken > 0):
         return
     log.warning(
-        "t = %g s: the time integration has taken %.2g of all converted energy from blocks that still move (scheme_loss in "
+        "t = %g s: the time integration has taken %.2g of all converted energy from blocks %s (scheme_loss in "
         "history.csv): the step does not resolve vibrations or impacts that matter to the result, whose error is of "
         'that order and shrinks with dda.time_step_s. dda.equilibrium = "start" avoids the vibration due to a '
         "suddenly applied load; dda.newmark = [0.25, 0.5] has no dissipation",
         time,
         budget.scheme / turnover,
+        "that still move" if moves else "whose cracks have grown in motion",
     )
 
 

@@ -173,6 +173,16 @@ class History:
             value = value + self.wave.at(time)
         return value
 
+    def is_steady(self, begin: float, end: float) -> bool:
+        """Whether the value is the same all the time from ``begin`` to ``end`` s."""
+        if self.wave is not None:
+            apart = begin >= self.wave.end or end <= self.wave.start
+            return apart and replace(self, wave=None).is_steady(begin, end)
+        if self.rate is not None and np.any(self.rate) and end > self.times[-1]:
+            return False
+        between = self.times[(self.times > begin) & (self.times < end)]
+        return all(np.array_equal(self.at(begin), self.at(time)) for time in (*between, end))
+
     def scaled(self, factor: ArrayLike) -> History:
         """This history times ``factor``: a number, or one per component (k,)."""
         wave = self.wave

@@ -16,6 +16,8 @@ AT_REST = 1e-2
 #: … and their kinetic energy is below this part of the energy stored in blocks and contacts (steady sliding is in
 #: equilibrium, too).
 STILL = 1e-2
+#: In statics the displacement that is left is also below this part of the largest (`Mechanism.remaining`).
+RESTS = 1e-2
 #: Number of blocks that are named.
 NAMED = 5
 #: A block counts as stable if it has moved by less than this part of its size √area, and at its velocity would not
@@ -30,7 +32,8 @@ def condition(cycle: Cycle) -> str:
     if math.isnan(unbalanced):
         return ""
     strained = statistics.get("elastic_energy", 0.0) + statistics.get("contact_energy", 0.0)
-    if unbalanced < AT_REST and statistics["kinetic_energy"] <= STILL * strained:
+    settled = statistics["kinetic_energy"] <= STILL * strained and statistics.get("remaining_motion", 0.0) <= RESTS
+    if unbalanced < AT_REST and settled:
         return "at rest"
     contacts, alone = cycle.state.contacts, ~np.asarray(cycle.blocks.fixed, dtype=bool)
     if cycle.state.removed is not None:

@@ -7,6 +7,7 @@ import re
 from dataclasses import replace
 from itertools import islice, pairwise
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -16,7 +17,7 @@ from geomech.bench.slopes.drawn_slopes import drawn, problem_of
 from geomech.bench.slopes.random_slopes import scene_text
 from geomech.coupling import cycles
 from geomech.coupling.monitoring import pass_agreement
-from geomech.coupling.monitoring.energy_check import UNPAID, BendingWatch, BudgetWatch
+from geomech.coupling.monitoring.energy_check import UNPAID, BendingWatch, BudgetWatch, check_dissipation
 from geomech.coupling.monitoring.pass_agreement import DISAGREES, AgreementWatch
 from geomech.dda.energy_balance import GAIN, EnergyBudget, StepEnergy
 from geomech.model import (
@@ -45,6 +46,16 @@ def test_a_share_beyond_the_bound_is_told_and_again_when_it_has_doubled(caplog):
     first, second = [record.getMessage() for record in caplog.records]
     assert first.startswith("t = 3 s: -0.015 of all converted energy") and "reduce the time step" in first
     assert second.startswith("t = 5 s: 20 of all converted energy")
+
+
+@pytest.mark.parametrize(
+    ("kinetic", "broken", "told"), [(10.0, 0.0, "still move"), (0.0, 1.0, "have grown"), (0.0, 0.0, "")]
+)
+def test_what_the_time_scheme_takes_matters_to_motion_and_to_cracks_that_grew_in_it(caplog, kinetic, broken, told):
+    budget = SimpleNamespace(last=SimpleNamespace(kinetic=kinetic), turnover=100.0, scheme=20.0, breaking=0.0)
+    with caplog.at_level(logging.WARNING):
+        check_dissipation(budget, 1.0, False, broken)
+    assert told in caplog.text and ("taken 0.2 of all" in caplog.text) == bool(told)
 
 
 def test_passes_that_do_not_agree_are_told_of_and_again_when_it_has_doubled(caplog):

@@ -11,13 +11,14 @@ import pytest
 
 from geomech import dda
 from geomech.coupling import cycles
-from geomech.coupling.monitoring.mechanism import Mechanism
+from geomech.coupling.monitoring.mechanism import Mechanism, loads_are_steady
 from geomech.model import (
     GROUND,
     Blocks,
     Bolt,
     Cracks,
     DdaSettings,
+    Excavation,
     History,
     JointLaw,
     Loads,
@@ -26,6 +27,7 @@ from geomech.model import (
     RunSettings,
     State,
 )
+from geomech.output.tables.motion_state import condition
 
 SQUARE = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
 
@@ -70,6 +72,48 @@ def test_a_run_that_ends_out_of_balance_says_so(caplog, friction_deg, warns):
     with caplog.at_level(logging.WARNING, "geomech"):
         assert not [e for c in cycles(replace(problem, run=RunSettings(end_time=0.03))) for e in c.events]
     assert ("ends out of balance: 9" in caplog.text) == warns
+
+
+@pytest.mark.parametrize("time_step", [0.02, 0.005])
+@pytest.mark.parametrize("short_of", [0.02, 1e-3, 0.0, -1e-3])
+def test_a_little_too_little_strength_is_a_mechanism_at_any_step(caplog, short_of, time_step):
+    """Sliding at a hundredth or a thousandth of g leaves less than 1 % of the forces out of balance; the block is not at rest."""
+    problem = on_a_slope(30.0, math.degrees(math.atan((1.0 - short_of) * math.tan(math.radians(30.0)))))
+    problem = replace(problem, dda=replace(problem.dda, time_step=time_step), run=RunSettings(end_time=24 * time_step))
+    with caplog.at_level(logging.WARNING, "geomech"):
+        seen = list(cycles(problem))
+    told = [event.kind for cycle in seen for event in cycle.events]
+    assert told == (["mechanism"] if short_of > 0 else [])
+    assert condition(seen[-1]) == ("sliding" if short_of > 0 else "at rest")
+    assert (seen[-1].statistics["remaining_motion"] > 1e6) == (short_of > 0)
+
+
+def test_a_run_that_ends_before_its_blocks_rest_says_how_much_is_missing(caplog):
+    """A tower of 100 m sinks into its joints in steps of 10 ms, for hundreds of them: no mechanism at any time."""
+    polygons = [np.array([[-1, -5], [11, -5], [11, 0], [-1, 0]], float)]
+    polygons += [10 * SQUARE + [0, 10 * k] for k in range(10)]
+    blocks = Blocks.from_polygons(polygons, fixed=[True] + 10 * [False])
+    ends = {}
+    for steps in (100, 400):
+        caplog.clear()
+        problem = replace(on_a_slope(0.0, 30.0), blocks=blocks, run=RunSettings(end_time=0.01 * steps))
+        with caplog.at_level(logging.WARNING, "geomech"):
+            seen = list(cycles(problem))
+        assert not [event for cycle in seen for event in cycle.events]
+        assert ("block 10 has about 8" in caplog.text) == ("ends out of balance" in caplog.text) == (steps == 100)
+        ends[steps] = seen[-1].state.vertices[-1, 1] - blocks.vertices[-1, 1], seen[-1].statistics["remaining_motion"]
+        assert condition(seen[-1]) == ("at rest" if steps == 400 else "sliding")
+    assert ends[100][0] * (1 + ends[100][1]) == pytest.approx(ends[400][0], rel=1e-2)
+
+
+def test_loads_that_change_are_told_from_steady_ones():
+    loads = Loads(
+        gravity=History.table([0.0, 1.0, 3.0], [[0.0, 0.0], [0.0, -9.81], [0.0, -9.81]]),
+        excavations=(Excavation(5.0, (1,)),),
+        bolts=(Bolt(1, (0.5, 0.5), GROUND, (0.5, 3.0), 1e6, installation=7.0),),
+    )
+    expected = {0.5: False, 1.5: True, 4.5: False, 5.5: True, 6.5: False, 7.5: True}
+    assert {begin: loads_are_steady(loads, begin, begin + 0.6) for begin in expected} == expected
 
 
 def test_a_run_may_end_at_a_mechanism():

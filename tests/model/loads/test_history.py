@@ -104,3 +104,14 @@ def test_a_baseline_that_is_a_polynomial_is_taken_off_whole(degree):
     # Chords of the quadratic's velocity are a second-order approximation, 401 times.
     assert found.values == pytest.approx(again.values, abs=1e-12 if degree < 2 else 1e-5)
     assert abs(found.integral(10.0)[0]) < 0.01 * abs(drifting.integral(10.0)[0])
+
+
+def test_what_changes_within_an_interval_is_not_steady():
+    table = History.table([0.0, 1.0, 2.0, 3.0], [0.0, 5.0, 5.0, 0.0])
+    begun_and_ended = [(-2.0, 0.0, True), (0.0, 0.5, False), (1.0, 2.0, True), (0.5, 2.5, False), (3.0, 9.0, True)]
+    for begin, end, steady in begun_and_ended:
+        assert table.is_steady(begin, end) is steady
+    assert History.ramp([1.0], start=2.0).is_steady(0.0, 2.0) and not History.ramp([1.0], start=2.0).is_steady(0.0, 2.1)
+    wave = History.sinusoid([1.0], 2.0, start=1.0, end=2.0)
+    # Equal at both ends and half-way, and not steady.
+    assert wave.is_steady(0.0, 1.0) and wave.is_steady(2.0, 3.0) and not wave.is_steady(1.0, 2.0)
