@@ -6,7 +6,7 @@ displacement d of the step, this is a balance of works. Each work equals a chang
     kinetic    d·M ā      = ΔT + (loss of the time scheme; none where d = ½ (v + v′) dt, as in Shi's)
     loads      F̄·d        = ½ (F + F′)·d + (θ − ½) ΔF·d (`step_actions`)
     elastic    A σ̄·Δε     = ΔU + ½ A (σ + σ′)·Δe_c (the strain of cracks) + (θ − ½) A Δσ·Δε
-    contact   −N̄ Δn − S̄ Δs = ΔΦ + friction + dashpots + broken bonds + (θ − ½) k Δg² + (θ − ½) ΔS²/kₛ …
+    contact   −N̄ Δn − S̄ Δs = ΔΦ + friction + dashpots + crushing + broken bonds + (θ − ½) k Δg² + (θ − ½) ΔS²/kₛ …
 
 Forces are weighted between the start and the end of the step (weight θ at the end; 1 in Shi's scheme, see `newmark`).
 The dissipation of the implicit scheme is computed, not inferred, so the balance of each step closes to round-off.
@@ -55,6 +55,7 @@ class StepEnergy(NamedTuple):
     impact           dissipated normal to the contact in impacts with a coefficient of restitution (`impacts`); their
                      friction is part of ``friction``
     beyond_mean      work of the loads that the step takes beyond that of their mean, part of ``scheme`` (`step_actions`)
+    crushing         dissipated by faces that crush, ≥ 0
     breaking         work that the bonds which break in the step would have done with their forces at its start: when they
                      break within the step is not known
     """
@@ -73,6 +74,7 @@ class StepEnergy(NamedTuple):
     carried: float
     overlap: float
     residual: float
+    crushing: float = 0.0
     impact: float = 0.0
     beyond_mean: float = 0.0
     breaking: float = 0.0
@@ -163,7 +165,8 @@ class ContactStep(NamedTuple):
     was_state, state      at its start and at its end
     was_bonded, bonded    bond state at its start and at its end
     gap0, gap             at its start and at its end, from where the faces meet, m
-    arc, lifted           parts of the change of gap due to rotation of the blocks and to dilation, m
+    arc, lifted           parts of the change of gap due to rotation of the blocks and to dilation or crushing, m
+    crushed               irreversible closure by crushing, ≥ 0, which is also in ``lifted``, m
     slip, sliding         plastic slip, and motion along the edge, m
     normal_force          acting over the step, N
     shear_force0, shear_force, end_shear    at its start, acting over it, and at its end, N
@@ -183,6 +186,7 @@ class ContactStep(NamedTuple):
     gap: np.ndarray
     arc: np.ndarray
     lifted: np.ndarray
+    crushed: np.ndarray
     slip: np.ndarray
     sliding: np.ndarray
     normal_force: np.ndarray
@@ -206,7 +210,7 @@ def _rubbing(shear, normal, mean):
 
 #: Positions of the terms of `StepEnergy` in the sums of a step.
 _KINETIC, _ELASTIC, _CONTACT, _BEFORE, _GRAVITY_WORK, _LOAD_WORK, _CRACK_WORK = range(7)
-_FRICTION, _DAMPING, _BOND, _SCHEME, _CARRIED, _OVERLAP, _RESIDUAL = range(7, 14)
+_FRICTION, _DAMPING, _BOND, _SCHEME, _CARRIED, _OVERLAP, _RESIDUAL, _CRUSHING = range(7, 15)
 
 
 @part(fastmath=False, error_model="numpy", nogil=True, **UNCOUNTED)
@@ -262,7 +266,7 @@ def _kinetic_energies(b, motion, mass, rate):
 
 @part(fastmath=False, error_model="numpy", nogil=True, **UNCOUNTED)
 def _add_blocks(out, motion, stress, mass, scheme, gravity, room):
-    """Add the terms of blocks to ``out`` (14,); ``room`` (3,) is work space."""
+    """Add the terms of blocks to ``out`` (15,); ``room`` (3,) is work space."""
     increment = motion.increment
     kinetic = elastic = before = fallen = loads = cracks = viscous = scheme_loss = lost = 0.0
     for b in range(increment.shape[0]):
@@ -297,15 +301,15 @@ def _add_blocks(out, motion, stress, mass, scheme, gravity, room):
 
 @part(fastmath=False, error_model="numpy", nogil=True, **UNCOUNTED)
 def _add_contacts(out, contacts, closure):
-    """Add the terms of contacts to the sums ``out`` (14,); ``closure`` (n_laws,) m: largest closure of a joint's faces."""
-    contact = overlap = friction = bond = 0.0
+    """Add the terms of contacts to the sums ``out`` (15,); ``closure`` (n_laws,) m: largest closure of a joint's faces."""
+    contact = overlap = friction = bond = crushing = 0.0
     before, viscous, scheme_loss = out[_BEFORE], out[_DAMPING], out[_SCHEME]
     for i in range(contacts.state.shape[0]):
         was, state, theta = contacts.was_state[i], contacts.state[i], contacts.theta[i]
         kn, g0, g1, limit = contacts.normal[i], contacts.gap0[i], contacts.gap[i], closure[contacts.law[i]]
         give = theta / contacts.shear[i] if contacts.shear[i] > 0.0 else 0.0
         lost = contacts.was_bonded[i] > 0 and contacts.bonded[i] == 0
-        phi0 = phi1 = given = frictional = drag = done = beyond = 0.0
+        phi0 = phi1 = given = frictional = drag = done = beyond = plastic = 0.0
         if was != OPEN:
             shear0 = contacts.shear_force0[i]
             phi0 = _stored(kn, g0, limit, contacts.was_bonded[i]) + 0.5 * give * shear0 * shear0
@@ -316,21 +320,26 @@ def _add_contacts(out, contacts, closure):
                 given = _stored(kn, g0, limit, 0)
             phi1 = _stored(kn, g1, limit, contacts.bonded[i]) + 0.5 * give * end * end
             # Forces act along the straight motion: the difference of the work along the arc belongs to the scheme.
-            lifted, slid = contacts.lifted[i], contacts.sliding[i]
+            lifted, slid, crushed = contacts.lifted[i], contacts.sliding[i], contacts.crushed[i]
             across = g1 - g0 - contacts.arc[i] + lifted
             done = pushed * across + sheared * slid
             beyond = (pushed - contacts.mean_normal[i]) * across + (sheared - contacts.mean_shear[i]) * slid
             if state == SLIP:
                 rubbing = _rubbing(sheared, pushed, contacts.mean_normal[i])
-                frictional = -rubbing * (contacts.slip[i] if give > 0.0 else slid) - contacts.mean_normal[i] * lifted
+                frictional = -rubbing * (contacts.slip[i] if give > 0.0 else slid) - contacts.mean_normal[i] * (
+                    lifted + crushed
+                )
+            # Faces crush at their limit only.
+            plastic = pushed * crushed
             if kn > 0.0:
                 start = g0 if was != OPEN and contacts.was_bonded[i] > 0 else min(g0, 0.0)
                 spring = -theta * _push(kn, g1, limit) - (1.0 - theta) * _push(kn, start, limit)
                 drag = -(pushed + spring) * (g1 - g0)
-        rest = given - done - (phi1 - phi0) - frictional - drag
+        rest = given - done - (phi1 - phi0) - frictional - drag - plastic
         contact += phi1
         overlap += given
         friction += frictional
+        crushing += plastic
         viscous += drag
         if lost:
             bond += rest + beyond
@@ -339,22 +348,23 @@ def _add_contacts(out, contacts, closure):
             scheme_loss += rest
     out[_BEFORE], out[_DAMPING], out[_SCHEME] = before, viscous, scheme_loss
     out[_CONTACT], out[_OVERLAP], out[_FRICTION], out[_BOND] = contact, overlap, friction, bond
+    out[_CRUSHING] = crushing
 
 
 @kept(fastmath=False, error_model="numpy", nogil=True)
 def step_energies(motion, stress, mass, scheme, gravity, contacts, closure):
-    """The terms of `StepEnergy` in their order, without impacts, (14,) J/m.
+    """The terms of `StepEnergy` in their order, without impacts, (15,) J/m.
 
     Plain tuples: ``motion``, ``stress`` and ``mass`` of the blocks (`StepMotion`, `StepStress`, `BlockMass`),
     ``scheme`` (`SchemeTerms`), ``gravity`` (2,) m/s², ``contacts`` (`ContactStep`), and ``closure`` (n_laws,) m, the
     largest closure of joints with Bandis' law, inf for others.
     """
-    out = np.zeros(14)
+    out = np.zeros(15)
     blocks = StepMotion(*motion), StepStress(*stress), BlockMass(*mass), SchemeTerms(*scheme)
     _add_blocks(out, *blocks, gravity, np.empty(3))
     _add_contacts(out, ContactStep(*contacts), closure)
     work = out[_GRAVITY_WORK] + out[_LOAD_WORK] + out[_OVERLAP]
-    losses = out[_FRICTION], out[_DAMPING], out[_BOND], out[_SCHEME], out[_CARRIED]
+    losses = out[_FRICTION], out[_DAMPING], out[_BOND], out[_SCHEME], out[_CARRIED] + out[_CRUSHING]
     out[_RESIDUAL] = out[_KINETIC] + out[_ELASTIC] + out[_CONTACT] - out[_BEFORE]
     out[_RESIDUAL] -= work - out[_CRACK_WORK] - losses[0] - losses[1] - losses[2] - losses[3] - losses[4]
     return out
@@ -365,7 +375,7 @@ class EnergyBudget:
     """Energies of a run, J/m: sums over its steps. ``budget = budget.after(result.energy, result.state.time)``.
 
     work       of weight and loads
-    losses     friction, damping, bonds, impacts, time scheme, velocity not carried over, cracks
+    losses     friction, damping, bonds, crushing, impacts, time scheme, velocity not carried over, cracks
     overlap    created by overlapping blocks; ``drawn``: the part created in the first step, by overlaps in the drawing
     start      stored at the start of the first step
     stored     stored now
@@ -479,9 +489,12 @@ _COLUMNS = {
     "friction_loss": "friction",
     "damping_loss": "damping",
     "bond_loss": "bond",
+    "crushing_loss": "crushing",
     "impact_loss": "impact",
     "scheme_loss": "scheme",
     "carried_loss": "carried",
     "overlap_energy": "overlap",
 }
-_LOSSES = [_SUMS[name] for name in ("crack_work", "friction", "damping", "bond", "impact", "scheme", "carried")]
+_LOSSES = [
+    _SUMS[name] for name in ("crack_work", "friction", "damping", "bond", "crushing", "impact", "scheme", "carried")
+]

@@ -114,7 +114,7 @@ class BlockSystem:
         self._parted: np.ndarray | None = None
         self._take_out(None, None)
         ordered = blocks.order is not None and (np.asarray(blocks.order) != 1)[~self.fixed].any()
-        if ordered or blocks.glued is not None:
+        if ordered or blocks.glued is not None or self._crushes:
             refuse_unsupported(blocks, self.materials, self.joints, self.settings)
             self._choose_orders()
         #: Strength of the bonded faces; None if they cannot separate.
@@ -163,11 +163,17 @@ class BlockSystem:
                 "blocks without mass have no equation of motion"
             )
 
+    @property
+    def _crushes(self) -> bool:
+        """Whether faces crush, at integration points as those of blocks of higher order have."""
+        return any(law.crushing_strength is not None for law in self.joints)
+
     def _choose_orders(self) -> None:
         """Set the orders of blocks: those given, or the first of their choice."""
         choice = OrderChoice(
-            self.blocks, self.fixed, self.density, self.stiffness, self.compliance, self.settings.order_target
-        )
+            self.blocks, self.fixed, self.density, self.stiffness, self.compliance, self.settings.order_target,
+            self._crushes,
+        )  # fmt: skip
         self.order_choice = choice if choice.found.any() else None
         self.order = np.zeros(self.blocks.n_blocks, np.int64)
         self._take_orders(choice, choice.first)

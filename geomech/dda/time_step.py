@@ -58,7 +58,7 @@ from .results import CrackResponse, StepResult
 
 if TYPE_CHECKING:
     from .interfaces import SteppedSystem
-    from .joint_laws.nonlinear_laws import CurvedJoints
+    from .joint_laws.nonlinear_laws import NonlinearLaws
 
 #: A dynamic step whose contact areas of faces have not converged after this multiple of ``max_open_close_iterations``
 #: is cut, this many times at most: two half steps take a tenth of the iterations (a thousand sliding blocks: 400
@@ -441,7 +441,7 @@ class Attempt:
             self._edges_along = found.edge, along
         return along
 
-    def _over_the_step(self, found: ContactSet) -> tuple[Springs, np.ndarray, float | np.ndarray, CurvedJoints | None]:
+    def _over_the_step(self, found: ContactSet) -> tuple[Springs, np.ndarray, float | np.ndarray, NonlinearLaws | None]:
         """Contacts ``found`` over the step: springs, starting gaps (n,), weight of the end of the step, nonlinear laws."""
         system = self.system
         curved = system.finder.curved(found)
@@ -823,7 +823,7 @@ class Attempt:
         stress = StepStress(self.stress, self.tangent, self.stress0, system.compliance, system.stiffness)
         contacts = ContactStep(
             found.state, settled.state, found.bonded, settled.bonded, found.gap_before, settled.gap,
-            found.arc + np.zeros(len(found)), settled.lifted, settled.slip, self.slid, settled.normal_force,
+            found.arc + np.zeros(len(found)), settled.lifted, self._crushed(), settled.slip, self.slid, settled.normal_force,
             found.shear, settled.shear_force, end_shear, *means, normal, shear, weight, found.law,
         )  # fmt: skip
         energies = step_energies(
@@ -861,6 +861,10 @@ class Attempt:
             # Elastic energy released where faces separate is a vibration that no step resolves.
             scheme=energy.scheme - self.frictional + found.released,
         )
+
+    def _crushed(self) -> np.ndarray:
+        """(n,) m: irreversible closure of faces that crush in the step."""
+        return np.where(np.isfinite(self.found.springs.crushing), 0.0 - self.settled.lifted, 0.0)
 
     def _breaking(self) -> float:
         """`StepEnergy.breaking` of the step, J/m."""

@@ -17,6 +17,7 @@ BLOCKS = {
     "friction_loss": "friction",
     "damping_loss": "damping",
     "bond_loss": "broken bonds",
+    "crushing_loss": "crushed faces",
     "impact_loss": "impacts",
     "scheme_loss": "time scheme",
     "carried_loss": "velocity carried over",

@@ -76,6 +76,7 @@ LAW = {
     "softening_slip": (-1.0, NAN, INF),
     "dilation_slip": (0.0, -1.0, NAN),
     "max_closure": (0.0, -1.0, NAN, INF),
+    "crushing_strength": (0.0, -1.0, NAN, INF),
     "restitution": (-0.1, 1.1, NAN),
 }
 ROCKS = {

@@ -28,9 +28,20 @@ def test_every_key_of_a_joint_arrives(scene_file):
     assert (r.jrc, r.jcs, r.length, r.sample_length, r.from_peak_slip) == (10.0, 5e7, 1.0, 0.2, True)
 
 
+def test_faces_that_crush(scene_file):
+    (law,) = load_scene(scene_file(GOOD + HEAD + "crushing_strength_pa = 3e6\n")).problem().joints
+    assert law.crushing_strength == 3e6 and law.straight
+
+
 @pytest.mark.parametrize(
     ("text", "place", "message", "way_out"),
     [
+        ("crushing_strength_pa = 0\n", "crushing_strength_pa", "", ""),
+        ("crushing_strength_pa = 1e6\nfriction_angle_deg = 9\ndilation_angle_deg = 5\n", "crushing_strength_pa",
+         "does not go with", "leave it out"),
+        ("crushing_strength_pa = 1e6\n[joints.ball]\nedges = ['load:top']\nrestitution = 0.5\n", "crushing_strength_pa", "ball", "leave it out"),
+        ("crushing_strength_pa = 1e6\n[dda]\nsprings = 'resolved'\n", "crushing_strength_pa", "stiff penalty", "leave"),
+        ("crushing_strength_pa = 1e6\n[cracks.flaw]\njoint = 'default'\n", "cracks.flaw.joint", "do not crush", "without"),
         ("cohesion_pa = -1\n", "cohesion_pa", "", "cohesion"),
         ("jrc = 21\njcs_pa = 1e8\n", "jrc", "at most 20", "roughness"),
         ("jrc = 10\n", "jrc", "no jcs_pa", "add jcs_pa"),

@@ -12,7 +12,8 @@ import numpy as np
 from ...model import OPEN, SLIP, STICK, Blocks, DdaSettings, JointLaw, State, corner_lengths
 from ..counters import Work
 from ..joint_laws.bonds import BondedFaces
-from ..joint_laws.nonlinear_laws import CurvedJoints
+from ..joint_laws.crushing import CrushingFaces
+from ..joint_laws.nonlinear_laws import CurvedJoints, NonlinearLaws
 from ..joint_laws.penalty_springs import JointTable, Springs, contact_springs, least_face, penalties, resolved
 from ..joint_laws.whole_faces import WholeFaces
 from ..open_close.contact_set import ContactSet
@@ -99,6 +100,7 @@ class ContactFinder:
         self._modulus, self._area = modulus, blocks.areas()
         self._table = JointTable.of(joints)
         self._rebounds = bool(np.isfinite(self._table.restitution).any())
+        self._crushes = bool(np.isfinite(self._table.crushing).any())
         self._stiff = ~np.isnan(self._table.normal_stiffness)
         # Waves cross bonded faces as they cross rock.
         self._yields = ~self._stiff & (self._table.tension == 0.0) & (self._table.cohesion == 0.0)
@@ -510,13 +512,14 @@ class ContactFinder:
 
     @property
     def stiff_laws(self) -> np.ndarray:
-        """(n_laws,) bool: laws with a normal joint stiffness."""
-        return self._stiff
+        """(n_laws,) bool: laws with a normal joint stiffness, and those that crush: springs at points of their faces are
+        proportional to the length that each has."""
+        return self._stiff | np.isfinite(self._table.crushing)
 
     @property
     def stiff_along_laws(self) -> np.ndarray:
-        """(n_laws,) bool: laws with a shear joint stiffness."""
-        return self._stiff_along
+        """(n_laws,) bool: laws with a shear joint stiffness, and those that crush."""
+        return self._stiff_along | np.isfinite(self._table.crushing)
 
     @property
     def closure(self) -> np.ndarray:
@@ -533,8 +536,11 @@ class ContactFinder:
             np.isnan(t.shear_stiffness[found.law]) & ~by_peak,
         )
 
-    def curved(self, found: ContactSet) -> CurvedJoints | None:
+    def curved(self, found: ContactSet) -> NonlinearLaws | None:
         """The contacts of ``found`` with nonlinear laws; None where there are none."""
+        if self._crushes and np.isfinite(found.springs.crushing).any():
+            # (In a system with such faces no law is curved: `higher_order.unsupported`.)
+            return CrushingFaces(found)
         if not (self._table.curved.any() and self._table.curved[found.law].any()):
             return None
         return CurvedJoints(self._table, found)

@@ -240,6 +240,7 @@ class FacePoints:
             shear=np.where(stiff_in_shear, lumped.shear * ratio, lumped.shear * share),
             cohesion=lumped.cohesion * ratio,
             tension=lumped.tension * ratio,
+            crushing=lumped.crushing * ratio,
         )
 
     def on_bonded(self, faces: BondedFaces) -> BondedFaces:

@@ -167,9 +167,9 @@ class OrderChoice:
 
     def __init__(
         self, blocks: Blocks, fixed: np.ndarray, density: np.ndarray, elastic: np.ndarray, compliance: np.ndarray,
-        target: float,
+        target: float, points_always: bool = False,
     ) -> None:  # fmt: skip
-        self.blocks, self.target = blocks, target
+        self.blocks, self.target, self._points_always = blocks, target, points_always
         self.found = np.zeros(len(fixed), bool) if blocks.order is None else (blocks.order == AUTO_ORDER) & ~fixed
         given = np.ones(len(fixed), int) if blocks.order is None else blocks.order
         self.first = np.where(fixed | self.found, 1, given).astype(np.int64)
@@ -181,8 +181,9 @@ class OrderChoice:
         self.judged = 0
 
     def deflected(self, order: np.ndarray) -> DeflectedBlocks | None:
-        """The blocks with these orders (n_blocks,); None where all are of first order and none are cells."""
-        if not (order > 1).any() and self.blocks.glued is None:
+        """The blocks with these orders (n_blocks,); None where all are of first order, none are cells and their faces need
+        no points."""
+        if not (order > 1).any() and self.blocks.glued is None and not self._points_always:
             return None
         return DeflectedBlocks(self.blocks, self._fixed, self._density, self._elastic, order)
 

@@ -1,4 +1,4 @@
-"""Features that blocks of higher order do not support yet, refused by name."""
+"""Features that blocks of higher order, and faces that crush, do not support yet, refused by name."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from .deflection_basis import HIGHEST
 def refuse_unsupported(
     blocks: Blocks, materials: Sequence[Material], joints: Sequence[JointLaw], settings: DdaSettings
 ) -> None:
-    """Raise ValueError for features of the model that ``blocks`` with orders above 1 do not support."""
+    """Raise ValueError for features of the model that ``blocks`` with orders above 1, or faces that crush, do not support."""
     order = np.ones(blocks.n_blocks, int) if blocks.order is None else np.asarray(blocks.order)
     if not (((order >= 1) & (order <= HIGHEST)) | (order == AUTO_ORDER)).all():
         raise ValueError(f"the order of a block is 1 to {HIGHEST}, got {order.min()} to {order.max()}")
@@ -25,7 +25,11 @@ def refuse_unsupported(
     bends |= cells
     names = blocks.names or tuple(f"block {b}" for b in range(blocks.n_blocks))
 
+    crushing = next((law.name for law in joints if law.crushing_strength is not None), None)
+
     def refuse(which: np.ndarray, why: str) -> None:
+        if crushing is not None and which is bends:
+            raise ValueError(f"joint {crushing!r} has a crushing strength: {why}")
         if which.any():
             block = int(np.argmax(which))
             order_text = '"auto"' if order[block] == AUTO_ORDER else order[block]

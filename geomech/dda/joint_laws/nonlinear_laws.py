@@ -12,7 +12,7 @@ Bakhtar (1985) fig. 4; closure: Bandis, Lumsden & Barton (1983) eq. 8.
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
@@ -53,6 +53,35 @@ def rough_strength(
     return pressure * slope, tangent, 0.5 * (angle - residual_angle)
 
 
+class NonlinearLaws(Protocol):
+    """Contacts ``rows`` (k,) of a step whose forces are not linear in their motion within a state.
+
+    ``continued()`` begins a sequence of laws that lead to the actual ones, for iterations that do not converge, and
+    ``proceeded()`` continues with the next one of it; both return whether there was any.
+    """
+
+    rows: np.ndarray
+
+    def continued(self) -> bool: ...
+
+    def proceeded(self) -> bool: ...
+
+    def lines(
+        self, springs: Springs, gap: np.ndarray, found: ContactSet, state: np.ndarray, direction: np.ndarray,
+        bonded: np.ndarray, normal_force: np.ndarray, plastic: np.ndarray,
+    ) -> tuple[Springs, np.ndarray]: ...  # fmt: skip
+
+    def misfit(
+        self, was: Springs, gap_was: np.ndarray, now: Springs, gap_now: np.ndarray, state: np.ndarray,
+        forces: np.ndarray, slack: np.ndarray,
+    ) -> np.ndarray: ...  # fmt: skip
+
+    def lifted(
+        self, springs: Springs, gap: np.ndarray, found: ContactSet, direction: np.ndarray, slip: np.ndarray,
+        forces: np.ndarray,
+    ) -> np.ndarray: ...  # fmt: skip
+
+
 class CurvedJoints:
     """The contacts of a step whose laws, of those in ``table``, are curved."""
 
@@ -62,6 +91,12 @@ class CurvedJoints:
         self._cohesive = self.length if found.cohesive is None else found.cohesive[at]
         self._wear, self._slip = found.wear[at], found.slip[at]
         self._table = table
+
+    def continued(self) -> bool:
+        return False
+
+    def proceeded(self) -> bool:
+        return False
 
     def lines(
         self,
@@ -197,3 +232,11 @@ class CurvedJoints:
         off = np.maximum(off, np.where(closed & ~slips, sprung, 0.0))
         out[at] = np.where(off > size, off, 0.0)
         return out
+
+    def lifted(
+        self, springs: Springs, gap: np.ndarray, found: ContactSet, direction: np.ndarray, slip: np.ndarray,
+        forces: np.ndarray,
+    ) -> np.ndarray:  # fmt: skip
+        """(n,) m: dilation in the step by ``slip`` (n,) m, with the ``forces`` (n, 4) of `check_states`."""
+        along = forces[:, 3] + found.stretch
+        return springs.lift * np.where(springs.lift * direction < 0, slip, along)

@@ -35,7 +35,7 @@ _LEAST_FACE = 0.05
 @dataclass(frozen=True, eq=False)
 class JointTable:
     """Joint laws as arrays (n_laws,). Stiffness is nan where the penalty is used, ``jrc`` 0 where a joint is not rough,
-    ``closure`` inf where stiffness is constant. Friction and dilation are tangents of angles, lengths m, stresses
+    ``closure`` inf where stiffness is constant, ``crushing`` inf where faces do not crush. Friction and dilation are tangents of angles, lengths m, stresses
     Pa."""
 
     friction: np.ndarray
@@ -53,6 +53,7 @@ class JointTable:
     peak_slip: np.ndarray
     stiff_by_peak: np.ndarray
     closure: np.ndarray
+    crushing: np.ndarray
     restitution: np.ndarray
     normal_stiffness: np.ndarray
     shear_stiffness: np.ndarray
@@ -82,6 +83,7 @@ class JointTable:
             peak_slip=rough(lambda r: r.peak_slip, np.inf),
             stiff_by_peak=rough(lambda r: r.from_peak_slip, 0.0) > 0,
             closure=column(lambda j: j.max_closure, np.inf),
+            crushing=column(lambda j: j.crushing_strength, np.inf),
             restitution=column(lambda j: j.restitution),
             normal_stiffness=column(lambda j: j.normal_stiffness),
             shear_stiffness=column(lambda j: j.shear_stiffness),
@@ -95,7 +97,8 @@ class Springs:
 
     A sliding contact carries ``friction`` N + ``sliding``, a sticking one up to ``peak`` N + ``hold``, plus
     ``cohesion`` while it is bonded; it opens at the tensile force ``tension``. ``lift``: dilation, m per m of slip
-    along the edge's direction. ``keeps``: contacts that keep some cohesion after slip. Nonlinear laws are represented
+    along the edge's direction. ``keeps``: contacts that keep some cohesion after slip. ``crushing``: largest normal
+    force, infinite without limit (`crushing`). Nonlinear laws are represented
     by their tangents at the present forces (`CurvedJoints`).
     """
 
@@ -109,6 +112,7 @@ class Springs:
     tension: np.ndarray
     lift: np.ndarray
     keeps: np.ndarray
+    crushing: np.ndarray
 
 
 def penalties(
@@ -165,8 +169,8 @@ def contact_springs(
     """Springs of contacts with joint ``law`` (n,) and tributary ``length`` (n,) m before slip.
 
     If a law has a stiffness (Pa/m), that times the tributary length, or times ``least`` (n,) m (`least_face`) if
-    longer, replaces the penalty (Pa). A single corner has no tributary length and neither cohesion nor tensile
-    strength.
+    longer, replaces the penalty (Pa). A single corner has no tributary length: neither cohesion nor tensile strength, and
+    no limit of its normal force.
     """
     bearing = np.maximum(length, least)
     kn, ks = table.normal_stiffness[law], table.shear_stiffness[law]
@@ -182,6 +186,7 @@ def contact_springs(
         tension=table.tension[law] * length,
         lift=nothing,
         keeps=(table.residual_cohesion[law] > 0) | (table.softening[law] > 0),
+        crushing=np.where(length > 0.0, table.crushing[law] * np.where(length > 0.0, length, 1.0), np.inf),
     )
 
 

@@ -15,7 +15,7 @@ from ...model import OPEN
 from ..open_close.contact_set import ContactSet
 from ..open_close.equations import Unsettled
 from ..open_close.settled_states import Settled
-from .nonlinear_laws import CurvedJoints
+from .nonlinear_laws import NonlinearLaws
 from .penalty_springs import Springs
 
 #: Tolerance of shear forces, relative to the contact's force, as for nonlinear laws.
@@ -30,7 +30,7 @@ def settle_sheared_sticks(
     springs: Springs,
     gap: np.ndarray,
     stretch: np.ndarray,
-    curved: CurvedJoints | None,
+    curved: NonlinearLaws | None,
 ) -> Settled:
     """Result of ``settle`` for the contacts ``found`` with the motion ``stretch`` (n,) m in their shear springs;
     ``springs``, starting ``gap`` (n,) m and ``curved`` laws of the step as for `open_close.settle`.

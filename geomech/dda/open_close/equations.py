@@ -11,7 +11,7 @@ from ...model import OPEN, SLIP
 from ..equation_records import BlockEquations, ContactMotion, ContactStiffness, SpringsInStates
 from ..joint_laws.bonds import BondedFaces, FaceBonds, ForcesBefore, check_faces, first_to_break
 from ..joint_laws.coulomb_return import ContactStates, Strengths, check_states, contact_forces
-from ..joint_laws.nonlinear_laws import CurvedJoints
+from ..joint_laws.nonlinear_laws import NonlinearLaws
 from ..joint_laws.penalty_springs import Springs
 from ..linear_solver import assembly
 from ..linear_solver.block_solver import RESIDUAL
@@ -93,7 +93,7 @@ class Equations:
     springs: Springs
     gap: np.ndarray
     slack: np.ndarray
-    curved: CurvedJoints | None
+    curved: NonlinearLaws | None
     statics: bool
     expected: np.ndarray | None = None
     earlier: np.ndarray | None = None
@@ -238,8 +238,7 @@ class Equations:
         lifted = np.zeros(len(forces))
         slip = plastic_slip(forces, states.state, self.found.shear, springs)
         if self.curved is not None:
-            along = forces[:, 3] + self.found.stretch
-            lifted = springs.lift * np.where(springs.lift * states.direction < 0, slip, along)
+            lifted = self.curved.lifted(springs, answer.gap, self.found, states.direction, slip, forces)
         return Settled(
             unknowns=answer.unknowns.reshape(-1, 6),
             state=states.state,

@@ -114,6 +114,32 @@ class _Search:
         self.may_split = self.solver.splitting and not effort.within_patch and can_split(self.equations)
         # A contact that sticks when closed, is opened by its own shear and closes again must slide.
         self.closed, self.sheared = np.zeros(n, np.int64), np.zeros(n)
+        self.continuing = False
+        self._restart()
+
+    def _continued(self) -> bool:
+        """Whether the search begins anew with laws that lead to the actual ones (`NonlinearLaws.continued`)."""
+        curved, found = self.equations.curved, self.found
+        if curved is None or not curved.continued():
+            return False
+        self.states = States(found.state, found.direction, found.bonded if found.tried is None else found.tried[2])
+        self.normal_force, self.slip, self.continuing = found.normal, np.zeros(len(found)), True
+        self._begin_again()
+        return True
+
+    def _proceeded(self) -> bool:
+        """Whether the search continues, from the states found, with the next of these laws."""
+        curved = self.equations.curved
+        self.continuing = curved is not None and curved.proceeded()
+        if self.continuing:
+            self._begin_again()
+        return self.continuing
+
+    def _begin_again(self) -> None:
+        """Restart the counts and limits of the search."""
+        self.seen.clear()
+        self.pivots, self.closed = 0, np.zeros(len(self.found), np.int64)
+        self.most = self.newton + self.effort.max_iterations
         self._restart()
 
     def _restart(self, proposed: bool = False) -> None:
@@ -126,10 +152,14 @@ class _Search:
         while True:
             answer = self._answer()
             wrong = answer.violation > 0
-            if not wrong.any() and (answer.missed is None or not answer.missed.any()):
+            agrees = answer.missed is None or not answer.missed.any()
+            if not wrong.any() and agrees:
+                if self._proceeded():
+                    continue
                 return self._found(answer)
             if self.newton >= self.most:
-                self._break_or_fail(answer)
+                if not self._continued():
+                    self._break_or_fail(answer)
                 continue
             if not wrong.any():
                 continue
@@ -144,7 +174,7 @@ class _Search:
             called = self._called(answer, wrong)
             returned = self.states.key in self.seen
             self.seen.add(self.states.key)
-            if returned and _negligible(answer, self.found, number, self.solver):
+            if returned and agrees and not self.continuing and _negligible(answer, self.found, number, self.solver):
                 return self._found(answer)
             self._count(number, answer, wrong)
             if self._by_patch(answer, wrong, number):
@@ -289,6 +319,8 @@ class _Search:
         (Júdice & Pires 1994). Raises `Unsettled`."""
         if not returned and self.tries <= self.solver.newton_tries:
             self.states = self.states.switched(wrong, called)
+            return
+        if self._continued():
             return
         self.pivots += 1
         if self.pivots > self.effort.max_iterations:

@@ -165,6 +165,12 @@ def factor_of_safety(
             "blocks of higher order ([zones.NAME] order) and cells are not supported in the search for a factor of safety yet: "
             "leave `order` and `mesh_size_m` out"
         )
+    crushing = next((law.name for law in joints if law.crushing_strength is not None), None)
+    if crushing is not None:
+        raise NothingToReduce(
+            f"joint {crushing!r} crushes (crushing_strength_pa), which is not supported in the search for a factor of safety: "
+            "leave it out, and check the stress of faces afterwards"
+        )
     if blocks.fixed.all():
         raise NothingToReduce("all blocks are fixed: none can fail")
     if loads.base is not None and loads.base.frame == "ground":

@@ -1,4 +1,5 @@
-"""Strength and stiffness of joints: Coulomb friction, cohesion, tension; softening, dilation, roughness, closure."""
+"""Strength and stiffness of joints: Coulomb friction, cohesion, tension; softening, dilation, roughness, closure,
+crushing."""
 
 from __future__ import annotations
 
@@ -100,6 +101,8 @@ class JointLaw:
                                 rotation as an elastic bed without tension does
     max_closure                 m: hyperbolic closure σ = kₙ δ/(1 − δ/Vm) of Bandis, Lumsden & Barton (1983), Int. J.
                                 Rock Mech. 20, 249-268, with ``normal_stiffness`` the initial one; None: straight
+    crushing_strength           Pa: largest normal stress; faces that bear it close further without more stress, and what
+                                closes so does not open again; None: no limit
     restitution                 e of Newton's impact law v′ = −e v across the faces of blocks that strike each other, from
                                 0 to 1; None: what springs and time integration leave of the speed
 
@@ -122,6 +125,7 @@ class JointLaw:
     dilation_slip: float = math.inf
     roughness: Roughness | None = None
     max_closure: float | None = None
+    crushing_strength: float | None = None
     restitution: float | None = None
 
     def __post_init__(self) -> None:
@@ -158,6 +162,20 @@ class JointLaw:
         if self.restitution is not None and self.normal_stiffness is not None:
             why = "restitution does not go with a normal_stiffness, whose spring gives an impact its rebound"
             self._refuse("restitution", why)
+        self._check_crushing()
+        self._check_roughness()
+
+    def _check_crushing(self) -> None:
+        if self.crushing_strength is None:
+            return
+        if not self.straight:
+            why = "does not go with softening, dilation, roughness or max_closure: give a linear law with it"
+            self._refuse("crushing_strength", f"crushing_strength {why}")
+        if self.restitution is not None:
+            why = "crushing_strength does not go with restitution: crushing determines the rebound"
+            self._refuse("crushing_strength", why)
+
+    def _check_roughness(self) -> None:
         if self.roughness is not None:
             plain = JointLaw.__dataclass_fields__
             for what in (
@@ -187,7 +205,8 @@ class JointLaw:
 
     @property
     def straight(self) -> bool:
-        """True for one straight Coulomb line with constant stiffness: no softening, dilation, roughness or closure."""
+        """True for one straight Coulomb line with constant stiffness: no softening, dilation, roughness or closure.
+        (Faces may crush.)"""
         return (
             self.residual_friction == self.friction
             and not self.residual_cohesion
@@ -208,5 +227,6 @@ _NUMBERS = {
     "softening_slip": Number(unit="m"),
     "dilation_slip": Number(closed=False, unit="m", infinite=True),
     "max_closure": Number(closed=False, unit="m", optional=True),
+    "crushing_strength": Number(closed=False, unit="Pa", optional=True),
     "restitution": Number(most=1.0, optional=True),
 }

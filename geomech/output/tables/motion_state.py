@@ -74,7 +74,7 @@ def energy_summary(cycle: Cycle) -> dict[str, float]:
     names = (
         "kinetic_energy", "elastic_energy", "contact_energy", "gravity_work", "load_work", "crack_work",
         "friction_loss",
-        "damping_loss", "bond_loss", "impact_loss", "scheme_loss", "carried_loss", "overlap_energy",
+        "damping_loss", "bond_loss", "crushing_loss", "impact_loss", "scheme_loss", "carried_loss", "overlap_energy",
         "split_energy", "energy_residual",
         "growth_release",
         "uneven_work", "set_free_energy", "crack_elastic", "crack_friction", "crack_bond_loss", "fracture_energy",
@@ -132,6 +132,8 @@ def closing(summary: dict[str, Any]) -> list[str]:
     if energy.get("gravity_work") is not None:
         work = energy["gravity_work"] + energy["load_work"]
         struck = f" impacts {energy['impact_loss']:.3g}," if energy.get("impact_loss") else ""
+        if energy.get("crushing_loss"):
+            struck += f" crushing {energy['crushing_loss']:.3g},"
         lines.append(
             f"  work {work:.3g} J/m, of which lost in friction {energy['friction_loss']:.3g}, damping "
             f"{energy['damping_loss']:.3g},{struck} time scheme {energy['scheme_loss']:.3g}; unexplained "

@@ -436,7 +436,7 @@ class Player {
     const columns = new Map();
     for (const run of this.runs) for (const name of Object.keys(run.units)) if (name !== "time") columns.set(name, run.units[name]);
     const has = (...names) => names.filter((name) => columns.has(name)), single = this.runs.length === 1;
-    const energies = has("elastic_energy", "contact_energy", "kinetic_energy", "fracture_energy", "friction_loss", "damping_loss", "impact_loss", "bond_loss");
+    const energies = has("elastic_energy", "contact_energy", "kinetic_energy", "fracture_energy", "friction_loss", "damping_loss", "impact_loss", "bond_loss", "crushing_loss");
     const options = [];
     const add = (key, label, group, x, names) => { if (names.length) options.push({ key, label, group, x, names }); };
     if (columns.has("strain") && columns.has("load")) add("load_strain", "load against strain", "Curves", "strain", ["load"]);

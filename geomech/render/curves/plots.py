@@ -35,6 +35,7 @@ _ENERGIES = {
     "friction_loss": "friction",
     "damping_loss": "damping",
     "bond_loss": "broken bonds",
+    "crushing_loss": "crushed faces",
     "impact_loss": "impacts",
     "scheme_loss": "time scheme",
     "overlap_energy": "overlaps",

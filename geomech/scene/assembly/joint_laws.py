@@ -22,6 +22,7 @@ _KEYS = {
     "softening_slip": ("softening_slip_m", "leave it out, or give a finite cohesion_pa"),
     "dilation_angle": ("dilation_angle_deg", "make it at most friction_angle_deg"),
     "max_closure": ("max_closure_m", "add normal_stiffness_pa_per_m, the stiffness where closure begins"),
+    "crushing_strength": ("crushing_strength_pa", "leave it out, or the other key"),
     "restitution": ("restitution", "leave it out, or leave out normal_stiffness_pa_per_m"),
     "shear_stiffness": ("shear_stiffness_pa_per_m", "leave it out, or stiffness_from_peak_slip"),
     "length": ("joint_length_m", "leave it out: the values of the sample are used then"),
@@ -63,6 +64,7 @@ def joint_law(name: str, joint: JointTable) -> JointLaw:
         dilation_slip=math.inf if joint.dilation_slip_m is None else joint.dilation_slip_m,
         roughness=rough,
         max_closure=joint.max_closure_m,
+        crushing_strength=joint.crushing_strength_pa,
         restitution=joint.restitution,
     )
 
@@ -89,7 +91,14 @@ def check_joints(c: Check) -> None:
             key, way_out = (_KEYS if joint.jrc is None else _KEYS_IF_ROUGH).get(field, ("", ""))
             c.refuse(("joints", name, key) if key else ("joints", name), str(error), way_out)
     for name, crack in (c.tables.cracks or {}).items():
-        if crack.joint in laws and not laws[crack.joint].straight:
+        law = laws.get(crack.joint or "")
+        if law is not None and law.crushing_strength is not None:
+            c.refuse(
+                ("cracks", name, "joint"),
+                f"crack faces cannot follow joint {crack.joint!r}: they do not crush",
+                "name a joint without crushing_strength_pa",
+            )
+        elif law is not None and not law.straight:
             c.refuse(
                 ("cracks", name, "joint"),
                 f"crack faces cannot follow joint {crack.joint!r}: they support neither residual friction, softening, "

@@ -17,7 +17,7 @@ from ..tables import SceneTables
 from ..validation import nearest
 from .check import Check
 from .edges import check_edges
-from .higher_order import check_orders
+from .higher_order import check_crushing, check_orders
 
 #: Least advance of a tip relative to the rock's largest side: coordinates of a drawing have twelve digits.
 SHORTEST_ADVANCE = 1e-9
@@ -40,6 +40,7 @@ def check(c: Check) -> None:
         check_borne(c)
         check_edges(c)
         check_orders(c)
+        check_crushing(c)
         _points(c)
         _toughness(c)
         _strength(c)

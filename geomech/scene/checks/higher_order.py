@@ -1,5 +1,5 @@
-"""Features that blocks of higher order ([zones.NAME] order) do not support yet; each is refused with a message that
-names it."""
+"""Features that blocks of higher order ([zones.NAME] order), and faces that crush, do not support yet; each is refused with
+a message that names it."""
 
 from __future__ import annotations
 
@@ -40,6 +40,19 @@ def check_orders(c: Check) -> None:
             )
 
 
+def check_crushing(c: Check) -> None:
+    """Refuse features that faces with a crushing strength do not support."""
+    for name, joint in (c.tables.joints or {}).items():
+        if joint.crushing_strength_pa is None:
+            continue
+
+        def refuse(why: str, way_out: str, name=name) -> None:
+            c.refuse(("joints", name, "crushing_strength_pa"), f"crushing_strength_pa: {why}", way_out)
+
+        _check_joints(c, refuse, name)
+        _check_solver(c, refuse)
+
+
 def _check_cell_joint(c: Check, zone: str, joint: str | None) -> None:
     """The joint along which the cells of ``zone`` separate must exist and have a strength."""
     if joint is None:
@@ -77,13 +90,16 @@ def _check_cracks(c: Check, name: str, zone, refuse) -> None:
         )
 
 
-def _check_joints(c: Check, refuse) -> None:
+def _check_joints(c: Check, refuse, besides: str = "") -> None:
+    """Refuse joints with laws that faces of higher order, and faces that crush, do not support, ``besides`` one."""
     for name, joint in (c.tables.joints or {}).items():
+        if name == besides:
+            continue
         curved = joint.jrc is not None or joint.max_closure_m is not None or joint.dilation_angle_deg > 0
         softens = joint.residual_friction_angle_deg is not None or joint.residual_cohesion_pa or joint.softening_slip_m
         if curved or softens:
             refuse(
-                f"faces of higher order support linear Coulomb laws only, and [joints.{name}] softens, dilates or "
+                f"faces of higher order, and faces that crush, support linear Coulomb laws only, and [joints.{name}] softens, dilates or "
                 "closes nonlinearly",
                 "leave these keys out",
             )
@@ -100,7 +116,7 @@ def _check_solver(c: Check, refuse) -> None:
         refuse("it supports Newmark's scheme with gamma = 2 beta only", "set newmark = [0.5, 1.0] or [0.25, 0.5]")
     if dda.contact != "penalty" or dda.springs != "stiff":
         refuse(
-            'its faces need stiff penalty springs or the stiffness of their joint, dda.contact = "penalty" and '
+            'faces need stiff penalty springs or the stiffness of their joint, dda.contact = "penalty" and '
             'dda.springs = "stiff"',
             "leave these keys out",
         )

@@ -150,6 +150,11 @@ class JointTable(Table):
         None,
         description="maximum closure, m: the joint stiffens hyperbolically from normal_stiffness_pa_per_m on",
     )
+    crushing_strength_pa: Positive | None = Field(
+        None,
+        description="largest normal stress of faces, Pa: they close further under it, irreversibly; corners that touch away "
+        "from a face have no area and no limit (unset: no limit)",
+    )
     restitution: Annotated[float, Field(ge=0, le=1)] | None = Field(
         None,
         description="coefficient of restitution of impacts, 0 (plastic) to 1 (elastic), independent of the time "
