@@ -21,6 +21,7 @@ import numpy as np
 
 from .. import dda
 from ..dda import StepResult
+from ..dda.statics.displacement_limit import DisplacementLimit
 from ..model import TIP, Motion, State
 from .coupled_state import CrackedBlocks
 from .crack_compliance.added_compliance import crack_responses, passive, stress_rotations, times
@@ -128,24 +129,33 @@ def at_rest(now: CrackedBlocks, load_time: float) -> dda.Equilibrium:
     """Bring the blocks to equilibrium under the loads of ``load_time``. In dynamics their cracks open and slide on the
     way, so that the first step begins without unbalanced crack strain; in statics the first step does this.
 
+    The blocks are brought to equilibrium with one crack strain after another, until assumed and found ones agree. Each
+    search begins at the equilibrium before, so that joints slide on only as far as the strains still change: searches that
+    all begin with the blocks as drawn end at another equilibrium of their friction each time.
+
     Sets ``now.state`` and ``now.response``.
     """
-    begun, response = now.state, now.response
+    drawn, response = now.state, now.response
+    begun, limits = drawn, None
     moving = not now.system.scheme.static and bool(now.bodies)
+    system = now.system.in_statics() if moving else now.system
     now.quasi_newton.forget()
     for _ in range(COMPLIANCE_PASSES):
+        if moving and limits is None:
+            # Displacements count from the blocks as drawn.
+            limits = dda.RelaxationLimits(limit=DisplacementLimit(system, drawn, now.problem.loads, load_time))
         before, now.system.raises_orders = now.system.order_of(begun), True
         with now.timed("dda"):
             found = dda.equilibrium(
-                now.system, begun, now.problem.loads, load_time=load_time, crack=response,
-                tolerance=now.problem.dda.unbalanced_tolerance,
+                system, begun, now.problem.loads, load_time=load_time, crack=response,
+                tolerance=now.problem.dda.unbalanced_tolerance, limits=limits,
             )  # fmt: skip
         now.system.raises_orders, order = False, found.state.order
         if order is not None and (order != before).any():
             take_orders(now, np.asarray(order), response, found.state)
-            begun, response = now.system.with_orders(begun, np.asarray(order)), now.response
+            drawn, response, limits = now.system.with_orders(drawn, np.asarray(order)), now.response, None
         # The last of the steps to equilibrium begins in the axes of its end.
-        now.state = found.state
+        now.state = begun = found.state
         if not moving or found.result is None or found.collapsed:
             return found
         now.by_mean_stress.take_all(now.bodies)
