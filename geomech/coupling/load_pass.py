@@ -448,7 +448,8 @@ def _solve_what_may_grow(now: CrackedBlocks, result: StepResult) -> dict:
     """Solve all bodies whose cracks may grow under the step ``result``; returns the others (block →)."""
     _take_loads(now, result)
     with now.timed("ddm solve"):
-        idle = now.growth_screening.among(now)
+        # Bounds are of K under loads. Tips that the stress of their block loads are known from its solution.
+        idle = now.growth_screening.among(now) - set(_loaded_by_stress(now))
     _solve(now, {block: body for block, body in now.bodies.items() if block not in idle})
     return {block: body for block, body in now.bodies.items() if block in idle}
 
@@ -461,10 +462,15 @@ def _take_loads(now: CrackedBlocks, result: StepResult) -> None:
         now.loads = boundary_loads(now.problem, now.blocks, now.state, motion, result, now.bodies)
 
 
+def _loaded_by_stress(now: CrackedBlocks) -> dict:
+    """Blocks of higher order in motion (block → its stress field): their stress loads the tips, as it does the strain of
+    their cracks. It gives the energy that growth takes."""
+    return {} if now.system.scheme.static else now.by_mean_stress.fields
+
+
 def _solve(now: CrackedBlocks, bodies: dict) -> None:
-    """Solve ``bodies`` (block →) under their loads. In motion, tips in blocks of higher order are loaded by the stress of
-    their blocks, as their strain is: these give the energy that growth takes."""
-    by_stress = {} if now.system.scheme.static else now.by_mean_stress.fields
+    """Solve ``bodies`` (block →) under their loads, or the stress of their blocks (`_loaded_by_stress`)."""
+    by_stress = _loaded_by_stress(now)
     own = {block: now.by_mean_stress.solutions[block] for block in bodies if block in by_stress}
     under_loads = {block: body for block, body in bodies.items() if block not in own}
     solved = now.solve(under_loads, now.loads, now.earlier | now.solutions) if under_loads else {}
