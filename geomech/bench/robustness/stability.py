@@ -1,5 +1,5 @@
 """Limits of the block solver: maps over penalty, time step, contrasts, slivers, offsets, overlaps, speeds, debris, thin
-walls; those of cracks and cracked blocks are in `crack_limits`.
+walls; those of blocks of higher order are in `bending_scenes`, of cracks and cracked blocks in `crack_limits`.
 
 Every cell is a small scene with an independent reference: right (within the stated bound), refused with a reason,
 reported (beyond the bound, with a warning), or wrong. The bounds allow for true elasticity only.
@@ -15,36 +15,42 @@ from pathlib import Path
 
 from ...output.tables.summary import write_json
 from ..figures import Measured
-from . import crack_limits, thin_scenes
+from . import bending_scenes, crack_limits, thin_scenes
 from . import stability_scenes as scenes
 from .stability_grid import OF_BLOCKS, OF_CRACKS, REFUSED, REPORTED, RIGHT, WRONG, Cell, Map, table
 
 
 def measure(quick: bool = False) -> Measured:
-    """The maps as text; cells as JSON, and pictures of blocks and of cracks, in outputs/stability.
+    """The maps as text; cells as JSON, and pictures of blocks, of those of higher order and of cracks, in outputs/stability.
 
     In a row for each map: errors and verdicts, then penetration, energy drift and cut steps, or condition number and
     residual. ``quick`` takes every second value and fewer steps, and draws errors and verdicts only.
     """
     from ...render.benchmarks.stability_map import draw
 
-    of_blocks, of_cracks = list(_maps(quick)), list(crack_limits.maps(quick))
-    of_block_cells = sum(len(grid.rows) * len(grid.columns) for grid in of_blocks)
-    maps = of_blocks + of_cracks
-    lines, every = [], []
-    for grid in maps:
-        cells = list(grid.cells())
-        every += cells
-        lines += [*table(grid, cells), ""]
+    groups = {
+        "stability": (list(_maps(quick)), OF_BLOCKS),
+        "stability_orders": (list(bending_scenes.maps(quick)), OF_BLOCKS),
+        "stability_cracks": (list(crack_limits.maps(quick)), OF_CRACKS),
+    }
+    lines, every, pictures = [], [], []
+    for name, (maps, quantities) in groups.items():
+        own: list[Cell] = []
+        for grid in maps:
+            cells = list(grid.cells())
+            own += cells
+            lines += [*table(grid, cells), ""]
+        every += own
+        pictures.append((maps, own, name, quantities))
     counts = Counter(cell.verdict for cell in every)
     lines.append("  ".join(f"{counts[verdict]} {verdict}" for verdict in (RIGHT, REPORTED, REFUSED, WRONG)))
     folder = Path("outputs/stability")
     folder.mkdir(parents=True, exist_ok=True)
     write_json(folder / "stability.json", [asdict(cell) for cell in every])
     # In a quick run the verdicts only: a picture takes as long as a map.
-    draw(of_blocks, every[:of_block_cells], folder / "stability.png", {} if quick else OF_BLOCKS)
-    draw(of_cracks, every[of_block_cells:], folder / "stability_cracks.png", {} if quick else OF_CRACKS)
-    lines.append(f"{folder}/stability.json, stability.png, stability_cracks.png")
+    for maps, own, name, quantities in pictures:
+        draw(maps, own, folder / f"{name}.png", {} if quick else quantities)
+    lines.append(f"{folder}/stability.json, " + ", ".join(f"{name}.png" for name in groups))
     # Not each cell's own error, many being round-off: a cell that is no longer right changes the share.
     return Measured.of("\n".join(lines), errors=not_right(every))
 

@@ -52,15 +52,19 @@ def turned(polygon: np.ndarray, angle: float) -> np.ndarray:
     return polygon @ np.array([[c, s], [-s, c]])
 
 
-def _system(polygons, fixed, friction_deg: float, materials=None, material=None, **settings) -> dda.BlockSystem:
-    blocks = Blocks.from_polygons(polygons, fixed=fixed, material=material)
+def system_of(
+    polygons, fixed, friction_deg: float, materials=None, material=None, order: int = 1, **settings
+) -> dda.BlockSystem:
+    """The blocks ``polygons``, of this ``order`` where they are not ``fixed``."""
+    orders = None if order == 1 else [1 if held else order for held in fixed]
+    blocks = Blocks.from_polygons(polygons, fixed=fixed, material=material, order=orders)
     joint = JointLaw("joint", friction_angle=math.radians(friction_deg))
     rock = Material("rock", 10e9, 0.25, density=2600.0)
     return dda.BlockSystem(blocks, materials or [rock], [joint], settings=DdaSettings(**settings))
 
 
 @dataclass
-class _Watch:
+class Watch:
     """Worst penetration, energy gain, the run's balance, and cut steps of a moving system."""
 
     system: dda.BlockSystem
@@ -120,14 +124,14 @@ def _inclined(friction: float, side: float, offset=0.0, **settings):
     slope = math.radians(30)
     length = max(20.0, 20 * side)
     polygons = [rectangle(-length, -length / 20, length, 0), rectangle(0.2 * length, 0, 0.2 * length + side, side)]
-    system = _system(
+    system = system_of(
         [turned(p, slope) + offset for p in polygons], [True, False], friction, dynamic_factor=1.0,
         max_displacement_ratio=0.05, **settings,
     )  # fmt: skip
     return system, -np.array([math.cos(slope), math.sin(slope)])
 
 
-def _slid(system, down, end: float, dt: float, max_steps: int, watch: _Watch) -> tuple[float, float]:
+def _slid(system, down, end: float, dt: float, max_steps: int, watch: Watch) -> tuple[float, float]:
     """(metres slid, seconds)."""
     state = watch.run(State.at_rest(system.blocks), WEIGHT, end, dt, max_steps)
     return float((state.vertices - system.blocks.vertices)[4:].mean(axis=0) @ down), state.time
@@ -143,11 +147,11 @@ def _off_travel(system, slid: float, seconds: float, friction: float, side: floa
     return abs(slid - exact) / (exact + 3 * (shortening + sunk))
 
 
-def incline(friction: float, most: int, penalty: float, dt: float) -> Outcome:
+def incline(friction: float, most: int, penalty: float, dt: float, order: int = 1) -> Outcome:
     """Half a second, or ``most`` steps."""
     modulus = Material("rock", 10e9, 0.25).plane_modulus
-    system, down = _inclined(friction, 1.0, normal_penalty=penalty * modulus)
-    watch = _Watch(system)
+    system, down = _inclined(friction, 1.0, normal_penalty=penalty * modulus, order=order)
+    watch = Watch(system)
     slid, seconds = _slid(system, down, 0.5, dt, most, watch)
     return watch.outcome(_off_travel(system, slid, seconds, friction, 1.0))
 
@@ -156,8 +160,8 @@ def small(most: int, side: float, dt: float) -> Outcome:
     """Displacement of a square of this side that slides down a slope."""
     slope = math.radians(30)
     polygons = [turned(p, slope) for p in (rectangle(-60, -10, 60, 0), rectangle(4, 0, 4 + side, side))]
-    system = _system(polygons, [True, False], 15.0, dynamic_factor=1.0)
-    watch = _Watch(system)
+    system = system_of(polygons, [True, False], 15.0, dynamic_factor=1.0)
+    watch = Watch(system)
     slid, seconds = _slid(system, -np.array([math.cos(slope), math.sin(slope)]), 0.5, dt, most, watch)
     return watch.outcome(_off_travel(system, slid, seconds, 15.0, side), side)
 
@@ -169,16 +173,16 @@ def far(most: int, offset: float, dt: float) -> Outcome:
 
 
 @functools.cache
-def _slide_from(offset: float, dt: float, most: int) -> tuple[_Watch, float]:
+def _slide_from(offset: float, dt: float, most: int) -> tuple[Watch, float]:
     """Displacement of a block on an incline at this distance from the origin, in 0.3 s or ``most`` steps."""
     system, down = _inclined(15.0, 1.0, np.array([offset, -offset]))
-    watch = _Watch(system)
+    watch = Watch(system)
     return watch, _slid(system, down, 0.3, dt, most, watch)[0]
 
 
-def _carried(system: dda.BlockSystem, loads: Loads = WEIGHT) -> tuple[np.ndarray, _Watch]:
+def carried(system: dda.BlockSystem, loads: Loads = WEIGHT) -> tuple[np.ndarray, Watch]:
     """Contact forces and moment on each block in static equilibrium. Raises NotConverged if there is none."""
-    watch = _Watch(system)
+    watch = Watch(system)
     rest = dda.equilibrium(
         system, State.at_rest(system.blocks), loads, tolerance=1e-9, watch=lambda result, row: watch(result)
     )
@@ -188,7 +192,7 @@ def _carried(system: dda.BlockSystem, loads: Loads = WEIGHT) -> tuple[np.ndarray
     return dda.contact_resultants(rest.result.contacts, system.blocks.n_blocks, centroid), watch
 
 
-def _weights_off(system: dda.BlockSystem, total: np.ndarray, gravity: float = GRAVITY) -> float:
+def weights_off(system: dda.BlockSystem, total: np.ndarray, gravity: float = GRAVITY) -> float:
     """Largest difference between a free block's contact forces and its weight, over the total weight."""
     weight = system.density * system.blocks.areas() * gravity
     free = ~system.blocks.fixed
@@ -197,21 +201,21 @@ def _weights_off(system: dda.BlockSystem, total: np.ndarray, gravity: float = GR
     return float(max(off.max(), base) / weight[free].sum())
 
 
-def column(stiffness: float, density: float) -> Outcome:
+def column(stiffness: float, density: float, order: int = 1) -> Outcome:
     """The weight that a column of two different blocks transmits to the ground."""
     light, heavy = (
         Material("below", 10e9, 0.25, density=2600.0),
         Material("above", 10e9 * stiffness, 0.25, density=2600.0 * density),
     )
     polygons = [rectangle(-1, -1, 2, 0), rectangle(0, 0, 1, 1), rectangle(0, 1, 1, 2)]
-    system = _system(polygons, [True, False, False], 30.0, [light, heavy], [0, 0, 1])
+    system = system_of(polygons, [True, False, False], 30.0, [light, heavy], [0, 0, 1], order)
     # Limited so that the weight strains the softer block by no more than 1e-4.
     gravity = 1e-4 * 10e9 * min(1.0, stiffness) / (2600.0 * max(1.0, density))
-    total, watch = _carried(system, Loads(gravity=History.constant([0.0, -gravity])))
-    return watch.outcome(_weights_off(system, total, gravity))
+    total, watch = carried(system, Loads(gravity=History.constant([0.0, -gravity])))
+    return watch.outcome(weights_off(system, total, gravity))
 
 
-def sliver(aspect: float, wedge: float) -> Outcome:
+def sliver(aspect: float, wedge: float, order: int = 1) -> Outcome:
     """The weight of slender blocks, or needles point to point (``wedge``)."""
     h = 1.0 / aspect
     if wedge:
@@ -220,9 +224,9 @@ def sliver(aspect: float, wedge: float) -> Outcome:
     else:
         between = [rectangle(0, 0, 1, h)]
     polygons = [rectangle(-1, -1, 2, 0), *between, rectangle(0, h, 1, 1 + h)]
-    system = _system(polygons, [True] + [False] * (len(polygons) - 1), 40.0)
-    total, watch = _carried(system)
-    return watch.outcome(_weights_off(system, total), h)
+    system = system_of(polygons, [True] + [False] * (len(polygons) - 1), 40.0, order=order)
+    total, watch = carried(system)
+    return watch.outcome(weights_off(system, total), h)
 
 
 def grid_of_squares(side: float, bond: float) -> Outcome:
@@ -234,16 +238,16 @@ def grid_of_squares(side: float, bond: float) -> Outcome:
         ends = [0, *np.arange(0.5, n), n] if bond and row % 2 else range(n + 1)
         squares += [rectangle(left, row, right, row + 1) for left, right in itertools.pairwise(ends)]
     polygons = [rectangle(-1, -1, n + 1, 0), *squares]
-    system = _system(polygons, [True] + [False] * len(squares), 35.0)
-    total, watch = _carried(system)
-    return watch.outcome(_weights_off(system, total))
+    system = system_of(polygons, [True] + [False] * len(squares), 35.0)
+    total, watch = carried(system)
+    return watch.outcome(weights_off(system, total))
 
 
 def start(most: int, gap: float, dt: float) -> Outcome:
     """A block released above the ground with this gap."""
     polygons = [rectangle(-1, -1, 2, 0), rectangle(0, gap, 1, 1 + gap)]
-    system = _system(polygons, [True, False], 30.0, dynamic_factor=1.0, max_displacement_ratio=0.05)
-    watch = _Watch(system)
+    system = system_of(polygons, [True, False], 30.0, dynamic_factor=1.0, max_displacement_ratio=0.05)
+    watch = Watch(system)
     state = watch.run(State.at_rest(system.blocks), WEIGHT, 1.0, dt, most)
     height = float(state.vertices[4:, 1].mean()) - 0.5
     return watch.outcome(abs(height))
@@ -252,10 +256,10 @@ def start(most: int, gap: float, dt: float) -> Outcome:
 def impact(speed: float, dt: float) -> Outcome:
     """Two blocks that collide at this speed: momentum and energy."""
     polygons = [rectangle(0, 0, 1, 1), rectangle(1.001, 0, 2.001, 1)]
-    system = _system(polygons, [False, False], 30.0, dynamic_factor=1.0, max_displacement_ratio=0.05)
+    system = system_of(polygons, [False, False], 30.0, dynamic_factor=1.0, max_displacement_ratio=0.05)
     state = State.at_rest(system.blocks)
     state.velocity[0, 0], state.velocity[1, 0] = speed, -0.5 * speed
-    watch = _Watch(system)
+    watch = Watch(system)
     # They meet after 7e-4/speed seconds, and separate a millisecond later.
     end = watch.run(state, Loads(), 0.01 / speed + 20 * dt, dt, 1000)
     mass = system.density * system.blocks.areas()
@@ -278,10 +282,12 @@ def debris(seconds: float, count: float) -> Outcome:
         angle = np.sort(2 * math.pi * (np.arange(corners) + 0.6 * rng.random(corners)) / corners)
         centre = np.array([1.0 + 2.0 * (k % per_row), 1.2 + 2.0 * (k // per_row)])
         polygons.append(centre + 0.85 * np.column_stack([np.cos(angle), np.sin(angle)]))
-    system = _system(polygons, [True] * 3 + [False] * int(count), 30.0, dynamic_factor=1.0, max_displacement_ratio=0.05)
+    system = system_of(
+        polygons, [True] * 3 + [False] * int(count), 30.0, dynamic_factor=1.0, max_displacement_ratio=0.05
+    )
     state = State.at_rest(system.blocks)
     state.velocity[3:, 2] = rng.uniform(-10, 10, int(count))
-    watch = _Watch(system)
+    watch = Watch(system)
     end = watch.run(state, WEIGHT, seconds, 5e-3)
     centres = system.blocks.mean_vertices(end.vertices)[3:]
     lost = float(np.mean((centres[:, 1] < 0) | (centres[:, 0] < 0) | (centres[:, 0] > width)))

@@ -9,8 +9,9 @@ import pytest
 from scenes_of_bending import ROCK, after, moved, rectangle, system_of, turned
 from scenes_of_cells import cells_of
 
+from geomech import dda
 from geomech.dda import EnergyBudget
-from geomech.model import EdgeTraction, History, JointLaw, Loads, Material, State
+from geomech.model import Blocks, DdaSettings, EdgeTraction, History, JointLaw, Loads, Material, State
 
 WEIGHT = Loads(gravity=History.constant((0.0, -9.81)))
 #: The trapezoidal rule, which does not dissipate, without damping.
@@ -80,6 +81,46 @@ def test_a_block_that_spins_is_stretched_and_keeps_spinning():
     assert state.rotation[0] == pytest.approx(50.0 * state.time, rel=5e-4)
     assert abs(budget.residual) + abs(budget.scheme) < 2e-4 * budget.turnover
     assert 0 < np.abs(state.deflection[:, 0]).max() < 1e-4
+
+
+@pytest.mark.parametrize(
+    ("order", "turns"), [(2, 2), (3, 2), pytest.param(3, 25, marks=pytest.mark.slow), pytest.param(8, 10, marks=pytest.mark.slow)]
+)  # fmt: skip
+def test_a_block_that_spins_for_many_turns(verified, order, turns):
+    """50 rad/s in steps of 0.1 rad, without Poisson's ratio: σx = ρω² (a² − x²)/2 and the ends move by ρω² a³/(3E), of a
+    polynomial of order 3; order 2 finds the mean of that strain. The stretched block is slower by 2 ∫ x·u dA/∫ r² dA, of
+    which the deflection, a sixth, is neglected."""
+    half, spin = np.array([2.0, 0.5]), 50.0
+    settings = DdaSettings(
+        dynamic_factor=1.0, time_step=2e-3, newmark=(0.25, 0.5), damping=0.3, max_displacement_ratio=0.5
+    )
+    blocks = Blocks.from_polygons([rectangle(-2, -0.5, 2, 0.5)], order=[order])
+    rock = Material("rock", 1e10, 0.0, 2500.0, plane="stress")
+    system = dda.BlockSystem(blocks, [rock], [JointLaw("joint")], settings=settings)
+    velocity = np.zeros((1, 6))
+    velocity[0, 2] = spin
+    state, budget = run(
+        system, Loads(), round(turns * 2 * np.pi / spin / 2e-3), replace(State.at_rest(blocks), velocity=velocity)
+    )
+    strain = 2500.0 * spin**2 * half**2 / (3 * 1e10)
+    slower = 1 + 2 * 0.8 * (strain * half**2).sum() / (half**2).sum()
+    assert state.velocity[0, 2] == pytest.approx(spin / slower, rel=4e-4)
+    assert state.rotation[0] == pytest.approx(spin / slower * state.time, rel=4e-4)
+    assert abs(budget.residual) < 1e-5 * budget.turnover and budget.scheme > -4e-4 * budget.turnover
+    assert np.abs(state.velocity[0, :2]).max() < 1e-9
+    assert system.deflected is not None and state.deflection is not None
+    corner = system.deflected.corners(state.vertices, state.rotation, state.deflection[:, 0])[2]
+    c, s = np.cos(state.rotation[0]), np.sin(state.rotation[0])
+    stretch = np.array([[c, s], [-s, c]]) @ corner - half
+    # Order 2 stretches evenly, and both by the square of the slower spin.
+    exact = strain * half * (state.velocity[0, 2] / spin) ** 2
+    print(
+        f"order {order}, {turns} turns: stretch off by {stretch / exact - 1}, spin by {state.velocity[0, 2] / spin * slower - 1:.1e}"
+    )
+    verified(
+        f"block of order {order} that spins for {turns} turns: stretch", abs(stretch / exact - 1).max(), "ρω²a³/(3E)"
+    )
+    assert stretch == pytest.approx(exact, rel=5e-3)
 
 
 @pytest.mark.parametrize("friction", [20.0, 35.0])
