@@ -344,6 +344,8 @@ class Coupling:
             ended = collapse or unsupported(now, found.result, self.mechanism)
             events, step.stops = events + ended, bool(collapse) or self._stops(ended)
         if growth is not None:
+            if self.static and not self.endless:
+                self.mechanism.warn_of_growth(found.result)
             found.tips["grown"] = growth.grown
             if self.tips is not None:
                 self.tips.record_growth(found.tips)

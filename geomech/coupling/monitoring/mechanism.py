@@ -50,7 +50,7 @@ class Mechanism:
         self.steady = 0
         self.remaining = 0.0
         self.fastest = ""
-        self.reported = False
+        self.reported = self.grew_unsupported = False
 
     def check(self, result: dda.StepResult, blocks: Blocks, steady: bool = True) -> tuple[int, str] | None:
         """After the load step of ``result``: the fastest block and a message, if blocks have been unbalanced for
@@ -88,6 +88,19 @@ class Mechanism:
             f"nothing holds {named}{f' and {others} more' if others > 0 else ''}: {100 * ratio:.2g} % of the forces on "
             "a block are left over, step after step"
         )
+
+    def warn_of_growth(self, result: dda.StepResult) -> None:
+        """Warn, once, that cracks grow in a static pass whose blocks are out of balance."""
+        ratio = float(result.statistics["unbalanced_ratio"])
+        if self.grew_unsupported or not ratio > SUPPORTED:
+            return
+        self.grew_unsupported = True
+        log.warning(
+            "t = %g s: cracks grow in a static step that balances %.2g %% of the forces on a block by inertia only "
+            "(unbalanced_ratio in history.csv). Their K is that of blocks which do not rest on each other yet, and depends "
+            'on the length of the step: set dda.equilibrium = "start" or "loads", or take longer steps',
+            result.state.time, 100 * ratio,
+        )  # fmt: skip
 
     def _left(self, result: dda.StepResult, blocks: Blocks) -> float:
         """Displacement, m, until the blocks rest, extrapolated over the last steps under steady loads."""
