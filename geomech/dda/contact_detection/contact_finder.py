@@ -390,7 +390,7 @@ class ContactFinder:
         Rows that are ``known`` (n,), because they continue contacts that press or that begin behind the line, and
         corners that meet corners, have. ``pressed`` (n_blocks,) m is the penetration of each block's faces.
         """
-        vertex, edge = table[:, 0], table[:, 1]
+        vertex, edge = np.ascontiguousarray(table[:, :2].T)
         block, other = self._owner[vertex], self._owner[edge]
         shallow = _TOUCHING_DEPTH * np.sqrt(np.minimum(self._area[block], self._area[other]))
         shallow += _DEEPER * np.maximum(pressed[block], pressed[other])

@@ -228,5 +228,13 @@ class Approach:
         rotation."""
         box = boxes(vertices, self._start[:-1])
         return _shares(
-            np.ascontiguousarray(pairs), affine, turn, centroid, box, vertices, self._next, self._start, self._size
+            np.ascontiguousarray(pairs),
+            affine,
+            np.ascontiguousarray(turn),
+            centroid,
+            box,
+            vertices,
+            self._next,
+            self._start,
+            self._size,
         )
