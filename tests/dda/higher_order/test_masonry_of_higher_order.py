@@ -82,6 +82,17 @@ def test_thrust_of_a_voussoir_beam_of_higher_order(verified, span):
     assert -0.1 < cells_2 < -0.04
 
 
+def test_soft_halves_do_not_fall_before_they_bear():
+    """E = 1 GPa: the sag grows with the order. A beam of any order may also fall freely without any contact force, as those
+    of order 3 and 5 did in the first static step, by 25 mm."""
+    sags = []
+    for order in (3, 4, 5, 8):
+        found = at_rest(voussoir_beam(10.0, order, 1, 1, 1e9), 10.0)
+        assert found is not None
+        sags.append(found[1])
+    assert np.all(np.diff(sags) > 0) and sags[-1] < 0.025
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("span", [5.0, 10.0])
 def test_thrust_of_a_voussoir_beam_converges(verified, span):
