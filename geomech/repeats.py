@@ -157,14 +157,21 @@ def changed(problem: Problem, kind: Repeat) -> Problem:
 
 def with_noise(problem: Problem, size: float, rng: np.random.Generator) -> Problem:
     """``problem`` with each vertex of each block moved by up to ``size`` of the blocks' extent along x and y; where the
-    outline of a block touches itself, together."""
-    vertices = problem.blocks.vertices
+    outline of a block touches itself, or a crack ends at it, together."""
+    vertices, cracks = problem.blocks.vertices, problem.cracks
     off = size * float(np.ptp(vertices, axis=0).max()) * rng.uniform(-1, 1, vertices.shape)
     _, first, which = np.unique(
         np.column_stack([problem.blocks.vertex_block, vertices]), axis=0, return_index=True, return_inverse=True
     )
     off = off[first[which.ravel()]]
-    return replace(problem, blocks=problem.blocks.with_vertices(vertices + off))
+    nodes = cracks.nodes.copy()
+    corner = {
+        (block, *at): by for block, at, by in zip(problem.blocks.vertex_block.tolist(), vertices.tolist(), off.tolist())
+    }
+    for ends, block in zip(cracks.segments.tolist(), np.asarray(cracks.block).tolist()):
+        for node in ends:
+            nodes[node] = cracks.nodes[node] + corner.get((block, *cracks.nodes[node].tolist()), (0.0, 0.0))
+    return replace(problem, blocks=problem.blocks.with_vertices(vertices + off), cracks=replace(cracks, nodes=nodes))
 
 
 def _scatter(base: dict[str, float], other: dict[str, float]) -> dict[str, Any]:

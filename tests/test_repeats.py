@@ -12,6 +12,8 @@ import pytest
 from small_scenes import PLATE, block
 
 from geomech import cli
+from geomech.bench.slopes.drawn_slopes import drawn, problem_of
+from geomech.bench.slopes.random_slopes import scene_text
 from geomech.coupling import cycles
 from geomech.model import REPEATS, RunSettings
 from geomech.pipeline import run, run_problem
@@ -40,6 +42,26 @@ class Quantities:
 
     def on_end(self, summary, error=None):
         self.scatter = summary.get("scatter")
+
+
+def test_noise_does_not_tear_an_outline_or_a_crack_off():
+    """Random slope 56, in which a block touches itself, and cracks end at its vertices."""
+    problem = problem_of(drawn(scene_text(56)))
+    blocks, cracks = problem.blocks, problem.cracks
+    rows = np.column_stack([blocks.vertex_block, blocks.vertices])
+    noisy = changed(problem, "noise")
+    moved = np.column_stack([blocks.vertex_block, noisy.blocks.vertices])
+    places = len(np.unique(rows, axis=0))
+    assert places < len(rows) and places == len(np.unique(moved, axis=0)) == len(
+        np.unique(np.hstack([rows, moved]), axis=0)
+    )
+    owner = np.repeat(cracks.block, 2)
+    ends = [np.column_stack([owner, of.cracks.nodes[cracks.segments.ravel()]]).tolist() for of in (problem, noisy)]
+    at = [
+        [rows_of.tolist().index(end) if end in rows_of.tolist() else -1 for end in each]
+        for rows_of, each in zip((rows, moved), ends)
+    ]
+    assert at[0] == at[1] and max(at[0]) >= 0
 
 
 def test_every_kind_changes_one_thing(scene):

@@ -38,7 +38,7 @@ from .load_pass import Balance, balanced, toughness
 from .load_transfer.load_imbalance import LoadBalance
 from .load_transfer.unbounded_rock import out_of_sight, solved_pass
 from .monitoring.collapse import collapse_in_situ, lost, relax, unsupported
-from .monitoring.energy_check import BendingWatch, BudgetWatch, GrowthWatch, check_dissipation
+from .monitoring.energy_check import BendingWatch, BudgetWatch, GrowthWatch, check_dissipation, check_supplied
 from .monitoring.mechanism import Mechanism
 from .monitoring.pass_agreement import AgreementWatch
 
@@ -230,6 +230,9 @@ class Coupling:
             self.mechanism.warn_at_the_end(self.now.state.time)
         if not self.endless:
             check_dissipation(self.now.budget, self.now.state.time, self.static, self.now.crack_energy.toughness)
+            if not self.static:
+                cracks = self.now.crack_energy
+                check_supplied(cracks.fracture + cracks.parting, self.now.budget, self.now.state.time)
             if not self.problem.dda.equilibrium:
                 dda.warn_of_toes_at_rest(self.now.system, self.now.state, self.problem.loads)
 

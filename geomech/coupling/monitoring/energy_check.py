@@ -83,6 +83,22 @@ def check_dissipation(budget: EnergyBudget, time: float, static: bool, broken: f
     )
 
 
+def check_supplied(supplied: float, budget: EnergyBudget, time: float) -> None:
+    """Warn at the end of a run in motion, ``time`` s, if growing cracks and cut blocks have left more than `GAIN` times all
+    energy converted that no block had ``supplied``, J/m: what the blocks spent on fracture and at the cuts, below 0."""
+    if not -supplied > GAIN * budget.turnover:
+        return
+    log.warning(
+        "t = %g s: cracks that grew and cut blocks have left %.3g J/m, %.2g of all converted energy, that came from no block "
+        "(fracture_energy and parting_energy in history.csv): forces that bend a block of uniform strain load its cracks "
+        "but do no work on it. The motion is uncertain by that share, or some times as much, as other steps give other "
+        "cracks. Give the zone an order of 2 to 8 (zones.NAME.order)",
+        time,
+        -supplied,
+        -supplied / budget.turnover,
+    )
+
+
 class BendingWatch:
     """Warns, once, when moving blocks have supplied less energy to their cracks than the rock takes as it breaks: a
     block of uniform strain stores no bending energy, so that cracks opened by bending cost it nothing."""

@@ -178,20 +178,23 @@ def contacts_after(
     for parent in cut:
         _inherit_along_walls(inherited, found, split, parent, solutions[parent], float(state.rotation[parent]))
         _inherit_along_divided_edges(inherited, found, split, before, parent, loads[parent], loaded, wet)
-    inherited.known |= _turned_away(found, state.contacts)
-    return system.with_inherited_contacts(
-        state, found, _contacts(system, found, inherited, blocks, np.isin(split.parent, cut) | _stiffer(split, before))
-    )
+    is_part = np.isin(split.parent, cut)
+    inherited.known |= _turned_away(found, state.contacts, is_part)
+    given = _contacts(system, found, inherited, blocks, is_part | _stiffer(split, before))
+    return system.with_inherited_contacts(state, found, given)
 
 
-def _turned_away(found, kept: np.ndarray) -> np.ndarray:
-    """(n,) bool: contacts of ``found`` that act in another direction than the one ``kept`` from before (CONTACT rows): at a
-    vertex in a straight side that is cut there, of which the other part bears the face now. They start without force."""
+def _turned_away(found, kept: np.ndarray, is_part: np.ndarray) -> np.ndarray:
+    """(n,) bool: corners of parts (n_blocks,) that faced a length of a side before, among the rows ``kept`` from then
+    (CONTACT), and act alone in another direction now: at a vertex in a straight side that is cut there, of which the other
+    part bears the face. They start without force."""
     if not len(kept):
         return np.zeros(len(found), bool)
     at = {(vertex, edge): row for row, (vertex, edge) in enumerate(zip(kept["vertex"].tolist(), kept["edge"].tolist()))}
     row = np.array([at.get(key, -1) for key in zip(found.vertex.tolist(), found.edge.tolist())], int)
-    return (row >= 0) & (np.sum(found.geometry[:, 1:3] * kept["normal"][row], axis=1) <= _ALIGNED)
+    alone = (row >= 0) & (kept["length"][row] > 0) & (found.geometry[:, 4] == 0)
+    turned = np.sum(found.geometry[:, 1:3] * kept["normal"][row], axis=1) <= _ALIGNED
+    return alone & turned & (is_part[found.block] | is_part[found.other])
 
 
 def _stiffer(split: Split, before: Blocks) -> np.ndarray:

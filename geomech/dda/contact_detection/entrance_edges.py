@@ -45,6 +45,9 @@ _ZONE = 2.0
 _HASTE = 2.0
 # cos of the angle between edges that count as mating faces, for tributary lengths.
 _MATING = 0.9986
+#: Sine up to which a vertex is flat, as in `Blocks.in_side`: the noise of the vertices of an edge of centimetres turns it by
+#: 1e-9, and must not decide whether a face touches there.
+_FLAT = 1e-6
 #: Areas of blocks that differ by less than this part are the same: then the blocks' numbers decide exact ties.
 _ALIKE = 1e-9
 
@@ -217,7 +220,7 @@ def convex_corners(vertices, next_vertex, previous_vertex):
         k, j = previous_vertex[i], next_vertex[i]
         ax, ay = vertices[i, 0] - vertices[k, 0], vertices[i, 1] - vertices[k, 1]
         bx, by = vertices[j, 0] - vertices[i, 0], vertices[j, 1] - vertices[i, 1]
-        convex[i] = ax * by - ay * bx >= -1e-9 * np.sqrt((ax * ax + ay * ay) * (bx * bx + by * by))
+        convex[i] = ax * by - ay * bx >= -_FLAT * np.sqrt((ax * ax + ay * ay) * (bx * bx + by * by))
     return convex
 
 

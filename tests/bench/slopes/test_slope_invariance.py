@@ -24,6 +24,7 @@ from geomech.bench.slopes.slope_invariance import (
     BOUNDS,
     VARIANTS,
     Invariance,
+    _off_moved,
     invariance,
     measure_invariance,
     table,
@@ -150,6 +151,22 @@ def test_mass_and_work_of_what_moves_are_those_of_a_rigid_shift():
     assert moving_from(problem) == 1e-3
     short = replace(problem, run=replace(problem.run, end_time=0.01))
     assert moving_from(short) == pytest.approx(0.1 * 0.5 * math.hypot(6.3057, 7.5149) * 1e-4)
+
+
+def test_a_block_at_the_threshold_counts_in_both_runs_or_in_none():
+    """Half the rock goes 1 % less than the threshold in one run and 1 % more in the other; 10 % are a difference."""
+    weights, still = np.array([1e3, 1e3]), np.zeros((2, 2))
+
+    def run(second):
+        return BlockDisplacements(
+            weights, np.ones(2), still, np.array([[0.0, -1.0], [0.0, -second]]), np.array([0.0, -10.0])
+        )
+
+    assert _off_moved(run(0.099), run(0.101), 0.1) == (0.0, 0.0)
+    assert _off_moved(run(0.101), run(0.099), 0.1) == (0.0, pytest.approx(0.002 / 1.099))
+    share, work = _off_moved(run(0.05), run(0.2), 0.1)
+    assert share == 0.5 and work == pytest.approx(0.2 / 1.2)
+    assert _off_moved(run(0.5), run(0.4), 0.1) == (0.0, pytest.approx(0.1 / 1.4))
 
 
 def test_a_block_that_slides_is_the_same_in_all_variants():

@@ -17,7 +17,13 @@ from geomech.bench.slopes.drawn_slopes import drawn, problem_of
 from geomech.bench.slopes.random_slopes import scene_text
 from geomech.coupling import cycles
 from geomech.coupling.monitoring import pass_agreement
-from geomech.coupling.monitoring.energy_check import UNPAID, BendingWatch, BudgetWatch, check_dissipation
+from geomech.coupling.monitoring.energy_check import (
+    UNPAID,
+    BendingWatch,
+    BudgetWatch,
+    check_dissipation,
+    check_supplied,
+)
 from geomech.coupling.monitoring.pass_agreement import DISAGREES, AgreementWatch
 from geomech.dda.energy_balance import GAIN, EnergyBudget, StepEnergy
 from geomech.model import (
@@ -165,6 +171,27 @@ def test_a_scheme_that_gives_without_growth_is_told_of(caplog):
         assert grown.released == 0.5 and not caplog.records
         EnergyBudget().after(StepEnergy(**step), 1.0)
     assert "without work" in caplog.records[0].getMessage()
+
+
+def test_what_no_block_supplied_to_cracks_and_cuts_is_told_of(caplog):
+    """The share of all converted energy, beyond the bound."""
+    budget = EnergyBudget(turnover=50.0)
+    for supplied in (1.0, 0.0, -0.99 * GAIN * 50.0):
+        check_supplied(supplied, budget, 2.0)
+    assert not caplog.records
+    check_supplied(-6.0, budget, 2.0)
+    assert "t = 2 s" in caplog.text and "left 6 J/m, 0.12 of all converted energy" in caplog.text
+
+
+@pytest.mark.slow
+def test_a_random_slope_says_what_no_block_supplied(caplog):
+    """Slope 36, whose work of gravity is 18 % off in half the step."""
+    problem = problem_of(drawn(scene_text(36)))
+    with caplog.at_level(logging.WARNING):
+        *_, last = cycles(replace(problem, dda=replace(problem.dda, time_step=0.5 * problem.dda.time_step)))
+    told = [re.search(r"have left (\S+) J/m", record.getMessage()) for record in caplog.records]
+    given = last.statistics["fracture_energy"] + last.statistics["parting_energy"]
+    assert [float(each[1]) for each in told if each] == [pytest.approx(-given, rel=1e-2)]
 
 
 def weighed_column(dt: float, end: float, **settings) -> Problem:

@@ -260,3 +260,13 @@ def test_a_needle_that_is_pressed_on_a_flat_corner_does_not_sink_in():
     states = list(dda.run(blocks, [rock], [joint], Loads(gravity=History.constant(across)), settings, end_time=0.02))
     off = states[-1].vertices[-3:] - blocks.vertices[-3:]
     assert np.hypot(*off.T).max() < 1e-6
+
+
+@pytest.mark.parametrize(("inwards", "flat"), [(0.0, True), (1e-8, True), (-1e-8, True), (1e-5, False)])
+def test_noise_does_not_decide_whether_a_straight_side_has_a_corner(inwards, flat):
+    """A vertex in the middle of a side of 2 cm, beside it by some 1e-10 m: flat as in `Blocks.in_side`."""
+    outline = np.array([[0.0, 0.0], [0.01, 0.01 * inwards], [0.02, 0.0], [0.02, 1.0], [0.0, 1.0]])
+    blocks = Blocks.from_polygons([outline])
+    middle = np.flatnonzero(blocks.vertices[:, 0] == 0.01)
+    convex = convex_corners(blocks.vertices, blocks.next_vertex.astype(int), blocks.previous_vertex.astype(int))
+    assert convex[middle].all() == flat and blocks.in_side[middle].all() == flat
