@@ -223,7 +223,9 @@ _WAVES = (0.25, 0.5)
 def _dda(tables: SceneTables) -> DdaSettings:
     d = tables.dda
     shaken = d.dynamic_factor == 1.0 and (tables.loads.base is not None or tables.loads.viscous_boundaries)
-    swings = shaken or (d.dynamic_factor == 1.0 and any(zone.order not in (1, "auto") for zone in tables.zones.values()))
+    swings = shaken or (
+        d.dynamic_factor == 1.0 and any(zone.order not in (1, "auto") for zone in tables.zones.values())
+    )
     mass, stiffness = 0.0, 0.0
     if d.rayleigh_fractions is not None:
         mass, stiffness = rayleigh_coefficients(d.rayleigh_fractions, given(d.rayleigh_frequencies_hz))

@@ -199,6 +199,7 @@ gravity_m_s2 = [0, -9.81]
 [dda]
 dynamic_factor = 1.0
 time_step_s = 0.005
+newmark = [0.5, 1.0]
 max_displacement_ratio = 0.01
 [run]
 end_time_s = 0.05
