@@ -18,6 +18,7 @@ strength are not covered: a bent face carries less than the sum of the strengths
 
 from __future__ import annotations
 
+import logging
 import math
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
@@ -32,12 +33,17 @@ from ..open_close.interior_point.linear_programme import smallest
 from ..results import contact_resultants
 from ..system import BlockSystem
 
+log = logging.getLogger(__name__)
+
 #: Largest factor of the search.
 _FARTHEST = 64.0
 #: Tolerance of equilibrium, relative to the largest load on a block.
 _BALANCED = 1e-6
 #: Relative change of F below which Newton's method ends.
 _PRECISE = 1e-4
+#: Unbalanced forces, relative to the largest load on a block, that may remain at any strength: those of slivers, which have no
+#: contacts in the directions of their loads.
+_SLIVERS = 1e-2
 
 
 @dataclass(frozen=True, eq=False)
@@ -132,11 +138,18 @@ class AdmissibleForces:
     def largest_factor(self, first: float = 1.0, stride: float = 1.0, precise: float = _PRECISE) -> float:
         """The largest factor with admissible forces to the relative accuracy ``precise``, searched from ``first``, and
         upwards from there in steps of the relative length ``stride`` and four times as long each; 0 if there are none
-        down to 1/64, inf if there are some at 64. Raises `Unsolved`."""
-        low, high, factor, step = 0.0, math.inf, first, precise
+        down to 1/64, inf if there are some at 64. Slivers that no strength holds do not count. Raises `Unsolved`."""
+        low, high, factor, step, floor = 0.0, math.inf, first, precise, _BALANCED
+        above: tuple[float, float, float] | None = None  # the last factor with a slope, its U and the slope
         while True:
             left, slope = self.unbalanced(factor)
-            if left <= _BALANCED:
+            if floor == _BALANCED < left <= _SLIVERS and -slope * (_FARTHEST - 1.0) / factor < left:
+                # No strength balances the rest: the bound is that of all other blocks.
+                log.info("%.2g of the largest load is balanced by no strength of the joints", left)
+                floor, low = left + _BALANCED, factor
+                if above is not None:
+                    factor, left, slope = above
+            if left <= floor:
                 low = factor
                 if low >= _FARTHEST:
                     return math.inf
@@ -146,10 +159,11 @@ class AdmissibleForces:
                 # An admissible iterate of Newton's method is only slightly below the bound.
                 factor, step = min(low * (1.0 + step), 0.5 * (low + high)), 4.0 * step
                 continue
-            high = factor
+            high, above = factor, (factor, left, slope)
             if high <= 1.0 / _FARTHEST:
                 return 0.0
-            factor = max(1.0 / (1.0 / high - left / slope), low) if slope < 0.0 else low
+            least = max(low, 1.0 / _FARTHEST)
+            factor = max(1.0 / (1.0 / high - (left - floor) / slope), least) if slope < 0.0 else low
             if high - factor <= precise * high or high - low <= 2.0 * precise * high:
                 return factor
             factor = factor if factor > low else 0.5 * (low + high)

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy import sparse
 
 from geomech import dda
 from geomech.bench.safety.factor_scenes import random_slope
@@ -51,6 +52,24 @@ def test_the_bound_of_a_block_on_a_plane_is_limit_equilibrium(cohesion):
     # What is not reduced holds at any factor.
     kept = AdmissibleForces.of(system, state, rest, joints, [])
     assert math.isinf(kept.largest_factor())
+
+
+@pytest.mark.parametrize("first", [0.5, 1.0, 2.0, 20.0])
+def test_a_sliver_that_nothing_holds_leaves_the_bound_of_the_other_blocks(first):
+    """A further block without contacts, with a thousandth of the load; with a tenth, nothing bounds the factor."""
+    system, state, joints = plane()
+    forces = AdmissibleForces.of(system, state, State.at_rest(system.blocks), joints, ["plane"])
+    expected = math.tan(math.radians(40)) / math.tan(DIP)
+
+    def with_sliver(load: float) -> AdmissibleForces:
+        none = [sparse.csc_matrix((3, each.shape[1])) for each in (forces.matrix, forces.bolts)]
+        matrix, bolts = (
+            sparse.vstack(pair, format="csc") for pair in zip((forces.matrix, forces.bolts), none, strict=True)
+        )
+        return replace(forces, matrix=matrix, bolts=bolts, loads=np.append(forces.loads, [0.0, load, 0.0]))
+
+    assert with_sliver(1e-3).largest_factor(first) == pytest.approx(expected, rel=2e-4)
+    assert with_sliver(0.1).largest_factor(first) == 0.0
 
 
 def test_a_bolt_may_pull_with_what_it_yields_at_beside_what_it_does():
