@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 from small_scenes import PLATE
 
@@ -37,4 +39,9 @@ def test_lines_name_the_largest_block_and_what_makes_it_large(problem, monkeypat
     assert "1 cracked block" in line and "unknowns on sides" in line and "GB" in line and "processor time" in line
     monkeypatch.setattr(crack_cost, "LARGE", 10)
     monkeypatch.setattr(crack_cost, "FINE", 0.01)
-    assert "simplify_m" in crack_cost.cost_lines(problem)[1]
+    _, finely, graded = crack_cost.cost_lines(problem)
+    assert "simplify_m" in finely and "grading_layers" in graded
+    # What the line promises of a problem that is graded.
+    ungraded = replace(problem, ddm=replace(problem.ddm, grading_layers=0))
+    assert crack_cost.crack_cost(ungraded).memory < crack_cost.crack_cost(problem).memory
+    assert len(crack_cost.cost_lines(ungraded)) == 2
