@@ -367,6 +367,28 @@ def _cracks(arrangement: Arrangement, graph: Graph, drawn: Drawn, inside: np.nda
     )
 
 
+def _within_sides(flat: np.ndarray, points: np.ndarray, start: np.ndarray, within: float) -> np.ndarray:
+    """Of the corners ``flat`` (n,) of loops, those ``within`` m of the side that is left without them. A row of them, each of
+    which hardly turns, may be a bend together: of each such row the farthest is kept, until none is farther."""
+    flat, index, n = flat.copy(), np.arange(len(points)), len(points)
+    loop = np.repeat(np.arange(len(start) - 1), np.diff(start))
+    while flat.any():
+        before, after = np.where(flat, -1, index), np.where(flat, n, index)
+        last, first = np.maximum.reduceat(before, start[:-1]), np.minimum.reduceat(after, start[:-1])
+        before, after = np.maximum.accumulate(before), np.minimum.accumulate(after[::-1])[::-1]
+        before = np.where(before < start[loop], last[loop], before)[flat]
+        after = np.where(after >= start[loop + 1], first[loop], after)[flat]
+        side, way = points[after] - points[before], points[flat] - points[before]
+        off = np.abs(side[:, 0] * way[:, 1] - side[:, 1] * way[:, 0]) / np.hypot(*side.T)
+        beyond = np.flatnonzero(off > within)
+        if not len(beyond):
+            break
+        farthest = beyond[np.lexsort((off[beyond], before[beyond]))]
+        ends = np.append(before[farthest][1:] != before[farthest][:-1], True)
+        flat[np.flatnonzero(flat)[farthest[ends]]] = False
+    return flat
+
+
 def _blocks(
     arrangement: Arrangement, drawn: Drawn, source: np.ndarray, inside: np.ndarray, zone_names: list[str], grid: float
 ) -> Blocks:
@@ -387,7 +409,7 @@ def _blocks(
     # ends, sides and crossings adds up to, and the side turns there by no more than that makes it turn.
     flat = (off <= np.minimum(_BESIDE * grid, _NO_TURN * short) * long) & (label == label[before])
     flat &= np.einsum("ij,ij->i", a, b) > 0
-    kept = np.flatnonzero(~flat)
+    kept = np.flatnonzero(~_within_sides(flat, points, start, _BESIDE * grid))
     owner = np.repeat(np.arange(len(loops)), count)[kept]
     count = np.bincount(owner, minlength=len(loops))
     start = np.concatenate([[0], np.cumsum(count)])

@@ -355,9 +355,10 @@ def neighbours_agree(cutting) -> None:
     assert np.isin(np.arange(len(index)), i[across]).all()
 
 
-@pytest.mark.parametrize("first", [0, pytest.param(10, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("first", [0, pytest.param(11, marks=pytest.mark.slow)])
 def test_the_finest_angles_and_gaps_leave_sound_blocks(first):
-    for seed in range(first, 10 if first == 0 else 300):
+    """Seed 10 has a row of corners a micrometre apart that hardly turn: left out one by one, they took along a bend."""
+    for seed in range(first, 11 if first == 0 else 300):
         traces = fine_network(seed)
         joints = [Joint("joint:a", traces[::2]), Joint("joint:b", traces[1::2])]
         for tolerance in (None, 1e-9):
