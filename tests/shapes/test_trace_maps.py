@@ -216,7 +216,7 @@ logging.basicConfig(level=logging.WARNING, format="%(message)s", stream=sys.stdo
 problem, kinds, passes = load_scene(sys.argv[1]).problem(), [], 0
 for cycle in Coupling(problem).cycles():
     kinds += [event.kind for event in cycle.events]
-    passes += bool((cycle.tips["grown"] > 0).any())
+    passes += cycle.growth_pass > 0  # without asking for tips, for which all cracked blocks would be solved
 use = resource.getrusage(resource.RUSAGE_SELF)
 print(cycle.state.time, passes, kinds.count("initiation"), kinds.count("split"), cycle.statistics["kinetic_energy"],
       cycle.statistics["overlap_energy"], cycle.statistics["gravity_work"], use.ru_utime + use.ru_stime, use.ru_maxrss * 1024)
@@ -242,7 +242,7 @@ def test_a_second_of_a_section_whose_cracks_grow(tmp_path):
     assert not any("do not converge" in line or "overlap" in line for line in warnings)
     time, passes, started, divided, kinetic, overlap, work, _, peak = map(float, end.split())
     assert time == pytest.approx(1.0)
-    assert 8 < passes < 40 and started > 8 and divided > 4
+    assert 3 < passes < 60 and started > 8 and divided > 4
     assert kinetic < 1e-6 * work and overlap < 1e-3 * work
     assert peak < 2.0e9
 
