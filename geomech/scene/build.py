@@ -25,6 +25,7 @@ from ..model import (
     ViscousBoundary,
     rayleigh_coefficients,
 )
+from ..model.loads.wave_limits import SECOND_ORDER
 from ..shapes.parts import JOINT
 from .assembly.cells import cells_of
 from .assembly.fixed_blocks import block_orders, constrained_unknowns, first_velocities, fixed_blocks
@@ -214,14 +215,10 @@ def _loads(tables: SceneTables, check: Check) -> Loads:
     )
 
 
-#: β and γ for waves and for blocks that bend: of second order and without gain of energy. Shi's scheme damps waves of 0.5 Hz
-#: at 10 ms by 5 % per wavelength, this one preserves their amplitude (`model.loads.wave_limits`). A dropped beam of 5 ms
-#: period has in steps of 0.1 ms 38 % of its energy damped by Shi's scheme, which its notch lacks, and 5 % by this one.
-_WAVES = (0.25, 0.5)
-
-
 def _dda(tables: SceneTables) -> DdaSettings:
     d = tables.dda
+    # Shi's scheme damps waves of 0.5 Hz at 10 ms by 5 % per wavelength, and takes 38 % of the energy of a dropped beam with a
+    # period of 5 ms in steps of 0.1 ms, where the trapezoidal rule takes 5 %.
     shaken = d.dynamic_factor == 1.0 and (tables.loads.base is not None or tables.loads.viscous_boundaries)
     swings = shaken or (
         d.dynamic_factor == 1.0 and any(zone.order not in (1, "auto") for zone in tables.zones.values())
@@ -233,7 +230,7 @@ def _dda(tables: SceneTables) -> DdaSettings:
         time_step=d.time_step_s,
         automatic_time_step=d.automatic_time_step,
         dynamic_factor=d.dynamic_factor,
-        newmark=d.newmark if d.newmark is not None else _WAVES if swings else DdaSettings().newmark,
+        newmark=d.newmark if d.newmark is not None else SECOND_ORDER if swings else DdaSettings().newmark,
         spectral_radius=d.spectral_radius,
         equilibrium=d.equilibrium,
         unbalanced_tolerance=d.unbalanced_tolerance,

@@ -29,6 +29,16 @@ def voussoirs(n: int, ratio: float, radius: float = 1.0) -> list[np.ndarray]:
     return [np.array([inner * a, outer * a, outer * b, inner * b]) for a, b in itertools.pairwise(rays)]
 
 
+def _weights(corners: np.ndarray) -> np.ndarray:
+    """(n, 3) right-hand sides of the equilibrium of voussoirs with ``corners`` (n, 4, 2): 0, weight, and its moment."""
+    x, y = corners[:, :, 0], corners[:, :, 1]
+    u, v = np.roll(x, -1, axis=1), np.roll(y, -1, axis=1)
+    cross = x * v - u * y
+    right = np.zeros((len(corners), 3))
+    right[:, 1], right[:, 2] = 0.5 * cross.sum(axis=1), np.sum((x + u) * cross, axis=1) / 6.0
+    return right
+
+
 def least_pull(n: int, ratio: float) -> float:
     """Smallest tension, over all equilibria of ``n`` rigid voussoirs under their own weight, that a corner of a joint
     must carry.
@@ -43,11 +53,7 @@ def least_pull(n: int, ratio: float) -> float:
     from scipy.sparse import csr_array
 
     corners = np.array(voussoirs(n, ratio))
-    x, y = corners[:, :, 0], corners[:, :, 1]
-    u, v = np.roll(x, -1, axis=1), np.roll(y, -1, axis=1)
-    cross = x * v - u * y
-    right = np.zeros((n, 3))
-    right[:, 1], right[:, 2] = 0.5 * cross.sum(axis=1), np.sum((x + u) * cross, axis=1) / 6.0  # weight, and its moment
+    right = _weights(corners)
     equations = np.zeros((n, 3, 3 * (n + 1) + 1))
     voussoir = np.arange(n)
     for sign, joint, inner, outer in (
@@ -94,11 +100,7 @@ def moment_reserve(n: int, ratio: float, strength: float) -> float:
     from scipy.sparse import csr_array
 
     corners = np.array(voussoirs(n, ratio))
-    x, y = corners[:, :, 0], corners[:, :, 1]
-    u, v = np.roll(x, -1, axis=1), np.roll(y, -1, axis=1)
-    cross = x * v - u * y
-    right = np.zeros((n, 3))
-    right[:, 1], right[:, 2] = 0.5 * cross.sum(axis=1), np.sum((x + u) * cross, axis=1) / 6.0  # weight, and its moment
+    right = _weights(corners)
     equations, voussoir, joints = np.zeros((n, 3, 3 * (n + 1) + 1)), np.arange(n), np.arange(n + 1)
     for sign, joint, inner, outer in (
         (1.0, voussoir, corners[:, 0], corners[:, 1]),

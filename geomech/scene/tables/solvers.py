@@ -32,7 +32,8 @@ class DdaTable(Table):
     newmark: Pair | None = Field(
         None,
         description="β and γ of the time scheme: [0.5, 1] is Shi's, [0.25, 0.5] the trapezoidal rule without dissipation "
-        "(unset: the latter if the ground moves, edges absorb waves or zones have a given order above 1, which Shi's damps, otherwise Shi's); "
+        "(unset: the latter if the ground moves, edges absorb waves or zones have a given order above 1, which Shi's damps, "
+        "otherwise Shi's); "
         "2β ≥ γ ≥ 0.5 and β ≤ γ − 0.25; γ > 0.5 damps and is of first order, `spectral_radius` damps and is of second",
     )
     spectral_radius: Annotated[float, Field(ge=0, le=1)] | None = Field(
