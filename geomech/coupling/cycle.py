@@ -229,10 +229,12 @@ class Coupling:
         else:
             self.mechanism.warn_at_the_end(self.now.state.time)
         if not self.endless:
-            check_dissipation(self.now.budget, self.now.state.time, self.static, self.now.crack_energy.toughness)
+            broken, newmark = self.now.crack_energy.toughness, self.problem.dda.newmark
+            check_dissipation(self.now.budget, self.now.state.time, self.static, broken, newmark)
             if not self.static:
                 cracks = self.now.crack_energy
-                check_supplied(cracks.fracture + cracks.parting, self.now.budget, self.now.state.time)
+                supplied = cracks.fracture + cracks.parting
+                check_supplied(supplied, self.now.budget, self.now.state.time, self.bending.bend)
             if not self.problem.dda.equilibrium:
                 dda.warn_of_toes_at_rest(self.now.system, self.now.state, self.problem.loads)
 
@@ -378,7 +380,8 @@ class Coupling:
         statistics["budget_residual"] = budget.left_over(cracks.residual, cracks.uneven)
         self.energy.check(statistics["budget_residual"], result.state.time)
         if grown.ends and not self.static:
-            self.bending.check(cracks.toughness, cracks.fracture + cracks.parting, result.state.time)
+            bend = now.bodies.keys() <= now.by_mean_stress.fields.keys()
+            self.bending.check(cracks.toughness, cracks.fracture + cracks.parting, result.state.time, bend)
         overlap = None if result.overlap is None else Overlap(*result.overlap)
         self.overlaps.check(budget, overlap, now.blocks.names, result.state.time)
         if grown.ends or len(grown.cut):

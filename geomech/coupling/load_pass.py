@@ -25,6 +25,7 @@ from ..dda.statics.displacement_limit import DisplacementLimit
 from ..model import TIP, Motion, State
 from .coupled_state import CrackedBlocks
 from .crack_compliance.added_compliance import crack_responses, passive, stress_rotations, times
+from .crack_compliance.line_search import Linearised, LineSearch
 from .crack_compliance.load_extrapolation import Answer
 from .crack_compliance.quasi_newton import QuasiNewton, strain_size
 from .load_path import loads_at
@@ -270,6 +271,7 @@ def _passes(
     tolerance = COMPLIANCE_TOLERANCE if static else DYNAMIC_TOLERANCE
     response = _expected(now, now.state.time + dt if load_time is None else load_time) if static else now.response
     result: StepResult | None = like
+    search = None if static else LineSearch()
     iterations: float = 0
     oscillating = _OscillatingBlocks(static, dt, ways.cement_breaks)
     left: list[float] = []
@@ -290,7 +292,9 @@ def _passes(
         solved = not all(block in now.by_mean_stress for block in now.bodies)
         if solved:
             _solve_bodies(now, result)
-        response, differences, answer = _take_response(now, result.state, quasi_newton, tolerance)
+        if search is not None and cut:
+            search.forget()
+        response, differences, answer = _take_response(now, result.state, quasi_newton, tolerance, search)
         left.append(float(differences.max()))
         oscillating.cut_mismatch = max(oscillating.cut_mismatch, left[-1]) if cut else oscillating.cut_mismatch
         if left[-1] < tolerance:
@@ -484,10 +488,11 @@ def _solve(now: CrackedBlocks, bodies: dict) -> None:
 
 
 def _take_response(
-    now: CrackedBlocks, state: State, quasi_newton: QuasiNewton, tolerance: float
+    now: CrackedBlocks, state: State, quasi_newton: QuasiNewton, tolerance: float, search: LineSearch | None = None
 ) -> tuple[dda.CrackResponse, np.ndarray, Answer]:
     """The crack response for the next iteration, the relative mismatch of the assumed one (n_cracked,), and the strains
-    found. Sets ``now.response``, with which the next step begins."""
+    found. Sets ``now.response``, with which the next step begins. ``search``: shortens the next steps of blocks that do not
+    agree."""
     blocks = np.array(list(now.bodies), int)
     with now.timed("ddm solve"):
         answers = _answers(now, state)
@@ -495,19 +500,14 @@ def _take_response(
         own = parallel_map(lambda of: _compliance(now, *of), list(answers.items()), threads_for(now.bodies))
         now.compliances.update(zip(answers, own))
         again, after = now.response.copy(), now.response.copy()
-        width, mean = now.response.offset.shape[1], now.by_mean_stress
-        known = _stacked([now.compliances[b][2] for b in answers], width)
-        strain = _stacked([mean.crack_strain(b, answer) for b, answer in answers.items()], width)
-        hang = [k for k, b in enumerate(answers) if b in now.by_mean_stress]
-        if hang:
-            limit = _stacked([mean.limit(b, now.bodies[b], now.elastic(b)) for b in blocks[hang].tolist()], width)
-            turned = limit.transpose(0, 2, 1)
-            known[hang], strain[hang] = turned @ known[hang] @ limit, times(turned, strain[hang])
+        width = now.response.offset.shape[1]
+        known, strain = _linearised(now, answers, width)
         # A response is given in the axes of the beginning of a step and rotates with its block.
         began, ends = now.state.rotation[blocks], state.rotation[blocks]
         borne = now.stress_of(state, blocks)
         stress = times(stress_rotations(began - ends, width), borne)
-        assumed = times(stress_rotations(ends - began, width).transpose(0, 2, 1), now.crack_strain_of(state, blocks))
+        carried = now.crack_strain_of(state, blocks)
+        assumed = times(stress_rotations(ends - began, width).transpose(0, 2, 1), carried)
         again.compliance[blocks], again.offset[blocks] = crack_responses(known, strain, stress, began)
         after.compliance[blocks], after.offset[blocks] = crack_responses(known, strain, borne, ends)
         found = again.offset[blocks] + times(again.compliance[blocks], stress)
@@ -522,7 +522,52 @@ def _take_response(
                 again.offset[blocks] = quasi_newton.next(before, residual, again.compliance[blocks], size)
     now.response = after
     own_stress = times(stress_rotations(-state.rotation[blocks], width), borne)
+    if search is not None:
+        own_assumed = times(stress_rotations(ends, width).transpose(0, 2, 1), carried)
+        for k in np.flatnonzero(differences > FAILED).tolist():
+            reached = Linearised(own_stress[k], strain[k], known[k], strain[k] - own_assumed[k])
+            _shorten(now, state, search, int(blocks[k]), reached, own_assumed[k], again)
     return again, differences, Answer(loads_at(now.problem.loads, state.time), _systems(now), strain, own_stress, known)
+
+
+def _linearised(now: CrackedBlocks, answers: dict, width: int) -> tuple[np.ndarray, np.ndarray]:
+    """S (n, w, w) and crack strain (n, w) of the solutions ``answers`` (block →), in the blocks' own axes."""
+    mean = now.by_mean_stress
+    known = _stacked([now.compliances[b][2] for b in answers], width)
+    strain = _stacked([mean.crack_strain(b, answer) for b, answer in answers.items()], width)
+    hang = [k for k, b in enumerate(answers) if b in mean]
+    if hang:
+        limited = [b for b in answers if b in mean]
+        limit = _stacked([mean.limit(b, now.bodies[b], now.elastic(b)) for b in limited], width)
+        turned = limit.transpose(0, 2, 1)
+        known[hang], strain[hang] = turned @ known[hang] @ limit, times(turned, strain[hang])
+    return known, strain
+
+
+def _shorten(
+    now: CrackedBlocks, state: State, search: LineSearch, block: int, reached: Linearised, assumed: np.ndarray,
+    again: dda.CrackResponse,
+) -> None:  # fmt: skip
+    """Linearise the cracks of ``block`` in the response ``again`` where ``search`` has them, instead of where the last step
+    has ``reached``; ``assumed`` (w,): the crack strain of that step, in the block's own axes."""
+    width = len(reached.stress)
+    turn = stress_rotations(state.rotation[block : block + 1], width)
+
+    def at(stress: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        with now.timed("ddm solve"):
+            answers = {block: _answer(now, state, block, times(turn, stress[None])[0])}
+        with now.timed("compliance"):
+            now.compliances[block] = _compliance(now, block, answers[block])
+            known, strain = _linearised(now, answers, width)
+        return strain[0], known[0]
+
+    to = search.next(block, reached, assumed, at)
+    if to is not reached:
+        began = now.state.rotation[block : block + 1]
+        stress = times(stress_rotations(began, width), to.stress[None])
+        again.compliance[[block]], again.offset[[block]] = crack_responses(
+            to.compliance[None], to.strain[None], stress, began
+        )
 
 
 def _stacked(values: list[np.ndarray], width: int) -> np.ndarray:
@@ -534,18 +579,21 @@ def _stacked(values: list[np.ndarray], width: int) -> np.ndarray:
 
 def _answers(now: CrackedBlocks, state: State) -> dict:
     """block → the solution whose crack strain the block is to take."""
+    return {
+        block: _answer(now, state, block, now.stress_of(state, np.array([block]))[0])
+        if block in now.by_mean_stress
+        else now.solutions[block]
+        for block in now.bodies
+    }
 
-    def answer(block: int):
-        if block not in now.by_mean_stress:
-            return now.solutions[block]
-        body, began = now.bodies[block], now.history.get(block)
-        elastic = now.elastic(block)
-        stress = now.stress_of(state, np.array([block]))[0, : len(elastic)]
-        return now.by_mean_stress.answer(
-            block, body, stress, float(state.rotation[block]), elastic, began, now.problem.run.skip
-        )
 
-    return {block: answer(block) for block in now.bodies}
+def _answer(now: CrackedBlocks, state: State, block: int, stress: np.ndarray):
+    """The solution of ``block`` under its mean ``stress`` (w,), Pa, in current axes."""
+    elastic = now.elastic(block)
+    return now.by_mean_stress.answer(
+        block, now.bodies[block], stress[: len(elastic)], float(state.rotation[block]), elastic,
+        now.history.get(block), now.problem.run.skip,
+    )  # fmt: skip
 
 
 def _compliance(now: CrackedBlocks, block: int, solution) -> tuple:

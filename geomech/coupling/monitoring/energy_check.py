@@ -6,6 +6,7 @@ from __future__ import annotations
 import logging
 
 from ...dda.energy_balance import GAIN, EnergyBudget
+from ...model.loads.wave_limits import SECOND_ORDER
 
 log = logging.getLogger(__name__)
 
@@ -44,9 +45,12 @@ class BudgetWatch:
         )
 
 
-def check_dissipation(budget: EnergyBudget, time: float, static: bool, broken: float = 0.0) -> None:
+def check_dissipation(
+    budget: EnergyBudget, time: float, static: bool, broken: float = 0.0, newmark: tuple[float, float] | None = None
+) -> None:
     """Warn at the end of a run, ``time`` s, if the time integration has damped vibrations that matter to its result,
-    or, in statics, a motion from one place to another. ``broken``: J/m of fracture energy, of cracks that have grown."""
+    or, in statics, a motion from one place to another. ``broken``: J/m of fracture energy, of cracks that have grown;
+    ``newmark``: (β, γ) of the scheme."""
     energy, turnover = budget.last, budget.turnover
     if static:
         if turnover and budget.scheme > UNHELD * turnover:
@@ -76,51 +80,66 @@ def check_dissipation(budget: EnergyBudget, time: float, static: bool, broken: f
         "t = %g s: the time integration has taken %.2g of all converted energy from blocks %s (scheme_loss in "
         "history.csv): the step does not resolve vibrations or impacts that matter to the result, whose error is of "
         'that order and shrinks with dda.time_step_s. dda.equilibrium = "start" avoids the vibration due to a '
-        "suddenly applied load; dda.newmark = [0.25, 0.5] has no dissipation",
+        "suddenly applied load%s",
         time,
         budget.scheme / turnover,
         "that still move" if moves else "whose cracks have grown in motion",
+        "" if tuple(newmark or ()) == SECOND_ORDER else f"; dda.newmark = {list(SECOND_ORDER)} has no dissipation",
     )
 
 
-def check_supplied(supplied: float, budget: EnergyBudget, time: float) -> None:
+def check_supplied(supplied: float, budget: EnergyBudget, time: float, bend: bool = False) -> None:
     """Warn at the end of a run in motion, ``time`` s, if growing cracks and cut blocks have left more than `GAIN` times all
-    energy converted that no block had ``supplied``, J/m: what the blocks spent on fracture and at the cuts, below 0."""
+    energy converted that no block had ``supplied``, J/m: what the blocks spent on fracture and at the cuts, below 0.
+    ``bend``: whether all cracked blocks are of higher order."""
     if not -supplied > GAIN * budget.turnover:
         return
     log.warning(
         "t = %g s: cracks that grew and cut blocks have left %.3g J/m, %.2g of all converted energy, that came from no block "
-        "(fracture_energy and parting_energy in history.csv): forces that bend a block of uniform strain load its cracks "
-        "but do no work on it. The motion is uncertain by that share, or some times as much, as other steps give other "
-        "cracks. Give the zone an order of 2 to 8 (zones.NAME.order)",
+        "(fracture_energy and parting_energy in history.csv): %s. The motion is uncertain by that share, or some times as "
+        "much, as other steps give other cracks. %s",
         time,
         -supplied,
         -supplied / budget.turnover,
+        _UNRESOLVED if bend else "forces that bend a block of uniform strain load its cracks but do no work on it",
+        _SHORTER if bend else "Give the zone an order of 2 to 8 (zones.NAME.order)",
     )
+
+
+#: Why cracks take no energy from blocks that bend, and what to do.
+_UNRESOLVED = "the steps are longer than the impact, or than the growth, in which their cracks take it"
+_SHORTER = "Shorten dda.time_step_s"
 
 
 class BendingWatch:
     """Warns, once, when moving blocks have supplied less energy to their cracks than the rock takes as it breaks: a
-    block of uniform strain stores no bending energy, so that cracks opened by bending cost it nothing."""
+    block of uniform strain stores no bending energy, so that cracks opened by bending cost it nothing.
+
+    bend  whether all cracked blocks so far are of higher order
+    """
 
     def __init__(self) -> None:
-        self._reported, self._before = False, 0.0
+        self._reported, self._before, self.bend = False, 0.0, True
 
-    def check(self, toughness: float, spent: float, time: float) -> None:
+    def check(self, toughness: float, spent: float, time: float, bend: bool = False) -> None:
         """Called after every step: ``toughness``, J/m: fracture energy until ``time`` s; ``spent``, J/m: what the
-        blocks supplied for it. Part of the growth in a step is paid for in the next one."""
+        blocks supplied for it; ``bend``: whether all cracked blocks are of higher order. Part of the growth in a step is
+        paid for in the next one."""
+        self.bend = self.bend and bend
         before, self._before = self._before, toughness
         if self._reported or not before - spent > UNPAID * before:
             return
         self._reported = True
         log.warning(
             "t = %g s: of the %.3g J/m of fracture energy, the blocks supplied %.3g (unpaid_toughness in summary.json): "
-            "blocks of uniform strain store no bending energy, so that cracks opened by bending take none from the "
-            "motion, and K under an impact may be several times too high. Give the zone an order of 2 to 8 "
-            "(zones.NAME.order), or take such cracks as an upper bound",
+            "%s, and K under an impact may be several times too high. %s, or take such cracks as an upper bound",
             time,
             before,
             spent,
+            _UNRESOLVED
+            if self.bend
+            else "blocks of uniform strain store no bending energy, so that cracks opened by bending take none from the motion",
+            _SHORTER if self.bend else "Give the zone an order of 2 to 8 (zones.NAME.order)",
         )
 
 

@@ -69,7 +69,7 @@ def energy_summary(cycle: Cycle) -> dict[str, float]:
     """Energy budget of the run, J/m, for ``summary.json``; empty without one.
 
     ``budget_residual`` is relative to all energy converted. ``unpaid_toughness``: fracture energy in a run in motion
-    that the blocks, which store no bending energy, did not supply.
+    that the blocks did not supply: those of order 1 store no bending energy.
     """
     names = (
         "kinetic_energy", "elastic_energy", "contact_energy", "gravity_work", "load_work", "crack_work",

@@ -61,6 +61,10 @@ def test_what_the_time_scheme_takes_matters_to_motion_and_to_cracks_that_grew_in
     budget = SimpleNamespace(last=SimpleNamespace(kinetic=kinetic), turnover=100.0, scheme=20.0, breaking=0.0)
     with caplog.at_level(logging.WARNING):
         check_dissipation(budget, 1.0, False, broken)
+        assert ("dda.newmark" in caplog.text) == bool(told)
+        caplog.clear()
+        check_dissipation(budget, 1.0, False, broken, (0.25, 0.5))
+        assert "dda.newmark" not in caplog.text
     assert told in caplog.text and ("taken 0.2 of all" in caplog.text) == bool(told)
 
 
@@ -93,8 +97,12 @@ def test_cracks_that_blocks_did_not_pay_for_are_told_of_once(caplog):
         for time, toughness, spent in ((1.0, 0.0, 0.0), (2.0, 4.0, 0.0), (3.0, 8.0, 4.0), (4.0, 8.0, 7.9 - UNPAID),
                                        (5.0, 8.0, 2.0), (6.0, 9.0, 0.0)):  # fmt: skip
             watch.check(toughness, spent, time)
-    (line,) = [record.getMessage() for record in caplog.records]
+        bent = BendingWatch()
+        for time, toughness in ((1.0, 4.0), (2.0, 4.0)):
+            bent.check(toughness, 0.0, time, bend=True)
+    line, other = [record.getMessage() for record in caplog.records]
     assert line.startswith("t = 5 s: of the 8 J/m of fracture energy") and "blocks supplied 2 " in line
+    assert "store no bending" in line and "store no bending" not in other and "dda.time_step_s" in other
 
 
 def notched_beam(height: float, speed: float) -> Problem:
@@ -181,6 +189,9 @@ def test_what_no_block_supplied_to_cracks_and_cuts_is_told_of(caplog):
     assert not caplog.records
     check_supplied(-6.0, budget, 2.0)
     assert "t = 2 s" in caplog.text and "left 6 J/m, 0.12 of all converted energy" in caplog.text
+    assert "Give the zone an order" in caplog.text
+    check_supplied(-6.0, budget, 2.0, bend=True)
+    assert caplog.records[-1].getMessage().endswith("Shorten dda.time_step_s")
 
 
 @pytest.mark.slow
