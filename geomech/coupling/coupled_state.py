@@ -113,6 +113,12 @@ class CrackedBlocks:
             more = {b: BlockStressField.of(deflected, b, compliance[b]) for b in bend if b not in known}
             self.by_mean_stress.take_fields(known | more)
 
+    @property
+    def glued_cells(self) -> set[int]:
+        """The cells that are bonded to others of their rock."""
+        glued = self.blocks.glued
+        return set() if glued is None else set(self.blocks.vertex_block[np.asarray(glued).ravel()].tolist())
+
     def take_orders(self, order: np.ndarray, begun: dda.CrackResponse, state: State | None) -> set[int]:
         """Raise blocks to these ``order`` (n_blocks,); returns which are raised. ``begun``: crack response of before, which
         is kept with room for more components; ``state`` with the new orders, None: the present one, with zero for what is

@@ -39,6 +39,7 @@ from .load_transfer.load_imbalance import LoadBalance
 from .load_transfer.unbounded_rock import out_of_sight, solved_pass
 from .monitoring.collapse import collapse_in_situ, lost, relax, unsupported
 from .monitoring.energy_check import BendingWatch, BudgetWatch, GrowthWatch, check_dissipation, check_supplied
+from .monitoring.free_motion import FreeMotion
 from .monitoring.mechanism import Mechanism
 from .monitoring.pass_agreement import AgreementWatch
 
@@ -146,6 +147,7 @@ class Coupling:
         self._brought: tuple[Event, ...] = ()
         self.tips = None if self.static else DynamicTips(problem)
         self.range, self.balance, self.mechanism = dda.ElasticRange(), LoadBalance(), Mechanism()
+        self.drift = FreeMotion()
         self.energy, self.bending, self.overlaps = BudgetWatch(), BendingWatch(), OverlapWatch()
         self.unstable, self.agreement = GrowthWatch(), AgreementWatch()
         self.under_way: UnderWay | None = None
@@ -347,6 +349,7 @@ class Coupling:
             # Only when growth has ended: a block on a thin ligament moves excessively until it is cut off.
             collapse = lost(now, state)
             ended = collapse or unsupported(now, found.result, self.mechanism)
+            self.drift.check(now, found.result)
             events, step.stops = events + ended, bool(collapse) or self._stops(ended)
         if growth is not None:
             if self.static and not self.endless:

@@ -27,6 +27,7 @@ from .coupled_state import CrackedBlocks
 from .crack_compliance.added_compliance import crack_responses, passive, stress_rotations, times
 from .crack_compliance.line_search import Linearised, LineSearch
 from .crack_compliance.load_extrapolation import Answer
+from .crack_compliance.outline_motion import OutlineMotion
 from .crack_compliance.quasi_newton import QuasiNewton, strain_size
 from .load_path import loads_at
 from .load_transfer.elastic_bodies import boundary_loads, threads_for, tip_rows
@@ -520,6 +521,8 @@ def _take_response(
             if differences.max() >= tolerance:
                 before = again.offset[blocks] - residual
                 again.offset[blocks] = quasi_newton.next(before, residual, again.compliance[blocks], size)
+    for block in now.glued_cells.intersection(answers):
+        again.outlines[block] = after.outlines[block] = _outline(now, block, answers[block])
     now.response = after
     own_stress = times(stress_rotations(-state.rotation[blocks], width), borne)
     if search is not None:
@@ -568,6 +571,13 @@ def _shorten(
         again.compliance[[block]], again.offset[[block]] = crack_responses(
             to.compliance[None], to.strain[None], stress, began
         )
+
+
+def _outline(now: CrackedBlocks, block: int, solution) -> OutlineMotion:
+    """How the faces of a cracked cell to its neighbours move with the ``solution`` of its cracks."""
+    mean = now.by_mean_stress
+    body, (stress, limit) = now.bodies[block], mean.stress[block]
+    return OutlineMotion.of(mean.fields[block], body, solution, stress, limit)
 
 
 def _stacked(values: list[np.ndarray], width: int) -> np.ndarray:

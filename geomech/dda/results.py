@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import Protocol
 
 import numpy as np
 
@@ -24,17 +25,26 @@ class Unsupported(NotConverged):
         self.motion, self.unbalanced = motion, unbalanced
 
 
+class CrackedOutline(Protocol):
+    """Displacement of the outline of a cracked block of higher order that its polynomials do not represent."""
+
+    def at(self, points: np.ndarray) -> np.ndarray:
+        """(n, 2, 4 + m) at undeformed ``points`` (n, 2) of the outline, m per Pa of its generalised stress
+        (`higher_order.crack_softening`), and m without stress; in the block's axes."""
+
+
 @dataclass(frozen=True, eq=False)
 class CrackResponse:
     """Response of cracks in blocks: mean crack strain e(σ) = ``offset`` + ``compliance`` σ, current axes.
 
     ``compliance`` (n_blocks, w, w) 1/Pa, symmetric; ``offset`` (n_blocks, w), engineering shear; w = 3, or more where
     cracked blocks are of higher order: their deflection follows, in their own frames (`higher_order.crack_softening`).
-    Zero for an intact block.
+    Zero for an intact block. ``outlines``: of cells, block → what displaces its faces besides.
     """
 
     compliance: np.ndarray
     offset: np.ndarray
+    outlines: dict[int, CrackedOutline] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         n, w = len(self.compliance), max(3, np.shape(self.compliance)[-1])
@@ -50,7 +60,7 @@ class CrackResponse:
         return cls(np.zeros((n_blocks, width, width)), np.zeros((n_blocks, width)))
 
     def copy(self) -> CrackResponse:
-        return CrackResponse(self.compliance.copy(), self.offset.copy())
+        return CrackResponse(self.compliance.copy(), self.offset.copy(), dict(self.outlines))
 
 
 @dataclass(frozen=True, eq=False)

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 
@@ -12,6 +13,10 @@ from .gmsh_models.session import gmsh_session
 
 #: Separator between the name of a block and the number of its cell.
 CELL = "#"
+
+
+#: A point is on an edge where its distance is below this part of the block's extent.
+_ON_EDGE = 1e-9
 
 
 class CannotMesh(RuntimeError):
@@ -24,12 +29,13 @@ def rock_of(name: str) -> str:
 
 
 def divided(
-    blocks: Blocks, size: np.ndarray, shape: np.ndarray, between: Sequence[str] | None = None
-) -> tuple[Blocks, np.ndarray]:
+    blocks: Blocks, size: np.ndarray, shape: np.ndarray, between: Sequence[str] | None = None,
+    along: Mapping[int, Sequence[np.ndarray]] | None = None,
+) -> tuple[Blocks, np.ndarray]:  # fmt: skip
     """``blocks`` with those that have a ``size`` divided into cells; and the block (n_cells,) of each.
 
     ``size`` (n_blocks,) m is the approximate cell size, nan for undivided blocks; ``shape`` (n_blocks,) is "triangles"
-    or "quads". Sides of cells keep the names of the edges on which they lie, those between cells have the name
+    or "quads"; no cell crosses the lines (n, 2) ``along`` which blocks (block →) are divided. Sides of cells keep the names of the edges on which they lie, those between cells have the name
     ``between`` (n_blocks,), if any. Raises CannotMesh naming the block.
     """
     polygons, names, edge_names, parent, glued, n = [], [], [], [], [], 0
@@ -47,7 +53,10 @@ def divided(
             n += int(start[b + 1] - start[b])
             continue
         try:
-            points, cells, lines = _mesh([blocks.vertices[loop] for loop in loops], float(size[b]), str(shape[b]))
+            outlines = [blocks.vertices[loop] for loop in loops]
+            points, cells, lines = _mesh(
+                outlines, float(size[b]), str(shape[b]), () if along is None else along.get(b, ())
+            )
         except Exception as error:
             raise CannotMesh(
                 f"{blocks.names[b]!r} cannot be divided into {shape[b]} of {size[b]:g} m: {error}"
@@ -81,20 +90,31 @@ def divided(
     return out, of
 
 
-def _mesh(loops: list[np.ndarray], size: float, shape: str):
+def _mesh(loops: list[np.ndarray], size: float, shape: str, along: Sequence[np.ndarray] = ()):
     """Points (n, 2), cells (lists of 3 or 4 of them, counter-clockwise), and ((a, b), edge), a < b, for all sides on
-    the edges of ``loops``, numbered one after the other."""
+    the edges of ``loops``, numbered one after the other; cells do not cross the lines ``along``."""
     with gmsh_session("cells") as gmsh:
         geo, mesh, option = gmsh.model.geo, gmsh.model.mesh, gmsh.option.setNumber
         lines, rings, corners = [], [], []
+        loops, of_edge = _with_ends(loops, along)
+        tag_of: dict[bytes, int] = {}
         for loop in loops:
             tags = [geo.addPoint(x, y, 0.0) for x, y in loop.tolist()]
+            tag_of |= zip((point.tobytes() for point in loop), tags, strict=True)
             corners.append(tags)
             own = [geo.addLine(a, b) for a, b in zip(tags, tags[1:] + tags[:1], strict=True)]
             lines += own
             rings.append(geo.addCurveLoop(own))
         surface = geo.addPlaneSurface(rings)
+        inner = []
+        for line in along:
+            for point in line:
+                if point.tobytes() not in tag_of:
+                    tag_of[point.tobytes()] = geo.addPoint(*point.tolist(), 0.0)
+            inner += [geo.addLine(tag_of[a.tobytes()], tag_of[b.tobytes()]) for a, b in pairwise(line)]
         geo.synchronize()
+        if inner:
+            mesh.embed(1, inner, 2, surface)
         option("Mesh.MeshSizeExtendFromBoundary", 1)
         option("Mesh.MeshSizeFromPoints", 0)
         option("Mesh.MeshSizeMax", size)
@@ -103,7 +123,7 @@ def _mesh(loops: list[np.ndarray], size: float, shape: str):
             option("Mesh.Algorithm", 8)
             option("Mesh.RecombinationAlgorithm", 1)
             mesh.setRecombine(2, surface)
-            if len(loops) == 1 and len(lines) == 4:
+            if len(loops) == 1 and len(lines) == 4 and not inner:
                 length = np.hypot(*(np.roll(loops[0], -1, axis=0) - loops[0]).T)
                 for k in range(4):
                     count = max(1, round(max(length[k], length[(k + 2) % 4]) / size))
@@ -117,7 +137,7 @@ def _mesh(loops: list[np.ndarray], size: float, shape: str):
         cells = [cell for kind, width in ((2, 3), (3, 4)) for cell in _of_kind(mesh, number, kind, width, surface)]
         sides = [
             ((min(a, b), max(a, b)), edge)
-            for edge, line in enumerate(lines)
+            for edge, line in zip(of_edge, lines, strict=True)
             for a, b in number[mesh.getElementsByType(1, line)[1]].reshape(-1, 2).tolist()
         ]
     if not cells:
@@ -127,6 +147,26 @@ def _mesh(loops: list[np.ndarray], size: float, shape: str):
         if float(x @ np.roll(y, -1) - y @ np.roll(x, -1)) < 0:
             cell.reverse()
     return points, cells, sides
+
+
+def _with_ends(loops: list[np.ndarray], along: Sequence[np.ndarray]) -> tuple[list[np.ndarray], list[int]]:
+    """``loops`` with the ends of the lines ``along`` on them as vertices, and the edge of before, numbered one after the
+    other, on which each edge is."""
+    ends = np.array([line[k] for line in along if (line[0] != line[-1]).any() for k in (0, -1)]).reshape(-1, 2)
+    out, of_edge, edge, extent = [], [], 0, max(float(np.ptp(loop, axis=0).max()) for loop in loops)
+    for loop in loops:
+        points: list[np.ndarray] = []
+        for start, end in zip(loop, np.roll(loop, -1, axis=0), strict=True):
+            way = end - start
+            share = (ends - start) @ way / (way @ way)
+            apart = np.hypot(*(ends - start - share[:, None] * way).T)
+            on = np.flatnonzero((apart <= _ON_EDGE * extent) & (share > 0.0) & (share < 1.0))
+            on = on[(ends[on] != start).any(axis=1) & (ends[on] != end).any(axis=1)]
+            points += [start, *ends[on[np.argsort(share[on])]]]
+            of_edge += [edge] * (len(on) + 1)
+            edge += 1
+        out.append(np.array(points))
+    return out, of_edge
 
 
 def _of_kind(mesh, number: np.ndarray, kind: int, width: int, surface: int) -> list[list[int]]:

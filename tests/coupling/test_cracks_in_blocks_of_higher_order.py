@@ -261,26 +261,6 @@ def test_a_dropped_beam_breaks_about_as_far_at_any_step(tmp_path, caplog):
     assert growth["newmark = [0.5, 1.0]"] < 0.6 * growth["shorter"]
 
 
-@pytest.mark.parametrize(
-    ("change", "message"),
-    [
-        ({"glued": np.array([[1, 5]])}, "cells glued to each other"),
-    ],
-)
-def test_what_does_not_go_together_is_refused(change, message):
-    problem = of_order(cantilever(0.3, 1e-3, 1e-3, None), 3)
-    from geomech.coupling.load_transfer.elastic_bodies import elastic_bodies
-
-    blocks = replace(problem.blocks, **change)
-    with pytest.raises(ValueError, match=message):
-        elastic_bodies(problem, blocks, problem.cracks, {}, [])
-    hole = np.array([[1.4, 0.4], [1.4, 0.6], [1.6, 0.6], [1.6, 0.4]])
-    wall = problem.blocks.loops(0)[0]
-    holed = Blocks.from_polygons([wall, [BEAM, hole]], fixed=[True, False], order=[1, 3])
-    with pytest.raises(ValueError, match="with a hole"):
-        elastic_bodies(problem, holed, problem.cracks, {}, [])
-
-
 FALLEN_ROCK = """
 [[geometry.zones]]
 name = "ground"

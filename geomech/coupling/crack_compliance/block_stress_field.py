@@ -9,6 +9,11 @@ with the jumps [u] add the generalised strain
 the strain on which Σ does the work that the stress does at the cracks. Under the block's own stress alone they are those
 of a body with a free outline whose crack faces are loaded by −σ n; its jumps have the potential W(Σ), so that e_c = ∂W/∂Σ
 and S = ∂e_c/∂Σ is symmetric. No body force is needed, whatever the order.
+
+The walls of holes are free of traction, but those of the polynomials are not. The field of a block with holes is that of
+the same forces on the block without them, H Σ (`_across_holes`), and the body whose cracks open has walls loaded by −σ n as
+well: s_k n above is the traction of both on closed cracks, and jumps still have a potential. For a uniform stress, H is
+1 − (area of the holes)/(area of the outline), as in blocks of first order.
 """
 
 from __future__ import annotations
@@ -20,7 +25,8 @@ import numpy as np
 
 from ...dda.higher_order.deflected_blocks import DeflectedBlocks
 from ...dda.higher_order.deflection_basis import DeflectionBasis
-from ...ddm.loads.body_loads import IntactField
+from ...dda.kinematics.polygon_quadrature import polygon_points
+from ...ddm.loads.body_loads import BodyLoad, IntactField
 from ...model import State
 
 if TYPE_CHECKING:
@@ -35,12 +41,15 @@ class BlockStressField:
     blocks: DeflectedBlocks
     block: int
     rock: np.ndarray
+    #: (3 + m, 3 + m) H of a block with holes, None without.
+    over_holes: np.ndarray | None = None
     _at_faces: tuple[object, np.ndarray] | None = field(default=None, repr=False)
 
     @classmethod
     def of(cls, blocks: DeflectedBlocks, block: int, compliance: np.ndarray) -> BlockStressField:
         """Of rock whose mean strain has this ``compliance`` (3, 3), 1/Pa."""
-        return cls(blocks, block, blocks.generalised_compliance(block, compliance))
+        rock = blocks.generalised_compliance(block, compliance)
+        return cls(blocks, block, rock, _across_holes(blocks, block, rock))
 
     @property
     def basis(self) -> DeflectionBasis:
@@ -60,17 +69,31 @@ class BlockStressField:
         """(n, 3, 3 + m) s_k at ``points`` (n, 2) of the undeformed block."""
         strain = self.basis.strain(points, self.block)[..., : self.width - 3]
         bent = self.size * (self.blocks.elastic[self.block] @ strain) @ self.rock[3:, 3:]
-        return np.concatenate([np.broadcast_to(np.eye(3), (len(points), 3, 3)), bent], axis=2)
+        units = np.concatenate([np.broadcast_to(np.eye(3), (len(points), 3, 3)), bent], axis=2)
+        return units if self.over_holes is None else units @ self.over_holes
 
     def traction(self, body: Body) -> np.ndarray:
-        """(n_crack_unknowns, 3 + m) traction of each s_k on the closed cracks of ``body``."""
+        """(n_crack_unknowns, 3 + m) traction of each s_k on the closed cracks of ``body``, whose holes are free."""
         from ...ddm.loads.unit_load_cache import on_elements
 
         if self._at_faces is None or self._at_faces[0] is not body.faces:
-            units = self.units(body.faces.nodes.reshape(-1, 2))
-            columns = [on_elements(body.faces, units[:, :, k]) for k in range(self.width)]
+            if self.over_holes is None:
+                units = self.units(body.faces.nodes.reshape(-1, 2))
+                columns = [on_elements(body.faces, units[:, :, k]) for k in range(self.width)]
+            else:
+                fields = (BodyLoad(intact=self.under(unit)) for unit in np.eye(self.width))
+                columns = [body.closed_traction(load) for load in fields]
             self._at_faces = body.faces, np.column_stack(columns)
         return self._at_faces[1]
+
+    def displacement_of(self, points: np.ndarray) -> np.ndarray:
+        """(n, 2, 3 + m) m, displacement of unit generalised strains at ``points`` (n, 2), without mean rotation, and without
+        displacement of the centroid."""
+        x, y = (points - self.basis.centroid[self.block]).T
+        none = np.zeros_like(x)
+        even = np.stack([np.stack([x, none, 0.5 * y], axis=1), np.stack([none, y, 0.5 * x], axis=1)], axis=1)
+        bent = self.basis.displacement(points, self.block)[..., : self.width - 3]
+        return np.concatenate([even, self.size * bent], axis=2)
 
     def crack_strain(self, body: Body, jumps: np.ndarray) -> np.ndarray:
         """(3 + m, …) e_c of ``jumps`` (n_crack_unknowns, …), times 2μ, of ``body``."""
@@ -122,6 +145,27 @@ class BlockStressField:
         return vars(self) | {"_at_faces": None}
 
 
+def _across_holes(blocks: DeflectedBlocks, block: int, rock: np.ndarray) -> np.ndarray | None:
+    """(3 + m, 3 + m) H: the generalised stress whose field, continued across the holes, has the work of Σ on all strains;
+    None without holes. ``rock`` (3 + m, 3 + m) is D⁻¹.
+
+    With the strains E of unit generalised strains, ∫ Eᵀ C E dA over the block and its holes is A (D + D_h), and H =
+    D (D + D_h)⁻¹."""
+    arrays, basis = blocks.blocks, blocks.basis
+    first, last = arrays.block_loop[block], arrays.block_loop[block + 1]
+    if last - first == 1:
+        return None
+    wall = np.arange(arrays.loop_start[first + 1], arrays.loop_start[last])
+    start, end = arrays.vertices[wall], arrays.vertices[arrays.next_vertex[wall]]
+    points, weights = polygon_points(start, end, basis.centroid[block], 2 * int(basis.order[block]) - 2)
+    size, m = float(np.sqrt(basis.area[block])), len(rock) - 3
+    bent = size * basis.strain(points, block)[..., :m]
+    strain = np.concatenate([np.broadcast_to(np.eye(3), (len(points), 3, 3)), bent], axis=2)
+    # (Holes are clockwise: their weights are negative.)
+    inside = np.einsum("n,nai,ab,nbj->ij", -weights, strain, blocks.elastic[block], strain, optimize=True)
+    return np.linalg.inv(np.eye(len(rock)) + inside @ rock / basis.area[block])
+
+
 @dataclass(frozen=True, eq=False)
 class PolynomialField(IntactField):
     """The field ``of`` a block with the generalised stress ``sizes`` (3 + m,), Pa."""
@@ -134,12 +178,9 @@ class PolynomialField(IntactField):
 
     def displacement(self, points: np.ndarray) -> np.ndarray:
         """(n, 2) m, without mean rotation, and without displacement of the centroid."""
-        own, basis = self.of, self.of.basis
-        arm, (xx, yy, shear) = points - basis.centroid[own.block], own.rock[:3, :3] @ self.sizes[:3]
-        x, y = arm.T
-        even = np.column_stack([xx * x + 0.5 * shear * y, yy * y + 0.5 * shear * x])
-        bent = basis.displacement(points, own.block)[..., : own.width - 3]
-        return even + bent @ (own.size * own.rock[3:, 3:] @ self.sizes[3:])
+        own = self.of
+        sizes = self.sizes if own.over_holes is None else own.over_holes @ self.sizes
+        return own.displacement_of(points) @ (own.rock @ sizes)
 
     def scaled(self, factor: float) -> PolynomialField:
         return PolynomialField(self.of, factor * self.sizes)

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from ... import dda
 from ...dda.higher_order.deflected_blocks import DeflectedBlocks
 from ...model import Event, State
 from ..coupled_state import CrackedBlocks
@@ -13,7 +14,7 @@ from ..cycle_record import event
 from ..load_pass import Balance, toughness
 from ..load_transfer.elastic_bodies import tip_rows
 from ..load_transfer.unbounded_rock import loads_of, take_endless
-from ..splitting.block_splitting import divided, split_blocks
+from ..splitting.block_splitting import divided, on_edges, split_blocks
 from ..splitting.contact_initialisation import contacts_after, holds_together
 from ..splitting.part_deflection import PartStress, inherited_deflection
 from ..splitting.part_initial_stress import initialise_moving_parts, initialise_parts_at_rest
@@ -57,7 +58,28 @@ def growth_of_tips(
     growth = corrected(tips, grow, look_ahead, now.number, now.problem.growth.correct, now.chords)
     if growth is not None:
         now.bodies = trial  # the corrected step reuses most of their matrices
+        _stay_in_cells(now, growth)
     return growth
+
+
+def _stay_in_cells(now: CrackedBlocks, growth) -> None:
+    """Raise `dda.NotConverged` where a crack has reached the face to another cell of its rock, which would close it."""
+    glued = now.blocks.glued
+    if glued is None:
+        return
+    edges = np.asarray(glued).ravel()
+    if now.state.parted is not None:
+        edges = np.asarray(glued)[~np.asarray(now.state.parted)].ravel()
+    for join in growth.joins:
+        found = on_edges(np.array(join.point), now.blocks, edges)
+        if join.other_crack < 0 and len(found):
+            cell = now.blocks.names[int(now.blocks.vertex_block[found[0]])]
+            x, y = join.point
+            raise dda.NotConverged(
+                f"t = {now.state.time:g} s: {now.cracks.names[join.crack]} has grown through its cell and would leave it at "
+                f"({x:.6g}, {y:.6g}), next to {cell!r}; cracks cannot cross faces between cells: give its zone a larger "
+                "`crack_margin_m`, as wide as the crack may grow"
+            )
 
 
 def drive(now: CrackedBlocks, found: Balance) -> float:

@@ -17,7 +17,7 @@ from ..parallel_map import parallel_map, return_free_memory
 from . import boundary_tractions
 from .boundary_tractions import BoundaryForces, BoundaryLoad
 from .inertia_forces import BlockInertia
-from .polynomial_traction import without_faces
+from .polynomial_traction import between_cells, without_faces
 
 if TYPE_CHECKING:
     from ...ddm import Body
@@ -51,7 +51,6 @@ def elastic_bodies(
         cracked = cracked[~removed[cracked]]
     if not len(cracked):
         return {}, {}
-    _refuse_unsupported(problem, blocks, cracked)
     from ... import ddm
 
     bodies: dict[int, Body | None] = {}
@@ -109,26 +108,6 @@ def elastic_bodies(
     return bodies, nodes_of
 
 
-def _refuse_unsupported(problem: Problem, blocks: Blocks, cracked: np.ndarray) -> None:
-    """Raise ValueError for what blocks of higher order cannot have together with cracks."""
-    if blocks.order is None:
-        return
-    order = np.asarray(blocks.order)[cracked]
-    bent = order != 1
-    glued = np.zeros(blocks.n_blocks, bool)
-    if blocks.glued is not None:
-        glued[blocks.vertex_block[np.asarray(blocks.glued).ravel()]] = True
-
-    def refuse(which: np.ndarray, why: str) -> None:
-        if which.any():
-            block = int(cracked[np.argmax(which)])
-            name = blocks.names[block] if blocks.names else f"block {block}"
-            raise ValueError(f"{name!r} is of higher order and has cracks, or may have: {why}")
-
-    refuse(bent & glued[cracked], "cells glued to each other have no cracks, and none can begin in them")
-    refuse(bent & (np.diff(blocks.block_loop)[cracked] > 1), "that is not supported for a block with a hole")
-
-
 def _loops(problem: Problem, blocks: Blocks, block: int) -> list[np.ndarray]:
     """Loops that bound the rock of ``block``; of unbounded rock its openings. The loop around a splinter that reaches
     to the surface is part of the outline."""
@@ -164,6 +143,9 @@ def boundary_loads(
             blocks, result.vertices, contacts, result.state.face_points, bent, keep_straight
         )
         edges = np.concatenate([edges, along])
+    if forces.bonds is not None:
+        cracked = np.isin(np.arange(blocks.n_blocks), numbers)
+        edges = np.concatenate([edges, between_cells(blocks, result.vertices, forces.bonds, cracked)])
     acting = BoundaryForces(
         result.vertices,
         motion,

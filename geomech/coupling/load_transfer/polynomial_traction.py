@@ -17,8 +17,8 @@ from itertools import pairwise
 
 import numpy as np
 
-from ...dda.kinematics.polygon_quadrature import lobatto_points
-from ...dda.loads.force_records import EDGE_FORCE
+from ...dda.kinematics.polygon_quadrature import gauss_points, lobatto_points
+from ...dda.loads.force_records import EDGE_FORCE, BondTractions
 from ...model import Blocks
 
 #: Pieces between two neighbouring points.
@@ -138,6 +138,46 @@ def _pressing(
         return []
     both = np.stack([scaled, force[:, 1].sum() / wanted[0] * scaled], axis=1)
     return [(marks[k], marks[k + 1], both[k : k + 2]) for k in range(len(length)) if both[k : k + 2].any()]
+
+
+def between_cells(blocks: Blocks, vertices: np.ndarray, bonds: BondTractions | None, cracked: np.ndarray) -> np.ndarray:
+    """EDGE_FORCE rows with the tractions ``bonds`` on the glued faces of the ``cracked`` cells (n_blocks,) bool.
+
+    ``vertices`` (n_vertices, 2) m, where forces act."""
+    out: list[tuple] = []
+    owner = blocks.vertex_block
+    faces = [] if bonds is None else np.flatnonzero(cracked[owner[bonds.edges]].any(axis=1)).tolist()
+    for face in faces:
+        assert bonds is not None
+        first, last = np.searchsorted(bonds.face, [face, face + 1])
+        pieces = _pieces_between_cells(bonds.traction[first:last])
+        for edge, way in zip(bonds.edges[face].tolist(), (1.0, -1.0)):
+            if not cracked[owner[edge]]:
+                continue
+            start, end = vertices[edge], vertices[blocks.next_vertex[edge]]
+            for low, high, values in pieces:
+                at = np.array([low, high]) if way > 0 else 1.0 - np.array([high, low])
+                on = start + at[:, None] * (end - start)
+                traction = values if way > 0 else -values[::-1]
+                force = 0.5 * (high - low) * np.hypot(*(end - start)) * traction.sum(axis=0)
+                out.append((owner[edge], edge, *on, traction, force))
+    return np.array(out, EDGE_FORCE) if out else np.zeros(0, EDGE_FORCE)
+
+
+def _pieces_between_cells(traction: np.ndarray) -> list[tuple[float, float, np.ndarray]]:
+    """As `_pieces`, for the ``traction`` (n, 2) at the Gauss points of a glued face: of degree n − 2, that of the stress of
+    its cells."""
+    n = len(traction)
+    place, weight = gauss_points(n)
+    table = np.polynomial.legendre.legvander(2 * place - 1, max(1, n - 2))
+    polynomial = (2 * np.arange(table.shape[1]) + 1)[:, None] * ((table * weight[:, None]).T @ traction)
+    marks = np.linspace(0.0, 1.0, n)
+    out = []
+    for a, b in pairwise(marks.tolist()):
+        s = a + (b - a) * place
+        values = np.polynomial.legendre.legval(2 * s - 1, polynomial).T * ((b - a) * weight)[:, None]
+        out.append((a, b, _linear(values.sum(axis=0), (s - a) @ values, b - a)))
+    return out
 
 
 def _linear(force: np.ndarray, moment: np.ndarray, length: float) -> np.ndarray:

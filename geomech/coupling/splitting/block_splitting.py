@@ -13,13 +13,16 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ...model import AUTO_ORDER, CONTACT, Blocks, Cracks, Motion, State
+from ...model import CONTACT, Blocks, Cracks, Motion, State
 from .planar_graph import BlockGraph, faces_without_slivers, steps
 
 _log = logging.getLogger(__name__)
 
 # Fate of a crack segment: still a crack; an edge of two parts; removed with a sliver.
 CRACK, WALL, MERGED = 0, 1, 2
+
+#: A point lies on an edge at less than this part of the edge's length from it.
+_ON_EDGE = 1e-6
 
 #: Loops of a polygon in reference coordinates → mean stress in it (3,), Pa, current axes.
 MeanStress = Callable[[list[np.ndarray]], np.ndarray]
@@ -64,6 +67,15 @@ class _Piece:
 def divided(blocks: Blocks, cracks: Cracks) -> np.ndarray:
     """Numbers of the blocks that ``cracks`` cut in two. Raises ValueError as `split_blocks`."""
     return np.array([b for b in np.unique(cracks.block).tolist() if BlockGraph.of(blocks, b, cracks).closes()], int)
+
+
+def on_edges(point: np.ndarray, blocks: Blocks, edges: np.ndarray) -> np.ndarray:
+    """Those of the ``edges`` (n,) of undeformed ``blocks`` on which ``point`` (2,) lies."""
+    start = blocks.vertices[edges]
+    along, arm = blocks.vertices[blocks.next_vertex[edges]] - start, point - start
+    square = np.sum(along * along, axis=1)
+    share = np.clip(np.sum(arm * along, axis=1) / square, 0.0, 1.0)
+    return edges[np.hypot(*(arm - share[:, None] * along).T) <= _ON_EDGE * np.sqrt(square)]
 
 
 def split_blocks(
@@ -125,7 +137,7 @@ def split_blocks(
         contacts=_contacts(state.contacts, pieces),
         acceleration=None,
         removed=None if state.removed is None else state.removed[parent],
-        order=None if state.order is None else _orders(np.asarray(state.order), pieces, np.asarray(blocks.order)),
+        order=None if state.order is None else np.asarray(state.order)[parent],
     )
     lost = blocks.areas() - np.bincount(parent, weights=children_blocks.areas(), minlength=blocks.n_blocks)
     origin, edge_origin, span = (
@@ -249,25 +261,13 @@ def _assemble(blocks: Blocks, pieces: list[_Piece]) -> Blocks:
         edge_name=np.array(labels, dtype=int),
         edge_names=tuple(known),
         names=tuple(piece.name for piece in pieces),
-        order=None if blocks.order is None else _orders(np.asarray(blocks.order), pieces),
+        order=None if blocks.order is None else np.asarray(blocks.order)[parent],
         glued=None if blocks.glued is None else _glued(np.asarray(blocks.glued), pieces),
     )
 
 
-def _orders(order: np.ndarray, pieces: list[_Piece], given: np.ndarray | None = None) -> np.ndarray:
-    """(n_blocks,) those of the parents; a part with a hole is of first order, which is logged: one of higher order could
-    have no cracks. ``given`` (n_parents,): orders as given, if ``order`` are those found."""
-    out, seen = np.array([order[piece.parent] for piece in pieces]), [piece.parent for piece in pieces]
-    for k, piece in enumerate(pieces):
-        if len(piece.loops) > 1 and out[k] != 1 and seen.count(piece.parent) > 1:
-            if out[k] != AUTO_ORDER and (given is None or given[piece.parent] == AUTO_ORDER):
-                _log.warning("%s has a hole: it continues as a block of first order, without deflection", piece.name)
-            out[k] = 1
-    return out
-
-
 def _glued(glued: np.ndarray, pieces: list[_Piece]) -> np.ndarray:
-    """(n_faces, 2) the ``glued`` edges by their new numbers; cells have no cracks and are not split."""
+    """(n_faces, 2) the ``glued`` edges by their new numbers; no crack ends at one."""
     origin = np.concatenate([edges for piece in pieces for edges in piece.edge_origin])
     number = np.full(max(int(glued.max()), int(origin.max())) + 1, -1)
     number[origin[origin >= 0]] = np.flatnonzero(origin >= 0)

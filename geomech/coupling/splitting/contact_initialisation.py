@@ -158,7 +158,7 @@ def contacts_after(
 ) -> State:
     """The state of ``split`` with contacts whose next step starts with the forces at the end of the last one.
 
-    ``system``: block system of the new blocks; ``before``: the blocks before the split, with the orders they had; ``solutions`` and boundary
+    ``system``: block system of the new blocks; ``before``: the blocks before the split; ``solutions`` and boundary
     ``loads`` (block →) of the last pass at ``split.state``; ``acting``: loads on the blocks; ``contacts``: CONTACT rows
     before the split.
     """
@@ -180,7 +180,7 @@ def contacts_after(
         _inherit_along_divided_edges(inherited, found, split, before, parent, loads[parent], loaded, wet)
     is_part = np.isin(split.parent, cut)
     inherited.known |= _turned_away(found, state.contacts, is_part)
-    given = _contacts(system, found, inherited, blocks, is_part | _stiffer(split, before))
+    given = _contacts(system, found, inherited, blocks, is_part)
     return system.with_inherited_contacts(state, found, given)
 
 
@@ -195,14 +195,6 @@ def _turned_away(found, kept: np.ndarray, is_part: np.ndarray) -> np.ndarray:
     alone = (row >= 0) & (kept["length"][row] > 0) & (found.geometry[:, 4] == 0)
     turned = np.sum(found.geometry[:, 1:3] * kept["normal"][row], axis=1) <= _ALIGNED
     return alone & turned & (is_part[found.block] | is_part[found.other])
-
-
-def _stiffer(split: Split, before: Blocks) -> np.ndarray:
-    """(n_blocks,) bool: parts of a lower order than the whole, which have lost its deflection."""
-    order = split.blocks.order if split.state.order is None else split.state.order
-    if before.order is None or order is None:
-        return np.zeros(split.blocks.n_blocks, bool)
-    return np.asarray(order) < np.asarray(before.order)[split.parent]
 
 
 def _contacts(

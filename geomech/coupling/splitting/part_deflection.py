@@ -103,7 +103,7 @@ def inherited_deflection(
             stresses[part] = _stress(split, begun, old, new, region, solutions.get(block), compliance[part])
     state = replace(
         state, vertices=vertices, velocity=velocity, rotation=rotation,
-        face_points=_face_points(split, begun, new.order < old.order[parent]), **kept,
+        face_points=_face_points(split, begun), **kept,
     )  # fmt: skip
     return state, stresses
 
@@ -173,9 +173,9 @@ def _kept(
     return out
 
 
-def _face_points(split: Split, begun: State, stiffer: np.ndarray) -> np.ndarray | None:
-    """FACE_POINT rows, renumbered, of faces whose sides have not been divided. Others, and those of ``stiffer`` parts
-    (n_blocks,) without the deflection of the whole, continue with the resultants of their contacts."""
+def _face_points(split: Split, begun: State) -> np.ndarray | None:
+    """FACE_POINT rows, renumbered, of faces whose sides have not been divided. Others continue with the resultants of
+    their contacts."""
     if begun.face_points is None:
         return None
     owner, rows = split.blocks.vertex_block, begun.face_points
@@ -188,7 +188,7 @@ def _face_points(split: Split, begun: State, stiffer: np.ndarray) -> np.ndarray 
     alone = begun.face_points["far_vertex"] < 0
     rows = rows[known & (alone | ((rows["far_vertex"] >= 0) & (rows["far_edge"] >= 0)))]
     rows["block"], rows["other"] = owner[rows["vertex"]], owner[rows["edge"]]
-    return rows[~(stiffer[rows["block"]] | stiffer[rows["other"]])]
+    return rows
 
 
 def _only_heir(origin: np.ndarray, whole: np.ndarray, rows: np.ndarray) -> np.ndarray:

@@ -22,6 +22,7 @@ from ..kinematics.midpoint_configuration import MidpointConfiguration
 from ..loads.bending_actions import BendingActions, DeflectedPoints
 from ..loads.bending_dashpots import BendingDashpots
 from ..loads.bending_motion import BendingMotion
+from ..loads.force_records import BondTractions
 from ..loads.load_vectors import generalised
 from ..loads.prescribed_motion import MovedBlocks
 from ..loads.viscous_boundary import ViscousEdges
@@ -45,10 +46,12 @@ _WITH_CRACKS = 5
 
 
 class BendingSystem(SteppedSystem, Protocol):
-    """A system with ``deflected`` blocks; ``glued`` are the faces of its cells, None without."""
+    """A system with ``deflected`` blocks; ``glued`` are the faces of its cells, None without, and ``bonded`` (m,) their
+    numbers in `Blocks.glued`."""
 
     deflected: DeflectedBlocks
     glued: GluedFaces | None
+    bonded: np.ndarray
 
 
 class BendingAttempt(Attempt):
@@ -135,7 +138,15 @@ class BendingAttempt(Attempt):
         self.glue = (
             None
             if faces is None
-            else Glue.of(faces, self.state, self.vertices, (self.deflection, self.strained), self.midpoint, self.turn)
+            else Glue.of(
+                faces,
+                self.state,
+                self.vertices,
+                (self.deflection, self.strained),
+                self.midpoint,
+                self.turn,
+                self.softened,
+            )
         )
         self._bending = (scheme.weight + drag / dt)[:, None, None] * blocks.stiffness
         self._inertia = inertia * self.shared, inertia * self.density * blocks.basis.area
@@ -253,7 +264,7 @@ class BendingAttempt(Attempt):
         fill_own(base, pattern.places, pattern.step, (own, self.own_at), pattern.order)
         base[pattern.spare] = np.abs(base).max(initial=1.0)
         if glue is not None:
-            glue.push(full.ravel(), pattern)
+            glue.push(full.ravel(), pattern, self.system.scheme.weight)
             n_bolts = 0 if self.actions is None else self.actions.n_bolts
             glue.stiffen(base, pattern, len(contacts) + n_bolts, self.system.scheme.weight)
         if self.actions is not None:
@@ -369,6 +380,14 @@ class BendingAttempt(Attempt):
         if self.glue is None or not len(self.glue.faces.block):
             return None
         return self.glue.mean_traction(self.glue_change)
+
+    def _bonds(self) -> BondTractions | None:
+        """Tractions between cells in the step."""
+        if self.glue is None:
+            return None
+        edges = np.asarray(self.blocks.blocks.glued)[self.system.bonded]
+        traction = self.glue.traction_on_cells(self.system.scheme.weight * self.glue_change)
+        return BondTractions(edges, self.glue.faces.face, traction)
 
     @property
     def _six_rows(self) -> SixRowPattern:
@@ -574,7 +593,7 @@ class BendingAttempt(Attempt):
             result.state, deflection=deflection, face_points=memory, deflection_origin=origin,
             crack_deflection=self.opened,
         )  # fmt: skip
-        return replace(result, state=state)
+        return replace(result, state=state, forces=replace(result.forces, bonds=self._bonds()))
 
     def _points_at_the_end(self) -> np.ndarray:
         """(n, 2) m: contact points on the vertices' blocks at the end of the step."""

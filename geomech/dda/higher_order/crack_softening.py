@@ -17,7 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...model import State
-from ..results import CrackResponse
+from ..results import CrackedOutline, CrackResponse
 from .deflected_blocks import DeflectedBlocks
 
 
@@ -31,6 +31,7 @@ class SoftenedBlock:
     begun     (3 + m,) Σ₀, Pa
     still     (3 + m,) Σ₁ of a step that does not strain the block, Pa
     tangent   (3 + m, 3 + m) (D⁻¹ + S)⁻¹, Pa
+    outline   displacement of its faces to other cells besides, None without any
     """
 
     block: int
@@ -40,6 +41,7 @@ class SoftenedBlock:
     begun: np.ndarray
     still: np.ndarray
     tangent: np.ndarray
+    outline: CrackedOutline | None = None
 
     @property
     def shared(self) -> np.ndarray:
@@ -80,5 +82,5 @@ def softened_blocks(
         begun = np.concatenate([state.stress[b], blocks.stiffness[b, : n - 3, : n - 3] @ strained[own] / size])
         tangent = np.linalg.inv(elastic + softness)
         still = tangent @ (strain + known - offset)
-        out.append(SoftenedBlock(b, size, softness, offset, begun, still, tangent))
+        out.append(SoftenedBlock(b, size, softness, offset, begun, still, tangent, crack.outlines.get(b)))
     return out

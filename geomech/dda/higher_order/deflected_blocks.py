@@ -124,11 +124,11 @@ class DeflectedBlocks:
         (`crack_softening`)."""
         m = n_deflections(int(self.order[block]))
         out = np.zeros((3 + m, 3 + m))
-        out[:3, :3], out[3:, 3:] = compliance, self._flexibility[block]
+        out[:3, :3], out[3:, 3:] = compliance, self.flexibility[block]
         return out
 
     @cached_property
-    def _flexibility(self) -> dict[int, np.ndarray]:
+    def flexibility(self) -> dict[int, np.ndarray]:
         """block → K⁻¹ (m, m), 1/Pa."""
         sizes = {b: n_deflections(int(self.order[b])) for b in self.bending.tolist()}
         inverse = {b: np.linalg.inv(self.stiffness[b, :m, :m]) for b, m in sizes.items()}

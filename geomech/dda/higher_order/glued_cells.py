@@ -20,6 +20,7 @@ Energies stay positive if τ > λ/2, with λ the largest possible ratio of ∫ |
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -29,7 +30,8 @@ from ...model import JointLaw, State
 from ..kinematics.midpoint_configuration import MidpointConfiguration
 from ..kinematics.polygon_quadrature import gauss_points
 from ..open_close.contact_set import ContactSet
-from .deflected_blocks import DeflectedBlocks, rotation_of
+from .crack_softening import SoftenedBlock
+from .deflected_blocks import DeflectedBlocks, rotation_of, strain_turned_back
 from .deflection_basis import n_deflections
 from .face_points import Faces
 from .six_row_system import SixRowPattern, add_force, add_pair, moved
@@ -55,6 +57,15 @@ def traction_of(normal: np.ndarray) -> np.ndarray:
 def _face_directions(normal: np.ndarray) -> np.ndarray:
     """(n, 2, 2) directions normal to and along faces."""
     return np.stack([normal, np.stack([-normal[:, 1], normal[:, 0]], axis=1)], axis=1)
+
+
+def _turned(outline: np.ndarray, angle: float) -> tuple[np.ndarray, np.ndarray]:
+    """(n, 2, 3 + m) and (n, 2): R and r₀ of an ``outline`` (n, 2, 4 + m) in the axes of a block turned by ``angle``, on fixed
+    axes."""
+    turned = rotation_of(np.array(angle)) @ outline
+    # σ' = Q⁻ᵀ σ, as σ·ε is the same on both axes.
+    back = np.linalg.inv(strain_turned_back(np.array(angle))).T
+    return np.concatenate([turned[..., :3] @ back, turned[..., 3:-1]], axis=2), turned[..., -1]
 
 
 @dataclass(frozen=True, eq=False)
@@ -165,19 +176,24 @@ class Glue:
     vectors  (2 n, 2, 2, w)  direction, side, per unit of all unknowns of the side's cell: of u − {t}/τ (m), and {t} (Pa)
     springs  (2 n,)          stiffness times length, and −1/τ times length
     before   (2 n, 2)        elongation at the start of the step
+    acting   (n, 2, 2)       directions normal to and along faces, in which they act
+    cracked  (2 n, 2)        elongation in the step by cracks that open in cells that do not move
     """
 
     faces: GluedFaces
     vectors: np.ndarray
     springs: np.ndarray
     before: np.ndarray
+    acting: np.ndarray
+    cracked: np.ndarray
 
     @classmethod
     def of(
         cls, faces: GluedFaces, state: State, vertices: np.ndarray, deflections: tuple[np.ndarray, np.ndarray],
-        midpoint: MidpointConfiguration, turn: np.ndarray,
+        midpoint: MidpointConfiguration, turn: np.ndarray, softened: Sequence[SoftenedBlock] = (),
     ) -> Glue:  # fmt: skip
-        """The bonds of cells in ``state`` with these ``deflections``: (k,) all, and (k,) those that strain the cells.
+        """The bonds of cells in ``state`` with these ``deflections``: (k,) all, and (k,) those that strain the cells, of which
+        some are ``softened`` by cracks.
 
         Forces act at the ``midpoint`` configuration, to which cells have rotated by ``turn`` (n_blocks,).
         """
@@ -193,7 +209,8 @@ class Glue:
         begun, acting = normal(start), _face_directions(normal(angle))
         between = 0.5 * (midpoint.points(first, owners[0]) + midpoint.points(second, owners[1]))
         jump, mean = np.zeros((n, 2, 2, max(cells.width, 6))), np.zeros((n, 2, 2, max(cells.width, 6)))
-        borne = np.zeros((n, 2))
+        apart = np.einsum("nwa,na->nw", _face_directions(begun), first - second)
+        borne, pulled, opened = np.zeros((3, n, 2))
         for side, (owner, sign) in enumerate(zip(owners, (1.0, -1.0), strict=True)):
             matrix = midpoint.displacement(between, owner)
             matrix[..., 2:] /= size[owner, None, None]
@@ -209,12 +226,23 @@ class Glue:
             borne += 0.5 * (
                 np.einsum("nws,ns->nw", across, state.stress[owner]) + np.einsum("nwj,nj->nw", own, padded[owner])
             )
-        apart = np.einsum("nwa,na->nw", _face_directions(begun), first - second)
+            for of in softened:
+                at, m = np.flatnonzero(owner == of.block), len(of.begun) - 3
+                units = np.concatenate([across[at], of.size * own[at, :, :m] @ cells.flexibility[of.block]], axis=2)
+                mean[at, :, side, 3 : 6 + m] = 0.5 * units @ of.tangent / of.size
+                pulled[at] += 0.5 * units @ (of.still - of.begun)
+                if of.outline is not None:
+                    moves, rest = _turned(of.outline.at(faces.points[side][at]), float(start[of.block]))
+                    along, more = sign * acting[at], of.still - of.begun
+                    jump[at, :, side, 3 : 6 + m] += along @ moves @ of.tangent / of.size
+                    opened[at] += np.einsum("nwa,na->nw", along, moves @ more)
+                    apart[at] += sign * np.einsum("nwa,na->nw", _face_directions(begun[at]), moves @ of.begun + rest)
         give = 1.0 / faces.penalty
         return cls(
             faces, np.concatenate([jump - give[:, None, None, None] * mean, mean]),
             np.concatenate([faces.penalty, -give]) * np.tile(faces.weight, 2),
-            np.concatenate([apart - give[:, None] * borne, borne]),
+            np.concatenate([apart - give[:, None] * borne, borne]), acting,
+            np.concatenate([opened - give[:, None] * pulled, pulled]),
         )  # fmt: skip
 
     def blocks(self, order: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -222,14 +250,15 @@ class Glue:
         one, two = self.faces.owners
         return np.tile(one, 2), np.tile(two, 2), order
 
-    def push(self, right: np.ndarray, pattern: SixRowPattern) -> None:
-        """Add the bond forces at the start of the step to ``right`` (6 n,)."""
+    def push(self, right: np.ndarray, pattern: SixRowPattern, weight: float) -> None:
+        """Add the bond forces at the start of the step, and those of cells that do not move times ``weight``, to ``right``
+        (6 n,)."""
         push_springs(
             right,
             self.blocks(pattern.order),
             pattern.unknowns,
             self.vectors,
-            self.springs[:, None] * self.before,
+            self.springs[:, None] * (self.before + weight * self.cracked),
         )
 
     def stiffen(self, data: np.ndarray, pattern: SixRowPattern, n_contacts: int, weight: float) -> None:
@@ -242,7 +271,7 @@ class Glue:
 
     def change(self, unknowns: np.ndarray, pattern: SixRowPattern) -> np.ndarray:
         """(2 n, 2) elongation of the springs due to all ``unknowns`` (6 n,) of the step."""
-        return moved(unknowns, self.blocks(pattern.order), pattern.unknowns, self.vectors)
+        return self.cracked + moved(unknowns, self.blocks(pattern.order), pattern.unknowns, self.vectors)
 
     def forces(self, change: np.ndarray, n_blocks: int) -> np.ndarray:
         """(n_blocks, 6) N: bond forces on the solver's first six unknowns after the elongation ``change`` (2 n, 2)."""
@@ -264,6 +293,10 @@ class Glue:
         """(n, 2) Pa: tension and shear at the points after the elongation ``change`` (2 n, 2)."""
         n = len(self.faces.face)
         return -self.faces.penalty[:, None] * (self.before + change)[:n]
+
+    def traction_on_cells(self, change: np.ndarray) -> np.ndarray:
+        """(n, 2) Pa: `traction` on the cells a, in fixed axes."""
+        return np.einsum("nw,nwa->na", self.traction(change), self.acting)
 
     def mean_traction(self, change: np.ndarray) -> np.ndarray:
         """(m, 2) Pa: mean `traction` on each face."""

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 #: One row per point force: position (current coordinates, m), material point (reference coordinates, m), force (N).
@@ -19,3 +21,17 @@ EDGE_FORCE = np.dtype(
         ("force", np.float64, 2),
     ]
 )
+
+
+@dataclass(frozen=True, eq=False)
+class BondTractions:
+    """Tractions between cells of continuous rock, in the configuration in which they act.
+
+    edges     (m, 2)  the edges of cells a and b along each face, in opposite directions
+    face      (n,)    the face of each Gauss point, in the order of the points along the edge of a
+    traction  (n, 2)  Pa, on a; that on b is opposite
+    """
+
+    edges: np.ndarray
+    face: np.ndarray
+    traction: np.ndarray

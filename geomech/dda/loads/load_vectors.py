@@ -10,7 +10,7 @@ import numpy as np
 from ...compiled import UNCOUNTED, kept, part
 from ...model import Blocks, EdgeTraction, LinearProfile, Loads, WaterTable
 from ..kinematics.displacement_matrix import material_weights
-from .force_records import EDGE_FORCE, POINT_FORCE
+from .force_records import EDGE_FORCE, POINT_FORCE, BondTractions
 from .water_pressure import pressed_edges, wet_pieces
 
 
@@ -59,6 +59,7 @@ class AppliedForces:
                                             motion on moving blocks; None: none is prescribed
     overstress            (n_blocks, 3)     Pa, current axes: stress that the forces balance minus the stress at the end
                                             of the step (`TimeScheme.overstress`); None at rest
+    bonds                 tractions between glued cells; None without any
     """
 
     points: np.ndarray
@@ -68,6 +69,7 @@ class AppliedForces:
     inertia: Inertia
     reaction: np.ndarray | None = None
     overstress: np.ndarray | None = None
+    bonds: BondTractions | None = None
 
     @cached_property
     def _body_forces(self) -> tuple[np.ndarray, np.ndarray]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -12,7 +12,7 @@ from ..kernels.point_forces import KelvinLoad, MelanLoad, WedgeLoad
 from ..kernels.traction_fields import LineForces, approximate, pieces
 from ..mesh.edge_location import OFF, onto_boundary, sides_for
 from ..system.influence_matrix import ElementSet
-from .body_loads import BodyLoad, OutOfEquilibrium, resultants
+from .body_loads import BodyLoad, IntactField, OutOfEquilibrium, resultants
 from .unit_load_cache import on_elements
 
 if TYPE_CHECKING:
@@ -92,8 +92,8 @@ class Applied:
 
 def apply(load: BodyLoad, body: CrackedBody) -> Applied:
     """``load`` applied to ``body``. Raises ValueError naming the part that does not fit the body."""
-    if load.intact is not None and (not body.outlined or len(body.loops) > 1):
-        raise ValueError("intact: the field of a body without cracks is for bodies with an outline and without holes")
+    if load.intact is not None and not body.outlined:
+        raise ValueError("intact: the field of a body without cracks is for bodies with an outline")
     none = np.empty((0, 2, 2))
     out = Applied(
         load,
@@ -101,9 +101,14 @@ def apply(load: BodyLoad, body: CrackedBody) -> Applied:
         none if load.segments is None else load.segments,
         none if load.tractions is None else load.tractions,
     )
+    functions = []
+    if load.intact is not None and len(body.loops) > 1:
+        functions.append(_free_walls(load.intact, body))
+        out.particular = _balancing(out.particular, functions[0], body)
+        out.functions = functions[0]
     if not load.sides and load.points is None:
         return out
-    segments, tractions, functions = [out.segments], [out.tractions], []
+    segments, tractions = [out.segments], [out.tractions]
     edges, boundary = body.mesh.edges, body.boundary
     for number, (where, value) in enumerate(load.sides):
         name = f"side {where}" if isinstance(where, int) else f"side load {number}"
@@ -148,6 +153,36 @@ def _particular(load: BodyLoad, body: CrackedBody) -> Particular | DepthDependen
     if load.about is not None:
         force = force + gradient @ (body.centroid - load.about)
     return Particular(body.centroid, force, gradient, uniform, body.material)
+
+
+def _free_walls(field: IntactField, body: CrackedBody) -> LineForces:
+    """Tractions on the walls of holes that cancel those of ``field``, which is that of a body without holes."""
+    parts = []
+    for edge in np.flatnonzero(body.mesh.edge_loop > 0).tolist():
+        way = body.mesh.edges[edge, 1] - body.mesh.edges[edge, 0]
+        # Holes are clockwise: the rock is on the left of an edge, and its outward normal on the right.
+        x, y = way[1] / np.hypot(*way), -way[0] / np.hypot(*way)
+
+        def freeing(points: np.ndarray, x: float = x, y: float = y) -> np.ndarray:
+            xx, yy, xy = field.stress(points).T
+            return -np.column_stack([xx * x + xy * y, xy * x + yy * y])
+
+        parts.append(approximate(freeing, *pieces(body.boundary, edge), "intact"))
+    joined = LineForces.join(parts)
+    assert joined is not None
+    return joined
+
+
+def _balancing(particular: Particular | DepthDependentStress, walls: LineForces, body: CrackedBody) -> Particular:
+    """``particular`` with a body force that balances the tractions on ``walls``: uniform, and growing as in a rotation.
+    A polynomial stress field of finite order is in equilibrium in the mean only, and not across a hole."""
+    assert isinstance(particular, Particular)  # there is an outline
+    force, moment, _ = walls.resultants(body.centroid)
+    turn = -moment / np.trace(body._second)
+    return replace(
+        particular, force=particular.force - force / body.area,
+        gradient=particular.gradient + turn * np.array([[0.0, -1.0], [1.0, 0.0]]),
+    )  # fmt: skip
 
 
 def _point(out: Applied, body: CrackedBody, k: int, point, force, segments: list, tractions: list) -> None:

@@ -13,6 +13,8 @@ from ..tables import SceneTables
 #: Edges called "fixed" or "fixed:NAME" fix their blocks; with "guided:x" or "guided:x:NAME" these can move along x
 #: only.
 FIXED, GUIDED = "fixed", "guided"
+#: The highest order of a block.
+_HIGHEST = 8
 #: Constrained unknowns of a block guided along an axis: translation across it, rotation and shear strain.
 _CONSTRAINED = {"x": [1, 2, 5], "y": [0, 2, 5]}
 
@@ -65,10 +67,13 @@ def constrained_unknowns(tables: SceneTables, drawing: Drawing) -> np.ndarray | 
 
 def block_orders(tables: SceneTables, drawing: Drawing) -> np.ndarray | None:
     """(n_blocks,) order of each block's displacement, 1 if it is fixed, `AUTO_ORDER` if it is chosen during the run;
-    None if all are of first order."""
+    None if all are of first order. Cells around cracks, which are larger than others, have the highest."""
     zones = tables.zones or {}
     given = [zones[zone].order if zone in zones else 1 for zone in drawing.zones]
     order = np.array([AUTO_ORDER if p == "auto" else p for p in given], dtype=int)
+    if drawing.cracks is not None:
+        cells = np.array([zone in zones and zones[zone].mesh_size_m is not None for zone in drawing.zones], bool)
+        order[np.intersect1d(drawing.cracks.block, np.flatnonzero(cells))] = _HIGHEST
     order[fixed_blocks(tables, drawing)] = 1
     return order if (order != 1).any() else None
 

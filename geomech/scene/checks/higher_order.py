@@ -3,8 +3,6 @@ a message that names it."""
 
 from __future__ import annotations
 
-import numpy as np
-
 from ..validation import nearest
 from .check import Check
 
@@ -30,7 +28,7 @@ def check_orders(c: Check) -> None:
         if material is not None and material.rigid:
             refuse("a rigid material does not bend", "leave `order` out, or `rigid`")
         _check_cell_joint(c, name, zone.cell_joint)
-        _check_cracks(c, name, zone, refuse)
+        _check_cracks(c, zone, refuse)
         _check_joints(c, refuse)
         _check_solver(c, refuse)
         if t.loads is not None and t.loads.in_situ is not None and zone.order == "auto":
@@ -66,26 +64,11 @@ def _check_cell_joint(c: Check, zone: str, joint: str | None) -> None:
         )
 
 
-def _check_cracks(c: Check, name: str, zone, refuse) -> None:
-    """Refuse what the blocks of the ``zone`` called ``name`` cannot have together with cracks."""
-    t, drawing = c.tables, c.drawing
-    begin = t.growth is not None and t.growth.initiation
-    blocks = np.zeros(0, int)
-    if drawing is not None and drawing.blocks is not None and drawing.cracks is not None:
-        own = np.array([b for b, of in enumerate(drawing.zones) if of == name], int)
-        blocks = own if begin else np.intersect1d(drawing.cracks.block, own)
-        if (np.diff(drawing.blocks.block_loop)[blocks] > 1).any():
-            refuse(
-                "cracks in a block of higher order with a hole are not supported: its polynomials leave stress on the wall of "
-                "the hole, from which cracks grow",
-                "set order = 1, with which the crack solver finds the stress around the hole",
-            )
-    if not (begin or len(blocks)):
-        return
-    cracked = "cracks, or cracks that begin (growth.initiation),"
-    if zone.mesh_size_m is not None:
+def _check_cracks(c: Check, zone, refuse) -> None:
+    """Refuse cracks that begin in the cells of a ``zone``."""
+    if zone.mesh_size_m is not None and c.tables.growth is not None and c.tables.growth.initiation:
         refuse(
-            f"{cracked} are not supported in cells: a crack would end at the first face between two of them",
+            "cracks that begin (growth.initiation) are not supported in cells, which they would have to cut",
             "leave `mesh_size_m` out, for one block of this order, or let cells separate at the strength of a `cell_joint`",
         )
 

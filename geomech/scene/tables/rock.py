@@ -66,6 +66,11 @@ class ZoneTable(Table):
     cells: Literal["triangles", "quads"] = Field(
         "triangles", description='shape of the cells of `mesh_size_m`: "triangles" or "quads"'
     )
+    crack_margin_m: Positive | None = Field(
+        None,
+        description="width of the rock around a crack, m, that is one cell, of order 8: the crack can grow inside it "
+        "(unset: the length of the crack)",
+    )
     cell_joint: str | None = Field(
         None,
         description="a name of [joints]: faces between cells separate where the stress reaches its tensile or shear "
@@ -87,6 +92,8 @@ class ZoneTable(Table):
             raise ValueError("rock that is `fixed`, `guided` or unbounded is not divided: leave out `mesh_size_m`")
         if self.cell_joint is not None and self.mesh_size_m is None:
             raise ValueError("`cell_joint` needs cells: give `mesh_size_m`, or leave it out")
+        if self.crack_margin_m is not None and self.mesh_size_m is None:
+            raise ValueError("`crack_margin_m` needs cells: give `mesh_size_m`, or leave it out")
         if self.mesh_size_m is not None and self.order in (1, "auto"):
             raise ValueError(
                 "cells need an order of 2 to 8, because uniformly strained ones are too stiff in bending: set order = 3"
