@@ -111,6 +111,7 @@ def holed_cantilever(order: int, dt: float, end: float, dynamic: float, ratio: f
     return replace(problem, blocks=blocks, dda=problem.dda if dynamic else DdaSettings(time_step=dt))
 
 
+@pytest.mark.slow
 def test_k_of_a_cantilever_with_a_hole_is_that_of_the_crack_solver():
     """Deflection of the end and K against the crack solver with a clamped side. The hole takes two fifths of the depth, and
     polynomials bend little around it: 48, 14 and 11 % too stiff at order 2, 4 and 8; K, of the forces, is right to 1 %."""
