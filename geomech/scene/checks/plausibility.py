@@ -61,6 +61,7 @@ def check_plausible(c: Check) -> None:
     _slivers(c)
     _rounding(c)
     _free_back(c)
+    _impacts(c)
 
 
 def _materials(c: Check) -> None:
@@ -346,3 +347,21 @@ def _largest(t: SceneTables, traction: TractionTable) -> float:
     """Largest magnitude of a traction during the run, Pa: its history is linear between its times and the end."""
     history, end = traction_history(traction), t.run.end_time_s
     return max(float(np.hypot(*history.at(time))) for time in (*history.times[history.times < end], end))
+
+
+def _impacts(c: Check) -> None:
+    """Impacts with a coefficient of restitution load no cracks."""
+    t = c.tables
+    laws = [name for name, joint in t.joints.items() if joint.restitution is not None]
+    if not laws or t.dda.dynamic_factor == 0 or not t.growth.enabled:
+        return
+    fixed, names = fixed_blocks(t, c.drawn), c.drawn.zones
+    cracked = [b for b in np.unique(c.cracks.block).tolist() if not fixed[b]]
+    if cracked:
+        others = f" and {counted(len(cracked) - 1, 'more block')}" if len(cracked) > 1 else ""
+        c.warn(
+            ("joints", laws[0], "restitution"),
+            "impacts by a coefficient of restitution change velocities only: they load no cracks, and "
+            f"{names[cracked[0]]!r}{others} will not break on landing",
+            "leave restitution out where rocks should break, with time steps well below a millisecond",
+        )

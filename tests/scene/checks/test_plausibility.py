@@ -14,6 +14,7 @@ from geomech.model import Cracks, Material
 from geomech.scene import SceneError, load_scene
 
 PIPELINES = Path(__file__).parents[3] / "pipelines"
+GEOMETRY = Path(__file__).parents[3] / "geometry"
 
 
 def warnings_of(scene_file, *changes, overrides=()):
@@ -378,3 +379,16 @@ def test_an_advance_longer_than_the_rock_is_reported(scene_file, increment, told
     """The plate is 1 × 2 m."""
     found = warnings_of(scene_file, overrides=[f"growth.increment_m={increment}"])
     assert ["crosses it in one step" in w.message for w in found] == [True] * told
+
+
+@pytest.mark.parametrize(("restitution", "grows", "told"), [(True, True, 1), (True, False, 0), (False, True, 0)])
+def test_impacts_that_load_no_cracks_are_reported(tmp_path, restitution, grows, told):
+    """The example of a rockfall, with a crack in one of the rocks."""
+    text = (GEOMETRY / "rockfall.toml").read_text(encoding="utf-8").replace("restitution = 0.25\n", "")
+    crack = '[[geometry.cracks]]\nname = "flaw"\npoints = [[4.0, 24.01], [4.05, 24.35]]\n'
+    text = text.replace("[materials.rock]", crack + "[materials.rock]\nk_ic_pa_sqrt_m = 1e6")
+    text = text.replace("enabled = false", f"enabled = {str(grows).lower()}\nincrement_m = 0.1")
+    text = text if restitution else text.replace("restitution = 0.4\n", "")
+    (tmp_path / "scene.toml").write_text(text, encoding="utf-8")
+    found = load_scene(tmp_path / "scene.toml").warnings
+    assert ["'slab' will not break on landing" in w.message for w in found] == [True] * told
