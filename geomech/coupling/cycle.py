@@ -354,6 +354,8 @@ class Coupling:
         if growth is not None:
             if self.static and not self.endless:
                 self.mechanism.warn_of_growth(found.result)
+            if self.static and self.events is None and step.growth_pass == 0:
+                self.unstable.begins(float(np.max(found.tips["k_eq"] / toughness(now, found.tips), initial=0.0)))
             found.tips["grown"] = growth.grown
             if self.tips is not None:
                 self.tips.record_growth(found.tips)

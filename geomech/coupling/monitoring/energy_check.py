@@ -20,6 +20,9 @@ IN_MOTION = 0.01
 #: Fraction of it that bonds of moving blocks may have done, or not, in the steps in which they broke: the result is uncertain
 #: by at least as much.
 BREAKS = 0.01
+#: Excess of K_eq over K_Ic, relative to K_Ic, with which cracks may begin to grow at the end of a load step. (Random slope 26
+#: begins with 0.66, 0.24 and 0.04 if its weight comes in three, six and twelve steps, and breaks into other blocks.)
+OVERSHOT = 0.1
 #: Fraction of it that static steps may take. Half of the work of a suddenly applied load is dissipated, and nothing of that
 #: of a load that grows with the steps; a larger fraction means that unsupported blocks have moved.
 UNHELD = 0.6
@@ -145,10 +148,14 @@ class BendingWatch:
 
 class GrowthWatch:
     """Reports, once, that growth at constant load has released more than `GAIN` of all converted energy: it is
-    unstable."""
+    unstable, and with load steps of given length it begins at a load that depends on them."""
 
     def __init__(self) -> None:
-        self._reported = False
+        self._reported, self._began = False, 1.0
+
+    def begins(self, drive: float) -> None:
+        """Cracks grow at a new load, at which K_eq/K_Ic is up to ``drive``."""
+        self._began = max(self._began, drive)
 
     def check(self, budget: EnergyBudget, time: float) -> None:
         """``budget`` after a load step that ends at ``time`` s."""
@@ -157,7 +164,11 @@ class GrowthWatch:
         self._reported = True
         log.warning(
             "t = %g s: cracks grow unstably at constant load and have released %.3g J/m so far, which a static run does "
-            "not convert to motion (growth_release in history.csv); set dda.dynamic_factor = 1 to follow the motion",
+            "not convert to motion (growth_release in history.csv); set dda.dynamic_factor = 1 to follow the motion%s",
             time,
             budget.released,
+            ""
+            if self._began < 1.0 + OVERSHOT
+            else f". They grow from {self._began:.3g} times their toughness on, at the end of a load step: which cracks run, and "
+            'where, depends on the load steps, until run.stepping = "events" finds the loads at which they begin',
         )

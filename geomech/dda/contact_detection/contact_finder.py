@@ -42,6 +42,9 @@ _SAME_POINT = 1e-9
 
 #: At time zero, faces nearer than this many times the domain's size touch and are bonded by cohesion and tension.
 _TOUCH = 1e-7
+#: Faces as drawn that are nearer than this many times the domain's size touch without force: rounding of coordinates leaves
+#: some 1e-12, which stiff springs would turn into 1e-5 of the forces in a slope (`geomech bench slopes --seeds 56`).
+_DRAWN = 1e-10
 #: Contacts lie on one line if the cosine of the angle between their normals exceeds this.
 _ALIGNED = 0.99
 _UNKNOWN = -2
@@ -154,6 +157,7 @@ class ContactFinder:
         self.widths = widths(blocks.vertices, self._next, self._start, self._area)
         self.take_out(None)
         self._size = float(np.ptp(blocks.vertices, axis=0).max())
+        self._drawn = _DRAWN * self._size
 
     def take_out(self, removed: np.ndarray | None) -> None:
         """Exclude the blocks ``removed`` (n_blocks,) from detection."""
@@ -294,7 +298,7 @@ class ContactFinder:
         """
         table, geometry, lift, state = met.table, met.geometry, remembered["lift"], remembered["state"]
         block, other = self._owner[table[:, 0]], self._owner[table[:, 1]]
-        lift = lift + misfit_of_new(old, (parent < 0) & (table[:, 2] < 0), block, other, geometry)
+        lift = lift + misfit_of_new(old, (parent < 0) & (table[:, 2] < 0), block, other, geometry, self._drawn)
         # A step that rounding smooths away does not count, and a vertex that is slightly behind a line that it has not
         # touched brings no energy: contacts begin without force there.
         touching_depth = _TOUCHING_DEPTH * np.sqrt(np.minimum(self._area[block], self._area[other]))
@@ -373,7 +377,7 @@ class ContactFinder:
         if not isinstance(window, Windows):
             pairs = self._near.of(vertices, max(window + lift, -_DEEPER * gap))
             window = Windows(pairs, np.full(len(pairs), window))
-        if not len(window.pairs) or (lift == 0.0 and -_DEEPER * gap <= window.reach.min()):
+        if not len(window.pairs) or (lift <= self._drawn and -_DEEPER * gap <= window.reach.min()):
             return window
         reach = window.reach.copy()
         at = window.of_contacts(old["block"], old["other"], len(self._area))
@@ -435,6 +439,8 @@ class ContactFinder:
             if len(old) == 0 and time == 0.0:
                 bonded[fresh & (geometry[:, 4] > 0)] = 1
             contact_state[fresh] = STICK
+            if len(old) == 0:
+                lift = np.where(fresh & (np.abs(geometry[:, 3]) <= self._drawn), geometry[:, 3], lift)
         bonded[(springs.cohesion == 0) & (springs.tension == 0)] = 0
         # Where the normal force is tensile by round-off, friction reverses: taken as the sense of sliding, this would
         # reverse it in every step, and change the matrix of blocks at rest.

@@ -110,21 +110,23 @@ def _closed_by(force: np.ndarray, stiffness: np.ndarray, closure: np.ndarray) ->
     return force / (stiffness + force / closure)
 
 
-def misfit_of_new(old: np.ndarray, new: np.ndarray, block: np.ndarray, other: np.ndarray, geometry: np.ndarray):
+def misfit_of_new(
+    old: np.ndarray, new: np.ndarray, block: np.ndarray, other: np.ndarray, geometry: np.ndarray, least: float
+) -> np.ndarray:
     """(n,) m: lifts ≤ 0 of contacts between ``block`` and ``other`` (n,) on ``geometry`` (n, 7); 0 unless ``new`` (n,).
 
     Faces that do not fit each other overlap by their misfit where they touch. A corner that slides into such a face, or
     past the end of an edge, begins there with the misfit of the nearest of the ``old`` CONTACT rows between the same
-    blocks in the same direction, and so without force."""
+    blocks in the same direction, and so without force. Misfits up to ``least``, m, are those of rounding."""
     lift = np.zeros(len(new))
     at = np.flatnonzero(new)
-    if not len(at) or not (old["lift"] < 0.0).any():
+    if not len(at) or not (old["lift"] < -least).any():
         return lift
     first, second = np.minimum(old["block"], old["other"]), np.maximum(old["block"], old["other"])
     n_blocks = int(max(second.max(), block.max(), other.max())) + 1
     key = np.minimum(block, other)[at] * n_blocks + np.maximum(block, other)[at]
     keys = first * n_blocks + second
-    at = at[np.isin(key, keys[old["lift"] < 0.0])]
+    at = at[np.isin(key, keys[old["lift"] < -least])]
     for c in at.tolist():
         pair = (first == min(block[c], other[c])) & (second == max(block[c], other[c]))
         pushes = np.where(old["block"] == block[c], 1.0, -1.0) * (old["normal"] @ geometry[c, 1:3])

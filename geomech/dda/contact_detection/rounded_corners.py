@@ -22,8 +22,8 @@ import numpy as np
 
 from ...compiled import UNCOUNTED, part
 
-#: A normal within this angle (cosine; 0.2 rad) of that of one line is replaced by it: so shallow a ramp is lower than a
-#: fiftieth of the rounding length and was not drawn as a step.
+#: A normal within this angle (cosine; 0.2 rad) of that of one line, and nearer to it than to the bisector of both, is
+#: replaced by it: so shallow a ramp is lower than a fiftieth of the rounding length and was not drawn as a step.
 _ON_LINE = 0.98
 #: Height of that ramp over the rounding length, 1 − cos 0.2.
 EASED = 0.02
@@ -106,8 +106,10 @@ def meeting(x, y, dx, dy, nx1, ny1, gap1, nx2, ny2, gap2, length, places):
         # The line ahead does not support the corner as long as the corner is behind it, outside the wedge.
         if (line == 1 and gap1 < -EASED * length) or (line == 2 and gap2 < -EASED * length):
             mx, my, gap, line = here
-    if line == 1 or (mx * nx1 + my * ny1 > _ON_LINE and gap1 > -EASED * length):
+    # Lines that cross at less than twice the angle of `_ON_LINE` are both near the arc's middle: rounding must not choose.
+    near = max(_ON_LINE, (mx * (nx1 + nx2) + my * (ny1 + ny2)) / np.sqrt(2.0 + 2.0 * cosine))
+    if line == 1 or (mx * nx1 + my * ny1 > near and gap1 > -EASED * length):
         return nx1, ny1, gap1, 1
-    if line == 2 or (mx * nx2 + my * ny2 > _ON_LINE and gap2 > -EASED * length):
+    if line == 2 or (mx * nx2 + my * ny2 > near and gap2 > -EASED * length):
         return nx2, ny2, gap2, 2
     return mx, my, gap, 0

@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 import re
 from dataclasses import replace
-from itertools import islice, pairwise
+from itertools import islice, pairwise, takewhile
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -16,11 +16,13 @@ import geomech
 from geomech.bench.slopes.drawn_slopes import drawn, problem_of
 from geomech.bench.slopes.random_slopes import scene_text
 from geomech.coupling import cycles
+from geomech.coupling.cycle import Coupling
 from geomech.coupling.monitoring import pass_agreement
 from geomech.coupling.monitoring.energy_check import (
     UNPAID,
     BendingWatch,
     BudgetWatch,
+    GrowthWatch,
     check_dissipation,
     check_supplied,
 )
@@ -170,6 +172,29 @@ def test_what_unstable_growth_sets_free_is_booked_and_told_once(caplog):
     (line,) = [line for line in lines if "grow unstably" in line]
     assert last.statistics["growth_release"] >= float(re.search(r"released (\S+) J/m", line)[1]) * 0.99 > 1.0
     assert abs(last.statistics["budget_residual"]) < 1e-6
+
+
+@pytest.mark.parametrize(("drive", "told"), [(1.05, ""), (1.66, "from 1.66 times their toughness")])
+def test_unstable_growth_says_if_load_steps_pass_the_load_at_which_it_begins(caplog, drive, told):
+    watch, budget = GrowthWatch(), EnergyBudget(turnover=50.0, released=1.0)
+    for each in (drive, 1.01):
+        watch.begins(each)
+    watch.check(budget, 2.0)
+    watch.check(budget, 3.0)
+    (line,) = [record.getMessage() for record in caplog.records]
+    assert "t = 2 s" in line and told in line and ("load steps" in line) == bool(told)
+
+
+@pytest.mark.parametrize(("steps", "told"), [(3, True), (48, False)])
+def test_coarse_load_steps_in_which_a_crack_runs_are_told_of(caplog, steps, told):
+    """Slope 26: its weight in three steps passes the load at which cracks begin to run by two thirds."""
+    problem = problem_of(drawn(scene_text(26)))
+    problem = replace(problem, dda=replace(problem.dda, time_step=3.0 / steps))
+    run = Coupling(problem)
+    for _ in takewhile(lambda cycle: not cycle.growth_pass, run.cycles()):
+        pass
+    run.unstable.check(EnergyBudget(turnover=1.0, released=1.0), 1.0)
+    assert ("depends on the load steps" in caplog.text) == told
 
 
 def test_a_scheme_that_gives_without_growth_is_told_of(caplog):

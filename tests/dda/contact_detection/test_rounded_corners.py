@@ -105,6 +105,21 @@ def test_the_path_says_which_side_is_met():
     assert normal[0] == pytest.approx([-np.sqrt(0.75), 0.5], abs=1e-9)
 
 
+@pytest.mark.parametrize("crossing", [5.0, 12.5, 20.0, 22.5])
+def test_where_joints_cross_at_a_small_angle_the_order_of_their_lines_decides_nothing(crossing):
+    """Corners that lie on each other are equally near to both lines. (In slope 13, mirrored, blocks moved by 1 % less.)"""
+    n, x = wedge(180.0 - crossing), np.zeros((1, 2))
+    for moved in ([0.0, 0.0], 1e-3 * LENGTH * n[0], -1e-3 * LENGTH * n.sum(axis=0)):
+        normal, gap, line = meetings(x, moved, n)
+        other, other_gap, other_line = meetings(x, moved, n[::-1])
+        assert normal == pytest.approx(other, abs=1e-12) and gap == pytest.approx(other_gap, abs=1e-15)
+        assert other_line[0] == [0, 2, 1][line[0]]
+    # What slides along a line stands on it.
+    for k, way in ((0, 1.0), (1, -1.0)):
+        along = way * LENGTH * np.array([-n[k, 1], n[k, 0]])
+        assert meetings(x - along, 2 * along, n)[2] == [k + 1]
+
+
 def bed(step: float, n: int = 5, corner: float = 90.0) -> list[np.ndarray]:
     """Blocks of 1 m along a bedding plane, those from x = 1 on by ``step`` (m) higher; the angle at the upper left of
     each, degrees."""
