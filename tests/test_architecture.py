@@ -5,6 +5,7 @@ import ast
 import shutil
 import subprocess
 import sys
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -75,6 +76,12 @@ LAZY = {"gmsh", "ezdxf", "vtk", "vtkmodules", "pyvista", "matplotlib", "scipy", 
 SOURCES = sorted(HOUSE.rglob("*.py"))
 
 
+@cache
+def tree_of(path: Path) -> ast.Module:
+    """The syntax tree of a source file."""
+    return ast.parse(path.read_text(encoding="utf-8"), filename=str(path))
+
+
 def part_of(path: Path) -> str:
     """The part of the house that a source file belongs to."""
     return path.relative_to(HOUSE).parts[0].removesuffix(".py")
@@ -98,7 +105,7 @@ def statements(tree: ast.AST, top: bool = True):
 def imports(path: Path, package: str | None = None, source: str | None = None):
     """All (dotted name, line, at module level) that ``path`` imports, those inside functions too."""
     package = package or ".".join(path.relative_to(ROOT).parts[:-1])
-    tree = ast.parse(path.read_text(encoding="utf-8") if source is None else source, filename=str(path))
+    tree = tree_of(path) if source is None else ast.parse(source, filename=str(path))
     for node, top in statements(tree):
         if isinstance(node, ast.Import):
             for alias in node.names:
@@ -171,10 +178,9 @@ def test_modules_are_named_after_their_idea_and_do_not_print(path):
     assert path.stem not in {"utils", "util", "helpers", "helper", "common", "misc"}
     if part_of(path) in EDGE:
         return
-    tree = ast.parse(path.read_text(encoding="utf-8"))
     printing = [
         n.lineno
-        for n in ast.walk(tree)
+        for n in ast.walk(tree_of(path))
         if isinstance(n, ast.Call) and isinstance(n.func, ast.Name) and n.func.id == "print"
     ]
     assert not printing, f"print in line {printing}"
@@ -317,5 +323,5 @@ def test_functions_take_few_arguments():
         assert too_many_arguments("x", ast.parse(text)) == ({} if many is None else {"x:f": many})
     found = {}
     for path in SOURCES:
-        found |= too_many_arguments(path.relative_to(ROOT).as_posix(), ast.parse(path.read_text(encoding="utf-8")))
+        found |= too_many_arguments(path.relative_to(ROOT).as_posix(), tree_of(path))
     assert found == {}
