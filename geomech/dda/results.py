@@ -59,6 +59,10 @@ class CrackResponse:
         """That of whole blocks."""
         return cls(np.zeros((n_blocks, width, width)), np.zeros((n_blocks, width)))
 
+    def of_mean_strain(self) -> CrackResponse:
+        """Without deflection."""
+        return CrackResponse(self.compliance[:, :3, :3].copy(), self.offset[:, :3].copy())
+
     def copy(self) -> CrackResponse:
         return CrackResponse(self.compliance.copy(), self.offset.copy(), dict(self.outlines))
 

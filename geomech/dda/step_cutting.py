@@ -55,12 +55,16 @@ class Deflection(Protocol):
 
 
 class LimitedSystem(SteppedSystem, Protocol):
-    """A system whose steps have limits; ``deflected`` are its blocks of higher order, None if there are none."""
+    """A system whose steps have limits; ``deflected`` are its blocks of higher order, None if there are none;
+    ``of_first_order``: the same blocks with uniform strain, None where there are no others."""
 
     limits: StepLimits
 
     @property
     def deflected(self) -> Deflection | None: ...
+
+    @property
+    def of_first_order(self) -> LimitedSystem | None: ...
 
 
 @dataclass(eq=False)
@@ -81,6 +85,17 @@ class _Search:
             self.state, self.vertices, self.near, self.glue_holds, broken=self.broken, motion=self.motion,
             margin=self.margin,
         )  # fmt: skip
+
+
+def _in_the_order_of(found: ContactSet, rows: np.ndarray) -> np.ndarray:
+    """CONTACT ``rows`` in the order of the contacts ``found``; those that are not among the rows are open."""
+    out = np.zeros(len(found), rows.dtype)
+    out["vertex"], out["edge"], out["state"], out["bonded"] = found.vertex, found.edge, OPEN, found.bonded
+    at = {key: row for row, key in enumerate(zip(rows["vertex"].tolist(), rows["edge"].tolist()))}
+    for k, key in enumerate(zip(found.vertex.tolist(), found.edge.tolist())):
+        if key in at:
+            out[k] = rows[at[key]]
+    return out
 
 
 def windows_of(system: LimitedSystem, start: StepStart, dt: float) -> Windows:
@@ -111,6 +126,8 @@ class StepCutting:
                 # (In dynamics the arcs are predicted from the velocity.)
                 self.found = self.found.along(*like.arcs)
         self.cuts, self.extensions, self.redirected = 0, 0, 0
+        #: Whether states of first order have been tried at this length of the step.
+        self.proposed = False
         #: Reason of the last failed attempt, and of the last one that shortened the step.
         self.reason = self.failed = ""
         #: Allowed ratio of motion to its limit, and that of the last attempt.
@@ -123,6 +140,28 @@ class StepCutting:
             accepted = self._attempt()
             if accepted is not None:
                 return accepted
+
+    def _with_states_of_first_order(self) -> bool:
+        """Whether the step of blocks of higher order is tried again, once at each length, from the contact states that the
+        same blocks have at first order."""
+        first = self.system.of_first_order
+        if first is None or self.proposed:
+            return False
+        self.proposed = True
+        start, state = self.start, self.start.state
+        crack = None if start.crack is None else start.crack.of_mean_strain()
+        state = replace(
+            state, deflection=None, deflection_origin=None, crack_deflection=None, face_points=None, order=None
+        )
+        start = replace(start, state=state, crack=crack)
+        try:
+            found = StepCutting(first, start, self.dt, None).found
+            rows = Attempt(first, start, self.dt, found, self.cuts).result().contacts
+        except (Unsettled, KeepsMoving):
+            return False
+        again = self.found.trying(_in_the_order_of(self.found, rows))
+        tried, self.found = again is not self.found, again
+        return tried
 
     def _attempt(self) -> tuple[Attempt, StepResult] | None:
         """One attempt and its result; None if it was not accepted."""
@@ -137,6 +176,8 @@ class StepCutting:
         except KeepsMoving as failure:
             raise self._unsupported(failure) from failure
         except Unsettled as failure:
+            if self._with_states_of_first_order():
+                return None
             self.failed = self.reason = f"{failure}{system.finder.where(found, failure.contact)}"
             self._cut(0.5 * self.dt, UNSETTLED, *found.blocks_of(failure.contact))
             return None
@@ -252,7 +293,7 @@ class StepCutting:
             self.start, self.cuts, shorter = replace(self.start, bonds_give=True), 0, self.asked
         system.limits.shortens(why, *blocks)
         log.debug("step at t = %g s cut from %.4g to %.4g s: %s", self.start.state.time, self.dt, shorter, self.reason)
-        self.dt = shorter
+        self.dt, self.proposed = shorter, False
         if not system.scheme.static:
             search, again = self.search, self._search()
             search.near, search.motion, search.margin = again.near, again.motion, again.margin

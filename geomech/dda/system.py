@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -243,6 +244,15 @@ class BlockSystem:
         out = BlockSystem(self.blocks, self.materials, self.joints, self._joint_index, settings, self.work)
         out.finder.toes, out.finder.whole_faces = self.finder.toes, self.finder.whole_faces
         return out
+
+    @cached_property
+    def of_first_order(self) -> BlockSystem | None:
+        """The same blocks with uniform strain; None where there are none of higher order, or cells, which need their
+        order."""
+        if self.deflected is None or self.blocks.glued is not None or self._crushes:
+            return None
+        blocks = replace(self.blocks, order=None)
+        return BlockSystem(blocks, self.materials, self.joints, self._joint_index, self.settings, self.work)
 
     def with_joints(self, joints: Sequence[JointLaw]) -> BlockSystem:
         """The same blocks with other joint laws, in the order of ``joints``, and steps without displacement limit."""

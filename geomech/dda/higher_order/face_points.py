@@ -273,8 +273,17 @@ class FaceContacts(ContactSet):
             "lift": faces.between(corners.lift), "arc": 0.0, "swing": 0.0,
             "inset": np.zeros(len(faces.face), bool),
         }  # fmt: skip
-        out = cls(**own)
-        return out._states_of_ends()._with_history(memory)
+        out = cls(**own)._states_of_ends()._with_history(memory)
+        return out if corners.tried is None else out._trying_ends(corners.tried)
+
+    def _trying_ends(self, tried: tuple[np.ndarray, ...]) -> FaceContacts:
+        """The search begins from the states, directions of sliding and bonds ``tried`` (n_corners,), at each point from those
+        of the nearer end of its face."""
+        faces, near = self.on_faces, self.on_faces.place[self.on_faces.inside] < 0.5
+        at_points = [
+            np.concatenate([value[faces.lone], np.where(near, *faces._both(value))]) for value in (tried[0], tried[1])
+        ]
+        return replace(self, tried=(at_points[0], at_points[1], self.bonded))
 
     @property
     def on_faces(self) -> Faces:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -39,9 +40,15 @@ def refuse_unsupported(
     refuse(bends & np.array([materials[m].rigid for m in blocks.material]), "a rigid block does not bend")
     if blocks.constrained is not None:
         refuse(bends & blocks.constrained.any(axis=1), "guided blocks of higher order are not supported yet")
-    law = next((law for law in joints if law.roughness is not None or not law.straight), None)
+    law = next((law for law in joints if not (law.straight or (crushing is None and _dilates_only(law)))), None)
     if law is not None:
         refuse(bends, f"nonlinear joint laws such as {law.name!r} are not supported with it yet")
+    law = next(
+        (law for law in joints if law.dilation_angle and None in (law.normal_stiffness, law.shear_stiffness)), None
+    )
+    if law is not None:
+        # With penalty springs points of a face lose contact as it slides, and rise by different amounts.
+        refuse(bends, f"joint {law.name!r}, which dilates, needs a stiffness of its own with it")
     law = next((law for law in joints if law.restitution is not None), None)
     if law is not None:
         refuse(bends, f"a coefficient of restitution, as {law.name!r} has, is not supported with it yet")
@@ -52,3 +59,8 @@ def refuse_unsupported(
         refuse(bends, 'its contacts must be stiff springs: leave dda.springs at "stiff"')
     if settings.contact != "penalty":
         refuse(bends, 'its contacts must be penalty springs or joints with a stiffness: leave dda.contact at "penalty"')
+
+
+def _dilates_only(law: JointLaw) -> bool:
+    """Whether ``law`` is straight but for its dilation."""
+    return replace(law, dilation_angle=0.0, dilation_slip=float("inf")).straight

@@ -78,13 +78,20 @@ def _check_joints(c: Check, refuse, besides: str = "") -> None:
     for name, joint in (c.tables.joints or {}).items():
         if name == besides:
             continue
-        curved = joint.jrc is not None or joint.max_closure_m is not None or joint.dilation_angle_deg > 0
+        dilates = joint.dilation_angle_deg > 0
+        curved = joint.jrc is not None or joint.max_closure_m is not None or (dilates and bool(besides))
         softens = joint.residual_friction_angle_deg is not None or joint.residual_cohesion_pa or joint.softening_slip_m
         if curved or softens:
             refuse(
                 f"faces of higher order, and faces that crush, support linear Coulomb laws only, and [joints.{name}] softens, dilates or "
                 "closes nonlinearly",
                 "leave these keys out",
+            )
+        elif dilates and None in (joint.normal_stiffness_pa_per_m, joint.shear_stiffness_pa_per_m):
+            refuse(
+                f"[joints.{name}] dilates, and has no stiffness: with penalty springs points of a face lose contact as it "
+                "slides, and rise by different amounts",
+                "give its normal_stiffness_pa_per_m and shear_stiffness_pa_per_m",
             )
         if joint.restitution is not None:
             refuse(f"[joints.{name}] restitution is not supported yet", "leave it out")
