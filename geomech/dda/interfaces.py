@@ -38,7 +38,7 @@ class SteppedSystem(Protocol):
     have a row. ``next`` and ``owner`` are by vertex. ``no_compliance`` (n_blocks, 3, 3) and ``no_offset`` (n_blocks, 3)
     are those of blocks without cracks. ``reach`` m: static steps are
     solved by operator splitting (`open_close.static_splitting`), and blocks that move beyond it are given up; None: they are
-    not.
+    not. ``plastic``: they are from the start, with cohesion (`open_close.plastic_splitting`).
     """
 
     blocks: Blocks
@@ -67,6 +67,7 @@ class SteppedSystem(Protocol):
     roundoff_reported: bool
     allowed_penetration: float
     reach: np.ndarray | None
+    plastic: bool
 
     @property
     def step_limit(self) -> float: ...

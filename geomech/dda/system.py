@@ -141,6 +141,8 @@ class BlockSystem:
         #: (n_blocks,) m: static steps are solved by operator splitting, which gives blocks up that move beyond this; None:
         #: they are not.
         self.reach: np.ndarray | None = None
+        #: Whether such steps are solved by operator splitting from the start (`open_close.plastic_splitting`).
+        self.plastic = False
         self.limits = StepLimits(
             self.finder, self.settings, self.half_diagonal, self.vertex_start, self.next, self.work
         )

@@ -159,6 +159,7 @@ class Attempt:
         self.iterations = 0
         #: (6 n_free,) motion of a static step as found last, with other contact areas or arcs; None before.
         self.earlier: np.ndarray | None = None
+        self.earlier_forces: np.ndarray | None = None
         #: J/m, kinetic energy of the mean velocity of a static step, which is not carried over.
         self.dropped = 0.0
         if not scheme.static and found.tried is None and len(found):
@@ -316,6 +317,9 @@ class Attempt:
         actions, found, order, midpoint = self.actions, self.found, self.order, self.midpoint
         constrained = self._constrained()
         own, shared = (self.matrix, self.right), 0
+        if self.system.plastic and self.system.reach is not None:
+            # Operator splitting gives each contact of a whole face the cohesion of its own length.
+            found, shared = found.sharing_cohesion(np.full(len(found), STICK), found.bonded), _SHARED
         for tries in range(1, 2 * _PLACED + 1):
             if found.points is not None or tries > 1:
                 self.matrix, self.right = own[0].copy(), own[1].copy()
@@ -348,6 +352,7 @@ class Attempt:
             self.iterations += settled.iterations
             if self.system.scheme.static:
                 self.earlier = settled.unknowns.ravel()
+                self.earlier_forces = np.stack([settled.normal_force, settled.shear_force], axis=1)
             if striking is not None:
                 settled = striking.back(settled, self.system.half_diagonal)
             better = found.misplaced(settled)
@@ -504,7 +509,10 @@ class Attempt:
         """Fields of `equations` that depend on further unknowns; ``right`` (n_free, 6) is the right-hand side of the
         first six."""
         reach = self.system.reach if self.system.scheme.static else None
-        return {"right": right, "expected": self._expected_unknowns(), "earlier": self.earlier, "reach": reach}
+        return {
+            "right": right, "expected": self._expected_unknowns(), "earlier": self.earlier,
+            "earlier_forces": self.earlier_forces, "reach": reach, "plastic": self.system.plastic and reach is not None,
+        }  # fmt: skip
 
     def _expected_unknowns(self) -> np.ndarray | None:
         """(6 n_free,) displacement of this step at its initial velocity, in the unknowns of `assembly`; None in

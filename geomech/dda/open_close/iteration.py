@@ -25,8 +25,9 @@ from .block_patches import settled_in_patch
 from .equations import Answer, Equations, States, Unsettled
 from .interior_point.central_path import SLIPPED, CentralPath
 from .operator_splitting import can_split, split
+from .plastic_splitting import split_plastic
 from .settled_states import Settled
-from .static_splitting import can_split_statics, split_statics
+from .static_splitting import Converged, can_split_statics, split_statics
 
 log = logging.getLogger(__name__)
 
@@ -68,6 +69,8 @@ def settle(equations: Equations, max_iterations: int, solver: ContactSolver, bon
     """
     in_order = len(equations.found) <= solver.bonds_in_order
     effort = Effort(max_iterations, solver, in_order, bonds_give=bonds_give)
+    if equations.plastic:
+        return _Search(equations, effort).settled_by_plastic_splitting()
     settled = _Search(equations, effort).settled()
     if equations.statics and not equations.first_order and _falls(equations, settled):
         settled = _borne_if_possible(equations, effort, settled)
@@ -322,9 +325,18 @@ class _Search:
         if self.effort.within_patch or not can_split_statics(equations, bonded, self.solver):
             return None
         solved = split_statics(equations, bonded, self.solver)
+        return self._split(solved, self._bonds_after_path(solved.state, bonded))
+
+    def settled_by_plastic_splitting(self) -> Settled:
+        """The result of operator splitting with cohesion, joint stiffness or bolts. Raises `Unsettled`."""
+        return self._split(*split_plastic(self.equations, self.solver))
+
+    def _split(self, solved: Converged, bonded: np.ndarray) -> Settled:
+        """The result of operator splitting, ``solved``, with bonds ``bonded`` (n,)."""
+        equations = self.equations
         log.debug("operator splitting: %d iterations", solved.iterations)
         self.spent += solved.spent
-        self.states = States(solved.state, solved.direction, self._bonds_after_path(solved.state, bonded))
+        self.states = States(solved.state, solved.direction, bonded)
         slip = np.zeros(len(self.found))
         return self._found(
             equations.checked(self.states, solved.unknowns, solved.forces, equations.springs, equations.gap, slip)

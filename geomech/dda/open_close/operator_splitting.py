@@ -54,8 +54,9 @@ class Proposal(NamedTuple):
 @kept(fastmath={"contract"}, error_model="numpy", nogil=True, **UNCOUNTED)
 def contact_turn(unknowns, contacts, law, rho, intact, relaxation, at_hand, states):
     """The contact part of one iteration, for the blocks' ``unknowns`` (6 n_free,) and ``contacts`` (`ContactMotion`).
-    ``law`` (n, 6): gap, kₙ, kₛ, S₀, μ, c; ``rho`` (2, n) normal and tangential; ``intact`` (n,): unbroken bonds. ``at_hand`` (n,
-    6): ζ, z and the forces ρ (2z − ζ − q), each normal and tangential; ``states``: state and direction (n,) of z."""
+    ``law`` (n, 7): gap, kₙ, kₛ, S₀, μ, c, and the gap over which c falls to 0; ``rho`` (2, n) normal and tangential;
+    ``intact`` (n,): unbroken bonds. ``at_hand`` (n, 6): ζ, z and the forces ρ (2z − ζ − q), each normal and tangential; ``states``:
+    state and direction (n,) of z."""
     state, direction = states
     block, other, order, vectors = contacts
     for c in range(len(law)):
@@ -67,23 +68,29 @@ def contact_turn(unknowns, contacts, law, rho, intact, relaxation, at_hand, stat
             for a in range(6):
                 apart += vectors[c, 0, k + a] * unknowns[6 * b + a]
                 along += vectors[c, 1, k + a] * unknowns[6 * b + a]
-        gap, normal, shear, before, friction, cohesion = (
+        gap, normal, shear, before, friction, cohesion, fades = (
             law[c, 0],
             law[c, 1],
             law[c, 2],
             law[c, 3],
             law[c, 4],
             law[c, 5],
+            law[c, 6],
         )
         normal_rho, shear_rho = rho[0, c], rho[1, c]
         normal_motion = at_hand[c, 0] + relaxation * (apart - at_hand[c, 2])
         shear_motion = at_hand[c, 1] + relaxation * (along - at_hand[c, 3])
         z, s = normal_motion, shear_motion
         state[c], direction[c] = OPEN, 0.0
-        if intact[c] or gap + normal_motion < 0.0:
-            z = (normal_rho * normal_motion - normal * gap) / (normal_rho + normal)
+        if intact[c] or gap + normal_motion < fades:
+            strength = cohesion
+            if intact[c] or gap + normal_motion < 0.0:
+                z = (normal_rho * normal_motion - normal * gap) / (normal_rho + normal)
+                strength -= friction * normal * (gap + z)
+            else:
+                strength *= 1.0 - (gap + z) / fades
             s = (shear_rho * shear_motion + before) / (shear_rho + shear)
-            strength, force = cohesion - friction * normal * (gap + z), before - shear * s
+            force = before - shear * s
             state[c] = STICK
             if not intact[c] and abs(force) > strength:
                 state[c], direction[c] = SLIP, (1.0 if force > 0.0 else -1.0)
@@ -149,13 +156,14 @@ class _Springs:
 
 
 def linear_laws(equations: Equations, bonded: np.ndarray) -> np.ndarray:
-    """(n, 6) of the contacts with bonds ``bonded`` (n,): gap, kₙ, kₛ, S₀, μ, c."""
+    """(n, 7) of the contacts with bonds ``bonded`` (n,), as for `contact_turn`: gap, kₙ, kₛ, S₀, μ, c, 0."""
     found, springs = equations.found, equations.springs
     slides = found.state == SLIP
     friction = np.where(slides, springs.friction, springs.peak)
     held = springs.hold + np.where(bonded == SLIPPED, springs.cohesion, 0.0)
     cohesion = np.where(slides, springs.sliding, held)
-    return np.stack([equations.gap, springs.normal, springs.shear, found.shear, friction, cohesion], axis=1)
+    none = np.zeros(len(found))
+    return np.stack([equations.gap, springs.normal, springs.shear, found.shear, friction, cohesion, none], axis=1)
 
 
 def split(equations: Equations, bonded: np.ndarray, solver: ContactSolver) -> Proposal:

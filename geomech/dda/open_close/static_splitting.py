@@ -64,8 +64,11 @@ class KeepsMoving(Unsettled):
     """Blocks without support: ``motion`` (n_free, 6) in a period, ``unbalanced`` (n_free, 6) forces on them, and
     ``order`` (n_blocks,), their rows."""
 
-    def __init__(self, motion: np.ndarray, unbalanced: np.ndarray, order: np.ndarray) -> None:
-        super().__init__("blocks without support move too far")
+    def __init__(
+        self, motion: np.ndarray, unbalanced: np.ndarray, order: np.ndarray,
+        reason: str = "blocks without support move too far",
+    ) -> None:  # fmt: skip
+        super().__init__(reason)
         self.motion, self.unbalanced, self.order = motion, unbalanced, order
 
 
@@ -118,13 +121,13 @@ def split_statics(equations: Equations, bonded: np.ndarray, solver: ContactSolve
     """The solution of a static step, from the motion of an earlier attempt if there is one. Raises `Unsettled`, and
     `KeepsMoving` if blocks move beyond ``equations.reach``."""
     try:
-        return _Splitting(equations, bonded, solver).solved()
+        return Splitting(equations, bonded, solver).solved()
     except np.linalg.LinAlgError as error:
         raise Unsettled(str(error)) from error
 
 
 @dataclass(frozen=True, eq=False)
-class _Period:
+class Period:
     """Means over a period of iterations: ``forces`` (n, 2), ``unknowns`` (6 n_free,), and ``unbalanced`` (n_free, 6) forces
     on blocks; ``end`` (6 n_free,): unknowns at its end."""
 
@@ -134,23 +137,33 @@ class _Period:
     end: np.ndarray
 
 
-def _farthest(motion: np.ndarray) -> np.ndarray:
+def farthest(motion: np.ndarray) -> np.ndarray:
     """(n_free,) m: about the largest displacement of blocks in the ``motion`` (n_free, 6)."""
     return np.hypot(motion[:, 0], motion[:, 1]) + np.abs(motion[:, 2])
 
 
-class _Splitting:
+class Splitting:
+    """The iterates of one step; arguments as for `split_statics`."""
+
     def __init__(self, equations: Equations, bonded: np.ndarray, solver: ContactSolver) -> None:
         pattern, found = equations.pattern, equations.found
         self._equations, self._solver, self._n = equations, solver, len(found)
         self._vectors = np.ascontiguousarray(equations.vectors)
         self._contacts = ContactMotion(found.block, found.other, pattern.order, self._vectors)
-        self._law, self._intact = linear_laws(equations, bonded), np.zeros(self._n, bool)
+        self._law, self._intact = self._laws(bonded), np.zeros(self._n, bool)
         self._states = np.full(self._n, STICK), np.zeros(self._n)
-        self._stiffest = float(equations.springs.normal.min())
+        self._soft, self._stiff = self._stiffness()
         self._begin()
-        soft, stiff = solver.static_splitting_soft, solver.static_splitting_stiff
-        self._take((stiff if self._loaded else soft) * self._stiffest)
+        self._take(self._stiff if self._loaded else self._soft)
+
+    def _laws(self, bonded: np.ndarray) -> np.ndarray:
+        """Laws of the contacts as for `contact_turn`."""
+        return linear_laws(self._equations, bonded)
+
+    def _stiffness(self) -> tuple[float, float]:
+        """N/m of the springs at first, and later."""
+        stiffest = float(self._equations.springs.normal.min())
+        return self._solver.static_splitting_soft * stiffest, self._solver.static_splitting_stiff * stiffest
 
     def _begin(self) -> None:
         """Start from the motion of an earlier attempt, or none, and the contact forces in it."""
@@ -170,7 +183,7 @@ class _Splitting:
     def _take(self, stiffness: float) -> None:
         """Use springs of this ``stiffness``, or less where blocks carry little, with the same forces."""
         equations, at_hand, forces = self._equations, self._at_hand, self._forces()
-        self._rho = np.tile(stiffness * self._share(forces), (2, 1))
+        self._rho = self._springs(stiffness, self._share(forces))
         at_hand[:, :2] = at_hand[:, 2:4] - forces / self._rho.T
         pattern, data, none = equations.pattern, equations.room(), np.zeros(self._n)
         springs = ContactStiffness(self._rho[0], self._rho[1], none, none)
@@ -178,6 +191,10 @@ class _Splitting:
         pattern.add_links(data)
         assert pattern.solver is not None  # `can_split_statics`
         self._correction = pattern.solver.corrections(data)
+
+    def _springs(self, stiffness: float, share: np.ndarray) -> np.ndarray:
+        """(2, n) N/m normal and shear, of springs of this ``stiffness`` where the ``share`` (n,) is 1."""
+        return np.tile(stiffness * share, (2, 1))
 
     def _share(self, forces: np.ndarray) -> np.ndarray:
         """(n,) of each contact: force that the less loaded of its blocks carries, relative to the mean, at most 1."""
@@ -203,7 +220,7 @@ class _Splitting:
         balance(0, pattern.n, *equations.sides, self._vectors, at_hand, 4, 5, rest, rest)
         self._unknowns += self._correction(rest)
 
-    def _period(self) -> _Period:
+    def _period(self) -> Period:
         """Iterate over a period."""
         number = self._solver.static_splitting_period
         before, forces, unknowns = self._at_hand[:, :2].copy(), np.zeros((self._n, 2)), np.zeros_like(self._unknowns)
@@ -216,7 +233,7 @@ class _Splitting:
         # The changes of ζ add up to what is unbalanced.
         pulled = np.zeros((self._n, 6))
         pulled[:, 4:] = self._rho.T * (self._at_hand[:, :2] - before) / number
-        return _Period(forces / sampled, unknowns / sampled, self._on_blocks(pulled), self._unknowns.copy())
+        return Period(forces / sampled, unknowns / sampled, self._on_blocks(pulled), self._unknowns.copy())
 
     def _on_blocks(self, pulled: np.ndarray) -> np.ndarray:
         """(n_free, 6) sums on the blocks of the contact forces in the last two columns of ``pulled`` (n, 6)."""
@@ -232,12 +249,12 @@ class _Splitting:
             for _ in range(solver.static_splitting_begin):
                 self._advance()
             taken = solver.static_splitting_begin
-            self._take(solver.static_splitting_stiff * self._stiffest)
+            self._take(self._stiff)
         last = self._period()
         while taken < solver.static_splitting_iterations:
             taken += solver.static_splitting_period
             period = self._period()
-            left = np.linalg.norm(period.unbalanced[:, :3], axis=1) / self._carried(period.forces)
+            left = self._left(period)
             steady = (left > solver.static_splitting_balance) & self._alike(last, period)
             changed = self._changed(last, period)
             if changed <= solver.static_splitting_change and self._balances(left, steady):
@@ -248,8 +265,12 @@ class _Splitting:
                 self._follow(last, period, steady, changed <= _CALM * solver.static_splitting_change)
             last = period
             if taken % (_ADAPTED * solver.static_splitting_period) == 0:
-                self._take(solver.static_splitting_stiff * self._stiffest)
+                self._take(self._stiff)
         raise Unsettled(f"contact forces did not balance in {taken} iterations of operator splitting")
+
+    def _left(self, period: Period) -> np.ndarray:
+        """(n_free,) unbalanced force on each block in the mean over the ``period``, over the largest force on it."""
+        return np.linalg.norm(period.unbalanced[:, :3], axis=1) / self._carried(period.forces)
 
     def _carried(self, forces: np.ndarray) -> np.ndarray:
         """(n_free,) largest force on each block: of its contacts (``forces`` (n, 2)) and loads."""
@@ -268,20 +289,20 @@ class _Splitting:
         few = cycling.sum() <= solver.static_splitting_cycling * len(left)
         return bool(few and not steady.any() and left.max() <= solver.static_splitting_cycle)
 
-    def _changed(self, last: _Period, period: _Period) -> float:
+    def _changed(self, last: Period, period: Period) -> float:
         """Change of the mean forces from period to period, relative to the mean normal force."""
         mean, change = float(period.forces[:, 0].mean()), period.forces - last.forces
         return float(np.sqrt(np.mean(change**2))) / max(mean, 1e-300)
 
     @staticmethod
-    def _alike(last: _Period, period: _Period) -> np.ndarray:
+    def _alike(last: Period, period: Period) -> np.ndarray:
         """(n_free,) bool: blocks on which the unbalanced force of successive periods is about the same."""
         one, two = last.unbalanced[:, :3], period.unbalanced[:, :3]
         first, second = np.linalg.norm(one, axis=1), np.linalg.norm(two, axis=1)
         along = np.einsum("na,na->n", one, two) > _STEADY * first * second
         return along & (np.abs(first - second) < _ALIKE * second)
 
-    def _follow(self, last: _Period, period: _Period, steady: np.ndarray, calm: bool) -> None:
+    def _follow(self, last: Period, period: Period, steady: np.ndarray, calm: bool) -> None:
         """Once forces are ``calm``, move the ``steady`` blocks (n_free,) on to where a contact closes. Raises `KeepsMoving`
         if one has moved too far, or will under a force that hardly decreases."""
         equations, order = self._equations, self._equations.pattern.order
@@ -290,11 +311,11 @@ class _Splitting:
         assert equations.reach is not None  # `can_split_statics`
         reach = np.empty(len(steady))
         reach[order[order >= 0]] = equations.reach[order >= 0]
-        if (_farthest(period.end.reshape(-1, 6)) > reach)[steady].any():
+        if (farthest(period.end.reshape(-1, 6)) > reach)[steady].any():
             raise KeepsMoving(motion, unbalanced, order)
         if not calm:
             return
-        most = np.where(steady, reach / np.maximum(_farthest(motion), 1e-300), 0.0)
+        most = np.where(steady, reach / np.maximum(farthest(motion), 1e-300), 0.0)
         stride = self._until_contact(motion, most)
         free = steady & (stride >= most)
         before, now = (float((each.unbalanced * motion)[free].sum()) for each in (last, period))
@@ -331,7 +352,7 @@ class _Splitting:
             np.minimum.at(stride, two, least)
         return stride[:-1]
 
-    def _result(self, period: _Period, taken: int) -> Converged:
+    def _result(self, period: Period, taken: int) -> Converged:
         law, motion, (normal, shear) = self._law, moved(period.unknowns, *self._contacts), period.forces.T
         slides = np.abs(shear) >= (law[:, 4] * normal + law[:, 5]) * (1.0 - _AT_STRENGTH)
         state = np.where(normal > 0.0, np.where(slides, SLIP, STICK), OPEN)

@@ -15,6 +15,7 @@ from ..joint_laws.whole_faces import WholeFaces
 from ..kinematics.simplex_integration import block_moments
 from ..loads.bolts import labels
 from ..open_close.contact_set import ContactSet
+from ..open_close.plastic_splitting import NOT_BALANCED
 from ..results import CrackResponse
 from ..step_control.relative_motion import Windows
 from ..system import BlockSystem
@@ -254,7 +255,9 @@ def parted_faces(system: BlockSystem, state: State) -> tuple[PartedFace, ...]:
     near = system.contacts_near(state)
     if near.whole is None:
         return ()
-    open_ends = (near.state == OPEN) & (near.bonded > 0) & near.whole.touch(near.state)
+    # Contacts that carry cohesion alone may be open (`open_close.plastic_splitting`).
+    touching = np.where((near.gap_before > near.precision) & system.plastic, OPEN, near.state)
+    open_ends = (touching == OPEN) & (near.bonded > 0) & near.whole.touch(touching)
     face = near.whole.face
     return _faces(near, near.whole, [np.flatnonzero(open_ends & (face == k)) for k in np.unique(face[open_ends])])
 
@@ -316,18 +319,20 @@ def as_rigid_blocks(
 
 
 def with_parted_faces(
-    blocks: Blocks, found: FactorOfSafety, parted: tuple[PartedFace, ...], other: FactorOfSafety
+    blocks: Blocks, found: FactorOfSafety, parted: tuple[PartedFace, ...], other: FactorOfSafety | None
 ) -> FactorOfSafety:
     """The answer ``found`` with the faces ``parted`` at one end, and the ``other`` answer in which open ends lose their
-    cohesion."""
+    cohesion; None if that was not searched for."""
     worst = parted[0]
     a, b = (blocks.names[k] if blocks.names else f"block {k}" for k in (worst.block, worst.other))
     one = len(parted) == 1
     line = (
         f"{'a face' if one else f'{len(parted)} faces'} with cohesion touch{'es' if one else ''} at one end only, open by "
-        f"up to {1e3 * worst.gap:.2g} mm ({a!r} and {b!r}): as in limit equilibrium, cohesion counts on the whole length; "
-        f"were it lost where faces are open, the factor would be {other.factor:.4f}"
+        f"up to {1e3 * worst.gap:.2g} mm ({a!r} and {b!r}): as in limit equilibrium, cohesion counts on the whole length"
     )
+    if other is None:
+        return replace(found, warnings=(*found.warnings, line))
+    line += f"; were it lost where faces are open, the factor would be {other.factor:.4f}"
     return replace(found, factor_if_parted=other.factor, warnings=(*found.warnings, line))
 
 
@@ -346,6 +351,11 @@ def with_admissible_forces(found: FactorOfSafety, largest: float | None) -> Fact
         "is that of the contact forces which result from the deformation of the blocks, and depends on the stiffness "
         "of blocks and joints"
     )
+    failed = min(
+        (t for t in found.trials if not t.stable and t.factor >= found.upper), key=lambda t: t.factor, default=None
+    )
+    if failed is not None and NOT_BALANCED in failed.reason:
+        line += f". The trial at {failed.factor:.4f} failed because its {failed.reason}: the factor may be too low"
     return replace(found, admissible=largest, warnings=(*found.warnings, line))
 
 

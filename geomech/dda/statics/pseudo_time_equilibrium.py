@@ -11,6 +11,7 @@ that slides onto a floor, have collapsed as well.
 from __future__ import annotations
 
 import logging
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
@@ -299,7 +300,21 @@ def pseudo_times(system: BlockSystem) -> tuple[float, float]:
     area = system.blocks.areas()
     transit = np.sqrt(area * system.density / stiffness)[free].min()
     lightest = (system.density * area)[free].min()
-    return _FIRST_TRANSITS * transit, float(np.sqrt(2 * lightest / (_LEAST_INERTIA * _PENALTY * stiffness.max())))
+    return _FIRST_TRANSITS * transit, _inertia_less(float(lightest), float(stiffness.max()))
+
+
+def settling_time(system: BlockSystem) -> float:
+    """Length, s, of a step by operator splitting, whose springs keep light blocks in place without inertia: that of
+    `pseudo_times` for the median block."""
+    mass = (system.density * system.blocks.areas())[~system.blocks.fixed & (system.density > 0)]
+    if not len(mass):
+        return 1.0
+    return _inertia_less(float(np.median(mass)), max(m.plane_modulus for m in system.materials))
+
+
+def _inertia_less(mass: float, stiffness: float) -> float:
+    """s: the longest step in which the inertia of a ``mass`` kg/m counts among contacts of ``stiffness`` E' Pa."""
+    return math.sqrt(2.0 * mass / (_LEAST_INERTIA * _PENALTY * stiffness))
 
 
 def _centroids(system: BlockSystem, state: State) -> np.ndarray:

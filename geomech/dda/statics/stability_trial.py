@@ -14,16 +14,19 @@ the unbalanced forces U, Σ U·φ / Σ m φ².
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ...model import OPEN, Loads, State
+from ...model import OPEN, Blocks, DdaSettings, JointLaw, Loads, State
 from ..joint_laws.friction_arrest import contact_speeds
+from ..joint_laws.reduced_strength import reduced
+from ..open_close.plastic_splitting import is_plastic, is_stronger
 from ..results import NotConverged, StepResult, Unsupported
 from ..system import BlockSystem
 from .displacement_limit import DisplacementLimit
-from .pseudo_time_equilibrium import pseudo_times
+from .pseudo_time_equilibrium import pseudo_times, settling_time
 
 #: Free fall in one step, as a fraction of a block's size √area: long against contact vibrations, small for the
 #: geometry.
@@ -86,9 +89,17 @@ class TrialLoads:
         pull = max(float(np.hypot(*self.loads.gravity.at(self.time))), 1e-3)
         return math.sqrt(2.0 * _FALL * size / pull)
 
+    def plastic(self, blocks: Blocks, joints: Sequence[JointLaw], settings: DdaSettings) -> bool:
+        """Whether trials of these ``blocks`` are solved by operator splitting with cohesion, joint stiffness or bolts: there
+        are many, and their ``joints`` keep what strength they have."""
+        many = int((~blocks.fixed).sum()) >= settings.contact_solver.plastic_splitting
+        more = bool(self.loads.bolts) or any(is_stronger(law) for law in joints)
+        plain = settings.contact == "penalty" and not self.loads.excavations
+        return many and more and plain and all(is_plastic(reduced(law, 1.0)) for law in joints)
+
     def at_once(self, system: BlockSystem) -> bool:
         """Whether a trial of this ``system`` is solved in a few long steps, by operator splitting."""
-        return system.splits_statics and not self.loads.bolts and not self.loads.excavations
+        return system.plastic or (system.splits_statics and not self.loads.bolts and not self.loads.excavations)
 
 
 def stability_trial(
@@ -153,7 +164,8 @@ def _at_once(
     system: BlockSystem, state: State, under: TrialLoads, factor: float, limit: DisplacementLimit
 ) -> tuple[Trial, State]:
     """`stability_trial` in a few long steps, by operator splitting."""
-    blocks, dt, way = system.blocks, pseudo_times(system)[1], _Way(system, limit)
+    blocks, way = system.blocks, _Way(system, limit)
+    dt = settling_time(system) if system.plastic else pseudo_times(system)[1]
     system.reach = _MARGIN * limit.farthest()
     nothing, drift, ratio, stable = np.zeros((blocks.n_blocks, 3)), math.nan, math.nan, False
     motion, steps, reason = nothing, 0, f"still moving after {_LONG_STEPS} steps"

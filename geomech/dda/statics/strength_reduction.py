@@ -71,6 +71,9 @@ _CUTS = 2
 #: Relative increase of F between trials of many blocks, each solved in one step: the same step over a larger increase may
 #: find a mechanism where smaller ones find an equilibrium, and the drifts there do not predict the factor.
 _STRIDE = 0.02
+#: … and with cohesion, joint stiffness or bolts its limit, as it doubles after each stable trial: faces that keep their cohesion
+#: depend less on the way.
+_LONGEST_STRIDE = 0.08
 #: Number of blocks that an error names.
 _NAMED = 5
 #: Distance of trials from an expected factor, in tolerances; and relative distance of a second failing trial above a
@@ -217,8 +220,13 @@ class _Search:
 
     def system(self, factor: float, counted: Counted) -> BlockSystem:
         """The blocks with joints whose strength is divided by the ``factor``."""
-        laws = [reduced(law, factor) if law.name in self.chosen else law for law in self.joints]
+        plastic = self.under.plastic(self.blocks, self.joints, self.settings)
+        laws = [
+            reduced(law, factor) if law.name in self.chosen else reduced(law, 1.0) if plastic else law
+            for law in self.joints
+        ]
         system = BlockSystem(self.blocks, self.materials, laws, self.joint_index, self.settings)
+        system.plastic = plastic
         if self.under.at_once(system):
             # A trial is one step, which fails as a whole.
             system.settings = replace(self.settings, max_step_cuts=0)
@@ -353,6 +361,10 @@ class _Search:
         """The answer ``found`` with the factor of rigid blocks, if faces are barely open or forces are admissible
         ``beyond`` the factor, and the factor without the cohesion of open ends."""
         system = self.system(found.lower, counted)
+        if system.plastic:
+            # Cohesion fades over hairline gaps, and further searches take as long as this one.
+            parted = parted_faces(system, found.state)
+            return with_parted_faces(self.blocks, found, parted, None) if parted else found
         loose = hairline_faces(system, found.state)
         if loose or beyond:
             rigid = replace(self, materials=[replace(material, rigid=True) for material in self.materials])
@@ -428,12 +440,13 @@ class _Bracket:
     ) -> None:
         self._search, self._counted, self._watch, self._aim = search, counted, watch, aim
         self._limit: Any = None  # DisplacementLimit of the last relaxation
-        self._at_once = search.under.at_once(search.system(1.0, counted))
+        system = search.system(1.0, counted)
+        self._at_once, self.plastic = search.under.at_once(system), system.plastic
         self._state = search.rest
         self.trials: list[Trial] = []
         # For each trial, the factor from whose equilibrium it started.
         self._began: dict[float, float] = {}
-        self.lower = 0.0
+        self.lower, self._stride = 0.0, _STRIDE
 
     def begin(self, factor: float) -> Trial:
         """Try a ``factor`` from the blocks at rest; if they keep moving, from the equilibrium with that factor, found by
@@ -443,7 +456,7 @@ class _Bracket:
         loads, time, system = search.under.loads, search.under.time, search.system(factor, self._counted)
         plain = not (loads.excavations or loads.bolts)
         self._state, self._limit = search.rest, DisplacementLimit(system, search.rest, loads, time)
-        if plain:
+        if plain or self._at_once:
             trial = self.tried(factor)
             if trial.stable or self._at_once:
                 return trial
@@ -466,12 +479,15 @@ class _Bracket:
             self._watch(trial)
         if trial.stable:
             self.lower, self._state = factor, end
+        if self.plastic:
+            self._stride = min(2.0 * self._stride, _LONGEST_STRIDE) if trial.stable else _STRIDE
         return trial
 
     def _known(self) -> list[Trial]:
-        # A trial that failed from far below may be stable when approached in small steps.
+        # A trial that failed from far below may be stable when approached in small steps; one that failed from no forces at all
+        # often is, where cohesion leaves blocks more ways to be wedged.
         last = {t.factor: t for t in self.trials if t.stable or t.factor > self.lower}
-        return list(last.values())
+        return [t for t in last.values() if t.stable or not self.plastic or self._began[t.factor] > 0.0]
 
     def closed(self, tolerance: float) -> FactorOfSafety:
         """The answer, once the trials enclose the factor to the ``tolerance``."""
@@ -488,7 +504,7 @@ class _Bracket:
             elif upper > self.lower * (1.0 + tolerance):
                 factor = _next_factor(known, self.lower, upper, tolerance)
                 if self._at_once:
-                    factor = min(2.0 * self.lower * upper / (self.lower + upper), self.lower * (1.0 + _STRIDE))
+                    factor = min(2.0 * self.lower * upper / (self.lower + upper), self.lower * (1.0 + self._stride))
             elif self._started_far_below(known, upper, tolerance):
                 factor = upper
             else:

@@ -1,0 +1,137 @@
+"""Factors of safety by operator splitting with cohesion, joint stiffness and bolts, against the linear programme of rigid blocks."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from geomech import dda
+from geomech.bench.safety.factor_cost import slope_of
+from geomech.bench.safety.slope_limits import admissible_factor
+from geomech.bench.slopes.drawn_slopes import Isometry, drawn, moved, problem_of
+from geomech.dda.open_close.operator_splitting import contact_turn
+from geomech.dda.open_close.plastic_splitting import is_plastic
+from geomech.dda.statics.stability_trial import TrialLoads
+from geomech.model import GROUND, SLIP, Bolt, ContactSolver, JointLaw, Loads
+
+#: Two joint sets behind a face, some seventy blocks.
+SCENE = """
+[geometry]
+seed = 1
+dead_ends = "trim"
+smallest_block_m2 = 0.2
+[[geometry.zones]]
+name = "rock"
+polygon = [[0, 0], [60, 0], [60, 20], [42, 20], [30, 40], [0, 40]]
+[[geometry.zones]]
+name = "base"
+polygon = [[-2, -2], [62, -2], [62, 20], [60, 20], [60, 0], [0, 0], [0, 40], [-2, 40]]
+[[geometry.joint_sets]]
+name = "bedding"
+angle_deg = -35
+spacing_m = 5.0
+region = [[0, 0], [60, 0], [60, 20], [42, 20], [30, 40], [0, 40]]
+[[geometry.joint_sets]]
+name = "cross"
+angle_deg = 70
+angle_deviation_deg = 5
+spacing_m = 6.0
+region = [[0, 0], [60, 0], [60, 20], [42, 20], [30, 40], [0, 40]]
+[materials.rock]
+youngs_modulus_pa = 20e9
+poissons_ratio = 0.25
+density_kg_m3 = 2600
+[zones.base]
+fixed = true
+[joints.default]
+friction_angle_deg = 30
+MORE
+[joints.beds]
+friction_angle_deg = 20
+edges = ["joint:bedding"]
+MORE
+[loads]
+gravity_m_s2 = [0, -9.81]
+[dda]
+time_step_s = 0.005
+[run]
+end_time_s = 2.0
+"""
+
+
+def factor_of(problem, solver: ContactSolver | None = None) -> dda.FactorOfSafety:
+    settings = replace(problem.dda, dynamic_factor=0.0, contact_solver=solver or ContactSolver())
+    return dda.factor_of_safety(
+        problem.blocks, problem.materials, problem.joints, problem.loads, settings, joint_index=problem.joint_index,
+        load_time=problem.run.end_time, search=dda.FactorSearch(follow=False),
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    "move", [None, Isometry.mirrored(), Isometry.rotated(0.3)], ids=["drawn", "mirrored", "rotated"]
+)
+def test_a_slope_with_cohesion_fails_within_a_per_cent_of_its_bound(move):
+    scene = drawn(SCENE.replace("MORE", "cohesion_pa = 20e3"))
+    problem = problem_of(scene if move is None else moved(scene, move))
+    found, bound = factor_of(problem), admissible_factor(problem, tolerance=1e-3)
+    print(f"{found.factor:.4f}, rigid blocks {bound:.4f}")
+    assert found.factor == pytest.approx(bound, rel=1e-2)
+    assert found.lower <= bound * 1.003 and found.moving and found.upper <= found.lower * 1.0021
+
+
+@pytest.mark.slow  # 6 s
+def test_a_slope_with_joint_stiffness_fails_as_with_newtons_method():
+    law = "normal_stiffness_pa_per_m = 5e9\nshear_stiffness_pa_per_m = 2e9"
+    problem = problem_of(drawn(SCENE.replace("MORE", law)))
+    one, other = factor_of(problem), factor_of(problem, ContactSolver(plastic_splitting=10**6))
+    assert one.factor == pytest.approx(other.factor, rel=1e-2)
+    assert one.factor <= admissible_factor(problem, tolerance=1e-3) * 1.003
+
+
+@pytest.mark.slow  # 8 s
+def test_bolts_count_with_their_yield_force():
+    problem = slope_of(60)
+    start = problem.blocks.vertex_start
+    centre = np.add.reduceat(problem.blocks.vertices, start[:-1]) / np.diff(start)[:, None]
+    face = int(np.where(problem.blocks.fixed, -np.inf, centre[:, 0]).argmax())
+    at = centre[face]
+    bolt = Bolt(face, (at[0], at[1]), GROUND, (at[0] - 8.0, at[1] - 4.0), 1e8, yield_force=1e5)
+    problem = replace(problem, loads=replace(problem.loads, bolts=(bolt,)))
+    found = factor_of(problem)
+    assert found.factor == pytest.approx(admissible_factor(problem, tolerance=1e-3), rel=3e-3)
+    assert found.anchors[0].force <= 1e5 * (1.0 + 1e-9)
+
+
+def test_strength_that_fades_is_left_to_the_open_close_iteration():
+    lasting = JointLaw("lasting", 0.5, 2e4, residual_cohesion=2e4)
+    assert is_plastic(lasting) and is_plastic(JointLaw("smooth", 0.5))
+    for name, value in (
+        ("tensile_strength", 1e3),
+        ("dilation_angle", 0.1),
+        ("residual_friction_angle", 0.3),
+        ("residual_cohesion", 0.0),
+    ):
+        assert not is_plastic(replace(lasting, **{name: value})), name
+
+
+def test_friction_alone_takes_no_part():
+    """Friction alone is solved as before (`static_splitting`), whatever the number of blocks."""
+    problem, under = slope_of(60), TrialLoads(Loads(), 0.0, 1e-5, 200, None)
+    assert not under.plastic(problem.blocks, problem.joints, problem.dda)
+    cohesive = [replace(law, cohesion=1e4) for law in problem.joints]
+    assert under.plastic(problem.blocks, cohesive, problem.dda)
+    few = replace(problem.dda, contact_solver=ContactSolver(plastic_splitting=1000))
+    assert not under.plastic(problem.blocks, cohesive, few)
+
+
+def test_a_face_open_by_a_hairline_holds_part_of_its_cohesion():
+    """A contact that its blocks hold 0.4 µm apart: cohesion that falls to zero over 1 µm."""
+    law = np.array([[4e-7, 1e12, 1e12, 0.0, 0.5, 1000.0, 1e-6]])
+    order, vectors = np.array([-1, -1]), np.zeros((1, 2, 12))
+    at_hand, states = np.array([[0.0, 1e-3, 0.0, 0.0, 0.0, 0.0]]), (np.zeros(1, np.int64), np.zeros(1))
+    contacts = (np.array([0]), np.array([1]), order, vectors)
+    contact_turn(np.zeros(6), contacts, law, np.full((2, 1), 1e9), np.zeros(1, bool), 1.0, at_hand, states)
+    normal, shear = 1e9 * (at_hand[0, 2:4] - at_hand[0, :2])
+    assert normal == 0.0 and shear == pytest.approx(-600.0) and states[0][0] == SLIP
