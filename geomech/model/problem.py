@@ -24,7 +24,8 @@ class DdaSettings:
     """Settings of the block solver (names and values after Shi 1988 where he has them).
 
     time_step            s; of every step, or the longest one with ``automatic_time_step``
-    automatic_time_step  True: steps shrink and grow with the open–close iterations they take
+    automatic_time_step  True: steps shrink and grow with the open–close iterations they take and, in motion, with the
+                         energy that the time scheme takes
                          (`dda.step_control.adaptive_time_step`)
     normal_penalty, shear_penalty   contact spring stiffness, N/m per metre of thickness (Pa); None: from the stiffness
                          of the blocks (`dda.joint_laws.penalty_springs`)

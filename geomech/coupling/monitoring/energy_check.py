@@ -82,8 +82,8 @@ def check_dissipation(
     log.warning(
         "t = %g s: the time integration has taken %.2g of all converted energy from blocks %s (scheme_loss in "
         "history.csv): the step does not resolve vibrations or impacts that matter to the result, whose error is of "
-        'that order and shrinks with dda.time_step_s. dda.equilibrium = "start" avoids the vibration due to a '
-        "suddenly applied load%s",
+        "that order and shrinks with dda.time_step_s. dda.automatic_time_step = true follows what the scheme takes most from in "
+        'shorter steps; dda.equilibrium = "start" avoids the vibration due to a suddenly applied load%s',
         time,
         budget.scheme / turnover,
         "that still move" if moves else "whose cracks have grown in motion",

@@ -19,7 +19,8 @@ class DdaTable(Table):
     )
     automatic_time_step: bool = Field(
         False,
-        description="steps grow and shrink below `time_step_s` by displacement and open–close iterations",
+        description="steps grow and shrink below `time_step_s` by displacement and open–close iterations, and in motion by the "
+        "energy that the time scheme takes: vibrations that matter are followed in shorter steps",
     )
     dynamic_factor: Annotated[float, Field(ge=0, le=1)] = Field(
         0.0, description="fraction of the velocity carried from step to step: 0 static, 1 dynamic"

@@ -11,6 +11,7 @@ from block_problems import rectangle
 
 from geomech import dda
 from geomech.coupling.cycle import cycles
+from geomech.dda.energy_balance import StepEnergy
 from geomech.dda.step_control import adaptive_time_step
 from geomech.model import (
     Blocks,
@@ -28,9 +29,10 @@ WEIGHT = Loads(gravity=History.constant([0.0, -9.81]))
 ROCK = Material("rock", 10e9, 0.25, density=2600.0)
 
 
-def finished(dt, iterations=1, cuts=0, share=0.0):
+def finished(dt, iterations=1, cuts=0, share=0.0, taken=0.0):
     facts = {"open_close_iterations": iterations, "step_cuts": cuts, "limit_share": share}
-    return SimpleNamespace(dt=dt, statistics=facts)
+    energy = dict.fromkeys(StepEnergy._fields, 0.0) | {"kinetic": 1.0, "scheme": taken}
+    return SimpleNamespace(dt=dt, statistics=facts, energy=StepEnergy(**energy))
 
 
 def test_steps_grow_and_shrink_by_what_is_stated_and_stay_bounded():
@@ -55,6 +57,46 @@ def test_steps_grow_and_shrink_by_what_is_stated_and_stay_bounded():
     for _ in range(100):
         length.after(finished(length.dt, iterations=99), length.dt)
     assert length.dt == adaptive_time_step.SHORTEST
+
+
+def test_in_motion_neither_iterations_nor_what_the_scheme_takes_shorten_steps_below_the_first():
+    length = dda.StepLength(DdaSettings(time_step=1.0, automatic_time_step=True, dynamic_factor=1.0))
+    for _ in range(100):
+        length.after(finished(length.dt), length.dt)
+    assert length.dt == 1.0
+    length.after(finished(1.0, taken=2 * adaptive_time_step.TAKEN), 1.0)
+    assert length.dt == pytest.approx(np.sqrt(0.5))
+    for trouble in ({"iterations": 99}, {"taken": 0.5}):
+        for _ in range(20):
+            length.after(finished(length.dt, **trouble), length.dt)
+        assert length.dt == adaptive_time_step.FIRST
+    length.after(finished(length.dt / 8, cuts=3), length.dt)
+    assert length.dt == adaptive_time_step.FIRST / 8
+
+
+def test_a_vibration_is_followed_whatever_the_longest_step_is():
+    """Work of gravity on a column under sudden weight after half a period, against steps of its thousandth part."""
+    column = [rectangle(-1, -1, 2, 0), *(rectangle(0, k, 1, k + 1) for k in range(5))]
+    blocks, soft = Blocks.from_polygons(column, fixed=[True] + [False] * 5), Material("soft", 1e9, 0.25, density=2600.0)
+    period = 4 * 5 / np.sqrt(1e9 / (1 - 0.25**2) / 2600)
+
+    def work(dt, automatic):
+        done = []
+        settings = DdaSettings(
+            time_step=dt, automatic_time_step=automatic, dynamic_factor=1.0, max_displacement_ratio=0.05, damping=0.0
+        )
+        for _ in dda.run(
+            blocks, [soft], [JointLaw("joint", friction_angle=0.6)], WEIGHT, settings, end_time=0.5 * period,
+            watch=lambda result: done.append(result.energy.gravity_work),
+        ):  # fmt: skip
+            pass
+        return sum(done), len(done)
+
+    exact, _ = work(period / 1000, False)
+    for parts, off in ((4, 0.3), (16, 0.1)):
+        assert work(period / parts, False)[0] < (1 - off) * exact
+        followed, steps = work(period / parts, True)
+        assert followed == pytest.approx(exact, rel=0.03) and steps < 120
 
 
 def test_without_it_every_static_step_is_the_one_asked_for():
