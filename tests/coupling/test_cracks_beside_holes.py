@@ -70,7 +70,7 @@ def of_forces_and_of_stress(problem: Problem) -> tuple[np.ndarray, np.ndarray, d
     return last.tips["k_i"], under_stress.tips["k_i"], last.statistics
 
 
-@pytest.mark.parametrize("cracks", [1, 2])
+@pytest.mark.parametrize("cracks", [pytest.param(1, marks=pytest.mark.slow), 2])
 @pytest.mark.parametrize("length", [0.2, pytest.param(1.0, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("order", [2, pytest.param(5, marks=pytest.mark.slow)])
 def test_cracks_from_a_hole_have_the_k_of_bowie(cracks, length, order):

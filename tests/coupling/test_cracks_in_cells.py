@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import logging
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from geomech import dda, ddm
 from geomech.coupling import Coupling, cycles
-from geomech.model import Material
+from geomech.model import History, JointLaw, Material
 from geomech.reference.cracks import fracture, plates
 from geomech.scene import SceneError, load_scene
 
@@ -104,8 +105,6 @@ def solved(problem_cracks, loops, half_height, sides) -> np.ndarray:
 
 
 def of_solver(problem, loops=(), half_height=1.5, sides=(0.0, 1.0)) -> np.ndarray:
-    from dataclasses import replace
-
     cracks = replace(problem.cracks, block=np.zeros(problem.cracks.n_segments, int))
     return solved(cracks, loops, half_height, sides)
 
@@ -157,6 +156,44 @@ def test_energy_of_a_cracked_plate_in_motion(tmp_path):
     told = [cycle.statistics for cycle in cycles(problem) if cycle.number]
     assert max(one["crack_work"] for one in told) > 0.01 * max(one["load_work"] for one in told)
     assert max(abs(one["budget_residual"]) for one in told) < 3e-5
+
+
+def test_a_closed_crack_slides_in_its_cell(tmp_path):
+    """Pressed, with 20° of friction: K_II against the crack solver."""
+    problem = plate(tmp_path, [[0.35, -0.15], [0.6, 0.1]], size=0.5)
+    laws = (JointLaw("rough", friction_angle=math.radians(20)),)
+    shut = replace(problem.cracks, aperture=np.zeros(1), law=np.zeros(1, int))
+    tractions = tuple(
+        replace(load, history=History.constant([-5.0 * part for part in load.history.at(0.0)]))
+        for load in problem.loads.edge_tractions
+    )
+    problem = replace(problem, cracks=shut, face_laws=laws, loads=replace(problem.loads, edge_tractions=tractions))
+    *_, last = Coupling(problem).cycles()
+    box = np.array([[0.0, -1.5], [1.0, -1.5], [1.0, 1.5], [0.0, 1.5]])
+    alone = replace(shut, block=np.zeros(1, int))
+    body = ddm.Body([box], alone, Material("rock", 20e9, 0.25, 2500.0), face_laws=laws)
+    push = np.array([[[0.0, -5e6]] * 2, [[0.0, 5e6]] * 2])
+    exact = body.solve(ddm.BodyLoad(segments=np.array([[box[2], box[3]], [box[0], box[1]]]), tractions=push))
+    assert np.abs(exact.tips["k_ii"]).min() > 1e5
+    assert last.tips["k_ii"] == pytest.approx(exact.tips["k_ii"], rel=5e-3) and last.tips["k_i"] == pytest.approx(
+        [0, 0]
+    )
+    assert last.statistics["crack_friction"] > 0.0
+
+
+@pytest.mark.slow
+def test_a_crack_grows_through_its_cell_in_motion(tmp_path):
+    """Pulled at once: the crack runs through and divides its cell. Energies of growth, waves and parts add up."""
+    more = {"dynamic": 1.0, "step": 2e-5, "end": 3e-3, "dda": "damping = 0.0", "zone": "crack_margin_m = 0.85"}
+    problem = plate(tmp_path, EDGE, 2, 0.5, k_ic=4e5, **more)
+    told = []
+    for cycle in cycles(problem):
+        told.append(cycle.statistics)
+        if cycle.blocks.n_blocks > problem.blocks.n_blocks:
+            break
+    assert cycle.blocks.n_blocks == problem.blocks.n_blocks + 1
+    assert told[-2]["fracture_energy"] > 0.5 * told[-2]["toughness_energy"]
+    assert max(abs(one["budget_residual"]) for one in told[1:]) < 2e-3
 
 
 @pytest.mark.slow
