@@ -15,11 +15,16 @@ from ..dda.higher_order.bent_body import bent_bodies
 from ..dda.step_control.step_limits import shortened
 from ..ddm.counters import Work
 from ..model import WEIGHT, Blocks, CrackFaces, Cracks, Cycle, Event, Motion, Problem, Skip, State
-from .load_transfer.elastic_bodies import solve_bodies, tip_rows
+from .crack_compliance.growth_screening import LastSolution
+from .load_transfer.elastic_bodies import MANY, solve_bodies, tips_with_criterion
 
 if TYPE_CHECKING:
     from ..ddm import Body
     from .coupled_state import CrackedBlocks
+
+#: Number of cycles after which bodies left out of all passes since are solved for `Cycle.latest_tips`; as often as interior
+#: fields are written while nothing grows.
+RENEWED = 50
 
 
 def record(
@@ -58,12 +63,13 @@ def record(
         work=work,
         skips=skips(now, work),
         shortened=shortened(now.block_work),
+        sparing=len(now.bodies) >= MANY and not now.system.scheme.static,
     )
     vars(cycle)["motion"] = motion  # already known
     del vars(cycle)["faces"]  # computed on first use
     if left_out:
         del vars(cycle)["tips"], vars(cycle)["bodies"]
-        vars(cycle)["_rest"] = _LeftOut(now, solutions, tips, dict(left_out))
+        vars(cycle)["_rest"] = _LeftOut(now, solutions, tips, dict(left_out), cycle.sparing)
     return cycle
 
 
@@ -78,37 +84,110 @@ class _LazyCycle(Cycle):
 
     @cached_property
     def bodies(self) -> dict[int, Any]:
-        return self._rest.bodies()
+        return self._rest.bodies(self.number)
+
+    @property
+    def has_fields(self) -> bool:
+        return "_rest" in vars(self) or super().has_fields
 
     @cached_property
     def tips(self) -> np.ndarray:
         return self._rest.tips(self.bodies)
 
+    @property
+    def _all_solved(self) -> bool:
+        known = vars(self)
+        return "_rest" not in known or "bodies" in known or not self.sparing
+
+    @cached_property
+    def _latest(self) -> dict[int, LastSolution]:
+        return self._rest.latest(self.number)
+
+    @cached_property
+    def _latest_rows(self) -> tuple[np.ndarray, np.ndarray]:
+        if self._all_solved:
+            return self.tips, np.full(len(self.tips), self.number)
+        tips = self._rest.latest_tips(self._latest)
+        return tips, np.array([self._latest[block].number for block in tips["block"].tolist()], int)
+
+    @property
+    def latest_tips(self) -> np.ndarray:
+        return self._latest_rows[0]
+
+    @property
+    def solved_in(self) -> np.ndarray:
+        return self._latest_rows[1]
+
+    @cached_property
+    def latest_faces(self) -> CrackFaces | None:
+        if self._all_solved:
+            return self.faces
+        return joined_faces(self.cracks, {block: last.solution for block, last in self._latest.items()})
+
 
 class _LeftOut:
     """Solves bodies left out of a pass as they would have been solved in it, from a copy of the data in ``now``, which
-    will change."""
+    will change. ``sparing`` as of the cycle."""
 
-    def __init__(self, now: CrackedBlocks, solutions: dict, tips: np.ndarray, left_out: dict[int, Body]) -> None:
+    def __init__(
+        self, now: CrackedBlocks, solutions: dict, tips: np.ndarray, left_out: dict[int, Body], sparing: bool
+    ) -> None:
         self._screening, self._solutions, self._left_out = now.growth_screening, solutions, left_out
         self._tips = tips
         self._problem, self._blocks, self._nodes_of = now.problem, now.blocks, now.nodes_of
         self._order, self._loads = list(now.bodies), {block: now.loads[block] for block in left_out}
+        self._last = {block: now.growth_screening.last(block) for block in left_out}
+        self._solved: dict[int, Any] = {}
+        self._sparing = sparing
 
-    def bodies(self) -> dict[int, Any]:
-        """block → solution of all bodies, in their order."""
-        self._screening.asked += 1
-        found = solve_bodies(self._left_out, self._loads, {}, {}, names=self._blocks.names)
-        for body in self._left_out.values():
-            body.work.solutions_left_out -= 1
-        found |= self._solutions
+    def bodies(self, number: int) -> dict[int, Any]:
+        """block → solution of all bodies at cycle ``number``, in their order."""
+        if not self._sparing:
+            self._screening.asked += 1
+        self._solve(self._left_out, number)
+        found = self._solved | self._solutions
         return {block: found[block] for block in self._order}
+
+    def _solve(self, bodies: dict[int, Body], number: int) -> None:
+        """Solve ``bodies``, which were left out of cycle ``number``, where they are not yet solved."""
+        bodies = {block: body for block, body in bodies.items() if block not in self._solved}
+        if not bodies:
+            return
+        before = {block: self._last[block].solution for block in bodies}
+        found = solve_bodies(bodies, self._loads, before, {}, names=self._blocks.names, forgets=self._sparing)
+        self._solved |= found
+        for block, solution in found.items():
+            bodies[block].work.solutions_left_out -= 1
+            last = self._last[block]
+            if last.number < number:  # not if later cycles have asked before
+                last.solution, last.number = solution, number
 
     def tips(self, solutions: dict[int, Any]) -> np.ndarray:
         """TIP rows of all bodies; those of the pass have what its tips have grown."""
-        left_out = {block: solutions[block] for block in self._left_out}
-        known = np.concatenate([self._tips, tip_rows(self._problem, self._blocks, left_out, self._nodes_of)])
+        return self._all_tips({block: solutions[block].tips for block in self._left_out})
+
+    def _all_tips(self, left_out: dict[int, np.ndarray]) -> np.ndarray:
+        rows = tips_with_criterion(self._problem, self._blocks, left_out, self._nodes_of)
+        known = np.concatenate([self._tips, rows])
         return np.concatenate([known[known["block"] == block] for block in self._order])
+
+    def latest(self, number: int) -> dict[int, LastSolution]:
+        """block → last solution of all bodies at cycle ``number``. Bodies left out for `RENEWED` cycles are solved."""
+        self._solve({b: of for b, of in self._left_out.items() if number - self._last[b].number >= RENEWED}, number)
+        # (A copy: the entries are renewed when later cycles ask.)
+        found = {block: replace(last) for block, last in self._last.items()}
+        found |= {block: LastSolution(solution, number) for block, solution in self._solutions.items()}
+        return {block: found[block] for block in self._order}
+
+    def latest_tips(self, latest: dict[int, LastSolution]) -> np.ndarray:
+        """TIP rows of all bodies by their ``latest`` solutions."""
+        rows = {}
+        for block, body in self._left_out.items():
+            # Cracks may have got other numbers since.
+            rows[block] = body.tip_elements[0].copy()
+            for name in ("k_i", "k_ii"):
+                rows[block][name] = latest[block].solution.tips[name]
+        return self._all_tips(rows)
 
 
 def skips(now: CrackedBlocks, work: dict[str, int]) -> dict[str, Skip]:

@@ -414,7 +414,8 @@ class Body:
 
     def forget_states(self) -> None:
         """Give up the factors of contact states and the loads of one of many bodies, whose contact is condensed: these take
-        as much memory as its matrices."""
+        as much memory as its matrices. From then on factors of a large boundary are given up after every use too."""
+        self._outside.sparing = self.in_number
         if self.in_number and not self._grown and condenses(self) and isinstance(self.crack_system, CrackSystem):
             self.crack_system.retire()
             self._loads.forget()

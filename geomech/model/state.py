@@ -253,6 +253,8 @@ class Cycle:
                 compression
     strain      axial strain between the gauge points, positive in shortening; nan without a gauge
     tips        TIP rows of all blocks
+    latest_tips, latest_faces   as tips and faces, but where the cycle is `sparing` those of each block's last solution, in
+                cycle `solved_in`: blocks whose cracks cannot grow are then solved now and then
     bent        block → body of a block of higher order, with ``fields(points)`` as ``bodies`` have, and
                 ``deflection(points)`` (n, 2): by how much points lie off where the block's vertices say
     faces       the crack faces, or None when no block holds a crack
@@ -262,6 +264,7 @@ class Cycle:
     statistics  numbers of the step: open_close_iterations, dt, kinetic_energy, elastic_energy, worst_penetration …
     work        counts of the crack solver so far: assemblies, factorisations, back-substitutions, contact solves
     skips       work avoided so far because nothing had changed, by name
+    sparing     whether so many cracked blocks move that not all results are output in every cycle
     shortened   blocks that have caused most shortened steps so far
     seconds     wall time spent so far in each phase of the solvers (not reproducible, so not in any series)
     """
@@ -285,11 +288,32 @@ class Cycle:
     work: dict[str, int] = field(default_factory=dict)
     skips: dict[str, Skip] = field(default_factory=dict)
     shortened: tuple[Shortened, ...] = ()
+    sparing: bool = False
+
+    @property
+    def latest_tips(self) -> np.ndarray:
+        """TIP rows of all blocks, each by its last solution."""
+        return self.tips
+
+    @property
+    def solved_in(self) -> np.ndarray:
+        """(n_tips,) number of the cycle in which each of `latest_tips` was solved for."""
+        return np.full(len(self.latest_tips), self.number)
+
+    @property
+    def latest_faces(self) -> CrackFaces | None:
+        """The crack faces of all blocks, each by its last solution."""
+        return self.faces
 
     @property
     def inside(self) -> dict[int, Any]:
         """block → stress and displacement inside it, for cracked blocks and those of higher order."""
         return {**self.bent, **self.bodies} if self.bent else self.bodies
+
+    @property
+    def has_fields(self) -> bool:
+        """Whether any block is `inside`; solves nothing."""
+        return bool(self.bent or self.bodies)
 
     @cached_property
     def moved(self) -> np.ndarray:

@@ -65,7 +65,13 @@ SERIES: dict[str, tuple[Field, ...]] = {
     ),
     "cracks": (
         _DISPLACEMENT,
-        Field("opening", "point", "m", "normal displacement jump, positive in opening; nan: not solved for"),
+        Field(
+            "opening",
+            "point",
+            "m",
+            "normal displacement jump, positive in opening; nan: not solved for. Like what follows, of the last solution of "
+            "its block (solved_cycle of its tips)",
+        ),
         Field("slip", "point", "m", "tangential jump, positive when the upper face moves along the tangent"),
         Field("normal_traction", "point", "Pa", "on the faces, negative in compression"),
         Field("shear_traction", "point", "Pa", "on the faces, along the crack"),
@@ -85,6 +91,7 @@ SERIES: dict[str, tuple[Field, ...]] = {
         Field("crack_id", "point", "-", "index of the crack; the names are in CRACK_NAMES", dtype="int32"),
         Field("end", "point", "-", "0 the tip at the start of its crack, 1 at its end", dtype="int32"),
         Field("tip_id", "point", "-", "node of the crack network, as in tips.csv", dtype="int32"),
+        Field("solved_cycle", "point", "-", "cycle in which K was computed, as in tips.csv", dtype="int32"),
         Field("block_id", "point", "-", "index of the block it lies in", dtype="int32"),
     ),
     "contacts": (
@@ -173,7 +180,7 @@ HISTORY: dict[str, str] = {
     "crack_length": "m, all cracks",
     "tips": "number of crack tips",
     "growing": "number of tips that grew in this cycle",
-    "max_k_eq": "Pa √m, largest over the tips",
+    "max_k_eq": "Pa √m, largest over the tips, as in tips.csv",
     "closed_contacts": "number of contacts that carry force",
 }
 
@@ -193,6 +200,8 @@ TIPS: dict[str, str] = {
     "angle_deg": "°, from the crack's direction, counter-clockwise",
     "grown_m": "m, in this cycle",
     "crack_name": "as in the scene",
+    "solved_cycle": "cycle in which K was computed: this one, but in motion with 8 or more cracked blocks up to 50 cycles "
+    "earlier where a bound shows that the block's cracks cannot grow",
 }
 
 #: Columns of ``joints.csv``: one row per joint and cycle. A joint has the name of its edges, or else that of its law.

@@ -4,7 +4,8 @@ In motion a block responds to its mean stress (`mean_stress_response`), so that 
 of its tips. Where an upper bound of K under the present forces (`ddm.fracture.sif_bound`) is below the toughness, the
 pass continues without that solution, with the same blocks. The bound is computed after several solutions with tips far
 from their toughness; otherwise it would cost more than it saves. If skipped solutions are requested after most passes,
-for example by a table of all tips, nothing is skipped.
+for example by a table of all tips, nothing is skipped. (With many cracked blocks such tables have the last solutions, see
+`cycle_record`.)
 """
 
 from __future__ import annotations
@@ -35,6 +36,7 @@ class CoupledBlocks(Protocol):
     """The part of a coupled run that is used: blocks, and by block their bodies, loads and solutions."""
 
     problem: Problem
+    number: int
     blocks: Blocks
     bodies: dict[int, Body]
     loads: dict[int, BodyLoad]
@@ -42,11 +44,20 @@ class CoupledBlocks(Protocol):
 
 
 @dataclass(eq=False)
+class LastSolution:
+    """The last ``solution`` of a body, of cycle ``number``."""
+
+    solution: Any
+    number: int
+
+
+@dataclass(eq=False)
 class _Known:
-    """Data of the body with this ``crack_system``: number of its solutions, the last ones ``far`` from toughness and
-    ``all``; the ``bound``; ``per_factor``: largest K_eq per unit K; ``never``: no bound exists."""
+    """Data of the body with this ``crack_system``: its ``last`` solution; number of its solutions, the last ones ``far``
+    from toughness and ``all``; the ``bound``; ``per_factor``: largest K_eq per unit K; ``never``: no bound exists."""
 
     crack_system: object
+    last: LastSolution
     far: int = 0
     all: int = 0
     bound: TipBound | ChangeBound | None = None
@@ -89,7 +100,8 @@ class GrowthScreening:
             body = now.bodies[block]
             known = self._known.get(block)
             if known is None or known.crack_system is not body.crack_system:
-                known = self._known[block] = _Known(body.crack_system)
+                known = self._known[block] = _Known(body.crack_system, LastSolution(solution, now.number))
+            known.last = LastSolution(solution, now.number)
             known.far = 0 if block in (nearer if _can_close(body) else near) else known.far + 1
             known.all += 1
             enough = known.far >= STOOD or known.all >= STOOD_ANYWHERE
@@ -100,6 +112,10 @@ class GrowthScreening:
             same = solution.body.crack_system is known.crack_system
             if isinstance(known.bound, ChangeBound) and load.points is None and same:
                 known.bound.refer(load, solution)
+
+    def last(self, block: int) -> LastSolution:
+        """The last solution of a ``block`` that is left out."""
+        return self._known[block].last
 
     def renumber(self, parent: np.ndarray | None, whole: np.ndarray) -> None:
         """Renumber the blocks: of ``whole`` (k,) new numbers, the data of their ``parent`` (n_blocks,) are kept."""

@@ -287,24 +287,39 @@ def inherited(history: dict, parent: np.ndarray, cracks: Cracks) -> dict:
 
 def tip_rows(problem: Problem, blocks: Blocks, solutions: dict, nodes_of: dict[int, np.ndarray]) -> np.ndarray:
     """TIP rows of all solved bodies with kink angle and K_eq; nodes numbered in the whole network."""
-    if not solutions:
-        return np.empty(0, TIP)
-    from ...ddm.fracture.f_criterion import apply_criterion, apply_criterion_to_rows
+    if problem.growth.trial_kink <= 0 or not solutions:
+        return tips_with_criterion(problem, blocks, {b: of.tips for b, of in solutions.items()}, nodes_of)
+    from ...ddm.fracture.f_criterion import apply_criterion
 
-    rows, of = [], list(solutions.items())
-    for b, solution in of:
-        tips = solution.tips.copy()
-        tips["node"] = nodes_of[b][tips["node"]]
-        rows.append(tips)
-    tips = rows[0] if len(rows) == 1 else np.concatenate(rows)
-    if problem.growth.trial_kink > 0:
-        angle, k_eq = zip(
-            *(apply_criterion(each, problem.growth, problem.materials[blocks.material[b]]) for b, each in of)
-        )
-        tips["angle"], tips["k_eq"] = np.concatenate(angle), np.concatenate(k_eq)
-        return tips
+    tips = _joined_tips({b: of.tips for b, of in solutions.items()}, nodes_of)
+    angle, k_eq = zip(
+        *(apply_criterion(of, problem.growth, problem.materials[blocks.material[b]]) for b, of in solutions.items())
+    )
+    tips["angle"], tips["k_eq"] = np.concatenate(angle), np.concatenate(k_eq)
+    return tips
+
+
+def tips_with_criterion(
+    problem: Problem, blocks: Blocks, tips_of: dict[int, np.ndarray], nodes_of: dict[int, np.ndarray]
+) -> np.ndarray:
+    """``tips_of`` bodies (block → TIP rows with K_I and K_II) as one table, with kink angle and K_eq by these; nodes
+    numbered in the whole network."""
+    if not tips_of:
+        return np.empty(0, TIP)
+    from ...ddm.fracture.f_criterion import apply_criterion_to_rows
+
+    tips = _joined_tips(tips_of, nodes_of)
     rock = blocks.material[tips["block"]]
     for m in np.unique(rock).tolist():
         own = rock == m
         tips["angle"][own], tips["k_eq"][own] = apply_criterion_to_rows(tips[own], problem.growth, problem.materials[m])
     return tips
+
+
+def _joined_tips(tips_of: dict[int, np.ndarray], nodes_of: dict[int, np.ndarray]) -> np.ndarray:
+    rows = []
+    for b, own in tips_of.items():
+        tips = own.copy()
+        tips["node"] = nodes_of[b][tips["node"]]
+        rows.append(tips)
+    return rows[0] if len(rows) == 1 else np.concatenate(rows)

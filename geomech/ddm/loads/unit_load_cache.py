@@ -275,8 +275,9 @@ class UnitLoads:
         d = segments[:, 1] - segments[:, 0]
         t = d / np.hypot(*d.T)[:, None]
         turn = np.stack([t, np.column_stack([-t[:, 1], t[:, 0]])], axis=1)
-        by_end = np.stack([unit[..., 0] - unit[..., 1], unit[..., 0] + unit[..., 1]], axis=-1) / 2
-        out = np.einsum("nmce,mcx->mnex", by_end, turn).reshape(len(segments), targets.n_unknowns, 4)
+        # From unit monomials along and across each segment to unit forces along x and y at its two ends.
+        to_ends = np.einsum("de,mcx->mcdex", np.array([[0.5, 0.5], [-0.5, 0.5]]), turn).reshape(-1, 4, 4)
+        out = unit.transpose(1, 0, 2, 3).reshape(len(segments), targets.n_unknowns, 4) @ to_ends
         if targets is self.boundary and self.anchors is not None:
             unit = self.anchors.of_forces(segments[:, 0], segments[:, 1], 1)
             by_end = np.stack([unit[..., 0] - unit[..., 1], unit[..., 0] + unit[..., 1]], axis=-1) / 2

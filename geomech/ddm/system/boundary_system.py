@@ -79,8 +79,8 @@ class BoundarySystem:
         self.at_old = at_old = g.found_in(previous.elements if previous else None)
         #: Number of successive bodies that have used this boundary unchanged.
         self.generation, self.unchanged = 0, False
-        #: How often released factors have been computed again.
-        self._again = 0
+        #: How often released factors have been computed again, and whether they are given up after every use.
+        self._again, self.sparing = 0, False
         if (
             previous is not None
             and previous.iterated == self.iterated
@@ -145,7 +145,7 @@ class BoundarySystem:
             return self._factor
         self._again += 1
         # Asked for once, they need not be kept; fields inside a block, for instance, take them again and again.
-        return self._factored(self._whole()) if self._again == 1 else self.kept_factor()
+        return self._factored(self._whole()) if self._again == 1 or self.sparing else self.kept_factor()
 
     def kept_factor(self) -> Factor | IteratedBoundary:
         """`factor`, kept from now on if it had been released."""

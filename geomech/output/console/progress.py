@@ -232,9 +232,10 @@ def _way_on(summary: dict[str, Any], folder: Path) -> str:
 def _cycle_text(cycle: Cycle) -> str:
     if not cycle.cracks.n_cracks:
         return f"t = {cycle.state.time:.4g} s, {state_text(cycle)}"
-    growing = int(np.count_nonzero(cycle.tips["grown"] > 0))
+    tips = cycle.latest_tips
+    growing = int(np.count_nonzero(tips["grown"] > 0))
     # Before a load begins, or without a leading one, the scene is driven by time.
     pulled = " in tension" if cycle.load < 0 else ""
     drive = f"load {stress_text(cycle.load, 3)}{pulled}" if cycle.load else f"t = {cycle.state.time:.4g} s"
     text = f"{drive}, cycle {cycle.number}"
-    return text + (f", {growing} of {len(cycle.tips)} tips growing" if len(cycle.tips) else "")
+    return text + (f", {growing} of {len(tips)} tips growing" if len(tips) else "")

@@ -9,8 +9,11 @@ import numpy as np
 
 from geomech.model import Cycle
 
-#: Number of bodies whose K are solved for on a finer mesh, those with the hardest driven tips: it doubles their cost.
+#: Number of bodies up to which all are looked at: their K are solved for on a finer mesh, which doubles their cost.
 ESTIMATED = 10
+#: Of more bodies, the number of those with the hardest driven tips: their boundaries are assembled and factored once more
+#: (ten of the 49 bodies of a trace map took a quarter of the time of a whole second of motion).
+OF_MANY = 3
 #: Unknowns up to which they are, where there are more bodies: a finer mesh takes half a GB, which a run of many cracked
 #: blocks would need for its summary alone.
 ESTIMATED_UP_TO = 4000
@@ -25,20 +28,21 @@ def _three_digits(number: float) -> float:
 
 
 def crack_trust(cycle: Cycle) -> dict[str, Any]:
-    """Worst values over the cracked blocks of ``cycle``.
+    """Worst values over the cracked blocks of ``cycle``; of more than `ESTIMATED`, over the `OF_MANY` with the hardest driven
+    tips among those of up to `ESTIMATED_UP_TO` unknowns (if there are none, among all).
 
     ``residual`` of equilibrium relative to the largest traction (at least `ROUND_OFF`), ``condition`` of the equations,
-    and the estimated error of K relative to the largest K of its block, with that block (of many blocks, the
-    `ESTIMATED` with the hardest driven tips among those of up to `ESTIMATED_UP_TO` unknowns).
+    and the estimated error of K relative to the largest K of its block, with that block (not of larger ones of many).
     """
-    summary: dict[str, Any] = {
-        "residual": _three_digits(max(ROUND_OFF, *(float(body.residual) for body in cycle.bodies.values()))),
-        "condition": _three_digits(max(float(body.condition) for body in cycle.bodies.values())),
-    }
-    few = len(cycle.bodies) <= ESTIMATED
+    drive = {b: float(cycle.tips["k_eq"][cycle.tips["block"] == b].max(initial=0.0)) for b in cycle.bodies}
+    few = len(drive) <= ESTIMATED
     asked = [b for b, body in cycle.bodies.items() if few or body.body.n_unknowns <= ESTIMATED_UP_TO]
-    drive = {b: float(cycle.tips["k_eq"][cycle.tips["block"] == b].max(initial=0.0)) for b in asked}
-    for block in sorted(drive, key=lambda b: (-drive[b], b))[:ESTIMATED]:
+    looked_at = sorted(asked or drive, key=lambda b: (-drive[b], b))[: ESTIMATED if few else OF_MANY]
+    summary: dict[str, Any] = {
+        "residual": _three_digits(max(ROUND_OFF, *(float(cycle.bodies[b].residual) for b in looked_at))),
+        "condition": _three_digits(max(float(cycle.bodies[b].condition) for b in looked_at)),
+    }
+    for block in looked_at if asked else ():
         body = cycle.bodies[block]
         largest = float(np.hypot(body.tips["k_i"], body.tips["k_ii"]).max(initial=0.0))
         if largest == 0.0:

@@ -6,7 +6,7 @@ import csv
 import io
 import math
 import os
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -38,7 +38,7 @@ class Histories:
 
     def on_cycle(self, cycle: Cycle) -> None:
         self._history.add([history_row(cycle)])
-        self._tips.add(tip_rows(cycle))
+        self._tips.add_columns(tip_columns(cycle))
         self._events.add(
             {
                 "kind": event.kind,
@@ -110,11 +110,26 @@ class Table:
         rows = list(rows)
         if not rows:
             return
-        fresh = list(dict.fromkeys(name for row in rows for name in row if name not in self._known))
+        self._room_for(name for row in rows for name in row)
+        self._append([[_written(row.get(name)) for name in self.columns] for row in rows])
+
+    def add_columns(self, columns: dict[str, list[Any]]) -> None:
+        """Append rows given by ``columns`` of one length and flush."""
+        n = len(next(iter(columns.values())))
+        if not n:
+            return
+        self._room_for(columns)
+        written = (list(map(_written, columns[name])) if name in columns else [None] * n for name in self.columns)
+        self._append(list(zip(*written, strict=True)))
+
+    def _room_for(self, names: Iterable[str]) -> None:
+        fresh = list(dict.fromkeys(name for name in names if name not in self._known))
         if fresh:
             self._widen(fresh)
+
+    def _append(self, rows: Sequence[Sequence[Any]]) -> None:
         text = io.StringIO()
-        csv.writer(text).writerows([[_written(row.get(name)) for name in self.columns] for row in rows])
+        csv.writer(text).writerows(rows)
         self._rows += len(rows)
         self._file.write(text.getvalue())
         self._file.flush()
@@ -150,7 +165,7 @@ class Table:
 
 def history_row(cycle: Cycle) -> dict[str, Any]:
     """The row of ``history.csv`` for ``cycle``: `fields.HISTORY`, then its statistics and monitors."""
-    tips, contacts = cycle.tips, cycle.state.contacts
+    tips, contacts = cycle.latest_tips, cycle.state.contacts
     row: dict[str, Any] = {
         "cycle": cycle.number,
         "time": cycle.state.time,
@@ -170,9 +185,9 @@ def history_row(cycle: Cycle) -> dict[str, Any]:
     return row
 
 
-def tip_rows(cycle: Cycle) -> list[dict[str, Any]]:
-    """The rows of ``tips.csv`` for ``cycle``."""
-    tips = cycle.tips
+def tip_columns(cycle: Cycle) -> dict[str, list[Any]]:
+    """The rows of ``tips.csv`` for ``cycle``, by column."""
+    tips = cycle.latest_tips
     same = {"cycle": cycle.number, "time": cycle.state.time, "load": cycle.load}
     columns = {
         "crack": tips["crack"],
@@ -186,9 +201,10 @@ def tip_rows(cycle: Cycle) -> list[dict[str, Any]]:
         "angle_deg": np.degrees(tips["angle"]),
         "grown_m": tips["grown"],
         "crack_name": _names(cycle.cracks.names, tips["crack"]),
+        "solved_cycle": cycle.solved_in,
     }
-    rows = zip(*(column.tolist() for column in columns.values()), strict=True)
-    return [same | dict(zip(columns, row, strict=True)) for row in rows]
+    whole = {name: [value] * len(tips) for name, value in same.items()}
+    return whole | {name: column.tolist() for name, column in columns.items()}
 
 
 def _names(names: tuple[str, ...], crack: np.ndarray) -> np.ndarray:

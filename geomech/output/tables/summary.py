@@ -63,7 +63,7 @@ class Summary:
         self._events += cycle.events
         self._peak = max(self._peak, cycle.load, key=abs)
         self._load_steps = max(self._load_steps, cycle.load_step)
-        grown = float(cycle.tips["grown"].sum())
+        grown = float(cycle.latest_tips["grown"].sum())
         self._growth_passes += grown > 0
         self._grown += grown
 
@@ -109,7 +109,7 @@ class Summary:
                 summary["motion"], summary["energy"] = motion_summary(last), energy_summary(last)
             if not last.cracks.n_cracks and len(last.state.contacts):
                 summary["key_blocks"] = key_block_summary(last, self._problem)
-            summary["tips"] = len(last.tips)
+            summary["tips"] = len(last.latest_tips)
         if self._scale is not None:
             half_length, toughness = self._scale
             summary["normalisation"] = {"half_length_m": half_length, "k_ic_pa_sqrt_m": toughness}

@@ -126,7 +126,7 @@ class CrackLines:
 
 def cracks_grid(cycle: Cycle, motion: Motion, configuration: str, lines: CrackLines) -> Grid:
     """The crack network. Segments without a solution have nan; at the start, the zeros of rock at rest."""
-    faces = cycle.faces
+    faces = cycle.latest_faces
     lines.update(cycle.cracks, faces)
     rest = np.full(2 * len(lines.unsolved), 0.0 if cycle.number == 0 else np.nan)
 
@@ -155,7 +155,10 @@ def cracks_grid(cycle: Cycle, motion: Motion, configuration: str, lines: CrackLi
 
 def tips_grid(cycle: Cycle, motion: Motion, configuration: str) -> Grid:
     """Every crack tip as a point; at the start, before the first solution, with the zeros of rock at rest."""
-    tips = _tips_at_rest(cycle.cracks) if cycle.number == 0 and not len(cycle.tips) else cycle.tips
+    tips, solved_in = cycle.latest_tips, cycle.solved_in
+    if cycle.number == 0 and not len(tips):
+        tips = _tips_at_rest(cycle.cracks)
+        solved_in = np.zeros(len(tips), int)
     moved = displacement(motion, tips["block"], tips["point"])
     c, s = np.cos(tips["angle"])[:, None], np.sin(tips["angle"])[:, None]
     growth = c * tips["direction"] + s * normal_of(tips["direction"])
@@ -174,6 +177,7 @@ def tips_grid(cycle: Cycle, motion: Motion, configuration: str) -> Grid:
             "crack_id": tips["crack"],
             "end": tips["end"],
             "tip_id": tips["node"],
+            "solved_cycle": solved_in,
             "block_id": tips["block"],
         },
     )

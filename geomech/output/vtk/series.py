@@ -48,7 +48,8 @@ class Series:
     ``every`` is the number of cycles between written ones; cycles in which a tip grew or an event happened, the first
     and the last are always written. ``interior_every`` is the number of cycles between interior fields while cracks
     grow; otherwise they are less frequent by a factor `QUIET`, because they mostly scale with the load. They are also
-    written with the first load, with every event, before and after blocks are cut and at the end; 0 leaves them out.
+    written with the first load, with every event, before and after blocks are cut and at the end; 0 leaves them out. Where
+    cycles are `sparing`, they take long: they are less frequent by `QUIET` once more, and not written with events.
     ``format`` is "vtu" (one file per cycle, PVD lists) or "vtkhdf" (one file per series). Raises ValueError for an
     unknown ``configuration`` or ``format``.
     """
@@ -109,14 +110,18 @@ class Series:
     def on_cycle(self, cycle: Cycle) -> None:
         began = time.perf_counter()
         self._cycles += 1
-        self._cracked += bool(cycle.inside)
-        if self._pending is not None and cycle.blocks.n_blocks != self._pending[0].blocks.n_blocks:
+        self._cracked += cycle.has_fields
+        if (
+            self._pending is not None
+            and cycle.blocks.n_blocks != self._pending[0].blocks.n_blocks
+            and not cycle.sparing
+        ):
             self._write_last_interior()  # of the rock while it was whole
         # Every cycle gets a time, written or not, so that times do not depend on which cycles are left out.
         at = self._time.of(cycle)
         if self._pending is None and cycle.number == 0:
             self._first = (cycle, at)
-        happened = bool(cycle.events) or bool((cycle.tips["grown"] > 0).any())
+        happened = bool(cycle.events) or bool((cycle.latest_tips["grown"] > 0).any())
         wanted = cycle.number == 0 or cycle.number % self.every == 0 or happened
         if wanted:
             self._write(cycle, at)
@@ -131,7 +136,8 @@ class Series:
             cycle, at, written = self._pending
             if not written:
                 self._write(cycle, at)
-            self._write_last_interior()
+            if not (cycle.sparing and isinstance(error, KeyboardInterrupt)):  # which is not to wait for it
+                self._write_last_interior()
         try:
             self._background.close()
         finally:
@@ -155,13 +161,16 @@ class Series:
         }
 
     def _interior_wanted(self, cycle: Cycle) -> bool:
-        if not self.interior_every or cycle.number == 0 or not (cycle.inside or self._last_interior >= 0):
+        if not self.interior_every or cycle.number == 0 or not (cycle.has_fields or self._last_interior >= 0):
             return False
         cut = self._pending is not None and cycle.blocks.n_blocks != self._pending[0].blocks.n_blocks
-        if any(event.kind not in CHANGES for event in cycle.events) or cut or self._last_interior < 0:
+        if self._last_interior < 0:
+            return True
+        if not cycle.sparing and (cut or any(event.kind not in CHANGES for event in cycle.events)):
             return True
         grew = cycle.cracks.n_segments != self._segments_then
-        return cycle.number - self._last_interior >= self.interior_every * (1 if grew else QUIET)
+        rarer = (1 if grew else QUIET) * (QUIET if cycle.sparing else 1)
+        return cycle.number - self._last_interior >= self.interior_every * rarer
 
     def _write(self, cycle: Cycle, at: float) -> None:
         began, motion, shape = time.perf_counter(), cycle.motion, self.configuration
@@ -180,11 +189,12 @@ class Series:
         """The interior of the last cycle, unless it is written or there is none."""
         assert self._pending is not None  # written after the first cycle
         cycle, at, _ = self._pending
-        begun = bool(cycle.inside) or self._last_interior >= 0
+        begun = cycle.has_fields or self._last_interior >= 0
         if self.interior_every and begun and cycle.number != self._last_interior:
             self._write_interior(cycle, at)
 
     def _write_interior(self, cycle: Cycle, at: float) -> None:
+        _ = cycle.bodies  # solved now, not beside the next pass
         if self._first is not None and self._last_interior < 0 and self._first[0] is not cycle:
             # From the start on, so that all series of the run span the same time.
             self._meshes.note_cracked(cycle)

@@ -43,7 +43,8 @@ class OutputTable(Table):
     interior_every: Annotated[int, Field(ge=1)] = Field(
         5,
         description="write the interior every n-th cycle while cracks grow, every 10 n-th otherwise; always at the "
-        "first load, with events, before and after a block is cut and at the end",
+        "first load, with events, before and after a block is cut and at the end (in motion with 8 or more cracked "
+        "blocks, for which it takes long, ten times less often, at the first load and at the end)",
     )
     checkpoint_every: Annotated[int, Field(ge=0)] | None = Field(
         None,

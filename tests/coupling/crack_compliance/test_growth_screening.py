@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from geomech.bench.cost.block_scenes import cracked_wall
-from geomech.coupling import cycles
+from geomech.coupling import cycle_record, cycles
 from geomech.model import CrackFaces, History
 
 STEPS = 14
@@ -92,6 +92,29 @@ def test_asking_makes_no_difference_to_what_moves():
     assert (
         "left-out solutions" not in asked[-1][0].skips and asked[-1][0].work["solutions"] > quiet[-1].work["solutions"]
     )
+
+
+def test_tables_of_many_blocks_have_the_last_solution_of_each(monkeypatch):
+    """Where many cracked blocks move, tables ask for the last solutions: these are those of the cycle they name, at most
+    `RENEWED` cycles old, and blocks stay left out. What is asked for itself is of its own cycle."""
+    monkeypatch.setattr(cycle_record, "MANY", 4)
+    monkeypatch.setattr(cycle_record, "RENEWED", 6)
+    whole = {cycle.number: cycle.tips for cycle in cycles(problem(skip=False))}
+    ages, last = [], None
+    for last in cycles(problem()):
+        assert last.sparing == (last.number > 0) or not len(last.latest_tips)
+        for tip, number in zip(last.latest_tips, last.solved_in):
+            (own,) = whole[number][(whole[number]["crack"] == tip["crack"]) & (whole[number]["end"] == tip["end"])]
+            for name in ("node", "point", "block", "k_i", "k_ii", "k_eq", "angle"):
+                np.testing.assert_allclose(
+                    tip[name], own[name], rtol=1e-7, atol=1e-9 * np.abs(whole[number][name]).max()
+                )
+            ages.append(last.number - number)
+        size = last.latest_faces.opening.size if last.number else 0
+        assert size == (last.faces.opening.size if last.number == STEPS else size)
+    assert set(ages) == {0, 1, 2, 3, 4, 5}
+    assert last.skips["left-out solutions"].kept >= 4 * (STEPS - 5) * 5 // 6
+    np.testing.assert_allclose(last.tips["k_eq"], whole[last.number]["k_eq"], rtol=1e-7)
 
 
 @pytest.mark.first_by_default(1)

@@ -7,7 +7,7 @@ import pytest
 
 from geomech import ddm
 from geomech.model import TIP, Cracks, DdmSettings, Material
-from geomech.output.tables.crack_reliability import ROUND_OFF, crack_trust
+from geomech.output.tables.crack_reliability import ESTIMATED_UP_TO, ROUND_OFF, crack_trust
 
 SQUARE = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1.0]])
 
@@ -48,3 +48,26 @@ def test_what_has_no_estimate_is_left_out():
     assert told["k_error_block"] == "right" and told["k_error"] == pytest.approx(
         fine.tip_errors.max() / fine.tips["k_i"].max(), rel=5e-3
     )
+
+
+def test_of_many_blocks_those_driven_hardest_are_looked_at():
+    """Three of eleven, and only of these is the error estimated."""
+    fine, asked = solved(0.3, order=6), []
+
+    class Body(SimpleNamespace):
+        @property
+        def residual(self):
+            asked.append(self.number)
+            return 1e-3
+
+    def of(number):
+        tips = fine.tips.copy()
+        tips["k_i"] *= 1 + number % 5
+        same = SimpleNamespace(n_unknowns=ESTIMATED_UP_TO + (number == 4))
+        return Body(number=number, tips=tips, condition=1e5 * number, body=same, tip_errors=0.01 * tips["k_i"])
+
+    many = cycle({number: of(number) for number in range(11)})
+    many.blocks.names = [str(number) for number in range(11)]
+    told = crack_trust(many)
+    assert asked == [9, 3, 8]  # 4, driven as hard as 9, is too large
+    assert told["condition"] == 9e5 and told["k_error_block"] in "938"

@@ -471,3 +471,18 @@ def test_large_grids_are_written_beside_the_run_to_the_same_bytes(tmp_path, monk
     assert len(files) > 40
     for file in files:
         assert (tmp_path / "beside" / file).read_bytes() == (tmp_path / "at_once" / file).read_bytes(), file
+
+
+@pytest.mark.parametrize("broken_off", [False, True])
+def test_the_interior_of_many_moving_blocks_is_rare(tmp_path, broken_off):
+    """With the first load, then ten times less often than for few blocks, and not before and after events; at the end, but
+    not where a run is broken off, which would have to wait for it."""
+    series = Series(every=1000, interior_every=1)
+    series.on_start(made.problem(), tmp_path)
+    cycles = [replace(cycle, sparing=cycle.number > 0) for cycle in made.cycles(steps=104, passes=3)]
+    assert any(cycle.events for cycle in cycles[102:-1])
+    for cycle in cycles:
+        series.on_cycle(cycle)
+    series.on_end({}, KeyboardInterrupt() if broken_off else None)
+    written = [int(file.stem[-6:]) for _, file in read_collection(tmp_path / "interior.pvd")]
+    assert written == [0, 1, 101] + [cycles[-1].number] * (not broken_off)
