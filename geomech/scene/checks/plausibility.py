@@ -11,12 +11,14 @@ from ...model.blocks.corners import LARGEST_SHARE, corner_lengths
 from ...model.blocks.polygon import distance_to_edges
 from ...model.cracks.curved_tips import ERRORS, tip_deviations
 from ...shapes.block_cutting.rock_outline import ground_of
+from ...shapes.parts import JOINT
 from ..assembly.fixed_blocks import constrained_unknowns, fixed_blocks
 from ..assembly.load_functions import traction_history
 from ..tables import SceneTables
 from ..tables.loads import TractionTable
 from .check import Check
 from .cross_checks import material_of
+from .edges import contact_names, joint_names
 
 #: A crack end that misses an outline by less than this part of its crack's length was probably meant to reach it.
 NEAR_MISS = 0.01
@@ -62,6 +64,7 @@ def check_plausible(c: Check) -> None:
     _rounding(c)
     _free_back(c)
     _impacts(c)
+    _smooth_ends(c)
 
 
 def _materials(c: Check) -> None:
@@ -364,4 +367,24 @@ def _impacts(c: Check) -> None:
             "impacts by a coefficient of restitution change velocities only: they load no cracks, and "
             f"{names[cracked[0]]!r}{others} will not break on landing",
             "leave restitution out where rocks should break, with time steps well below a millisecond",
+        )
+
+
+def _smooth_ends(c: Check) -> None:
+    """Dead ends of joints that have their friction from [joints.default]: the faces of cracks have none of it."""
+    t = c.tables
+    default = t.joints.get("default")
+    if default is None or default.friction_angle_deg == 0 or "default" in t.cracks or not t.growth.enabled:
+        return
+    known = contact_names(c.drawn)
+    own = {edge for joint in t.joints.values() for edge in joint_names(joint.edges, known)}
+    drawn = {crack.name for crack in t.geometry.cracks}
+    sets = {name.rpartition(" ")[0] for name in c.cracks.names if name not in t.cracks and name not in drawn}
+    smooth = sorted(name for name in sets if JOINT + name in set(known) - own and name not in t.cracks)
+    if smooth:
+        c.warn(
+            ("joints", "default"),
+            f"joints {', '.join(map(repr, smooth))} end in rock, and the faces of these ends are smooth although the joints "
+            f"have a friction of {default.friction_angle_deg:g}°: their cracks slide, and grow, under lower loads",
+            'set cracks.default.joint = "default", or cracks.default.aperture = "closed" if they are to be smooth',
         )

@@ -392,3 +392,17 @@ def test_impacts_that_load_no_cracks_are_reported(tmp_path, restitution, grows, 
     (tmp_path / "scene.toml").write_text(text, encoding="utf-8")
     found = load_scene(tmp_path / "scene.toml").warnings
     assert ["'slab' will not break on landing" in w.message for w in found] == [True] * told
+
+
+@pytest.mark.parametrize(
+    ("law", "friction", "told"),
+    [("", 35, 1), ("", 0, 0), ('[cracks.default]\njoint = "default"\n', 35, 0),
+     ('[joints.seams]\nedges = ["joint:seam"]\nfriction_angle_deg = 20\n', 35, 0)],
+)  # fmt: skip
+def test_smooth_ends_of_joints_that_have_friction_are_reported(scene_file, law, friction, told):
+    """A drawn joint that ends in front of a rock bridge, under the law for all joints."""
+    seam = '[[geometry.joints]]\nname = "seam"\npoints = [[-1.0, 0.9], [0.2, 1.0]]\n'
+    law = f"[joints.default]\nfriction_angle_deg = {friction}\n{law}"
+    text = GOOD.replace("[materials.rock]", seam + law + "[materials.rock]")
+    found = load_scene(scene_file(text)).warnings
+    assert ["are smooth although the joints have a friction of 35°" in w.message for w in found] == [True] * told
