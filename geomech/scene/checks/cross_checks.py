@@ -11,12 +11,12 @@ from ...model import CHANGES, Blocks
 from ...shapes import cutting_cracks
 from ...shapes.cells import rock_of
 from ..assembly.fixed_blocks import check_borne, check_holding, fixed_blocks
-from ..assembly.joint_laws import check_joints
+from ..assembly.joint_laws import check_joints, joint_law
 from ..locator import Path
 from ..tables import SceneTables
 from ..validation import nearest
 from .check import Check
-from .edges import check_edges
+from .edges import check_edges, dead_end_laws
 from .higher_order import check_crushing, check_orders
 
 #: Least advance of a tip relative to the rock's largest side: coordinates of a drawing have twelve digits.
@@ -39,6 +39,7 @@ def check(c: Check) -> None:
         check_holding(c)
         check_borne(c)
         check_edges(c)
+        _dead_ends(c)
         check_orders(c)
         check_crushing(c)
         _points(c)
@@ -259,6 +260,26 @@ def _crack_joints(c: Check) -> None:
                 f"faces with an aperture cannot have the tensile strength of joint {crack.joint!r}",
                 'set aperture = "closed", or name a joint without tensile strength',
             )
+
+
+def _dead_ends(c: Check) -> None:
+    """Joints that end in rock need a law that crack faces can have."""
+    for name, key in dead_end_laws(c).items():
+        joint = (c.tables.joints or {}).get(key or "")
+        if key is None or joint is None:
+            continue
+        try:
+            law = joint_law(key, joint)
+        except ValueError:
+            continue  # refused by `check_joints`
+        if law.straight and law.crushing_strength is None:
+            continue
+        c.refuse(
+            ("joints", key),
+            f"the joints {name!r} end in rock, and the faces of these cracks cannot follow joint {key!r}: they support neither "
+            "residual friction, softening, dilation, roughness, hyperbolic closure nor crushing",
+            f'name a joint with friction, cohesion and stiffnesses only as cracks."{name}".joint, or set geometry.dead_ends = "trim"',
+        )
 
 
 def _are(known: list[str]) -> str:

@@ -127,6 +127,20 @@ def joint_names(patterns: tuple[str, ...], known: list[str]) -> list[str]:
     return [name for name in known if any(fnmatch.fnmatchcase(name, pattern) for pattern in patterns)]
 
 
+def dead_end_laws(c: Check) -> dict[str, str | None]:
+    """Joints that end in rock → the key of [joints] that names them; None: none does. Without those that [cracks] has an
+    entry for."""
+    known = contact_names(c.drawn)
+    drawn = {crack.name for crack in c.tables.geometry.cracks}
+    ends = {name.rpartition(" ")[0] for name in c.cracks.names if not {name, "default"} & set(c.tables.cracks or ())}
+    laws: dict[str, str | None] = {}
+    for name in sorted(ends - drawn - set(c.tables.cracks or ())):
+        if JOINT + name in known:
+            naming = [k for k, j in (c.tables.joints or {}).items() if joint_names(j.edges, [JOINT + name])]
+            laws[name] = naming[-1] if naming else None
+    return laws
+
+
 def contact_names(drawing: Drawing) -> list[str]:
     """Names of faces in contact: drawn edges, and the faces of cracks that cut through a block."""
     assert drawing.blocks is not None and drawing.cracks is not None

@@ -11,14 +11,13 @@ from ...model.blocks.corners import LARGEST_SHARE, corner_lengths
 from ...model.blocks.polygon import distance_to_edges
 from ...model.cracks.curved_tips import ERRORS, tip_deviations
 from ...shapes.block_cutting.rock_outline import ground_of
-from ...shapes.parts import JOINT
 from ..assembly.fixed_blocks import constrained_unknowns, fixed_blocks
 from ..assembly.load_functions import traction_history
 from ..tables import SceneTables
 from ..tables.loads import TractionTable
 from .check import Check
 from .cross_checks import material_of
-from .edges import contact_names, joint_names
+from .edges import dead_end_laws
 
 #: A crack end that misses an outline by less than this part of its crack's length was probably meant to reach it.
 NEAR_MISS = 0.01
@@ -372,15 +371,10 @@ def _impacts(c: Check) -> None:
 
 def _smooth_ends(c: Check) -> None:
     """Dead ends of joints that have their friction from [joints.default]: the faces of cracks have none of it."""
-    t = c.tables
-    default = t.joints.get("default")
-    if default is None or default.friction_angle_deg == 0 or "default" in t.cracks or not t.growth.enabled:
+    default = c.tables.joints.get("default")
+    if default is None or default.friction_angle_deg == 0 or not c.tables.growth.enabled:
         return
-    known = contact_names(c.drawn)
-    own = {edge for joint in t.joints.values() for edge in joint_names(joint.edges, known)}
-    drawn = {crack.name for crack in t.geometry.cracks}
-    sets = {name.rpartition(" ")[0] for name in c.cracks.names if name not in t.cracks and name not in drawn}
-    smooth = sorted(name for name in sets if JOINT + name in set(known) - own and name not in t.cracks)
+    smooth = [name for name, law in dead_end_laws(c).items() if law is None]
     if smooth:
         c.warn(
             ("joints", "default"),

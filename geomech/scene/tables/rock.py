@@ -185,7 +185,9 @@ class CrackTable(Table):
         "closed", description='"closed", "slot" (its faces never meet) or the initial aperture in m'
     )
     joint: str | None = Field(
-        None, description="a name of [joints] for the law of its faces; new growth has friction only (unset: smooth)"
+        None,
+        description="a name of [joints] for the law of its faces; new growth has friction only (unset: smooth; without an "
+        "entry, ends of joints in rock follow the joint whose `edges` name them)",
     )
 
     @field_validator("aperture", mode="before")
