@@ -306,6 +306,6 @@ def test_a_rock_falls_on_a_flawed_slab_which_breaks(tmp_path):
     """Half a tonne at 6 m/s; the crack curves back into the slab and closes in part before it cuts it. Passes at 0.25 ms ran
     in a circle between its open and closed states and ended the run at 4 ms."""
     (tmp_path / "scene.toml").write_text(FALLEN_ROCK)
-    *_, last = cycles(load_scene(tmp_path / "scene.toml"))
+    *_, last = cycles(load_scene(tmp_path / "scene.toml").problem())
     assert any(event.kind == "split" for event in last.events)
     assert abs(last.statistics["budget_residual"]) < 1e-3
