@@ -355,7 +355,9 @@ def with_admissible_forces(found: FactorOfSafety, largest: float | None) -> Fact
         (t for t in found.trials if not t.stable and t.factor >= found.upper), key=lambda t: t.factor, default=None
     )
     if failed is not None and NOT_BALANCED in failed.reason:
-        line += f". The trial at {failed.factor:.4f} failed because its {failed.reason}: the factor may be too low"
+        line += (
+            f". In the trial at {failed.factor:.4f} {NOT_BALANCED} (no block moved too far): the factor may be too low"
+        )
     return replace(found, admissible=largest, warnings=(*found.warnings, line))
 
 
