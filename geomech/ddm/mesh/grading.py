@@ -32,7 +32,7 @@ FOLD, FOLD_SHRINKS = math.radians(120), math.radians(20 / 3)
 #: with it.
 CLOSED_KINK, CLOSED_EXPONENT, CLOSED_ERROR, CLOSED_TURN = math.radians(5) - 1e-9, 0.41, 1.1e-2, math.radians(25)
 #: Without a target they get layers of this ratio that leave this error: two thirds of the unknowns that layers of 0.3 take.
-#: (Cracks of 3 to 24 sides that turn by 5° to 100°: K to 9e-4, as a rule to 5e-4; `tests/ddm/mesh/test_closed_kinks.py`.)
+#: (Cracks of 3 to 24 sides that turn by 5° to 100°: K to 9e-4, as a rule to 5e-4; `tests/ddm/mesh/test_graded_kinks.py`.)
 #: Not beyond `FOLD`, where layers of less than 0.3 need shorter elements.
 CLOSED_RATIO = 0.1
 #: Re-entrant corners of the outline with a crack within this many outline elements get the layers that leave this error
