@@ -152,8 +152,7 @@ class Grading:
 
     def of_closed_kink(self, turn: float) -> Grading:
         """The grading at a kink of ``turn`` (rad) of a crack drawn closed."""
-        graded = self.target is None and self.layers > 0
-        fine = graded and CLOSED_KINK <= turn <= FOLD and self.ratio > CLOSED_RATIO
+        fine = self.target is None and CLOSED_KINK <= turn <= FOLD and self.ratio > CLOSED_RATIO
         return replace(self, ratio=CLOSED_RATIO) if fine else self
 
     def at_closed_kink(self, turn: float) -> int:
