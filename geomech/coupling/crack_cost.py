@@ -93,7 +93,7 @@ def cost_lines(problem: Problem) -> list[str]:
         )
     if cost.on_sides[most] + cost.on_cracks[most] > LARGE and problem.ddm.grading_layers:
         lines.append(
-            f"{name} needs fewer elements with ddm.grading_layers = 1 (K of digitised cracks within 0.5 %) or 0 (2 %, about "
-            "half the memory)"
+            f"{name} needs fewer elements with ddm.grading_layers = 1 (K of digitised cracks within 0.3 %) or 0 (2 %, about a "
+            "third of the memory)"
         )
     return lines

@@ -145,8 +145,7 @@ class DdmSettings:
     order            p of the elements, 0 to 12
     nodes            collocation nodes: "chebyshev", "gauss" or "equal"
     elements_per_crack, elements_per_side   elements of a straight crack, and of a side of the boundary
-    grading_ratio    ratio of neighbouring elements at kinks, junctions, corners and mouths; 0.1 or less at kinks of cracks
-                     drawn closed
+    grading_ratio    ratio of neighbouring elements at kinks, junctions, corners and mouths
     grading_layers   layers of that grading. Kinks get more, by their angle: 2 layers leave an error of 5e-4 in K, each
                      further layer halves it
     solver           "dense" (factored), "compressed" (iterative), or "auto" by the number of unknowns

@@ -95,8 +95,7 @@ def mesh(
     else:
         sides = key, _boundary(loops, edges, mouths, settings, grading, extent, [*marks, *corners]), _straight_on(loops)
     boundary = sides[1]
-    *crack, ratio_on_cracks = _cracks(cracks, settings, grading, extent, sides_of_rock)
-    ratio = np.concatenate([np.full(len(edges), grading.ratio), ratio_on_cracks])
+    crack = _cracks(cracks, settings, grading, extent, sides_of_rock)
     start, end, kind, source = (np.concatenate(pair) for pair in zip(boundary, crack))
     source[len(boundary[0]) :] += len(edges)
     pieces = np.concatenate([edges, cracks.nodes[cracks.segments]])
@@ -105,10 +104,8 @@ def mesh(
         (start, end, pieces), kind, source, touching = _with_images(
             half_plane, (start, end, pieces), kind, source, touching, ON_SURFACE * extent
         )
-        ratio = np.concatenate([ratio, ratio])
     start, end, kind, source = keep_apart(
-        start, end, kind, source, Pieces(pieces, touching, len(edges), n_pieces, ratio),
-        settings.grading_ratio, extent,
+        start, end, kind, source, Pieces(pieces, touching, len(edges), n_pieces), settings.grading_ratio, extent,
         # Images have no unknowns.
         (2 if half_plane is None else 1) * (settings.order + 1),
     )  # fmt: skip
@@ -353,7 +350,7 @@ def _beside_mouth(fractions: list[float], k: int, mouths: np.ndarray) -> bool:
 def _cracks(cracks: Cracks, settings: DdmSettings, grading: Grading, extent: float, edges: np.ndarray):
     n = cracks.n_segments
     if n == 0:
-        return np.empty((0, 2)), np.empty((0, 2)), np.empty(0, np.int64), np.empty(0, np.int64), np.empty(0)
+        return np.empty((0, 2)), np.empty((0, 2)), np.empty(0, np.int64), np.empty(0, np.int64)
     length = cracks.lengths
     drawn = cracks.birth_cycle == 0
     total = np.bincount(cracks.crack, weights=np.where(drawn, length, 0.0), minlength=cracks.crack.max() + 1)
@@ -361,7 +358,7 @@ def _cracks(cracks: Cracks, settings: DdmSettings, grading: Grading, extent: flo
     # Rounded to nine digits first: both halves of a crack drawn in two, with 2½ of five elements each, get the same
     # number.
     count = np.maximum(1, np.rint(np.round(settings.elements_per_crack * share, 9)).astype(int))
-    layers, ratio = _node_layers(cracks, length / count, grading, edges)
+    layers = _node_layers(cracks, length / count, grading, edges)
     inner: list[float] = []
     pieces = np.ones(n, np.int64)
     for s in np.flatnonzero((count > 1) | layers.any(axis=1)).tolist():
@@ -373,25 +370,20 @@ def _cracks(cracks: Cracks, settings: DdmSettings, grading: Grading, extent: flo
         part = m / long
         fine: list[float] = list(range(1, m))
         if at_start:
-            least = grading.finest(a, long, extent) * part
-            fine = grading.fractions(at_start, least, ratio[s, 0]) + fine
+            fine = grading.fractions(at_start, grading.finest(a, long, extent) * part) + fine
         if at_end:
-            least = grading.finest(b, long, extent) * part
-            fine += [m - f for f in grading.fractions(at_end, least, ratio[s, 1])][::-1]
+            fine += [m - f for f in grading.fractions(at_end, grading.finest(b, long, extent) * part)][::-1]
         inner += [q / m for q in fine]
         pieces[s] += len(fine)
     tip = np.zeros(len(cracks.nodes), bool)
     tip[cracks.tips] = True
     nodes, segments = np.ascontiguousarray(cracks.nodes), np.ascontiguousarray(cracks.segments, dtype=np.int64)
-    return (*cut(nodes, segments, tip, pieces, np.array(inner, dtype=float)), ratio.min(axis=1))
+    return cut(nodes, segments, tip, pieces, np.array(inner, dtype=float))
 
 
-def _node_layers(
-    cracks: Cracks, size: np.ndarray, grading: Grading, edges: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """(n_segments, 2) graded layers at the start and end of every segment, and their ratio; ``size`` is its element
-    length."""
-    layers, ratio = np.zeros((cracks.n_segments, 2), int), np.full((cracks.n_segments, 2), grading.ratio)
+def _node_layers(cracks: Cracks, size: np.ndarray, grading: Grading, edges: np.ndarray) -> np.ndarray:
+    """(n_segments, 2) graded layers at the start and end of every segment; ``size`` is its element length."""
+    layers = np.zeros((cracks.n_segments, 2), int)
     closed, surface = _closed(cracks), cracks.surface
     first, ends = ends_at(cracks)
     plain = (cracks.valence == 0) | ((cracks.valence == 1) & ~surface)
@@ -413,8 +405,7 @@ def _node_layers(
             turn = _heading(cracks, s) - _heading(cracks, r) + (math.pi if e == f else 0.0)
             turn = abs(math.remainder(turn, 2 * math.pi))
             if closed[s] and closed[r]:
-                own = grading.of_closed_kink(turn)
-                deep, ratio[s, e], ratio[r, f] = own.at_closed_kink(turn), own.ratio, own.ratio
+                deep = grading.at_closed_kink(turn)
             else:
                 deep = grading.at_kink(turn, turn > KINK and _left_behind(cracks, first, ends, here))
             if deep:
@@ -422,9 +413,9 @@ def _node_layers(
         least = min(float(size[s]) for s, _ in here)
         for at in here:
             if size[at[0]] > JUMP * least:
-                needed = round(math.log(least / float(size[at[0]])) / math.log(ratio[at]))
+                needed = round(math.log(least / float(size[at[0]])) / math.log(grading.ratio))
                 layers[at] = max(layers[at], needed) if grading.target is None else layers[at] + needed
-    return layers, ratio
+    return layers
 
 
 def _heading(cracks: Cracks, segment: int) -> float:

@@ -9,7 +9,7 @@ Either m is given, the same at every node, or it follows from the target error, 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -31,10 +31,6 @@ FOLD, FOLD_SHRINKS = math.radians(120), math.radians(20 / 3)
 #: 0.01 of their crack); ungraded kinks leave this relative error of K, proportional to the turn up to the angle given
 #: with it.
 CLOSED_KINK, CLOSED_EXPONENT, CLOSED_ERROR, CLOSED_TURN = math.radians(5) - 1e-9, 0.41, 1.1e-2, math.radians(25)
-#: Without a target they get layers of this ratio that leave this error: two thirds of the unknowns that layers of 0.3 take.
-#: (Cracks of 3 to 24 sides that turn by 5° to 100°: K to 9e-4, as a rule to 5e-4; `tests/ddm/mesh/test_graded_kinks.py`.)
-#: Not beyond `FOLD`, where layers of less than 0.3 need shorter elements.
-CLOSED_RATIO = 0.1
 #: Re-entrant corners of the outline with a crack within this many outline elements get the layers that leave this error
 #: of K, unless no layers are wanted: half that of a kink, so that it adds little to what other corners leave.
 NEAR_CORNER, CORNER_ERROR = 3.0, 0.5 * KINK_ERROR
@@ -150,14 +146,8 @@ class Grading:
         most = min(MOST_LAYERS, math.floor(math.log(max(CORNER_FINEST * reach, 1e-300)) / math.log(self.ratio)))
         return max(self.at_corner(angle), min(wanted, most))
 
-    def of_closed_kink(self, turn: float) -> Grading:
-        """The grading at a kink of ``turn`` (rad) of a crack drawn closed."""
-        fine = self.target is None and CLOSED_KINK <= turn <= FOLD and self.ratio > CLOSED_RATIO
-        return replace(self, ratio=CLOSED_RATIO) if fine else self
-
     def at_closed_kink(self, turn: float) -> int:
-        """Layers at a kink of ``turn`` (rad) of a crack drawn closed, with the ratio `of_closed_kink`; no fewer than at an
-        open one."""
+        """Layers at a kink of ``turn`` (rad) of a crack drawn closed; no fewer than at an open one."""
         if turn < CLOSED_KINK or (self.target is None and not self.layers):
             return self.at_kink(turn, False)
         error = CLOSED_ERROR * min(1.0, turn / CLOSED_TURN) / (KINK_ERROR if self.target is None else self.target)
@@ -195,8 +185,6 @@ class Grading:
         reach = min(max(abs(point[0]), abs(point[1])), extent)
         return max(_FINEST * reach ** (2 / 3) * length ** (1 / 3), _SHORTEST * extent)
 
-    def fractions(self, layers: int, least: float = 0.0, ratio: float | None = None) -> list[float]:
-        """Fractions inside (0, 1) that grade an element towards 0, by ``ratio`` (None: that of the grading); no interval is
-        shorter than ``least``."""
-        ratio = self.ratio if ratio is None else ratio
-        return [f for f in (ratio**k for k in range(layers, 0, -1)) if f >= least]
+    def fractions(self, layers: int, least: float = 0.0) -> list[float]:
+        """Fractions inside (0, 1) that grade an element towards 0; no interval is shorter than ``least``."""
+        return [f for f in (self.ratio**k for k in range(layers, 0, -1)) if f >= least]

@@ -72,15 +72,15 @@ class Sources(NamedTuple):
     images    number from which on sources are images behind a free surface
     span      (n_sources,)  length, m
     meeting   (n_sources, n_sources)  0: they do not meet; 1: they meet; −sin of the angle between cracks where acute
-    chained   (n_sources,)  largest length relative to the distance where they meet; at an acute angle `AT_ACUTE`, and
-              ``acute_share`` times `GRADED`
+    chained   largest length relative to the distance where they meet; at an acute angle `AT_ACUTE`, and ``acute_share`` times
+              `GRADED`
     """
 
     n_edges: int
     images: int
     span: np.ndarray
     meeting: np.ndarray
-    chained: np.ndarray
+    chained: float
     acute_share: float
 
 
@@ -152,8 +152,7 @@ def _compare(elements, length, sources, i, j, out):
     meet = sources.meeting[one, other]
     allowed = APART
     if meet != 0:
-        chained = min(sources.chained[one], sources.chained[other])
-        allowed = chained if meet > 0 else min(chained, AT_ACUTE)
+        allowed = sources.chained if meet > 0 else min(sources.chained, AT_ACUTE)
     elif one < n_edges and other < n_edges:
         allowed = ACROSS
     ax, ay, bx, by = start[i, 0], start[i, 1], end[i, 0], end[i, 1]
@@ -177,14 +176,12 @@ class Pieces(NamedTuple):
     ends       (n_sources, 2, 2) m, the first ``n_edges`` edges, then crack segments
     touching   (n_sources, n_sources) bool, which of them meet
     images     number from which on they are images behind a free surface
-    ratio      (n_sources,) finest ratio of neighbouring elements on each
     """
 
     ends: np.ndarray
     touching: np.ndarray
     n_edges: int
     images: int
-    ratio: np.ndarray
 
 
 def keep_apart(start, end, kind, source, pieces: Pieces, ratio: float, extent: float, unknowns: int):
@@ -196,7 +193,7 @@ def keep_apart(start, end, kind, source, pieces: Pieces, ratio: float, extent: f
     can resolve.
     """
     # A graded element is 1/ratio times its distance from the next but one.
-    chained = np.maximum(2.5, 1.05 / pieces.ratio)
+    chained = max(2.5, 1.05 / ratio)
     if ratio >= FINE:  # acute angles then add no limit of their own
         acute_share, meeting = np.inf, pieces.touching.astype(float)
     else:

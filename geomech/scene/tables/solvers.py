@@ -142,8 +142,7 @@ class DdmTable(Table):
     elements_per_crack: Annotated[int, Field(ge=1)] = Field(4, description="elements per straight crack")
     elements_per_side: Annotated[int, Field(ge=1)] = Field(6, description="elements per side of a block")
     grading_ratio: Annotated[float, Field(gt=0, lt=1)] = Field(
-        0.3,
-        description="ratio of neighbouring elements at kinks, junctions and mouths (0.1 or less at kinks of closed cracks)",
+        0.3, description="ratio of neighbouring elements at kinks, junctions and mouths"
     )
     grading_layers: Annotated[int, Field(ge=0)] = Field(
         2,
