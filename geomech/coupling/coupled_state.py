@@ -114,6 +114,13 @@ class CrackedBlocks:
             self.by_mean_stress.take_fields(known | more)
 
     @property
+    def bonds(self) -> np.ndarray:
+        """(m, 2) edges along which cells of one rock are still bonded to each other."""
+        glued, parted = self.blocks.glued, self.state.parted
+        whole = np.zeros((0, 2), int) if glued is None else np.asarray(glued)
+        return whole if parted is None else whole[~np.asarray(parted)]
+
+    @property
     def glued_cells(self) -> set[int]:
         """The cells that are bonded to others of their rock."""
         glued = self.blocks.glued

@@ -538,12 +538,11 @@ def _linearised(now: CrackedBlocks, answers: dict, width: int) -> tuple[np.ndarr
     mean = now.by_mean_stress
     known = _stacked([now.compliances[b][2] for b in answers], width)
     strain = _stacked([mean.crack_strain(b, answer) for b, answer in answers.items()], width)
-    hang = [k for k, b in enumerate(answers) if b in mean]
+    hang = {k: b for k, b in enumerate(answers) if b in mean}
     if hang:
-        limited = [b for b in answers if b in mean]
-        limit = _stacked([mean.limit(b, now.bodies[b], now.elastic(b)) for b in limited], width)
-        turned = limit.transpose(0, 2, 1)
-        known[hang], strain[hang] = turned @ known[hang] @ limit, times(turned, strain[hang])
+        limit = _stacked([mean.limit(b, now.bodies[b], now.elastic(b)) for b in hang.values()], width)
+        turned, at = limit.transpose(0, 2, 1), list(hang)
+        known[at], strain[at] = turned @ known[at] @ limit, times(turned, strain[at])
     return known, strain
 
 
@@ -571,6 +570,8 @@ def _shorten(
         again.compliance[[block]], again.offset[[block]] = crack_responses(
             to.compliance[None], to.strain[None], stress, began
         )
+        if block in again.outlines:
+            again.outlines[block] = _outline(now, block, now.by_mean_stress.solutions[block])
 
 
 def _outline(now: CrackedBlocks, block: int, solution) -> OutlineMotion:

@@ -59,9 +59,10 @@ class ContactSolver:
     static_splitting_cycle          … and at slivers where iterates go round in a cycle, …
     static_splitting_cycling        … which may be this fraction of the blocks
     static_splitting_change         largest change of the mean forces between two periods, relative to their mean
-    plastic_splitting               number of free blocks from which it is used with cohesion (`dda.open_close.plastic_splitting`;
-                                    with bolts, or with joint stiffness alone, from ``static_splitting``): 87 blocks with cohesion have their bound in 1 s; Newton's
-                                    method, which breaks bonds one by one, ends 7 % below it after 31 s
+    plastic_splitting               number of free blocks from which it is used with cohesion
+                                    (`dda.open_close.plastic_splitting`; with bolts, or with joint stiffness alone,
+                                    from ``static_splitting``): 87 blocks with cohesion have their bound in 1 s;
+                                    Newton's method, which breaks bonds one by one, ends 7 % below it after 31 s
     plastic_splitting_change        with cohesion, joint stiffness or bolts: largest change of the mean forces
 
     Central path (`dda.open_close.interior_point`)

@@ -7,50 +7,21 @@ import math
 from dataclasses import replace
 
 import pytest
+from small_scenes import two_set_slope
 
 from geomech import dda
 from geomech.model import State
 from geomech.scene import load_scene
 
-SCENE = """
-[geometry]
-seed = 1
-dead_ends = "trim"
-[[geometry.zones]]
-name = "rock"
-polygon = [[0, 0], [60, 0], [60, 20], [42, 20], [30, 40], [0, 40]]
-[[geometry.zones]]
-name = "base"
-polygon = [[-2, -2], [62, -2], [62, 20], [60, 20], [60, 0], [0, 0], [0, 40], [-2, 40]]
-[[geometry.joint_sets]]
-name = "bedding"
-angle_deg = -25
-spacing_m = 4
-region = [[0, 0], [60, 0], [60, 20], [42, 20], [30, 40], [0, 40]]
-[[geometry.joint_sets]]
-name = "cross"
-angle_deg = 70
-angle_deviation_deg = 5
-spacing_m = 5
-length_m = 12
-gap_m = 3
-region = [[0, 0], [60, 0], [60, 20], [42, 20], [30, 40], [0, 40]]
-[materials.rock]
-youngs_modulus_pa = 20e9
-poissons_ratio = 0.25
-density_kg_m3 = 2600
-[zones.base]
-fixed = true
-[joints.default]
-friction_angle_deg = 30
-[joints.beds]
-friction_angle_deg = 20
-edges = ["joint:bedding"]
+SCENE = (
+    two_set_slope("angle_deg = -25\nspacing_m = 4", "spacing_m = 5\nlength_m = 12\ngap_m = 3")
+    + """
 [loads]
 gravity_m_s2 = [0, -9.81]
 [run]
 end_time_s = 1
 """
+)
 
 
 @pytest.fixture

@@ -22,6 +22,9 @@ if TYPE_CHECKING:
     from ...ddm import Body, Solution
     from .block_stress_field import BlockStressField
 
+#: Sets of points of which values are kept: those of the two sides of a block's faces.
+_KEPT = 4
+
 
 @dataclass(eq=False)
 class OutlineMotion:
@@ -81,7 +84,3 @@ class OutlineMotion:
 
     def __getstate__(self) -> dict:
         return vars(self) | {"_known": {}}
-
-
-#: Sets of points of which values are kept: those of the two sides of a block's faces.
-_KEPT = 4

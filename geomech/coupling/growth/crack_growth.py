@@ -64,13 +64,8 @@ def growth_of_tips(
 
 def _stay_in_cells(now: CrackedBlocks, growth) -> None:
     """Raise `dda.NotConverged` where a crack has reached the face to another cell of its rock, which would close it."""
-    glued = now.blocks.glued
-    if glued is None:
-        return
-    edges = np.asarray(glued).ravel()
-    if now.state.parted is not None:
-        edges = np.asarray(glued)[~np.asarray(now.state.parted)].ravel()
-    for join in growth.joins:
+    edges = now.bonds.ravel()
+    for join in growth.joins if len(edges) else ():
         found = on_edges(np.array(join.point), now.blocks, edges)
         if join.other_crack < 0 and len(found):
             cell = now.blocks.names[int(now.blocks.vertex_block[found[0]])]

@@ -26,6 +26,9 @@ OVERSHOT = 0.1
 #: Fraction of it that static steps may take. Half of the work of a suddenly applied load is dissipated, and nothing of that
 #: of a load that grows with the steps; a larger fraction means that unsupported blocks have moved.
 UNHELD = 0.6
+#: Why cracks take no energy from blocks that bend; and what to do then, and about blocks that do not bend.
+_UNRESOLVED = "the steps are longer than the impact, or than the growth, in which their cracks take it"
+_SHORTER, _HIGHER = "Shorten dda.time_step_s", "Give the zone an order of 2 to 8 (zones.NAME.order)"
 
 
 class BudgetWatch:
@@ -105,13 +108,8 @@ def check_supplied(supplied: float, budget: EnergyBudget, time: float, bend: boo
         -supplied,
         -supplied / budget.turnover,
         _UNRESOLVED if bend else "forces that bend a block of uniform strain load its cracks but do no work on it",
-        _SHORTER if bend else "Give the zone an order of 2 to 8 (zones.NAME.order)",
+        _SHORTER if bend else _HIGHER,
     )
-
-
-#: Why cracks take no energy from blocks that bend, and what to do.
-_UNRESOLVED = "the steps are longer than the impact, or than the growth, in which their cracks take it"
-_SHORTER = "Shorten dda.time_step_s"
 
 
 class BendingWatch:
@@ -142,7 +140,7 @@ class BendingWatch:
             _UNRESOLVED
             if self.bend
             else "blocks of uniform strain store no bending energy, so that cracks opened by bending take none from the motion",
-            _SHORTER if self.bend else "Give the zone an order of 2 to 8 (zones.NAME.order)",
+            _SHORTER if self.bend else _HIGHER,
         )
 
 

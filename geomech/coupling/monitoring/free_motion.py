@@ -22,6 +22,9 @@ log = logging.getLogger(__name__)
 #: Jᵀ J has no rank below this part of its largest eigenvalue: normals that differ by less than 3e-5 rad are parallel.
 _NO_RANK = 1e-9
 
+#: Out of balance by more than this part of the forces, a body moves under a force, not by rounding (`Mechanism`).
+_IN_BALANCE = 10 * BALANCED
+
 #: A motion whose displacement is below this part of its rotation (times the body's size) is a rotation.
 _TURNS = 1e-6
 
@@ -63,10 +66,6 @@ class FreeMotion:
         )  # fmt: skip
 
 
-#: Out of balance by more than this part of the forces, a body moves under a force, not by rounding (`Mechanism`).
-_IN_BALANCE = 10 * BALANCED
-
-
 def _free_way(now: CrackedBlocks, result: dda.StepResult, block: int) -> np.ndarray | None:
     """(2,) displacement of the body of ``block`` in the motion that nothing resists; None: everything is resisted."""
     blocks, loads, laws = now.blocks, now.problem.loads, now.problem.joints
@@ -80,13 +79,13 @@ def _free_way(now: CrackedBlocks, result: dda.StepResult, block: int) -> np.ndar
     rows = rows[body[rows["block"]] != body[rows["other"]]]
     if not len(rows):
         return None
-    grips = np.array([law.friction > 0.0 for law in laws])
+    holds = np.array([law.friction > 0.0 for law in laws])[rows["law"]] | (rows["bonded"] > 0)
     corners = np.flatnonzero(body[blocks.vertex_block])
     centre = result.state.vertices[corners].mean(axis=0)
     size = float(np.sqrt(blocks.areas()[body].sum()))
     normal, arm = rows["normal"], (rows["point"] - centre) / size
-    tangent = np.stack([-normal[:, 1], normal[:, 0]], axis=1)[grips[rows["law"]] | (rows["bonded"] > 0)]
-    arms = np.concatenate([arm, arm[grips[rows["law"]] | (rows["bonded"] > 0)]])
+    tangent = np.stack([-normal[:, 1], normal[:, 0]], axis=1)[holds]
+    arms = np.concatenate([arm, arm[holds]])
     ways = np.concatenate([normal, tangent])
     jacobian = np.column_stack([ways, arms[:, 0] * ways[:, 1] - arms[:, 1] * ways[:, 0]])
     values, vectors = np.linalg.eigh(jacobian.T @ jacobian)
@@ -95,14 +94,12 @@ def _free_way(now: CrackedBlocks, result: dda.StepResult, block: int) -> np.ndar
 
 def _body_of(now: CrackedBlocks, block: int) -> np.ndarray:
     """(n_blocks,) bool: ``block`` and the cells that are bonded to it."""
-    n, glued = now.blocks.n_blocks, now.blocks.glued
-    if glued is None:
+    n, pairs = now.blocks.n_blocks, now.blocks.vertex_block[now.bonds]
+    if not len(pairs):
         return np.arange(n) == block
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
 
-    parted = now.state.parted
-    pairs = now.blocks.vertex_block[np.asarray(glued) if parted is None else np.asarray(glued)[~np.asarray(parted)]]
     joined = coo_array((np.ones(len(pairs)), pairs.T), shape=(n, n))
     number = connected_components(joined, directed=False)[1]
     return number == number[block]

@@ -82,9 +82,9 @@ class Answer:
 @dataclass(eq=False)
 class Equations:
     """The equations of a step without contact states; arguments as for `settle`. ``earlier``: (6 n,) the motion found by
-    an earlier attempt at the same static step, if any, and ``earlier_forces`` (n, 2) its normal and shear forces; ``reach``: (n_blocks,) m beyond
-    which blocks are given up if operator splitting is to solve a static step; ``plastic``: it does so from the start, with
-    cohesion (`plastic_splitting`)."""
+    an earlier attempt at the same static step, if any, and ``earlier_forces`` (n, 2) its normal and shear forces;
+    ``reach``: (n_blocks,) m beyond which blocks are given up if operator splitting is to solve a static step;
+    ``plastic``: it does so from the start, with cohesion (`plastic_splitting`)."""
 
     pattern: assembly.Pattern
     matrix: np.ndarray

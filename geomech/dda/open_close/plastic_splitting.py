@@ -24,16 +24,7 @@ from ..joint_laws.coulomb_return import moved
 from ..joint_laws.penalty_springs import PENALTY_RATIO
 from .equations import Equations, Unsettled
 from .interior_point.central_path import SLIPPED
-from .static_splitting import Converged, KeepsMoving, Period, Splitting
-
-#: Beginning of the reason why a step failed in which blocks neither came to rest nor moved too far.
-NOT_BALANCED = "contact forces did not balance"
-#: Forces are calm if they change by no more than this multiple of `ContactSolver.static_splitting_change`.
-_CALM = 3.0
-#: Number of periods between adaptations of the springs to the forces.
-_ADAPTED = 4
-#: Relative distance from the strength within which a contact slides.
-_AT_STRENGTH = 1e-9
+from .static_splitting import ADAPTED, AT_STRENGTH, CALM, NOT_BALANCED, Converged, KeepsMoving, Period, Splitting
 
 
 def is_plastic(law: JointLaw) -> bool:
@@ -172,13 +163,11 @@ class _PlasticSplitting(Splitting):
             if taken >= solver.static_splitting_iterations:
                 raise self._unbalanced(last, period, mean, taken)
             if steady.any():
-                self._follow(
-                    last, period, steady, self._changed(last, period) <= _CALM * solver.static_splitting_change
-                )
+                self._follow(last, period, steady, self._changed(last, period) <= CALM * solver.static_splitting_change)
                 mean = before = _Span.of(period)
                 longest = 1
             last = period
-            if taken % (_ADAPTED * solver.static_splitting_period) == 0:
+            if taken % (ADAPTED * solver.static_splitting_period) == 0:
                 self._take(self._stiff)
 
     def _unbalanced(self, last: Period, period: Period, mean: Period, taken: int) -> KeepsMoving:
@@ -191,7 +180,7 @@ class _PlasticSplitting(Splitting):
 
     def _result(self, period: Period, taken: int) -> Converged:
         law, motion, (normal, shear) = self._law, moved(period.unknowns, *self._contacts), period.forces.T
-        slides = np.abs(shear) >= (law[:, 4] * normal + law[:, 5]) * (1.0 - _AT_STRENGTH)
+        slides = np.abs(shear) >= (law[:, 4] * normal + law[:, 5]) * (1.0 - AT_STRENGTH)
         # A contact that is open by less than its cohesion reaches may carry shear alone.
         closed = (normal > 0.0) | (shear != 0.0)
         state = np.where(closed, np.where(slides, SLIP, STICK), OPEN)

@@ -37,25 +37,27 @@ from .equations import Equations, Unsettled
 from .interior_point.contact_terms import balance
 from .operator_splitting import contact_turn, linear_laws
 
+#: Beginning of the reason why a step failed in which blocks neither came to rest nor moved too far.
+NOT_BALANCED = "contact forces did not balance"
 #: Cost of an iteration in Newton iterations.
 _TURN = 0.04
 #: Every which iteration enters the mean forces and motions of a period.
 _SAMPLED = 5
 #: Relative distance from the strength within which a contact slides.
-_AT_STRENGTH = 1e-9
+AT_STRENGTH = 1e-9
 #: A block moves steadily if the unbalanced forces on it in successive periods have directions with at least this cosine, and
 #: magnitudes that differ by less than this fraction.
 _STEADY, _ALIKE = 0.98, 0.2
 #: Forces are calm if they change by no more than this multiple of `ContactSolver.static_splitting_change`: blocks that move
 #: push a little on others.
-_CALM = 3.0
+CALM = 3.0
 #: Part of the way to where a contact closes over which motion is extrapolated.
 _NEARLY = 0.9
 #: Loads smaller than this fraction of the median of all blocks count as that large.
 _LIGHT = 1e-2
 #: Smallest stiffness of springs on blocks that carry little, relative to others, and number of periods after which this is
 #: adapted.
-_LEAST, _ADAPTED = 1e-4, 4
+_LEAST, ADAPTED = 1e-4, 4
 #: Number of rounds in which blocks that touch take the smallest extrapolation of their neighbours.
 _SPREAD = 20
 
@@ -262,11 +264,11 @@ class Splitting:
             if not np.isfinite(period.unknowns).all():
                 break
             if steady.any():
-                self._follow(last, period, steady, changed <= _CALM * solver.static_splitting_change)
+                self._follow(last, period, steady, changed <= CALM * solver.static_splitting_change)
             last = period
-            if taken % (_ADAPTED * solver.static_splitting_period) == 0:
+            if taken % (ADAPTED * solver.static_splitting_period) == 0:
                 self._take(self._stiff)
-        raise Unsettled(f"contact forces did not balance in {taken} iterations of operator splitting")
+        raise Unsettled(f"{NOT_BALANCED} in {taken} iterations of operator splitting")
 
     def _left(self, period: Period) -> np.ndarray:
         """(n_free,) unbalanced force on each block in the mean over the ``period``, over the largest force on it."""
@@ -354,7 +356,7 @@ class Splitting:
 
     def _result(self, period: Period, taken: int) -> Converged:
         law, motion, (normal, shear) = self._law, moved(period.unknowns, *self._contacts), period.forces.T
-        slides = np.abs(shear) >= (law[:, 4] * normal + law[:, 5]) * (1.0 - _AT_STRENGTH)
+        slides = np.abs(shear) >= (law[:, 4] * normal + law[:, 5]) * (1.0 - AT_STRENGTH)
         state = np.where(normal > 0.0, np.where(slides, SLIP, STICK), OPEN)
         direction = np.where(state == SLIP, np.sign(shear), 0.0)
         closed = state != OPEN

@@ -15,7 +15,7 @@ from ..joint_laws.whole_faces import WholeFaces
 from ..kinematics.simplex_integration import block_moments
 from ..loads.bolts import labels
 from ..open_close.contact_set import ContactSet
-from ..open_close.plastic_splitting import NOT_BALANCED
+from ..open_close.static_splitting import NOT_BALANCED
 from ..results import CrackResponse
 from ..step_control.relative_motion import Windows
 from ..system import BlockSystem

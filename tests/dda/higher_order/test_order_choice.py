@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scenes_of_bending import after, body_of, moved, rectangle, system_of
+from small_scenes import two_set_slope
 
 from geomech import dda, load_scene
 from geomech.bench.cost.block_scenes import wall
@@ -159,41 +160,11 @@ def test_the_work_on_all_blocks_is_that_on_a_patch_of_all(monkeypatch):
         assert every[1] == pytest.approx(patch[1], rel=1e-5) if block == 1 else every[1] < patch[1]
 
 
-SLOPE = """
-[geometry]
-smallest_block_m2 = 0.3
-seed = 1
-dead_ends = "trim"
-[[geometry.zones]]
-name = "rock"
-polygon = [[0, 0], [60, 0], [60, 20], [42, 20], [30, 40], [0, 40]]
-[[geometry.zones]]
-name = "base"
-polygon = [[-2, -2], [62, -2], [62, 20], [60, 20], [60, 0], [0, 0], [0, 40], [-2, 40]]
-[[geometry.joint_sets]]
-name = "bedding"
-angle_deg = -35
-spacing_m = 3.0
-region = [[0, 0], [60, 0], [60, 20], [42, 20], [30, 40], [0, 40]]
-[[geometry.joint_sets]]
-name = "cross"
-angle_deg = 70
-angle_deviation_deg = 5
-spacing_m = 3.5
-region = [[0, 0], [60, 0], [60, 20], [42, 20], [30, 40], [0, 40]]
-[materials.rock]
-youngs_modulus_pa = 20e9
-poissons_ratio = 0.25
-density_kg_m3 = 2600
-[zones.base]
-fixed = true
-[zones.rock]
-order = ORDER
-[joints.default]
-friction_angle_deg = 30
-[joints.beds]
-friction_angle_deg = 20
-edges = ["joint:bedding"]
+SLOPE = (
+    two_set_slope(
+        "angle_deg = -35\nspacing_m = 3.0", "spacing_m = 3.5", "smallest_block_m2 = 0.3", rock="order = ORDER"
+    )
+    + """
 [loads]
 gravity_m_s2 = [0, -9.81]
 [dda]
@@ -204,6 +175,7 @@ max_displacement_ratio = 0.01
 [run]
 end_time_s = 0.05
 """
+)
 
 
 def slid(tmp_path, order: str, bends: str | None = None, end: float = 0.05) -> State:

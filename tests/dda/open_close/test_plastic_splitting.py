@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from small_scenes import two_set_slope
 
 from geomech import dda
 from geomech.bench.safety.factor_cost import slope_of
@@ -17,40 +18,11 @@ from geomech.dda.statics.stability_trial import TrialLoads
 from geomech.model import GROUND, SLIP, Bolt, ContactSolver, JointLaw, Loads
 
 #: Two joint sets behind a face, some seventy blocks.
-SCENE = """
-[geometry]
-seed = 1
-dead_ends = "trim"
-smallest_block_m2 = 0.2
-[[geometry.zones]]
-name = "rock"
-polygon = [[0, 0], [60, 0], [60, 20], [42, 20], [30, 40], [0, 40]]
-[[geometry.zones]]
-name = "base"
-polygon = [[-2, -2], [62, -2], [62, 20], [60, 20], [60, 0], [0, 0], [0, 40], [-2, 40]]
-[[geometry.joint_sets]]
-name = "bedding"
-angle_deg = -35
-spacing_m = 5.0
-region = [[0, 0], [60, 0], [60, 20], [42, 20], [30, 40], [0, 40]]
-[[geometry.joint_sets]]
-name = "cross"
-angle_deg = 70
-angle_deviation_deg = 5
-spacing_m = 6.0
-region = [[0, 0], [60, 0], [60, 20], [42, 20], [30, 40], [0, 40]]
-[materials.rock]
-youngs_modulus_pa = 20e9
-poissons_ratio = 0.25
-density_kg_m3 = 2600
-[zones.base]
-fixed = true
-[joints.default]
-friction_angle_deg = 30
-MORE
-[joints.beds]
-friction_angle_deg = 20
-edges = ["joint:bedding"]
+SCENE = (
+    two_set_slope("angle_deg = -35\nspacing_m = 5.0", "spacing_m = 6.0", "smallest_block_m2 = 0.2").replace(
+        "[joints.beds]", "MORE\n[joints.beds]"
+    )
+    + """
 MORE
 [loads]
 gravity_m_s2 = [0, -9.81]
@@ -59,6 +31,7 @@ time_step_s = 0.005
 [run]
 end_time_s = 2.0
 """
+)
 
 #: Also with joint stiffness or bolts and without cohesion, which others solve among so few blocks.
 EVERY = ContactSolver(static_splitting=1)
