@@ -62,8 +62,8 @@ def add_energy(page: Page, energy: Mapping[str, float]) -> None:
         )
     if energy.get("unpaid_toughness"):
         sentences.append(
-            f"Of this, blocks did not supply {energy['unpaid_toughness']:.4g} J/m: blocks of order 1 store no bending, and "
-            "steps may be longer than the growth."
+            f"Of this, blocks did not supply {energy['unpaid_toughness']:.4g} J/m: blocks of order 1 store no bending "
+            "energy, or the time step is longer than the growth."
         )
     if energy.get("budget_residual") is not None:
         sentences.append(

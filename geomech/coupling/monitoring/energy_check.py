@@ -27,7 +27,9 @@ OVERSHOT = 0.1
 #: of a load that grows with the steps; a larger fraction means that unsupported blocks have moved.
 UNHELD = 0.6
 #: Why cracks take no energy from blocks that bend; and what to do then, and about blocks that do not bend.
-_UNRESOLVED = "the steps are longer than the impact, or than the growth, in which their cracks take it"
+_UNRESOLVED = (
+    "the time step is longer than the impact or the growth, so that their cracks cannot take it from the motion"
+)
 _SHORTER, _HIGHER = "Shorten dda.time_step_s", "Give the zone an order of 2 to 8 (zones.NAME.order)"
 
 
@@ -85,8 +87,8 @@ def check_dissipation(
     log.warning(
         "t = %g s: the time integration has taken %.2g of all converted energy from blocks %s (scheme_loss in "
         "history.csv): the step does not resolve vibrations or impacts that matter to the result, whose error is of "
-        "that order and shrinks with dda.time_step_s. dda.automatic_time_step = true follows what the scheme takes most from in "
-        'shorter steps; dda.equilibrium = "start" avoids the vibration due to a suddenly applied load%s',
+        "that order and shrinks with dda.time_step_s. dda.automatic_time_step = true takes shorter steps while "
+        'vibrations are damped; dda.equilibrium = "start" avoids the vibration due to a suddenly applied load%s',
         time,
         budget.scheme / turnover,
         "that still move" if moves else "whose cracks have grown in motion",
@@ -168,5 +170,5 @@ class GrowthWatch:
             ""
             if self._began < 1.0 + OVERSHOT
             else f". They grow from {self._began:.3g} times their toughness on, at the end of a load step: which cracks run, and "
-            'where, depends on the load steps, until run.stepping = "events" finds the loads at which they begin',
+            'where, depends on the load steps; run.stepping = "events" finds the loads at which growth begins',
         )
