@@ -1,4 +1,5 @@
-"""Division of blocks into triangles or quadrilaterals by Gmsh: cells of rock that is continuous across their faces."""
+"""Division of blocks into triangles or quadrilaterals by Gmsh, or into Voronoi cells of the size of such triangles: cells of
+rock that is continuous across their faces."""
 
 from __future__ import annotations
 
@@ -10,6 +11,7 @@ import numpy as np
 
 from ..model import Blocks
 from .gmsh_models.session import gmsh_session
+from .voronoi_cells import voronoi_mesh
 
 #: Separator between the name of a block and the number of its cell.
 CELL = "#"
@@ -34,8 +36,8 @@ def divided(
 ) -> tuple[Blocks, np.ndarray]:  # fmt: skip
     """``blocks`` with those that have a ``size`` divided into cells; and the block (n_cells,) of each.
 
-    ``size`` (n_blocks,) m is the approximate cell size, nan for undivided blocks; ``shape`` (n_blocks,) is "triangles"
-    or "quads"; no cell crosses the lines (n, 2) ``along`` which blocks (block →) are divided. Sides of cells keep the names of the edges on which they lie, those between cells have the name
+    ``size`` (n_blocks,) m is the approximate cell size, nan for undivided blocks; ``shape`` (n_blocks,) is "triangles",
+    "quads" or "voronoi"; no cell crosses the lines (n, 2) ``along`` which blocks (block →) are divided. Sides of cells keep the names of the edges on which they lie, those between cells have the name
     ``between`` (n_blocks,), if any. Raises CannotMesh naming the block.
     """
     polygons, names, edge_names, parent, glued, n = [], [], [], [], [], 0
@@ -59,7 +61,7 @@ def divided(
             )
         except Exception as error:
             raise CannotMesh(
-                f"{blocks.names[b]!r} cannot be divided into {shape[b]} of {size[b]:g} m: {error}"
+                f"{blocks.names[b]!r} cannot be divided into cells ({shape[b]}) of {size[b]:g} m: {error}"
             ) from error
         edge_of, inner = dict(lines), "" if between is None else between[b]
         vertices = np.concatenate(loops)
@@ -91,7 +93,7 @@ def divided(
 
 
 def _mesh(loops: list[np.ndarray], size: float, shape: str, along: Sequence[np.ndarray] = ()):
-    """Points (n, 2), cells (lists of 3 or 4 of them, counter-clockwise), and ((a, b), edge), a < b, for all sides on
+    """Points (n, 2), cells (lists of them, counter-clockwise), and ((a, b), edge), a < b, for all sides on
     the edges of ``loops``, numbered one after the other; cells do not cross the lines ``along``."""
     with gmsh_session("cells") as gmsh:
         geo, mesh, option = gmsh.model.geo, gmsh.model.mesh, gmsh.option.setNumber
@@ -142,6 +144,9 @@ def _mesh(loops: list[np.ndarray], size: float, shape: str, along: Sequence[np.n
         ]
     if not cells:
         raise CannotMesh("Gmsh has made no cells")
+    if shape == "voronoi":
+        mesh_of = voronoi_mesh(loops, points[np.array(cells)], along)
+        return mesh_of.points, mesh_of.cells, [(side, of_edge[edge]) for side, edge in mesh_of.sides]
     for cell in cells:
         x, y = points[cell].T
         if float(x @ np.roll(y, -1) - y @ np.roll(x, -1)) < 0:

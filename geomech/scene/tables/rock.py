@@ -59,12 +59,14 @@ class ZoneTable(Table):
     )
     mesh_size_m: Positive | None = Field(
         None,
-        description="its blocks are divided by Gmsh into cells of about this size, m, smaller at short edges of "
+        description="its blocks are divided into cells of about this size, m, smaller at short edges of "
         "their outline; displacement and stress are continuous between cells. Needs an `order` of 2 or "
         "more (unset: a block is one cell)",
     )
-    cells: Literal["triangles", "quads"] = Field(
-        "triangles", description='shape of the cells of `mesh_size_m`: "triangles" or "quads"'
+    cells: Literal["triangles", "quads", "voronoi"] = Field(
+        "triangles",
+        description='shape of the cells of `mesh_size_m`: "triangles", "quads", or "voronoi", polygons around random points, '
+        "such as grains (with `cell_joint`)",
     )
     crack_margin_m: Positive | None = Field(
         None,

@@ -57,12 +57,12 @@ def system(blocks: Blocks, joint=None, rock: Material | None = None, **settings)
     return dda.BlockSystem(blocks, [rock], [joint], settings=DdaSettings(**given))
 
 
-def meshed(polygon, size: float, order: int, *, below, names, shape="triangles", **more) -> dda.BlockSystem:
-    """One ``polygon`` (loops), its edges called ``names``, divided by Gmsh, above the fixed block ``below``."""
+def meshed(polygon, size: float, order: int, *, below, names, shape="triangles", between="", **more) -> dda.BlockSystem:
+    """One ``polygon`` (loops), its edges called ``names``, divided into cells, sides ``between`` them, above the fixed block ``below``."""
     blocks = Blocks.from_polygons(
         [[below], polygon], fixed=[True, False], order=[1, order], edge_names=[[[""] * len(below)], names]
     )
-    return system(divided(blocks, np.array([np.nan, size]), np.array(["", shape]))[0], **more)
+    return system(divided(blocks, np.array([np.nan, size]), np.array(["", shape]), ["", between])[0], **more)
 
 
 def moved_corners(of: dda.BlockSystem, state: State) -> np.ndarray:
