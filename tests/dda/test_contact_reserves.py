@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from geomech.dda.joint_laws.coulomb_return import ContactStates, Strengths, check_states, reserves
+from geomech.dda.joint_laws.coulomb_return import check_states, reserves
 from geomech.model import OPEN, SLIP, STICK
 
 
@@ -34,8 +34,8 @@ def test_contacts_leave_their_states_where_nothing_is_left_in_reserve(slack):
     gap = np.where(state == OPEN, -beyond * slack, -normal / springs.normal)
     zero = np.zeros(n)
     after = check_states(
-        np.column_stack([normal, shear, gap, zero]), ContactStates(state, np.ones(n), bonded),
-        Strengths(
+        np.column_stack([normal, shear, gap, zero]), (state, np.ones(n), bonded),
+        (
             springs.normal, springs.shear, zero, zero, springs.peak, springs.hold, springs.cohesion, springs.tension,
             np.zeros(n, bool),
         ),

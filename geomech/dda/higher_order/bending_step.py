@@ -426,7 +426,7 @@ class BendingAttempt(Attempt):
             self.slid = moved(
                 self.settled.unknowns.ravel(), (found.block, found.other, pattern.order),
                 pattern.unknowns, rows,
-            )[:, 1]  # fmt: skip
+            )[:, 1].copy()  # fmt: skip
             if self.actions is not None:
                 self.slid += self.actions.along
         self._residual_of_driven()

@@ -146,7 +146,7 @@ class DeflectionBasis:
         ``vertices`` (n_vertices, 2) m; ``next_vertex`` (n_vertices,); ``vertex_start`` first vertex of each block.
         Raises ValueError for an order that is not 1 to 10.
         """
-        order = np.ascontiguousarray(order, np.int64)
+        order = np.array(order, np.int64)
         if len(order) and not (order.min() >= 1 and order.max() <= _HIGHEST_BASIS):
             raise ValueError(f"the order of a basis is 1 to {_HIGHEST_BASIS}, got {order.min()} to {order.max()}")
         n, highest = len(order), int(order.max(initial=1))
@@ -205,7 +205,7 @@ class DeflectionBasis:
 
     def _evaluated(self, points: np.ndarray, owner: np.ndarray | int, gradients: bool) -> np.ndarray:
         points = np.ascontiguousarray(points, float).reshape(-1, 2)
-        owner = np.ascontiguousarray(np.broadcast_to(owner, len(points)), np.int64)
+        owner = np.full(len(points), owner, np.int64)
         return _evaluate(owner, points, self.order, self.centre, self.to_box, self.coefficients, gradients)
 
     def _orthonormalise(self, block: int, points: np.ndarray, weights: np.ndarray) -> None:

@@ -14,12 +14,8 @@ import numpy as np
 
 from ...compiled import UNCOUNTED, kept, part
 from ...model import OPEN, SLIP, STICK
+from ..kinematics.tolerances import LITTLE, SAME
 from .penalty_springs import Springs
-
-#: Relative tolerance of strengths; tolerance of slip, counted from the start of the step, relative to the round-off of
-#: coordinates.
-_KNOWN, _OF_SLIP = 1e-9, 1e-3
-
 
 #: Products may be fused into sums.
 _jit = kept(fastmath={"contract"}, error_model="numpy", nogil=True)
@@ -43,13 +39,11 @@ def _move(unknowns, block, other, order, vectors, c):
 
 
 @_jit
-def moved(unknowns, block, other, order, vectors, lift=None):
-    """(n, 2): motion in the step along the normal, less ``lift`` (n,) times that along the edge, and along the edge."""
+def moved(unknowns, block, other, order, vectors):
+    """(n, 2): motion in the step along the normal and along the edge."""
     out = np.empty((block.shape[0], 2))
     for c in range(block.shape[0]):
         out[c, 0], out[c, 1] = _move(unknowns, block, other, order, vectors, c)
-        if lift is not None:
-            out[c, 0] -= lift[c] * out[c, 1]
     return out
 
 
@@ -131,21 +125,21 @@ def check_states(forces, states, strengths, shear0, slack):
                 new_state[c] = STICK
             continue
         pull = tension[c] if bonded[c] == 1 else 0.0
-        if -forces[c, 0] > pull * (1.0 + _KNOWN) + normal[c] * slack[c]:
+        if -forces[c, 0] > pull * (1.0 + SAME) + normal[c] * slack[c]:
             # Without tensile strength it opens without breaking, since it may close again during the iteration.
             new_state[c], new_bonded[c] = OPEN, (0 if pull > 0.0 else bonded[c])
             violation[c] = normal[c] * abs(gap)
         elif state[c] == STICK:
             strength = max(0.0, peak[c] * forces[c, 0] + hold[c] + (cohesion[c] if bonded[c] else 0.0))
             excess = abs(forces[c, 1]) - strength
-            if excess > _KNOWN * strength + (_OF_SLIP * shear[c] + peak[c] * normal[c]) * slack[c]:
+            if excess > SAME * strength + (LITTLE * shear[c] + peak[c] * normal[c]) * slack[c]:
                 new_state[c], new_bonded[c] = SLIP, (2 if keeps[c] and bonded[c] else 0)
                 new_direction[c] = np.sign(forces[c, 1])
                 violation[c] = excess
         elif friction[c] > 0.0 or sliding[c] > 0.0:
             strength = max(0.0, friction[c] * forces[c, 0] + sliding[c])
             trial = direction[c] * (shear0[c] - shear[c] * slide)
-            if strength - trial > _KNOWN * strength + (_OF_SLIP * shear[c] + friction[c] * normal[c]) * slack[c]:
+            if strength - trial > SAME * strength + (LITTLE * shear[c] + friction[c] * normal[c]) * slack[c]:
                 # Through sticking, even if it would slide back: two solutions of opposite direction may alternate.
                 new_state[c] = STICK
                 violation[c] = strength - trial
@@ -160,9 +154,9 @@ def reserves(state, bonded, normal_force, shear_force, gap, springs, slack) -> n
     round-off ``slack`` (n,) m of coordinates."""
     rounding = springs.normal * slack
     pull = np.where(bonded == 1, springs.tension, 0.0)
-    lifts = normal_force + pull * (1.0 + _KNOWN) + rounding
+    lifts = normal_force + pull * (1.0 + SAME) + rounding
     firm = springs.hold + np.where(bonded > 0, springs.cohesion, 0.0)
     strength = np.maximum(0.0, springs.peak * normal_force + firm)
-    excess = _KNOWN * strength + (_OF_SLIP * springs.shear + springs.peak * springs.normal) * slack
+    excess = SAME * strength + (LITTLE * springs.shear + springs.peak * springs.normal) * slack
     closed = np.where(state == STICK, np.minimum(lifts, strength + excess - np.abs(shear_force)), lifts)
     return np.where(state == OPEN, springs.normal * gap + rounding, closed)

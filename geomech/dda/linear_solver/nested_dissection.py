@@ -294,7 +294,7 @@ def _places(row, column, entry, entries, pivots, reach, boundary):
 def plan(points: np.ndarray, rows: np.ndarray, columns: np.ndarray, cut: tuple[np.ndarray, ...] | None = None) -> Tree:
     """The tree for matrix blocks at (``rows``, ``columns``), both triangles and the diagonal, sorted by row then
     column; with the fronts of ``cut`` if given, as from `dissect`."""
-    n = len(points)
+    n, columns = len(points), np.ascontiguousarray(columns)
     pointer = np.searchsorted(rows, np.arange(n + 1))
     blocks, pivots, parent = dissect(points, pointer, columns) if cut is None else cut
     n_fronts = len(parent)

@@ -181,10 +181,10 @@ def generalised(points: np.ndarray, edges: np.ndarray, centroid: np.ndarray) -> 
     (n_blocks, 2); N and N m."""
     out = np.zeros((len(centroid), 6))
     if len(points) or len(edges):
-        _gather(
-            out, centroid, points["block"], points["point"], points["force"], edges["block"], edges["start"],
-            edges["end"], edges["traction"],
-        )  # fmt: skip
+        # Contiguous, as fields of records are not: one compilation does for all.
+        fields = [points[name] for name in ("block", "point", "force")]
+        fields += [edges[name] for name in ("block", "start", "end", "traction")]
+        _gather(out, centroid, *(np.ascontiguousarray(field) for field in fields))
     return out
 
 

@@ -186,7 +186,7 @@ def split(equations: Equations, bonded: np.ndarray, solver: ContactSolver) -> Pr
     states = found.state.copy(), np.zeros(len(found))
     seen, relaxation, spent = states[0].copy(), 1.0, _FACTORS
     for taken in range(1, solver.splitting_iterations + 1):
-        contact_turn(unknowns, contacts, law, between.rho, intact, relaxation, at_hand, states)
+        contact_turn(unknowns, tuple(contacts), law, between.rho, intact, relaxation, at_hand, states)
         relaxation, spent = _RELAXATION, spent + _TURN
         if taken % _LOOK == 0:
             changing = np.count_nonzero(states[0] != seen) / len(found)

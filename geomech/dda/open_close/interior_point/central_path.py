@@ -239,11 +239,9 @@ class CentralPath:
         kn_bonded, ks_bonded, gap_bonded, before_bonded = self._bonds
         springs = list(np.ascontiguousarray(laws.T[1:]))
         if len(kn_bonded):
-            bonded_rows = moved(self._unknowns, *self._bonded_at, self._all_lift[len(self._kn) :])
-            pulled, sheared = (
-                -kn_bonded * (gap_bonded + bonded_rows[:, 0]),
-                before_bonded - ks_bonded * bonded_rows[:, 1],
-            )
+            apart, along = moved(self._unknowns, *self._bonded_at).T
+            apart = apart - self._all_lift[len(self._kn) :] * along
+            pulled, sheared = -kn_bonded * (gap_bonded + apart), before_bonded - ks_bonded * along
             add_forces(residual, *self._bonded_at, pulled, sheared)
             springs = [
                 np.concatenate(pair)
