@@ -3,11 +3,18 @@
 import fcntl
 import json
 import math
+import os
 import signal
+import sys
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
 import pytest
+
+# Processes that tests start load the package's 600 modules from bytecode, also where the user wants none written: half a
+# second of each start.
+os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+sys.dont_write_bytecode = False
 
 ROOT = Path(__file__).parents[1]
 #: Measured figures of the verification pages. `pytest --record-figures` writes those of the tests that it runs.

@@ -87,6 +87,7 @@ def keeps_to_the_schema():
     return jsonschema.Draft202012Validator(told)
 
 
+@pytest.mark.first_by_default(8)
 @pytest.mark.parametrize("path", SCENES, ids=lambda path: f"{path.parent.name}-{path.stem}")
 def test_every_scene_keeps_to_the_schema(path, keeps_to_the_schema):
     keeps_to_the_schema.validate(tomllib.loads(path.read_text(encoding="utf-8")))
