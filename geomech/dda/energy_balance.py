@@ -26,12 +26,13 @@ import numpy as np
 from ..compiled import UNCOUNTED, kept, part
 from ..model import OPEN, SLIP
 from .kinematics.newmark import BlockMass, SchemeTerms
+from .kinematics.tolerances import NOTABLE
 
 log = logging.getLogger(__name__)
 
 #: Energy gain, relative to the energy converted (`EnergyBudget.turnover`), above which a warning is given. Sliding,
 #: falling and colliding blocks stay within 3e-4 (most below 1e-5), a specimen strained by half a per cent within 3e-3.
-GAIN = 0.01
+GAIN = NOTABLE
 
 
 class StepEnergy(NamedTuple):

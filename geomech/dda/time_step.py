@@ -43,6 +43,7 @@ from .kinematics.newmark import (
 from .kinematics.rigid_blocks import mean_stress
 from .kinematics.roundoff import undecided_gaps, warn_of_roundoff
 from .kinematics.simplex_integration import block_moments, mass_matrix
+from .kinematics.tolerances import LITTLE
 from .linear_solver import assembly
 from .loads.load_vectors import AppliedForces, Inertia, generalised
 from .loads.prescribed_motion import MovedBlocks
@@ -68,11 +69,11 @@ _MOST_WORK, _MOST_WORK_CUTS = 6, 3
 _PLACED = 20
 #: Most repetitions to find the ends of faces that carry the cohesion of the whole face.
 _SHARED = 8
-#: Most repetitions for the gaps of rotating blocks, and accuracy of these relative to the contacts' ``precision``, in
-#: dynamics and in statics. In statics contacts store little energy, and springs of 40 E' turn an error of the gap into
+#: Most repetitions for the gaps of rotating blocks, and accuracy of these relative to the contacts' ``precision`` in
+#: dynamics; a hundredth of that in statics. In statics contacts store little energy, and springs of 40 E' turn an error of the gap into
 #: energy (for leaning slabs, at a tenth of the precision, as much in one step as the work of all loads). Operator splitting
 #: balances forces less exactly than that.
-_BENDS, _KNOWN, _KNOWN_IN_STATICS = 4, 0.1, 1e-3
+_BENDS, _KNOWN = 4, 0.1
 
 
 #: Most corrections of blocks that overlap after an impact because of other impacts.
@@ -397,7 +398,7 @@ class Attempt:
         if not len(found) or not self.n_free:
             return False
         exact = system.scheme.static and system.reach is None
-        known = (_KNOWN_IN_STATICS if exact else _KNOWN) * found.precision
+        known = (LITTLE if exact else _KNOWN) * found.precision
         # A point that rotates by r while it moves by d deviates from its chord by at most r d.
         increment = self._increment(self.unknowns)
         if 2.0 * np.abs(increment[:, 2]).max() * system.step_limit < known.min():

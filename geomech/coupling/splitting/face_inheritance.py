@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ...dda.joint_laws.bonds import ALIGNED, OFF_LINE
+from ...dda.kinematics.tolerances import ONE_FACE_COS, ONE_FACE_SIN
 
 if TYPE_CHECKING:
     from ...dda.open_close.contact_set import ContactSet
@@ -62,8 +62,8 @@ def _nearest(found: ContactSet, row: int, faces: np.ndarray, parent: np.ndarray)
     normal, point = found.geometry[row, 1:3], found.geometry[row, 5:7]
     apart = faces["point"] - point
     distance = np.hypot(*apart.T)
-    on_line = (same | swapped) & (sense * (faces["normal"] @ normal) > ALIGNED)
-    on_line &= np.abs(apart @ normal) <= OFF_LINE * np.maximum(distance, faces["length"])
+    on_line = (same | swapped) & (sense * (faces["normal"] @ normal) > ONE_FACE_COS)
+    on_line &= np.abs(apart @ normal) <= ONE_FACE_SIN * np.maximum(distance, faces["length"])
     at = np.flatnonzero(on_line)
     if not len(at):
         return -1

@@ -9,10 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-#: A vertex is at the end of an edge within this part of its length: bonds deform by some thousandths at most.
-_AT_END = 0.01
-#: Tributary lengths below this part of the edge are round-off.
-_LEAST_FACE = 1e-6
+from ..kinematics.tolerances import NOTABLE, NOTHING
 
 
 def find_bonded_corners(
@@ -23,7 +20,7 @@ def find_bonded_corners(
     ``vertex``, ``edge`` (n,) as in CONTACT; ``after`` (n_vertices,) the next vertex of each; ``position`` (n,) along
     the edge; ``share`` (n,) tributary length over the edge's; ``bonded`` (n,) bool.
     """
-    face = share > _LEAST_FACE
+    face = share > NOTHING
     glue = np.flatnonzero(bonded & face)
     lone = np.flatnonzero(~face)
     if not (len(glue) and len(lone)):
@@ -34,7 +31,7 @@ def find_bonded_corners(
     n = len(after)
     # Vertices at one point that bonds join; a vertex bonded to the interior of an edge is joined to the edge
     # itself.
-    end = np.where(position < _AT_END, edge, np.where(position > 1 - _AT_END, after[edge], n + edge))
+    end = np.where(position < NOTABLE, edge, np.where(position > 1 - NOTABLE, after[edge], n + edge))
     links = coo_array((np.ones(len(glue)), (vertex[glue], end[glue])), shape=(2 * n, 2 * n))
     _, label = connected_components(links, directed=False)
     out = np.zeros(len(vertex), bool)

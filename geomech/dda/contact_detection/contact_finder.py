@@ -16,6 +16,7 @@ from ..joint_laws.crushing import CrushingFaces
 from ..joint_laws.nonlinear_laws import CurvedJoints, NonlinearLaws
 from ..joint_laws.penalty_springs import JointTable, Springs, contact_springs, least_face, penalties, resolved
 from ..joint_laws.whole_faces import WholeFaces
+from ..kinematics.tolerances import SAME
 from ..open_close.contact_set import ContactSet
 from ..statics.sharp_toes import SHARP, ToeCorners, stand_off
 from ..step_control.relative_motion import Approach, Windows, widths
@@ -32,21 +33,16 @@ from .entrance_edges import (
     find_contacts,
 )
 from .face_quadrature import FaceForces, FacePoints, give_by_bending
-from .inherited_contacts import misfit_of_new
+from .inherited_contacts import ALIGNED, misfit_of_new
 from .neighbour_search import NearPairs
 from .t_junctions import nodes_in_faces
 from .thin_walls import from_outside
-
-#: Vertices nearer to each other than this fraction of the model are one point of cells.
-_SAME_POINT = 1e-9
 
 #: At time zero, faces nearer than this many times the domain's size touch and are bonded by cohesion and tension.
 _TOUCH = 1e-7
 #: Faces as drawn that are nearer than this many times the domain's size touch without force: rounding of coordinates leaves
 #: some 1e-12, which stiff springs would turn into 1e-5 of the forces in a slope (`geomech bench slopes --seeds 56`).
 _DRAWN = 1e-10
-#: Contacts lie on one line if the cosine of the angle between their normals exceeds this.
-_ALIGNED = 0.99
 _UNKNOWN = -2
 _NEVER = -1
 #: The gaps of rotating blocks are followed to this part of the smaller block's size (√area).
@@ -194,7 +190,7 @@ class ContactFinder:
         if self._by_length.any():
             nodes = nodes_in_faces(vertex, edge, self._owner, self._flat, geometry, law, self._by_length[law])
         if nodes is not None:
-            geometry[:, 4] = nodes.left(geometry[:, 4])
+            geometry[:, 4] = nodes.left(geometry[:, 4].copy())
             parent = nodes.continued(met.parent, np.ascontiguousarray(old["state"]))
         block, other = self._owner[vertex], self._owner[edge]
         springs = self._springs(block, other, law, geometry[:, 4], state.time >= self._softened_from)
@@ -508,7 +504,7 @@ class ContactFinder:
         )
         for c in np.flatnonzero((remembered["state"] == OPEN) & (remembered["lift"] >= 0)):
             same = (pair[0] == min(block[c], other[c])) & (pair[1] == max(block[c], other[c]))
-            same &= np.abs(touched["normal"] @ geometry[c, 1:3]) > _ALIGNED
+            same &= np.abs(touched["normal"] @ geometry[c, 1:3]) > ALIGNED
             same &= touched["wear"] > remembered["wear"][c]
             if same.any():
                 at = np.flatnonzero(same)
@@ -669,7 +665,7 @@ def _meeting_cells(blocks: Blocks) -> np.ndarray:
 def _apart_in_a_face(blocks: Blocks) -> np.ndarray:
     """(k,) a · n_blocks + b, a < b, of all blocks a and b that have an edge in common that is not bonded."""
     vertices, (edge, mate) = blocks.vertices, np.asarray(blocks.glued, np.int64).T
-    grid = np.round((vertices - vertices.min(axis=0)) / (_SAME_POINT * float(np.ptp(vertices, axis=0).max())))
+    grid = np.round((vertices - vertices.min(axis=0)) / (SAME * float(np.ptp(vertices, axis=0).max())))
     point = np.unique(grid, axis=0, return_inverse=True)[1].ravel()
     start, end = point, point[blocks.next_vertex]
     n = int(point.max()) + 1

@@ -19,22 +19,17 @@ from typing import NamedTuple
 import numpy as np
 
 from ...compiled import UNCOUNTED, kept, part
+from ..kinematics.tolerances import NOTABLE, NOTHING, ONE_FACE_COS, ONE_FACE_SIN, SAME
 from .neighbour_search import boxes
 from .rounded_corners import EASED, meeting, rounding_length
 
-# Faces inclined into each other by less than this angle (sine, about 3°) count as face-to-face contacts.
-_ANGLE = 0.05
 # A corner outside an edge may also touch it first, though its neighbour is nearer, if their face is inclined to the
 # edge by less than this (sine): a block that hits with one end of a face rotates flat in the same step.
 _TURN = 0.25
 # Entrance lines whose directions differ by less than this are the same line.
 _PARALLEL = 0.0025
-# Of two corners on one line, the one represents it past which the other's face does not lean by more than this (sine).
-_LEAN = 0.01
 # Corners that lie within each other's edges by more than this part of the edges are the two ends of a common face.
 _ENDS = 1e-4
-# Squared distances of corners must differ by more than this part to count as different.
-_NEARER = 1e-2
 #: Kinds: a vertex and a face; two corners; two corners whose small overlap rounding smooths.
 FACE, CORNERS, SMOOTHED = 0, 1, 2
 # Corners whose lines may come within the window of both are at most this many windows apart.
@@ -43,13 +38,6 @@ _CORNERS = 1.5
 _ZONE = 2.0
 # Corners may approach by this many times their expected motion.
 _HASTE = 2.0
-# cos of the angle between edges that count as mating faces, for tributary lengths.
-_MATING = 0.9986
-#: Sine up to which a vertex is flat, as in `Blocks.in_side`: the noise of the vertices of an edge of centimetres turns it by
-#: 1e-9, and must not decide whether a face touches there.
-_FLAT = 1e-6
-#: Areas of blocks that differ by less than this part are the same: then the blocks' numbers decide exact ties.
-_ALIKE = 1e-9
 
 
 @part(fastmath=False, error_model="numpy", nogil=True, **UNCOUNTED)
@@ -80,7 +68,7 @@ def _lies_behind(vertices, next_vertex, previous_vertex, vertex, nx, ny):
     """Whether the rock at corner ``vertex`` lies behind an edge with the outward normal (nx, ny), not in front of it.
 
     A flat corner on the tip of a needle leans by the needle's angle into the edge on the needle's other side, which may be
-    less than `_ANGLE`; its rock is behind that edge.
+    less than `ONE_FACE_SIN`; its rock is behind that edge.
     """
     a, b = previous_vertex[vertex], next_vertex[vertex]
     ax, ay = vertices[a, 0] - vertices[vertex, 0], vertices[a, 1] - vertices[vertex, 1]
@@ -101,7 +89,7 @@ def _may_turn_to(vertices, next_vertex, previous_vertex, vertex, nx, ny, gap, wi
     for neighbour in (next_vertex[vertex], previous_vertex[vertex]):
         dx, dy = vertices[neighbour, 0] - vertices[vertex, 0], vertices[neighbour, 1] - vertices[vertex, 1]
         length, rise = np.sqrt(dx * dx + dy * dy), dx * nx + dy * ny
-        if rise < -min(window, _TURN * length) or gap + rise < -_ANGLE * length:
+        if rise < -min(window, _TURN * length) or gap + rise < -ONE_FACE_SIN * length:
             return False
     return True
 
@@ -111,7 +99,7 @@ def _nearer(vertices, here, one, other):
     """Whether vertex ``here`` is nearer to vertex ``one`` than to ``other``."""
     ax, ay = vertices[here, 0] - vertices[one, 0], vertices[here, 1] - vertices[one, 1]
     bx, by = vertices[here, 0] - vertices[other, 0], vertices[here, 1] - vertices[other, 1]
-    return ax * ax + ay * ay < (bx * bx + by * by) * (1.0 - _NEARER)
+    return ax * ax + ay * ay < (bx * bx + by * by) * (1.0 - NOTABLE)
 
 
 @part(fastmath=False, error_model="numpy", nogil=True, **UNCOUNTED)
@@ -136,7 +124,7 @@ def _meet(vertices, next_vertex, previous_vertex, v, w):
 def _shallower(vertices, next_vertex, previous_vertex, vertex, gap, other):
     """Whether ``vertex`` meets the edge with this ``gap`` at a corner, rather than the corner's ``other`` edge."""
     away, _, _, other_gap, _, _ = _against(vertices, next_vertex, previous_vertex, vertex, other)
-    return away < -_ANGLE or gap >= other_gap
+    return away < -ONE_FACE_SIN or gap >= other_gap
 
 
 @part(fastmath=False, error_model="numpy", nogil=True, **UNCOUNTED)
@@ -220,7 +208,9 @@ def convex_corners(vertices, next_vertex, previous_vertex):
         k, j = previous_vertex[i], next_vertex[i]
         ax, ay = vertices[i, 0] - vertices[k, 0], vertices[i, 1] - vertices[k, 1]
         bx, by = vertices[j, 0] - vertices[i, 0], vertices[j, 1] - vertices[i, 1]
-        convex[i] = ax * by - ay * bx >= -_FLAT * np.sqrt((ax * ax + ay * ay) * (bx * bx + by * by))
+        # Flat as in `Blocks.in_side`: the noise of the vertices of an edge of centimetres turns it by 1e-9, and must not
+        # decide whether a face touches there.
+        convex[i] = ax * by - ay * bx >= -NOTHING * np.sqrt((ax * ax + ay * ay) * (bx * bx + by * by))
     return convex
 
 
@@ -286,7 +276,7 @@ def _look_at(rows, lines, box, pairs, windows, outlines, old_keys, corners):
     for pair in range(pairs.shape[0]):
         a, b = pairs[pair, 0], pairs[pair, 1]
         # In exact ties vertices of the later block represent a contact: of the smaller one, whatever the blocks' numbers.
-        if corners.size[a] < (1.0 - _ALIKE) * corners.size[b]:
+        if corners.size[a] < (1.0 - SAME) * corners.size[b]:
             a, b = b, a
         # Lines of rounded corners do not act separately.
         zone = rounding_length(
@@ -354,7 +344,9 @@ def _entrance_lines(lines, outlines, old_keys, v, w):
         else:
             vertex, edge, sign = v, (w if c == 2 else previous_vertex[w]), 1.0
         away, nx, ny, gap, along, length = _against(vertices, next_vertex, previous_vertex, vertex, edge)
-        if away < -_ANGLE or (away < 0.0 and _lies_behind(vertices, next_vertex, previous_vertex, vertex, nx, ny)):
+        if away < -ONE_FACE_SIN or (
+            away < 0.0 and _lies_behind(vertices, next_vertex, previous_vertex, vertex, nx, ny)
+        ):
             continue
         nx, ny = sign * nx, sign * ny
         outside = max(0.0, -along, along - length)
@@ -388,7 +380,8 @@ def _stands_better(lines, same, old_keys, n_vertices, vertex, edge, away, outsid
     """Whether ``vertex`` and ``edge`` represent the line ``same`` better than its present representative."""
     shape = lines.shape
     near = 1e-9 * max(length, shape[same, 4])
-    if abs(away - shape[same, 6]) > _LEAN:
+    # Of two corners on one line, the one represents it past which the other's face does not lean by more.
+    if abs(away - shape[same, 6]) > NOTABLE:
         return away > shape[same, 6]
     if abs(outside - shape[same, 3]) <= near:
         return (
@@ -496,7 +489,7 @@ def _meets_edge(outlines, convex, window, v, edge):
     away, nx, ny, gap, along, length = _against(vertices, next_vertex, previous_vertex, v, edge)
     if abs(gap) > window or along < -window or along > length + window:
         return False
-    if away < -_ANGLE:
+    if away < -ONE_FACE_SIN:
         if gap <= 0.0 or along < 0.0 or along > length:
             return False
         if not _may_turn_to(vertices, next_vertex, previous_vertex, v, nx, ny, gap, window):
@@ -526,7 +519,7 @@ def _met_next_to_corner(outlines, v, gap, corner, other):
 
 def _each(window, n: int) -> np.ndarray:
     """(n,) m: the same ``window`` for all, or one of each."""
-    return np.ascontiguousarray(np.broadcast_to(np.asarray(window, float), n))
+    return np.full(n, window, float)
 
 
 class Known(NamedTuple):
@@ -627,7 +620,7 @@ def _tributary(outlines, vertex, edge, nx, ny, along, length, before, after):
             tx, ty = vertices[far, 0] - vertices[face, 0], vertices[far, 1] - vertices[face, 1]
             face_length = np.sqrt(tx * tx + ty * ty)
             tx, ty = tx / face_length, ty / face_length
-            if (sx * tx + sy * ty) / own_length > -_MATING or -ny * tx + nx * ty < _MATING:
+            if (sx * tx + sy * ty) / own_length > -ONE_FACE_COS or -ny * tx + nx * ty < ONE_FACE_COS:
                 continue
             s0 = (vertices[own, 0] - vertices[face, 0]) * tx + (vertices[own, 1] - vertices[face, 1]) * ty
             s1 = (vertices[head, 0] - vertices[face, 0]) * tx + (vertices[head, 1] - vertices[face, 1]) * ty

@@ -43,12 +43,10 @@ from ...compiled import kept
 from ...model import OPEN
 from ..joint_laws.bonds import WITHOUT_GAPS, BondedFaces, on_lines
 from ..joint_laws.penalty_springs import Springs
+from ..kinematics.tolerances import NOTABLE
 
 #: Distance between the two Gauss points of an interval, relative to its length.
 _GAUSS = 1 / np.sqrt(3.0)
-#: The part in contact counts as found when its ends change by less than this part of the face; forces are then accurate
-#: to its square. The next step begins from the geometry, so that statics converge.
-_KNOWN = 1e-2
 #: Springs at this relative distance from each other are at the corners of the face.
 _AT_CORNERS = 0.99
 
@@ -313,7 +311,8 @@ class FacePoints:
         way = part - self.part
         relaxation = np.where((way * self.last_change).sum(axis=1) < 0, 0.5 * self.relaxation, self.relaxation)
         way *= relaxation[:, None]
-        off = np.abs(way).max(axis=1) > _KNOWN * (part[:, 1] - part[:, 0])
+        # Forces are accurate to the square of this. The next step begins from the geometry, so that statics converge.
+        off = np.abs(way).max(axis=1) > NOTABLE * (part[:, 1] - part[:, 0])
         if not off.any():
             return None
         way[~off] = 0.0

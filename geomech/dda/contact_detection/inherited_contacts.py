@@ -12,16 +12,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ...model import CONTACT, OPEN, SLIP, STICK
+from ..kinematics.tolerances import LITTLE
 from .face_quadrature import FacePoints
 
 if TYPE_CHECKING:
     from ..open_close.contact_set import ContactSet
 
 #: Faces of two blocks with a smaller angle between their normals (cosine) have the same misfit.
-_ALIGNED = 0.99
-#: A contact starts as sliding when its shear force is within this part of its strength: edges have rotated by strains
-#: since the force was computed.
-_AT_STRENGTH = 1e-3
+ALIGNED = 0.99
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,7 +59,8 @@ def inherited_rows(
     at, n = inherited.which, inherited.normal
     closed = (n > 0) | (found.bonded[at] > 0)
     strength = found.springs.peak[at] * n
-    slides = closed & (found.bonded[at] == 0) & (np.abs(inherited.shear) >= (1 - _AT_STRENGTH) * strength)
+    # Edges have rotated by strains since the force was computed.
+    slides = closed & (found.bonded[at] == 0) & (np.abs(inherited.shear) >= (1 - LITTLE) * strength)
     # A contact that slides without friction has no force that gives its direction.
     slides &= (inherited.shear != 0) | (strength == 0)
     pressed_in = np.where(on_multiplier[at], 0.0, _closed_by(n, found.springs.normal[at], closure[found.law[at]]))
@@ -130,7 +129,7 @@ def misfit_of_new(
     for c in at.tolist():
         pair = (first == min(block[c], other[c])) & (second == max(block[c], other[c]))
         pushes = np.where(old["block"] == block[c], 1.0, -1.0) * (old["normal"] @ geometry[c, 1:3])
-        rows = np.flatnonzero(pair & (pushes > _ALIGNED))
+        rows = np.flatnonzero(pair & (pushes > ALIGNED))
         if len(rows):
             apart = old["point"][rows] - geometry[c, 5:7]
             lift[c] = min(float(old["lift"][rows[np.argmin(np.hypot(*apart.T))]]), 0.0)

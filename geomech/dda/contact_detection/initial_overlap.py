@@ -8,15 +8,15 @@ import numpy as np
 
 from ...compiled import UNCOUNTED, kept, part
 from ...model import Blocks
+from ..kinematics.tolerances import LITTLE, NOTHING
 from ..step_control.continuous_collision import depth_inside
 from .neighbour_search import boxes, near_pairs
 
 log = logging.getLogger(__name__)
 
-#: Overlap over the size √area of the smaller block, above which it is refused,
-REFUSED = 1e-3
-#: and above which it is reported: the springs release the energy of the overlap.
-REPORTED = 1e-6
+#: Overlap over the size √area of the smaller block, above which it is refused; above `NOTHING` it is reported, since the
+#: springs release the energy of the overlap.
+REFUSED = LITTLE
 
 
 @part(fastmath=False, error_model="numpy", nogil=True, **UNCOUNTED)
@@ -99,10 +99,10 @@ def refuse_overlap(blocks: Blocks, vertices: np.ndarray, moments: np.ndarray) ->
     """Check for overlapping blocks at ``vertices``; ``moments`` as in `deepest_overlap`.
 
     Raises ValueError that names the worst pair when it overlaps by more than `REFUSED` of the smaller block's size;
-    logs a warning above `REPORTED`.
+    logs a warning above `NOTHING`.
     """
     a, b, depth, share = deepest_overlap(blocks, vertices, moments)
-    if share <= REPORTED:
+    if share <= NOTHING:
         return
     start = blocks.vertex_start
     low, high = ([limit(vertices[start[k] : start[k + 1]], axis=0) for k in (a, b)] for limit in (np.min, np.max))

@@ -17,7 +17,8 @@ import numpy as np
 
 from ...compiled import kept
 from ...model import OPEN
-from ..joint_laws.bonds import ALIGNED, OFF_LINE, WITHOUT_GAPS
+from ..joint_laws.bonds import WITHOUT_GAPS
+from ..kinematics.tolerances import ONE_FACE_COS, ONE_FACE_SIN
 
 
 class NodesInFaces(NamedTuple):
@@ -116,11 +117,11 @@ def _between(candidate, vertex, edge, owner, geometry, law):
                 break
             if q == r or out[q] or law[q] != law[r] or length[q] <= 0.0:
                 continue
-            if abs(nx * geometry[q, 1] + ny * geometry[q, 2]) < ALIGNED:
+            if abs(nx * geometry[q, 1] + ny * geometry[q, 2]) < ONE_FACE_COS:
                 continue
             dx, dy = geometry[q, 5] - geometry[r, 5], geometry[q, 6] - geometry[r, 6]
             along, off = dy * nx - dx * ny, dx * nx + dy * ny
-            if abs(off) > OFF_LINE * abs(along) + abs(geometry[r, 3]) + abs(geometry[q, 3]):
+            if abs(off) > ONE_FACE_SIN * abs(along) + abs(geometry[r, 3]) + abs(geometry[q, 3]):
                 continue
             if along < 0.0 and along > before:
                 before, low = along, q

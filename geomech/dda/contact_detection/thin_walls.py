@@ -16,11 +16,7 @@ from __future__ import annotations
 import numpy as np
 
 from ...compiled import UNCOUNTED, kept, part
-
-#: A vertex touches an edge, rather than lies behind it, within this part of the edge's length.
-_BEHIND = 1e-9
-#: The far side of a wall is farther than this part of the depth: nearer hits are the near side itself.
-_START = 1e-6
+from ..kinematics.tolerances import NOTHING, SAME
 
 
 @part(fastmath=False, error_model="numpy", nogil=True, **UNCOUNTED)
@@ -55,7 +51,7 @@ def _convex(vertices, next_vertex, previous_vertex, i):
     k, j = previous_vertex[i], next_vertex[i]
     ax, ay = vertices[i, 0] - vertices[k, 0], vertices[i, 1] - vertices[k, 1]
     bx, by = vertices[j, 0] - vertices[i, 0], vertices[j, 1] - vertices[i, 1]
-    return ax * by - ay * bx >= -_BEHIND * np.sqrt((ax * ax + ay * ay) * (bx * bx + by * by))
+    return ax * by - ay * bx >= -SAME * np.sqrt((ax * ax + ay * ay) * (bx * bx + by * by))
 
 
 @kept(fastmath=False, error_model="numpy", nogil=True)
@@ -72,7 +68,7 @@ def from_outside(vertex, edge, gap, vertices, next_vertex, previous_vertex, star
         f = next_vertex[e]
         dx, dy = vertices[f, 0] - vertices[e, 0], vertices[f, 1] - vertices[e, 1]
         length = np.sqrt(dx * dx + dy * dy)
-        if known[c] or gap[c] >= -_BEHIND * length:
+        if known[c] or gap[c] >= -SAME * length:
             continue
         nx, ny = dy / length, -dx / length
         t = ((vertices[v, 0] - vertices[e, 0]) * dx + (vertices[v, 1] - vertices[e, 1]) * dy) / (length * length)
@@ -93,7 +89,8 @@ def from_outside(vertex, edge, gap, vertices, next_vertex, previous_vertex, star
             nx, ny = nx / depth, ny / depth
         else:
             x, y = vertices[e, 0] + t * dx, vertices[e, 1] + t * dy
-        thick, far = _thickness(vertices, next_vertex, e, start[b], start[b + 1], x, y, nx, ny, _START * depth)
+        # Hits nearer than `NOTHING` of the depth are the near side itself.
+        thick, far = _thickness(vertices, next_vertex, e, start[b], start[b + 1], x, y, nx, ny, NOTHING * depth)
         if shallow[c] >= 0.0 and not past and far >= 0 and (next_vertex[far] == e or next_vertex[e] == far):
             g = next_vertex[far]
             ux, uy = vertices[g, 0] - vertices[far, 0], vertices[g, 1] - vertices[far, 1]

@@ -29,6 +29,7 @@ from ...compiled import UNCOUNTED, kept
 from ...model import JointLaw, State
 from ..kinematics.midpoint_configuration import MidpointConfiguration
 from ..kinematics.polygon_quadrature import gauss_points
+from ..kinematics.tolerances import LITTLE, NOTABLE
 from ..open_close.contact_set import ContactSet
 from .crack_softening import SoftenedBlock
 from .deflected_blocks import DeflectedBlocks, rotation_of, strain_turned_back
@@ -39,10 +40,6 @@ from .six_row_system import SixRowPattern, add_force, add_pair, moved
 #: τ over the larger λ of the two cells; above a half is stable. Displacements of a cantilever of cells hardly change
 #: from 1 to 10 (`tests/dda/higher_order/test_glued_cells.py`).
 PENALTY = 2.0
-#: Corners of cells of one rock coincide if their distance is below this part of the cells' size (√area).
-_SAME = 1e-3
-#: Faces separate together whose stress is within this part of the highest: those that symmetry makes equal.
-_TOGETHER = 0.01
 
 
 def traction_of(normal: np.ndarray) -> np.ndarray:
@@ -346,7 +343,7 @@ class GlueStrength:
         if not len(share) or not share.max() > 1.0:
             return None
         out = parted.copy()
-        out[left[share > max(1.0, (1.0 - _TOGETHER) * share.max())]] = True
+        out[left[share > max(1.0, (1.0 - NOTABLE) * share.max())]] = True
         return out
 
 
@@ -373,7 +370,7 @@ class KeptCorners:
         both, place = np.stack([found.block, found.other], axis=1), found.geometry[:, 5:7]
         tree = cKDTree(place[ends])
         for c in faces.lone.tolist():
-            for e in ends[tree.query_ball_point(place[c], _SAME * size[c])].tolist():
+            for e in ends[tree.query_ball_point(place[c], LITTLE * size[c])].tolist():
                 for end, other_end in ((0, 0), (0, 1), (1, 0), (1, 1)):
                     a, b = int(both[c, end]), int(both[e, other_end])
                     if both[c, 1 - end] == both[e, 1 - other_end] and _is_in(min(a, b) * n + max(a, b), self.joined):

@@ -39,6 +39,7 @@ import numpy as np
 
 from ...model import AUTO_ORDER, OPEN, SLIP, STICK, Blocks
 from ..kinematics.displacement_matrix import displacement_matrix
+from ..kinematics.tolerances import NOTABLE
 from .deflected_blocks import DeflectedBlocks
 from .deflection_basis import HIGHEST, n_deflections
 from .face_points import FaceContacts
@@ -57,8 +58,6 @@ _SOFTER_IN_BENDING = 4.0
 #: Increase of the forces on a block, or decrease of the energy, since earlier estimates by which these may be out of date:
 #: the work grows with the square of the forces. And number of steps after which they are repeated in any case.
 _MORE, _REPEATED = 1.1, 10
-#: Forces below this fraction of the largest do not count.
-_SMALL = 1e-2
 #: Unknowns of blocks are constrained by springs of this part of the rock's stiffness, to make matrices regular: small beside
 #: the rock, and so large that blocks which move freely as a group are known to 1e-10 of contacts that are a hundred times stiffer.
 _REGULARISATION = 1e-6
@@ -200,7 +199,7 @@ class OrderChoice:
         if before is None:
             self._borne = _Borne(forces, energy)
             return False
-        least = _SMALL * before.forces.max(initial=0.0)
+        least = NOTABLE * before.forces.max(initial=0.0)
         same = (forces <= _MORE * np.maximum(before.forces, least)).all() and _MORE * energy >= before.energy
         before.steps += 1
         if same and before.steps < _REPEATED:

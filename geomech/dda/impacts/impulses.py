@@ -17,11 +17,10 @@ from typing import NamedTuple
 import numpy as np
 
 from ...compiled import kept
+from ..kinematics.tolerances import SAME
 
-#: Sweeps end when no relative velocity changes by more than this fraction of the largest required one, far below the
-#: accuracy of coefficients of restitution, …
-_WITHIN = 1e-9
-#: … or after this number: a struck column of 100 bricks takes 4 000.
+#: Sweeps end when no relative velocity changes by more than `SAME` of the largest required one, far below the accuracy of
+#: coefficients of restitution, or after this number: a struck column of 100 bricks takes 4 000.
 _SWEEPS = 20_000
 
 
@@ -54,7 +53,7 @@ class ImpulseProblem(NamedTuple):
         velocity = np.ascontiguousarray(self.velocity, dtype=float).copy()
         impulse = _swept(
             self.block, self.other, self.normal, self.arms, self.inverse, velocity, self.across, self.along,
-            self.friction, self.glued, _WITHIN, _SWEEPS,
+            self.friction, self.glued, SAME, _SWEEPS,
         )  # fmt: skip
         return impulse, velocity
 

@@ -27,16 +27,13 @@ import numpy as np
 
 from ...compiled import UNCOUNTED, kept, part
 from ...model import OPEN, SLIP, STICK
+from ..kinematics.tolerances import NOTABLE, ONE_FACE_COS, ONE_FACE_SIN
 from .coulomb_return import ContactStates, Strengths
 
 #: Bond states of a CONTACT row: intact, and cracked from its edge (cohesion only under compression).
 WHOLE, CRACKED = 1, 3
-#: Contacts may lie on one face if the angle between their normals is less than this (cosine) …
-ALIGNED = 0.9986
-#: … and if their offset from its line is less than this fraction of their distance (sine of the same angle, about 3°).
-OFF_LINE = 0.053
 #: Relative difference between a face's length and the sum of its tributary lengths above which it has gaps.
-WITHOUT_GAPS = 1e-2
+WITHOUT_GAPS = NOTABLE
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,8 +108,8 @@ def _on_one_line(first, last, swapped, geometry):
             turn = sense * (-1.0 if swapped[k] else 1.0)
             nx, ny = geometry[k, 1], geometry[k, 2]
             dx, dy = geometry[c, 5] - geometry[k, 5], geometry[c, 6] - geometry[k, 6]
-            straight = turn * (nx * geometry[c, 1] + ny * geometry[c, 2]) > ALIGNED
-            if straight and abs(nx * dx + ny * dy) <= OFF_LINE * np.sqrt(dx * dx + dy * dy):
+            straight = turn * (nx * geometry[c, 1] + ny * geometry[c, 2]) > ONE_FACE_COS
+            if straight and abs(nx * dx + ny * dy) <= ONE_FACE_SIN * np.sqrt(dx * dx + dy * dy):
                 face[c], lead[c], along[c] = face[k], k, nx * dy - ny * dx
                 break
         if face[c] < 0:

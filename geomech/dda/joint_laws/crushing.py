@@ -22,6 +22,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ...model import OPEN
+from ..kinematics.tolerances import NOTHING
 from .penalty_springs import Springs
 
 if TYPE_CHECKING:
@@ -34,8 +35,6 @@ _HARDENING = 1e-8
 #: crush, and each next law from the states of the last one. (An arch of twelve voussoirs under its weight in one step
 #: takes 40 iterations. Without them trial states with many crushing faces move blocks by metres.)
 _CONTINUED = (1.0, 1e-1, 1e-2, 1e-3, 1e-4, 1e-6, _HARDENING)
-#: Relative tolerance of the limit force, well above the rounding of crushing contacts.
-_KNOWN = 1e-6
 
 
 class CrushingFaces:
@@ -84,7 +83,7 @@ class CrushingFaces:
         out, at = np.zeros(len(state)), self.rows
         moved = forces[at, 2] - gap_was[at]
         off = np.abs(now.normal[at] * (gap_now[at] + moved) + forces[at, 0])
-        least = np.maximum(_KNOWN * self._limit, np.maximum(was.normal[at], now.normal[at]) * slack[at])
+        least = np.maximum(NOTHING * self._limit, np.maximum(was.normal[at], now.normal[at]) * slack[at])
         wrong = (state[at] != OPEN) & (was.normal[at] != now.normal[at]) & (off > least)
         out[at] = np.where(wrong, off, 0.0)
         return out

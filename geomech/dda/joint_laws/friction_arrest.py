@@ -26,6 +26,7 @@ from ...compiled import UNCOUNTED, kept
 from ...model import OPEN, SLIP, STICK
 from ..contact_detection.contact_records import largest_of_blocks
 from ..equation_records import BlockEquations, ContactMotion, ContactStiffness, SpringsInStates
+from ..kinematics.tolerances import LITTLE, NOTABLE
 from ..linear_solver import assembly
 from ..open_close.contact_set import ContactSet
 from ..open_close.settled_states import Settled
@@ -39,13 +40,6 @@ _TURNS_ABOUT = 16.0
 #: Displacement of blocks at rest per step due to rounding, in units of the rounding of one contact: 4 in a wall of 1
 #: 000 bricks, 19 in one of 10 000. Slower sliding is not stopped, which would take three solutions in every step.
 _PASSED_ON = 20.0
-#: Sliding is stopped if any speed exceeds this fraction of the velocity change that the largest contact force on the
-#: block causes in a step. (A brick that slides on a wall of 10 000 moves hundreds of contacts at their strength by
-#: 1e-11 m per step, 1e-12 J in all; stopping these would take three more solutions of all equations.)
-_WORTHWHILE = 1e-3
-#: Vibrations are removed if they change contact forces by more than this fraction of the largest: smaller ones hardly
-#: bring contacts to their strength.
-_SWING = 1e-2
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,7 +64,8 @@ class Unresolved:
         along = np.where(sticks, speeds[:, 1] - slid / dt, 0.0)
         rows = np.flatnonzero(holds)
         largest = np.maximum(np.abs(apart[rows]), np.abs(along[rows])) / dt
-        if not _worth_it(found, rows, largest, light, mass, settled.normal_force, _SWING):
+        # Smaller vibrations hardly bring contacts to their strength.
+        if not _worth_it(found, rows, largest, light, mass, settled.normal_force, NOTABLE):
             return None
         return cls(apart, along)
 
@@ -102,7 +97,9 @@ class Stopped:
         before = sense * (2.0 * slid[rows] / dt - after)
         keep = (np.abs(after) * dt > _PASSED_ON * slack) & (before > 0.0) & (sense * after < 0.0)
         light = np.where(mass[found.block] <= mass[found.other], found.block, found.other)
-        if not _worth_it(found, rows[keep], np.abs(after[keep]) / dt, light, mass, settled.normal_force, _WORTHWHILE):
+        # A brick that slides on a wall of 10 000 moves hundreds of contacts at their strength by 1e-11 m per step, 1e-12 J in
+        # all: stopping these would take three more solutions of all equations.
+        if not _worth_it(found, rows[keep], np.abs(after[keep]) / dt, light, mass, settled.normal_force, LITTLE):
             return None
         return cls(rows[keep], sense[keep], before[keep], sense[keep] * after[keep])
 

@@ -18,6 +18,7 @@ import numpy as np
 
 from ...model import OPEN, SLIP
 from ...model.joints.joint_law import STEEPEST
+from ..kinematics.tolerances import NOTHING
 from .penalty_springs import JointTable, Springs
 
 if TYPE_CHECKING:
@@ -26,8 +27,6 @@ if TYPE_CHECKING:
 #: JRC mobilised over its peak, at slips over that of the peak.
 _SLIP_OVER_PEAK = np.array([1.0, 2.0, 4.0, 10.0, 25.0, 100.0])
 _ROUGHNESS_LEFT = np.array([1.0, 0.85, 0.70, 0.50, 0.40, 0.0])
-#: Lower limit of the normal stress for the shear stiffness, relative to the wall's strength.
-_LEAST_PRESSURE = 1e-6
 #: Tolerance between forces and laws, relative to the contact's force. Wear by slip is found by successive substitution,
 #: so it is larger than the round-off tolerance of contact states.
 _AGREED = 1e-8
@@ -127,7 +126,7 @@ class CurvedJoints:
         shear = springs.shear[at]
         by_peak = t.stiff_by_peak[law] & face
         if by_peak.any():
-            least = np.maximum(pressure, _LEAST_PRESSURE * t.jcs[law])
+            least = np.maximum(pressure, NOTHING * t.jcs[law])
             strength, _, _ = rough_strength(least, t.jrc[law], t.jcs[law], t.residual_angle[law])
             shear = np.where(by_peak, strength * length / t.peak_slip[law], shear)
         lift = np.where(state[at] == SLIP, self._lift(pressure, p, direction[at]), 0.0)

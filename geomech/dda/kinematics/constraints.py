@@ -5,10 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ...compiled import UNCOUNTED, kept
-
-#: Loads on a lone block balance when their resultant, over the sum of their sizes, is below this. Loads that balance on
-#: the undeformed block are out of balance by about its strain on the deformed one, which is less.
-_BALANCE = 1e-2
+from .tolerances import NOTABLE
 
 
 def balanced(load: np.ndarray, points: np.ndarray, edges: np.ndarray, weight: np.ndarray, moments: np.ndarray) -> bool:
@@ -19,8 +16,9 @@ def balanced(load: np.ndarray, points: np.ndarray, edges: np.ndarray, weight: np
     direction it is unstable. In statics its rigid motion, which carries no force, is therefore constrained.
     """
     size = sum(float(np.abs(rows["force"]).sum()) for rows in (points, edges))
+    # Loads that balance on the undeformed block are out of balance by about its strain on the deformed one, which is less.
     total = np.abs(load[:3] / [1.0, 1.0, np.sqrt(moments[0])])
-    return float(np.abs(weight).sum()) <= _BALANCE * size and bool((total <= _BALANCE * size).all())
+    return float(np.abs(weight).sum()) <= NOTABLE * size and bool((total <= NOTABLE * size).all())
 
 
 def with_rigid_motion(constrained: np.ndarray | None) -> np.ndarray:

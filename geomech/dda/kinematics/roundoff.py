@@ -8,17 +8,17 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from .tolerances import NOTABLE, NOTHING
+
 log = logging.getLogger(__name__)
 
 #: Round-off of coordinates and gaps over the largest coordinate.
 _ROUNDING = 5e-16
-#: In dynamic steps, gaps below this many times the round-off do not decide contact states, where their forces are below
-#: that part of the loads nearby. (In walls and slopes of 1 000 to 40 000 blocks at rest, one step in one to three has a
+#: In dynamic steps, gaps below this many times the round-off do not decide contact states, where their forces are
+#: nothing beside the loads nearby. (In walls and slopes of 1 000 to 40 000 blocks at rest, one step in one to three has a
 #: contact that exceeds the round-off, by 1.3 times it at most, and costs one more solution.) Of a sliver the force of the
-#: round-off alone may be more: a contact that is let pull by it moves the sliver by that part of its free fall.
-_WANDERS, _NOTHING = 4.0, 1e-6
-#: Warn of a block whose contact forces from round-off exceed this part of its weight.
-_NOTICEABLE = 1e-2
+#: round-off alone may be more: a contact that is let pull by it moves the sliver by a millionth of its free fall.
+_WANDERS = 4.0
 
 
 def rounding_of(vertices: np.ndarray) -> float:
@@ -37,7 +37,7 @@ def undecided_gaps(
     their ``order`` (n_blocks,). The round-off alone would make a pebble far from the origin stick."""
     load = np.append(np.abs(right).max(axis=1, initial=0.0), np.inf)
     least = np.minimum(load[order[block]], load[order[other]])
-    return np.minimum(_NOTHING * least / np.maximum(normal, 1e-300), _WANDERS * rounding)
+    return np.minimum(NOTHING * least / np.maximum(normal, 1e-300), _WANDERS * rounding)
 
 
 def warn_of_roundoff(
@@ -52,7 +52,7 @@ def warn_of_roundoff(
     least = np.minimum(weight[block], weight[other])
     share = rounding * normal / np.maximum(least, 1e-300)
     c = int(np.argmax(share))
-    if share[c] <= _NOTICEABLE or least[c] == 0.0:
+    if share[c] <= NOTABLE or least[c] == 0.0:
         return
     light = block[c] if weight[block[c]] <= weight[other[c]] else other[c]
     log.warning(

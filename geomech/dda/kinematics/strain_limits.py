@@ -8,11 +8,12 @@ import numpy as np
 
 from ...model import Blocks, Motion
 from ..results import NotConverged
+from .tolerances import NOTABLE
 
 log = logging.getLogger(__name__)
 
 #: Strain beyond which a block is reported: rock is elastic up to strains of some thousandths.
-BEYOND = 1e-2
+BEYOND = NOTABLE
 #: Strain at which the run ends: the block is no linear elastic body any more, and its cracks are solved on the
 #: undeformed one.
 REFUSED = 0.25

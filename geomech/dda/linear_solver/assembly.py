@@ -23,12 +23,10 @@ from ..equation_records import (
 )
 from .block_solver import RESIDUAL, BlockSolver
 from .simd import load_six, minus_product, numbers, plus_product, product, spread, store, store_six, zeros
-from .task_pool import add_at_once, await_value, thread_team
+from .task_pool import SHARE, THREADED, add_at_once, await_value, thread_team
 
 #: Number of free blocks up to which a dense factorisation is faster than a sparse one (measured on brick walls).
 DENSE_BLOCKS = 60
-#: Number of blocks from which rows are filled on all cores, and number of rows per task.
-THREADED, SHARE = 4000, 256
 #: Fraction of blocks up to which only the rows of those with changed contact springs are filled again.
 FILLED_AGAIN = 0.25
 

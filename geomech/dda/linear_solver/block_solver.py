@@ -22,7 +22,7 @@ from ..counters import Work
 from .conjugate_residuals import Directions
 from .multifrontal import Factors
 from .nested_dissection import KEPT, Tree
-from .task_pool import add_at_once, await_value, thread_team
+from .task_pool import SHARE, THREADED, add_at_once, await_value, thread_team
 
 _jit = kept(fastmath=False, error_model="numpy", nogil=True)
 
@@ -58,8 +58,6 @@ SINGLE = 4000
 #: of a millisecond each (0.12 ms with 80 blocks, 0.6 ms with 200), and kernels for single precision take a tenth of the
 #: first run's compiling.
 SINGLE_ROUGH = 150
-#: Number of blocks from which products are formed on all cores, and number of rows per task.
-SHARED, SHARE = 4000, 512
 
 
 @kept(fastmath={"reassoc", "contract", "nsz"}, error_model="numpy", nogil=True, **UNCOUNTED)
@@ -100,7 +98,7 @@ def multiply(data: np.ndarray, pointer: np.ndarray, columns: np.ndarray, x: np.n
     """A x for 6×6 blocks stored row by row; large systems on all cores, with the same result bit for bit."""
     out = np.empty(6 * (len(pointer) - 1))
     given = data, pointer, columns, x, out
-    if len(pointer) <= SHARED:
+    if len(pointer) <= THREADED:
         _multiply_rows(0, len(pointer) - 1, *given)
     else:
         thread_team().share(_multiply_shared, np.zeros(1, np.int64), np.zeros(1, np.int64), SHARE, *given)

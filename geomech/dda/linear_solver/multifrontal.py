@@ -16,13 +16,13 @@ from ...compiled import UNCOUNTED, kept
 from .blas_threads import blas_threads
 from .front_elimination import eliminate, places, working_space
 from .nested_dissection import Tree, plan
-from .task_pool import add_at_once, await_value, thread_team
+from .task_pool import THREADED, add_at_once, await_value, thread_team
 from .triangular_solve import backward, forward
 
 _jit = kept(fastmath=False, error_model="numpy", nogil=True, **UNCOUNTED)
 
-#: Number of blocks from which they are factored, and solutions substituted, on all cores.
-THREADED, THREADED_SOLUTION = 500, 4000
+#: Number of blocks from which they are factored on all cores; solutions are substituted on all from `THREADED`.
+_THREADED_FACTORS = 500
 
 
 @kept(fastmath=False, error_model="numpy", nogil=True)
@@ -172,7 +172,7 @@ class Factors:
         self._left = self._again and (again or not touched.all())
         with blas_threads(1):
             done = self._shared(
-                _eliminate_shared, THREADED, touched, self._fronts, (data, t.entries, t.entry, t.row, t.column),
+                _eliminate_shared, _THREADED_FACTORS, touched, self._fronts, (data, t.entries, t.entry, t.row, t.column),
                 (t.own_room if self._left else t.stack, self._at, self._back),
                 (self._room, self._factors, self._units),
             )  # fmt: skip
@@ -188,7 +188,7 @@ class Factors:
         out, x = np.empty(len(right), self._factors.dtype), np.empty(len(right))
         _take(right, self._order, size, out)
         self._shared(
-            _substitute_shared, THREADED_SOLUTION, out, self._fronts, t.boundary, (self._at, self._back),
+            _substitute_shared, THREADED, out, self._fronts, t.boundary, (self._at, self._back),
             self._factors, self._passed,
         )  # fmt: skip
         _give(out, self._order, size, x)

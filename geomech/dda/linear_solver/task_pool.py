@@ -21,6 +21,8 @@ from numba.np.arrayobj import make_array
 
 from ...compiled import UNCOUNTED, part
 
+#: Number of blocks from which rows, products and iterations are shared by all cores, and number of blocks per task.
+THREADED, SHARE = 4000, 512
 #: Number of checks for another thread's result before this one sleeps for this many microseconds between them: with
 #: more threads than cores the other one may not be running.
 _LOOKS, _SLEEP = 2000, 50

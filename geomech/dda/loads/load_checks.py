@@ -8,11 +8,11 @@ import numpy as np
 
 from ...model import GROUND, BaseMotion, Blocks, Loads, ViscousBoundary
 from ...model.blocks.polygon import distance_to_edges, winding_number
+from ..kinematics.tolerances import LITTLE
 from .bolts import labels
 
-#: A point belongs to a block when its distance outside is at most this part of the block's size,
-_OF_BLOCK = 1e-3
-#: or this part of the whole drawing's size: scenes accept points up to 1e-6 of it outside.
+#: A point belongs to a block when its distance outside is at most `LITTLE` of the block's size, or this part of the whole
+#: drawing's size: scenes accept points up to 1e-6 of it outside.
 _OF_DRAWING = 2e-6
 
 
@@ -78,7 +78,7 @@ class LoadChecks:
         if abs(winding_number(loops, at)) > 0.5:
             return
         away = min(distance_to_edges(at, loop, np.roll(loop, -1, axis=0)) for loop in loops)
-        if away > max(_OF_BLOCK * float(np.ptp(loops[0], axis=0).max()), self._reach):
+        if away > max(LITTLE * float(np.ptp(loops[0], axis=0).max()), self._reach):
             raise ValueError(
                 f"{what} acts on {name!r} at ({at[0]:g}, {at[1]:g}), which lies {away:.3g} m outside of it: points are "
                 "given in the coordinates in which the blocks were drawn"

@@ -5,10 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from ...model import Blocks, WaterTable
+from ..kinematics.tolerances import NOTHING
 from .force_records import EDGE_FORCE
-
-#: Faces lie against drained blocks, or on the ground, within this part of the drawing's size.
-_AGAINST = 1e-6
 
 
 def wet_pieces(
@@ -29,7 +27,7 @@ def wet_pieces(
     start = blocks.vertices[edges]
     along = blocks.vertices[blocks.next_vertex[edges]] - start
     square = np.sum(along**2, axis=1)
-    near = _AGAINST * np.ptp(blocks.vertices, axis=0).max()
+    near = NOTHING * np.ptp(blocks.vertices, axis=0).max()
     dry: dict[int, list[tuple[float, float]]] = {}
     for ends in np.concatenate(against):
         arm = ends[:, None] - start

@@ -13,6 +13,7 @@ from ..joint_laws.bonds import BondedFaces, FaceBonds, ForcesBefore, check_faces
 from ..joint_laws.coulomb_return import ContactStates, Strengths, check_states, contact_forces
 from ..joint_laws.nonlinear_laws import NonlinearLaws
 from ..joint_laws.penalty_springs import Springs
+from ..kinematics.tolerances import NOTHING
 from ..linear_solver import assembly
 from ..linear_solver.block_solver import RESIDUAL
 from .contact_set import ContactSet
@@ -20,8 +21,6 @@ from .settled_states import Settled
 
 #: Residual, relative to the forces, that suffices to recognise inconsistent states.
 _ROUGHLY = 1e-8
-#: Bonds that reach their strengths within this relative difference of the load break together.
-_AT_ONCE = 1e-6
 
 
 class Unsettled(Exception):
@@ -227,7 +226,7 @@ class Equations:
             np.minimum.at(first, blocks, when)
         first[self.pattern.order < 0] = np.inf
         least = np.minimum(first[found.block], first[found.other])
-        return which & (when <= least + _AT_ONCE * np.abs(least))
+        return which & (when <= least + NOTHING * np.abs(least))
 
     def settled(self, states: States, answer: Answer, iterations: int) -> Settled:
         """The result for consistent ``states``. Bonds without tensile strength are lost where they are open by more

@@ -21,6 +21,7 @@ import numpy as np
 from ...model import OPEN, SLIP, STICK, ContactSolver
 from ..contact_detection.contact_finder import ContactSet
 from ..contact_detection.contact_records import largest_of_blocks
+from ..kinematics.tolerances import NOTHING
 from .block_patches import settled_in_patch
 from .equations import Answer, Equations, States, Unsettled
 from .interior_point.central_path import SLIPPED, CentralPath
@@ -30,9 +31,6 @@ from .settled_states import Settled
 from .static_splitting import Converged, can_split_statics, split_statics
 
 log = logging.getLogger(__name__)
-
-#: Contact forces on a block below this fraction of the loads on it are round-off.
-_NO_FORCE = 1e-6
 
 
 @dataclass(frozen=True)
@@ -85,7 +83,7 @@ def _falls(equations: Equations, settled: Settled) -> bool:
         np.maximum.at(push, blocks, np.hypot(settled.normal_force, settled.shear_force))
         touched[blocks[found.state != OPEN]] = True
     free = np.flatnonzero(touched & (order >= 0))
-    return bool((push[free] < _NO_FORCE * np.abs(equations.right[order[free], :2]).max(axis=1)).any())
+    return bool((push[free] < NOTHING * np.abs(equations.right[order[free], :2]).max(axis=1)).any())
 
 
 def _borne_if_possible(equations: Equations, effort: Effort, settled: Settled) -> Settled:

@@ -35,8 +35,8 @@ from ..system import BlockSystem
 
 log = logging.getLogger(__name__)
 
-#: Largest factor of the search.
-_FARTHEST = 64.0
+#: Largest factor, and smallest inverse, of searches.
+FARTHEST = 64.0
 #: Tolerance of equilibrium, relative to the largest load on a block.
 _BALANCED = 1e-6
 #: Relative change of F below which Newton's method ends.
@@ -143,7 +143,7 @@ class AdmissibleForces:
         above: tuple[float, float, float] | None = None  # the last factor with a slope, its U and the slope
         while True:
             left, slope = self.unbalanced(factor)
-            if floor == _BALANCED < left <= _SLIVERS and -slope * (_FARTHEST - 1.0) / factor < left:
+            if floor == _BALANCED < left <= _SLIVERS and -slope * (FARTHEST - 1.0) / factor < left:
                 # No strength balances the rest: the bound is that of all other blocks.
                 log.info("%.2g of the largest load is balanced by no strength of the joints", left)
                 floor, low = left + _BALANCED, factor
@@ -151,7 +151,7 @@ class AdmissibleForces:
                     factor, left, slope = above
             if left <= floor:
                 low = factor
-                if low >= _FARTHEST:
+                if low >= FARTHEST:
                     return math.inf
                 if math.isinf(high):
                     factor, stride = low * (1.0 + stride), 4.0 * stride
@@ -160,9 +160,9 @@ class AdmissibleForces:
                 factor, step = min(low * (1.0 + step), 0.5 * (low + high)), 4.0 * step
                 continue
             high, above = factor, (factor, left, slope)
-            if high <= 1.0 / _FARTHEST:
+            if high <= 1.0 / FARTHEST:
                 return 0.0
-            least = max(low, 1.0 / _FARTHEST)
+            least = max(low, 1.0 / FARTHEST)
             factor = max(1.0 / (1.0 / high - (left - floor) / slope), least) if slope < 0.0 else low
             if high - factor <= precise * high or high - low <= 2.0 * precise * high:
                 return factor

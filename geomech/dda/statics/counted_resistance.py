@@ -13,6 +13,7 @@ import numpy as np
 from ...model import GROUND, OPEN, Blocks, Loads, State
 from ..joint_laws.whole_faces import WholeFaces
 from ..kinematics.simplex_integration import block_moments
+from ..kinematics.tolerances import LITTLE, NOTABLE, NOTHING, ONE_FACE_SIN
 from ..loads.bolts import labels
 from ..open_close.contact_set import ContactSet
 from ..open_close.static_splitting import NOT_BALANCED
@@ -29,22 +30,8 @@ log = logging.getLogger(__name__)
 
 #: Number of blocks with toes that are named, and of contacts that carry most where nothing fails.
 _LISTED, _CARRYING = 8, 3
-#: A toe is an obstacle if its block approaches what it touches by more than this fraction of the fastest block's
-#: displacement, and bears load if its force is more than this fraction of its block's weight.
-_OBSTACLE, _BEARS = 1e-3, 1e-3
-#: In runs, a toe may hold its block if it bears more than this fraction of its weight, and the block has moved by less than
-#: this part of its size √area.
-_HOLDS, _UNMOVED = 1e-2, 1e-3
-#: Relative difference below which the bound of admissible forces equals the factor of rigid blocks.
-_AS_RIGID = 1e-2
-#: Relative distance from the yield force within which a bolt yields.
-_AT_YIELD = 1e-6
 #: Part of the largest displacement allowed from which on it is that which keeps a bolt from its yield force.
 _NEARLY = 0.9
-#: Blocks slide along a face if their relative motion is inclined to it by less than this (sine of 3°).
-_ALONG = 0.05
-#: Relative increase over the pretension from which a bolt without yield force counts as loaded.
-_TAKEN = 1e-3
 
 
 def toes_in_the_way(
@@ -66,7 +53,7 @@ def toes_in_the_way(
                 x, y = at - centre[block]
                 apart += sign * (failed.displacement[block] + failed.rotation[block] * np.array([-y, x]))
             fastest = float(np.hypot(*failed.displacement.T).max())
-            if not apart @ found.geometry[k, 1:3] < -_OBSTACLE * fastest:
+            if not apart @ found.geometry[k, 1:3] < -LITTLE * fastest:
                 continue
         row = borne.get((int(found.vertex[k]), int(found.edge[k])))
         force = 0.0 if row is None else float(row["normal_force"])
@@ -80,7 +67,7 @@ def bearing_toes(system: BlockSystem, state: State, loads: Loads, load_time: flo
     """The toes that bear load in ``state``."""
     weight = system.mass * float(np.hypot(*loads.gravity.at(load_time)))
     system.finder.toes = FREE
-    return tuple(toe for toe in toes_in_the_way(system, state) if toe.force > _BEARS * weight[toe.block])
+    return tuple(toe for toe in toes_in_the_way(system, state) if toe.force > LITTLE * weight[toe.block])
 
 
 def warn_of_toes(
@@ -130,8 +117,8 @@ def warn_of_toes_at_rest(system: BlockSystem, state: State, loads: Loads) -> Non
         finder.toes = before
     weight = system.mass * float(np.hypot(*loads.gravity.at(state.time)))
     moved = np.hypot(*blocks.displacements(state.vertices).T)
-    still = moved <= _UNMOVED * size
-    bearing = tuple(toe for toe in toes if still[toe.block] and toe.force > _HOLDS * weight[toe.block])
+    still = moved <= LITTLE * size
+    bearing = tuple(toe for toe in toes if still[toe.block] and toe.force > NOTABLE * weight[toe.block])
     if bearing:
         log.warning(
             "t = %g s: %s, with corners as sharp as drawn, and bear%s %.4g kN/m. Sharp tips can support blocks that rounded "
@@ -200,7 +187,7 @@ def _anchors(loads: Loads, state: State, moved: np.ndarray) -> tuple[Anchor, ...
         force = float(row["force"])
         stretch = (force - bolt.pretension) / bolt.stiffness + float(row["plastic"])
         far = max(float(moved[b]) for b in (bolt.block, bolt.other) if b != GROUND)
-        out.append(Anchor(name, force, stretch, far, force >= bolt.yield_force * (1.0 - _AT_YIELD)))
+        out.append(Anchor(name, force, stretch, far, force >= bolt.yield_force * (1.0 - NOTHING)))
     return tuple(out)
 
 
@@ -212,7 +199,7 @@ def with_anchors(blocks: Blocks, loads: Loads, found: FactorOfSafety) -> FactorO
     for bolt, anchor in zip((b for b, row in zip(loads.bolts, found.state.bolts, strict=False)
                              if row["installed"] and not row["broken"]), anchors, strict=True):  # fmt: skip
         least = min(float(size[b]) for b in (bolt.block, bolt.other) if b != GROUND)
-        if math.isinf(bolt.yield_force) and anchor.force > bolt.pretension * (1.0 + _TAKEN):
+        if math.isinf(bolt.yield_force) and anchor.force > bolt.pretension * (1.0 + LITTLE):
             lines.append(
                 f"bolt {anchor.name} has no yield force: it counts with the {anchor.force / 1e3:.4g} kN/m that it "
                 f"takes while its block moves {1e3 * anchor.moved:.3g} mm"
@@ -247,7 +234,7 @@ class PartedFace:
         if failed is None:
             return False
         way = failed.displacement[self.block] - failed.displacement[self.other]
-        return abs(float(way @ self.normal)) <= _ALONG * float(np.hypot(*way))
+        return abs(float(way @ self.normal)) <= ONE_FACE_SIN * float(np.hypot(*way))
 
 
 def parted_faces(system: BlockSystem, state: State) -> tuple[PartedFace, ...]:
@@ -342,7 +329,7 @@ def with_admissible_forces(found: FactorOfSafety, largest: float | None) -> Fact
     if largest is None:
         return found
     rigid = found.factor_if_rigid
-    if rigid is not None and largest <= rigid * (1.0 + _AS_RIGID):
+    if rigid is not None and largest <= rigid * (1.0 + NOTABLE):
         return replace(found, admissible=largest)
     bound = f"up to a factor of {largest:.4f}" if math.isfinite(largest) else "at more than four times that factor"
     line = (

@@ -21,6 +21,7 @@ from dataclasses import replace
 import numpy as np
 
 from ...model import CONTACT, GROUND, OPEN, JointLaw, Loads, State
+from ..kinematics.tolerances import LITTLE
 from ..results import NotConverged, StepResult
 from ..system import BlockSystem
 from .sharp_toes import SHARP
@@ -37,8 +38,6 @@ _STRETCHED, _WEDGED = 3.0, 10.0
 FARTHEST = 0.1
 #: The strength of joints that do not fail, Pa.
 _UNBREAKABLE = 1e15
-#: Unbalanced force, relative to all forces, below which joints that cannot fail bear the loads.
-_BALANCED = 1e-3
 #: Length of that static step, s: inertia is negligible.
 _LONG = 1e4
 #: Factor on displacements without joint failure, for joints that open and slide a little: voussoir beams sag twice as
@@ -178,4 +177,4 @@ def without_failure(system: BlockSystem, begin: State, loads: Loads, load_time: 
     except (NotConverged, ValueError) as failure:
         log.debug("no displacements without joint failure: %s", failure)
         return None
-    return None if result.statistics["unbalanced_ratio"] > _BALANCED else result.state
+    return None if result.statistics["unbalanced_ratio"] > LITTLE else result.state

@@ -30,6 +30,7 @@ from ...model import SLIP, Blocks, InSituStress, Loads, State
 from ..contact_detection.inherited_contacts import InheritedContacts
 from ..higher_order.deflected_blocks import DeflectedBlocks
 from ..joint_laws.bonds import on_lines
+from ..kinematics.tolerances import LITTLE
 from ..system import BlockSystem
 from .pseudo_time_equilibrium import Equilibrium, equilibrium
 
@@ -38,9 +39,6 @@ log = logging.getLogger(__name__)
 #: Largest number of corrections of the stress of blocks of higher order. Each reduces the error by the ratio of contact to
 #: total compliance, a fortieth or less with penalty springs.
 _PASSES = 12
-#: Energy that sliding joints dissipate until the stress is borne, relative to the elastic energy of the blocks, and deviation
-#: from the given stress, above which a warning is given: energies are then uncertain by more than a thousandth.
-_SLIDES = 1e-3
 #: Largest number of joints named in it.
 _NAMED = 3
 
@@ -156,7 +154,7 @@ def _warn_of_sliding(system: BlockSystem, state: State, off: float) -> None:
     area = np.where(system.fixed, 0.0, system.blocks.areas(state.vertices))
     stored = 0.5 * float(np.einsum("b,bi,bij,bj->", area, state.stress, system.compliance, state.stress))
     # Blocks that bear the given stress have slid as contacts closed, which leaves no trace in it.
-    if not (off > _SLIDES and lost.sum() > _SLIDES * stored):
+    if not (off > LITTLE and lost.sum() > LITTLE * stored):
         return
     names, by_joint = system.blocks.names, dict[tuple[int, int], float]()
     for pair, energy in zip(np.sort(np.stack([rows["block"], rows["other"]], axis=1), axis=1).tolist(), lost.tolist()):

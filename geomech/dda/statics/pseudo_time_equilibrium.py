@@ -21,7 +21,9 @@ import numpy as np
 from ...model import OPEN, Loads, State
 from ...model.former_names import gathered_arguments
 from ..energy_balance import StepEnergy
+from ..joint_laws.penalty_springs import PENALTY_RATIO
 from ..kinematics.simplex_integration import block_moments
+from ..kinematics.tolerances import NOTHING
 from ..results import CrackResponse, NotConverged, StepResult
 from ..system import BlockSystem
 from .displacement_limit import DisplacementLimit
@@ -53,10 +55,8 @@ _GONE, _IN_VAIN, _FLYING = 0.05, 25, 0.99
 _LEAST_INERTIA = 1e-10
 #: Most steps in which blocks without equilibrium are followed, most cuts of them and most open–close iterations beyond one
 #: a step, so that this takes about as long as the search for the factor (a single block that slides by its size: 57 steps
-#: and 1; 200 blocks: 5 and 60); and the unbalanced force over the mean force below which they are at rest.
-_FOLLOWED, _CUTS, _ITERATIONS, _AT_REST = 60, 2, 50, 1e-6
-#: Penalty over E', for that comparison.
-_PENALTY = 40.0
+#: and 1; 200 blocks: 5 and 60).
+_FOLLOWED, CUTS, _ITERATIONS = 60, 2, 50
 
 
 @dataclass(frozen=True, eq=False)
@@ -156,8 +156,8 @@ def travel(system: BlockSystem, state: State, loads: Loads, load_time: float, re
     or one has moved by ``reach`` m."""
     system.limits.warns = False
     relaxation = _Relaxation(system, state, loads, load_time, reach, None, None)
-    relaxation.most_cuts, relaxation.most_iterations = _CUTS, _ITERATIONS
-    end = relaxation.run(_AT_REST, _FOLLOWED, None, True)
+    relaxation.most_cuts, relaxation.most_iterations = CUTS, _ITERATIONS
+    end = relaxation.run(NOTHING, _FOLLOWED, None, True)
     way = np.hypot(*(end.state.vertices - state.vertices).T)
     moved = np.maximum.reduceat(way, system.vertex_start[:-1])
     return Travel(moved, end.converged, "" if end.converged or end.collapsed else end.reason)
@@ -314,7 +314,7 @@ def settling_time(system: BlockSystem) -> float:
 
 def _inertia_less(mass: float, stiffness: float) -> float:
     """s: the longest step in which the inertia of a ``mass`` kg/m counts among contacts of ``stiffness`` E' Pa."""
-    return math.sqrt(2.0 * mass / (_LEAST_INERTIA * _PENALTY * stiffness))
+    return math.sqrt(2.0 * mass / (_LEAST_INERTIA * PENALTY_RATIO * stiffness))
 
 
 def _centroids(system: BlockSystem, state: State) -> np.ndarray:
@@ -325,7 +325,7 @@ def _centroids(system: BlockSystem, state: State) -> np.ndarray:
 def rounding_force(system: BlockSystem) -> float:
     """Force in the stiffest contact springs due to the rounding of coordinates, N/m."""
     modulus = max((m.plane_modulus for m in system.materials if not m.rigid), default=0.0)
-    return _PENALTY * modulus * system.rounding
+    return PENALTY_RATIO * modulus * system.rounding
 
 
 def unbalanced_force(system: BlockSystem, result: StepResult) -> float:

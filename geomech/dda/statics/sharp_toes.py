@@ -22,13 +22,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-#: Sides inclined to an edge by less than this (sine of 3°) form a face with it, not a toe.
-_LEAN = 0.053
+from ..kinematics.tolerances import LITTLE, ONE_FACE_SIN
+
 #: Distance by which a toe that must not carry load is moved off, relative to its block's size √area.
 _FAR = 0.02
-#: A corner is a toe if its distance from the end of a face is less than this, in rounding lengths or relative to its
-#: block's size √area, …
-_NEAR, _NEAR_IN_SIZES = 1.0, 1e-3
+#: A corner is a toe if its distance from the end of a face is less than this, in rounding lengths, or less than a
+#: thousandth of its block's size √area, …
+_NEAR = 1.0
 #: … and the gap of that face is less than this fraction of that distance.
 _TOUCHING = 0.1
 #: A face shorter than this fraction of its block's size counts as a toe at the end of a longer face to which it is
@@ -88,7 +88,7 @@ def stand_off(
     out = np.full(len(vertex), -1.0)
     # Corner-to-corner contacts are rounded already.
     lone = (geometry[:, 4] <= 0.0) & (met < 0)
-    near = np.maximum(_NEAR * corners.rounding, _NEAR_IN_SIZES * corners.size)
+    near = np.maximum(_NEAR * corners.rounding, LITTLE * corners.size)
     faces = np.flatnonzero(
         (geometry[:, 4] > 0.0) & (geometry[:, 3] <= _TOUCHING * np.minimum(near[vertex], near[edge]))
     )
@@ -123,7 +123,7 @@ def stand_off(
     cosine = np.einsum("na,na->n", bisector, one)
     leans = np.minimum(np.einsum("na,na->n", one, n), np.einsum("na,na->n", two, n))
     # A side parallel to the edge forms a face with it once they touch.
-    sharp = (leans > _LEAN) & (cosine > _LEAN)
+    sharp = (leans > ONE_FACE_SIN) & (cosine > ONE_FACE_SIN)
     if toes == FREE:
         off = _FAR * corners.size[v]
     else:

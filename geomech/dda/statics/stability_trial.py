@@ -22,6 +22,7 @@ import numpy as np
 from ...model import OPEN, Blocks, DdaSettings, JointLaw, Loads, State
 from ..joint_laws.friction_arrest import contact_speeds
 from ..joint_laws.reduced_strength import reduced
+from ..kinematics.tolerances import LITTLE
 from ..open_close.plastic_splitting import is_plastic, is_stronger
 from ..results import NotConverged, StepResult, Unsupported
 from ..system import BlockSystem
@@ -46,8 +47,6 @@ _BEYOND = 5.0
 _MARGIN = 2.0
 #: Most long steps of a trial of many blocks.
 _LONG_STEPS = 6
-#: A contact stops the motion if it closes by more than this fraction of the fastest block's displacement.
-_CLOSES = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
@@ -249,5 +248,5 @@ class _Way:
         found = system.finder.find(state, np.ascontiguousarray(state.vertices), window, lumped=True)
         speed = np.where(self._free[:, None], result.acceleration, 0.0)
         across = contact_speeds(found, found.geometry, speed, result.forces.centroid)[:, 0]
-        closes = (found.state == OPEN) & (found.gap_before > 0.0) & (-across > _CLOSES * fastest)
+        closes = (found.state == OPEN) & (found.gap_before > 0.0) & (-across > LITTLE * fastest)
         return bool((found.gap_before < -across * reach)[closes].any())

@@ -27,10 +27,11 @@ from typing import Any
 from ...model import Blocks, DdaSettings, JointLaw, Loads, Material, State
 from ...model.former_names import gathered_arguments, renamed_argument
 from ..joint_laws.reduced_strength import reduced
+from ..kinematics.tolerances import NOTABLE
 from ..open_close.interior_point.linear_programme import Unsolved
 from ..results import NotConverged
 from ..system import BlockSystem
-from .admissible_forces import AdmissibleForces
+from .admissible_forces import FARTHEST, AdmissibleForces
 from .counted_resistance import (
     as_rigid_blocks,
     bearing_toes,
@@ -45,7 +46,7 @@ from .counted_resistance import (
     with_toes,
 )
 from .displacement_limit import DisplacementLimit, without_failure
-from .pseudo_time_equilibrium import RelaxationLimits, Travel, equilibrium, travel
+from .pseudo_time_equilibrium import CUTS, RelaxationLimits, Travel, equilibrium, travel
 from .safety_answer import FactorOfSafety, mechanism_of, moving_in
 from .sharp_toes import FREE, ROUNDED, SHARP
 from .stability_trial import Trial, TrialLoads, stability_trial
@@ -56,18 +57,12 @@ log = logging.getLogger(__name__)
 _RELAXING = 100
 #: An upper bound is tried again from just below if its trial started farther below than this many tolerances.
 _FROM_AFAR = 3.0
-#: Largest factor, and smallest inverse, of the search for a stable and an unstable trial.
-_FARTHEST = 64.0
-#: Relative difference from the largest factor with admissible contact forces above which that is reported.
-_BEYOND = 1e-2
 #: Factor from step to step in the search for a stable trial near a known factor; and of the first trial below a bound.
 _NEARBY, _BELOW = 0.85, 0.95
 #: Start of the search for the bound: Newton's method approaches from above, and most slopes fail below this.
 _FIRST = 2.0
 #: … and with many blocks, whose programmes take longest, from here.
 _FIRST_OF_MANY = 1.0
-#: Most cuts of one step in which failed blocks are followed: where contacts find no states, following them ends.
-_CUTS = 2
 #: Relative increase of F between trials of many blocks, each solved in one step: the same step over a larger increase may
 #: find a mechanism where smaller ones find an equilibrium, and the drifts there do not predict the factor.
 _STRIDE = 0.02
@@ -260,7 +255,7 @@ class _Search:
             return found
         reach = math.sqrt(abs(float(self.blocks.areas()[found.moving[0]])))
 
-        coarse = replace(self, settings=replace(self.settings, max_step_cuts=min(self.settings.max_step_cuts, _CUTS)))
+        coarse = replace(self, settings=replace(self.settings, max_step_cuts=min(self.settings.max_step_cuts, CUTS)))
 
         def followed(toes: str) -> Travel:
             system = coarse.system(found.travels_at, replace(counted, toes=toes))
@@ -271,7 +266,7 @@ class _Search:
         if way.rests and counted.toes != SHARP and not found.toes:
             other = followed(SHARP)
             far, short = float(way.moved.max()), float(other.moved.max())
-            sharp = short if other.rests and short < far * (1.0 - _BEYOND) else None
+            sharp = short if other.rests and short < far * (1.0 - NOTABLE) else None
         return replace(found, travel=way, sharp_travel=sharp)
 
     def _found(self, counted: Counted, watch: Callable[[Trial], None] | None) -> tuple[FactorOfSafety, Counted]:
@@ -286,7 +281,7 @@ class _Search:
             if not whole:
                 raise
             return self.run(touching, aim=aim), touching
-        if not whole or aim <= found.upper * (1.0 + _BEYOND):
+        if not whole or aim <= found.upper * (1.0 + NOTABLE):
             return found, counted
         just_above = found.upper * (1.0 + 2.0 * self.tolerance)
         other = self._otherwise(touching, just_above, just_above)
@@ -325,7 +320,7 @@ class _Search:
         ``found``. With many blocks it is that of the blocks as drawn."""
         if not math.isfinite(found.upper):
             return None
-        beyond, system = found.factor * (1.0 + _BEYOND), self.system(found.lower, counted)
+        beyond, system = found.factor * (1.0 + NOTABLE), self.system(found.lower, counted)
         if self.under.at_once(system):
             aim = self.aims.get(counted, 0.0)
             return aim if aim > beyond else None
@@ -401,16 +396,16 @@ class _Search:
         near = stands or math.isfinite(above)
         aim = 0.0 if near else self.aim(counted) if aim is None else aim
         bracket = _Bracket(self, counted, watch, aim)
-        known = near or 0.0 < aim < _FARTHEST
+        known = near or 0.0 < aim < FARTHEST
         trial = bracket.begin(first if near or not known else _BELOW * aim)
         if trial.stable and stands:
             raise _SameFactor
         while not trial.stable:
             if first >= above:
                 raise _SameFactor
-            if trial.factor <= 1.0 / _FARTHEST:
+            if trial.factor <= 1.0 / FARTHEST:
                 raise NotConverged(
-                    f"the blocks are unstable even with joints {_FARTHEST:g} times as strong: "
+                    f"the blocks are unstable even with joints {FARTHEST:g} times as strong: "
                     f"{self._moving(trial)}{trial.reason}; the motion does not depend on joint strength, or no "
                     "contact states were found"
                 )
@@ -495,7 +490,7 @@ class _Bracket:
             known = self._known()
             upper = min((t.factor for t in known if not t.stable), default=math.inf)
             if math.isinf(upper):
-                if self.lower >= _FARTHEST:
+                if self.lower >= FARTHEST:
                     return self._answer(self.lower, None)
                 close_trial = _close_to(self._aim, self.lower, tolerance) if math.isfinite(self._aim) else None
                 factor = 2.0 * self.lower if close_trial is None else close_trial

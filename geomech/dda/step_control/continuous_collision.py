@@ -21,6 +21,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...compiled import UNCOUNTED, kept, part
+from ..kinematics.tolerances import NOTABLE
 
 #: Depth to which vertices may lie in a block, relative to the smaller block's size √area (the radius of corners), …
 _DEPTH = 1e-5
@@ -29,8 +30,9 @@ _PRESSED = 2.0
 #: Where rounded corners pass each other, one may lie in the other by this part of their rounding length, if it is this
 #: near in rounding lengths: an arc removes 1 − cos 45° of the corner that it rounds.
 ROUNDED_OVERLAP, _NEAR = 0.3, 1.6
-#: Part of the outline that a vertex may cut at a corner: relative to the smaller block's size, or in rounding lengths.
-_CORNER, _CUT = 1e-2, 2.5
+#: Part of the outline that a vertex may cut at a corner: `NOTABLE` of the smaller block's size, or so many rounding
+#: lengths.
+_CUT = 2.5
 #: Edges of rounded corners that pass each other cross by at most this many rounding lengths.
 _TIPS = 1.2
 #: Kinds of crossings.
@@ -247,7 +249,7 @@ def _of_vertex(paths, box, allow, v, j, smaller):
     if now > allowed:
         was, _ = depth_inside(x0, y0, before, paths.next_vertex, first, last)
         return (INTO, near, now) if now > was + least else (-1, -1, 0.0)
-    longest = max(_CORNER * smaller, _CUT * allow.rounding[v])
+    longest = max(NOTABLE * smaller, _CUT * allow.rounding[v])
     edge, depth = _gone_through(paths, v, first, last, allowed, longest)
     return (THROUGH, edge, depth) if edge >= 0 else (-1, -1, 0.0)
 

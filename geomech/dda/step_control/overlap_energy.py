@@ -12,12 +12,13 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from ..energy_balance import EnergyBudget
+from ..kinematics.tolerances import NOTABLE
 from ..results import NotConverged
 
 log = logging.getLogger(__name__)
 
 #: Fractions of the energy converted: for the warning, and for the end of the run.
-WARNED, ENDED = 0.01, 0.1
+WARNED, ENDED = NOTABLE, 10 * NOTABLE
 
 
 class Overlap(NamedTuple):

@@ -20,22 +20,20 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..interfaces import SteppedSystem
+from ..kinematics.tolerances import LITTLE, NOTHING, SAME
 from ..open_close.contact_set import ContactSet
 from ..open_close.equations import Unsettled
 from ..time_step import Attempt, StepStart
 
-#: Inertia force, relative to the forces on a block, below which it counts as zero.
-_NOTHING = 1e-6
 #: Blocks are supported if their inertia force decreases to this fraction or less each time; and largest number of
 #: solutions. (In a slope of 200 blocks under sudden weight it decreases to an eighth.)
 _FALLS, _SOLUTIONS = 0.5, 12
 
 
-#: A bolt supports a block if it would stop it within this fraction of the block's size √area and the inertia force
-#: decreases by more than this relative round-off. After an extrapolation this fraction of the inertia force must have
-#: vanished, and at most the last fraction may remain in the opposite direction: friction would hold a block that has
-#: gone too far.
-_WITHIN, _ROUNDED, _GONE, _BACK = 0.1, 1e-9, 0.5, 1e-3
+#: A bolt supports a block if it would stop it within this fraction of the block's size √area. After an extrapolation this
+#: fraction of the inertia force must have vanished, and little of it may remain in the opposite direction: friction would
+#: hold a block that has gone too far.
+_WITHIN, _GONE = 0.1, 0.5
 
 
 def balanced_attempt(
@@ -46,7 +44,7 @@ def balanced_attempt(
     `Unsettled`."""
     attempt = first = Attempt(system, start, dt, found, cuts)
     inertia, size = attempt.inertia_and_size()
-    begun, negligible, ahead = inertia, _NOTHING * size, None
+    begun, negligible, ahead = inertia, NOTHING * size, None
     supported, bolted = inertia > negligible, reach > 0.0 and _bolts_hold(start)
     for _ in range(_SOLUTIONS):
         if not (supported & (inertia > negligible)).any():
@@ -86,7 +84,7 @@ def balanced_attempt(
         supported &= decreases
     return (
         first
-        if ahead is not None and _too_far(attempt, ahead, inertia > np.maximum(_BACK * begun, negligible))
+        if ahead is not None and _too_far(attempt, ahead, inertia > np.maximum(LITTLE * begun, negligible))
         else attempt
     )
 
@@ -136,7 +134,7 @@ class _Extrapolated:
         are ``slow``. None if there are none."""
         size = np.sqrt(attempt.moments[:, 0])
         gain = 1.0 - after / np.maximum(inertia, 1e-300)
-        slow = slow & (gain > _ROUNDED)
+        slow = slow & (gain > SAME)
         ahead = np.where(slow[:, None], again.increment - attempt.increment, 0.0)
         ahead /= np.where(slow, gain, 1.0)[:, None]
         far = np.hypot(ahead[:, 0], ahead[:, 1]) + size * np.abs(ahead[:, 2])

@@ -30,7 +30,7 @@ _MARGIN = 0.02
 #: … times this factor.
 _WIDER = 1.1
 #: Share of the allowed motion that a step limited by speed uses; round-off and impacts take the rest.
-_AIM = 0.99
+AIM = 0.99
 
 
 @part(fastmath=False, error_model="numpy", nogil=True, **UNCOUNTED)
@@ -97,14 +97,14 @@ def _longest(pairs, affine, turn, centroid, box, vertices, next_vertex, start, s
         if motion < 0.0:
             continue
         speed, spin = motion / dt, abs(turn[a] - turn[b]) / dt
-        if speed * longest + 0.5 * g * longest * longest > _AIM * may and motion > 0.0:
-            may = _AIM * (may + _apart(vertices, next_vertex, start, a, b))
+        if speed * longest + 0.5 * g * longest * longest > AIM * may and motion > 0.0:
+            may = AIM * (may + _apart(vertices, next_vertex, start, a, b))
             # Root of speed t + g t²/2 = limit, in the form that is accurate for small g.
             time = 2.0 * may / (speed + np.sqrt(speed * speed + 2.0 * g * may))
             if time < longest:
                 longest, which = time, k
-        if spin * longest > _AIM * TURN:
-            longest, which = _AIM * TURN / spin, k
+        if spin * longest > AIM * TURN:
+            longest, which = AIM * TURN / spin, k
     return longest, which
 
 

@@ -21,8 +21,9 @@ from ..contact_detection.neighbour_search import boxes
 from ..counters import Work
 from ..kinematics.midpoint_configuration import affine_motion
 from ..kinematics.simplex_integration import fastest_vertex
+from ..kinematics.tolerances import LITTLE, NOTABLE
 from .continuous_collision import INTO, THROUGH, Allowed, Paths, crossings
-from .relative_motion import Windows
+from .relative_motion import AIM, Windows
 
 if TYPE_CHECKING:
     from ..interfaces import AttemptedStep
@@ -30,20 +31,10 @@ if TYPE_CHECKING:
 
 log = logging.getLogger(__name__)
 
-#: Share of the allowed motion that a step limited by speed uses: round-off, arcs and impacts take the rest, so that the
-#: step need not be cut.
-_AIM = 0.99
 #: Where a vertex crossed an outline, contacts are searched for within this many times the blocks' motion.
 _WIDER = 1.5
-#: Largest mismatch of blocks that are bonded to each other, or to a third, relative to the smaller one's size, due to
-#: their different strains and rotations.
-_MISFIT = 1e-3
 
 
-#: Contacts that penetrate by more than this fraction of the thinner block's size are checked for passing through it.
-_DEEP = 0.01
-#: Overlaps that create more than this fraction of the energy of all blocks in a step count as new.
-_GIVEN = 1e-3
 #: Reasons why steps are shortened, and the remedy.
 DISPLACEMENT, APPROACH, CROSSING, UNSETTLED = "displacement", "relative motion", "crossing", "contact states"
 WAY_OUT = {
@@ -109,7 +100,7 @@ class StepLimits:
         if not carried.any():
             return dt
         g = float(np.hypot(*gravity))
-        speed, may = float(fastest_vertex(carried, vertices, self._start, moments)), _AIM * self.displacement
+        speed, may = float(fastest_vertex(carried, vertices, self._start, moments)), AIM * self.displacement
         # Root of speed t + g t²/2 = limit, in the form that is accurate for small g.
         longest = 2.0 * may / (speed + np.sqrt(speed * speed + 2.0 * g * may))
         shorter = min(dt, longest)
@@ -184,7 +175,7 @@ class StepLimits:
         pair, vertex, edge, kind, depth = crossings(paths, pairs, box, allow)
         if len(pair):
             real = self._finder.may_touch(vertex, edge)
-            shallow = (kind == INTO) & (depth <= _MISFIT * self._size[pairs[pair]].min(axis=1))
+            shallow = (kind == INTO) & (depth <= LITTLE * self._size[pairs[pair]].min(axis=1))
             if shallow.any():
                 real &= ~(shallow & _glued(pairs[pair], rows[rows["bonded"] > 0]))
             pair, vertex, kind, depth = pair[real], vertex[real], kind[real], depth[real]
@@ -231,11 +222,11 @@ class StepLimits:
         """Blocks pushed apart that had not penetrated each other; None for none.
 
         These are contacts that close in a step with a vertex that was behind their edge at its start, if that creates
-        more than `_GIVEN` of the present energy, and was not drawn so. A shorter step searches contacts within a
+        more than `LITTLE` of the present energy, and was not drawn so. A shorter step searches contacts within a
         shorter distance, and finds them where they first touch.
         """
         energy = result.energy
-        if energy.overlap <= _GIVEN * max(energy.stored, energy.before) or not len(attempt.state.contacts):
+        if energy.overlap <= LITTLE * max(energy.stored, energy.before) or not len(attempt.state.contacts):
             return None
         if result.overlap is None:
             return None
@@ -251,7 +242,7 @@ class StepLimits:
         on: springs then no longer know from which side it came."""
         rows = result.contacts
         least = np.minimum(self._size[rows["block"]], self._size[rows["other"]])
-        rows = rows[(rows["state"] != OPEN) & (-(rows["gap"] + rows["lift"]) > _DEEP * least)]
+        rows = rows[(rows["state"] != OPEN) & (-(rows["gap"] + rows["lift"]) > NOTABLE * least)]
         if not (len(rows) and self.warns):
             return
         vertices = np.ascontiguousarray(result.state.vertices)

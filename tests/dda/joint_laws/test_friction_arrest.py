@@ -102,8 +102,8 @@ def test_what_a_sliding_brick_shakes_is_not_stopped_by_itself(monkeypatch):
     velocity[-1, 0] = thrown
     monkeypatch.setattr(time_step, "stop", lambda *given: solved.append(1) or friction_arrest.stop(*given))
     told = []
-    for worth in (friction_arrest._WORTHWHILE, 0.0):
-        monkeypatch.setattr(friction_arrest, "_WORTHWHILE", worth)
+    for worth in (friction_arrest.LITTLE, 0.0):
+        monkeypatch.setattr(friction_arrest, "LITTLE", worth)
         system = dda.BlockSystem(
             blocks, [block_scenes.ROCK], [block_scenes.JOINT], settings=block_scenes.settings(0.01)
         )

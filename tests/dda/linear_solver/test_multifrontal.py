@@ -210,7 +210,7 @@ def test_result_does_not_depend_on_threads(monkeypatch):
     right = np.ones(2400)
     alone = BlockSolver(points, rows, columns).solve(data.ravel(), right)
     monkeypatch.setattr(multifrontal, "THREADED", 0)
-    monkeypatch.setattr(multifrontal, "THREADED_SOLUTION", 0)
+    monkeypatch.setattr(multifrontal, "_THREADED_FACTORS", 0)
     for helpers in (0, 1, 5):
         team = task_pool.ThreadTeam(helpers)
         monkeypatch.setattr(multifrontal, "thread_team", lambda team=team: team)
@@ -314,7 +314,7 @@ def test_products_and_their_largest_terms(monkeypatch):
     product = block_solver.multiply(*at)
     assert np.abs(product - matrix @ x).max() <= 1e-14 * size
     # The same to the bit when threads share the rows.
-    monkeypatch.setattr(block_solver, "SHARED", 0)
+    monkeypatch.setattr(block_solver, "THREADED", 0)
     monkeypatch.setattr(block_solver, "SHARE", 4)
     assert np.array_equal(block_solver.multiply(*at), product)
 

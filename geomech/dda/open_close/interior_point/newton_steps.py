@@ -13,7 +13,7 @@ import numpy as np
 
 from ....compiled import UNCOUNTED, kept
 from ...linear_solver.assembly import sides_of
-from ...linear_solver.task_pool import add_at_once, await_value, thread_team
+from ...linear_solver.task_pool import SHARE, THREADED, add_at_once, await_value, thread_team
 from .contact_terms import (
     Between,
     Changes,
@@ -33,8 +33,8 @@ from .contact_terms import (
 
 #: Tasks.
 _LINEARISE, _PREDICT, _CORRECT, _CENTRE, _CHANGE, _GO = range(6)
-#: Number of blocks from which all cores are used; contacts, and blocks, per chunk.
-THREADED, SHARE, SHARE_BLOCKS = 4000, 2048, 512
+#: Contacts per task.
+_CONTACTS = 4 * SHARE
 #: Factor within which products are brought to their target; factor below which force and gap of a contact, in units of
 #: its stiffness, differ if it is undecided.
 _SPREAD, _CLEAR = 10.0, 3.0
@@ -120,7 +120,7 @@ class PathSteps:
         n, each = len(block), np.arange(n_blocks)
         self._fixed = tuple(Between(block, other, vectors, lift))
         self._sides = tuple(sides_of(n_blocks, np.append(each, -1), block, other))
-        self._parts = np.empty((n + SHARE - 1) // SHARE)
+        self._parts = np.empty((n + _CONTACTS - 1) // _CONTACTS)
         self.numbers, self.laws = np.empty((n, 6)), np.empty((n, 4))
         self._missed, self._pulled = np.empty((n, 2)), np.empty((n, 3))
         #: (6 n_blocks,) N: unbalanced forces on blocks, and the right-hand side of a step.
@@ -181,7 +181,7 @@ class PathSteps:
         out: np.ndarray = _NONE,
     ) -> None:
         step, tried = self.step, self.tried
-        chunks = np.zeros(1, np.int64), np.zeros(2, np.int64), SHARE, SHARE_BLOCKS
+        chunks = np.zeros(1, np.int64), np.zeros(2, np.int64), _CONTACTS, SHARE
         linearised = tuple(Linearised(self.numbers, self._missed, self.laws, self._pulled))
         work = (
             chunks, task, (epsilon, far), self._parts, self._fixed, self._springs, self._sides, self._at_hand, linearised,

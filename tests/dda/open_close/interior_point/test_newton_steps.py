@@ -76,8 +76,8 @@ def test_steps_solve_the_linearised_equations(given):
 
 
 def test_steps_do_not_depend_on_threads(given, monkeypatch):
-    monkeypatch.setattr(newton_steps, "SHARE", 50)
-    monkeypatch.setattr(newton_steps, "SHARE_BLOCKS", 10)
+    monkeypatch.setattr(newton_steps, "_CONTACTS", 50)
+    monkeypatch.setattr(newton_steps, "SHARE", 10)
     found = []
     for helpers in (0, 1, 5):
         monkeypatch.setattr(newton_steps, "THREADED", 0 if helpers else 10**9)
