@@ -36,10 +36,8 @@ log = logging.getLogger(__name__)
 
 #: Most extensions of the search distance in one step; then the step is cut.
 _FARTHER = 6
-#: Most repetitions of a step because corners meet in an unexpected direction, …
-_REDIRECTED = 3
-#: … and the angle to the expected direction above which it is repeated (cosine).
-_OTHER_DIRECTION = 0.95
+#: Most repetitions of a step because corners meet that were not expected to.
+_REPEATED = 3
 #: Additional search distance of corners beyond the motion due to weight, in units of √area of the smallest block:
 #: elastic motion of blocks at rest in a step.
 _BESIDES = 1e-6
@@ -125,7 +123,7 @@ class StepCutting:
             if system.scheme.static and self.found.tried is not None:
                 # (In dynamics the arcs are predicted from the velocity.)
                 self.found = self.found.along(*like.arcs)
-        self.cuts, self.extensions, self.redirected = 0, 0, 0
+        self.cuts, self.extensions, self.repeated = 0, 0, 0
         #: Whether states of first order have been tried at this length of the step.
         self.proposed = False
         #: Reason of the last failed attempt, and of the last one that shortened the step.
@@ -181,7 +179,7 @@ class StepCutting:
             self.failed = self.reason = f"{failure}{system.finder.where(found, failure.contact)}"
             self._cut(0.5 * self.dt, UNSETTLED, *found.blocks_of(failure.contact))
             return None
-        if self._bonds_missed(result) or self._corners_missed(attempt, result):
+        if self._bonds_missed(result) or self._corners_missed(attempt):
             return None
         used = system.limits.used(attempt, result)
         self.reason = used.reason
@@ -218,15 +216,15 @@ class StepCutting:
         self.found = search.find()
         return True
 
-    def _corners_missed(self, attempt: Attempt, result: StepResult) -> bool:
-        """Whether corners have met elsewhere than expected, so that the step is repeated with these contacts. Where
+    def _corners_missed(self, attempt: Attempt) -> bool:
+        """Whether corners have met that were not expected to, so that the step is repeated with these contacts. Where
         they meet is known once the motion of the step is."""
-        if self.redirected >= _REDIRECTED:
+        if self.repeated >= _REPEATED:
             return False
-        again = self._with_corners_of(attempt, result.contacts["state"])
+        again = self._with_corners_of(attempt)
         if again is None:
             return False
-        self.redirected, self.found = self.redirected + 1, again
+        self.repeated, self.found = self.repeated + 1, again
         return True
 
     def _accepts(self, attempt: Attempt, result: StepResult, used: Used) -> bool:
@@ -342,55 +340,31 @@ class StepCutting:
         end = MidpointConfiguration.of(increment, 1.0, start.vertices, self.system.owner, start.moments)
         return end.vertices - start.vertices
 
-    def _with_corners_of(self, attempt: Attempt, state: np.ndarray) -> ContactSet | None:
-        """The contacts with which the step is repeated because corners have met elsewhere than expected in the
-        ``attempt``, whose contacts ended in ``state`` (n,); None if all met as expected."""
+    def _with_corners_of(self, attempt: Attempt) -> ContactSet | None:
+        """The contacts with which the step is repeated because corners have met in the ``attempt`` that are not among
+        its contacts; None if there are none."""
         system, search = self.system, self.search
         found, moved = attempt.found, attempt.new_vertices - attempt.vertices
         found = found.on_corners
-        pressed = (found.corner >= 0) & (state != OPEN)
         off = np.abs(moved if search.motion is None else moved - search.motion).max(axis=1)
         deviating = np.zeros(system.blocks.n_blocks, bool)
         deviating[system.owner[off > 0.5 * search.margin]] = True
-        if not pressed.any() and not deviating.any():
+        if not deviating.any():
             return None
         search.motion, search.glue_holds = moved, found.relies_on_glue
-        # Only these pairs may meet differently; all pairs are searched again if one of them does.
+        # Only these pairs may meet otherwise; all pairs are searched again if one of them does.
         near = search.near
         some = deviating[near.pairs].any(axis=1)
-        at = near.of_contacts(found.block[pressed], found.other[pressed], len(deviating))
-        some[at[at >= 0]] = True
         doubtful = replace(search, near=Windows(near.pairs[some], near.reach[some])).find()
-        if not self._meets_otherwise(attempt, found, doubtful, state):
+        if not self._more_meet(attempt, found, doubtful):
             return None
         again = search.find()
-        return again if self._meets_otherwise(attempt, found, again, state) else None
+        return again if self._more_meet(attempt, found, again) else None
 
-    def _meets_otherwise(self, attempt: Attempt, found: ContactSet, again: ContactSet, state: np.ndarray) -> bool:
-        """Whether corners meet differently in ``again``, contacts found with the motion of the ``attempt``, than in
-        ``found``, whose states at the end of the attempt are ``state`` (n,): closed ones in another direction, or some
-        that ``found`` lacks."""
+    def _more_meet(self, attempt: Attempt, found: ContactSet, again: ContactSet) -> bool:
+        """Whether contacts ``again``, found with the motion of the ``attempt``, have closed in it that ``found`` lacks."""
         again = again.on_corners
-        if self._redirected(found, again, state):
-            return True
         finder, n = self.system.finder, len(attempt.vertices)
         known = np.isin(again.vertex * n + again.edge, found.vertex * n + found.edge)
         gap = finder.gaps(attempt.new_vertices, attempt.vertices, again) - again.lift
         return bool((~known & (gap < -again.precision)).any())
-
-    def _redirected(self, found: ContactSet, again: ContactSet, state: np.ndarray) -> bool:
-        """Whether any closed pair of rounded corners in ``state`` (n,) of ``found`` meets in another direction in
-        ``again``."""
-        known = {pair: c for c, pair in enumerate(zip(again.vertex.tolist(), again.edge.tolist(), strict=True))}
-        previous = self.system.blocks.previous_vertex
-        for c in np.flatnonzero((found.corner >= 0) & (state != OPEN)):
-            v, w = int(found.vertex[c]), int(found.corner[c])
-            names = ((v, w, 1), (v, int(previous[w]), 1), (w, v, -1), (w, int(previous[v]), -1))
-            cosines = [
-                sense * float(found.geometry[c, 1:3] @ again.geometry[known[v, e], 1:3])
-                for v, e, sense in names
-                if (v, e) in known
-            ]
-            if max(cosines, default=-1.0) < _OTHER_DIRECTION:
-                return True
-        return False

@@ -61,18 +61,14 @@ if TYPE_CHECKING:
     from .interfaces import SteppedSystem
     from .joint_laws.nonlinear_laws import NonlinearLaws
 
-#: A dynamic step whose contact areas of faces have not converged after this multiple of ``max_open_close_iterations``
-#: is cut, this many times at most: two half steps take a tenth of the iterations (a thousand sliding blocks: 400
-#: instead of 24 000).
-_MOST_WORK, _MOST_WORK_CUTS = 6, 3
 #: Most repetitions of a step to find the parts of joint faces in contact. Few steps need more than four.
 _PLACED = 20
 #: Most repetitions to find the ends of faces that carry the cohesion of the whole face.
 _SHARED = 8
 #: Most repetitions for the gaps of rotating blocks, and accuracy of these relative to the contacts' ``precision`` in
-#: dynamics; a hundredth of that in statics. In statics contacts store little energy, and springs of 40 E' turn an error of the gap into
-#: energy (for leaning slabs, at a tenth of the precision, as much in one step as the work of all loads). Operator splitting
-#: balances forces less exactly than that.
+#: dynamics; a hundredth of that in statics, where contacts store little energy, and springs of 40 E' turn an error of the
+#: gap into energy (for leaning slabs, at a tenth of the precision, as much in one step as the work of all loads). Operator
+#: splitting balances forces less exactly than that.
 _BENDS, _KNOWN = 4, 0.1
 
 
@@ -362,8 +358,6 @@ class Attempt:
                 better, shared = (None if sharing is found else sharing), shared + 1
             if better is None:
                 break
-            if self._takes_too_long():
-                raise Unsettled(f"contact states did not converge in {self.iterations} open–close iterations")
             if tries % _PLACED == 0:
                 # If contact areas alternate at any step length, these faces are supported at their corners in this
                 # step.
@@ -384,12 +378,6 @@ class Attempt:
         centroid = np.ascontiguousarray(self.moments[:, 1:3])
         speed = contact_speeds(found, found.geometry, rigid, centroid)
         return Striking.of(found, restitution, speed, float(np.hypot(*self.gravity)) * self.dt)
-
-    def _takes_too_long(self) -> bool:
-        """Whether shorter steps are likely to need fewer iterations in total."""
-        if self.system.scheme.static or self.cuts >= _MOST_WORK_CUTS:
-            return False
-        return self.iterations > _MOST_WORK * self.system.settings.max_open_close_iterations
 
     def _update_arcs(self) -> bool:
         """Update the gaps of contacts to those of the actual motion, and in dynamics the midpoint configuration; False
