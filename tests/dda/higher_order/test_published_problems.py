@@ -249,13 +249,17 @@ def tunnel(friction: float, angle_deg: float, from_wall: bool = False, order: in
     system = system_with(
         replace(blocks, glued=glued[~joint]), JointLaw("joint", friction), ROCK
     )  # fmt: skip
-    # Pressed unequally, a disc that nothing holds may turn.
+    # Pressed unequally, a disc that nothing holds turns, and so do its halves on a joint without friction, each about the
+    # point that holds it: the upper one is held at both ends of the joint, where what is excavated moves nothing up or down.
     centre, still = centres(system), History.constant((0.0,))
     top, bottom = centre[:, 1].argmax(), centre[:, 1].argmin()
-    held = tuple(
-        PointMotion(int(block), (0.0, y), still, direction=direction)
-        for block, y, direction in ((top, 16.0, (1.0, 0.0)), (bottom, -16.0, (1.0, 0.0)), (top, 16.0, (0.0, 1.0)))
-    )
+    points = [(top, (0.0, 16.0), (1.0, 0.0)), (bottom, (0.0, -16.0), (1.0, 0.0))]
+    if angle_deg == 0.0:
+        above = np.where(centre[:, 1] > 0, centre[:, 0], 0.0)
+        points += [(above.argmax(), (16.0, 0.0), (0.0, 1.0)), (above.argmin(), (-16.0, 0.0), (0.0, 1.0))]
+    else:
+        points.append((top, (0.0, 16.0), (0.0, 1.0)))
+    held = tuple(PointMotion(int(block), at, still, direction=direction) for block, at, direction in points)
     outside = Loads(edge_tractions=tractions, point_motions=held)
     rest = dda.in_situ_state(system, InSituStress(np.array([-ALONG, -ACROSS, 0.0])), outside)
     turn = np.linspace(0, 2 * math.pi, 60, endpoint=False)
