@@ -304,7 +304,7 @@ class OrderChoice:
         self._reported.add(block)
         log.warning(
             "t = %g s: %r has order %d, the highest, and higher orders would contain %.2g of the energy (dda.order_target = %g): %s. "
-            "Draw it as several blocks, or allow a larger share",
+            "Divide it into cells (zones.NAME.mesh_size_m with an order of 3), draw it as several blocks, or allow a larger share",
             time, self.blocks.names[block], HIGHEST, left, self.target, self._why(block),
         )  # fmt: skip
 
@@ -317,6 +317,8 @@ class OrderChoice:
         inward = turns < -1e-6 * np.hypot(*before.T) * np.hypot(*after.T)
         if not inward.any():
             return "its stress is concentrated at corners or ends of contacts"
+        if len(self.blocks.loops(block)) > 1:
+            return "polynomials cannot bend around its hole"
         x, y = at[own[inward]][0]
         return f"stress is singular at its re-entrant corner ({x:.4g}, {y:.4g})"
 

@@ -65,6 +65,19 @@ def test_settings_that_do_not_go_with_it_are_refused(tmp_path, old, new, message
         load_scene(scene(tmp_path, text=BENDING.replace(old, new)))
 
 
+@pytest.mark.parametrize(
+    ("order", "more", "told"), [("4", "", 1), ('"auto"', "", 1), ("1", "", 0), ("3", "\nmesh_size_m = 0.3", 0)]
+)
+def test_blocks_with_large_holes_are_reported(tmp_path, order, more, told):
+    """9.9 % of the area, less than a block with cells or of first order is warned of."""
+    text = BENDING.replace("order = 4", f"order = {order}{more}")
+    drawn = "rectangle = [1, 0, 2, 1]"
+    assert drawn in text
+    text = text.replace(drawn, drawn + ", holes = [[[1.4, 0.4], [1.4, 0.7], [1.7, 0.7], [1.7, 0.4]]]")
+    found = [w for w in load_scene(scene(tmp_path, text=text)).warnings if "holes of" in w.message]
+    assert len(found) == told and all("mesh_size_m" in w.way_out for w in found)
+
+
 def test_stress_inside_and_bent_outlines_are_written_and_a_run_resumes(tmp_path):
     """A block under its weight: what is written of its inside has the mean stress of the block, and varies. A run that goes
     on from its checkpoint writes what one that was not broken off does."""
