@@ -198,6 +198,8 @@ class Body:
         self._condensed: tuple[UniformContact | None] | None = None
         #: Where faces stand on bases, and how unit tractions move them by the states of the cracks (`rigid_bases`).
         self.on_bases: dict[bytes, tuple[np.ndarray, ...]] = {}
+        #: Whether a warning has been given that the contact area of a face on its base was not found.
+        self.lost_base = False
         self._assemble(previous, holds, many)
 
     def _measure(self, same: Body | None) -> None:

@@ -38,7 +38,16 @@ from ..crack_compliance.added_compliance import stress_rotations, times
 from .contact_gathering import faces_and_lone, on_outline, touches_of
 from .face_traction import add_face, add_lone
 from .inertia_forces import BlockInertia, BlockShape, balanced
-from .piecewise_traction import Found, add_couple, add_edge_piece, add_point_load, add_row, line_of, outlines
+from .piecewise_traction import (
+    Found,
+    add_couple,
+    add_edge_piece,
+    add_point_load,
+    add_row,
+    line_of,
+    outlines,
+    pieces_on_base,
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -236,10 +245,10 @@ def _pieces(found, asked, of, vertex_start, acting, pointed):
                 if first == len(rows):
                     continue  # only single contacts
                 start = sides[number, 0]
-                based = acting.based[touches.against[first]]
-                amount, lost = add_face(found, of, start, touches, face, number, based)
+                _, _, ax, ay, length = line_of(of, start)
+                pieces = pieces_on_base(length, asked.area[b]) if acting.based[touches.against[first]] else 0
+                amount, lost = add_face(found, of, start, touches, face, number, pieces)
                 couple += lost
-                _, _, ax, ay, _ = line_of(of, start)
                 stretch[b, 0, 0] += amount * ax * ax
                 stretch[b, 0, 1] += amount * ax * ay
                 stretch[b, 1, 0] += amount * ax * ay

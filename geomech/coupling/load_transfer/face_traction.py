@@ -42,11 +42,11 @@ class _Spread(NamedTuple):
 
 
 @allocating
-def add_face(found, of, start, touches, face, number, based):
+def add_face(found, of, start, touches, face, number, pieces):
     """Add the traction of the contacts with this face ``number`` to ``found``, on the straight side that begins with
     the edge ``start``.
 
-    ``based``: the face lies on a rigid base, and the distribution of its pressure is found later by
+    ``pieces``, if not 0: the face lies on a rigid base, and the distribution of its pressure on so many pieces is found later by
     `geomech.ddm.loads.rigid_bases`; the rows of its pieces and the traction per unit pressure are added, too.
 
     Returns two moments, N: Σ r ⊗ f along the side that the tractions do not reproduce (opposed shears of two contacts
@@ -90,13 +90,13 @@ def add_face(found, of, start, touches, face, number, based):
     even = holds or abs(total) <= 1e-9 * size or not inside
     slope = 0.0 if even else shear / total
     wx, wy = slope * ax - ay, slope * ay + ax
-    if based and not even:
+    if pieces and not even:
         near, far = on_grid(min(max(near, 0.0), length), length), on_grid(min(max(far, 0.0), length), length)
         arm = moment / total
         if min(arm - near, far - arm) > AT_AN_END * (far - near):
             _, _, p_near, p_far = linear(far - near, total, moment - near * total)
             begins = found.count[0]
-            add_base(found, of, start, near, far, p_near, p_far, wx, wy)
+            add_base(found, of, start, near, far, p_near, p_far, wx, wy, pieces)
             add_row(found.count, found.bases, 2, begins, found.count[0], wx, wy)
             return stretched - slope * moment, 0.0
     spread = _Spread(total, moment, shear, wx, wy, holds, even)

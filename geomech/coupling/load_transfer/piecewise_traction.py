@@ -40,8 +40,10 @@ ON_EDGE = 1e-6
 LONE_SPREAD = 1.0 / 20.0
 
 
-#: Pieces of a face on a rigid base. K of a slot in a block as wide as deep, twice and three times as wide is accurate
-#: to 6e-4, 1e-4 and 2e-3 with 24 pieces, and to 7e-4, 2e-3 and 2 % with 16 (`tests/coupling/test_bases.py`).
+#: Pieces of a face on a rigid base that is as long as √area of the block, and as many more as it is longer: below a wide block
+#: the pressure varies over a part of the face as long as the block is deep. K of a slot in a block as wide as deep, twice and
+#: three times as wide is accurate to 6e-4, 2e-4 and 1e-3 (`tests/coupling/test_bases.py`); 24 pieces left 7 % at four times.
+#: From twice as many on, pieces are shorter than the elements of the boundary resolve, and no area of contact is found.
 ON_BASE = 24
 
 
@@ -86,6 +88,12 @@ def line_of(of, start):
     x, y = of.vertices[last, 0] - sx, of.vertices[last, 1] - sy
     length = math.hypot(x, y)
     return sx, sy, x / length, y / length, length
+
+
+@jit
+def pieces_on_base(length, area):
+    """Number of pieces of a face of this ``length`` (m) of a block of this ``area`` (m²)."""
+    return int(ON_BASE * max(1.0, length / math.sqrt(area)) + 0.5)
 
 
 @jit
@@ -155,19 +163,19 @@ def add_on_side(found, of, start, low, high, tax, tay, tbx, tby):
 
 
 @allocating
-def add_base(found, of, start, low, high, p_low, p_high, wx, wy):
-    """Add a pressure, linear from ``p_low`` to ``p_high`` over [``low``, ``high``] of a straight side, on pieces whose
+def add_base(found, of, start, low, high, p_low, p_high, wx, wy, pieces):
+    """Add a pressure, linear from ``p_low`` to ``p_high`` over [``low``, ``high``] of a straight side, on so many ``pieces`` whose
     pressures can be changed later: short at the ends, where a rigid base presses most. (wx, wy): traction per unit
     pressure."""
     sx, sy, ax, ay, length = line_of(of, start)
-    n = ON_BASE + 1
+    n = pieces + 1
     places, vertex = (
         np.empty(n + of.chain_last[start] - of.chain_first[start]),
         np.full(n + of.chain_last[start] - of.chain_first[start], -1),
     )
-    for k in range(ON_BASE):
-        places[k] = low + math.sin(0.5 * math.pi * k / ON_BASE) ** 2 * (high - low)
-    places[ON_BASE] = high
+    for k in range(pieces):
+        places[k] = low + math.sin(0.5 * math.pi * k / pieces) ** 2 * (high - low)
+    places[pieces] = high
     for k in range(of.chain_first[start] + 1, of.chain_last[start] - 1):
         corner = of.chain[k]
         at = place_along(of.vertices[corner, 0], of.vertices[corner, 1], sx, sy, ax, ay)

@@ -83,7 +83,12 @@ def on_bases(
         still = faces.moved(warm) - gives @ pressure
         found = faces.settled(gives, still, right)
         if found is None:
-            _log.debug("the contact area of a face on its rigid base was not found: its pressure is unchanged")
+            if not body.lost_base:
+                body.lost_base = True
+                _log.warning(
+                    "the contact area of a face on its rigid base was not found: its pressure stays linear, and K may be off by "
+                    "several per cent or, in a wide block, more: set more elements on the sides (ddm.elements_per_side)"
+                )
             return warm
         change = np.abs(found - pressure).max()
         if change <= SETTLED * np.abs(found).max():
