@@ -64,7 +64,7 @@ class SteppedSystem(Protocol):
     owner: np.ndarray
     half_diagonal: float
     rounding: float
-    roundoff_reported: bool
+    warned: set[str]
     allowed_penetration: float
     reach: np.ndarray | None
     plastic: bool

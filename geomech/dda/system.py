@@ -137,7 +137,9 @@ class BlockSystem:
             raise ValueError(f"{blocks.names[int(areas.argmin())]}: the block has no area")
         self._refuse_massless()
         self.half_diagonal = 0.5 * float(np.hypot(*np.ptp(vertices, axis=0)))
-        self.rounding, self.roundoff_reported = rounding_of(vertices), False
+        self.rounding = rounding_of(vertices)
+        #: What has been warned of already; systems of the same blocks share it.
+        self.warned: set[str] = set()
         #: (n_blocks,) m: static steps are solved by operator splitting, which gives blocks up that move beyond this; None:
         #: they are not.
         self.reach: np.ndarray | None = None
@@ -245,6 +247,7 @@ class BlockSystem:
         settings = replace(self.settings, dynamic_factor=0.0)
         out = BlockSystem(self.blocks, self.materials, self.joints, self._joint_index, settings, self.work)
         out.finder.toes, out.finder.whole_faces = self.finder.toes, self.finder.whole_faces
+        out.warned = self.warned
         return out
 
     @cached_property
@@ -261,6 +264,7 @@ class BlockSystem:
         settings = replace(self.settings, max_displacement_ratio=_ANYWHERE)
         out = BlockSystem(self.blocks, self.materials, joints, self._joint_index, settings, self.work)
         out.finder.toes, out.finder.whole_faces = self.finder.toes, self.finder.whole_faces
+        out.warned = self.warned
         return out
 
     def removed(self, loads: Loads, time: float) -> np.ndarray | None:

@@ -41,7 +41,7 @@ from .kinematics.newmark import (
     turned,
 )
 from .kinematics.rigid_blocks import mean_stress
-from .kinematics.roundoff import undecided_gaps, warn_of_roundoff
+from .kinematics.roundoff import ROUND_OFF, undecided_gaps, warn_of_roundoff
 from .kinematics.simplex_integration import block_moments, mass_matrix
 from .kinematics.tolerances import LITTLE
 from .linear_solver import assembly
@@ -51,7 +51,7 @@ from .loads.step_actions import BeyondMean, StepActions, beyond_mean, effective_
 from .loads.viscous_boundary import ViscousEdges
 from .open_close.augmented_lagrangian import settle_augmented
 from .open_close.contact_set import ContactSet
-from .open_close.equations import Equations, Unsettled
+from .open_close.equations import Equations, GivingSprings, Unsettled
 from .open_close.iteration import settle
 from .open_close.settled_states import Settled
 from .out_of_balance import imbalance
@@ -157,6 +157,7 @@ class Attempt:
         #: (6 n_free,) motion of a static step as found last, with other contact areas or arcs; None before.
         self.earlier: np.ndarray | None = None
         self.earlier_forces: np.ndarray | None = None
+        self.giving = GivingSprings()
         #: J/m, kinetic energy of the mean velocity of a static step, which is not carried over.
         self.dropped = 0.0
         if not scheme.static and found.tried is None and len(found):
@@ -314,7 +315,7 @@ class Attempt:
         actions, found, order, midpoint = self.actions, self.found, self.order, self.midpoint
         constrained = self._constrained()
         own, shared = (self.matrix, self.right), 0
-        if self.system.plastic and self.system.reach is not None:
+        if self._splits_plastic:
             # Operator splitting gives each contact of a whole face the cohesion of its own length.
             found, shared = found.sharing_cohesion(np.full(len(found), STICK), found.bonded), _SHARED
         for tries in range(1, 2 * _PLACED + 1):
@@ -342,6 +343,7 @@ class Attempt:
                 unknowns = settled.unknowns
             else:
                 assert self.pattern is not None  # blocks are free
+                actions.limits_in_settle = self._splits_plastic
                 solve = partial(self._settled, vectors=vectors, springs=springs, curved=curved)
                 settled, unknowns = actions.settle(
                     self.pattern, self.matrix, self.right, vectors, geometry, found, gap, solve
@@ -466,8 +468,8 @@ class Attempt:
             if system.scheme.static
             else undecided_gaps(system.rounding, right, pattern.order, found.block, found.other, springs.normal)
         )
-        if not system.roundoff_reported:
-            system.roundoff_reported = True
+        if ROUND_OFF not in system.warned:
+            system.warned.add(ROUND_OFF)
             weight = np.where(system.fixed, np.inf, system.mass * np.hypot(*self.gravity))
             warn_of_roundoff(system.rounding, weight, found.block, found.other, springs.normal, system.finder.names)
 
@@ -497,11 +499,17 @@ class Attempt:
     def _further_equations(self, pattern, matrix, right, contacts, vectors) -> dict[str, Any]:
         """Fields of `equations` that depend on further unknowns; ``right`` (n_free, 6) is the right-hand side of the
         first six."""
-        reach = self.system.reach if self.system.scheme.static else None
+        bolts = None if self.actions is None or not self._splits_plastic else self.actions.bolts
         return {
             "right": right, "expected": self._expected_unknowns(), "earlier": self.earlier,
-            "earlier_forces": self.earlier_forces, "reach": reach, "plastic": self.system.plastic and reach is not None,
+            "earlier_forces": self.earlier_forces, "reach": self.system.reach if self.system.scheme.static else None,
+            "plastic": self._splits_plastic, "limits": bolts, "giving": self.giving,
         }  # fmt: skip
+
+    @property
+    def _splits_plastic(self) -> bool:
+        """Whether contacts are settled by `plastic_splitting`."""
+        return self.system.scheme.static and self.system.plastic and self.system.reach is not None
 
     def _expected_unknowns(self) -> np.ndarray | None:
         """(6 n_free,) displacement of this step at its initial velocity, in the unknowns of `assembly`; None in

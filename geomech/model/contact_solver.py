@@ -59,10 +59,11 @@ class ContactSolver:
     static_splitting_cycle          … and at slivers where iterates go round in a cycle, …
     static_splitting_cycling        … which may be this fraction of the blocks
     static_splitting_change         largest change of the mean forces between two periods, relative to their mean
-    plastic_splitting               number of free blocks from which it is used with cohesion
-                                    (`dda.open_close.plastic_splitting`; with bolts, or with joint stiffness alone,
-                                    from ``static_splitting``): 87 blocks with cohesion have their bound in 1 s;
-                                    Newton's method, which breaks bonds one by one, ends 7 % below it after 31 s
+    plastic_splitting               number of free blocks from which it is used with cohesion, joint stiffness or bolts
+                                    (`dda.open_close.plastic_splitting`): 87 blocks with cohesion have their bound in 1 s; Newton's
+                                    method, which breaks bonds one by one, ends 7 % below it after 31 s
+    plastic_splitting_gives         stiffness of springs that give, relative to others: bolts of 1e7 N/m between blocks of
+                                    20 GPa take up their forces in hundreds of iterations instead of tens of thousands
     plastic_splitting_change        with cohesion, joint stiffness or bolts: largest change of the mean forces
 
     Central path (`dda.open_close.interior_point`)
@@ -119,6 +120,7 @@ class ContactSolver:
     static_splitting_cycling: float = 3e-3
     static_splitting_change: float = 3e-4
     plastic_splitting: int = 50
+    plastic_splitting_gives: float = 0.01
     plastic_splitting_change: float = 3e-3
     central_path: bool = True
     path_iterations: int = 60

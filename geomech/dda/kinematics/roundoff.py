@@ -26,6 +26,10 @@ def rounding_of(vertices: np.ndarray) -> float:
     return _ROUNDING * float(np.abs(vertices).max())
 
 
+#: What `warn_of_roundoff` warns of, once.
+ROUND_OFF = "round-off"
+
+
 def undecided_gaps(
     rounding: float, right: np.ndarray, order: np.ndarray, block: np.ndarray, other: np.ndarray, normal: np.ndarray
 ) -> np.ndarray:

@@ -11,6 +11,7 @@ from __future__ import annotations
 from llvmlite import ir
 from numba import types
 from numba.core import cgutils
+from numba.core.errors import TypingError
 from numba.extending import intrinsic, models, register_model
 from numba.np.arrayobj import make_array
 
@@ -67,7 +68,11 @@ def _address(builder, args, vector):
 
 @intrinsic
 def numbers(typingctx, array):
-    """Address of the first number of a contiguous ``array``."""
+    """Address of the first number of a contiguous ``array``. Others are refused: their numbers do not follow one another."""
+    if array.layout != "C":
+        raise TypingError(
+            f"a kernel reads numbers one after the other, but {array} is not stored so: pass it by ascontiguousarray"
+        )
 
     def codegen(context, builder, signature, args):
         return make_array(signature.args[0])(context, builder, args[0]).data

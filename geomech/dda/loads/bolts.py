@@ -172,6 +172,28 @@ class BoltSet:
         k, at_rest = self.springs()
         return at_rest - k * motion
 
+    def let_elastic(self) -> None:
+        """Take all bolts as elastic; `beyond` tells what they exceed."""
+        self.axial, self.across = np.zeros_like(self.axial), np.zeros_like(self.across)
+
+    def beyond(self, unknowns: np.ndarray, order: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """As `ForceLimits.beyond`, of bolts that are all elastic: (2 n,) first blocks, then second ones."""
+        at, owners = self.pairs, np.concatenate([self.pairs.block, self.pairs.other])
+        rows = np.where(owners >= 0, order[owners], -1)
+        own = np.where((rows >= 0)[:, None], unknowns.reshape(-1, 6)[rows], 0.0).reshape(2, -1, 1, 6)
+        vectors = at.vectors.reshape(-1, 2, 2, 6)
+        motion = at.shift + (vectors * own.transpose(1, 2, 0, 3)).sum(axis=(2, 3))
+        force = self.trial + self.stiffness * motion[:, 0]
+        dowel = self.dowel - self.shear_stiffness * motion[:, 1]
+        # Forces act on the second block, along the axis −T.
+        lost = np.stack(
+            [force - np.clip(force, self.least, self.most), np.clip(dowel, -self.strength, self.strength) - dowel]
+        )
+        if not lost.any():
+            return rows[:0], own[0, :0, 0]
+        push = np.einsum("kn,nka->na", lost, at.vectors)
+        return rows, np.concatenate([push[:, :6], push[:, 6:]])
+
     def motion(self, unknowns: np.ndarray, order: np.ndarray) -> np.ndarray:
         """(n, 2) elongation and relative motion across the axis, m, from the solver's ``unknowns`` (n_free, 6)."""
         out = self.pairs.shift.copy()

@@ -130,6 +130,8 @@ class StepActions:
         #: (n_contacts,) m: contacts' motion along their edges due to the motion of fixed blocks.
         self.along = np.zeros(0)
         self._motion = np.zeros((0 if self.bolts is None else len(self.bolts.number), 2))
+        #: Whether contacts are settled together with the limits of bolts (`ForceLimits`).
+        self.limits_in_settle = False
 
     @classmethod
     def of(
@@ -206,11 +208,13 @@ class StepActions:
     def _with_bolts(self, pattern, matrix, right, found, gap, settle: Settle) -> Settled:
         if self.bolts is None:
             return settle(pattern, matrix, right, found, gap)
+        if self.limits_in_settle:
+            self.bolts.let_elastic()
         for _ in range(ROUNDS):
             own, side, across = self.bolts.assemble(matrix, right, self.order)
             settled = settle(replace(pattern, links=self._links(pattern, across)), own, side, found, gap)
             self._motion = self.bolts.motion(settled.unknowns, self.order)
-            if self.bolts.take_states(self._motion):
+            if self.bolts.take_states(self._motion) or self.limits_in_settle:
                 return settled
         raise self.bolts.unsettled()
 

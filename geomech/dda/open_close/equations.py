@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from typing import Protocol
 
 import numpy as np
 
@@ -78,12 +79,30 @@ class Answer:
     gap: np.ndarray
 
 
+@dataclass
+class GivingSprings:
+    """Which springs of contacts gave, (2, n) normal and shear, in the last solution of a step by `plastic_splitting`; None before
+    there is any."""
+
+    which: np.ndarray | None = None
+
+
+class ForceLimits(Protocol):
+    """Springs in the blocks' equations whose forces have limits."""
+
+    def beyond(self, unknowns: np.ndarray, order: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Rows of blocks (k,), −1 for those without unknowns, and the forces (k, 6) that they have to lose, since springs
+        exceed their limits after the motion ``unknowns`` (6 n_free,)."""
+        ...
+
+
 @dataclass(eq=False)
 class Equations:
     """The equations of a step without contact states; arguments as for `settle`. ``earlier``: (6 n,) the motion found by
     an earlier attempt at the same static step, if any, and ``earlier_forces`` (n, 2) its normal and shear forces;
     ``reach``: (n_blocks,) m beyond which blocks are given up if operator splitting is to solve a static step;
-    ``plastic``: it does so from the start, with cohesion (`plastic_splitting`)."""
+    ``plastic``: it does so from the start, with cohesion, joint stiffness or bolts (`plastic_splitting`), whose ``limits``
+    it takes into account."""
 
     pattern: assembly.Pattern
     matrix: np.ndarray
@@ -100,6 +119,8 @@ class Equations:
     earlier_forces: np.ndarray | None = None
     reach: np.ndarray | None = None
     plastic: bool = False
+    limits: ForceLimits | None = None
+    giving: GivingSprings = field(default_factory=GivingSprings)
     #: Whether patches and the central path can be used, which are for six unknowns per block.
     first_order = True
 

@@ -5,12 +5,17 @@ convex set, whatever slip they have behind them, and the iteration needs no stat
 
     c  counts in full on faces that touch anywhere (`whole_faces`); on others it falls to zero over the gap that the contact's
        spring has under a force of c ℓ, so that a face that is open by a hairline does not lose all of it at once
-    ρ  in series with the springs of the contacts: joint stiffness may be far below that of the blocks
+    ρ  in series with the springs of the contacts: joint stiffness may be far below that of the blocks. In an iteration a block
+       on contacts that slide or are open moves by its unbalanced force over the sum of their ρ, which is far less than a bolt or
+       a soft joint needs to take up the force. Contacts that were open or slid throughout a period, at blocks that move steadily,
+       get springs of a hundredth of that stiffness until they have been closed, or have stuck, for a whole period
     S₀ and N₀ of the last step are the forces at first
 
-Bolts are part of the blocks' equations. Cohesive blocks stay wedged in more ways than blocks with friction alone, and iterates
-go round in longer cycles: the means are taken over more and more periods. Blocks that do not balance in
-`ContactSolver.static_splitting_iterations` have failed, which may underrate the factor, and never overrates it.
+Bolts are part of the blocks' equations as if they were elastic. What a bolt's force exceeds its limits by after the motion of
+an iteration is taken off the right side of the next one. Cohesive blocks stay wedged in more ways than blocks with friction
+alone, and iterates go round in longer cycles: means are also taken over more and more periods. Blocks that stay beyond the
+limit of motion, and those that do not balance in `ContactSolver.static_splitting_iterations`, have failed, which may underrate
+the factor, and never overrates it.
 """
 
 from __future__ import annotations
@@ -24,7 +29,17 @@ from ..joint_laws.coulomb_return import moved
 from ..joint_laws.penalty_springs import PENALTY_RATIO
 from .equations import Equations, Unsettled
 from .interior_point.central_path import SLIPPED
-from .static_splitting import ADAPTED, AT_STRENGTH, CALM, NOT_BALANCED, Converged, KeepsMoving, Period, Splitting
+from .static_splitting import (
+    ADAPTED,
+    AT_STRENGTH,
+    CALM,
+    NOT_BALANCED,
+    Converged,
+    KeepsMoving,
+    Period,
+    Splitting,
+    farthest,
+)
 
 
 def is_plastic(law: JointLaw) -> bool:
@@ -104,11 +119,35 @@ class _PlasticSplitting(Splitting):
 
     def _springs(self, stiffness: float, share: np.ndarray) -> np.ndarray:
         contacts = np.ascontiguousarray(self._law[:, 1:3].T)
-        return share / (1.0 / stiffness + 1.0 / contacts)
+        given = np.where(self._gives, self._solver.plastic_splitting_gives, 1.0)
+        return given * share / (1.0 / stiffness + 1.0 / contacts)
+
+    def _period(self) -> Period:
+        self._always, self._ever = np.ones((2, self._n), bool), np.zeros((2, self._n), bool)
+        return super()._period()
+
+    def _sample(self) -> None:
+        state = self._states[0]
+        gives = np.stack([state == OPEN, state != STICK])
+        self._always &= gives
+        self._ever |= gives
+
+    def _give(self, steady: np.ndarray) -> bool:
+        """Whether other springs than before give: those of contacts of ``steady`` blocks (n_free,) that were open or slid for a
+        whole period, until they are closed or stick for as long."""
+        found, order = self._equations.found, self._equations.pattern.order
+        moves = np.append(steady, False)
+        gives = (self._always & (moves[order[found.block]] | moves[order[found.other]])) | (self._gives & self._ever)
+        before = self._gives
+        self._gives = self._equations.giving.which = gives
+        return bool((before != gives).any())
 
     def _begin(self) -> None:
         equations, law = self._equations, self._law
         earlier, forces = equations.earlier, equations.earlier_forces
+        self._beyond = np.zeros(equations.pattern.n, int)
+        gave = equations.giving.which
+        self._gives = np.zeros((2, self._n), bool) if gave is None or gave.shape[1] != self._n else gave
         self._unknowns = np.zeros(equations.right.size) if earlier is None else earlier.copy()
         motion = moved(self._unknowns, *self._contacts)
         if forces is None or len(forces) != self._n:
@@ -151,24 +190,41 @@ class _PlasticSplitting(Splitting):
             if not np.isfinite(period.unknowns).all():
                 raise Unsettled("operator splitting diverged")
             self._keep_cohesion(period.forces[:, 0])
+            self._refuse_beyond(period)
             steady = (self._left(period) > solver.static_splitting_balance) & self._alike(last, period)
             # What goes round in a cycle cancels in means over longer and longer times.
             if mean.number < longest:
                 mean = mean.joined(period)
             else:
                 before, mean, longest = mean, _Span.of(period), 2 * longest
-            balanced = self._left(mean).max() <= solver.static_splitting_balance and not steady.any()
-            if balanced and self._changed(before, mean) <= solver.plastic_splitting_change:
-                return self._result(mean, taken)
+            for one, two in ((last, period), (before, mean)) if not steady.any() else ():
+                if self._settled(one, two):
+                    return self._result(two, taken)
             if taken >= solver.static_splitting_iterations:
                 raise self._unbalanced(last, period, mean, taken)
             if steady.any():
-                self._follow(last, period, steady, self._changed(last, period) <= CALM * solver.static_splitting_change)
                 mean = before = _Span.of(period)
                 longest = 1
-            last = period
-            if taken % (ADAPTED * solver.static_splitting_period) == 0:
+            if self._give(steady):
                 self._take(self._stiff)
+            else:
+                if steady.any():
+                    calm = self._changed(last, period) <= CALM * solver.static_splitting_change
+                    self._follow(last, period, steady, calm)
+                if taken % (ADAPTED * solver.static_splitting_period) == 0:
+                    self._take(self._stiff)
+            last = period
+
+    def _settled(self, last: Period, period: Period) -> bool:
+        """Whether the forces in the means of a ``period`` balance, and are those of the ``last``."""
+        balanced = self._left(period).max() <= self._solver.static_splitting_balance
+        return bool(balanced and self._changed(last, period) <= self._solver.plastic_splitting_change)
+
+    def _refuse_beyond(self, period: Period) -> None:
+        """Raise `KeepsMoving` if a block has been beyond its reach for some periods: it would not be accepted there at rest."""
+        self._beyond = np.where(farthest(period.end.reshape(-1, 6)) > self._reach(), self._beyond + 1, 0)
+        if self._beyond.max(initial=0) >= ADAPTED:
+            raise KeepsMoving(period.end.reshape(-1, 6), period.unbalanced, self._equations.pattern.order)
 
     def _unbalanced(self, last: Period, period: Period, mean: Period, taken: int) -> KeepsMoving:
         moves = (self._left(mean) > self._solver.static_splitting_balance)[:, None]

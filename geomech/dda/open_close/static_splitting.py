@@ -218,7 +218,11 @@ class Splitting:
         contact_turn(
             self._unknowns, tuple(self._contacts), self._law, self._rho, self._intact, 1.0, at_hand, self._states
         )
-        rest = (equations.right - pattern.without_contacts(equations.matrix, self._unknowns)).ravel()
+        rest = equations.right - pattern.without_contacts(equations.matrix, self._unknowns)
+        if equations.limits is not None:
+            rows, lost = equations.limits.beyond(self._unknowns, pattern.order)
+            np.add.at(rest, rows[rows >= 0], lost[rows >= 0])
+        rest = rest.ravel()
         balance(0, pattern.n, *equations.sides, self._vectors, at_hand, 4, 5, rest, rest)
         self._unknowns += self._correction(rest)
 
@@ -231,11 +235,15 @@ class Splitting:
             if k % _SAMPLED == 0:
                 forces += self._forces()
                 unknowns += self._unknowns
+                self._sample()
         sampled = len(range(0, number, _SAMPLED))
         # The changes of ζ add up to what is unbalanced.
         pulled = np.zeros((self._n, 6))
         pulled[:, 4:] = self._rho.T * (self._at_hand[:, :2] - before) / number
         return Period(forces / sampled, unknowns / sampled, self._on_blocks(pulled), self._unknowns.copy())
+
+    def _sample(self) -> None:
+        """Record the states of contacts."""
 
     def _on_blocks(self, pulled: np.ndarray) -> np.ndarray:
         """(n_free, 6) sums on the blocks of the contact forces in the last two columns of ``pulled`` (n, 6)."""
@@ -307,12 +315,10 @@ class Splitting:
     def _follow(self, last: Period, period: Period, steady: np.ndarray, calm: bool) -> None:
         """Once forces are ``calm``, move the ``steady`` blocks (n_free,) on to where a contact closes. Raises `KeepsMoving`
         if one has moved too far, or will under a force that hardly decreases."""
-        equations, order = self._equations, self._equations.pattern.order
+        order = self._equations.pattern.order
         motion = np.where(steady[:, None], (period.end - last.end).reshape(-1, 6), 0.0)
         unbalanced = np.where(steady[:, None], period.unbalanced, 0.0)
-        assert equations.reach is not None  # `can_split_statics`
-        reach = np.empty(len(steady))
-        reach[order[order >= 0]] = equations.reach[order >= 0]
+        reach = self._reach()
         if (farthest(period.end.reshape(-1, 6)) > reach)[steady].any():
             raise KeepsMoving(motion, unbalanced, order)
         if not calm:
@@ -333,6 +339,14 @@ class Splitting:
         along[:, 1] *= is_open | (self._states[0] == SLIP)
         self._at_hand[:, :2] += along
         self._at_hand[:, 2:4] += along
+
+    def _reach(self) -> np.ndarray:
+        """(n_free,) m: motion beyond which blocks are given up."""
+        order, reach = self._equations.pattern.order, self._equations.reach
+        assert reach is not None  # `can_split_statics`
+        out = np.empty(self._equations.pattern.n)
+        out[order[order >= 0]] = reach[order >= 0]
+        return out
 
     def _until_contact(self, motion: np.ndarray, stride: np.ndarray) -> np.ndarray:
         """(n_free,) the ``stride`` of the blocks' ``motion`` (n_free, 6), shortened to where open contacts close, and the

@@ -90,11 +90,8 @@ class TrialLoads:
 
     def plastic(self, blocks: Blocks, joints: Sequence[JointLaw], settings: DdaSettings) -> bool:
         """Whether trials of these ``blocks`` are solved by operator splitting with cohesion, joint stiffness or bolts: there
-        are many, and their ``joints`` keep what strength they have. (With bolts it often fails too early: on 12 random slopes
-        of 87 to 282 blocks up to 21 % below the bound, where the open–close iteration is up to 16 % better.)"""
-        solver, cohesive = settings.contact_solver, any(law.cohesion > 0.0 for law in joints)
-        soon = cohesive and not self.loads.bolts
-        many = int((~blocks.fixed).sum()) >= (solver.plastic_splitting if soon else solver.static_splitting)
+        are many, and their ``joints`` keep what strength they have."""
+        many = int((~blocks.fixed).sum()) >= settings.contact_solver.plastic_splitting
         more = bool(self.loads.bolts) or any(is_stronger(law) for law in joints)
         plain = settings.contact == "penalty" and not self.loads.excavations
         return many and more and plain and all(is_plastic(reduced(law, 1.0)) for law in joints)

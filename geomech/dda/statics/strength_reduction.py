@@ -210,6 +210,8 @@ class _Search:
     under: TrialLoads
     rest: State
     tolerance: float
+    #: What trials have warned of.
+    warned: set[str] = field(default_factory=set)
     #: What `aim` has found.
     aims: dict[Counted, float] = field(default_factory=dict, init=False)
 
@@ -221,7 +223,7 @@ class _Search:
             for law in self.joints
         ]
         system = BlockSystem(self.blocks, self.materials, laws, self.joint_index, self.settings)
-        system.plastic = plastic
+        system.plastic, system.warned = plastic, self.warned
         if self.under.at_once(system):
             # A trial is one step, which fails as a whole.
             system.settings = replace(self.settings, max_step_cuts=0)
@@ -493,7 +495,7 @@ class _Bracket:
                 if self.lower >= FARTHEST:
                     return self._answer(self.lower, None)
                 close_trial = _close_to(self._aim, self.lower, tolerance) if math.isfinite(self._aim) else None
-                factor = 2.0 * self.lower if close_trial is None else close_trial
+                factor = self._beyond_bound(tolerance) if close_trial is None else close_trial
             elif self._expected(upper) and sum(not t.stable for t in known) == 1:
                 factor = upper * (1.0 + _SECOND)
             elif upper > self.lower * (1.0 + tolerance):
@@ -506,6 +508,13 @@ class _Bracket:
                 failed = next(t for t in known if t.factor == upper)
                 return self._answer(_extrapolated_factor(known, self.lower, upper), failed)
             self.tried(factor)
+
+    def _beyond_bound(self, tolerance: float) -> float:
+        """The next factor where blocks are stable at the bound: just above, since rigid blocks fail there and others hardly
+        later, then ever farther; twice the last one without a bound."""
+        if not (self._at_once and 0.0 < self._aim < math.inf):
+            return 2.0 * self.lower
+        return self.lower + max(2.0 * (self.lower - self._aim), tolerance / (1.0 + tolerance) * self.lower)
 
     def _expected(self, upper: float) -> bool:
         """Whether blocks that fail at the factor ``upper`` do so as the bound says, and not earlier, where a trial above the

@@ -32,6 +32,7 @@ import operator
 from llvmlite import ir
 from numba import types
 from numba.core import cgutils
+from numba.core.errors import TypingError
 from numba.extending import intrinsic, lower_builtin, models, register_model, type_callable
 
 from ...compiled import UNCOUNTED, part
@@ -251,8 +252,17 @@ def value(typing, b, q):
     return complex_lanes(complex_lanes, complex_lanes), code
 
 
+def _first(context, builder, kind, array):
+    """Address of the first number of a contiguous ``array``; others are refused: their numbers do not follow one another."""
+    if kind.layout != "C":
+        raise TypingError(
+            f"a kernel reads numbers one after the other, but {kind} is not stored so: pass it by ascontiguousarray"
+        )
+    return context.make_array(kind)(context, builder, array).data
+
+
 def _address(context, builder, kind, array, at):
-    data = context.make_array(kind)(context, builder, array).data
+    data = _first(context, builder, kind, array)
     return builder.bitcast(builder.gep(data, [at]), _F8.as_pointer())
 
 
@@ -299,8 +309,8 @@ def store(typing, array, at, x):
 
 def _addresses(context, builder, sig, array, at, places, first):
     """Address of each lane in turn."""
-    data = builder.gep(context.make_array(sig.args[0])(context, builder, array).data, [at])
-    places = builder.gep(context.make_array(sig.args[2])(context, builder, places).data, [first])
+    data = builder.gep(_first(context, builder, sig.args[0], array), [at])
+    places = builder.gep(_first(context, builder, sig.args[2], places), [first])
     for k in range(WIDTH):
         place = builder.load(builder.gep(places, [ir.Constant(ir.IntType(64), k)]))
         yield ir.Constant(ir.IntType(32), k), builder.gep(data, [place])
