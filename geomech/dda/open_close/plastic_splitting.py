@@ -96,6 +96,9 @@ class _Span(Period):
 
 
 class _PlasticSplitting(Splitting):
+    #: (2, n) bool, normal and shear springs that give.
+    _gives: np.ndarray
+
     def _laws(self, bonded: np.ndarray) -> np.ndarray:
         found, springs, holds = self._equations.found, self._equations.springs, bonded > 0
         gap = self._equations.gap
