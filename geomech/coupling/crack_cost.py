@@ -70,11 +70,11 @@ def crack_cost(problem: Problem) -> CrackCost:
     return CrackCost(cracked, on_sides, on_cracks, sides, memory, growing, seconds)
 
 
-def cost_lines(problem: Problem) -> list[str]:
-    """Lines that state the `crack_cost` of ``problem``; none without cracked blocks."""
+def cost_lines(problem: Problem, cost: CrackCost | None = None) -> list[str]:
+    """Lines that state the `crack_cost` of ``problem`` (``cost``, if known); none without cracked blocks."""
     if not problem.cracks.n_cracks or problem.endless is not None:
         return []
-    cost = crack_cost(problem)
+    cost = crack_cost(problem) if cost is None else cost
     if not len(cost.blocks):
         return []
     most = int(np.argmax(cost.on_sides + cost.on_cracks))

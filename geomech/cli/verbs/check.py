@@ -20,7 +20,8 @@ def declare(verbs: Verbs) -> None:
 
 
 def _check(options: argparse.Namespace) -> int:
-    from ...coupling import crack_cost
+    from ...coupling.crack_cost import cost_lines, crack_cost
+    from ...coupling.run_cost import run_line
     from ...model import counted
     from ...model.loads.wave_limits import wave_lines
     from ...scene import load_scene
@@ -35,7 +36,13 @@ def _check(options: argparse.Namespace) -> int:
         problem = scene.problem()
         tips = f" with {counted(len(problem.cracks.tips), 'tip')}" if problem.cracks.n_cracks else ""
         print("\n".join([f"{problem.title}: {problem.inventory}{tips}: no errors", *scene.overview()]))
-        for label, lines in (("elements", crack_cost.cost_lines(problem)), ("waves", wave_lines(problem))):
+        cost = crack_cost(problem)
+        about = (
+            ("elements", cost_lines(problem, cost)),
+            ("waves", wave_lines(problem)),
+            ("time", [run_line(problem, cost)]),
+        )
+        for label, lines in about:
             for k, line in enumerate(lines):
                 print(f"  {label if k == 0 else '':<9} {line}")
     if first.variants and not options.variants:

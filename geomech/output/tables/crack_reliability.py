@@ -14,9 +14,9 @@ ESTIMATED = 10
 #: Of more bodies, the number of those with the hardest driven tips: their boundaries are assembled and factored once more
 #: (ten of the 49 bodies of a trace map took a quarter of the time of a whole second of motion).
 OF_MANY = 3
-#: Unknowns up to which they are, where there are more bodies: a finer mesh takes half a GB, which a run of many cracked
-#: blocks would need for its summary alone.
-ESTIMATED_UP_TO = 4000
+#: Unknowns up to which they are, where there are more bodies. A finer mesh has twice as many: of 4 000, it took half a GB
+#: and a tenth of the time of a second of motion, for the summary alone.
+ESTIMATED_UP_TO = 2500
 #: Smaller residuals are round-off, whose last digits depend on the location of arrays in memory.
 ROUND_OFF = 1e-12
 _log = logging.getLogger(__name__)
