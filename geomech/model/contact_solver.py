@@ -75,12 +75,10 @@ class ContactSolver:
     path_start              initial ε in units of the mean of N²/kₙ (1 takes a third more iterations) …
     path_least_start        … and its lower limit, in units of the squared load over the stiffness
     path_correctors         largest number of correctors per step (Gondzio 1996; without, a quarter more iterations)
-    path_recentred          number of times that contacts are centred again when steps have become short, …
+    path_recentred          number of times that contacts are centred again when they block the path, …
     path_recentred_larger   … with ε larger by this factor
     path_load_rings         number of rings of blocks over which the largest force is a contact's load: a pebble below a
                             large block carries the load of that block
-    path_blocked            the path is blocked after this many successive steps …
-    path_short              … that are shorter than this fraction of the full step
 
     large_system            number of free blocks from which a dynamic step is halved as soon as its path is stopped: on a
                             slope of 20 000 blocks under sudden weight no states were found in 126 s, in half the step
@@ -133,7 +131,5 @@ class ContactSolver:
     path_recentred: int = 4
     path_recentred_larger: float = 10.0
     path_load_rings: int = 3
-    path_blocked: int = 5
-    path_short: float = 0.05
     large_system: int = 3000
     single_precision_only: int = 30_000

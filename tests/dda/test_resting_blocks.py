@@ -9,7 +9,6 @@ from geomech import dda
 from geomech.bench.cost import block_scenes
 from geomech.bench.cost.block_scenes import JOINT, ROCK, WEIGHT
 from geomech.dda.kinematics.roundoff import undecided_gaps
-from geomech.dda.linear_solver import assembly
 from geomech.model import SLIP, Blocks, DdaSettings, History, JointLaw, Loads, Material, State
 
 
@@ -27,30 +26,6 @@ def test_blocks_at_rest_are_not_factored_again(make):
         state = system.step(state, WEIGHT).state
     assert system.work.factorisations <= begun + 1
     assert np.abs(state.vertices - before).max() < 1e-12
-
-
-@pytest.mark.parametrize("make", [block_scenes.wall, block_scenes.slope])
-def test_rows_filled_again_where_contacts_have_changed_are_those_of_all_filled_anew(make, monkeypatch):
-    def states():
-        blocks, found = make(150), []
-        system = dda.BlockSystem(blocks, [ROCK], [JOINT], settings=block_scenes.settings(0.01))
-        state = State.at_rest(blocks)
-        for _ in range(3):
-            state = system.step(state, WEIGHT).state
-            found.append(state)
-        return found
-
-    filled = []
-    again = assembly._fill_again
-    monkeypatch.setattr(assembly, "_fill_again", lambda *given: filled.append(again(*given)) or filled[-1])
-    some = states()
-    assert any(filled)
-    monkeypatch.setattr(assembly, "FILLED_AGAIN", -1.0)
-    filled.clear()
-    for state, other in zip(some, states(), strict=True):
-        assert np.array_equal(state.vertices, other.vertices)
-        assert np.array_equal(state.contacts, other.contacts)
-    assert not any(filled)
 
 
 @pytest.mark.parametrize("make", [block_scenes.wall, block_scenes.slope])

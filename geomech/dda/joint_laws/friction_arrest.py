@@ -25,7 +25,7 @@ import numpy as np
 from ...compiled import UNCOUNTED, kept
 from ...model import OPEN, SLIP, STICK
 from ..contact_detection.contact_records import largest_of_blocks
-from ..equation_records import BlockEquations, ContactMotion, ContactStiffness, SpringsInStates
+from ..equation_records import BlockEquations, ContactMotion, SpringsInStates
 from ..kinematics.tolerances import LITTLE, NOTABLE
 from ..linear_solver import assembly
 from ..open_close.contact_set import ContactSet
@@ -157,7 +157,6 @@ def stop(
     own = BlockEquations(matrix, np.zeros((pattern.n, 6)))
     contacts = ContactMotion(found.block, found.other, pattern.order, vectors)
     sides = assembly.sides_of(pattern.n, pattern.order, found.block, found.other)
-    filled: ContactStiffness | None = None
 
     def answer(state, direction, friction, push, pull) -> np.ndarray:
         # Other contacts keep their states: closed ones their gap, sticking ones their position, sliding ones their
@@ -165,10 +164,7 @@ def stop(
         in_states = SpringsInStates(
             state, direction, 0.5 * dt * apart, springs.normal, springs.shear, friction, push, springs.lift, pull
         )
-        nonlocal filled
-        _, stiffness = assembly.assemble_contacts(pattern, own, contacts, in_states, data, side, sides, filled)
-        # Dense matrices are overwritten by their factors, links added to all.
-        filled = stiffness if pattern.solver is not None and pattern.links is None else None
+        assembly.assemble_contacts(pattern, own, contacts, in_states, data, side, sides)
         return assembly.solve(pattern, data, side, False).reshape(-1, 6)
 
     shear = -springs.shear * 0.5 * dt * along

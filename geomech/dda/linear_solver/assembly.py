@@ -27,8 +27,6 @@ from .task_pool import SHARE, THREADED, add_at_once, await_value, thread_team
 
 #: Number of free blocks up to which a dense factorisation is faster than a sparse one (measured on brick walls).
 DENSE_BLOCKS = 60
-#: Fraction of blocks up to which only the rows of those with changed contact springs are filled again.
-FILLED_AGAIN = 0.25
 
 
 @dataclass(frozen=True, eq=False)
@@ -269,29 +267,6 @@ def _fill_shared(claimed, done, share, sides, data, matrix, places, contacts, st
     await_value(done, 0, shares)
 
 
-@kept(fastmath=False, error_model="numpy", nogil=True)
-def _fill_again(most, filled, sides, data, matrix, places, contacts, stiffness):
-    """Fill the rows of blocks whose contacts' ``stiffness`` differs from that ``filled``, unless these are more than
-    ``most`` blocks; returns whether they were filled."""
-    n, rows = len(matrix), 0
-    block, other, order, _ = contacts
-    normal, shear, slope, lift = stiffness
-    normal0, shear0, slope0, lift0 = filled
-    differs = np.zeros(n, np.bool_)
-    for c in range(len(block)):
-        if normal[c] != normal0[c] or shear[c] != shear0[c] or slope[c] != slope0[c] or lift[c] != lift0[c]:
-            for i in (order[block[c]], order[other[c]]):
-                if i >= 0 and not differs[i]:
-                    differs[i] = True
-                    rows += 1
-    if rows > most:
-        return False
-    for b in range(n):
-        if differs[b]:
-            _fill_rows(b, b + 1, sides, data, matrix, places, contacts, stiffness)
-    return True
-
-
 def assemble(
     pattern: Pattern,
     data: np.ndarray,
@@ -300,18 +275,15 @@ def assemble(
     stiffness: ContactStiffness,
     couplings: tuple[np.ndarray, np.ndarray] | None = None,
     sides: ContactSides | None = None,
-    filled: ContactStiffness | None = None,
 ) -> None:
     """Fill ``data`` with the blocks' own ``matrix`` (n, 6, 6) and the ``stiffness`` of ``contacts``. ``couplings``:
     ``upper`` and ``lower`` of these contacts, where they are not those of the ``pattern``; ``sides`` as from
-    `sides_of`, if known. ``filled``: the stiffness with which ``data`` has been filled, everything else being equal."""
+    `sides_of`, if known."""
     upper, lower = (pattern.upper, pattern.lower) if couplings is None else couplings
     places = MatrixPlaces(pattern.begins, pattern.stride, pattern.diagonal, upper, lower)
     sides = sides_of(pattern.n, contacts.order, contacts.block, contacts.other) if sides is None else sides
     # Plain tuples: for each named one Numba takes 1.6 µs to find out its type.
     rest = tuple(sides), data, matrix, tuple(places), tuple(contacts), tuple(stiffness)
-    if filled is not None and _fill_again(int(FILLED_AGAIN * pattern.n), tuple(filled), *rest):
-        return
     if pattern.n < THREADED:
         _fill_rows(0, pattern.n, *rest)
         return
@@ -364,17 +336,16 @@ def assemble_contacts(
     data: np.ndarray,
     right: np.ndarray,
     sides: ContactSides | None = None,
-    filled: ContactStiffness | None = None,
 ) -> tuple[bool, ContactStiffness]:
     """Fill ``data`` and ``right`` with the blocks' ``own`` equations and the ``springs`` of closed ``contacts``. Returns
-    whether the matrix is symmetric, and the stiffness in ``data``; ``sides`` and ``filled`` as for `assemble`.
+    whether the matrix is symmetric, and the stiffness in ``data``; ``sides`` as for `assemble`.
 
     Normal force N = −kₙ(g + n·Δu − κ t·Δu), with dilation κ. Stick: S = S₀ − kₛ t·Δu. Slip: S = ± (μ N + c) with the
     unknown N, which makes the matrix unsymmetric but friction exact in one solution.
     """
     normal, shear, slope, symmetric = _springs(right, own.right, tuple(contacts), tuple(springs))
     stiffness = ContactStiffness(normal, shear, slope, springs.lift)
-    assemble(pattern, data, own.matrix, contacts, stiffness, sides=sides, filled=filled)
+    assemble(pattern, data, own.matrix, contacts, stiffness, sides=sides)
     return symmetric, stiffness
 
 

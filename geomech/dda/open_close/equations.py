@@ -161,7 +161,7 @@ class Equations:
         """Fill the matrix and the right side with contacts in this ``state``, as `assemble_contacts`."""
         return assembly.assemble_contacts(
             self.pattern, BlockEquations(self.matrix, self.right), self._contacts,
-            self._in_states(state, direction, springs, gap), self._data, self._side, self.sides, self._held,
+            self._in_states(state, direction, springs, gap), self._data, self._side, self.sides,
         )  # fmt: skip
 
     @property

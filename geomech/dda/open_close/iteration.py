@@ -425,7 +425,7 @@ class _Search:
         return np.where(known & ~slides[whole.face] & (bonded == SLIPPED), self.states.bonded, bonded)
 
     def _proposed(self, path: CentralPath) -> States | None:
-        """New states proposed by the ``path`` once nearly all contacts are decided; None if it ends, is blocked,
+        """New states proposed by the ``path`` once nearly all contacts are decided; None if it ends,
         exceeds its limit or, in a large system, is stopped by contacts. Raises `Unsettled`."""
         solver, n = self.solver, len(self.found)
         while path.taken < solver.path_iterations:
@@ -434,7 +434,7 @@ class _Search:
             except np.linalg.LinAlgError as error:
                 raise Unsettled(str(error)) from error
             self.spent += 1
-            if not path.arrived and (path.ended or path.blocked or (self.large and path.stopped)):
+            if not path.arrived and (path.ended or (self.large and path.stopped)):
                 return None
             # Contacts that carry no load in so short a step are neither closed nor open; round-off decides.
             few = max(2, min(solver.path_undecided, solver.path_undecided_share * n))

@@ -164,11 +164,6 @@ class CentralPath:
         self._begin(max(self._solver.path_start * mean, self._solver.path_least_start))
 
     @property
-    def blocked(self) -> bool:
-        """Whether the last steps were all short."""
-        return self._blocked >= self._solver.path_blocked
-
-    @property
     def stopped(self) -> bool:
         """Whether contacts had to be centred again."""
         return self._again > 0
@@ -186,7 +181,7 @@ class CentralPath:
     def _begin(self, epsilon: float) -> None:
         """Start with ``epsilon``, centred about the present motion."""
         self.epsilon, self.missed, self.ended = epsilon, 1.0, not len(self._some)
-        self._blocked, self._again = 0, 0
+        self._again = 0
         self._centre(epsilon * self._unit)
 
     def _centre(self, epsilon: np.ndarray) -> None:
@@ -267,11 +262,10 @@ class CentralPath:
         self._unknowns += far * steps.step.unknowns
         undecided = steps.go(far)
         self.missed = (1.0 - far) * float(np.abs(residual).max()) / self._load
-        self._blocked = self._blocked + 1 if far < solver.path_short else 0
         self.epsilon = epsilon
-        if epsilon > _END and self._again < solver.path_recentred and (self.blocked or not far > _STUCK):
+        if epsilon > _END and self._again < solver.path_recentred and not far > _STUCK:
             self._again += 1
-            self._blocked, self.epsilon = 0, solver.path_recentred_larger**self._again * epsilon
+            self.epsilon = solver.path_recentred_larger**self._again * epsilon
             self._centre(self.epsilon * unit)
             return len(self._g)
         self.ended = not (epsilon > _END and far > _STUCK)
