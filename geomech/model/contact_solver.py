@@ -64,7 +64,6 @@ class ContactSolver:
                                     method, which breaks bonds one by one, ends 7 % below it after 31 s
     plastic_splitting_gives         stiffness of springs that give, relative to others: bolts of 1e7 N/m between blocks of
                                     20 GPa take up their forces in hundreds of iterations instead of tens of thousands
-    plastic_splitting_change        with cohesion, joint stiffness or bolts: largest change of the mean forces
 
     Central path (`dda.open_close.interior_point`)
     central_path            whether it is used
@@ -119,7 +118,6 @@ class ContactSolver:
     static_splitting_change: float = 3e-4
     plastic_splitting: int = 50
     plastic_splitting_gives: float = 0.01
-    plastic_splitting_change: float = 3e-3
     central_path: bool = True
     path_iterations: int = 60
     path_undecided: int = 12

@@ -221,7 +221,7 @@ class _PlasticSplitting(Splitting):
     def _settled(self, last: Period, period: Period) -> bool:
         """Whether the forces in the means of a ``period`` balance, and are those of the ``last``."""
         balanced = self._left(period).max() <= self._solver.static_splitting_balance
-        return bool(balanced and self._changed(last, period) <= self._solver.plastic_splitting_change)
+        return bool(balanced and self._changed(last, period) <= self._solver.static_splitting_change)
 
     def _refuse_beyond(self, period: Period) -> None:
         """Raise `KeepsMoving` if a block has been beyond its reach for some periods: it would not be accepted there at rest."""
