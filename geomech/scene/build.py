@@ -26,14 +26,13 @@ from ..model import (
     rayleigh_coefficients,
 )
 from ..model.loads.wave_limits import SECOND_ORDER
-from ..shapes.parts import JOINT
 from .assembly.cells import cells_of
 from .assembly.fixed_blocks import block_orders, constrained_unknowns, first_velocities, fixed_blocks
 from .assembly.joint_laws import joint_law
 from .assembly.load_functions import actions_of, force_history, in_situ_of, profile_of, traction_history
 from .checks.check import Check
 from .checks.cross_checks import carrier, gauge_carriers, material_of
-from .checks.edges import contact_names, joint_names
+from .checks.edges import contact_names, dead_end_laws, joint_names
 from .checks.plausibility import wide_on_base
 from .drawing import Drawing
 from .tables import SceneTables
@@ -57,8 +56,7 @@ def build_problem(tables: SceneTables, drawing: Drawing, check: Check) -> Proble
         order=block_orders(tables, drawing),
     )
     joints, joint_of = _joints(tables, drawing)
-    edge_laws = {name: joints[law] for (other, name), law in joint_of.items() if other == ""}
-    face_laws, law = _face_laws(tables, drawn_cracks, joints, edge_laws)
+    face_laws, law = _face_laws(tables, drawn_cracks, joints, dead_end_laws(check))
     cracks = replace(drawn_cracks, aperture=_apertures(tables, drawn_cracks), law=law)
     gauge, carriers = tables.gauge, gauge_carriers(check)
     return Problem(
@@ -145,20 +143,19 @@ def _apertures(tables: SceneTables, cracks: Cracks) -> np.ndarray:
 
 
 def _face_laws(
-    tables: SceneTables, cracks: Cracks, joints: tuple[JointLaw, ...], joint_law_of: dict[str, JointLaw]
+    tables: SceneTables, cracks: Cracks, joints: tuple[JointLaw, ...], dead_ends: dict[str, str | None]
 ) -> tuple[tuple[JointLaw, ...], np.ndarray]:
-    """The laws of crack faces, smooth ones first, and the law of every segment; ``joint_law_of`` edge names."""
+    """The laws of crack faces, smooth ones first, and the law of every segment; ``dead_ends`` as in `dead_end_laws`."""
     known = {joint.name: joint for joint in joints}
     laws = [Problem.face_laws[0]]
 
     def number(crack: str) -> int:
         entry = _crack_entry(tables, crack)
-        law = None if entry is None or entry.joint is None else known[entry.joint]
-        if law is None and entry is None:
-            # The dead end of a joint has the joint's roughness.
-            law = joint_law_of.get(JOINT + _set_of(crack))
-        if law is None:
+        # The dead end of a joint has the joint's roughness.
+        key = dead_ends.get(_set_of(crack)) if entry is None else entry.joint
+        if key is None:
             return 0
+        law = known[key]
         if law not in laws:
             laws.append(law)
         return laws.index(law)

@@ -128,16 +128,17 @@ def joint_names(patterns: tuple[str, ...], known: list[str]) -> list[str]:
 
 
 def dead_end_laws(c: Check) -> dict[str, str | None]:
-    """Joints that end in rock → the key of [joints] that names them; None: none does. Without those that [cracks] has an
-    entry for."""
+    """Joints that end in rock → the key of [joints] that they follow: the one that names them, else the default; None
+    without either. Without those that [cracks] has an entry for."""
     known = contact_names(c.drawn)
+    joints = c.tables.joints or {}
     drawn = {crack.name for crack in c.tables.geometry.cracks}
     ends = {name.rpartition(" ")[0] for name in c.cracks.names if not {name, "default"} & set(c.tables.cracks or ())}
     laws: dict[str, str | None] = {}
     for name in sorted(ends - drawn - set(c.tables.cracks or ())):
         if JOINT + name in known:
-            naming = [k for k, j in (c.tables.joints or {}).items() if joint_names(j.edges, [JOINT + name])]
-            laws[name] = naming[-1] if naming else None
+            naming = [key for key, joint in joints.items() if joint_names(joint.edges, [JOINT + name])]
+            laws[name] = (naming or [key for key in joints if key == "default"] or [None])[-1]
     return laws
 
 

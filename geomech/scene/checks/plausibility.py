@@ -17,7 +17,6 @@ from ..tables import SceneTables
 from ..tables.loads import TractionTable
 from .check import Check
 from .cross_checks import material_of
-from .edges import dead_end_laws
 from .higher_order import check_holes
 
 #: A crack end that misses an outline by less than this part of its crack's length was probably meant to reach it.
@@ -65,7 +64,6 @@ def check_plausible(c: Check) -> None:
     _rounding(c)
     _free_back(c)
     _impacts(c)
-    _smooth_ends(c)
 
 
 def _materials(c: Check) -> None:
@@ -378,19 +376,4 @@ def _impacts(c: Check) -> None:
             "impacts by a coefficient of restitution change velocities only: they load no cracks, and "
             f"{names[cracked[0]]!r}{others} will not break on landing",
             "leave restitution out where rocks should break, with time steps well below a millisecond",
-        )
-
-
-def _smooth_ends(c: Check) -> None:
-    """Dead ends of joints that have their friction from [joints.default]: the faces of cracks have none of it."""
-    default = c.tables.joints.get("default")
-    if default is None or default.friction_angle_deg == 0 or not c.tables.growth.enabled:
-        return
-    smooth = [name for name, law in dead_end_laws(c).items() if law is None]
-    if smooth:
-        c.warn(
-            ("joints", "default"),
-            f"joints {', '.join(map(repr, smooth))} end in rock, and the faces of these ends are smooth although the joints "
-            f"have a friction of {default.friction_angle_deg:g}°: their cracks slide, and grow, under lower loads",
-            'set cracks.default.joint = "default", or cracks.default.aperture = "closed" if they are to be smooth',
         )

@@ -189,7 +189,7 @@ class CrackTable(Table):
     joint: str | None = Field(
         None,
         description="a name of [joints] for the law of its faces; new growth has friction only (unset: smooth; without an "
-        "entry, ends of joints in rock follow the joint whose `edges` name them)",
+        "entry, ends of joints in rock follow the law of their joint, which may be the default)",
     )
 
     @field_validator("aperture", mode="before")

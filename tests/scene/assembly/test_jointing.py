@@ -96,6 +96,19 @@ def test_a_jointed_scene_becomes_blocks_and_cracks(tmp_path):
     )
 
 
+def test_dead_ends_follow_the_default_joint_unless_an_entry_of_cracks_replaces_it(tmp_path):
+    """Faces of ends that no joint names: their law, and without friction when an entry names none."""
+    unnamed = ('edges = ["joint:cross"]', 'edges = ["joint:beds"]')
+    for entry, names in (
+        ("", {"default"}),
+        ("[cracks.cross]", {"frictionless"}),
+        ("[cracks.default]", {"frictionless"}),
+    ):
+        problem = load(tmp_path, SCENE + entry, unnamed).problem()
+        assert problem.cracks.n_cracks > 0
+        assert {problem.face_laws[k].name for k in problem.cracks.law} == names
+
+
 def test_dead_ends_can_be_trimmed_and_told_about(tmp_path):
     assert load(tmp_path, SCENE, ("seed = 3", 'seed = 3\ndead_ends = "trim"')).problem().cracks.n_cracks == 0
     slot = load(tmp_path, SCENE + '\n[cracks.cross]\naperture = "slot"\n').problem()

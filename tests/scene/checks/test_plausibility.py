@@ -399,26 +399,13 @@ def test_impacts_that_load_no_cracks_are_reported(tmp_path, restitution, grows, 
     assert ["'slab' will not break on landing" in w.message for w in found] == [True] * told
 
 
-@pytest.mark.parametrize(
-    ("law", "friction", "told"),
-    [("", 35, 1), ("", 0, 0), ('[cracks.default]\njoint = "default"\n', 35, 0),
-     ('[joints.seams]\nedges = ["joint:seam"]\nfriction_angle_deg = 20\n', 35, 0)],
-)  # fmt: skip
-def test_smooth_ends_of_joints_that_have_friction_are_reported(scene_file, law, friction, told):
-    """A drawn joint that ends in front of a rock bridge, under the law for all joints."""
-    seam = '[[geometry.joints]]\nname = "seam"\npoints = [[-1.0, 0.9], [0.2, 1.0]]\n'
-    law = f"[joints.default]\nfriction_angle_deg = {friction}\n{law}"
-    text = GOOD.replace("[materials.rock]", seam + law + "[materials.rock]")
-    found = load_scene(scene_file(text)).warnings
-    assert ["are smooth although the joints have a friction of 35°" in w.message for w in found] == [True] * told
-
-
 @pytest.mark.parametrize("law", ["jrc = 8\njcs_pa = 50e6", "dilation_angle_deg = 5", "crushing_strength_pa = 1e6"])
 def test_ends_of_joints_whose_law_crack_faces_cannot_have_are_refused(scene_file, law):
-    """The run refused them, after the check had found no errors."""
+    """By the joint that names them, or the default: the run refused them, after the check had found no errors."""
     seam = '[[geometry.joints]]\nname = "seam"\npoints = [[-1.0, 0.9], [0.2, 1.0]]\n'
-    seams = f'[joints.seams]\nedges = ["joint:seam"]\nfriction_angle_deg = 28\n{law}\n'
-    with pytest.raises(SceneError, match=r"(?s)joints.seams.*'seam' end in rock.*dead_ends"):
-        load_scene(scene_file(GOOD.replace("[materials.rock]", seam + seams + "[materials.rock]")))
-    smooth = seams + '[joints.plain]\nfriction_angle_deg = 28\n[cracks.seam]\njoint = "plain"\n'
-    assert load_scene(scene_file(GOOD.replace("[materials.rock]", seam + smooth + "[materials.rock]"))).problem()
+    for header in ('[joints.seams]\nedges = ["joint:seam"]', "[joints.default]"):
+        seams = f"{header}\nfriction_angle_deg = 28\n{law}\n"
+        with pytest.raises(SceneError, match=r"(?s)joints.(seams|default).*'seam' end in rock.*dead_ends"):
+            load_scene(scene_file(GOOD.replace("[materials.rock]", seam + seams + "[materials.rock]")))
+        other = seams + '[joints.plain]\nedges = ["crack:*"]\nfriction_angle_deg = 28\n[cracks.seam]\njoint = "plain"\n'
+        assert load_scene(scene_file(GOOD.replace("[materials.rock]", seam + other + "[materials.rock]"))).problem()
