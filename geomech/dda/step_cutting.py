@@ -38,6 +38,8 @@ log = logging.getLogger(__name__)
 _FARTHER = 6
 #: Most repetitions of a step because corners meet that were not expected to.
 _REPEATED = 3
+#: Shortest step in motion relative to the time step asked for: cut further, time stands still.
+_SHORTEST = 1e-9
 #: Additional search distance of corners beyond the motion due to weight, in units of √area of the smallest block:
 #: elastic motion of blocks at rest in a step.
 _BESIDES = 1e-6
@@ -232,7 +234,7 @@ class StepCutting:
         system, state = self.system, self.start.state
         crossed = system.limits.crossed(attempt, result)
         if crossed is None and self.cuts < system.settings.max_step_cuts:
-            crossed = system.limits.pressed_apart(attempt, result)
+            crossed = self._pressed_apart(attempt, result)
         if crossed is None:
             self._refuse_crushed(result.state)
             if system.deflected is not None:
@@ -254,6 +256,16 @@ class StepCutting:
         self.extensions = 0
         self._cut(0.5 * self.dt, CROSSING, *crossed.blocks)
         return False
+
+    def _pressed_apart(self, attempt: Attempt, result: StepResult) -> Crossed | None:
+        """The result of `StepLimits.pressed_apart` if a shorter step may avoid it: where blocks lie within the smallest
+        search distance, it finds the same contact as deep."""
+        crossed = self.system.limits.pressed_apart(attempt, result)
+        if crossed is None or result.overlap is None:
+            return None
+        deep, n = result.overlap[3], self.system.blocks.n_blocks
+        smallest = windows_of(self.system, self.start, 0.0).reach_of(*crossed.blocks, n)
+        return crossed if smallest < deep < self.search.near.reach_of(*crossed.blocks, n) else None
 
     def _extend_search(self, attempt: Attempt, crossed: Crossed) -> bool:
         """Whether contacts are found within a larger distance; the step is then repeated with its length unchanged."""
@@ -282,6 +294,8 @@ class StepCutting:
         """Repeat with the length ``shorter``; ``blocks`` are those that required it, for the reason ``why``."""
         system = self.system
         self.cuts += 1
+        if not system.scheme.static and shorter < _SHORTEST * system.settings.time_step:
+            self._refuse()
         if self.cuts > system.settings.max_step_cuts:
             if not (
                 system.scheme.static and why == UNSETTLED and not self.start.bonds_give and self.found.bonded.any()

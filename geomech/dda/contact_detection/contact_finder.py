@@ -33,7 +33,7 @@ from .entrance_edges import (
     find_contacts,
 )
 from .face_quadrature import FaceForces, FacePoints, give_by_bending
-from .inherited_contacts import ALIGNED, misfit_of_new
+from .inherited_contacts import ALIGNED, misfit_of_new, pressed_before
 from .neighbour_search import NearPairs
 from .t_junctions import nodes_in_faces
 from .thin_walls import from_outside
@@ -203,6 +203,9 @@ class ContactFinder:
             softened = self._keep_forces(old, parent, geometry, springs, remembered, law)
         if self._table.curved.any():
             self._pass_on_wear(old, block, other, geometry, remembered)
+        sunk = (parent < 0) & self._stiff[law] & (geometry[:, 3] < -_TOUCH * self._size)
+        if sunk.any() and len(old):
+            remembered["state"][pressed_before(old, sunk, block, other, geometry)] = STICK
         remembered["lift"] = self._lifts(old, parent, met, vertices, remembered)
         keep = np.ones(len(vertex), bool)
         if nodes is not None:

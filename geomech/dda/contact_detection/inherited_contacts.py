@@ -6,6 +6,7 @@ therefore a lift, and a gap that the geometry does not show (faces that do not f
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -20,6 +21,8 @@ if TYPE_CHECKING:
 
 #: Faces of two blocks with a smaller angle between their normals (cosine) have the same misfit.
 ALIGNED = 0.99
+#: A new contact of faces that were closed before is at most so many times as deep as they were: they move on in the step.
+_AS_DEEP = 1.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,10 +130,39 @@ def misfit_of_new(
     keys = first * n_blocks + second
     at = at[np.isin(key, keys[old["lift"] < -least])]
     for c in at.tolist():
-        pair = (first == min(block[c], other[c])) & (second == max(block[c], other[c]))
-        pushes = np.where(old["block"] == block[c], 1.0, -1.0) * (old["normal"] @ geometry[c, 1:3])
-        rows = np.flatnonzero(pair & (pushes > ALIGNED))
-        if len(rows):
-            apart = old["point"][rows] - geometry[c, 5:7]
-            lift[c] = min(float(old["lift"][rows[np.argmin(np.hypot(*apart.T))]]), 0.0)
+        nearest = _nearest_of_face(old, int(block[c]), int(other[c]), geometry[c])
+        if nearest >= 0:
+            lift[c] = min(float(old["lift"][nearest]), 0.0)
     return lift
+
+
+def pressed_before(
+    old: np.ndarray, new: np.ndarray, block: np.ndarray, other: np.ndarray, geometry: np.ndarray
+) -> np.ndarray:
+    """(n,) bool: ``new`` contacts (n,) bool between ``block`` and ``other`` (n,) on ``geometry`` (n, 7) of faces that were
+    closed there before, as deep as they are now.
+
+    Where two faces with a stiffness per area slide past a vertex between two edges, one contact takes over the length that
+    another had: the faces store the same energy as before, and the new contact begins closed. ``old``: CONTACT rows."""
+    out = np.zeros(len(new), bool)
+    for c in np.flatnonzero(new).tolist():
+        k = _nearest_of_face(old, int(block[c]), int(other[c]), geometry[c])
+        if k < 0 or old["state"][k] == OPEN:
+            continue
+        before, now = old["lift"][k] - old["gap"][k], -geometry[c, 3]
+        across, along = old["normal"][k], old["point"][k] - geometry[c, 5:7]
+        tilted = abs(across[0] * geometry[c, 2] - across[1] * geometry[c, 1]) * math.hypot(*along)
+        out[c] = now <= _AS_DEEP * before + tilted
+    return out
+
+
+def _nearest_of_face(old: np.ndarray, block: int, other: int, geometry: np.ndarray) -> int:
+    """Number of the ``old`` CONTACT row between two blocks in the direction of ``geometry`` (7,) that is nearest to it; −1
+    for none."""
+    one, two = min(block, other), max(block, other)
+    pair = (np.minimum(old["block"], old["other"]) == one) & (np.maximum(old["block"], old["other"]) == two)
+    pushes = np.where(old["block"] == block, 1.0, -1.0) * (old["normal"] @ geometry[1:3])
+    rows = np.flatnonzero(pair & (pushes > ALIGNED))
+    if not len(rows):
+        return -1
+    return int(rows[np.argmin(np.hypot(*(old["point"][rows] - geometry[5:7]).T))])

@@ -165,6 +165,11 @@ class Windows:
         at = np.minimum(np.searchsorted(keys, key), len(keys) - 1)
         return np.where(keys[at] == key, at, -1)
 
+    def reach_of(self, block: int, other: int, n_blocks: int) -> float:
+        """Search distance of two blocks, m; 0 where they are not in the list."""
+        at = int(self.of_contacts(np.array([block]), np.array([other]), n_blocks)[0])
+        return float(self.reach[at]) if at >= 0 else 0.0
+
 
 def widths(vertices: np.ndarray, next_vertex: np.ndarray, vertex_start: np.ndarray, area: np.ndarray) -> np.ndarray:
     """(n_blocks,) m: effective size of blocks: √area, or 4 area/perimeter where a block is thin or has teeth (the side

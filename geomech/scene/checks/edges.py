@@ -138,7 +138,7 @@ def dead_end_laws(c: Check) -> dict[str, str | None]:
     for name in sorted(ends - drawn - set(c.tables.cracks or ())):
         if JOINT + name in known:
             naming = [key for key, joint in joints.items() if joint_names(joint.edges, [JOINT + name])]
-            laws[name] = (naming or [key for key in joints if key == "default"] or [None])[-1]
+            laws[name] = naming[-1] if naming else "default" if "default" in joints else None
     return laws
 
 

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from geomech import dda
-from geomech.model import OPEN, Blocks, DdaSettings, History, JointLaw, Loads, Material, State
+from geomech.dda.contact_detection.inherited_contacts import pressed_before
+from geomech.model import CONTACT, OPEN, SLIP, STICK, Blocks, DdaSettings, History, JointLaw, Loads, Material, State
 
 #: m that the faces have closed from where they were drawn, as far as the crack was open.
 MISFIT = 1e-4
@@ -46,3 +47,21 @@ def test_a_corner_that_slides_past_a_node_of_its_face_keeps_the_misfit(speed):
     assert created < 1e-6 * energy
     # Weight on the springs: 1e-8 m.
     assert state.vertices[5:7, 1] == pytest.approx(-MISFIT, abs=3e-8)
+
+
+@pytest.mark.parametrize(
+    ("state", "deep", "closed"), [(STICK, 7e-4, True), (SLIP, 7e-4, True), (STICK, 7e-5, False), (OPEN, 7e-4, False)]
+)
+def test_a_contact_that_takes_over_the_length_of_another_begins_closed(state, deep, closed):
+    """The corner of a block slides past a node of the face below, which then presses on the block: as deep as the corner did
+    before, it brings no energy; deeper, or where nothing pressed, it does."""
+    old = np.zeros(1, CONTACT)
+    old["block"], old["other"], old["state"], old["gap"] = 1, 0, state, -deep
+    old["normal"], old["point"] = (0.0, 1.0), (0.0, 0.0)
+    tilt = np.radians(2.5)
+    geometry = np.zeros((2, 7))
+    geometry[:, 1:3], geometry[:, 3] = (-np.sin(tilt), -np.cos(tilt)), -6.6e-4
+    geometry[:, 5] = 1e-3
+    block, other = np.array([0, 0]), np.array([1, 2])
+    found = pressed_before(old, np.array([True, True]), block, other, geometry)
+    assert found.tolist() == [closed, False]

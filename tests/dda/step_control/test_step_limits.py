@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from block_problems import rectangle, turned
@@ -65,3 +67,20 @@ def test_what_shortens_steps_is_counted_by_its_blocks():
     (why, *blocks), often = system.work.shortened.most_common(1)[0]
     assert (why, sorted(blocks)) == ("relative motion", ["block 0", "block 1"])
     assert often == pytest.approx(count, abs=2)
+
+
+def test_blocks_that_already_overlap_are_not_pushed_apart_in_ever_shorter_steps():
+    """A block a centimetre deep in another, where no contact was before (another block has one): a contact searched within
+    millimetres finds it, and no shorter step would find it earlier. The step is accepted, its energy counted as brought in
+    by an overlap."""
+    polygons = [rectangle(-5, -1, 5, 0), rectangle(0, 0, 1, 1), rectangle(3, 0, 4, 1)]
+    blocks = Blocks.from_polygons(polygons, fixed=[True, False, False])
+    settings = DdaSettings(time_step=0.005, dynamic_factor=1.0)
+    system = dda.BlockSystem(blocks, [ROCK], [JointLaw("joint")], settings=settings)
+    state = system.step(State.at_rest(blocks), WEIGHT, 0.005).state
+    vertices, contacts = state.vertices.copy(), state.contacts
+    vertices[4:8, 1] -= 0.01
+    state = replace(state, vertices=vertices, contacts=contacts[(contacts["block"] == 2) | (contacts["other"] == 2)])
+    result = system.step(state, WEIGHT, 0.005)
+    assert result.state.time - state.time == pytest.approx(0.005)
+    assert result.energy.overlap > 1e3
