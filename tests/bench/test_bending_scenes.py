@@ -17,6 +17,11 @@ def test_contrasts_and_slivers():
     assert scenes.sliver(1e3, 0.0, order=3).error < 1e-6
 
 
+def test_frames_with_re_entrant_corners_bear_their_weight():
+    assert bending_scenes.frame(3, 0.1).error < 1e-6
+    assert bending_scenes.frame(8, 0.01).error < 1e-6
+
+
 def test_a_spinning_block():
     outcome = bending_scenes.spinning(3, 5e-3)
     assert outcome.error < 1e-3 and outcome.drift < 1e-3

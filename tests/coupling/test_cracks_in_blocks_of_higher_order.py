@@ -103,12 +103,12 @@ def test_a_beam_that_breaks_pays_for_its_fracture(stiffness):
 
 @pytest.mark.parametrize("wide", [1.0, 2.0, 3.0])
 def test_k_of_wide_blocks_on_a_rigid_base_needs_no_setting(wide):
-    """Against the crack solver with its base held, or, where it lifts off, with the piece it stands on: 2e-3. A block of
-    first order is 106 and 308 % off by default."""
+    """Against the crack solver with its base held: 1e-3; or, where it lifts off, with the piece it stands on: 2e-3, since the
+    pressure is linear on the piece in which it ends. A linear pressure on all of the base is 106 and 308 % off."""
     expected = test_bases.alone(wide) if wide < 3 else test_bases.alone(3.0, ((-0.93, 0.0), (0.93, 0.0)))
     for order in (2, 5):
         tips = test_bases.last(of_order(test_bases.slab(wide, "contacts"), order))[1]
-        assert tips["k_i"] == pytest.approx(expected.tips["k_i"], rel=2e-3)
+        assert tips["k_i"] == pytest.approx(expected.tips["k_i"], rel=1e-3 if wide < 3 else 2e-3)
 
 
 def specimen(order: int, lines, aperture: float, stress: float, law: int = 0, angle: float = 0.0) -> Problem:

@@ -1,5 +1,5 @@
 """Small scenes of blocks of higher order for the maps of `stability`: those of `stability_scenes` with this order, rock that is
-nearly incompressible, and a block that spins."""
+nearly incompressible, frames with re-entrant corners, and a block that spins."""
 
 from __future__ import annotations
 
@@ -26,6 +26,16 @@ def incompressible(order: float, missing: float) -> Outcome:
     polygons = [rectangle(-1, -1, 2, 0), rectangle(0, 0, 1, 1), rectangle(0, 1, 1, 2)]
     rock = Material("rock", 10e9, 0.5 - missing, density=2600.0)
     system = scenes.system_of(polygons, [True, False, False], 30.0, [rock], order=int(order))
+    total, watch = scenes.carried(system)
+    return watch.outcome(scenes.weights_off(system, total))
+
+
+def frame(order: float, thickness: float) -> Outcome:
+    """The weight of a frame on two legs, with two re-entrant corners, whose legs and lintel have this ``thickness``, m."""
+    t = thickness
+    outline = np.array([[0, 0], [t, 0], [t, 1], [2 - t, 1], [2 - t, 0], [2, 0], [2, 1 + t], [0, 1 + t]])
+    rock = Material("rock", 10e9, 0.25, density=2600.0)
+    system = scenes.system_of([rectangle(-1, -1, 3, 0), outline], [True, False], 30.0, [rock], order=int(order))
     total, watch = scenes.carried(system)
     return watch.outcome(scenes.weights_off(system, total))
 
@@ -82,6 +92,16 @@ def maps(quick: bool) -> Iterator[Map]:
         "nearly incompressible, by order", load, "order", orders, "1/2 - Poisson's ratio", some(1e-2, 1e-4, 1e-6, 1e-9), 1e-6,
         incompressible,
     )  # fmt: skip
+    yield Map(
+        "frames with re-entrant corners, by order",
+        load,
+        "order",
+        orders,
+        "thickness, m",
+        some(0.5, 0.1, 0.03, 0.01),
+        1e-6,
+        frame,
+    )
     yield Map(
         "spinning at 50 rad/s, by order", "spin and turn off, energy gained", "order", orders, "dt, s",
         some(5e-4, 1e-3, 2e-3, 5e-3, 1e-2), 2e-3, spinning,
