@@ -21,7 +21,8 @@ def parallel_map(work: Callable[[_Item], _Result], items: Sequence[_Item], threa
     """``work(item)`` of all ``items``, in their order, on ``threads`` threads (default `THREADS`).
 
     Each item is processed by one thread, so that results do not depend on the number of threads; ``work`` must not
-    modify shared data. If several items raise, the exception of the first item is raised after all have ended.
+    modify shared data. If several items raise, the exception of the first item is raised after all have ended. After an
+    interrupt only those that have begun are worked on.
     """
     threads = min(THREADS if threads is None else threads, len(items))
     if threads < 2:
@@ -29,7 +30,12 @@ def parallel_map(work: Callable[[_Item], _Result], items: Sequence[_Item], threa
     if threads not in _pools:
         _pools[threads] = ThreadPoolExecutor(threads, thread_name_prefix="geomech-blocks")
     running = [_pools[threads].submit(work, item) for item in items]
-    wait(running)
+    try:
+        wait(running)
+    except BaseException:
+        for each in running:
+            each.cancel()
+        raise
     return [each.result() for each in running]
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import threading
+import time
 from dataclasses import replace
 from itertools import islice
 
@@ -175,3 +177,25 @@ def test_the_first_of_several_failures_is_reported():
     with pytest.raises(ValueError, match="2"):
         parallel_map.parallel_map(work, list(range(5)), threads=3)
     assert parallel_map.parallel_map(lambda k: k * k, range(4), threads=2) == [0, 1, 4, 9]
+
+
+def test_an_interrupt_leaves_what_has_not_begun(monkeypatch):
+    """Two of twenty are under way when the wait for them is interrupted."""
+    begun, go_on = [], threading.Event()
+
+    def work(k):
+        begun.append(k)
+        go_on.wait(10.0)
+
+    def interrupted(_):
+        while len(begun) < 2:
+            time.sleep(0.001)
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(parallel_map, "wait", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        parallel_map.parallel_map(work, list(range(20)), threads=2)
+    go_on.set()
+    monkeypatch.undo()
+    assert parallel_map.parallel_map(lambda k: k, [3, 4], threads=2) == [3, 4]
+    assert begun == [0, 1]

@@ -28,6 +28,10 @@ _TIED = 0.25
 _SHARP = math.radians(20)
 
 
+class Stopped(Exception):
+    """Fields that nobody waits for any longer."""
+
+
 @dataclass(frozen=True, eq=False)
 class _Kept:
     """Mesh of a cracked block.
@@ -58,6 +62,11 @@ class InteriorMeshes:
         self._kept: dict[bytes, _Kept] = {}
         self._cracked_materials: set[int] = set()
         self._triangles = Triangles()
+        self._stopped = False
+
+    def stop(self) -> None:
+        """Fields being worked on in another thread end before the next block, with `Stopped`."""
+        self._stopped = True
 
     def note_cracked(self, cycle: Cycle) -> None:
         """Note the materials with cracks at ``cycle``, before an earlier cycle is drawn."""
@@ -104,6 +113,8 @@ class InteriorMeshes:
     def _block(
         self, cycle: Cycle, b: int, body: Any, motion: Motion, before: dict[bytes, _Kept]
     ) -> dict[str, np.ndarray]:
+        if self._stopped:
+            raise Stopped
         kept = self._mesh(cycle, b, before)
         gradient = motion.gradient[b]
         turn = float(rotation(gradient))

@@ -136,7 +136,11 @@ class Series:
             cycle, at, written = self._pending
             if not written:
                 self._write(cycle, at)
-            if not (cycle.sparing and isinstance(error, KeyboardInterrupt)):  # which is not to wait for it
+            if cycle.sparing and isinstance(error, KeyboardInterrupt):
+                # It is not to wait; what the checkpoint lists is written.
+                self._meshes.stop()
+                self._background.drop()
+            else:
                 self._write_last_interior()
         try:
             self._background.close()
