@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import ctypes
+import os
+import signal
 import tempfile
 import threading
 from collections.abc import Iterator
@@ -43,7 +46,8 @@ def gmsh_session(name: str = "geomech") -> Iterator:
         before = None
         if opened_here:
             # Signal handlers work in the main thread only, and a user's ~/.gmshrc must not affect results.
-            gmsh.initialize(interruptible=False, readConfigFiles=False)
+            with _signals_kept():
+                gmsh.initialize(interruptible=False, readConfigFiles=False)
         else:
             before = gmsh.model.getCurrent()
         try:
@@ -58,6 +62,25 @@ def gmsh_session(name: str = "geomech") -> Iterator:
                 gmsh.model.remove()
                 if before in gmsh.model.list():
                     gmsh.model.setCurrent(before)
+
+
+@contextmanager
+def _signals_kept() -> Iterator[None]:
+    """What signals do stays as it was: Gmsh sets SIGTERM back to ending the process, with which a run left no summary. Python
+    itself changes handlers in its main thread only."""
+    if os.name != "posix":
+        yield
+        return
+    library, numbers = ctypes.CDLL(None), (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+    # Larger than struct sigaction anywhere.
+    kept = {number: ctypes.create_string_buffer(1024) for number in numbers}
+    for number, action in kept.items():
+        library.sigaction(int(number), None, action)
+    try:
+        yield
+    finally:
+        for number, action in kept.items():
+            library.sigaction(int(number), action, None)
 
 
 def open_model(gmsh, path: Path) -> None:
