@@ -33,7 +33,6 @@ from .assembly.load_functions import actions_of, force_history, in_situ_of, prof
 from .checks.check import Check
 from .checks.cross_checks import carrier, gauge_carriers, material_of
 from .checks.edges import contact_names, dead_end_laws, joint_names
-from .checks.plausibility import wide_on_base
 from .drawing import Drawing
 from .tables import SceneTables
 from .tables.entries import given
@@ -93,7 +92,7 @@ def build_problem(tables: SceneTables, drawing: Drawing, check: Check) -> Proble
         run=RunSettings(
             end_time=tables.run.end_time_s,
             stop_at=tables.run.stop_at,
-            boundary_stress=tables.run.boundary_stress or ("bases" if wide_on_base(check) else "contacts"),
+            boundary_stress=tables.run.boundary_stress,
             stepping=tables.run.stepping,
             events=_events(tables, blocks),
             longest_step=tables.run.longest_step_s,

@@ -104,6 +104,7 @@ WARNED = (
     "are no more accurate",
     "is not resolved, and friction remembers it",
     "before they bear it",
+    "rigid base was not found",
     *sorted({words for invariant in INVARIANTS.values() for words in invariant.reported}),
 )
 #: The same of results that depend on the time step, not on the place.

@@ -248,13 +248,12 @@ class RunTable(Table):
         "is made at the load at which the most driven tip has K_eq = K_Ic, also if that is lower than "
         "before (time, as the argument of the loads, decreases with them)",
     )
-    boundary_stress: Literal["contacts", "bases", "springs", "kelvin-springs"] | None = Field(
-        None,
+    boundary_stress: Literal["contacts", "bases", "springs", "kelvin-springs"] = Field(
+        "contacts",
         description='how contact forces load cracked blocks of order 1: "contacts", linear over each face; "bases", the same, '
         'but on fixed, guided and rigid blocks as on a straight rigid base without tension; "springs", '
         'as point forces at the springs; "kelvin-springs", as Kelvin\'s point forces of the infinite '
-        'plane, for comparison: most of a force is then lost (unset: "bases" in a static run if a cracked block of order 1 lies on a '
-        'fixed one with a side that is longer than the block is deep, otherwise "contacts")',
+        "plane (for comparison: most of a force is then lost)",
     )
     skip: bool = Field(
         True,
