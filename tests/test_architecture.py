@@ -5,6 +5,7 @@ import ast
 import shutil
 import subprocess
 import sys
+from collections import Counter
 from functools import cache
 from pathlib import Path
 
@@ -274,6 +275,12 @@ def import_graph(sources) -> dict[str, set[str]]:
 def test_no_modules_import_each_other():
     assert circles({"a": {"b"}, "b": {"c"}, "c": {"a"}, "d": {"a"}}) == [{"a", "b", "c"}]
     assert circles(import_graph(SOURCES)) == []
+
+
+def test_no_two_test_files_have_one_name():
+    """pytest leaves one of them out."""
+    names = Counter(path.name for path in (ROOT / "tests").rglob("test_*.py"))
+    assert [name for name, count in names.items() if count > 1] == []
 
 
 def test_no_folder_holds_more_than_twelve_files():

@@ -33,10 +33,6 @@ LEFT_BEHIND = 3
 STRAIGHT = math.radians(0.1)
 #: … their elements get one length when the ratio of the lengths is below this.
 ALIKE = 1.2
-#: Edges between which the outline turns by less than this in all, rad, continue each other: lengths of their elements are
-#: tied to each other as along one edge. (A digitised line otherwise had its sides halved once or twice, each for the
-#: length of the next. Holes stand for curved walls, next to which stress matters.)
-CONTINUES = math.radians(60)
 #: Mouths and further points within this part of the extent of an edge, or of a vertex, lie on it.
 ON_EDGE = 1e-7
 #: A mouth nearer to an element's end than this part of its length moves that end; no shorter element is made.
@@ -49,15 +45,15 @@ class Mesh:
 
     boundary, cracks   elements; their source is the edge or the crack segment
     edges, edge_loop   (m, 2, 2) edges of all loops and (m,) the loop of each
-    sides              what the boundary elements depend on, these elements before halving, and which edges continue
-                       each other
+    sides              what the boundary elements depend on, these elements before halving, and the straight runs of
+                       edges
     """
 
     boundary: ElementSet
     cracks: ElementSet
     edges: np.ndarray
     edge_loop: np.ndarray
-    sides: tuple[tuple, tuple[np.ndarray, ...], np.ndarray]
+    sides: tuple[tuple, tuple[np.ndarray, ...], np.ndarray | None]
 
 
 def outline_edges(loops: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
@@ -97,7 +93,7 @@ def mesh(
     if known is not None and known.sides[0] == key:
         sides = known.sides
     else:
-        sides = key, _boundary(loops, edges, mouths, settings, grading, extent, [*marks, *corners]), _continuing(loops)
+        sides = key, _boundary(loops, edges, mouths, settings, grading, extent, [*marks, *corners]), _straight_on(loops)
     boundary = sides[1]
     crack = _cracks(cracks, settings, grading, extent, sides_of_rock)
     start, end, kind, source = (np.concatenate(pair) for pair in zip(boundary, crack))
@@ -109,7 +105,7 @@ def mesh(
             half_plane, (start, end, pieces), kind, source, touching, ON_SURFACE * extent
         )
     start, end, kind, source = keep_apart(
-        start, end, kind, source, Pieces(pieces, touching, len(edges), _on_outline(loops), n_pieces), settings.grading_ratio, extent,
+        start, end, kind, source, Pieces(pieces, touching, len(edges), n_pieces), settings.grading_ratio, extent,
         # Images have no unknowns.
         (2 if half_plane is None else 1) * (settings.order + 1),
     )  # fmt: skip
@@ -481,32 +477,23 @@ def _alike(one: ElementSet, other: ElementSet) -> bool:
     )
 
 
-def _on_outline(loops: list[np.ndarray]) -> int:
-    """Number of edges of the outline, the first loop unless all are holes."""
-    return len(loops[0]) if loops and signed_area(loops[0]) > 0 else 0
+def _straight_on(loops: list[np.ndarray]) -> np.ndarray | None:
+    """(m,) for each edge the number of its straight run between bends; None where every vertex is a bend."""
+    bends = [np.abs(interior_angles(loop) - np.pi) >= STRAIGHT for loop in loops]
+    if all(bend.all() for bend in bends):
+        return None
+    # A loop that begins within a straight run: its last edges belong to its first run.
+    n_edges = sum(len(bend) for bend in bends)
+    return np.concatenate([np.cumsum(bend) % max(bend.sum(), 1) + n_edges * k for k, bend in enumerate(bends)])
 
 
-def _continuing(loops: list[np.ndarray]) -> np.ndarray:
-    """(m, m) bool: edges between which a loop turns by no more than `CONTINUES`, around a hole by `STRAIGHT`, all its
-    turns added up."""
-    n_edges = sum(len(loop) for loop in loops)
-    out, first = np.zeros((n_edges, n_edges), bool), 0
-    for loop in loops:
-        turned = np.cumsum(np.abs(interior_angles(loop) - np.pi))
-        between = np.abs(turned[:, None] - turned)
-        last = first + len(loop)
-        most = STRAIGHT if signed_area(loop) < 0 else CONTINUES
-        out[first:last, first:last] = np.minimum(between, turned[-1] - between) <= most
-        first = last
-    return out
-
-
-def _touching(continuing: np.ndarray, pieces: np.ndarray, n_edges: int, cracks: Cracks, extent: float) -> np.ndarray:
-    """(m, m) which of ``pieces`` (m, 2, 2), edges and segments, share a node; edges that are ``continuing``
-    each other (`_continuing`) count as one."""
+def _touching(side: np.ndarray | None, pieces: np.ndarray, n_edges: int, cracks: Cracks, extent: float) -> np.ndarray:
+    """(m, m) which of ``pieces`` (m, 2, 2), edges and segments, share a node; edges of one straight run ``side``
+    (`_straight_on`) count as one."""
     # Nodes are compared by coordinates, so that corners, junctions and drawn end points that coincide are one.
     out = share_ends(pieces)
-    out[:n_edges, :n_edges] |= continuing
+    if side is not None:
+        out[:n_edges, :n_edges] |= side[:, None] == side
     if n_edges and cracks.surface.any():
         a, d = pieces[:n_edges, 0], pieces[:n_edges, 1] - pieces[:n_edges, 0]
         length = np.hypot(*d.T)

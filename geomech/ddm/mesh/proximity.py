@@ -18,8 +18,8 @@ from ..kernels import shape_functions
 #: Largest element length relative to its distance from another element. The density still converges like 3.5^−p.
 APART = 1.25
 #: The same for opposite edges of a body: in a slender body the remaining equilibrium error is amplified by the
-#: slenderness squared. Edges of the outline are opposite within 60° (the cosine between them is below −`OPPOSED`).
-ACROSS, OPPOSED = 0.6, 0.5
+#: slenderness squared.
+ACROSS = 0.6
 #: The same for elements of cracks that meet at an angle below `ACUTE`: they run close to each other however they are
 #: graded towards the node. Graded elements with the lengths that a ratio of 0.3 gives are kept (a ratio of 0.15 left K
 #: of a fold of 165° off by 10 %, of 168° useless). At order 2 and below the limit is a share `LOW` of it; from a ratio
@@ -67,17 +67,16 @@ class Candidates(NamedTuple):
 
 
 class Sources(NamedTuple):
-    """Edges (the first ``n_edges``, of these the first ``outline`` on the outline) and crack segments.
+    """Edges (the first ``n_edges``) and crack segments.
 
     images    number from which on sources are images behind a free surface
     span      (n_sources,)  length, m
-    meeting   (n_sources, n_sources)  0: they do not meet; 1: they meet or continue each other; −sin of the angle between cracks where acute
+    meeting   (n_sources, n_sources)  0: they do not meet; 1: they meet; −sin of the angle between cracks where acute
     chained   largest length relative to the distance where they meet; at an acute angle `AT_ACUTE`, and ``acute_share`` times
               `GRADED`
     """
 
     n_edges: int
-    outline: int
     images: int
     span: np.ndarray
     meeting: np.ndarray
@@ -88,8 +87,8 @@ class Sources(NamedTuple):
 def crowding(elements: Candidates, sources: Sources) -> np.ndarray:
     """(n,) the largest ratio of the length of each of the ``elements`` to its allowed length, over all others.
 
-    Allowed is `APART` times the distance, `ACROSS` times it between opposite edges, and a larger value from ``sources``
-    where the two lie on one source or on two that meet or continue each other, whose grading already ties sizes to distances; there elements
+    Allowed is `APART` times the distance, `ACROSS` times it between two edges, and a larger value from ``sources``
+    where the two lie on one source or on two that meet, whose grading already ties sizes to distances; there elements
     below the part `AT_NODE` (`AT_BOUNDARY` at a surface: where one is an edge, or only one is an image) of the shorter
     span are left alone. Elements that share an end are compared only with the tip at the far end of the neighbour.
     """
@@ -154,13 +153,10 @@ def _compare(elements, length, sources, i, j, out):
     allowed = APART
     if meet != 0:
         allowed = sources.chained if meet > 0 else min(sources.chained, AT_ACUTE)
+    elif one < n_edges and other < n_edges:
+        allowed = ACROSS
     ax, ay, bx, by = start[i, 0], start[i, 1], end[i, 0], end[i, 1]
     cx, cy, dx, dy = start[j, 0], start[j, 1], end[j, 0], end[j, 1]
-    if meet == 0 and one < n_edges and other < n_edges:
-        # All edges run with the rock on their left.
-        along = (bx - ax) * (dx - cx) + (by - ay) * (dy - cy)
-        at_hole = one >= sources.outline or other >= sources.outline
-        allowed = ACROSS if at_hole or along < -OPPOSED * length[i] * length[j] else APART
     d = min(_distance_squared(ax, ay, cx, cy, dx, dy), _distance_squared(bx, by, cx, cy, dx, dy))
     d = min(d, _distance_squared(cx, cy, ax, ay, bx, by), _distance_squared(dx, dy, ax, ay, bx, by))
     d = np.sqrt(d)
@@ -178,15 +174,13 @@ class Pieces(NamedTuple):
     """The edges and crack segments on which elements lie.
 
     ends       (n_sources, 2, 2) m, the first ``n_edges`` edges, then crack segments
-    outline    number of the first edges that lie on the outline, not on holes
-    touching   (n_sources, n_sources) bool, which of them meet, or are edges that continue each other
+    touching   (n_sources, n_sources) bool, which of them meet
     images     number from which on they are images behind a free surface
     """
 
     ends: np.ndarray
     touching: np.ndarray
     n_edges: int
-    outline: int
     images: int
 
 
@@ -206,7 +200,7 @@ def keep_apart(start, end, kind, source, pieces: Pieces, ratio: float, extent: f
         acute_share = LOW if unknowns <= 6 else 1.0
         meeting = _meeting(pieces.ends, pieces.touching, pieces.n_edges, np.cos(ACUTE))
     span = np.hypot(*(pieces.ends[:, 1] - pieces.ends[:, 0]).T)
-    sources = Sources(pieces.n_edges, pieces.outline, pieces.images, span, meeting, chained, float(acute_share))
+    sources = Sources(pieces.n_edges, pieces.images, span, meeting, chained, float(acute_share))
     most = max(4 * len(start), MOST_UNKNOWNS // unknowns)
     while True:
         tip = np.where(kind == shape_functions.ORDINARY, 0, kind)

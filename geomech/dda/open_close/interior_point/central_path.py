@@ -30,7 +30,7 @@ from ...joint_laws.coulomb_return import moved
 from ...joint_laws.penalty_springs import Springs
 from ...linear_solver import assembly
 from ..equations import Equations
-from .contact_terms import LEAST_LEFT, PathSprings, Variables
+from .contact_terms import LEAST_LEFT, SHORT_OF, PathSprings, Variables
 from .newton_steps import THREADED, PathSteps
 
 #: Bond state of a contact that has slipped but kept some cohesion: it may slide.
@@ -40,6 +40,14 @@ _FAR = 0.9
 #: … aiming at a length larger by a factor and an amount, and accepted if a step gains this fraction of it (Gondzio
 #: 1996).
 _FARTHER, _FURTHER, _GAIN = 1.2, 0.1, 0.1
+#: Steps shorter than this, relative to the full step, …
+_ALONE_SHORT = 0.05
+#: … are made longer: contacts that limit one to less than this length are centred again about the motion that the others
+#: allow, if they are no more than this fraction of all contacts, or this number, …
+_ALONE_FAR, _ALONE, _ALONE_FEW = 0.3, 0.005, 8
+#: … with ε larger by this factor, and at most this many times. (Friction at the corners of two neighbours may block the
+#: path.)
+_ALONE_LARGER, _ALONE_AGAIN = 1000.0, 40
 #: ε, relative to its initial value, at which only round-off is left; and step length below which the path is blocked.
 _END, _STUCK = 1e-14, 1e-3
 #: Residual of a step, relative to its right-hand side; the next step includes the remainder in the balance of forces. A
@@ -161,12 +169,13 @@ class CentralPath:
         self._s = along - found.shear[some] / self._ks
         self._load = max(float(np.abs(left).max()), 1e-300)
         mean = float(np.mean(forces[some] ** 2 / self._kn / self._unit)) if len(some) else 0.0
-        self._begin(max(self._solver.path_start * mean, self._solver.path_least_start))
+        self._start = max(self._solver.path_start * mean, self._solver.path_least_start)
+        self._begin(self._start)
 
     @property
     def stopped(self) -> bool:
         """Whether contacts had to be centred again."""
-        return self._again > 0
+        return self._lone + self._again > 0
 
     @property
     def arrived(self) -> bool:
@@ -181,7 +190,7 @@ class CentralPath:
     def _begin(self, epsilon: float) -> None:
         """Start with ``epsilon``, centred about the present motion."""
         self.epsilon, self.missed, self.ended = epsilon, 1.0, not len(self._some)
-        self._again = 0
+        self._again, self._lone = 0, 0
         self._centre(epsilon * self._unit)
 
     def _centre(self, epsilon: np.ndarray) -> None:
@@ -259,9 +268,15 @@ class CentralPath:
                 break
             steps.accept()
             far = steps.step.far
+        alone = None
+        if far < _ALONE_SHORT and self._lone < _ALONE_AGAIN:
+            far, alone = self._without_few(steps.numbers.T, steps.step.changed.T, far)
         self._unknowns += far * steps.step.unknowns
         undecided = steps.go(far)
         self.missed = (1.0 - far) * float(np.abs(residual).max()) / self._load
+        if alone is not None:
+            self._lone += 1
+            self._centre_alone(alone, max(epsilon, min(_ALONE_LARGER * epsilon, self._start)))
         self.epsilon = epsilon
         if epsilon > _END and self._again < solver.path_recentred and not far > _STUCK:
             self._again += 1
@@ -270,6 +285,27 @@ class CentralPath:
             return len(self._g)
         self.ended = not (epsilon > _END and far > _STUCK)
         return undecided
+
+    def _without_few(self, numbers: np.ndarray, changed: np.ndarray, far: float) -> tuple[float, np.ndarray | None]:
+        """Step length of the changes (6, n) without a few limiting contacts, and these (n,) bool; ``far`` and None if
+        there are many."""
+        falling = changed < 0.0
+        falling[2:] &= self._rough
+        reach = np.where(falling, -numbers / np.where(falling, changed, -1.0), np.inf).min(axis=0)
+        few = reach < _ALONE_FAR
+        if few.sum() > max(_ALONE_FEW, _ALONE * len(few)):
+            return far, None
+        return min(1.0, SHORT_OF * float(reach[~few].min(initial=np.inf))), few
+
+    def _centre_alone(self, which: np.ndarray, epsilon: float) -> None:
+        """`_centre` for the contacts ``which`` only. The next step removes the resulting imbalance."""
+        known = self._normal, self._width, self._shear, self._slip
+        self._centre(epsilon * self._unit)
+        again = self._normal, self._width, self._shear, self._slip
+        self._normal, self._width, self._shear, self._slip = (
+            np.where(which, new, old) for new, old in zip(again, known, strict=True)
+        )
+        self.missed = 1.0
 
     def states(self) -> tuple[np.ndarray, np.ndarray]:
         """States and directions (n,) that the contacts approach."""

@@ -67,6 +67,23 @@ def test_pebbles_below_a_large_block_bear_it(monkeypatch, gravity):
     assert path.arrived and path.missed < 1e-6 and taken < 40
 
 
+def test_few_contacts_that_stop_the_path_are_centred_alone():
+    rng = np.random.default_rng(4)
+    path = centred(rng.uniform(-1e-6, 1e-6, 200), rng.uniform(-1e-6, 1e-6, 200), 1e-9)
+    path._unit, path._rough[7] = np.ones(200), False
+    numbers = np.stack([path._normal, path._width, *path._slip, *path._left()])
+    changes = -0.5 * numbers
+    changes[1, 3], changes[4, 5] = -1e4 * numbers[1, 3], -1e3 * numbers[4, 5]
+    changes[4, 7] = -1e9 * numbers[4, 7]  # no friction there: nothing to run out of
+    far, alone = path._without_few(numbers, changes, 1e-4)
+    assert far == 1.0 and np.flatnonzero(alone).tolist() == [3, 5]
+    path._centre_alone(alone, 1e-6)
+    products = path._normal * path._width
+    assert products[alone] == pytest.approx(1e-6) and products[~alone] == pytest.approx(1e-9)
+    changes[1, :50] = -1e4 * numbers[1, :50]
+    assert path._without_few(numbers, changes, 1e-4)[1] is None
+
+
 def test_of_many_blocks_in_motion_a_step_whose_path_is_stopped_is_halved_at_once(monkeypatch):
     """What comes out is the half step, to the bit; in statics, and of fewer blocks, the path is followed."""
     blocks, asked, large = block_scenes.slope(300), [], ContactSolver()
