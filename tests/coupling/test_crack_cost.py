@@ -5,26 +5,20 @@ from __future__ import annotations
 from dataclasses import replace
 
 import pytest
-from small_scenes import PLATE
 
 from geomech import ddm
 from geomech.coupling import crack_cost
-from geomech.scene import load_scene
 
 
-@pytest.fixture
-def problem(tmp_path):
-    path = tmp_path / "plate.toml"
-    path.write_text(PLATE, encoding="utf-8")
-    return load_scene(path).problem()
-
-
-def test_unknowns_are_those_of_the_solver(problem):
-    cost = crack_cost.crack_cost(problem)
+def test_unknowns_are_those_of_the_solver(torn_plate):
+    cost = crack_cost.crack_cost(torn_plate)
     assert len(cost.blocks) == 1
     block = int(cost.blocks[0])
     body = ddm.Body(
-        problem.blocks.loops(block), problem.cracks, problem.materials[problem.blocks.material[block]], problem.ddm
+        torn_plate.blocks.loops(block),
+        torn_plate.cracks,
+        torn_plate.materials[torn_plate.blocks.material[block]],
+        torn_plate.ddm,
     )
     m, n = body.boundary.n_unknowns, body.faces.n_unknowns
     assert (cost.on_sides[0], cost.on_cracks[0]) == (m, n)
@@ -34,14 +28,14 @@ def test_unknowns_are_those_of_the_solver(problem):
     assert cost.seconds > 0
 
 
-def test_lines_name_the_largest_block_and_what_makes_it_large(problem, monkeypatch):
-    (line,) = crack_cost.cost_lines(problem)
+def test_lines_name_the_largest_block_and_what_makes_it_large(torn_plate, monkeypatch):
+    (line,) = crack_cost.cost_lines(torn_plate)
     assert "1 cracked block" in line and "unknowns on sides" in line and "GB" in line and "processor time" in line
     monkeypatch.setattr(crack_cost, "LARGE", 10)
     monkeypatch.setattr(crack_cost, "FINE", 0.01)
-    _, finely, graded = crack_cost.cost_lines(problem)
+    _, finely, graded = crack_cost.cost_lines(torn_plate)
     assert "simplify_m" in finely and "grading_layers" in graded
     # What the line promises of a problem that is graded.
-    ungraded = replace(problem, ddm=replace(problem.ddm, grading_layers=0))
-    assert crack_cost.crack_cost(ungraded).memory < crack_cost.crack_cost(problem).memory
+    ungraded = replace(torn_plate, ddm=replace(torn_plate.ddm, grading_layers=0))
+    assert crack_cost.crack_cost(ungraded).memory < crack_cost.crack_cost(torn_plate).memory
     assert len(crack_cost.cost_lines(ungraded)) == 2

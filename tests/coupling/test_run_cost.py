@@ -10,7 +10,6 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from small_scenes import PLATE
 
 from geomech.coupling import run_cost
 from geomech.coupling.crack_cost import crack_cost
@@ -20,31 +19,24 @@ from geomech.scene import load_scene
 ROOT = Path(__file__).parents[2]
 
 
-@pytest.fixture
-def problem(tmp_path):
-    path = tmp_path / "plate.toml"
-    path.write_text(PLATE, encoding="utf-8")
-    return load_scene(path).problem()
-
-
-def test_cycles_times_the_time_of_a_cycle(problem):
-    static = run_cost.run_cost(problem)
-    assert static.cycles == math.ceil(problem.run.end_time / problem.dda.time_step - 1e-9)
+def test_cycles_times_the_time_of_a_cycle(torn_plate):
+    static = run_cost.run_cost(torn_plate)
+    assert static.cycles == math.ceil(torn_plate.run.end_time / torn_plate.dda.time_step - 1e-9)
     assert static.seconds == pytest.approx(static.once + static.cycles * static.each)
-    cracks = crack_cost(problem)
-    moving = run_cost.run_cost(replace(problem, dda=replace(problem.dda, dynamic_factor=1.0)), cracks)
+    cracks = crack_cost(torn_plate)
+    moving = run_cost.run_cost(replace(torn_plate, dda=replace(torn_plate.dda, dynamic_factor=1.0)), cracks)
     assert moving.each == pytest.approx(
-        run_cost.CYCLE + run_cost.BLOCK * (~problem.blocks.fixed).sum() + run_cost.CRACKED
+        run_cost.CYCLE + run_cost.BLOCK * (~torn_plate.blocks.fixed).sum() + run_cost.CRACKED
     )
     assert static.each > moving.each and moving.once > static.once > cracks.seconds
 
 
-def test_the_line_states_it_with_its_uncertainty(problem):
-    assert "to the end, within a factor of 4" in run_line(problem)
+def test_the_line_states_it_with_its_uncertainty(torn_plate):
+    assert "to the end, within a factor of 4" in run_line(torn_plate)
     # Steps that end at events have no number beforehand.
-    to_events = replace(problem, run=replace(problem.run, stepping="events"))
+    to_events = replace(torn_plate, run=replace(torn_plate.run, stepping="events"))
     assert "a cycle, within a factor of 4" in run_line(to_events)
-    long = replace(problem, run=replace(problem.run, end_time=1e5 * problem.dda.time_step))
+    long = replace(torn_plate, run=replace(torn_plate.run, end_time=1e5 * torn_plate.dda.time_step))
     assert " h of processor time" in run_line(long) or " min of processor time" in run_line(long)
 
 

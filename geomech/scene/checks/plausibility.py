@@ -224,24 +224,6 @@ def _sudden_weight(c: Check) -> None:
 
 
 def _shallow(c: Check) -> None:
-    """Linear contact pressure below wide cracked blocks."""
-    found = [] if c.tables.run.boundary_stress == "bases" else _wide_on_base(c)
-    if found:
-        slenderness, block, length = max(found)
-        others = f", and {len(found) - 1} more sides of cracked blocks" if len(found) > 1 else ""
-        c.warn(
-            ("geometry",),
-            f"{c.blocks.names[block]!r} contains cracks and lies on a fixed block with a side of {length:.3g} m, "
-            f"{slenderness:.2g} times as long as the block is deep{others}: its base pressure is linear, which bends "
-            "it more than a true base would; K of its cracks may be too large by a factor of two",
-            'give its zone an order of 2 (zones.NAME.order), set run.boundary_stress = "bases", or draw it deeper '
-            f"(less than {SHALLOW:g} times as wide as deep), or cut it by joints into pieces that are",
-        )
-
-
-def _wide_on_base(c: Check) -> list[tuple[float, int, float]]:
-    """(length over depth, block, length in m) of sides of cracked blocks of first order that lie on fixed blocks in a static
-    run, and are longer than `SHALLOW` times the depth of the block above them."""
     blocks = c.blocks
     fixed = fixed_blocks(c.tables, c.drawn)
     base = np.flatnonzero(fixed[blocks.vertex_block])
@@ -250,8 +232,8 @@ def _wide_on_base(c: Check) -> list[tuple[float, int, float]]:
     first = [of[b] not in zones or zones[of[b]].order == 1 for b in range(blocks.n_blocks)]
     cracked = [b for b in np.unique(c.cracks.block).tolist() if first[b] and not fixed[b]]
     # In dynamics blocks land on corners and edges: static contact pressure is not what loads their cracks.
-    if not (len(base) and cracked) or c.tables.dda.dynamic_factor > 0:
-        return []
+    if not (len(base) and cracked) or c.tables.dda.dynamic_factor > 0 or c.tables.run.boundary_stress == "bases":
+        return
     starts, ends = blocks.vertices[base], blocks.vertices[blocks.next_vertex[base]]
     weight, found = np.array(c.tables.loads.gravity_m_s2), []
     for start, side in blocks.sides.items():
@@ -268,7 +250,17 @@ def _wide_on_base(c: Check) -> list[tuple[float, int, float]]:
         # (A square is as wide as deep, whatever round-off says.)
         if slenderness > (1 + LIES_ON) * SHALLOW and _overlap(a, b, starts, ends) > MOST_OF_IT * length:
             found.append((slenderness, block, length))
-    return found
+    if found:
+        slenderness, block, length = max(found)
+        others = f", and {len(found) - 1} more sides of cracked blocks" if len(found) > 1 else ""
+        c.warn(
+            ("geometry",),
+            f"{blocks.names[block]!r} contains cracks and lies on a fixed block with a side of {length:.3g} m, "
+            f"{slenderness:.2g} times as long as the block is deep{others}: its base pressure is linear, which bends "
+            "it more than a true base would; K of its cracks may be too large by a factor of two",
+            'give its zone an order of 2 (zones.NAME.order), set run.boundary_stress = "bases", or draw it deeper '
+            f"(less than {SHALLOW:g} times as wide as deep), or cut it by joints into pieces that are",
+        )
 
 
 def _overlap(a: np.ndarray, b: np.ndarray, starts: np.ndarray, ends: np.ndarray) -> float:
