@@ -5,6 +5,9 @@ instances of allowed classes. Each object is stored once, however many refer to 
 keeps sharing its memory, with the same strides: strides determine how BLAS computes a product, and so its last bits. An
 instance is stored as the name of its class and its attributes; it is restored without calling the class, and only
 allowed classes can be named. A store may thus contain wrong data, but never code.
+
+Of an array with many zeros, such as matrices of blocks of different order that have the size of the largest, only a bit
+for each word of eight bytes and the words other than zero are stored.
 """
 
 from __future__ import annotations
@@ -77,8 +80,8 @@ def write(file: BinaryIO, value: Any, allowed: Allowed) -> None:
     ).encode()
     file.write(len(text).to_bytes(8, "little"))
     file.write(text)
-    for array in table.arrays:
-        file.write(_memory(array))
+    for array, words in table.arrays:
+        _write_array(file, array, words)
 
 
 def read(file: BinaryIO, allowed: Allowed) -> Any:
@@ -106,13 +109,37 @@ def _memory(array: np.ndarray) -> memoryview:
     return (flat.view(np.uint8) if flat.size and flat.dtype.itemsize else np.empty(0, np.uint8)).data
 
 
+def _words(array: np.ndarray) -> np.ndarray:
+    """The words of eight bytes of a contiguous array in memory order; none if its size is no multiple of eight."""
+    memory = np.asarray(_memory(array))
+    return memory[: 0 if len(memory) % 8 else len(memory)].view(np.uint64)
+
+
+def _fewer_words(array: np.ndarray) -> int | None:
+    """Number of words other than zero if these and a bit for each word take less space than ``array``, else None."""
+    words = _words(array)
+    number = int(np.count_nonzero(words))
+    return number if 8 * number + (len(words) + 7) // 8 < words.nbytes else None
+
+
+def _write_array(file: BinaryIO, array: np.ndarray, words: int | None) -> None:
+    """The memory of ``array``; if its ``words`` other than zero are few, a bit for each word and then those."""
+    if words is None:
+        file.write(_memory(array))
+        return
+    every = _words(array)
+    nonzero = every != 0
+    file.write(np.packbits(nonzero).data)
+    file.write(every[nonzero].view(np.uint8).data)
+
+
 class _Table:
     """Objects as nodes, each once."""
 
     def __init__(self, allowed: Allowed) -> None:
         self.allowed = allowed
         self.nodes: list[Any] = []
-        self.arrays: list[np.ndarray] = []
+        self.arrays: list[tuple[np.ndarray, int | None]] = []
         self.classes: list[str] = []
         self._class_at: dict[type, int] = {}
         self._at: dict[int, int] = {}
@@ -193,8 +220,27 @@ class _Table:
                 return ["v", self._place(base), described, *layout, value.flags.writeable]
         order: Literal["F", "C"] = "F" if value.flags.f_contiguous and not value.flags.c_contiguous else "C"
         stored = np.asarray(value, order=order)
-        self.arrays.append(stored)
-        return ["a", len(self.arrays) - 1, _described(value.dtype), list(value.shape), order, value.flags.writeable]
+        words = _fewer_words(stored)
+        self.arrays.append((stored, words))
+        layout = [_described(value.dtype), list(value.shape), order, value.flags.writeable]
+        return ["a", len(self.arrays) - 1, *layout, words]
+
+
+def _fill(file: BinaryIO, memory: memoryview) -> None:
+    # By `readinto`: every binary file has it, although BinaryIO does not promise it.
+    if cast(io.BufferedIOBase, file).readinto(memory) != memory.nbytes:
+        raise Broken("the file ends within an array")
+
+
+def _fill_words(file: BinaryIO, every: np.ndarray, words: int) -> None:
+    """Read into ``every`` word what `_write_array` has written of an array with ``words`` words other than zero."""
+    bits, values = np.empty((len(every) + 7) // 8, np.uint8), np.empty(words, np.uint64)
+    _fill(file, bits.data)
+    _fill(file, _memory(values))
+    nonzero = np.unpackbits(bits, count=len(every)).view(np.bool_)
+    if np.count_nonzero(nonzero) != words:
+        raise Broken("an array with another number of words")
+    every[nonzero] = values
 
 
 def _described(dtype: np.dtype) -> Any:
@@ -252,17 +298,19 @@ class _Reader:
         left = file.seek(0, io.SEEK_END) - start
         file.seek(start)
         for _, k in own:
-            _, _, described, shape, order, writeable = self.nodes[k]
+            _, _, described, shape, order, writeable, words = self.nodes[k]
             dtype = _dtype(described)
+            size = math.prod(shape) * dtype.itemsize
+            stored = size if words is None else (size // 8 + 7) // 8 + 8 * words
             # Checked before memory is allocated.
-            if min(shape, default=0) < 0 or math.prod(shape) * dtype.itemsize > left:
+            if min(*shape, words or 0, 0) < 0 or stored > left:
                 raise Broken("the file ends within an array")
-            array = np.empty(tuple(shape), dtype, order)
-            left -= array.nbytes
-            memory = _memory(array)
-            # By `readinto`: every binary file has it, although BinaryIO does not promise it.
-            if cast(io.BufferedIOBase, file).readinto(memory) != memory.nbytes:
-                raise Broken("the file ends within an array")
+            array = (np.empty if words is None else np.zeros)(tuple(shape), dtype, order)
+            left -= stored
+            if words is None:
+                _fill(file, _memory(array))
+            else:
+                _fill_words(file, _words(array), words)
             array.flags.writeable = writeable
             self.made[k] = array
 

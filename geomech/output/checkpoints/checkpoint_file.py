@@ -27,7 +27,7 @@ from typing import Any, BinaryIO, cast
 from geomech import plain_data
 
 #: Version of the file format; the first was a pickle after a line of JSON.
-FORMAT = 4
+FORMAT = 5
 #: Relative to the run folder.
 FOLDER = "checkpoint"
 #: Number of checkpoints kept: the last, and one more in case it is damaged.

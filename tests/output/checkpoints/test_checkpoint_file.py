@@ -1,6 +1,7 @@
 """What a run goes on from: files whole or not at all, arrays as they were, tables and series cut back."""
 
 import errno
+import io
 import json
 import os
 import pickle
@@ -48,6 +49,33 @@ def test_views_go_on_sharing_memory_and_keep_their_layout(tmp_path):
     assert again["part"][0, 0] == -2.0 and again["part"].strides == stored["part"].strides
 
 
+def test_zeros_of_an_array_take_no_space(tmp_path):
+    """All bits come back: of negative zeros, of the smallest numbers, in either memory order."""
+    padded = np.zeros((50, 84, 84))
+    padded[:, :12, :12] = np.arange(144.0).reshape(12, 12) - 5
+    signs = np.asfortranarray(np.zeros((300, 7), np.float32))
+    signs[::9, 2], signs[5, 5], signs[6, 5] = -0.0, 1e-42, np.nan
+    odd, none = np.zeros(1001, bool), np.zeros((0, 5))
+    stored = {"padded": padded, "part": padded[3], "signs": signs, "odd": odd, "none": none}
+    path = checkpoint_file.write(tmp_path, HEAD, stored)
+    assert path.stat().st_size < padded.nbytes / 25
+    back = checkpoint_file.read(path)
+    for name, value in stored.items():
+        assert back[name].tobytes("A") == value.tobytes("A") and back[name].strides == value.strides, name
+    assert np.shares_memory(back["part"], back["padded"])
+    back["padded"][3, 83, 83] = 1.0
+    assert back["part"][83, 83] == 1.0
+
+
+def test_a_store_with_more_words_than_stated_is_refused():
+    plain_data.write(file := io.BytesIO(), np.eye(1, 64, 9), plain_data.Allowed())
+    stored = bytearray(file.getvalue())
+    assert np.array_equal(plain_data.read(io.BytesIO(stored), plain_data.Allowed()), np.eye(1, 64, 9))
+    stored[-9] |= 1
+    with pytest.raises(plain_data.Broken, match="another number of words"):
+        plain_data.read(io.BytesIO(stored), plain_data.Allowed())
+
+
 def test_one_object_stays_one(tmp_path):
     one = np.ones(3)
     back = through(tmp_path, {"a": one, "b": [one]})
@@ -87,7 +115,7 @@ def test_an_old_checkpoint_is_named_and_not_unpickled(tmp_path):
     marker, path = tmp_path / "ran", tmp_path / "cycle_0000007.checkpoint"
     path.write_bytes(json.dumps(HEAD | {"format": 1}).encode() + b"\n" + pickle.dumps(_Runs(marker)))
     assert checkpoint_file.read_header(path) == {"format": 1}
-    with pytest.raises(NotResumable, match="of format 1, but this version of geomech reads format 4"):
+    with pytest.raises(NotResumable, match="of format 1, but this version of geomech reads format 5"):
         checkpoint_file.read(path)
     assert not marker.exists()
 
@@ -116,10 +144,13 @@ def _crafted(tmp_path, classes, nodes):
         (["geomech.model.problem:Problem"], [["m", ["r", 1], "__init__"], ["o", 0]]),
         (["geomech.model.problem:Problem"], [["s", 0, 1]]),
         (["geomech.model.state:Skip"], [["n", 0, 1]]),
-        ([], [["a", 0, "|O", [2], "C", True]]),
-        ([], [["a", 0, "<f8", [10**14], "C", True]]),
-        ([], [["v", 1, "<f8", [9], [8], 0, True], ["a", 0, "<f8", [0], "C", True]]),
-        ([], [["v", 1, "|O", [1], [8], 0, True], ["a", 0, "<f8", [0], "C", True]]),
+        ([], [["a", 0, "|O", [2], "C", True, None]]),
+        ([], [["a", 0, "<f8", [10**14], "C", True, None]]),
+        ([], [["v", 1, "<f8", [9], [8], 0, True], ["a", 0, "<f8", [0], "C", True, None]]),
+        ([], [["v", 1, "|O", [1], [8], 0, True], ["a", 0, "<f8", [0], "C", True, None]]),
+        ([], [["a", 0, "<f8", [10**14], "C", True, -(10**14)]]),
+        ([], [["a", 0, "<f8", [2], "C", True, 2]]),
+        ([], [["a", 0, "<f8", [0], "C", True, 1.5]]),
         ([], [["z", 1]]),
         ([], [["r", 7]]),
         ([], "no list"),
