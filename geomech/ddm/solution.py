@@ -86,6 +86,12 @@ class Solution:
         """(n_unknowns,) boundary unknowns: 2μ times displacement, or reactions where supported."""
         return self.body.boundary_unknowns(self._loads.on_boundary, self.jumps)
 
+    def prepare_fields(self) -> None:
+        """Find now what `fields` need if that is found iteratively: the last solution is the first guess of the next, so
+        that fields computed beside other solutions would change these within the tolerance."""
+        if self.body._outside.iterated:
+            _ = self._x
+
     @cached_property
     def _u(self) -> np.ndarray:
         """(n_unknowns,) 2μ times the displacement of the boundary, without that of the particular field."""

@@ -103,6 +103,9 @@ class UniformBody:
     def __init__(self, load: float, spin: float = 3e-4) -> None:
         self.load, self.spin = load, spin
 
+    def prepare_fields(self) -> None:
+        """Nothing is found iteratively."""
+
     def fields(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         stress = np.zeros((len(points), 3))
         stress[:, 1] = -self.load

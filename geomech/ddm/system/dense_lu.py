@@ -65,9 +65,12 @@ class Factor:
         from scipy.linalg.lapack import dgetrs  # imported here: a checkpoint cannot store a compiled function
 
         scale = self.scale if right.ndim == 1 else self.scale[:, None]
+        # SciPy counts the pivots from 1 in their own memory for as long as LAPACK works, without the interpreter's lock:
+        # threads that share them (a run and its interior fields) would get wrong solutions without a word.
+        pivots = self._pivots.copy()
         if transposed:
-            return scale * dgetrs(self._lu, self._pivots, right, trans=1 - self._transposed)[0]
-        return dgetrs(self._lu, self._pivots, right * scale, trans=self._transposed, overwrite_b=True)[0]
+            return scale * dgetrs(self._lu, pivots, right, trans=1 - self._transposed)[0]
+        return dgetrs(self._lu, pivots, right * scale, trans=self._transposed, overwrite_b=True)[0]
 
     @cached_property
     def inverse(self) -> np.ndarray:

@@ -198,7 +198,8 @@ class Series:
             self._write_interior(cycle, at)
 
     def _write_interior(self, cycle: Cycle, at: float) -> None:
-        _ = cycle.bodies  # solved now, not beside the next pass
+        for body in cycle.bodies.values():  # solved now, not beside the next pass
+            body.prepare_fields()
         if self._first is not None and self._last_interior < 0 and self._first[0] is not cycle:
             # From the start on, so that all series of the run span the same time.
             self._meshes.note_cracked(cycle)
