@@ -216,6 +216,7 @@ class CoupledRun:
         due = self.checkpoints is not None and self.checkpoints.due
         if self.interruption.asked:
             self.interruption.wait()
+            self.group.on_interrupt()
         if self.interruption.asked or last or (due and not self.before_the_last):
             self._store(coupling)
         if self.interruption.asked:

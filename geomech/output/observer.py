@@ -18,7 +18,9 @@ class Observer(Protocol):
 
     An observer whose files a resumed run continues has two further methods: ``memory()`` returns what it needs for that
     (plain data, see `geomech.plain_data`), and ``on_resume(problem, folder, memory)``, called instead of `on_start`,
-    restores its files to their state at that time. Observers without these methods are started as in a new run.
+    restores its files to their state at that time. Observers without these methods are started as in a new run. One that
+    works in the background may have ``on_interrupt()``, called before the ``memory()`` of a run that is interrupted: it
+    stops that work, and what is not done goes into the memory.
 
     ``summary`` is one mapping that all observers share: the driver of the cycles enters what it knows (``end``, the
     reason; ``wall_s``), and each observer may add to it. ``error`` is the exception that ended the run, if any.
@@ -63,6 +65,11 @@ class Group:
                 left.remove(found)
                 cast(Resumed, observer).on_resume(problem, folder, found[1])
             self._started.append(observer)
+
+    def on_interrupt(self) -> None:
+        for observer in self.observers:
+            if hasattr(observer, "on_interrupt"):
+                observer.on_interrupt()
 
     def memories(self) -> list[tuple[str, Any]]:
         """(kind, memory) of every observer that can be resumed."""

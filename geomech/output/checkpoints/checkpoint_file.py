@@ -51,6 +51,8 @@ _ALLOWED = plain_data.Allowed(
 )  # fmt: skip
 #: Sources that determine what a run does and what a checkpoint holds.
 _DECISIVE = ("conventions.py", "model", "dda", "ddm", "coupling", "output")
+#: Bytes handed to the disk at a time: enough for its full speed, little beside a run's memory.
+_PIECE = 1 << 26
 #: Bytes, upper limit of the header's length.
 _LONGEST_HEADER = 1 << 24
 
@@ -177,15 +179,33 @@ def _read_header(path: Path, file: BinaryIO) -> dict[str, Any]:
 
 
 class _Summed(io.RawIOBase):
-    """A file that computes the checksum and the length of what is written to it."""
+    """A file that computes the checksum and the length of what is written to it.
+
+    What has been written is handed to the disk piece by piece and dropped from the system's memory: a checkpoint of
+    gigabytes would otherwise fill as much of it as the run itself uses.
+    """
 
     def __init__(self, file: BinaryIO) -> None:
-        self._file, self.crc, self.length = file, 0, 0
+        self._file, self.crc, self.length, self._in_memory = file, 0, 0, 0
 
     def write(self, data: Any) -> int:
-        self.crc = zlib.crc32(data, self.crc)
-        self.length += memoryview(data).nbytes
-        return self._file.write(data)
+        whole = memoryview(data)  # (of bytes)
+        for first in range(0, len(whole), _PIECE):
+            piece = whole[first : first + _PIECE]
+            self.crc = zlib.crc32(piece, self.crc)
+            self._file.write(piece)
+            self._in_memory += len(piece)
+            if self._in_memory >= _PIECE:
+                self._drop()
+        self.length += len(whole)
+        return len(whole)
+
+    def _drop(self) -> None:
+        self._in_memory = 0
+        if hasattr(os, "posix_fadvise"):  # not on every system
+            self._file.flush()
+            os.fdatasync(self._file.fileno())
+            os.posix_fadvise(self._file.fileno(), 0, 0, os.POSIX_FADV_DONTNEED)
 
 
 def _sources() -> str:

@@ -65,8 +65,11 @@ class InteriorMeshes:
         self._stopped = False
 
     def stop(self) -> None:
-        """Fields being worked on in another thread end before the next block, with `Stopped`."""
+        """Fields being worked on in another thread end before the next block, with `Stopped`, as if they had not begun."""
         self._stopped = True
+
+    def __getstate__(self) -> dict[str, Any]:
+        return vars(self) | {"_stopped": False}
 
     def note_cracked(self, cycle: Cycle) -> None:
         """Note the materials with cracks at ``cycle``, before an earlier cycle is drawn."""
@@ -78,12 +81,16 @@ class InteriorMeshes:
         self.note_cracked(cycle)
         whole = np.isin(blocks.material, [*self._cracked_materials]) & ~blocks.fixed
         whole[[*cycle.inside]] = False
-        before, self._kept = self._kept, {}
-        parts = [self._block(cycle, b, body, motion, before) for b, body in sorted(cycle.inside.items())]
         # Blocks whose cracks have no solution yet: before the first step.
         waiting = np.intersect1d(np.flatnonzero(whole), cycle.cracks.block).tolist()
         whole[waiting] = False
-        parts += [self._waiting_block(cycle, b, motion, before) for b in waiting]
+        before, self._kept = self._kept, {}
+        try:
+            parts = [self._block(cycle, b, body, motion, before) for b, body in sorted(cycle.inside.items())]
+            parts += [self._waiting_block(cycle, b, motion, before) for b in waiting]
+        except Stopped:
+            self._kept = before
+            raise
         parts += [self._whole_blocks(cycle, whole)] if whole.any() else []
         first = np.cumsum([0, *(len(p["points"]) for p in parts)])
 
@@ -113,8 +120,6 @@ class InteriorMeshes:
     def _block(
         self, cycle: Cycle, b: int, body: Any, motion: Motion, before: dict[bytes, _Kept]
     ) -> dict[str, np.ndarray]:
-        if self._stopped:
-            raise Stopped
         kept = self._mesh(cycle, b, before)
         gradient = motion.gradient[b]
         turn = float(rotation(gradient))
@@ -168,6 +173,8 @@ class InteriorMeshes:
         }
 
     def _mesh(self, cycle: Cycle, b: int, before: dict[bytes, _Kept]) -> _Kept:
+        if self._stopped:
+            raise Stopped
         loops, cracks = cycle.blocks.loops(b), cycle.cracks.in_block(b)
         key = b"|".join([*(loop.tobytes() for loop in loops), cracks.nodes.tobytes(), cracks.segments.tobytes()])
         kept = before.get(key)

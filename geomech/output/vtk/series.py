@@ -14,7 +14,7 @@ from ..background_jobs import BackgroundJobs
 from ..checkpoints.checkpoint_file import FilesChanged
 from ..tables.skipped_work import skip_summary
 from . import grids
-from .interior_fields import InteriorMeshes
+from .interior_fields import InteriorMeshes, Stopped
 from .structures import BoltLines, WaterLine, outlines_grid
 from .triangulate import Triangles
 from .vtkhdf import HdfStore
@@ -34,7 +34,7 @@ QUIET = 10
 #: State of a `Series` in addition to the list of what it has written.
 _REMEMBERED = (
     "_triangles", "_lines", "_meshes", "_keys", "_bolts", "_time", "_pending", "_first", "_last_interior",
-    "_segments_then", "seconds", "_cycles", "_cracked", "_interior_seconds", "_series_seconds",
+    "_segments_then", "seconds", "_cycles", "_cracked", "_interior_seconds", "_series_seconds", "_left",
 )  # fmt: skip
 
 #: Grids with more bytes of fields than these take longer to pack (some 20 ms per MB) than to pass to another thread.
@@ -76,9 +76,16 @@ class Series:
         self._pending: tuple[Cycle, float, bool] | None = None
         self._first: tuple[Cycle, float] | None = None
         self._last_interior, self._segments_then = -1, 0
+        #: Cycles, with their times, whose interior an interrupted run has left to the one that resumes it.
+        self._left: list[tuple[Cycle, float]] = []
         self._cycles = self._cracked = 0
         self._interior_seconds = self._series_seconds = 0.0
         self._open(problem, Path(folder), {})
+
+    def on_interrupt(self) -> None:
+        """Leave interior fields that take long to the run that is resumed."""
+        if self._pending is not None and self._pending[0].sparing:
+            self._meshes.stop()
 
     def memory(self) -> dict[str, Any]:
         self._background.wait()
@@ -93,6 +100,9 @@ class Series:
         if missing:
             raise FilesChanged(f"{len(missing)} files of its series are missing in {folder}, the first is {missing[0]}")
         self._open(problem, Path(folder), listed, resumed=True)
+        left, self._left = self._left, []
+        for cycle, at in left:
+            self._background.do(self._interior, cycle, at)
 
     def _open(
         self, problem: Problem, folder: Path, listed: dict[str, list[tuple[float, str]]], resumed: bool = False
@@ -210,7 +220,11 @@ class Series:
 
     def _interior(self, cycle: Cycle, at: float) -> None:
         began = time.perf_counter()
-        grid = self._meshes.grid(cycle, self._materials, cycle.motion, self.configuration)
+        try:
+            grid = self._meshes.grid(cycle, self._materials, cycle.motion, self.configuration)
+        except Stopped:
+            self._left.append((cycle, at))
+            return
         timed = self._store.count("interior") > 1
         self._put("interior", cycle, at, grid)
         self._interior_seconds += (time.perf_counter() - began) if timed else 0.0
