@@ -26,6 +26,7 @@ as much again, without an equal loss in the block: cracks running under waves ga
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -46,7 +47,6 @@ from .piecewise_traction import (
     add_row,
     line_of,
     outlines,
-    pieces_on_base,
 )
 
 
@@ -245,9 +245,9 @@ def _pieces(found, asked, of, vertex_start, acting, pointed):
                 if first == len(rows):
                     continue  # only single contacts
                 start = sides[number, 0]
-                _, _, ax, ay, length = line_of(of, start)
-                pieces = pieces_on_base(length, asked.area[b]) if acting.based[touches.against[first]] else 0
-                amount, lost = add_face(found, of, start, touches, face, number, pieces)
+                _, _, ax, ay, _ = line_of(of, start)
+                size = math.sqrt(asked.area[b]) if acting.based[touches.against[first]] else 0.0
+                amount, lost = add_face(found, of, start, touches, face, number, size)
                 couple += lost
                 stretch[b, 0, 0] += amount * ax * ax
                 stretch[b, 0, 1] += amount * ax * ay

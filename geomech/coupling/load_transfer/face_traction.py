@@ -18,14 +18,13 @@ from .piecewise_traction import (
     add_on_side,
     add_row,
     allocating,
+    first_on_base,
     jit,
     line_of,
     on_grid,
+    pieces_on_base,
     place_along,
 )
-
-#: A resultant closer to the end of a face than this fraction of its length acts as a force at that end.
-AT_AN_END = 1e-2
 
 
 class _Spread(NamedTuple):
@@ -42,7 +41,7 @@ class _Spread(NamedTuple):
 
 
 @allocating
-def add_face(found, of, start, touches, face, number, pieces):
+def add_face(found, of, start, touches, face, number, size_on_base):
     """Add the traction of the contacts with this face ``number`` to ``found``, on the straight side that begins with
     the edge ``start``.
 
@@ -90,10 +89,12 @@ def add_face(found, of, start, touches, face, number, pieces):
     even = holds or abs(total) <= 1e-9 * size or not inside
     slope = 0.0 if even else shear / total
     wx, wy = slope * ax - ay, slope * ay + ax
-    if pieces and not even:
+    if size_on_base > 0 and not even:
         near, far = on_grid(min(max(near, 0.0), length), length), on_grid(min(max(far, 0.0), length), length)
         arm = moment / total
-        if min(arm - near, far - arm) > AT_AN_END * (far - near):
+        pieces = pieces_on_base(far - near, size_on_base)
+        # Within a third of the first piece no pressure of these pieces has the resultant: a triangle at the end has it.
+        if min(arm - near, far - arm) > first_on_base(pieces) * (far - near) / 3.0:
             _, _, p_near, p_far = linear(far - near, total, moment - near * total)
             begins = found.count[0]
             add_base(found, of, start, near, far, p_near, p_far, wx, wy, pieces)
