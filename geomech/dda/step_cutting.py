@@ -249,7 +249,9 @@ class StepCutting:
         if self._extend_search(attempt, crossed):
             return False
         if self.cuts >= system.settings.max_step_cuts and not crossed.through:
-            log.warning("step at t = %g s: %s, and no shorter step avoids it", state.time, crossed.reason)
+            # The next step of a trial finds what one step has moved too far.
+            level = logging.DEBUG if system.splits_plastic else logging.WARNING
+            log.log(level, "step at t = %g s: %s, and no shorter step avoids it", state.time, crossed.reason)
             result.statistics["limit_share"] = used.share
             return True
         self.failed = self.reason = crossed.reason
@@ -271,7 +273,9 @@ class StepCutting:
         """Whether contacts are found within a larger distance; the step is then repeated with its length unchanged."""
         search = self.search
         wider = search.near.widened(crossed.pairs, crossed.motion, self.system.blocks.n_blocks)
-        if self.extensions >= _FARTHER or not wider.reaches_beyond(search.near):
+        # Without the arcs of rotating blocks, which trials leave to their next step, corners enter a little at any distance.
+        most = 1 if self.system.splits_plastic and not crossed.through else _FARTHER
+        if self.extensions >= most or not wider.reaches_beyond(search.near):
             return False
         search.near, search.motion = wider, attempt.new_vertices - self.start.vertices
         search.glue_holds = self.found.relies_on_glue
@@ -341,9 +345,11 @@ class StepCutting:
         margin = np.inf
         if not system.scheme.static:
             margin = dt * dt * float(np.hypot(*start.gravity)) + _BESIDES * math.sqrt(start.moments[:, 0].min())
+        # In trials, bonds are lost in most steps.
         return _Search(
-            system.finder, start.state, start.vertices, windows_of(system, start, dt), self._expected_motion(), margin
-        )
+            system.finder, start.state, start.vertices, windows_of(system, start, dt), self._expected_motion(), margin,
+            glue_holds=not system.splits_plastic,
+        )  # fmt: skip
 
     def _expected_motion(self) -> np.ndarray | None:
         """(n_vertices, 2) m: motion of the step at its initial velocities; None if these are zero."""

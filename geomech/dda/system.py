@@ -238,6 +238,11 @@ class BlockSystem:
         )
 
     @property
+    def splits_plastic(self) -> bool:
+        """Whether the next steps are those of a trial by `open_close.plastic_splitting`."""
+        return self.scheme.static and self.plastic and self.reach is not None
+
+    @property
     def step_limit(self) -> float:
         """Largest displacement of a vertex allowed in a step, m."""
         return self.limits.displacement

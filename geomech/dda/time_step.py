@@ -168,7 +168,8 @@ class Attempt:
         if scheme.place == 1.0 and predicted is not None:
             # About the end of the step the arc is long, but as accurate as the lever arms.
             self._follow(predicted, self.midpoint.vertices)
-        for bends in range(_BENDS, -1, -1):
+        # In a trial by `plastic_splitting` the next step begins with the actual gaps.
+        for bends in range(0 if self.system.splits_plastic else _BENDS, -1, -1):
             self._act(start.loads, start.load_time)
             self._assemble()
             self._absorb(start.loads, start.load_time)
@@ -315,7 +316,7 @@ class Attempt:
         actions, found, order, midpoint = self.actions, self.found, self.order, self.midpoint
         constrained = self._constrained()
         own, shared = (self.matrix, self.right), 0
-        if self._splits_plastic:
+        if self.system.splits_plastic:
             # Operator splitting gives each contact of a whole face the cohesion of its own length.
             found, shared = found.sharing_cohesion(np.full(len(found), STICK), found.bonded), _SHARED
         for tries in range(1, 2 * _PLACED + 1):
@@ -343,7 +344,7 @@ class Attempt:
                 unknowns = settled.unknowns
             else:
                 assert self.pattern is not None  # blocks are free
-                actions.limits_in_settle = self._splits_plastic
+                actions.limits_in_settle = self.system.splits_plastic
                 solve = partial(self._settled, vectors=vectors, springs=springs, curved=curved)
                 settled, unknowns = actions.settle(
                     self.pattern, self.matrix, self.right, vectors, geometry, found, gap, solve
@@ -499,17 +500,12 @@ class Attempt:
     def _further_equations(self, pattern, matrix, right, contacts, vectors) -> dict[str, Any]:
         """Fields of `equations` that depend on further unknowns; ``right`` (n_free, 6) is the right-hand side of the
         first six."""
-        bolts = None if self.actions is None or not self._splits_plastic else self.actions.bolts
+        bolts = None if self.actions is None or not self.system.splits_plastic else self.actions.bolts
         return {
             "right": right, "expected": self._expected_unknowns(), "earlier": self.earlier,
             "earlier_forces": self.earlier_forces, "reach": self.system.reach if self.system.scheme.static else None,
-            "plastic": self._splits_plastic, "limits": bolts, "giving": self.giving,
+            "plastic": self.system.splits_plastic, "limits": bolts, "giving": self.giving,
         }  # fmt: skip
-
-    @property
-    def _splits_plastic(self) -> bool:
-        """Whether contacts are settled by `plastic_splitting`."""
-        return self.system.scheme.static and self.system.plastic and self.system.reach is not None
 
     def _expected_unknowns(self) -> np.ndarray | None:
         """(6 n_free,) displacement of this step at its initial velocity, in the unknowns of `assembly`; None in

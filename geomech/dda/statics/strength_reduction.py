@@ -228,6 +228,8 @@ class _Search:
             # A trial is one step, which fails as a whole.
             system.settings = replace(self.settings, max_step_cuts=0)
         system.finder.toes, system.finder.whole_faces = counted.toes, counted.whole_faces
+        # Which part of a face with joint stiffness is pressed does not change what it can carry.
+        system.finder.at_corners = plastic
         return system
 
     def answer(self, counted: Counted, watch: Callable[[Trial], None] | None) -> tuple[FactorOfSafety, Counted]:
@@ -319,18 +321,18 @@ class _Search:
 
     def _admissible_beyond(self, found: FactorOfSafety, counted: Counted) -> float | None:
         """The largest factor with admissible contact forces; None if it is unknown or hardly larger than that
-        ``found``. With many blocks it is that of the blocks as drawn."""
+        ``found``. With many blocks it is that of the blocks as drawn, unless they stand beyond it."""
         if not math.isfinite(found.upper):
             return None
         beyond, system = found.factor * (1.0 + NOTABLE), self.system(found.lower, counted)
-        if self.under.at_once(system):
-            aim = self.aims.get(counted, 0.0)
-            return aim if aim > beyond else None
+        aim = self.aims.get(counted, 0.0)
+        if self.under.at_once(system) and aim >= found.lower * (1.0 - NOTABLE):
+            # `aim` may be below the bound by the tolerance.
+            return aim if aim * (1.0 + self.tolerance) > beyond else None
         forces = AdmissibleForces.of(system, found.state, self.rest, self.joints, self.chosen)
         try:
             if forces is None or not forces.balance(beyond):
                 return None
-            aim = self.aims.get(counted, 0.0)
             if beyond < aim < math.inf:
                 return forces.largest_factor(aim, self.tolerance)
             return forces.largest_factor(beyond / _NEARBY)
@@ -496,6 +498,8 @@ class _Bracket:
                     return self._answer(self.lower, None)
                 close_trial = _close_to(self._aim, self.lower, tolerance) if math.isfinite(self._aim) else None
                 factor = self._beyond_bound(tolerance) if close_trial is None else close_trial
+                if self.plastic:
+                    factor = min(factor, self.lower * (1.0 + self._stride))
             elif self._expected(upper) and sum(not t.stable for t in known) == 1:
                 factor = upper * (1.0 + _SECOND)
             elif upper > self.lower * (1.0 + tolerance):

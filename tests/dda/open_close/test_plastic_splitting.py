@@ -65,6 +65,13 @@ def test_it_fails_there_mirrored_and_rotated(move):
     fails_at_its_bound(problem_of(moved(drawn(COHESIVE), move)))
 
 
+@pytest.mark.parametrize("stiffness", [1e9, pytest.param(5e10, marks=pytest.mark.slow)])
+def test_a_slope_with_joint_stiffness_fails_within_a_per_cent_of_its_bound(stiffness):
+    """Whatever part of a soft face is pressed, its contact force may act anywhere on it: 3.5 % lower with springs inside faces."""
+    law = f"normal_stiffness_pa_per_m = {stiffness}\nshear_stiffness_pa_per_m = {0.4 * stiffness}"
+    fails_at_its_bound(problem_of(drawn(SCENE.replace("MORE", law))))
+
+
 @pytest.mark.slow  # 6 s
 def test_a_slope_with_joint_stiffness_fails_as_with_newtons_method():
     law = "normal_stiffness_pa_per_m = 5e9\nshear_stiffness_pa_per_m = 2e9"
