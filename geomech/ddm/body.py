@@ -409,16 +409,23 @@ class Body:
     def retire(self) -> None:
         """Give up what only further loads need, once a body with grown cracks has taken this one's place."""
         if self.lean and isinstance(self.crack_system, CrackSystem):
-            self.condensation.release()
+            self.condensation.retire()
             self.crack_system.retire()
+            if "face_equations" in vars(self):
+                self.face_equations.forget()
             self._loads.forget()
             self._condensed = (None,)
 
     def forget_states(self) -> None:
         """Give up the factors of contact states and the loads of one of many bodies, whose contact is condensed: these take
-        as much memory as its matrices. From then on factors of a large boundary are given up after every use too."""
+        as much memory as its matrices. Of faces with friction only the factors of open ones are given up, where others
+        are kept. From then on factors of a large boundary are given up after every use too."""
         self._outside.sparing = self.in_number
-        if self.in_number and not self._grown and condenses(self) and isinstance(self.crack_system, CrackSystem):
+        if not self.in_number or not isinstance(self.crack_system, CrackSystem):
+            return
+        if self.rough and self.crack_system.bases:
+            self.crack_system.release_open()
+        elif not self._grown and condenses(self):
             self.crack_system.retire()
             self._loads.forget()
 

@@ -48,10 +48,11 @@ class Condensed:
     ):
         self.system, self.faces = system, faces
         self._columns: KeptRows | None = None
+        self._rows: KeptRows | None = None
         if before is None or was is None or seen is None:
-            self.rows = KeptRows.whole(self._carried(np.arange(faces.n)), faces)
+            self._rows = KeptRows.whole(self._carried(np.arange(faces.n)), faces)
         else:
-            self.rows = before.rows.grown(faces, seen, self._carried)
+            self._rows = before.rows.grown(faces, seen, self._carried)
             self._columns = before.columns.grown(faces, was, self._influence)
 
     def _carried(self, elements: np.ndarray) -> np.ndarray:
@@ -76,6 +77,13 @@ class Condensed:
         return self.system.influence_on(self.faces.take(elements), np.arange(self.system.elements.n))
 
     @property
+    def rows(self) -> KeptRows:
+        """G, kept until the body is retired."""
+        if self._rows is None:
+            self._rows = KeptRows.whole(self._carried(np.arange(self.faces.n)), self.faces)
+        return self._rows
+
+    @property
     def columns(self) -> KeptRows:
         """A_ΓC, by its columns; kept until they are released."""
         if self._columns is None:
@@ -87,6 +95,12 @@ class Condensed:
         if self.system.large:
             self.release_columns()
             self.system.release()
+
+    def retire(self) -> None:
+        """Give up all that is large: another body, with grown cracks, takes this one's place."""
+        self.release()
+        if self.system.large:
+            self._rows = None
 
     @property
     def for_growth(self) -> int:
@@ -132,6 +146,8 @@ class Operators:
 
     def release(self) -> None:
         """Nothing is large."""
+
+    retire = release
 
     def influence_on(self, elements: np.ndarray) -> np.ndarray:
         """Rows of A_CΓ of some of the crack elements."""

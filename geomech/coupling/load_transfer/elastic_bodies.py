@@ -27,9 +27,9 @@ if TYPE_CHECKING:
 #: the sides of 48 blocks of a trace map took 1.1 GB, and cracks grew in a few.)
 MANY = 8
 
-#: Bytes that many bodies together keep for further growth, the largest first: those of ten blocks with 2 000 unknowns on
-#: their sides, or of one with 6 000.
-FOR_GROWTH = 3e8
+#: Bytes that many bodies together keep for further growth: those of ten blocks with 2 000 unknowns on their sides, or of one
+#: with 6 000 and 2 000 on its cracks.
+FOR_GROWTH = 4e8
 
 
 def elastic_bodies(

@@ -118,20 +118,23 @@ class CrackSystem:
         if self._shut is None or self._shut[0] != key:
             none = np.zeros(self.n)
             self._shut = key, *self.changed(Rows(closed, none, none, self.matrix.elements.per))
-            if isinstance(self.matrix, WholeMatrix) and self.matrix.release():
-                vars(self).pop("open_factor", None)
-                self._column_at[:] = -1
-                self._columns = np.empty((self.n, 0))
-                self._prescribed_factor = None
+            self.release_open()
         return self._shut[1:]
+
+    def release_open(self) -> None:
+        """Give up factors of open faces, if they have not grown, and columns of their inverse."""
+        if isinstance(self.matrix, WholeMatrix) and self.matrix.release():
+            vars(self).pop("open_factor", None)
+            self._column_at[:] = -1
+            self._columns = np.empty((self.n, 0))
+            self._prescribed_factor = None
 
     def retire(self) -> None:
         """Give up the factors of contact states."""
         self.bases, self._factors, self._shut, self._prescribed_factor = [], {}, None, None
         self._column_at[:] = -1
         self._columns = np.empty((self.n, 0))
-        if isinstance(self.matrix, WholeMatrix) and self.matrix.release():
-            vars(self).pop("open_factor", None)
+        self.release_open()
 
     def changed(self, rows: Rows) -> tuple[np.ndarray, AnyFactor]:
         """Indices of the unknowns that ``rows`` leave free, and factors of their equations."""
