@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from ..model import Problem, counted
+from ..model import Problem, counted, duration_text
 from .crack_cost import CrackCost, crack_cost
 
 #: Seconds to start a run, of every cycle with its output, of a step of each moving block, and of a cycle of each cracked
@@ -56,18 +56,8 @@ def run_line(problem: Problem, cracks: CrackCost | None = None) -> str:
     """One line that states the `run_cost`."""
     cost = run_cost(problem, cracks)
     if not cost.cycles:
-        return (
-            f"about {_time(cost.once)} of processor time and {_time(cost.each)} a cycle, within a factor of {WITHIN:g}"
-        )
+        return f"about {duration_text(cost.once)} of processor time and {duration_text(cost.each)} a cycle, within a factor of {WITHIN:g}"
     return (
-        f"about {_time(cost.seconds)} of processor time to the end, within a factor of {WITHIN:g}: "
-        f"{counted(cost.cycles, 'cycle')} of {_time(cost.each)}, {_time(cost.once)} besides"
+        f"about {duration_text(cost.seconds)} of processor time to the end, within a factor of {WITHIN:g}: "
+        f"{counted(cost.cycles, 'cycle')} of {duration_text(cost.each)}, {duration_text(cost.once)} besides"
     )
-
-
-def _time(seconds: float) -> str:
-    """Two digits of ``seconds``, in minutes or hours where it is long."""
-    for unit, length in (("h", 3600.0), ("min", 60.0)):
-        if seconds >= 2 * length:
-            return f"{seconds / length:.2g} {unit}" if seconds < 99 * length else f"{seconds / length:.0f} {unit}"
-    return f"{float(format(seconds, '.2g')):g} s"

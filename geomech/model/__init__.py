@@ -35,6 +35,7 @@ from .problem import (
     Problem,
     RunSettings,
     counted,
+    duration_text,
 )  # fmt: skip
 from .state import CONTACT, FACE_POINT, OPEN, SLIP, STICK, TIP, CrackFaces, Cycle, Event, Shortened, Skip, State
 from .unbounded_rock import EndlessRock, Fluid
@@ -95,6 +96,7 @@ __all__ = [
     "baseline_corrected",
     "corner_lengths",
     "counted",
+    "duration_text",
     "grouted_bolt",
     "rayleigh_coefficients",
     "read_record",

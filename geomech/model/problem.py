@@ -360,3 +360,15 @@ class Problem:
 def counted(number: int, noun: str) -> str:
     """ "1 block", "2 blocks": for messages."""
     return f"{number} {noun}" if number == 1 else f"{number} {noun}s"
+
+
+def duration_text(seconds: float) -> str:
+    """A duration as people say it, for messages: 0.071 s, 5.8 s, 45 s, 2.5 min, 12 min, 2 h 5 min."""
+    if seconds < 9.95:
+        return f"{float(format(seconds, '.2g')):g} s"
+    if seconds < 99.5:
+        return f"{seconds:.0f} s"
+    if seconds < 585.0:
+        return f"{round(seconds / 30.0) / 2.0:g} min"
+    minutes = round(seconds / 60.0)
+    return f"{minutes} min" if minutes < 100 else f"{minutes // 60} h {minutes % 60} min"

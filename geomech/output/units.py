@@ -50,13 +50,3 @@ def _unit(units: tuple[tuple[float, str, float], ...], largest: float) -> tuple[
     if not (math.isfinite(size) and size > 0):
         return units[0][1:]
     return next((name, unit) for least, name, unit in units if size >= least)
-
-
-def duration_text(seconds: float) -> str:
-    """Wall time as people say it: 45 s, 2.5 min, 12 min, 2 h 5 min."""
-    if seconds < 99.5:
-        return f"{seconds:.0f} s"
-    if seconds < 585.0:
-        return f"{round(seconds / 30.0) / 2.0:g} min"
-    minutes = round(seconds / 60.0)
-    return f"{minutes} min" if minutes < 100 else f"{minutes // 60} h {minutes % 60} min"

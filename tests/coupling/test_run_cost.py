@@ -14,6 +14,7 @@ import pytest
 from geomech.coupling import run_cost
 from geomech.coupling.crack_cost import crack_cost
 from geomech.coupling.run_cost import run_line
+from geomech.model import duration_text
 from geomech.scene import load_scene
 
 ROOT = Path(__file__).parents[2]
@@ -37,7 +38,12 @@ def test_the_line_states_it_with_its_uncertainty(torn_plate):
     to_events = replace(torn_plate, run=replace(torn_plate.run, stepping="events"))
     assert "a cycle, within a factor of 4" in run_line(to_events)
     long = replace(torn_plate, run=replace(torn_plate.run, end_time=1e5 * torn_plate.dda.time_step))
-    assert " h of processor time" in run_line(long) or " min of processor time" in run_line(long)
+    assert " min of processor time" in run_line(long)
+
+
+def test_durations_are_said_in_one_way():
+    said = {0.0714: "0.071 s", 5.84: "5.8 s", 45.2: "45 s", 150.0: "2.5 min", 700.0: "12 min", 7500.0: "2 h 5 min"}
+    assert {seconds: duration_text(seconds) for seconds in said} == said
 
 
 @pytest.mark.slow

@@ -10,7 +10,8 @@ import time
 from contextlib import suppress
 from typing import Self, TextIO
 
-from ..units import duration_text
+from geomech.model import duration_text
+
 from .pace import Compiled, Course
 
 #: Silence, s, after which a line is written.

@@ -14,12 +14,12 @@ from typing import Any, TextIO
 
 import numpy as np
 
-from geomech.model import STOPS, Cycle, Problem, counted
+from geomech.model import STOPS, Cycle, Problem, counted, duration_text
 
 from ..checkpoints import checkpoint_file
 from ..tables.deepest_penetration import limits_line
 from ..tables.motion_state import closing, state_text
-from ..units import duration_text, length_text, stress_text
+from ..units import length_text, stress_text
 from .at_work import note_output
 from .pace import Compiled, Course, Pace, name_of_run
 
