@@ -265,9 +265,10 @@ class RunSettings:
                      that the most driven tip has K_eq = K_Ic
     events           kinds of state changes that steps end at, or report when steps are fixed; None: all with "events",
                      none with "fixed"
-    boundary_stress  how contact forces load a cracked block: "contacts" as pressures over faces; "bases" likewise, and
-                     on fixed and guided blocks as on a rigid base; "springs" as point forces; "kelvin-springs" as point
-                     forces of the infinite plane
+    boundary_stress  how contact forces load a cracked block of order 1: "contacts" as pressures linear over faces; "bases"
+                     likewise, and on fixed and guided blocks as on a rigid base; "auto" as on a rigid base in static runs
+                     where a block is wider than deep, otherwise linear; "springs" as point forces; "kelvin-springs" as
+                     point forces of the infinite plane
     skip             False: every body and solution is recomputed in every pass, for comparison; results are the same
     repeat           kinds of `REPEATS`: the finished run is repeated with each of these changes, and states by how much
                      its results differ
@@ -275,7 +276,7 @@ class RunSettings:
 
     end_time: float = 1.0
     stop_at: tuple[str, ...] = ("coalescence", "split")
-    boundary_stress: str = "contacts"
+    boundary_stress: str = "auto"
     stepping: str = "fixed"
     events: tuple[str, ...] | None = None
     longest_step: float | None = None

@@ -82,9 +82,21 @@ def test_blocks_press_on_their_base_as_the_crack_solver_has_it(wide):
     expected = alone(wide).tips["k_i"]
     solution, tips = last(slab(wide, "bases"))
     assert tips["k_i"] == pytest.approx(expected, rel=1e-3)
+    # Unless told otherwise, sides that are longer than the block is deep have it.
+    by_default = last(slab(wide, RunSettings().boundary_stress))[1]["k_i"].max() / expected.max()
+    assert (abs(by_default - 1) < 1e-3) == (wide > 1)
     assert base_pressure(solution)[1].min() >= 0
     linear = last(slab(wide, "contacts"))[1]["k_i"].max() / expected.max()
     assert abs(linear - 1) > 0.02
+
+
+def test_blocks_in_motion_have_linear_pressure():
+    """Unless told otherwise: they land on corners and edges."""
+    problem = slab(2.0, "auto")
+    moving = replace(problem.dda, dynamic_factor=1.0, time_step=1e-4)
+    problem = replace(problem, dda=moving, run=replace(problem.run, end_time=2e-4))
+    linear = replace(problem, run=replace(problem.run, boundary_stress="contacts"))
+    assert last(problem)[1]["k_i"].tolist() == last(linear)[1]["k_i"].tolist()
 
 
 def test_wide_blocks_lift_off_their_base_at_its_ends():

@@ -135,7 +135,10 @@ def boundary_loads(
     contacts, edges = contacts_of_loaded_pairs(result.contacts, blocks.n_blocks), forces.edges
     route, bent = problem.run.boundary_stress, np.zeros(blocks.n_blocks, bool)
     order = blocks.order if result.state.order is None else result.state.order
-    if order is not None and route in ("contacts", "bases") and problem.dda.dynamic_factor == 0.0:
+    if route == "auto" and problem.dda.dynamic_factor > 0.0:
+        # Blocks in motion land on corners and edges; static pressure is not what loads their cracks.
+        route = "contacts"
+    if order is not None and route in ("auto", "contacts", "bases") and problem.dda.dynamic_factor == 0.0:
         # (In motion the cracks of such blocks are loaded by the stress of their blocks.)
         bent[numbers] = np.asarray(order)[numbers] > 1
     if bent.any():

@@ -232,7 +232,11 @@ def _shallow(c: Check) -> None:
     first = [of[b] not in zones or zones[of[b]].order == 1 for b in range(blocks.n_blocks)]
     cracked = [b for b in np.unique(c.cracks.block).tolist() if first[b] and not fixed[b]]
     # In dynamics blocks land on corners and edges: static contact pressure is not what loads their cracks.
-    if not (len(base) and cracked) or c.tables.dda.dynamic_factor > 0 or c.tables.run.boundary_stress == "bases":
+    if (
+        not (len(base) and cracked)
+        or c.tables.dda.dynamic_factor > 0
+        or c.tables.run.boundary_stress in ("auto", "bases")
+    ):
         return
     starts, ends = blocks.vertices[base], blocks.vertices[blocks.next_vertex[base]]
     weight, found = np.array(c.tables.loads.gravity_m_s2), []
@@ -258,8 +262,7 @@ def _shallow(c: Check) -> None:
             f"{blocks.names[block]!r} contains cracks and lies on a fixed block with a side of {length:.3g} m, "
             f"{slenderness:.2g} times as long as the block is deep{others}: its base pressure is linear, which bends "
             "it more than a true base would; K of its cracks may be too large by a factor of two",
-            'give its zone an order of 2 (zones.NAME.order), set run.boundary_stress = "bases", or draw it deeper '
-            f"(less than {SHALLOW:g} times as wide as deep), or cut it by joints into pieces that are",
+            'leave run.boundary_stress out, or set it to "bases"',
         )
 
 

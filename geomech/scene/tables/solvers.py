@@ -248,10 +248,11 @@ class RunTable(Table):
         "is made at the load at which the most driven tip has K_eq = K_Ic, also if that is lower than "
         "before (time, as the argument of the loads, decreases with them)",
     )
-    boundary_stress: Literal["contacts", "bases", "springs", "kelvin-springs"] = Field(
-        "contacts",
+    boundary_stress: Literal["auto", "contacts", "bases", "springs", "kelvin-springs"] = Field(
+        "auto",
         description='how contact forces load cracked blocks of order 1: "contacts", linear over each face; "bases", the same, '
-        'but on fixed, guided and rigid blocks as on a straight rigid base without tension; "springs", '
+        'but on fixed, guided and rigid blocks as on a straight rigid base without tension; "auto", as "bases" in static runs where '
+        'a side is longer than the block is deep on average, otherwise as "contacts"; "springs", '
         'as point forces at the springs; "kelvin-springs", as Kelvin\'s point forces of the infinite '
         "plane (for comparison: most of a force is then lost)",
     )
