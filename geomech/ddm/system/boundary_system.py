@@ -141,17 +141,19 @@ class BoundarySystem:
     @property
     def factor(self) -> Factor | IteratedBoundary:
         """See above."""
-        if self._factor is not None:
-            return self._factor
+        factor = self._factor  # read once: the run may release it while fields inside the body are computed beside it
+        if factor is not None:
+            return factor
         self._again += 1
         # Asked for once, they need not be kept; fields inside a block, for instance, take them again and again.
         return self._factored(self._whole()) if self._again == 1 or self.sparing else self.kept_factor()
 
     def kept_factor(self) -> Factor | IteratedBoundary:
         """`factor`, kept from now on if it had been released."""
-        if self._factor is None:
-            self._factor = self._factored(self._whole())
-        return self._factor
+        factor = self._factor
+        if factor is None:
+            self._factor = factor = self._factored(self._whole())
+        return factor
 
     def release(self) -> None:
         """Give up factors of a large boundary. Loads need none: what the boundary does to cracks is in A_CΓ A_ΓΓ⁻¹
