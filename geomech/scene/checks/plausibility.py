@@ -28,9 +28,9 @@ SIZES = 1e-3, 100.0
 LEAST_MODULUS, LEAST_TOUGHNESS = 1e6, 1e3
 #: Least plausible density, below that of the lightest pumice, kg/m³; smaller numbers (except 0) are in g/cm³ or t/m³.
 LEAST_DENSITY = 100.0
-#: Ratio of side length to block depth above which a cracked block on a fixed one is reported. Contact pressure is
-#: linear there; on a rigid base the true pressure concentrates below the load. K is off by 2 % at a ratio of 1, and too
-#: large by a factor of 1.4 at 1½, 2 at 2, 5 at 3 (`tests/coupling/test_bases.py`).
+#: Ratio of side length to block depth above which a cracked block with linear contact pressure is reported. The true pressure
+#: concentrates below the load. On a rigid base K is off by 2 % at a ratio of 1, and too large by a factor of 1.4 at 1½, 2 at 2,
+#: 5 at 3 (`tests/coupling/test_bases.py`); on a block of the same rock by 1.3 at 2, 2.3 at 3.
 SHALLOW = 1.5
 #: A side lies on another one if their distance is below this part of its length, over at least that part of it.
 LIES_ON, MOST_OF_IT = 1e-6, 0.5
@@ -224,21 +224,40 @@ def _sudden_weight(c: Check) -> None:
 
 
 def _shallow(c: Check) -> None:
-    blocks = c.blocks
-    fixed = fixed_blocks(c.tables, c.drawn)
-    base = np.flatnonzero(fixed[blocks.vertex_block])
-    # Those of higher order have the pressure of a rigid base.
-    zones, of = c.tables.zones, c.drawn.zones
-    first = [of[b] not in zones or zones[of[b]].order == 1 for b in range(blocks.n_blocks)]
-    cracked = [b for b in np.unique(c.cracks.block).tolist() if first[b] and not fixed[b]]
+    """Linear contact pressure below wide cracked blocks of first order in a static run: on all blocks if it was asked for,
+    by default on those that deform."""
     # In dynamics blocks land on corners and edges: static contact pressure is not what loads their cracks.
-    if (
-        not (len(base) and cracked)
-        or c.tables.dda.dynamic_factor > 0
-        or c.tables.run.boundary_stress in ("auto", "bases")
-    ):
+    if c.tables.dda.dynamic_factor > 0 or not c.cracks.n_segments:
         return
-    starts, ends = blocks.vertices[base], blocks.vertices[blocks.next_vertex[base]]
+    asked_for = c.tables.run.boundary_stress not in ("auto", "bases")
+    found = _wide_sides(c, on_fixed=asked_for)
+    if not found:
+        return
+    slenderness, block, length, on_fixed = max(found)
+    others = f", and {len(found) - 1} more sides of cracked blocks" if len(found) > 1 else ""
+    c.warn(
+        ("run", "boundary_stress") if on_fixed else ("geometry",),
+        f"{c.blocks.names[block]!r} contains cracks and lies on {'a fixed' if on_fixed else 'another'} block with a side of "
+        f"{length:.3g} m, {slenderness:.2g} times as long as the block is deep{others}: its contact pressure is linear, which "
+        "bends it more than the true one would; K of its cracks may be too large by a factor of two",
+        'leave run.boundary_stress out, or set it to "bases"'
+        if on_fixed
+        else f"give its zone and the one below an order of 7 (zones.NAME.order), or cut it by joints into pieces that are less "
+        f"than {SHALLOW:g} times as wide as deep",
+    )
+
+
+def _wide_sides(c: Check, on_fixed: bool) -> list[tuple[float, int, float, bool]]:
+    """(length over depth, block, length in m, whether on a rigid base) of sides of cracked blocks of first order, longer than
+    `SHALLOW` times their depth, that lie on blocks which deform or, with ``on_fixed``, on fixed, guided and rigid ones."""
+    blocks, fixed = c.blocks, fixed_blocks(c.tables, c.drawn)
+    zones, of = c.tables.zones, c.drawn.zones
+    guided = constrained_unknowns(c.tables, c.drawn)
+    straight = fixed | np.array([c.tables.materials[material_of(c.tables, zone)].rigid for zone in of], bool)
+    straight = straight if guided is None else straight | guided.any(axis=1)
+    # On these, blocks of higher order have the pressure of a rigid base.
+    first = [of[b] not in zones or zones[of[b]].order == 1 for b in range(blocks.n_blocks)]
+    cracked = {b for b in np.unique(c.cracks.block).tolist() if first[b] and not fixed[b]}
     weight, found = np.array(c.tables.loads.gravity_m_s2), []
     for start, side in blocks.sides.items():
         block = int(blocks.vertex_block[start])
@@ -252,18 +271,13 @@ def _shallow(c: Check) -> None:
         depth = np.abs((b - a)[0] * corners[:, 1] - (b - a)[1] * corners[:, 0]).max() / length
         slenderness = length / float(depth)
         # (A square is as wide as deep, whatever round-off says.)
-        if slenderness > (1 + LIES_ON) * SHALLOW and _overlap(a, b, starts, ends) > MOST_OF_IT * length:
-            found.append((slenderness, block, length))
-    if found:
-        slenderness, block, length = max(found)
-        others = f", and {len(found) - 1} more sides of cracked blocks" if len(found) > 1 else ""
-        c.warn(
-            ("geometry",),
-            f"{blocks.names[block]!r} contains cracks and lies on a fixed block with a side of {length:.3g} m, "
-            f"{slenderness:.2g} times as long as the block is deep{others}: its base pressure is linear, which bends "
-            "it more than a true base would; K of its cracks may be too large by a factor of two",
-            'leave run.boundary_stress out, or set it to "bases"',
-        )
+        if slenderness <= (1 + LIES_ON) * SHALLOW:
+            continue
+        for rigid in (True, False) if on_fixed else (False,):
+            base = np.flatnonzero((straight[blocks.vertex_block] == rigid) & (blocks.vertex_block != block))
+            if _overlap(a, b, blocks.vertices[base], blocks.vertices[blocks.next_vertex[base]]) > MOST_OF_IT * length:
+                found.append((slenderness, block, length, rigid))
+    return found
 
 
 def _overlap(a: np.ndarray, b: np.ndarray, starts: np.ndarray, ends: np.ndarray) -> float:

@@ -236,6 +236,47 @@ boundary_stress = "{route}"
         assert "'slab'" in warning.message and "leave run.boundary_stress out" in warning.way_out
 
 
+@pytest.mark.parametrize(("height", "order", "told"), [(0.5, 1, 1), (0.8, 1, 0), (0.5, 7, 0)])
+def test_shallow_cracked_blocks_on_a_block_that_deforms_are_reported(scene_file, height, order, told):
+    """The pressure between deformable blocks of first order is linear, whatever the base of the lower one has."""
+    text = f"""
+title = "a slab on a block"
+[[geometry.zones]]
+name = "slab"
+rectangle = [0.0, 0.0, 1.0, {height}]
+[[geometry.zones]]
+name = "below"
+rectangle = [-1.0, -1.0, 2.0, 0.0]
+[[geometry.zones]]
+name = "ground"
+rectangle = [-1.0, -2.0, 2.0, -1.0]
+[[geometry.cracks]]
+name = "flaw"
+points = [[0.5, 0.2], [0.5, 0.4]]
+[materials.rock]
+youngs_modulus_pa = 20e9
+poissons_ratio = 0.25
+density_kg_m3 = 2500
+k_ic_pa_sqrt_m = 1e6
+[zones.slab]
+order = {order}
+[zones.ground]
+fixed = true
+[joints.default]
+friction_angle_deg = 30
+[loads]
+gravity_m_s2 = [0.0, -9.81]
+[run]
+end_time_s = 1.0
+"""
+    found = [w for w in load_scene(scene_file(text)).warnings if "lies on another block" in w.message]
+    assert len(found) == told
+    for warning in found:
+        assert "'slab'" in warning.message and "order of 7" in warning.way_out
+    rigid = text.replace("[zones.ground]", '[zones.below]\nguided = "y"\n[zones.ground]')
+    assert not [w for w in load_scene(scene_file(rigid)).warnings if "lies on" in w.message]
+
+
 def test_a_crack_that_reaches_the_outline_or_keeps_away_is_not_reported(scene_file):
     end = "points = [[0.5, 1.0], [{x}, 1.0]]"
     old = "centre = [0.5, 1.0]\nlength_m = 0.2\nangle_deg = 30"
