@@ -5,12 +5,13 @@ from __future__ import annotations
 
 import logging
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
-from ...model import GROUND, OPEN, Blocks, Loads, State
+from ...model import GROUND, OPEN, Blocks, JointLaw, Loads, State
 from ..joint_laws.whole_faces import WholeFaces
 from ..kinematics.simplex_integration import block_moments
 from ..kinematics.tolerances import LITTLE, NOTABLE, NOTHING, ONE_FACE_SIN
@@ -321,6 +322,35 @@ def with_parted_faces(
         return replace(found, warnings=(*found.warnings, line))
     line += f"; were it lost where faces are open, the factor would be {other.factor:.4f}"
     return replace(found, factor_if_parted=other.factor, warnings=(*found.warnings, line))
+
+
+def with_laws_left_out(found: FactorOfSafety, joints: Sequence[JointLaw]) -> FactorOfSafety:
+    """The answer ``found`` without the tensile strength and dilation of ``joints``, and a warning of it: a state of rest without
+    tension is one with tensile strength, too, whatever bonds have broken on the way."""
+    parts = []
+    for what, of in (("tensile strength", "tensile_strength"), ("dilation", "dilation_angle")):
+        named = ", ".join(f"{law.name!r}" for law in joints if getattr(law, of) > 0.0)
+        parts += [f"the {what} of {named}"] if named else []
+    line = (
+        f"{' and '.join(parts)} {'are' if len(parts) > 1 else 'is'} not counted among so many blocks: the factor is that of joints "
+        f"with friction and cohesion alone, and may be higher with {'them' if len(parts) > 1 else 'it'}"
+    )
+    return replace(found, warnings=(*found.warnings, line))
+
+
+def with_displacements(blocks: Blocks, found: FactorOfSafety, drawn: float) -> FactorOfSafety:
+    """The answer ``found``, with a warning if it is clearly above the largest factor with admissible forces as ``drawn`` (0: unknown),
+    as blocks have moved on the way: soft bolts and joints allow that."""
+    if not 0.0 < drawn * (1.0 + NOTABLE) < found.lower:
+        return found
+    free = ~blocks.fixed
+    block = int(np.flatnonzero(free)[found.moved[free].argmax()])
+    line = (
+        f"the factor is that of blocks which have moved, by up to {1e3 * found.moved[block]:.3g} mm "
+        f"({blocks.names[block] if blocks.names else f'block {block}'!r}), before their forces balance: where they are drawn, no "
+        f"contact forces balance the loads above a factor of {drawn:.4f}"
+    )
+    return replace(found, warnings=(*found.warnings, line))
 
 
 def with_admissible_forces(found: FactorOfSafety, largest: float | None) -> FactorOfSafety:

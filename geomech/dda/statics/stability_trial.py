@@ -24,6 +24,7 @@ from ..joint_laws.friction_arrest import contact_speeds
 from ..joint_laws.reduced_strength import reduced
 from ..kinematics.tolerances import LITTLE
 from ..open_close.plastic_splitting import is_plastic, is_stronger
+from ..open_close.static_splitting import is_straight
 from ..results import NotConverged, StepResult, Unsupported
 from ..system import BlockSystem
 from .displacement_limit import DisplacementLimit
@@ -89,12 +90,26 @@ class TrialLoads:
         return math.sqrt(2.0 * _FALL * size / pull)
 
     def plastic(self, blocks: Blocks, joints: Sequence[JointLaw], settings: DdaSettings) -> bool:
-        """Whether trials of these ``blocks`` are solved by operator splitting with cohesion, joint stiffness or bolts: there
-        are many, and their ``joints`` keep what strength they have."""
-        many = int((~blocks.fixed).sum()) >= settings.contact_solver.plastic_splitting
+        """Whether trials of these ``blocks`` are solved by operator splitting as with cohesion, joint stiffness or bolts: there are
+        many, or very many with friction alone (and not so many that `static_splitting` does), and their ``joints`` keep what
+        strength they have."""
+        n, solver = int((~blocks.fixed).sum()), settings.contact_solver
         more = bool(self.loads.bolts) or any(is_stronger(law) for law in joints)
+        alone = solver.plastic_splitting_alone <= n < solver.static_splitting
+        many = n >= solver.plastic_splitting if more else alone
         plain = settings.contact == "penalty" and not self.loads.excavations
-        return many and more and plain and all(is_plastic(reduced(law, 1.0)) for law in joints)
+        return many and plain and all(is_plastic(reduced(law, 1.0)) for law in joints)
+
+    def simpler(self, blocks: Blocks, joints: Sequence[JointLaw], settings: DdaSettings) -> Sequence[JointLaw]:
+        """The laws ``joints`` without tensile strength and dilation where many ``blocks`` are solved by splitting with these only:
+        faces lose their tensile strength one after the other, and dilation wedges blocks in states that Newton's method does not
+        find. The same ``joints`` otherwise."""
+        if not any(law.tensile_strength > 0.0 or law.dilation_angle > 0.0 for law in joints):
+            return joints
+        plain = [replace(law, tensile_strength=0.0, dilation_angle=0.0) for law in joints]
+        large = int((~blocks.fixed).sum()) >= settings.contact_solver.static_splitting
+        alone = large and not self.loads.excavations and all(is_straight(law) for law in plain)
+        return plain if alone or self.plastic(blocks, plain, settings) else joints
 
     def at_once(self, system: BlockSystem) -> bool:
         """Whether a trial of this ``system`` is solved in a few long steps, by operator splitting."""

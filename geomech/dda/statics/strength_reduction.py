@@ -40,6 +40,8 @@ from .counted_resistance import (
     toes_in_the_way,
     with_admissible_forces,
     with_anchors,
+    with_displacements,
+    with_laws_left_out,
     with_no_mechanism,
     with_parted_faces,
     with_rigid_blocks,
@@ -132,7 +134,8 @@ def factor_of_safety(
     """The factor F by which the strength of the joints can be divided before no static equilibrium is left.
 
     Loads are those of ``load_time`` s, after excavations up to then; ``search`` says which strengths are reduced, and how
-    F is found.
+    F is found. Many blocks that stand without the tensile strength and dilation of their joints have the factor without these, and
+    a warning (`TrialLoads.simpler`).
 
     With Coulomb friction the forces of a system are not unique: strengths are reduced step by step from an equilibrium,
     and another path may give a factor that differs by some thousandths where contacts slide and stick again.
@@ -179,13 +182,25 @@ def factor_of_safety(
     under = TrialLoads(loads, load_time, how.unbalanced, how.max_steps, how.time_step)
     rest = State.at_rest(blocks) if how.state is None else how.state
     settings = replace(settings or DdaSettings(), dynamic_factor=0.0)
-    trials = _Search(blocks, materials, joints, joint_index, settings, chosen, under, rest, how.tolerance)
-    counted = Counted(how.toes, how.whole_faces)
-    if how.compare:
-        found, counted = trials.answer(counted, how.watch)
-    else:
-        found = trials.run(counted, watch=how.watch)
-    return trials.with_travel(found, counted) if how.follow else found
+
+    def answered(laws: Sequence[JointLaw]) -> FactorOfSafety:
+        trials = _Search(blocks, materials, laws, joint_index, settings, chosen, under, rest, how.tolerance)
+        counted = Counted(how.toes, how.whole_faces)
+        if laws is not joints and not trials.aim(counted):
+            raise NotConverged("no contact forces are admissible without them")
+        if how.compare:
+            found, counted = trials.answer(counted, how.watch)
+        else:
+            found = trials.run(counted, watch=how.watch)
+        return trials.with_travel(found, counted) if how.follow else found
+
+    simpler = under.simpler(blocks, joints, settings)
+    if simpler is not joints:
+        try:
+            return with_laws_left_out(answered(simpler), joints)
+        except NotConverged as failure:
+            log.info("tensile strength and dilation count: %s", failure)
+    return answered(joints)
 
 
 @dataclass(frozen=True)
@@ -251,6 +266,8 @@ class _Search:
         largest = self._admissible_beyond(found, counted)
         if self._cohesive:
             found = self._with_parted_faces(found, counted, largest is not None)
+        if self.under.at_once(self.system(1.0, counted)):
+            found = with_displacements(self.blocks, found, self.aims.get(counted, 0.0))
         return with_admissible_forces(found, largest), counted
 
     def with_travel(self, found: FactorOfSafety, counted: Counted) -> FactorOfSafety:

@@ -15,7 +15,7 @@ from geomech.bench.slopes.drawn_slopes import Isometry, drawn, moved, problem_of
 from geomech.dda.open_close.operator_splitting import contact_turn
 from geomech.dda.open_close.plastic_splitting import is_plastic
 from geomech.dda.statics.stability_trial import TrialLoads
-from geomech.model import GROUND, SLIP, Bolt, ContactSolver, JointLaw, Loads
+from geomech.model import GROUND, SLIP, Blocks, Bolt, ContactSolver, DdaSettings, History, JointLaw, Loads, Material
 
 #: Two joint sets behind a face, some seventy blocks.
 SCENE = (
@@ -81,6 +81,34 @@ def test_a_slope_with_joint_stiffness_fails_as_with_newtons_method():
     assert one.factor <= admissible_factor(problem, tolerance=1e-3) * 1.003
 
 
+def test_tensile_strength_and_dilation_of_many_blocks_are_left_out_with_a_warning():
+    more = "cohesion_pa = 20e3\ntensile_strength_pa = 10e3\ndilation_angle_deg = 5"
+    found, other = (
+        factor_of(problem_of(drawn(SCENE.replace("MORE", text))), compare=False, tolerance=0.03)
+        for text in (more, "cohesion_pa = 20e3")
+    )
+    assert found.factor == other.factor and not other.warnings
+    (warning,) = found.warnings
+    assert "the tensile strength of 'default', 'beds' and the dilation of 'default', 'beds' are not counted" in warning
+
+
+def test_blocks_that_hang_on_tensile_strength_have_their_factor():
+    """A block of 1 m x 1 m below a roof, 25 kN/m, with 40 kPa: 1.6, also where many blocks have the factor without it."""
+    roof, square = np.array([[-1, 0], [2, 0], [2, 1], [-1, 1]]), np.array([[0, -1], [1, -1], [1, 0], [0, 0]])
+    blocks = Blocks.from_polygons([roof, square], fixed=[True, False])
+    rock, joint = Material("rock", 10e9, 0.25, density=2500.0), JointLaw("joint", 0.5, 1e5, 4e4)
+    settings = DdaSettings(contact_solver=ContactSolver(plastic_splitting=1))
+    found = dda.factor_of_safety(
+        blocks,
+        [rock],
+        [joint],
+        Loads(gravity=History.constant([0.0, -10.0])),
+        settings,
+        search=dda.FactorSearch(follow=False),
+    )
+    assert found.factor == pytest.approx(1.6, rel=2e-3) and not any("not counted" in line for line in found.warnings)
+
+
 @pytest.mark.parametrize("stiffness", [1e7, *(pytest.param(k, marks=pytest.mark.slow) for k in (3e6, 1e8))])
 def test_bolts_count_with_their_yield_force(stiffness):
     """However far blocks have to move for it, 33 to 1 mm: three bolts raise the bound from 0.520 to 0.750."""
@@ -110,7 +138,7 @@ def test_strength_that_fades_is_left_to_the_open_close_iteration():
 
 
 def test_what_is_solved_in_this_way():
-    """Cohesion, bolts and joint stiffness from 50 blocks on, friction alone never."""
+    """Cohesion, bolts and joint stiffness from 50 blocks on; friction alone where there are very many, without dilation."""
     problem, under = slope_of(60), TrialLoads(Loads(), 0.0, 1e-5, 200, None)
     assert not under.plastic(problem.blocks, problem.joints, problem.dda)
     bolted = replace(under, loads=Loads(bolts=(Bolt(1, (0.0, 0.0), GROUND, (1.0, 0.0), 1e8),)))
@@ -119,6 +147,18 @@ def test_what_is_solved_in_this_way():
         laws = [replace(law, **more) for law in problem.joints]
         assert under.plastic(problem.blocks, laws, problem.dda)
         assert not under.plastic(problem.blocks, laws, replace(problem.dda, contact_solver=NEWTON))
+    dilating = [replace(law, dilation_angle=0.1) for law in problem.joints]
+    assert under.simpler(problem.blocks, dilating, problem.dda) is dilating
+    fewer = replace(problem.dda, contact_solver=ContactSolver(plastic_splitting_alone=50))
+    assert under.plastic(problem.blocks, problem.joints, fewer)
+    assert [law.dilation_angle for law in under.simpler(problem.blocks, dilating, fewer)] == [0.0] * len(dilating)
+
+
+def test_many_blocks_with_friction_alone_fail_at_their_bound():
+    problem = problem_of(drawn(SCENE.replace("MORE", "")))
+    solver = ContactSolver(plastic_splitting_alone=50)
+    found, bound = factor_of(problem, solver), admissible_factor(problem, tolerance=1e-3)
+    assert found.factor == pytest.approx(bound, rel=1e-2) and found.lower <= bound * 1.003
 
 
 def test_a_face_open_by_a_hairline_holds_part_of_its_cohesion():
