@@ -10,8 +10,9 @@ import pytest
 
 from geomech import ddm
 from geomech.ddm import condensation
+from geomech.ddm.system import schur_complement
 from geomech.ddm.system.boundary_system import KEPT_BESIDE_FACTORS, BoundarySystem
-from geomech.model import Cracks, DdmSettings, Material
+from geomech.model import Cracks, DdmSettings, JointLaw, Material
 
 ROCK = Material("rock", 17e9, 0.21, k_ic=2e6)
 SQUARE = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
@@ -50,6 +51,35 @@ def test_released_bodies_are_loaded_alike(aperture):
     again = sheared(body)
     assert np.array_equal(factors(again), at) and np.array_equal(again.displacement(INSIDE), inside)
     assert again.residual < 1e-9 and again.condition == before.condition
+
+
+def test_bodies_with_friction_give_up_factors_of_open_faces(monkeypatch):
+    """Of many, once their contact has factors of its own, from which later loads are solved to the same bits."""
+    monkeypatch.setattr(schur_complement, "WORTHWHILE", 1)
+    law = JointLaw("rough", friction_angle=0.3)
+    body = ddm.Body([SQUARE], crack(0.3, 0.0), ROCK, FINE, face_laws=(law,))
+    body.release()
+    softness = body.compliance()
+    first = sheared(body)
+    assert "open_factor" in vars(body.crack_system) and body.crack_system.bases
+    body.forget_states()
+    assert "open_factor" not in vars(body.crack_system)
+    assert np.array_equal(factors(sheared(body)), factors(first))
+    assert np.array_equal(body.compliance(), softness)
+
+
+def test_a_body_whose_cracks_have_grown_keeps_no_matrices_of_its_boundary():
+    """Its earlier solutions still have their displacement inside."""
+    body = ddm.Body([SQUARE], crack(0.3, 0.0), ROCK, FINE)
+    body.release()
+    body.lean = True
+    before = sheared(body)
+    held, inside = size(body), before.displacement(INSIDE)
+    n = body.boundary.n_unknowns
+    body.retire()
+    assert size(body) < held - 8 * n * body.faces.n_unknowns
+    assert np.array_equal(before.displacement(INSIDE), inside)
+    assert np.array_equal(factors(sheared(body)), factors(before))
 
 
 def test_released_bodies_grow_alike():
