@@ -78,17 +78,19 @@ class Condensed:
 
     @property
     def rows(self) -> KeptRows:
-        """G, kept until the body is retired."""
-        if self._rows is None:
-            self._rows = KeptRows.whole(self._carried(np.arange(self.faces.n)), self.faces)
-        return self._rows
+        """G, kept until the body is retired (which may happen while fields inside it are computed)."""
+        rows = self._rows
+        if rows is None:
+            self._rows = rows = KeptRows.whole(self._carried(np.arange(self.faces.n)), self.faces)
+        return rows
 
     @property
     def columns(self) -> KeptRows:
         """A_ΓC, by its columns; kept until they are released."""
-        if self._columns is None:
-            self._columns = KeptRows.whole(self._influence(np.arange(self.faces.n)), self.faces)
-        return self._columns
+        columns = self._columns
+        if columns is None:
+            self._columns = columns = KeptRows.whole(self._influence(np.arange(self.faces.n)), self.faces)
+        return columns
 
     def release(self) -> None:
         """Give up what only growth and the boundary's displacement need, where that is much."""
