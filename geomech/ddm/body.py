@@ -561,7 +561,8 @@ class Body:
     def boundary_unknowns(self, load: np.ndarray, jumps: np.ndarray) -> np.ndarray:
         """(n_boundary_unknowns,) or (…, k): 2μ times displacement, or reactions where supported, under tractions ``load``
         (n_boundary_unknowns,) on the boundary and ``jumps`` (n_crack_unknowns,) at the cracks; or (…, k) each."""
-        return -self._outside.solve(load + self.condensation.moved_by(jumps) if self.faces.n else load)
+        right = load + self.condensation.moved_by(jumps) if self.faces.n else load
+        return -self._outside.solve(right, counted=False)
 
     def reduced_transposed(self, on_faces: np.ndarray) -> np.ndarray:
         """(n_boundary_unknowns, k): the action of tractions on the boundary on what ``on_faces`` (n_crack_unknowns, k)

@@ -226,9 +226,11 @@ class BoundarySystem:
         matrix = influence(targets, self.elements.take(elements), self.nu, self.tol)
         return matrix if self.holds is None else self.holds.swapped(targets, elements, matrix, self.nu, self.tol)
 
-    def solve(self, right: np.ndarray, transposed: bool = False) -> np.ndarray:
-        """A_ΓΓ⁻¹ ``right`` (n,) or (n, k), without rigid motions; A_ΓΓ⁻ᵀ ``right`` if ``transposed``."""
-        self.work.back_substitutions += 1 if right.ndim == 1 else right.shape[1]
+    def solve(self, right: np.ndarray, transposed: bool = False, counted: bool = True) -> np.ndarray:
+        """A_ΓΓ⁻¹ ``right`` (n,) or (n, k), without rigid motions; A_ΓΓ⁻ᵀ ``right`` if ``transposed``. Solutions for fields
+        inside the body, which are computed beside the run at any time, are not ``counted``."""
+        if counted:
+            self.work.back_substitutions += 1 if right.ndim == 1 else right.shape[1]
         return self.factor.solve(np.asfortranarray(right), transposed)
 
     def carried(self, rows: np.ndarray) -> np.ndarray:
