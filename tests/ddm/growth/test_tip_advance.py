@@ -405,8 +405,12 @@ def test_random_networks_stay_sound(seed):
             assert (growth.grown[tips["k_eq"] < 1] == 0).all()
             assert (growth.grown <= settings.increment * (1 + join) + 1e-9).all()
             # What was there stays there: total length grows by exactly what the tips grew.
-            if not (growth.grown[growth.grown > 0] < SLIVER * settings.min_increment).any():
-                assert cracks.lengths.sum() == pytest.approx(before.lengths.sum() + growth.grown.sum(), rel=1e-12)
+            sliver = SLIVER * settings.min_increment
+            if not (growth.grown[growth.grown > 0] < sliver).any():
+                # Where cracks close a ring through one mouth, it is parted by up to that along the surface.
+                parted = len(growth.joins) - len({join.point for join in growth.joins})
+                expected = before.lengths.sum() + growth.grown.sum()
+                assert cracks.lengths.sum() == pytest.approx(expected, rel=1e-12, abs=parted * sliver)
             assert cracks.tips.size <= n
             if not loops and not growth.joins:
                 assert cracks.tips.size == n
