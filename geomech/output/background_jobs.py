@@ -30,12 +30,6 @@ class BackgroundJobs:
         while self._jobs:
             self._jobs.popleft().result()
 
-    def drop(self) -> None:
-        """Forget all jobs: those that wait are not done, and the one under way is not asked for its result."""
-        for job in self._jobs:
-            job.cancel()
-        self._jobs.clear()
-
     def close(self) -> None:
         try:
             self.wait()

@@ -147,9 +147,7 @@ class Series:
             if not written:
                 self._write(cycle, at)
             if cycle.sparing and isinstance(error, KeyboardInterrupt):
-                # It is not to wait; what the checkpoint lists is written.
-                self._meshes.stop()
-                self._background.drop()
+                self.on_interrupt()  # also of a run that is aborted within a cycle
             else:
                 self._write_last_interior()
         try:

@@ -191,6 +191,36 @@ def test_how_far_linear_pressure_is_off_under_shallow_blocks(ratio, at, too_larg
     assert linear.tips["k_i"].max() / constrained.tips["k_i"].max() == pytest.approx(too_large, rel=0.01)
 
 
+def slab_on(height: float, order: int, below: str, run: str = "") -> str:
+    """A scene: a cracked slab 1 m wide on the zones ``below``, of which "ground" is fixed."""
+    return f"""
+title = "a slab on what is below"
+[[geometry.zones]]
+name = "slab"
+rectangle = [0.0, 0.0, 1.0, {height}]
+{below}
+[[geometry.cracks]]
+name = "flaw"
+points = [[0.5, 0.2], [0.5, 0.4]]
+[materials.rock]
+youngs_modulus_pa = 20e9
+poissons_ratio = 0.25
+density_kg_m3 = 2500
+k_ic_pa_sqrt_m = 1e6
+[zones.slab]
+order = {order}
+[zones.ground]
+fixed = true
+[joints.default]
+friction_angle_deg = 30
+[loads]
+gravity_m_s2 = [0.0, -9.81]
+[run]
+end_time_s = 1.0
+{run}
+"""
+
+
 @pytest.mark.parametrize(
     ("height", "route", "order", "told"),
     [
@@ -202,34 +232,16 @@ def test_how_far_linear_pressure_is_off_under_shallow_blocks(ratio, at, too_larg
     ],
 )
 def test_shallow_cracked_blocks_on_a_fixed_base_are_reported(scene_file, height, route, order, told):
-    text = f"""
-title = "a slab on its ground"
-[[geometry.zones]]
-name = "slab"
-rectangle = [0.0, 0.0, 1.0, {height}]
+    text = slab_on(
+        height,
+        order,
+        """
 [[geometry.zones]]
 name = "ground"
 rectangle = [-1.0, -1.0, 2.0, 0.0]
-[[geometry.cracks]]
-name = "flaw"
-points = [[0.5, 0.2], [0.5, 0.4]]
-[materials.rock]
-youngs_modulus_pa = 20e9
-poissons_ratio = 0.25
-density_kg_m3 = 2500
-k_ic_pa_sqrt_m = 1e6
-[zones.slab]
-order = {order}
-[zones.ground]
-fixed = true
-[joints.default]
-friction_angle_deg = 30
-[loads]
-gravity_m_s2 = [0.0, -9.81]
-[run]
-end_time_s = 1.0
-boundary_stress = "{route}"
-"""
+""",
+        f'boundary_stress = "{route}"',
+    )
     found = [w for w in load_scene(scene_file(text)).warnings if "lies on a fixed block" in w.message]
     assert len(found) == told
     for warning in found:
@@ -239,36 +251,18 @@ boundary_stress = "{route}"
 @pytest.mark.parametrize(("height", "order", "told"), [(0.5, 1, 1), (0.8, 1, 0), (0.5, 7, 0)])
 def test_shallow_cracked_blocks_on_a_block_that_deforms_are_reported(scene_file, height, order, told):
     """The pressure between deformable blocks of first order is linear, whatever the base of the lower one has."""
-    text = f"""
-title = "a slab on a block"
-[[geometry.zones]]
-name = "slab"
-rectangle = [0.0, 0.0, 1.0, {height}]
+    text = slab_on(
+        height,
+        order,
+        """
 [[geometry.zones]]
 name = "below"
 rectangle = [-1.0, -1.0, 2.0, 0.0]
 [[geometry.zones]]
 name = "ground"
 rectangle = [-1.0, -2.0, 2.0, -1.0]
-[[geometry.cracks]]
-name = "flaw"
-points = [[0.5, 0.2], [0.5, 0.4]]
-[materials.rock]
-youngs_modulus_pa = 20e9
-poissons_ratio = 0.25
-density_kg_m3 = 2500
-k_ic_pa_sqrt_m = 1e6
-[zones.slab]
-order = {order}
-[zones.ground]
-fixed = true
-[joints.default]
-friction_angle_deg = 30
-[loads]
-gravity_m_s2 = [0.0, -9.81]
-[run]
-end_time_s = 1.0
-"""
+""",
+    )
     found = [w for w in load_scene(scene_file(text)).warnings if "lies on another block" in w.message]
     assert len(found) == told
     for warning in found:
