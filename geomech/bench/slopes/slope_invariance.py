@@ -100,18 +100,19 @@ BOUNDS = {
 WARNED = (
     "nothing holds",
     "static steps have dissipated",
-    "of their strain only",
+    "agree only to",
     "are no more accurate",
     "is not resolved, and friction remembers it",
     "before they bear it",
     "rigid base was not found",
+    "did not agree after",
     *sorted({words for invariant in INVARIANTS.values() for words in invariant.reported}),
 )
 #: The same of results that depend on the time step, not on the place.
 WARNED_OF_STEPS = (
     "does not resolve vibrations",
     "bonds broke within steps",
-    "that came from no block",
+    "which no block supplied",
     "depends on the load steps",
 )
 _MODULES = (

@@ -4,7 +4,7 @@ As long as all states persist, the `reserve` of each (its distance from the chan
 before a change therefore predict its load, and a pass just beyond confirms it. Changes that cannot be predicted in this
 way (bonds that break together, corners that slide off an edge) are enclosed by bisection.
 
-Changes far apart are found one by one. In a rapid succession, as when a wall settles brick by brick, more and more of
+Changes far apart are found one by one. In rapid succession, as when a wall settles brick by brick, more and more of
 them are taken together, which limits the cost to a few dozen additional steps.
 """
 
@@ -180,7 +180,7 @@ class FirstChange:
         if not self._coarse and within < way <= (1 + FOUND) * self._near and way > COARSE * abs(time):
             self._coarse = True
             log.warning(
-                "t = %g s: contacts and crack faces change their states in such a rapid succession that the changes since t = "
+                "t = %g s: contacts and crack faces change their states in such rapid succession that the changes since t = "
                 "%g s, %.2g of the time until then, are taken together, and later ones too. The order in which they slip is "
                 "not resolved, and friction remembers it: displacements and crack paths are one of several possible "
                 "results. --repeat noise shows by how much they differ",

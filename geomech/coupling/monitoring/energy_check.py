@@ -97,15 +97,15 @@ def check_dissipation(
 
 
 def check_supplied(supplied: float, budget: EnergyBudget, time: float, bend: bool = False) -> None:
-    """Warn at the end of a run in motion, ``time`` s, if growing cracks and cut blocks have left more than `GAIN` times all
-    energy converted that no block had ``supplied``, J/m: what the blocks spent on fracture and at the cuts, below 0.
+    """Warn at the end of a run in motion, ``time`` s, if growing cracks and cut blocks have released more than `GAIN` times
+    all energy converted that no block had ``supplied``, J/m: what the blocks spent on fracture and at the cuts, below 0.
     ``bend``: whether all cracked blocks are of higher order."""
     if not -supplied > GAIN * budget.turnover:
         return
     log.warning(
-        "t = %g s: cracks that grew and cut blocks have left %.3g J/m, %.2g of all converted energy, that came from no block "
-        "(fracture_energy and parting_energy in history.csv): %s. The motion is uncertain by that share, or some times as "
-        "much, as other steps give other cracks. %s",
+        "t = %g s: cracks that grew and cut blocks released %.3g J/m, %.2g of all converted energy, which no block supplied "
+        "(fracture_energy and parting_energy in history.csv): %s. The motion is uncertain by that share or several times as "
+        "much, since other steps give other cracks. %s",
         time,
         -supplied,
         -supplied / budget.turnover,

@@ -28,8 +28,8 @@ class AgreementWatch:
             return
         self._reported = 2.0 * worst
         log.warning(
-            "t = %g s: %s and its cracks agree to %.2g of their strain only (compliance_mismatch in history.csv), because "
-            "contacts or crack faces change their states to and fro from pass to pass. K there is uncertain by as much, "
+            "t = %g s: %s and its cracks agree only to %.2g of their strain (compliance_mismatch in history.csv), because "
+            "contacts or crack faces change their states back and forth from pass to pass. K there is uncertain by as much, "
             "and displacements and crack paths after it too, since friction depends on what was before: take smaller "
             "load steps, and compare with a run that is repeated (--repeat noise)",
             time,

@@ -145,7 +145,7 @@ class AdmissibleForces:
             left, slope = self.unbalanced(factor)
             if floor == _BALANCED < left <= _SLIVERS and -slope * (FARTHEST - 1.0) / factor < left:
                 # No strength balances the rest: the bound is that of all other blocks.
-                log.info("%.2g of the largest load is balanced by no strength of the joints", left)
+                log.info("no strength of the joints balances the rest: %.2g of the largest load", left)
                 floor, low = left + _BALANCED, factor
                 if above is not None:
                     factor, left, slope = above

@@ -108,7 +108,7 @@ class ZoneTable(Table):
         if self.guided is not None and self.velocity_m_s is not None and self.velocity_m_s[across] != 0:
             raise ValueError(f"a zone guided along {self.guided} cannot have an initial velocity across it")
         if self.body != "block" and (self.fixed or self.guided is not None):
-            raise ValueError(f'unbounded rock (body =  "{self.body}") is neither `fixed` nor `guided`')
+            raise ValueError(f'unbounded rock (body = "{self.body}") is neither `fixed` nor `guided`')
         return self
 
 
