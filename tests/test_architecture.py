@@ -322,3 +322,22 @@ def test_functions_take_few_arguments():
     for path in SOURCES:
         found |= too_many_arguments(path.relative_to(ROOT).as_posix(), tree_of(path))
     assert found == {}
+
+
+#: Most lines of a function.
+MOST_LINES = 80
+
+
+def too_many_lines(path, tree):
+    """{path:function: number of lines} of the functions in ``tree`` that are longer than they may be."""
+    functions = [node for node in ast.walk(tree) if isinstance(node, (ast.FunctionDef, ast.AsyncFunctionDef))]
+    lines = {f"{path}:{node.name}": node.end_lineno - node.lineno + 1 for node in functions}
+    return {name: count for name, count in lines.items() if count > MOST_LINES}
+
+
+def test_functions_are_short():
+    assert too_many_lines("x", ast.parse("def f():\n" + "    pass\n" * 80)) == {"x:f": 81}
+    found = {}
+    for path in SOURCES:
+        found |= too_many_lines(path.relative_to(ROOT).as_posix(), tree_of(path))
+    assert found == {}

@@ -197,7 +197,7 @@ class CrackedBlocks:
         forgets = not self.system.scheme.static and len(bodies) >= MANY
         with self.timed("ddm solve"):
             return solve_bodies(
-                bodies, loads, warm, self.history, self.solved_from, self.problem.run.skip, self.blocks.names, forgets
+                bodies, loads, warm, self.history, self.blocks.names, self.solved_from, self.problem.run.skip, forgets
             )
 
     def strain_solutions(self) -> dict:

@@ -78,7 +78,7 @@ def cost_lines(problem: Problem, cost: CrackCost | None = None) -> list[str]:
     if not len(cost.blocks):
         return []
     most = int(np.argmax(cost.on_sides + cost.on_cracks))
-    name = problem.blocks.names[cost.blocks[most]] if problem.blocks.names else f"block {cost.blocks[most]}"
+    name = problem.blocks.names[cost.blocks[most]]
     each = f" (most in {name}: {cost.on_sides[most]} and {cost.on_cracks[most]})" if len(cost.blocks) > 1 else ""
     lines = [
         f"{counted(len(cost.blocks), 'cracked block')}, {cost.on_sides.sum()} unknowns on sides, {cost.on_cracks.sum()} "

@@ -154,7 +154,7 @@ class _LeftOut:
         if not bodies:
             return
         before = {block: self._last[block].solution for block in bodies}
-        found = solve_bodies(bodies, self._loads, before, {}, names=self._blocks.names, forgets=self._sparing)
+        found = solve_bodies(bodies, self._loads, before, {}, self._blocks.names, forgets=self._sparing)
         self._solved |= found
         for block, solution in found.items():
             bodies[block].work.solutions_left_out -= 1

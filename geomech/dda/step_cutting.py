@@ -331,9 +331,7 @@ class StepCutting:
         system = self.system
         area = block_moments(state.vertices, system.next, system.vertex_start)[:, 0]
         if not (area > 0).all():
-            crushed = int(np.argmin(area > 0))
-            names = system.blocks.names
-            name = names[crushed] if names else f"block {crushed}"
+            name = system.blocks.names[int(np.argmin(area > 0))]
             raise NotConverged(
                 f"{name!r} is compressed to zero area at t = {state.time:g} s: its loads are too large for its stiffness"
             )

@@ -75,10 +75,7 @@ class BlockSystem:
         work: Work | None = None,
     ) -> None:
         self.work = work or Work()
-        if not blocks.n_blocks:
-            raise ValueError("there are no blocks to move")
-        if int(np.max(blocks.material)) >= len(materials):
-            raise ValueError(f"a block has material {int(np.max(blocks.material))}, but there are {len(materials)}")
+        areas = _areas(blocks, len(materials))
         self.blocks = blocks
         self.materials = tuple(materials)
         self.joints = tuple(joints) or (JointLaw("frictionless"),)
@@ -96,7 +93,6 @@ class BlockSystem:
         rigid = np.array([m.rigid for m in self.materials])[of]
         joint_index = joint_index or (lambda edge_name, other_name: 0)
         self._joint_index = joint_index
-        areas = blocks.areas()
         self.mass = self.density * areas
         self.finder = ContactFinder(
             blocks, self.joints, joint_index, self.settings, modulus, rigid, self.mass, self.work
@@ -133,8 +129,6 @@ class BlockSystem:
         self.no_offset = np.zeros((blocks.n_blocks, 3))
 
         vertices = blocks.vertices
-        if (areas <= 0).any():
-            raise ValueError(f"{blocks.names[int(areas.argmin())]}: the block has no area")
         self._refuse_massless()
         self.half_diagonal = 0.5 * float(np.hypot(*np.ptp(vertices, axis=0)))
         self.rounding = rounding_of(vertices)
@@ -176,9 +170,8 @@ class BlockSystem:
     def _choose_orders(self) -> None:
         """Set the orders of blocks: those given, or the first of their choice."""
         choice = OrderChoice(
-            self.blocks, self.fixed, self.density, self.stiffness, self.compliance, self.settings.order_target,
-            self._crushes,
-        )  # fmt: skip
+            self.blocks, self.fixed, self.stiffness, self.compliance, self.settings.order_target, self._crushes
+        )
         self.order_choice = choice if choice.found.any() else None
         self.order = np.zeros(self.blocks.n_blocks, np.int64)
         self._take_orders(choice, choice.first)
@@ -508,3 +501,16 @@ class BlockSystem:
         pattern.solver.work = self.work
         self._sparse = pairs, pattern
         return pattern
+
+
+def _areas(blocks: Blocks, n_materials: int) -> np.ndarray:
+    """(n_blocks,) m²: areas of the blocks. Raises ValueError if there are no blocks, a material is missing, or a block has no
+    area."""
+    if not blocks.n_blocks:
+        raise ValueError("there are no blocks to move")
+    if int(np.max(blocks.material)) >= n_materials:
+        raise ValueError(f"a block has material {int(np.max(blocks.material))}, but there are {n_materials}")
+    areas = blocks.areas()
+    if (areas <= 0).any():
+        raise ValueError(f"{blocks.names[int(areas.argmin())]}: the block has no area")
+    return areas

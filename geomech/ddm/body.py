@@ -173,18 +173,8 @@ class Body:
         self.boundary: ElementSet = self.mesh.boundary
         self.faces: ElementSet = self.mesh.cracks
         self._measure(same)
-        self._factored_after_all = previous is not None and previous._factored_after_all
-        solver = "dense" if self._factored_after_all else settings.solver
         holds = Holds(self.boundary, self.supports, self.support_segments, self._extent) if self.supports else None
-        holes_supported = holds is not None and bool(self.mesh.edge_loop[holds.sources.source].any())
-        many = half_plane is None and is_iterated(solver, self.boundary.n_unknowns, holds, holes_supported)
-        factored = previous is not None and not previous.compressed and previous.faces.n > 0
-        self.compressed = is_compressed("compressed" if many else solver, self.faces.n_unknowns, factored)
-        if half_plane is not None and self.boundary.n_unknowns > FACTORABLE:
-            raise ValueError(
-                f"half-plane: {self.boundary.n_unknowns} unknowns on holes, but below a free surface no more than "
-                f"{FACTORABLE} can be solved: set a larger target_error, or draw the surface as a side of a large block"
-            )
+        many = self._is_iterated(previous, holds)
         self._functionals: tuple[tuple, TipFunctionals] | None = None
         #: Bodies with trial kinks (`f_criterion`), by kink length and direction number.
         self.trials: dict[float, dict[int, Body]] = {}
@@ -198,9 +188,26 @@ class Body:
         self._condensed: tuple[UniformContact | None] | None = None
         #: Where faces stand on bases, and how unit tractions move them by the states of the cracks (`rigid_bases`).
         self.on_bases: dict[bytes, tuple[np.ndarray, ...]] = {}
-        #: Whether a warning has been given that the contact area of a face on its base was not found.
-        self.lost_base = False
+        #: What has been warned of at faces on bases.
+        self.warned_of_bases: set[str] = set()
         self._assemble(previous, holds, many)
+
+    def _is_iterated(self, previous: Body | None, holds: Holds | None) -> bool:
+        """Whether the boundary is solved iteratively; ``compressed`` says so of the cracks. Raises ValueError for a half-plane
+        with too many unknowns on holes."""
+        half_plane, unknowns = self.half_plane, self.boundary.n_unknowns
+        self._factored_after_all = previous is not None and previous._factored_after_all
+        solver = "dense" if self._factored_after_all else self.settings.solver
+        holes_supported = holds is not None and bool(self.mesh.edge_loop[holds.sources.source].any())
+        many = half_plane is None and is_iterated(solver, unknowns, holds, holes_supported)
+        factored = previous is not None and not previous.compressed and previous.faces.n > 0
+        self.compressed = is_compressed("compressed" if many else solver, self.faces.n_unknowns, factored)
+        if half_plane is not None and unknowns > FACTORABLE:
+            raise ValueError(
+                f"half-plane: {unknowns} unknowns on holes, but below a free surface no more than {FACTORABLE} can be solved: "
+                "set a larger target_error, or draw the surface as a side of a large block"
+            )
+        return many
 
     def _measure(self, same: Body | None) -> None:
         """Compute area, centroid and moments of the rock and its holes, or copy those of a body with the ``same``

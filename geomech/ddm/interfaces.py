@@ -34,12 +34,6 @@ class LoadParts(Protocol):
     tractions: np.ndarray
 
 
-class Multiplied(Protocol):
-    """A matrix of which products with a vector or matrix are asked for only."""
-
-    def __matmul__(self, x: np.ndarray) -> np.ndarray: ...
-
-
 class CrackedBody(Protocol):
     """A body with cracks: geometry, elements, matrices. Lengths in m, moduli in Pa."""
 

@@ -1,6 +1,6 @@
 """Records that all solvers share: blocks, cracks, materials, joint laws, loads, settings, and the state of a run."""
 
-from .blocks.block_arrays import AUTO_ORDER, Blocks
+from .blocks.block_arrays import AUTO_ORDER, HIGHEST_ORDER, Blocks
 from .blocks.block_motion import Motion
 from .blocks.corners import corner_lengths
 from .contact_solver import ContactSolver
@@ -37,7 +37,7 @@ from .problem import (
     counted,
     duration_text,
 )  # fmt: skip
-from .state import CONTACT, FACE_POINT, OPEN, SLIP, STICK, TIP, CrackFaces, Cycle, Event, Shortened, Skip, State
+from .state import CONTACT, FACE_POINT, OPEN, RESTS, SLIP, STICK, TIP, CrackFaces, Cycle, Event, Shortened, Skip, State
 from .unbounded_rock import EndlessRock, Fluid
 
 __all__ = [
@@ -47,9 +47,11 @@ __all__ = [
     "CONTACT",
     "FACE_POINT",
     "GROUND",
+    "HIGHEST_ORDER",
     "LARGEST_CORNER",
     "OPEN",
     "REPEATS",
+    "RESTS",
     "SHORTEST_STEP",
     "SLIP",
     "STICK",

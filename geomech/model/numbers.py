@@ -62,8 +62,8 @@ class Number:
         return f"must be {'at least' if self.closed else 'more than'} {self.least:g}"
 
 
-#: Ranges that several classes use.
-POSITIVE, NOT_NEGATIVE = Number(closed=False), Number()
+#: The range of positive numbers.
+POSITIVE = Number(closed=False)
 
 
 def refuse_numbers(of: object, table: Mapping[str, Number], subject: str = "") -> None:

@@ -354,7 +354,7 @@ class Problem:
         for block in np.unique(self.cracks.block):
             material = self.materials[self.blocks.material[block]]
             if material.rigid:
-                name = self.blocks.names[block] if self.blocks.names else f"block {block}"
+                name = self.blocks.names[block]
                 raise ValueError(f"{name!r} contains a crack, but its material {material.name!r} is rigid")
 
 

@@ -16,6 +16,9 @@ from .joints.bolt import BOLT
 #: Contact and crack-face states.
 OPEN, STICK, SLIP = 0, 1, 2
 
+#: A static run ends at rest if the displacement that is left is below this part of the largest.
+RESTS = 1e-2
+
 #: One row per contact. Forces act on the block that owns ``vertex``; signs: ``geomech.conventions``.
 CONTACT = np.dtype(
     [

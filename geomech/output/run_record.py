@@ -23,9 +23,6 @@ _log = logging.getLogger("geomech.run")
 class RunLog:
     """Observer that keeps ``run.log``: everything geomech logs during the run, its events and its end."""
 
-    def __init__(self, level: int = logging.INFO) -> None:
-        self.level = level
-
     def on_start(self, problem: Problem, folder: Path) -> None:
         self._problem = problem
         self._last: Cycle | None = None
@@ -46,12 +43,12 @@ class RunLog:
         folder.mkdir(parents=True, exist_ok=True)
         self._handler = logging.FileHandler(folder / "run.log", mode=mode, encoding="utf-8")
         self._handler.setFormatter(logging.Formatter("%(asctime)s %(levelname)-7s %(name)s: %(message)s"))
-        self._handler.setLevel(self.level)
+        self._handler.setLevel(logging.INFO)
         logger = logging.getLogger("geomech")
         self._level_before = logger.level
         logger.addHandler(self._handler)
-        if logger.getEffectiveLevel() > self.level:
-            logger.setLevel(self.level)
+        if logger.getEffectiveLevel() > logging.INFO:
+            logger.setLevel(logging.INFO)
 
     def on_cycle(self, cycle: Cycle) -> None:
         self._last = cycle

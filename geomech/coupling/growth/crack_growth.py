@@ -159,7 +159,7 @@ def take_growth(now: CrackedBlocks, growth, state: State, solutions: dict) -> tu
         system.follow(now.state)
         # (None where all parts are of first order.)
         parts = system.deflected or DeflectedBlocks(
-            now.blocks, system.fixed, system.density, system.stiffness, np.ones(now.blocks.n_blocks)
+            now.blocks, system.fixed, system.stiffness, np.ones(now.blocks.n_blocks)
         )
         now.state, stresses = inherited_deflection(split, begun, deflected, parts, solutions, system.compliance)
         split = replace(split, state=now.state)

@@ -55,7 +55,7 @@ class LeftOut:
     def k_eq(self, key: _Key) -> float:
         """K_eq of the tip ``key``, Pa √m."""
         if not self._k_eq:
-            solved = solve_bodies({self.block: self.body}, {self.block: self.load}, {}, {}, names=self.blocks.names)
+            solved = solve_bodies({self.block: self.body}, {self.block: self.load}, {}, {}, self.blocks.names)
             tips = tip_rows(self.problem, self.blocks, solved, {self.block: self.nodes})
             self._k_eq = dict(zip(_keys(tips), tips["k_eq"].tolist()))
         return self._k_eq[key]

@@ -195,9 +195,9 @@ def solve_bodies(
     loads: dict[int, BoundaryLoad],
     warm: dict,
     history: dict,
+    names: Sequence[str],
     solved_from: dict | None = None,
     skip: bool = True,
-    names: Sequence[str] = (),
     forgets: bool = False,
 ) -> dict:
     """Solutions (block →) of ``bodies`` under ``loads``, in parallel.
@@ -231,9 +231,9 @@ def solve_bodies(
             # (Subclasses, as `ddm.OutOfEquilibrium`, carry more than a message.)
             if type(failure) not in (ValueError, ddm.NotConverged):
                 raise
-            raise type(failure)(f"{_called(b, names)}: {failure}") from failure
+            raise type(failure)(f"{names[b]}: {failure}") from failure
         except ddm.TargetMissed as failure:
-            raise ddm.TargetMissed(failure.solution, failure.target, f"{_called(b, names)}: ") from failure
+            raise ddm.TargetMissed(failure.solution, failure.target, f"{names[b]}: ") from failure
 
     solutions = dict(zip(bodies, parallel_map(solved, list(bodies), threads_for(bodies))))
     if any(body.lean for body in bodies.values()):
@@ -242,10 +242,6 @@ def solve_bodies(
         # Solutions that meet the target error may belong to refined bodies.
         bodies.update((b, solution.body) for b, solution in solutions.items())
     return solutions
-
-
-def _called(block: int, names: Sequence[str]) -> str:
-    return names[block] if block < len(names) else f"block {block}"
 
 
 #: Unknowns from which a body is solved on a thread of its own. A smaller one takes about a millisecond, most of it in

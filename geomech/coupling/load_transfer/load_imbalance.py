@@ -37,5 +37,5 @@ class LoadBalance:
             log.warning(
                 "t = %g s: the forces on %s are out of balance by %.1e of their size; the stress intensity factors of "
                 "its cracks have an error of the same order",
-                time, blocks.names[b] if blocks.names else f"block {b}", most,
+                time, blocks.names[b], most,
             )  # fmt: skip

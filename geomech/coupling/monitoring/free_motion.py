@@ -13,9 +13,9 @@ import logging
 import numpy as np
 
 from ... import dda
-from ...model import OPEN
+from ...model import OPEN, RESTS
 from ..coupled_state import CrackedBlocks
-from .mechanism import BALANCED, RESTS, loads_are_steady
+from .mechanism import BALANCED, loads_are_steady
 
 log = logging.getLogger(__name__)
 

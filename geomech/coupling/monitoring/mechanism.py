@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from ... import dda
-from ...model import Blocks, Bolt, Excavation, History
+from ...model import RESTS, Blocks, Bolt, Excavation, History
 
 log = logging.getLogger(__name__)
 
@@ -31,8 +31,6 @@ FADES, STEPS = 0.1, 5
 #: fraction of its size. Under steady loads, blocks that have more than this left to move are a mechanism: a tower of
 #: 100 m that sinks into its joints for hundreds of steps has a twentieth of it.
 FLYING, MOVED = 0.99, 0.05
-#: A run ends at rest if the displacement that is left is below this fraction of the largest.
-RESTS = 1e-2
 #: Number of blocks that are named.
 NAMED = 4
 
@@ -66,7 +64,7 @@ class Mechanism:
         speed = np.hypot(*result.state.velocity[:, :2].T)
         speed[np.asarray(blocks.fixed, bool)] = 0.0
         first = int(np.argmax(speed))
-        self.fastest = _name(blocks, first)
+        self.fastest = blocks.names[first]
         left = self._left(result, blocks)
         self.remaining = left / self.ways[-1] if self.ways[-1] > 0 else 0.0
         if self.reported or len(self.ratios) <= STEPS:
@@ -82,7 +80,7 @@ class Mechanism:
         self.reported = True
         moving = np.flatnonzero(speed > 0.1 * speed.max())
         moving = moving[np.argsort(-speed[moving], kind="stable")]
-        named = ", ".join(_name(blocks, b) for b in moving[:NAMED].tolist())
+        named = ", ".join(blocks.names[b] for b in moving[:NAMED].tolist())
         others = len(moving) - NAMED
         return first, (
             f"nothing holds {named}{f' and {others} more' if others > 0 else ''}: {100 * ratio:.2g} % of the forces on "
@@ -138,10 +136,6 @@ class Mechanism:
             return False
         gained, way = self.ratios[0] - self.ratios[-1], self.ways[-1] - self.ways[0]
         return gained > 0 and way * self.ratios[-1] <= gained * MOVED * float(np.sqrt(blocks.areas()[block]))
-
-
-def _name(blocks: Blocks, block: int) -> str:
-    return blocks.names[block] if blocks.names else f"block {block}"
 
 
 def loads_are_steady(loads: Any, begin: float, end: float) -> bool:

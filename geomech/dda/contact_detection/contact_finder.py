@@ -91,7 +91,7 @@ class ContactFinder:
         work: Work | None = None,
     ) -> None:
         self._work = work
-        self.names = blocks.names or tuple(f"block {b}" for b in range(blocks.n_blocks))
+        self.names = blocks.names
         self._edge_names = blocks.edge_names
         self._n_joints = len(joints)
         self._joint_index = joint_index
@@ -223,12 +223,7 @@ class ContactFinder:
             remembered = {name: value[keep] for name, value in remembered.items()}
         bonded = remembered["bonded"]
         found = ContactSet(
-            vertex=vertex,
-            edge=edge,
-            block=block,
-            other=other,
-            law=law,
-            corner=corner,
+            vertex=vertex, edge=edge, block=block, other=other, law=law, corner=corner,
             tilt=self._tilt(vertices, edge, corner, geometry),
             precision=_PRECISION * np.sqrt(np.minimum(self._area[block], self._area[other])),
             geometry=np.ascontiguousarray(geometry),
@@ -237,14 +232,18 @@ class ContactFinder:
             faces=BondedFaces.of(block, other, geometry, bonded) if bonded.any() else None,
             released=softened,
             **remembered,
-        )
+        )  # fmt: skip
         if self.whole_faces:
-            cohesion = np.where(found.bonded > 0, self._table.cohesion[found.law], 0.0)
-            whole = WholeFaces.of(found.block, found.other, found.geometry, found.law, cohesion)
-            found = replace(found, whole=whole).sharing_cohesion(found.state, found.bonded)
+            found = self._on_whole_faces(found)
         if self.at_corners:
             return found if self.kept_corners is None else found.part(self.kept_corners(found))
         return found if lumped else self._with_springs_in_faces(found, vertices, broken)
+
+    def _on_whole_faces(self, found: ContactSet) -> ContactSet:
+        """The contacts ``found`` with cohesion on the whole of faces that touch anywhere."""
+        cohesion = np.where(found.bonded > 0, self._table.cohesion[found.law], 0.0)
+        whole = WholeFaces.of(found.block, found.other, found.geometry, found.law, cohesion)
+        return replace(found, whole=whole).sharing_cohesion(found.state, found.bonded)
 
     def _bonded_corners(self, vertices, vertex, edge, geometry, bonded) -> np.ndarray | None:
         """(n,) bool: corner contacts that the bonds around them join (`find_bonded_corners`); None without any."""

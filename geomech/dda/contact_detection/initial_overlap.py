@@ -107,10 +107,7 @@ def refuse_overlap(blocks: Blocks, vertices: np.ndarray, moments: np.ndarray) ->
     start = blocks.vertex_start
     low, high = ([limit(vertices[start[k] : start[k + 1]], axis=0) for k in (a, b)] for limit in (np.min, np.max))
     x, y = 0.5 * (np.maximum(*low) + np.minimum(*high))
-    names = blocks.names or tuple(f"block {k}" for k in range(blocks.n_blocks))
-    what = (
-        f"{names[a]!r} and {names[b]!r} overlap by {depth:.3g} m near x = {x:.6g}, y = {y:.6g} m before they have moved"
-    )
+    what = f"{blocks.names[a]!r} and {blocks.names[b]!r} overlap by {depth:.3g} m near x = {x:.6g}, y = {y:.6g} m before they have moved"
     if share > REFUSED:
         raise ValueError(f"{what}: draw them apart, or subtract one from the other")
     log.warning("%s; their contact pushes them apart", what)

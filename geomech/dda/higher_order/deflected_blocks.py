@@ -16,11 +16,11 @@ from functools import cached_property
 
 import numpy as np
 
-from ...model import Blocks, InSituStress, State
+from ...model import HIGHEST_ORDER, Blocks, InSituStress, State
 from ..kinematics.polygon_quadrature import gauss_points, polygon_points
 from ..open_close.contact_set import ContactSet
 from ..results import NotConverged
-from .deflection_basis import HIGHEST, DeflectionBasis, n_deflections
+from .deflection_basis import DeflectionBasis, n_deflections
 
 log = logging.getLogger(__name__)
 
@@ -52,20 +52,17 @@ class DeflectedBlocks:
     """The ``blocks`` of a system, some of which have an order above 1; ``order`` (n_blocks,) is 1 where they do not
     bend.
 
-    ``rows`` (n_blocks,) of six unknowns each, 0 for ``fixed`` blocks; ``density`` (n_blocks,) kg/m³ and ``elastic``
-    (n_blocks, 3, 3) Pa of the undeformed blocks. The order is that of the ``blocks`` unless another is given.
+    ``rows`` (n_blocks,) of six unknowns each, 0 for ``fixed`` blocks; ``elastic`` (n_blocks, 3, 3) Pa of
+    the undeformed blocks. The order is that of the ``blocks`` unless another is given.
     """
 
-    def __init__(
-        self, blocks: Blocks, fixed: np.ndarray, density: np.ndarray, elastic: np.ndarray,
-        order: np.ndarray | None = None,
-    ) -> None:  # fmt: skip
+    def __init__(self, blocks: Blocks, fixed: np.ndarray, elastic: np.ndarray, order: np.ndarray | None = None) -> None:
         self.blocks = blocks
         self.order = np.where(fixed, 1, np.asarray(blocks.order if order is None else order)).astype(np.int64)
         self.basis = DeflectionBasis.of(blocks.vertices, blocks.next_vertex, blocks.vertex_start, self.order)
         self.rows = np.where(fixed, 0, 1 + -(-n_deflections(self.order) // 6)).astype(np.int64)
         self.bending = np.flatnonzero(self.order > 1)
-        self.mass_density, self.elastic = density, elastic
+        self.elastic = elastic
         #: (n_blocks,) m/s²: mean acceleration of deflection in the last step.
         self.acceleration = np.zeros(blocks.n_blocks)
         #: Largest slope of a deflection that has been reported.
@@ -197,7 +194,7 @@ class DeflectedBlocks:
         (n,)."""
         blocks = self.blocks
         some = np.flatnonzero(self.order[blocks.vertex_block] > 1)
-        at = np.linspace(0.0, 1.0, HIGHEST + 1)
+        at = np.linspace(0.0, 1.0, HIGHEST_ORDER + 1)
         start, end = blocks.vertices[some], blocks.vertices[blocks.next_vertex[some]]
         points = start[:, None] + at[:, None] * (end - start)[:, None]
         owner = blocks.vertex_block[some]
@@ -277,7 +274,7 @@ class DeflectedBlocks:
             matrix = self.directions(np.ascontiguousarray(points["at"]), points["block"], angle)
             np.add.at(out, points["block"], np.einsum("na,naj->nj", points["force"], matrix))
         if len(edges):
-            at, weight = gauss_points((HIGHEST + 5) // 2)
+            at, weight = gauss_points((HIGHEST_ORDER + 5) // 2)
             start, along = edges["start"][:, None], (edges["end"] - edges["start"])[:, None]
             where = start + at[:, None] * along
             length = np.hypot(along[..., 0], along[..., 1])

@@ -26,11 +26,12 @@ from typing import TypeVar
 import numpy as np
 
 from ...compiled import UNCOUNTED, kept, part
+from ...model import HIGHEST_ORDER
 from ..kinematics.displacement_matrix import displacement_matrix
 from ..kinematics.polygon_quadrature import polygon_points
 
-#: The highest order of a block, and of a basis: the error estimate uses two orders more.
-HIGHEST, _HIGHEST_BASIS = 8, 10
+#: The highest order of a basis: the error estimate uses two orders more than a block has.
+_HIGHEST_BASIS = HIGHEST_ORDER + 2
 
 
 #: A number, or many.

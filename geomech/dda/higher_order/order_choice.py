@@ -37,11 +37,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ...model import AUTO_ORDER, OPEN, SLIP, STICK, Blocks
+from ...model import AUTO_ORDER, HIGHEST_ORDER, OPEN, SLIP, STICK, Blocks
 from ..kinematics.displacement_matrix import displacement_matrix
 from ..kinematics.tolerances import NOTABLE
 from .deflected_blocks import DeflectedBlocks
-from .deflection_basis import HIGHEST, n_deflections
+from .deflection_basis import n_deflections
 from .face_points import FaceContacts
 
 if TYPE_CHECKING:
@@ -159,20 +159,20 @@ class OrderChoice:
     """Orders of the ``blocks`` of a system.
 
     Blocks with `AUTO_ORDER` are raised from 1 until the next two orders would take up less than a ``target`` part of
-    the energy of all such blocks. ``fixed`` (n_blocks,), ``density`` (n_blocks,) kg/m³, ``elastic`` and ``compliance``
+    the energy of all such blocks. ``fixed`` (n_blocks,), ``elastic`` and ``compliance``
     (n_blocks, 3, 3), Pa and 1/Pa, are those of the undeformed blocks. ``first`` (n_blocks,) are the orders at the start
     of a run, ``judged`` counts estimates.
     """
 
     def __init__(
-        self, blocks: Blocks, fixed: np.ndarray, density: np.ndarray, elastic: np.ndarray, compliance: np.ndarray,
-        target: float, points_always: bool = False,
+        self, blocks: Blocks, fixed: np.ndarray, elastic: np.ndarray, compliance: np.ndarray, target: float,
+        points_always: bool = False,
     ) -> None:  # fmt: skip
         self.blocks, self.target, self._points_always = blocks, target, points_always
         self.found = np.zeros(len(fixed), bool) if blocks.order is None else (blocks.order == AUTO_ORDER) & ~fixed
         given = np.ones(len(fixed), int) if blocks.order is None else blocks.order
         self.first = np.where(fixed | self.found, 1, given).astype(np.int64)
-        self._fixed, self._density, self._elastic, self._compliance = fixed, density, elastic, compliance
+        self._fixed, self._elastic, self._compliance = fixed, elastic, compliance
         self._trial: DeflectedBlocks | None = None
         self._groups: list[_Group] = []
         self._reported: set[int] = set()
@@ -184,7 +184,7 @@ class OrderChoice:
         no points."""
         if not (order > 1).any() and self.blocks.glued is None and not self._points_always:
             return None
-        return DeflectedBlocks(self.blocks, self._fixed, self._density, self._elastic, order)
+        return DeflectedBlocks(self.blocks, self._fixed, self._elastic, order)
 
     def known(self, attempt) -> bool:
         """Whether estimates of earlier steps still hold in that of ``attempt``: no block bears much more than it did, and
@@ -242,14 +242,14 @@ class OrderChoice:
                     first, both = faces.work(trial, b, group, left[k], cracked.get(b), every)
                 if both <= limit:
                     continue
-                out[b] = min(order[b] + (2 if both - first > limit else 1), HIGHEST)
-                if order[b] == HIGHEST:
+                out[b] = min(order[b] + (2 if both - first > limit else 1), HIGHEST_ORDER)
+                if order[b] == HIGHEST_ORDER:
                     self._report(b, both / limit * self.target, attempt.time)
         if (out == order).all():
             return None
         names = [f"{self.blocks.names[b]!r} to {out[b]}" for b in np.flatnonzero(out > order).tolist()]
         log.info(
-            "t = %g s: the order is raised of %s%s", attempt.time, ", ".join(names[:5]),
+            "t = %g s: orders are raised: %s%s", attempt.time, ", ".join(names[:5]),
             f" and {len(names) - 5} more" if len(names) > 5 else "",
         )  # fmt: skip
         return out
@@ -258,7 +258,7 @@ class OrderChoice:
         """The blocks with automatic order, with the higher orders that are estimated."""
         order_above = np.where(self.found, order + _ORDERS_ABOVE, 1)
         if self._trial is None or not np.array_equal(self._trial.order, order_above):
-            self._trial = DeflectedBlocks(self.blocks, self._fixed, self._density, self._elastic, order_above)
+            self._trial = DeflectedBlocks(self.blocks, self._fixed, self._elastic, order_above)
             self._groups = [
                 _Group.of(self._trial, np.flatnonzero(self.found & (order == p)), p)
                 for p in np.unique(order[self.found]).tolist()
@@ -305,7 +305,7 @@ class OrderChoice:
         log.warning(
             "t = %g s: %r has order %d, the highest, and higher orders would contain %.2g of the energy (dda.order_target = %g): %s. "
             "Divide it into cells (zones.NAME.mesh_size_m with an order of 3), draw it as several blocks, or allow a larger share",
-            time, self.blocks.names[block], HIGHEST, left, self.target, self._why(block),
+            time, self.blocks.names[block], HIGHEST_ORDER, left, self.target, self._why(block),
         )  # fmt: skip
 
     def _why(self, block: int) -> str:

@@ -7,8 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ...model import AUTO_ORDER, Blocks, DdaSettings, JointLaw, Material
-from .deflection_basis import HIGHEST
+from ...model import AUTO_ORDER, HIGHEST_ORDER, Blocks, DdaSettings, JointLaw, Material
 
 
 def refuse_unsupported(
@@ -16,16 +15,14 @@ def refuse_unsupported(
 ) -> None:
     """Raise ValueError for features of the model that ``blocks`` with orders above 1, or faces that crush, do not support."""
     order = np.ones(blocks.n_blocks, int) if blocks.order is None else np.asarray(blocks.order)
-    if not (((order >= 1) & (order <= HIGHEST)) | (order == AUTO_ORDER)).all():
-        raise ValueError(f"the order of a block is 1 to {HIGHEST}, got {order.min()} to {order.max()}")
+    if not (((order >= 1) & (order <= HIGHEST_ORDER)) | (order == AUTO_ORDER)).all():
+        raise ValueError(f"the order of a block is 1 to {HIGHEST_ORDER}, got {order.min()} to {order.max()}")
     bends = (order != 1) & ~blocks.fixed
     cells = np.zeros(blocks.n_blocks, bool)
     if blocks.glued is not None:
         cells[blocks.vertex_block[np.asarray(blocks.glued).ravel()]] = True
         cells &= ~blocks.fixed
     bends |= cells
-    names = blocks.names or tuple(f"block {b}" for b in range(blocks.n_blocks))
-
     crushing = next((law.name for law in joints if law.crushing_strength is not None), None)
 
     def refuse(which: np.ndarray, why: str) -> None:
@@ -34,7 +31,7 @@ def refuse_unsupported(
         if which.any():
             block = int(np.argmax(which))
             order_text = '"auto"' if order[block] == AUTO_ORDER else order[block]
-            raise ValueError(f"{names[block]!r} has order {order_text}: {why}")
+            raise ValueError(f"{blocks.names[block]!r} has order {order_text}: {why}")
 
     refuse(cells & (order == 1), "cells glued to each other need an order from 2")
     refuse(bends & np.array([materials[m].rigid for m in blocks.material]), "a rigid block does not bend")

@@ -33,7 +33,7 @@ class ElasticRange:
         strain = 0.5 * np.abs(gradient.transpose(0, 2, 1) @ gradient - np.eye(2)).max(axis=(1, 2))
         strain[blocks.fixed] = 0.0
         b = int(np.argmax(strain))
-        most, name = float(strain[b]), blocks.names[b] if blocks.names else f"block {b}"
+        most, name = float(strain[b]), blocks.names[b]
         if most > REFUSED:
             raise NotConverged(
                 f"{name} is strained by {100 * most:.3g} % at t = {time:g} s: beyond linear elasticity. Its loads "

@@ -58,7 +58,7 @@ class BendingActions(StepActions):
 
     def bend(self, blocks: DeflectedBlocks, angle: np.ndarray) -> None:
         """Let the bolts act on the deflection of ``blocks`` rotated by ``angle`` (n_blocks,), where forces act."""
-        self._width, self._deflected = max(blocks.width, 6), blocks
+        self._width = max(blocks.width, 6)
         if self.bolts is None:
             return
         pairs, bolts = self.bolts.pairs, [self.bolts.bolts[k] for k in self.bolts.number]

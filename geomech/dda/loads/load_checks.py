@@ -71,7 +71,7 @@ class LoadChecks:
         n = self._blocks.n_blocks
         if not (isinstance(block, (int, np.integer)) and 0 <= block < n):
             raise ValueError(f"{what} names block {block!r}, but there are {n}, numbered from 0")
-        return self._blocks.names[block] if self._blocks.names else f"block {block}"
+        return self._blocks.names[block]
 
     def _refuse_outside(self, what: str, block: int, at: np.ndarray) -> None:
         name, loops = self._name(what, block), self._blocks.loops(block)

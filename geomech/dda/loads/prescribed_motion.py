@@ -190,7 +190,7 @@ class PrescribedMotion:
         given.source.append(source)
 
     def _name(self, block: int) -> str:
-        return repr(self.blocks.names[block]) if self.blocks.names else f"block {block}"
+        return repr(self.blocks.names[block])
 
     def _scale(self, block: int) -> np.ndarray:
         """(6,) scale of the solver's unknowns, which are all lengths, over d."""

@@ -168,7 +168,7 @@ def _where(blocks: Blocks, toes: tuple[Toe, ...]) -> str:
     """Text that names the toes, what they touch, and where."""
 
     def name(block: int) -> str:
-        return repr(blocks.names[block] if blocks.names else f"block {block}")
+        return repr(blocks.names[block])
 
     first = toes[0]
     where = f"the toe of {name(first.block)} touches {name(first.other)} at {place(*first.at)}"
@@ -292,7 +292,7 @@ def as_rigid_blocks(
     """The answer of ``rigid`` blocks in place of ``found``, that of elastic blocks, whose uniform strain opens the ``loose``
     faces by less than the precision of positions; toes are those of ``found``."""
     worst, one = loose[0], len(loose) == 1
-    a, b = (blocks.names[k] if blocks.names else f"block {k}" for k in (worst.block, worst.other))
+    a, b = blocks.names[worst.block], blocks.names[worst.other]
     line = (
         f"{'a face' if one else f'{len(loose)} faces'} with cohesion between {a!r} and {b!r}{'' if one else ' and others'} would "
         f"open by {1e3 * worst.gap:.2g} mm and hold nothing, but only because blocks have uniform strain: the factor is that of "
@@ -312,7 +312,7 @@ def with_parted_faces(
     """The answer ``found`` with the faces ``parted`` at one end, and the ``other`` answer in which open ends lose their
     cohesion; None if that was not searched for."""
     worst = parted[0]
-    a, b = (blocks.names[k] if blocks.names else f"block {k}" for k in (worst.block, worst.other))
+    a, b = blocks.names[worst.block], blocks.names[worst.other]
     one = len(parted) == 1
     line = (
         f"{'a face' if one else f'{len(parted)} faces'} with cohesion touch{'es' if one else ''} at one end only, open by "
@@ -347,7 +347,7 @@ def with_displacements(blocks: Blocks, found: FactorOfSafety, drawn: float) -> F
     block = int(np.flatnonzero(free)[found.moved[free].argmax()])
     line = (
         f"the factor is that of blocks which have moved, by up to {1e3 * found.moved[block]:.3g} mm "
-        f"({blocks.names[block] if blocks.names else f'block {block}'!r}), before their forces balance: where they are drawn, no "
+        f"({blocks.names[block]!r}), before their forces balance: where they are drawn, no "
         f"contact forces balance the loads above a factor of {drawn:.4f}"
     )
     return replace(found, warnings=(*found.warnings, line))
@@ -399,6 +399,6 @@ def _largest_forces(blocks: Blocks, state: State) -> list[str]:
         found.append((force, block, other, own["normal_force"] @ own["point"] / force))
     out = []
     for force, block, other, (x, y) in sorted(found, key=lambda each: -each[0])[:_CARRYING]:
-        a, b = (repr(blocks.names[k] if blocks.names else f"block {k}") for k in (block, other))
-        out.append(f"{a} presses on {b}, {force / 1e3:.4g} kN/m at {place(x, y)}")
+        a, b = blocks.names[block], blocks.names[other]
+        out.append(f"{a!r} presses on {b!r}, {force / 1e3:.4g} kN/m at {place(x, y)}")
     return out

@@ -282,7 +282,7 @@ class _Relaxation:
             order = np.argsort(-speed, kind="stable")
             moving = tuple(order[speed[order] > 0.1 * speed.max()].tolist())
         if not converged and moving:
-            named = ", ".join(repr(blocks.names[b] if blocks.names else f"block {b}") for b in moving[:5])
+            named = ", ".join(repr(blocks.names[b]) for b in moving[:5])
             reason += f"; {named}{' and others' if len(moving) > 5 else ''} move{'s' if len(moving) == 1 else ''}"
         rest = replace(state, time=self.start, velocity=np.zeros_like(state.velocity))
         rows = np.array(self.history, RELAXATION_STEP) if self.history else np.empty(0, RELAXATION_STEP)

@@ -183,7 +183,7 @@ def mechanism_of(blocks: Blocks, trial: Trial, moving: tuple[int, ...]) -> tuple
     for block in moving[:_LISTED]:
         (x, y), turn = trial.displacement[block], trial.rotation[block]
         far = math.hypot(x, y)
-        name = blocks.names[block] if blocks.names else f"block {block}"
+        name = blocks.names[block]
         # Adding zero turns −0 into 0.
         text = f"{name}: {far / fastest:.2f} of the fastest, towards {round(math.degrees(math.atan2(y, x))) + 0}°"
         size = math.sqrt(abs(float(blocks.areas()[block])))

@@ -118,6 +118,30 @@ class FactorSearch:
             raise NothingToReduce(f"the tolerance of the factor must lie between 0 and 1, got {self.tolerance!r}")
 
 
+def _refuse_unsearchable(blocks: Blocks, joints: Sequence[JointLaw], loads: Loads, chosen: set[str]) -> None:
+    """Raise `NothingToReduce` where no factor of the strength of the joints ``chosen`` can be searched for."""
+    if not any(_has_strength(law) for law in joints if law.name in chosen):
+        raise NothingToReduce("the joints have no friction, cohesion or tensile strength that could be reduced")
+    if blocks.glued is not None or (blocks.order is not None and (blocks.order != 1).any()):
+        raise NothingToReduce(
+            "blocks of higher order ([zones.NAME] order) and cells are not supported in the search for a factor of safety yet: "
+            "leave `order` and `mesh_size_m` out"
+        )
+    crushing = next((law.name for law in joints if law.crushing_strength is not None), None)
+    if crushing is not None:
+        raise NothingToReduce(
+            f"joint {crushing!r} crushes (crushing_strength_pa), which is not supported in the search for a factor of safety: "
+            "leave it out, and check the stress of faces afterwards"
+        )
+    if blocks.fixed.all():
+        raise NothingToReduce("all blocks are fixed: none can fail")
+    if loads.base is not None and loads.base.frame == "ground":
+        raise NothingToReduce(
+            "a static search cannot include ground motion: leave out the motion of the base, or give it the frame "
+            '"base", in which it is a body force at the time of the search'
+        )
+
+
 @renamed_argument("compare_toes", "compare")
 @gathered_arguments("search", FactorSearch)
 def factor_of_safety(
@@ -159,26 +183,7 @@ def factor_of_safety(
             f"no joint {', '.join(map(repr, unknown))} to reduce; there are {', '.join(map(repr, names))}"
         )
     chosen = set(names if how.reduce is None else how.reduce)
-    if not any(_has_strength(law) for law in joints if law.name in chosen):
-        raise NothingToReduce("the joints have no friction, cohesion or tensile strength that could be reduced")
-    if blocks.glued is not None or (blocks.order is not None and (blocks.order != 1).any()):
-        raise NothingToReduce(
-            "blocks of higher order ([zones.NAME] order) and cells are not supported in the search for a factor of safety yet: "
-            "leave `order` and `mesh_size_m` out"
-        )
-    crushing = next((law.name for law in joints if law.crushing_strength is not None), None)
-    if crushing is not None:
-        raise NothingToReduce(
-            f"joint {crushing!r} crushes (crushing_strength_pa), which is not supported in the search for a factor of safety: "
-            "leave it out, and check the stress of faces afterwards"
-        )
-    if blocks.fixed.all():
-        raise NothingToReduce("all blocks are fixed: none can fail")
-    if loads.base is not None and loads.base.frame == "ground":
-        raise NothingToReduce(
-            "a static search cannot include ground motion: leave out the motion of the base, or give it the frame "
-            '"base", in which it is a body force at the time of the search'
-        )
+    _refuse_unsearchable(blocks, joints, loads, chosen)
     under = TrialLoads(loads, load_time, how.unbalanced, how.max_steps, how.time_step)
     rest = State.at_rest(blocks) if how.state is None else how.state
     settings = replace(settings or DdaSettings(), dynamic_factor=0.0)
@@ -440,7 +445,7 @@ class _Search:
         moving = moving_in(failed)
         if not moving:
             return ""
-        names = ", ".join(repr(self.blocks.names[b] if self.blocks.names else f"block {b}") for b in moving[:_NAMED])
+        names = ", ".join(repr(self.blocks.names[b]) for b in moving[:_NAMED])
         return f"{names}{' and others' if len(moving) > _NAMED else ''}: "
 
 

@@ -38,7 +38,7 @@ class StepLength:
     """
 
     settings: DdaSettings
-    #: J/m: energy converted so far, as `EnergyBudget.turnover`.
+    #: J/m: sums over the steps of |work of weight| and |work of loads|, and the largest energy stored.
     _worked: float = 0.0
     _stored: float = 0.0
 

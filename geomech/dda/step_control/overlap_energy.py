@@ -54,7 +54,7 @@ class OverlapWatch:
         share, worst = budget.by_overlap, self._worst
         if share <= WARNED or worst is None or (self._warned and share <= ENDED):
             return
-        a, b = (names[k] if names else f"block {k}" for k in (worst.block, worst.other))
+        a, b = names[worst.block], names[worst.other]
         what = (
             f"overlapping blocks have created {share:.2g} of all converted energy in the run, most of it at "
             f"t = {self._when:.6g} s: {a!r} and {b!r} overlapped by {worst.deep:.3g} m near x = {worst.x:.6g}, "

@@ -89,8 +89,8 @@ def on_bases(
         still = faces.moved(warm) - gives @ pressure
         found = faces.settled(gives, still, right)
         if found is None:
-            if not body.lost_base:
-                body.lost_base = True
+            if "no contact area" not in body.warned_of_bases:
+                body.warned_of_bases.add("no contact area")
                 _log.warning(
                     "the contact area of a face on its rigid base was not found: its pressure stays linear, and K may be off by "
                     "several per cent or, in a wide block, more: set more elements on the sides (ddm.elements_per_side)"
@@ -103,8 +103,8 @@ def on_bases(
         given = faces.tractions(given, pressure)
         load = replace(load, tractions=given)
     largest = np.abs(pressure).max()
-    if change > _WARNED * largest and not body.lost_base:
-        body.lost_base = True
+    if change > _WARNED * largest and "no agreement" not in body.warned_of_bases:
+        body.warned_of_bases.add("no agreement")
         _log.warning(
             "the pressure of a face on its rigid base and the crack faces that close under it did not agree after %d "
             "solutions: the pressure still changes by %.1g of itself, and K by as much",

@@ -25,6 +25,8 @@ from .polygon import (
 
 #: Value of `Blocks.order`: determined during the run.
 AUTO_ORDER = 0
+#: The highest order of a block.
+HIGHEST_ORDER = 8
 #: Edges are collinear when the tangent of the angle between them is below this.
 STRAIGHT = 1e-6
 
@@ -51,7 +53,7 @@ class Blocks:
                                         strength of their joint law, others hold. None: no blocks are cells
         edge_name     (n_vertices,)     index into ``edge_names`` (0: the empty name, unnamed)
         edge_names    tuple of str      e.g. ("", "load:top", "joint:set1")
-        names         tuple of str      one name per block, for messages and files
+        names         tuple of str      one name per block, for messages and files: "block 0", … if not given
     """
 
     vertices: np.ndarray
@@ -65,6 +67,10 @@ class Blocks:
     constrained: np.ndarray | None = None
     order: np.ndarray | None = None
     glued: np.ndarray | None = None
+
+    def __post_init__(self) -> None:
+        if not self.names:
+            object.__setattr__(self, "names", tuple(f"block {b}" for b in range(self.n_blocks)))
 
     @classmethod
     @renamed_argument("held", "constrained")
@@ -97,7 +103,7 @@ class Blocks:
         given = {"material": material, "fixed": fixed, "constrained": constrained, "edge_names": edge_names, "names": names,
                  "order": order}  # fmt: skip
         _refuse_lengths(n_blocks, given)
-        names = tuple(names) if names is not None else tuple(f"block {b}" for b in range(n_blocks))
+        names = tuple(names or (f"block {b}" for b in range(n_blocks)))
         loops, block_loop = [], [0]
         for block in polygons:
             bare = isinstance(block, np.ndarray) or np.ndim(block[0][0]) == 0

@@ -7,17 +7,15 @@ from typing import Any
 
 import numpy as np
 
-from geomech.model import OPEN, SLIP, Cycle, Problem
+from geomech.model import OPEN, RESTS, SLIP, Cycle, Problem
 from geomech.model.blocks.key_blocks import CLASSES, FALLS, FIXED, SLIDES, key_blocks
 
 #: Blocks are at rest, apart from small vibrations, if the unbalanced force on every block is below this part of its
 #: forces …
 AT_REST = 1e-2
 #: … and their kinetic energy is below this part of the energy stored in blocks and contacts (steady sliding is in
-#: equilibrium, too).
+#: equilibrium, too). In statics the displacement that is left is also small (`RESTS`).
 STILL = 1e-2
-#: In statics the displacement that is left is also below this part of the largest (`Mechanism.remaining`).
-RESTS = 1e-2
 #: Number of blocks that are named.
 NAMED = 5
 #: A block counts as stable if it has moved by less than this part of its size √area, and at its velocity would not

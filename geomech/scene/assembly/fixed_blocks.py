@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from geomech.model import AUTO_ORDER
+from geomech.model import AUTO_ORDER, HIGHEST_ORDER
 
 from ..checks.check import Check
 from ..drawing import Drawing
@@ -13,8 +13,6 @@ from ..tables import SceneTables
 #: Edges called "fixed" or "fixed:NAME" fix their blocks; with "guided:x" or "guided:x:NAME" these can move along x
 #: only.
 FIXED, GUIDED = "fixed", "guided"
-#: The highest order of a block.
-_HIGHEST = 8
 #: Constrained unknowns of a block guided along an axis: translation across it, rotation and shear strain.
 _CONSTRAINED = {"x": [1, 2, 5], "y": [0, 2, 5]}
 
@@ -73,7 +71,7 @@ def block_orders(tables: SceneTables, drawing: Drawing) -> np.ndarray | None:
     order = np.array([AUTO_ORDER if p == "auto" else p for p in given], dtype=int)
     if drawing.cracks is not None:
         cells = np.array([zone in zones and zones[zone].mesh_size_m is not None for zone in drawing.zones], bool)
-        order[np.intersect1d(drawing.cracks.block, np.flatnonzero(cells))] = _HIGHEST
+        order[np.intersect1d(drawing.cracks.block, np.flatnonzero(cells))] = HIGHEST_ORDER
     order[fixed_blocks(tables, drawing)] = 1
     return order if (order != 1).any() else None
 

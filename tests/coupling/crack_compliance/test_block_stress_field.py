@@ -20,7 +20,7 @@ LINES = [np.array([[0.5, 0.5], [0.9, 0.8]]), np.array([[1.2, 0.06], [1.25, 0.5]]
 def field(order: int) -> BlockStressField:
     blocks = Blocks.from_polygons([OUTLINE], order=[order])
     elastic = ROCK.stiffness()[None]
-    deflected = DeflectedBlocks(blocks, np.zeros(1, bool), np.array([2500.0]), elastic)
+    deflected = DeflectedBlocks(blocks, np.zeros(1, bool), elastic)
     return BlockStressField.of(deflected, 0, ROCK.compliance())
 
 

@@ -23,7 +23,7 @@ CUT = np.array([[0.8, 0.0], [1.0, 0.6], [0.9, 1.2 - 0.2 * 0.9 / 2.1]])
 def deflected(blocks: Blocks) -> DeflectedBlocks:
     n = blocks.n_blocks
     elastic = np.tile(ROCK.stiffness(), (n, 1, 1))
-    return DeflectedBlocks(blocks, np.zeros(n, bool), np.full(n, ROCK.density), elastic)
+    return DeflectedBlocks(blocks, np.zeros(n, bool), elastic)
 
 
 def moving(order: int, size: float) -> tuple[Blocks, State, DeflectedBlocks]:

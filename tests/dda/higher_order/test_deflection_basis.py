@@ -241,7 +241,7 @@ def test_pressure_and_point_loads_work_on_deflection(angle):
     shape = turned(L_SHAPE, 0.3)
     blocks = Blocks.from_polygons([shape], order=[4])
     elastic = Material("rock", 2e10, 0.2, 2500.0).stiffness()[None]
-    deflected = DeflectedBlocks(blocks, np.array([False]), np.array([2500.0]), elastic)
+    deflected = DeflectedBlocks(blocks, np.array([False]), elastic)
     moved = turned(shape, angle, (3.0, 5.0))
     following = blocks.next_vertex
     edges = np.zeros(len(shape), EDGE_FORCE)
