@@ -38,7 +38,7 @@ class SteppedSystem(Protocol):
     have a row. ``next`` and ``owner`` are by vertex. ``no_compliance`` (n_blocks, 3, 3) and ``no_offset`` (n_blocks, 3)
     are those of blocks without cracks. ``reach`` m: static steps are
     solved by operator splitting (`open_close.static_splitting`), and blocks that move beyond it are given up; None: they are
-    not. ``splits_plastic``: they are from the start, with cohesion (`open_close.plastic_splitting`).
+    not.
     """
 
     blocks: Blocks
@@ -70,8 +70,5 @@ class SteppedSystem(Protocol):
 
     @property
     def step_limit(self) -> float: ...
-
-    @property
-    def splits_plastic(self) -> bool: ...
 
     def pattern_of(self, block: np.ndarray, other: np.ndarray, moments: np.ndarray, linked: Any) -> Pattern: ...

@@ -112,6 +112,13 @@ class StepCutting:
     """Attempts at a step of ``system`` from ``start`` by at most ``dt``. ``like``: the result of the same step with
     other cracks, whose contact states are the first guess; ``pseudo_inertia`` as in `BlockSystem.step`."""
 
+    #: Class of attempts at steps of first-order blocks.
+    attempts: type[Attempt] = Attempt
+    #: Whether corner contacts that bonds join are left out at first (`ContactFinder.find`).
+    glue_holds = True
+    #: Level at which the log reports that blocks have entered each other in a step of any length.
+    level_of_crossings = logging.WARNING
+
     def __init__(
         self, system: LimitedSystem, start: StepStart, dt: float, like: StepResult | None, pseudo_inertia: bool = True
     ) -> None:
@@ -166,7 +173,7 @@ class StepCutting:
     def _attempt(self) -> tuple[Attempt, StepResult] | None:
         """One attempt and its result; None if it was not accepted."""
         system, found = self.system, self.found
-        make: Callable[..., Attempt] = Attempt if system.deflected is None else BendingAttempt
+        make: Callable[..., Attempt] = self.attempts if system.deflected is None else BendingAttempt
         if self.balances:
             reach = _REACH * system.limits.displacement * self.dt / self.asked
             make = partial(balanced_attempt, reach=reach)
@@ -249,8 +256,7 @@ class StepCutting:
         if self._extend_search(attempt, crossed):
             return False
         if self.cuts >= system.settings.max_step_cuts and not crossed.through:
-            # The next step of a trial finds what one step has moved too far.
-            level = logging.DEBUG if system.splits_plastic else logging.WARNING
+            level = self.level_of_crossings
             log.log(level, "step at t = %g s: %s, and no shorter step avoids it", state.time, crossed.reason)
             result.statistics["limit_share"] = used.share
             return True
@@ -273,14 +279,16 @@ class StepCutting:
         """Whether contacts are found within a larger distance; the step is then repeated with its length unchanged."""
         search = self.search
         wider = search.near.widened(crossed.pairs, crossed.motion, self.system.blocks.n_blocks)
-        # Without the arcs of rotating blocks, which trials leave to their next step, corners enter a little at any distance.
-        most = 1 if self.system.splits_plastic and not crossed.through else _FARTHER
-        if self.extensions >= most or not wider.reaches_beyond(search.near):
+        if self.extensions >= self._most_extensions(crossed) or not wider.reaches_beyond(search.near):
             return False
         search.near, search.motion = wider, attempt.new_vertices - self.start.vertices
         search.glue_holds = self.found.relies_on_glue
         self.extensions, self.found = self.extensions + 1, search.find()
         return True
+
+    def _most_extensions(self, crossed: Crossed) -> int:
+        """Most extensions of the search distance in a step in which blocks have ``crossed``."""
+        return _FARTHER
 
     def _allow(self, used: Used) -> None:
         """Accept, in statics, motion under a load that does not decrease with the step, and search contacts far enough
@@ -343,10 +351,9 @@ class StepCutting:
         margin = np.inf
         if not system.scheme.static:
             margin = dt * dt * float(np.hypot(*start.gravity)) + _BESIDES * math.sqrt(start.moments[:, 0].min())
-        # In trials, bonds are lost in most steps.
         return _Search(
             system.finder, start.state, start.vertices, windows_of(system, start, dt), self._expected_motion(), margin,
-            glue_holds=not system.splits_plastic,
+            glue_holds=self.glue_holds,
         )  # fmt: skip
 
     def _expected_motion(self) -> np.ndarray | None:

@@ -35,6 +35,7 @@ from .open_close.static_splitting import is_straight
 from .results import CrackResponse, StepResult
 from .step_control.relative_motion import Windows
 from .step_control.step_limits import StepLimits
+from .step_control.trial_step import TrialCutting
 from .step_cutting import StepCutting, windows_of
 from .time_step import Attempt, StepStart
 
@@ -137,7 +138,7 @@ class BlockSystem:
         #: (n_blocks,) m: static steps are solved by operator splitting, which gives blocks up that move beyond this; None:
         #: they are not.
         self.reach: np.ndarray | None = None
-        #: Whether such steps are solved by operator splitting from the start (`open_close.plastic_splitting`).
+        #: Whether such steps are solved by operator splitting from the start (`step_control.trial_step`).
         self.plastic = False
         self.limits = StepLimits(
             self.finder, self.settings, self.half_diagonal, self.vertex_start, self.next, self.work
@@ -229,11 +230,6 @@ class BlockSystem:
             and len(self.moving) >= self.settings.contact_solver.static_splitting
             and all(is_straight(law) for law in self.joints)
         )
-
-    @property
-    def splits_plastic(self) -> bool:
-        """Whether the next steps are those of a trial by `open_close.plastic_splitting`."""
-        return self.scheme.static and self.plastic and self.reach is not None
 
     @property
     def step_limit(self) -> float:
@@ -423,7 +419,9 @@ class BlockSystem:
             self._excavations.refuse(loads)
             self._refuse_unsupported(loads, state.time + dt if load_time is None else load_time)
         start = StepStart(state, vertices, carried, moments, loads.gravity.at(state.time + dt), loads, crack, load_time)
-        return StepCutting(self, start, dt, like, pseudo_inertia).accepted_step()
+        in_trial = self.scheme.static and self.plastic and self.reach is not None
+        cutting = TrialCutting if in_trial else StepCutting
+        return cutting(self, start, dt, like, pseudo_inertia).accepted_step()
 
     def contacts_near(self, state: State) -> ContactSet:
         """The contacts at the start of a step from ``state``."""

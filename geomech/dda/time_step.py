@@ -51,7 +51,7 @@ from .loads.step_actions import BeyondMean, StepActions, beyond_mean, effective_
 from .loads.viscous_boundary import ViscousEdges
 from .open_close.augmented_lagrangian import settle_augmented
 from .open_close.contact_set import ContactSet
-from .open_close.equations import Equations, GivingSprings, Unsettled
+from .open_close.equations import Equations, Unsettled
 from .open_close.iteration import settle
 from .open_close.settled_states import Settled
 from .out_of_balance import imbalance
@@ -133,6 +133,8 @@ class Attempt:
 
     #: Class of the equations from which contact states are found.
     equations: type[Equations] = Equations
+    #: Most repetitions for the gaps of rotating blocks, and for the cohesion of whole faces.
+    bends, shares = _BENDS, _SHARED
 
     def __init__(self, system: SteppedSystem, start: StepStart, dt: float, found: ContactSet, cuts: int) -> None:
         self.system, self.state, self.vertices = system, start.state, start.vertices
@@ -157,7 +159,6 @@ class Attempt:
         #: (6 n_free,) motion of a static step as found last, with other contact areas or arcs; None before.
         self.earlier: np.ndarray | None = None
         self.earlier_forces: np.ndarray | None = None
-        self.giving = GivingSprings()
         #: J/m, kinetic energy of the mean velocity of a static step, which is not carried over.
         self.dropped = 0.0
         if not scheme.static and found.tried is None and len(found):
@@ -168,8 +169,7 @@ class Attempt:
         if scheme.place == 1.0 and predicted is not None:
             # About the end of the step the arc is long, but as accurate as the lever arms.
             self._follow(predicted, self.midpoint.vertices)
-        # In a trial by `plastic_splitting` the next step begins with the actual gaps.
-        for bends in range(0 if self.system.splits_plastic else _BENDS, -1, -1):
+        for bends in range(self.bends, -1, -1):
             self._act(start.loads, start.load_time)
             self._assemble()
             self._absorb(start.loads, start.load_time)
@@ -313,12 +313,9 @@ class Attempt:
     def _settle(self) -> None:
         """Find contact states and unknowns; repeated with other contact areas of faces with a stiffness until these
         agree."""
-        actions, found, order, midpoint = self.actions, self.found, self.order, self.midpoint
+        actions, found, order, midpoint = self.actions, self._first_contacts(), self.order, self.midpoint
         constrained = self._constrained()
         own, shared = (self.matrix, self.right), 0
-        if self.system.splits_plastic:
-            # Operator splitting gives each contact of a whole face the cohesion of its own length.
-            found, shared = found.sharing_cohesion(np.full(len(found), STICK), found.bonded), _SHARED
         for tries in range(1, 2 * _PLACED + 1):
             if found.points is not None or tries > 1:
                 self.matrix, self.right = own[0].copy(), own[1].copy()
@@ -344,7 +341,6 @@ class Attempt:
                 unknowns = settled.unknowns
             else:
                 assert self.pattern is not None  # blocks are free
-                actions.limits_in_settle = self.system.splits_plastic
                 solve = partial(self._settled, vectors=vectors, springs=springs, curved=curved)
                 settled, unknowns = actions.settle(
                     self.pattern, self.matrix, self.right, vectors, geometry, found, gap, solve
@@ -356,7 +352,7 @@ class Attempt:
             if striking is not None:
                 settled = striking.back(settled, self.system.half_diagonal)
             better = found.misplaced(settled)
-            if better is None and shared < _SHARED:
+            if better is None and shared < self.shares:
                 sharing = found.sharing_cohesion(settled.state, settled.bonded)
                 better, shared = (None if sharing is found else sharing), shared + 1
             if better is None:
@@ -370,6 +366,10 @@ class Attempt:
             raise Unsettled("the contact areas of faces did not converge")
         self.found, self.settled, self.unknowns = found, settled, unknowns
         self.vectors, self.weight, self.acting, self.striking = vectors, weight, geometry, striking
+
+    def _first_contacts(self) -> ContactSet:
+        """The contacts with which the search for their states begins."""
+        return self.found
 
     def _striking(self, found: ContactSet) -> Striking | None:
         """The contacts of ``found`` at which blocks may collide with a coefficient of restitution."""
@@ -500,11 +500,9 @@ class Attempt:
     def _further_equations(self, pattern, matrix, right, contacts, vectors) -> dict[str, Any]:
         """Fields of `equations` that depend on further unknowns; ``right`` (n_free, 6) is the right-hand side of the
         first six."""
-        bolts = None if self.actions is None or not self.system.splits_plastic else self.actions.bolts
         return {
             "right": right, "expected": self._expected_unknowns(), "earlier": self.earlier,
             "earlier_forces": self.earlier_forces, "reach": self.system.reach if self.system.scheme.static else None,
-            "plastic": self.system.splits_plastic, "limits": bolts, "giving": self.giving,
         }  # fmt: skip
 
     def _expected_unknowns(self) -> np.ndarray | None:
