@@ -37,13 +37,13 @@ def overwriting(allowed: bool = True) -> Iterator[None]:
         _OVERWRITE.reset(before)
 
 
-def refuse_results(folders: Iterable[Path]) -> None:
-    """Refuse folders that already hold results, before the first of several runs begins: raises
-    `geomech.output.run_lock.FolderTaken`, unless runs may overwrite (`overwriting`)."""
+def refuse_results(folders: Iterable[Path], *, locked: bool = False) -> None:
+    """Refuse folders that already hold results, before the first of several runs begins, unless runs may overwrite
+    (`overwriting`). ``locked``: the caller has their lock. Raises `geomech.output.run_lock.FolderTaken`, FolderInUse."""
     from .output import run_lock
 
     if not _OVERWRITE.get():
-        run_lock.refuse_results(folders)
+        run_lock.refuse_results(folders, locked=locked)
 
 
 def cycles(scene: Scene | str | Path) -> Iterator[Cycle]:
@@ -110,7 +110,7 @@ def run_problem(
     from .output.run_lock import RunLock
 
     with overwriting(_OVERWRITE.get() if overwrite is None else overwrite), RunLock(folder) as lock:
-        refuse_results([folder])
+        refuse_results([folder], locked=True)
         summary = CoupledRun(problem, folder, observers).go([*warnings, *([lock.stale] if lock.stale else [])])
     run_ended()
     return summary

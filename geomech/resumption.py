@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 import logging
 from collections.abc import Callable, Iterable, Mapping
@@ -103,7 +104,7 @@ def _resumed(request: _Request) -> dict[str, Any]:
         wanted = scene.problem()
         problem = replace(problem, title=wanted.title, run=wanted.run)
     warnings = [f"{name} was {was!r}, is now {now!r}" for name, (was, now) in changes.items()]
-    warnings += _other_surroundings(header)
+    warnings += _damaged(folder, path) + _other_surroundings(header)
     try:
         return CoupledRun(problem, folder, request.watching(scene), stored).go(warnings)
     except FilesChanged as error:
@@ -205,9 +206,20 @@ def _run_from_start(request: _Request) -> dict[str, Any]:
         )
     if not (folder / "scene.toml").is_file():
         raise NotResumable(f"{folder} holds neither a checkpoint nor a scene.toml: run the scene again")
-    request.tell(f"{folder} holds no checkpoint yet: the run begins again")
+    damaged = _damaged(folder)
+    for message in (
+        *damaged,
+        f"{folder} holds no {'other checkpoint' if damaged else 'checkpoint yet'}: the run begins again",
+    ):
+        request.tell(message)
     scene = request.scene()
     return run(scene, folder, request.watching(scene), again=True)
+
+
+def _damaged(folder: Path, used: Path | None = None) -> list[str]:
+    """A warning for each checkpoint that is later than the one used, because it is damaged."""
+    later = itertools.takewhile(lambda path: path != used, checkpoint_file.found(folder / checkpoint_file.FOLDER))
+    return [f"{path} is damaged, and is not used" for path in later]
 
 
 def _other_surroundings(header: Mapping[str, Any]) -> list[str]:

@@ -331,6 +331,28 @@ def test_what_came_after_the_checkpoint_is_dropped(write, tmp_path):
     assert differing(tmp_path / "whole", out) == []
 
 
+def test_a_damaged_checkpoint_is_named_and_the_one_before_it_used(write, tmp_path, capfd):
+    scene = load_scene(write(SLIDING), ["output.checkpoint_every=4"])
+    run(scene, tmp_path / "whole", standard_observers(scene, quiet=True))
+    out = tmp_path / "parts"
+    broken_off(scene, out, 9)
+    newest, older = checkpoint_file.found(out / checkpoint_file.FOLDER)
+    newest.write_bytes(newest.read_bytes()[:-30] + b"x" * 30)
+    resume(out, quiet=True)
+    assert f"{newest} is damaged, and is not used" in (out / "run.log").read_text()
+    assert differing(tmp_path / "whole", out) == []
+
+    broken_off(scene, out, 9)
+    for path in checkpoint_file.found(out / checkpoint_file.FOLDER):
+        path.write_bytes(b"")
+    assert cli.main(["resume", str(out), "--quiet"]) == cli.DONE
+    assert capfd.readouterr().err.splitlines()[-3:] == [
+        f"{newest} is damaged, and is not used",
+        f"{older} is damaged, and is not used",
+        f"{out} holds no other checkpoint: the run begins again",
+    ]
+
+
 def test_a_finished_run_says_so_and_can_be_made_longer(write, tmp_path):
     """What was to end earlier ends as if it had been meant to last as long from the start."""
     path = write(SLIDING)

@@ -39,12 +39,14 @@ class FolderTaken(FolderRefused):
     """The folder holds the results of a run."""
 
 
-def refuse_results(folders: Iterable[Path]) -> None:
-    """Refuse folders that hold results: raises FolderTaken. A run that failed or was killed before its first cycle, and
-    left no checkpoint, has none."""
-    for folder in folders:
-        found = _results(Path(folder))
+def refuse_results(folders: Iterable[Path], *, locked: bool = False) -> None:
+    """Refuse folders that hold results: raises FolderTaken, or FolderInUse while another run writes them (``locked``:
+    the caller has the lock). A run that failed or was killed before its first cycle, and left no checkpoint, has none."""
+    for folder in map(Path, folders):
+        found = _results(folder)
         if found is not None:
+            if not locked:
+                _refuse_in_use(folder)
             raise FolderTaken(
                 f"{folder} holds {found}: to replace it use --overwrite, to keep it name another folder (--out DIR), "
                 f"to continue it `geomech resume {folder}`"
@@ -59,6 +61,18 @@ def _results(folder: Path) -> str | None:
     if checkpoint_file.found(folder / checkpoint_file.FOLDER):
         return "an interrupted run with a checkpoint"
     return None
+
+
+def _refuse_in_use(folder: Path) -> None:
+    """Raise FolderInUse if a run has the folder."""
+    try:
+        handle = os.open(folder / FILE, os.O_RDWR | getattr(os, "O_CLOEXEC", 0))
+    except OSError:
+        return
+    try:
+        _lock(folder, handle)
+    finally:
+        os.close(handle)
 
 
 class RunLock:
@@ -79,10 +93,7 @@ class RunLock:
         while True:
             handle = os.open(path, os.O_RDWR | os.O_CREAT | getattr(os, "O_CLOEXEC", 0), 0o666)
             try:
-                locked = _locked(handle)
-                found = _read(handle)
-                if locked is False or (locked is None and found and _alive(found)):
-                    raise FolderInUse(f"{self.folder} is in use by {_holder_text(found)}{self._way_out(locked)}")
+                locked, found = _lock(self.folder, handle)
                 # The previous owner may have removed the file between opening and locking: then it locks nobody out.
                 if locked and not _is_still(handle, path):
                     os.close(handle)
@@ -109,10 +120,17 @@ class RunLock:
             os.close(self._file)
             self._file = None
 
-    def _way_out(self, locked: bool | None) -> str:
+
+def _lock(folder: Path, handle: int) -> tuple[bool | None, dict[str, Any]]:
+    """Lock the open file of ``folder``: whether it is locked, as `_locked`, and its content. Raises FolderInUse."""
+    locked = _locked(handle)
+    found = _read(handle)
+    if locked is False or (locked is None and found and _alive(found)):
+        way_out = ": wait for it, end it, or name another folder"
         if locked is None:
-            return f": wait for it, name another folder, or remove {self.folder / FILE} if it is gone"
-        return ": wait for it, end it, or name another folder"
+            way_out = f": wait for it, name another folder, or remove {folder / FILE} if it is gone"
+        raise FolderInUse(f"{folder} is in use by {_holder_text(found)}{way_out}")
+    return locked, found
 
 
 def _locked(handle: int) -> bool | None:

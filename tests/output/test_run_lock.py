@@ -60,6 +60,14 @@ def test_a_folder_in_use_is_refused_by_name_and_time(held, scene, capsys):
     assert capsys.readouterr().err.count(there) == 2
 
 
+def test_a_live_run_with_a_checkpoint_is_in_use_and_not_interrupted(held, scene, capsys):
+    folder, other = held
+    (folder / "checkpoint").mkdir()
+    (folder / "checkpoint" / "cycle_0000003.checkpoint").write_bytes(b"")
+    assert cli.main(["run", str(scene), "--out", str(folder)]) == cli.BAD_INPUT
+    assert f"{folder} is in use by process {other.pid}" in capsys.readouterr().err
+
+
 def test_a_folder_left_without_a_word_is_told_and_taken_over(held, scene):
     folder, other = held
     other.kill()
