@@ -4,7 +4,8 @@ rotated, shifted, with joints in another order, and with noise on the vertices.
 Joints are drawn once (`drawn_slopes`), so that all variants have the same blocks. Over the whole run in steps of dt,
 dt/2 and dt/4, the moving fraction of the rock and the work of gravity on it (`moved_mass`) are compared. Over the first
 steps, with friction as drawn and without, every block's displacement and the energies are compared with those of the
-slope as drawn. A slope is `RIGHT`, `REPORTED` (beyond a bound, with a warning of one of the two compared runs that its
+slope as drawn. Where two static runs both tell of a mechanism, which blocks move is compared, not how far: there is no
+equilibrium to move to. A slope is `RIGHT`, `REPORTED` (beyond a bound, with a warning of one of the two compared runs that its
 result is unreliable), `REFUSED` (already as drawn, for a named reason), `LONG` (some run was not finished, the others
 agree) or `WRONG`.
 """
@@ -12,6 +13,7 @@ agree) or `WRONG`.
 from __future__ import annotations
 
 import math
+import re
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass, field, fields, replace
@@ -115,6 +117,8 @@ WARNED_OF_STEPS = (
     "which no block supplied",
     "depends on the load steps",
 )
+#: What static runs say, under the loads and under the in-situ stress, where there is no equilibrium.
+_NO_EQUILIBRIUM = re.compile("nothing holds .* step after step|under the in-situ stress there is no equilibrium")
 _MODULES = (
     "drawn_slopes", "limited_runs", "moved_mass", "random_slopes", "refusals", "slope_invariance", "slope_invariants",
 )  # fmt: skip
@@ -171,6 +175,11 @@ class _Run:
         return any(each in line for line in self.ended.warnings for each in words)
 
     @property
+    def has_no_equilibrium(self) -> bool:
+        """Whether a static run has told that blocks have no equilibrium."""
+        return any(_NO_EQUILIBRIUM.search(line) for line in self.ended.warnings)
+
+    @property
     def how(self) -> str:
         what = self.ended.reason or self.ended.message.strip().rpartition("\n")[2]
         return f"{self.ended.verdict}: {what}"
@@ -191,8 +200,8 @@ def invariance(seed: int, seconds: float = LIMIT, text: str | None = None) -> In
     if compared.refused:
         return compared.outcome(first, threshold)
     dt = first.dda.time_step
-    compared.geometry(scene, FIRST * dt, ", friction")
-    compared.geometry(frictionless(scene, FRICTIONLESS_STEP), FIRST * FRICTIONLESS_STEP, ", smooth")
+    compared.geometry(scene, FIRST * dt, ", friction", threshold)
+    compared.geometry(frictionless(scene, FRICTIONLESS_STEP), FIRST * FRICTIONLESS_STEP, ", smooth", threshold)
     return compared.outcome(first, threshold)
 
 
@@ -229,9 +238,10 @@ class _Compared:
                 continue
             off_share, off_work = _off_moved(run.at, finest.at, threshold)
             self._take("share, dt", off_share, label, run, finest)
-            self._take("work, dt", off_work, label, run, finest)
+            if not (run.has_no_equilibrium and finest.has_no_equilibrium):
+                self._take("work, dt", off_work, label, run, finest)
 
-    def geometry(self, scene: Scene, end: float, label: str) -> None:
+    def geometry(self, scene: Scene, end: float, label: str, threshold: float) -> None:
         """The first steps of ``scene``, until ``end`` s, as drawn and in every variant."""
         base_problem = _until(problem_of(scene), end)
         base = self._run(base_problem)
@@ -248,7 +258,7 @@ class _Compared:
             run = self._run(problem)
             if not self._both(f"{name}{label}", base, run):
                 continue
-            off = _difference(base, run, by or Isometry())
+            off = _difference(base, run, by or Isometry(), threshold)
             if off is None:
                 self._fault(f"{name}{label}: other blocks", base, run)
             else:
@@ -356,10 +366,11 @@ def _same_blocks(one: BlockDisplacements, other: BlockDisplacements) -> tuple[np
     return at, to_other[at]
 
 
-def _difference(base: _Run, run: _Run, by: Isometry) -> float | None:
+def _difference(base: _Run, run: _Run, by: Isometry, threshold: float) -> float | None:
     """The largest of: difference of a block's displacement, beyond that of the vertices, over the largest displacement,
     of its position over the extent, or of an energy, beyond the work of all weight over the noise, over the largest energy;
-    None if the blocks are not the same."""
+    None if the blocks are not the same. If neither run has an equilibrium, the share of the rock that moves by more than
+    ``threshold`` (m) in one of them only."""
     from scipy.spatial import cKDTree
 
     one, other = base.at, run.at
@@ -369,6 +380,8 @@ def _difference(base: _Run, run: _Run, by: Isometry) -> float | None:
     distance, at = cKDTree(by.back(other.centre)).query(one.centre)
     if len(set(at.tolist())) < len(at) or not (distance < SAME_BLOCK * extent).all():
         return None
+    if base.has_no_equilibrium and run.has_no_equilibrium:
+        return float(one.mass[one.moves(threshold) != other.moves(threshold)[at]].sum() / one.mass.sum())
     back = other.displacement[at] @ by.matrix
     away = max(0.0, np.hypot(*(back - one.displacement).T).max() - ABOVE_NOISE * NOISE * extent)
     lifted = one.weight() * NOISE * extent

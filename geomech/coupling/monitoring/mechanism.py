@@ -40,6 +40,7 @@ class Mechanism:
     between.
 
     remaining  displacement that is left until the blocks rest, relative to the largest so far; inf: they do not fade
+    lost       begin and end, s, of the load step in which balance was lost; None while there is balance
     """
 
     def __init__(self) -> None:
@@ -48,6 +49,7 @@ class Mechanism:
         self.steady = 0
         self.remaining = 0.0
         self.fastest = ""
+        self.lost: tuple[float, float] | None = None
         self.reported = self.grew_unsupported = False
 
     def check(self, result: dda.StepResult, blocks: Blocks, steady: bool = True) -> tuple[int, str] | None:
@@ -57,8 +59,10 @@ class Mechanism:
         self.steady = self.steady + 1 if steady else 0
         self.remaining = 0.0
         if not ratio > (BALANCED if steady else SUPPORTED):
-            self.ratios, self.ways, self.reported = [], [], False
+            self.ratios, self.ways, self.lost, self.reported = [], [], None, False
             return None
+        end = result.state.time
+        self.lost = begin, end = self.lost or (end - result.dt, end)
         self.ratios = [*self.ratios[-STEPS:], ratio]
         self.ways = [*self.ways[-STEPS:], float(np.hypot(*(result.state.vertices - blocks.vertices).T).max())]
         speed = np.hypot(*result.state.velocity[:, :2].T)
@@ -84,7 +88,7 @@ class Mechanism:
         others = len(moving) - NAMED
         return first, (
             f"nothing holds {named}{f' and {others} more' if others > 0 else ''}: {100 * ratio:.2g} % of the forces on "
-            "a block are left over, step after step"
+            f"a block are left over, step after step, since the step from t = {begin:.4g} to {end:.4g} s"
         )
 
     def warn_of_growth(self, result: dda.StepResult) -> None:

@@ -17,14 +17,16 @@ from geomech.bench.slopes.drawn_slopes import (
     problem_of,
     reordered,
 )
-from geomech.bench.slopes.limited_runs import REPORTED, RIGHT, VERDICTS, WRONG
+from geomech.bench.slopes.limited_runs import REPORTED, RIGHT, VERDICTS, WRONG, Ended
 from geomech.bench.slopes.moved_mass import BlockDisplacements, moving_from
 from geomech.bench.slopes.random_slopes import scene_text
 from geomech.bench.slopes.slope_invariance import (
     BOUNDS,
     VARIANTS,
     Invariance,
+    _difference,
     _off_moved,
+    _Run,
     invariance,
     measure_invariance,
     table,
@@ -197,6 +199,24 @@ def test_a_block_that_slides_is_the_same_in_all_variants():
     way = 0.5 * (6.3057 - math.tan(math.radians(10)) * 7.5149) * 0.1**2
     # Elastic shortening under sudden weight is some 1e-6 m of 25 mm.
     assert found.work[-1] == pytest.approx(5200 * 6.3057 * way, rel=1e-3)
+
+
+def test_a_mechanism_is_the_same_if_the_same_blocks_move():
+    """In statics: how far the block has gone where the run ends depends on the step."""
+    static = SLIDES.replace("dynamic_factor = 1.0", "dynamic_factor = 0").replace(
+        "end_time_s = 0.1", "end_time_s = 0.5"
+    )
+    found = invariance(0, text=static.replace("time_step_s = 0.004", "time_step_s = 0.05"))
+    assert found.verdict == RIGHT and found.moved == (1.0, 1.0, 1.0), found
+    assert found.work[0] > 2 * found.work[-1] and "work, dt" not in found.scatter
+
+    tells = Ended(
+        warnings=("cycle 6, t = 1 s: nothing holds rock: 3 % of the forces on a block are left over, step after step",)
+    )
+    one, other = (_Run(tells, _fallen(*depths), np.zeros(4)) for depths in ((1.0, 0.0), (0.3, 0.0)))
+    assert _difference(one, other, Isometry(), 0.1) == 0.0
+    assert _difference(one, replace(other, at=_fallen(1.0, 0.5)), Isometry(), 0.1) == 0.5
+    assert _difference(one, replace(other, ended=Ended()), Isometry(), 0.1) == pytest.approx(0.7)
 
 
 def test_what_changes_in_silence_is_wrong_and_with_a_warning_reported(monkeypatch):

@@ -128,6 +128,18 @@ def test_steps_to_events_end_at_a_mechanism(caplog):
         seen = list(cycles(problem))
     assert seen[-1].events[-1].kind == "mechanism" and seen[-1].state.time < 0.15
     assert "the run ends, as there is no equilibrium" in caplog.text
+    # It slides under any load: balance is lost in the first step.
+    assert seen[-1].events[-1].detail.endswith(f"since the step from t = 0 to {seen[1].state.time:.4g} s")
+
+
+def test_a_mechanism_tells_between_which_loads_balance_was_lost():
+    """A block on a base that is tilted by 2° a step slides from 20.5° on; five steps more show that it does not stop."""
+    angles = np.radians(np.linspace(0.0, 40.0, 21))
+    weight = History.table(0.01 * np.arange(21.0), 9.81 * np.stack([np.sin(angles), -np.cos(angles)], axis=1))
+    problem = on_a_slope(0.0, 20.5, gravity=weight, stop_at=("mechanism",))
+    last = list(cycles(problem))[-1]
+    assert last.state.time > 0.13
+    assert last.events[-1].detail.endswith("since the step from t = 0.1 to 0.11 s")
 
 
 @pytest.mark.parametrize("friction_deg", [31.0, 40.0])
