@@ -16,6 +16,11 @@ ROOT = Path(__file__).parents[1]
 TUNNEL = ROOT / "geometry" / "tunnel.toml"
 
 
+def test_the_citation_names_this_version():
+    citation = (ROOT / "CITATION.cff").read_text(encoding="utf-8")
+    assert f"\nversion: {geomech.__version__}\n" in citation
+
+
 def test_completion_help_and_type_checkers_show_the_same():
     stub = ast.parse((ROOT / "geomech" / "__init__.pyi").read_text(encoding="utf-8"))
     named = {alias.asname for node in stub.body if isinstance(node, ast.ImportFrom) for alias in node.names}

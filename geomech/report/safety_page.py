@@ -50,7 +50,7 @@ class MovingBlock:
         if abs(self.turn) > SLIDES:
             side = "left" if self.turn > 0 else "right"
             text += f", turning {side} by {math.degrees(abs(self.turn)):.0f}° while it moves by its own size (√area)"
-        return text if self.travel is None else f"{text}; goes {self.travel:.3g} m"
+        return text if self.travel is None else f"{text}; travels {self.travel:.3g} m"
 
 
 @dataclass(frozen=True, eq=False)
@@ -140,7 +140,7 @@ class SafetyReport:
             lines.append(f"  reduced along {', '.join(self.along)} only")
         moving = self.moving()
         if moving:
-            lines.append(f"mechanism: {self.mechanism}, moving at failure:")
+            lines.append(f"mechanism: {self.mechanism}; blocks that move at failure:")
             lines += [f"  {each}" for each in moving[:_LISTED]] + _more(len(moving), f"of {len(names)} blocks")
             lines += [f"  {found.travel_text()}"] if found.travel is not None else []
         lines += self._joint_lines()
@@ -175,7 +175,7 @@ class SafetyReport:
         lines = [
             "joints at the factor, their strength divided by it:",
             f"  {'joint':24}{'length m':>9}{'normal kN/m':>13}{'shear kN/m':>12}{'strength':>11}{'mobilised':>11}"
-            f"{'slides':>8}{'parted':>8}",
+            f"{'slides':>8}{'open':>8}",
         ]
         for each in joints[:_LISTED]:
             name = each.joint.removeprefix("joint:") or each.law

@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 
-from ...model import OPEN, Loads, State
+from ...model import OPEN, Loads, State, counted
 from ...model.former_names import gathered_arguments
 from ..energy_balance import StepEnergy
 from ..joint_laws.penalty_springs import PENALTY_RATIO
@@ -286,7 +286,7 @@ class _Relaxation:
             reason += f"; {named}{' and others' if len(moving) > 5 else ''} move{'s' if len(moving) == 1 else ''}"
         rest = replace(state, time=self.start, velocity=np.zeros_like(state.velocity))
         rows = np.array(self.history, RELAXATION_STEP) if self.history else np.empty(0, RELAXATION_STEP)
-        log.info("static equilibrium: %s (%d steps)", reason, len(rows))
+        log.info("static equilibrium: %s (%s)", reason, counted(len(rows), "step"))
         moved = self.limit.moved(state.vertices)
         return Equilibrium(rest, converged, collapsed, moving, reason, rows, moved, self.result, tuple(self.energies))
 

@@ -107,7 +107,7 @@ class FactorOfSafety:
                 f"{t.factor:8.4f}  {answer:<11}  {t.steps:5d}  {t.unbalanced:10.2e}  {t.drift:10.2e}  {t.reason}"
             )
         found = f"{self.factor:.4f}" if math.isfinite(self.upper) else f"above {self.lower:g}"
-        lines.append(f"{title} {found}" + (", moving at failure:" if self.mechanism else ""))
+        lines.append(f"{title} {found}" + ("; blocks that move at failure:" if self.mechanism else ""))
         lines += [f"  {line}" for line in self.mechanism]
         lines += [f"  {self.travel_text()}"] if self.travel is not None else []
         for a in self.anchors:

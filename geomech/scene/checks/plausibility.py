@@ -105,7 +105,8 @@ def _slivers(c: Check) -> None:
         return
     least = int(slivers[np.argmin(areas[slivers])])
     x, y = blocks.mean_vertices(blocks.vertices)[least]
-    others = f", and {len(slivers) - 1} more are below {SLIVER * usual:.2g} m²" if len(slivers) > 1 else ""
+    more = len(slivers) - 1
+    others = f", and {more} more {'is' if more == 1 else 'are'} below {SLIVER * usual:.2g} m²" if more else ""
     c.warn(
         ("geometry",),
         f"{blocks.names[least]!r} near x = {x:.4g}, y = {y:.4g} m has {areas[least]:.2g} m², where half of the blocks have "
