@@ -170,7 +170,7 @@ def measure(quick: bool = False) -> Measured:
     if not quick:
         draw(
             points, ROUTES, FOLDER / "work_precision.png", (1, 2), lambda p: f"p = {p.size}",
-            ("largest error of a stress intensity factor, better to the right", "a load step, bodies made anew, ms"), None,
+            ("largest error of a stress intensity factor, better to the right", "a load step, bodies set up again, ms"), None,
         )  # fmt: skip
     write_json(FOLDER / "boundary.json", record)
     lines = [

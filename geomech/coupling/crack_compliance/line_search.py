@@ -40,7 +40,7 @@ class LineSearch:
         self._last: dict[int, Linearised] = {}
 
     def forget(self) -> None:
-        """Start anew: the step has another length."""
+        """Start again: the step has another length."""
         self._last = {}
 
     def next(

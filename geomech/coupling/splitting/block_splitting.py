@@ -36,7 +36,6 @@ class Split:
     state      velocity, stress, rotation and crack strain inherited, contacts renumbered
     cracks     segments that are not block edges now, each with the part that contains it
     parent     (n_blocks,) number of each block's parent before the split
-    lost_area  (n_blocks before,) m², area of each block less that of its parts: round-off, since slivers are merged
     vertex_origin, edge_origin   (n_vertices,) the vertex before the split, and the edge before the split that the edge
                leaving it is (part of); −1 for a new vertex and for a former crack face
     edge_span  (n_vertices, 2) begin and end of the edge on that former edge, 0 to 1
@@ -46,7 +45,6 @@ class Split:
     state: State
     cracks: Cracks
     parent: np.ndarray
-    lost_area: np.ndarray
     vertex_origin: np.ndarray
     edge_origin: np.ndarray
     edge_span: np.ndarray
@@ -139,12 +137,11 @@ def split_blocks(
         removed=None if state.removed is None else state.removed[parent],
         order=None if state.order is None else np.asarray(state.order)[parent],
     )
-    lost = blocks.areas() - np.bincount(parent, weights=children_blocks.areas(), minlength=blocks.n_blocks)
     origin, edge_origin, span = (
         np.concatenate([part for piece in pieces for part in getattr(piece, name)])
         for name in ("origin", "edge_origin", "edge_span")
     )
-    return Split(children_blocks, after, rest, parent, lost, origin, edge_origin, span)
+    return Split(children_blocks, after, rest, parent, origin, edge_origin, span)
 
 
 def _divide(

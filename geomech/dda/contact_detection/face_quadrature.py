@@ -247,7 +247,7 @@ class FacePoints:
         arm[faces.rows] = faces.arm
         first, second = arm[self.ends].T
         arm[self.ends] = first[:, None] + self.place * (second - first)[:, None]
-        return replace(faces, arm=arm[faces.rows])
+        return faces._replace(arm=arm[faces.rows])
 
     def at_points(self, force: np.ndarray) -> np.ndarray:
         """(n,) normal forces of the springs, N, from the ``force`` (n,) of CONTACT rows at the corners."""

@@ -20,7 +20,6 @@ strength, the face that reaches f = 0 first.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -36,8 +35,7 @@ WHOLE, CRACKED = 1, 3
 WITHOUT_GAPS = NOTABLE
 
 
-@dataclass(frozen=True, eq=False)
-class BondedFaces:
+class BondedFaces(NamedTuple):
     """Faces (m,) with at least two bonds at the start of a step.
 
     start   (m + 1,)  first position of each face's contacts in ``rows``
@@ -125,19 +123,6 @@ def _when(before, after, strength):
     if before > 0.0:
         return -before / (before + strength)
     return -before / max(after - before, 1e-300)
-
-
-class FaceBonds(NamedTuple):
-    """`BondedFaces` for kernels."""
-
-    start: np.ndarray
-    rows: np.ndarray
-    arm: np.ndarray
-    length: np.ndarray
-
-    @classmethod
-    def of(cls, faces: BondedFaces) -> FaceBonds:
-        return cls(faces.start, faces.rows, faces.arm, faces.length)
 
 
 class ForcesBefore(NamedTuple):
@@ -260,9 +245,9 @@ def _stick_again(f, faces, forces, states, strengths, called, violation):
 @kept(fastmath=False, error_model="numpy", nogil=True, **UNCOUNTED)
 def check_faces(face_bonds, forces, forces_before, tried, strength, slack, new, violation):
     """Correct, in place, the states ``new`` and the ``violation`` of `check_states` for contacts of bonded faces. Plain
-    tuples: ``face_bonds`` (`FaceBonds`), ``forces_before`` (`ForcesBefore`), the states ``tried`` (`ContactStates`) and
+    tuples: ``face_bonds`` (`BondedFaces`), ``forces_before`` (`ForcesBefore`), the states ``tried`` (`ContactStates`) and
     their ``strength`` (`Strengths`); other arguments as there."""
-    faces, before, states = FaceBonds(*face_bonds), ForcesBefore(*forces_before), ContactStates(*tried)
+    faces, before, states = BondedFaces(*face_bonds), ForcesBefore(*forces_before), ContactStates(*tried)
     strengths, called = Strengths(*strength), ContactStates(*new)
     for f in range(faces.length.shape[0]):
         intact, opened, loose = _bond_of_face(f, faces, states)

@@ -54,6 +54,24 @@ class ContactStates(NamedTuple):
     direction: np.ndarray
     bonded: np.ndarray
 
+    @property
+    def key(self) -> bytes:
+        return self.state.tobytes() + self.direction.tobytes() + self.bonded.tobytes()
+
+    def without_open_bonds(self) -> ContactStates:
+        """These states, without the bonds that are open."""
+        return ContactStates(self.state, self.direction, np.where(self.state == OPEN, 0, self.bonded))
+
+    def switched(self, wrong: np.ndarray, to: ContactStates) -> ContactStates:
+        """These states, replaced by those of ``to`` where ``wrong``."""
+        return ContactStates(*(np.where(wrong, new, old) for old, new in zip(self, to, strict=True)))
+
+    def sliding(self, which: np.ndarray, shear: np.ndarray) -> ContactStates:
+        """These states, with the contacts ``which`` that have no bond sliding under ``shear`` (n,) N."""
+        which = which & (self.bonded == 0) & (shear != 0)
+        direction = np.where(which, np.sign(shear), self.direction)
+        return ContactStates(np.where(which, SLIP, self.state), direction, self.bonded)
+
 
 class Strengths(NamedTuple):
     """The fields of `penalty_springs.Springs` that `check_states` uses, (n,) each."""

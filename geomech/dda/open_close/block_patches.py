@@ -15,17 +15,17 @@ from dataclasses import replace
 import numpy as np
 
 from ...model import ContactSolver
-from ..joint_laws.coulomb_return import moved
+from ..joint_laws.coulomb_return import ContactStates, moved
 from ..joint_laws.penalty_springs import Springs
 from ..linear_solver import assembly
-from .equations import Answer, Equations, States, Unsettled
+from .equations import Answer, Equations, Unsettled
 from .settled_states import Settled
 
 
 def settled_in_patch(
-    equations: Equations, which: np.ndarray, states: States, answer: Answer, settle: Callable[[Equations], Settled],
+    equations: Equations, which: np.ndarray, states: ContactStates, answer: Answer, settle: Callable[[Equations], Settled],
     solver: ContactSolver,
-) -> tuple[States | None, float]:  # fmt: skip
+) -> tuple[ContactStates | None, float]:  # fmt: skip
     """``states`` in which those of the contacts around ``which`` (n,) bool are replaced by the result of ``settle``,
     with all other blocks moving as in ``answer``; None if it finds none. Also returns the cost in solutions of the
     whole system."""
@@ -82,7 +82,7 @@ def settled_in_patch(
         return None, 0.0
     state, direction = states.state.copy(), states.direction.copy()
     state[rows], direction[rows] = settled.state, settled.direction
-    return States(state, direction, states.bonded), settled.iterations * float(inside.sum()) / n
+    return ContactStates(state, direction, states.bonded), settled.iterations * float(inside.sum()) / n
 
 
 def _of(unknowns: np.ndarray, inside: np.ndarray) -> np.ndarray:

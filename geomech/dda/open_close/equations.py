@@ -10,7 +10,7 @@ import numpy as np
 
 from ...model import OPEN, SLIP
 from ..equation_records import BlockEquations, ContactMotion, ContactStiffness, SpringsInStates
-from ..joint_laws.bonds import BondedFaces, FaceBonds, ForcesBefore, check_faces, first_to_break
+from ..joint_laws.bonds import BondedFaces, ForcesBefore, check_faces, first_to_break
 from ..joint_laws.coulomb_return import ContactStates, Strengths, check_states, contact_forces
 from ..joint_laws.nonlinear_laws import NonlinearLaws
 from ..joint_laws.penalty_springs import Springs
@@ -38,40 +38,13 @@ def plastic_slip(forces: np.ndarray, state: np.ndarray, shear_force: np.ndarray,
 
 
 @dataclass(frozen=True, eq=False)
-class States:
-    """Trial states of contacts (n,)."""
-
-    state: np.ndarray
-    direction: np.ndarray
-    bonded: np.ndarray
-
-    @property
-    def key(self) -> bytes:
-        return self.state.tobytes() + self.direction.tobytes() + self.bonded.tobytes()
-
-    def without_open_bonds(self) -> States:
-        """These states, without the bonds that are open."""
-        return States(self.state, self.direction, np.where(self.state == OPEN, 0, self.bonded))
-
-    def switched(self, wrong: np.ndarray, to: States) -> States:
-        """These states, replaced by those of ``to`` where ``wrong``."""
-        pairs = ((self.state, to.state), (self.direction, to.direction), (self.bonded, to.bonded))
-        return States(*(np.where(wrong, replacement, present) for present, replacement in pairs))
-
-    def sliding(self, which: np.ndarray, shear: np.ndarray) -> States:
-        """These states, with the contacts ``which`` that have no bond sliding under ``shear`` (n,) N."""
-        which = which & (self.bonded == 0) & (shear != 0)
-        return States(np.where(which, SLIP, self.state), np.where(which, np.sign(shear), self.direction), self.bonded)
-
-
-@dataclass(frozen=True, eq=False)
 class Answer:
     """Solution in trial states: motion (6 n,) and forces (n, 4), the states these require, the violation of each
     contact (N), whether linearised and nonlinear laws agree, and the linearised laws."""
 
     unknowns: np.ndarray
     forces: np.ndarray
-    called: States
+    called: ContactStates
     violation: np.ndarray
     missed: np.ndarray | None
     slip: np.ndarray
@@ -137,7 +110,7 @@ class Equations:
         self._held = None
         return self._data
 
-    def answer(self, states: States, normal_force: np.ndarray, slip: np.ndarray) -> Answer:
+    def answer(self, states: ContactStates, normal_force: np.ndarray, slip: np.ndarray) -> Answer:
         """Solve with ``states``. Nonlinear laws are linearised at ``normal_force`` and ``slip`` (n,). Raises
         `Unsettled`."""
         pattern, found, springs, gap = self.pattern, self.found, self.springs, self.gap
@@ -184,7 +157,7 @@ class Equations:
         return contact_forces(unknowns, tuple(self._contacts), tuple(in_states))
 
     def _answered(
-        self, states: States, springs: Springs, gap: np.ndarray, slip: np.ndarray, symmetric: bool, within: float
+        self, states: ContactStates, springs: Springs, gap: np.ndarray, slip: np.ndarray, symmetric: bool, within: float
     ) -> Answer:
         """The solution of the assembled system, with linearised ``springs`` and ``gap``, to a relative residual of
         ``within``."""
@@ -203,7 +176,7 @@ class Equations:
         return self.checked(states, unknowns, forces, springs, gap, slip)
 
     def checked(
-        self, states: States, unknowns: np.ndarray, forces: np.ndarray, springs: Springs, gap: np.ndarray,
+        self, states: ContactStates, unknowns: np.ndarray, forces: np.ndarray, springs: Springs, gap: np.ndarray,
         slip: np.ndarray,
     ) -> Answer:  # fmt: skip
         """The solution ``unknowns`` (6 n,) with contact ``forces`` (n, 4), and the states that it requires."""
@@ -218,9 +191,9 @@ class Equations:
         tried, strengths = (state, direction, bonded), tuple(Strengths.of(known))
         *called, violation = check_states(forces, tried, strengths, found.shear, self.slack)
         if found.faces is not None:
-            faces, before = tuple(FaceBonds.of(found.faces)), (found.normal, found.shear)
+            faces, before = tuple(found.faces), (found.normal, found.shear)
             check_faces(faces, forces, before, tried, strengths, self.slack, tuple(called), violation)
-        return Answer(unknowns, forces, States(*called), violation, missed, slip, springs, gap)
+        return Answer(unknowns, forces, ContactStates(*called), violation, missed, slip, springs, gap)
 
     @property
     def _product(self) -> Callable[[np.ndarray], np.ndarray] | None:
@@ -232,14 +205,14 @@ class Equations:
         to ``within``."""
         return None
 
-    def first_bonds(self, states: States, answer: Answer, which: np.ndarray) -> np.ndarray:
+    def first_bonds(self, states: ContactStates, answer: Answer, which: np.ndarray) -> np.ndarray:
         """(n,) bool: those of the bonds ``which`` (n,) bool that break first on the faces of their blocks under a load
         that grows linearly during the step."""
         found, springs = self.found, answer.springs
         faces = BondedFaces.none() if found.faces is None else found.faces
         when = first_to_break(
-            FaceBonds.of(faces), answer.forces, ForcesBefore(found.normal, found.shear),
-            ContactStates(states.state, states.direction, states.bonded), answer.called.bonded, Strengths.of(springs),
+            faces, answer.forces, ForcesBefore(found.normal, found.shear),
+            states, answer.called.bonded, Strengths.of(springs),
         )  # fmt: skip
         when[~which] = np.inf
         first = np.full(len(self.pattern.order), np.inf)
@@ -249,7 +222,7 @@ class Equations:
         least = np.minimum(first[found.block], first[found.other])
         return which & (when <= least + NOTHING * np.abs(least))
 
-    def settled(self, states: States, answer: Answer, iterations: int) -> Settled:
+    def settled(self, states: ContactStates, answer: Answer, iterations: int) -> Settled:
         """The result for consistent ``states``. Bonds without tensile strength are lost where they are open by more
         than the accuracy of gaps. (A face that opens by a micrometre only because of how springs share its load, and
         closes as the load grows, stays bonded.)"""

@@ -21,9 +21,10 @@ import numpy as np
 from ...model import OPEN, SLIP, STICK, ContactSolver
 from ..contact_detection.contact_finder import ContactSet
 from ..contact_detection.contact_records import largest_of_blocks
+from ..joint_laws.coulomb_return import ContactStates
 from ..kinematics.tolerances import NOTHING
 from .block_patches import settled_in_patch
-from .equations import Answer, Equations, States, Unsettled
+from .equations import Answer, Equations, Unsettled
 from .interior_point.central_path import SLIPPED, CentralPath
 from .operator_splitting import can_split, split
 from .plastic_splitting import split_plastic
@@ -137,7 +138,9 @@ class _Search:
         self.equations, self.effort, self.solver = equations, effort, effort.solver
         found = self.found = equations.found
         n = len(found)
-        self.states = States(*((found.state, found.direction, found.bonded) if found.tried is None else found.tried))
+        self.states = ContactStates(
+            *((found.state, found.direction, found.bonded) if found.tried is None else found.tried)
+        )
         self.normal_force, self.slip = found.normal, np.zeros(n)
         self.newton, self.spent, self.most = 0, 0.0, effort.max_iterations
         self.large = is_large(equations.pattern.n, equations.statics, self.solver)
@@ -152,11 +155,13 @@ class _Search:
         self._restart()
 
     def _continued(self) -> bool:
-        """Whether the search begins anew with laws that lead to the actual ones (`NonlinearLaws.continued`)."""
+        """Whether the search begins again with laws that lead to the actual ones (`NonlinearLaws.continued`)."""
         curved, found = self.equations.curved, self.found
         if curved is None or not curved.continued():
             return False
-        self.states = States(found.state, found.direction, found.bonded if found.tried is None else found.tried[2])
+        self.states = ContactStates(
+            found.state, found.direction, found.bonded if found.tried is None else found.tried[2]
+        )
         self.normal_force, self.slip, self.continuing = found.normal, np.zeros(len(found)), True
         self._begin_again()
         return True
@@ -179,7 +184,7 @@ class _Search:
     def _restart(self, proposed: bool = False) -> None:
         """Restart the counts with other states, which may be ``proposed`` by the central path."""
         self.fewest, self.tries, self.proposed, self.falls = np.inf, 0, proposed, True
-        self.best: tuple[States, Answer, np.ndarray] | None = None
+        self.best: tuple[ContactStates, Answer, np.ndarray] | None = None
 
     def settled(self) -> Settled:
         """The consistent states. Raises `Unsettled`."""
@@ -257,7 +262,7 @@ class _Search:
         self.seen.clear()
         self._break_bonds(answer, bonds)
 
-    def _called(self, answer: Answer, wrong: np.ndarray) -> States:
+    def _called(self, answer: Answer, wrong: np.ndarray) -> ContactStates:
         """The states that the ``answer`` requires."""
         closing = wrong & (self.states.state == OPEN) & (answer.called.state == STICK)
         called = answer.called.sliding(closing & (self.closed > 0), self.sheared)
@@ -334,7 +339,7 @@ class _Search:
         equations = self.equations
         log.debug("operator splitting: %d iterations", solved.iterations)
         self.spent += solved.spent
-        self.states = States(solved.state, solved.direction, bonded)
+        self.states = ContactStates(solved.state, solved.direction, bonded)
         slip = np.zeros(len(self.found))
         return self._found(
             equations.checked(self.states, solved.unknowns, solved.forces, equations.springs, equations.gap, slip)
@@ -356,7 +361,7 @@ class _Search:
         self._restart()
         return True
 
-    def _pivot(self, answer: Answer, wrong: np.ndarray, called: States, returned: bool) -> None:
+    def _pivot(self, answer: Answer, wrong: np.ndarray, called: ContactStates, returned: bool) -> None:
         """Switch all ``wrong`` contacts to the required states ``called``; or, once states have ``returned`` or the
         number does not decrease, only the worst of each block until there is a new minimum: block principal pivoting
         (Júdice & Pires 1994). Raises `Unsettled`."""
@@ -424,7 +429,7 @@ class _Search:
         slides[whole.face[known & (state == SLIP)]] = True
         return np.where(known & ~slides[whole.face] & (bonded == SLIPPED), self.states.bonded, bonded)
 
-    def _proposed(self, path: CentralPath) -> States | None:
+    def _proposed(self, path: CentralPath) -> ContactStates | None:
         """New states proposed by the ``path`` once nearly all contacts are decided; None if it ends,
         exceeds its limit or, in a large system, is stopped by contacts. Raises `Unsettled`."""
         solver, n = self.solver, len(self.found)
@@ -441,7 +446,7 @@ class _Search:
             decided = path.arrived or undecided <= few
             if decided and path.missed < solver.path_balance and path.epsilon < 1.0:
                 state, direction = path.states()
-                states = States(state, direction, self._bonds_after_path(state, path.bonded))
+                states = ContactStates(state, direction, self._bonds_after_path(state, path.bonded))
                 if states.key not in self.offered:
                     self.offered.add(states.key)
                     return states

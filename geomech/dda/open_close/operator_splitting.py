@@ -29,8 +29,9 @@ import numpy as np
 from ...compiled import UNCOUNTED, kept
 from ...model import OPEN, SLIP, STICK, ContactSolver
 from ..equation_records import ContactMotion, ContactStiffness
+from ..joint_laws.coulomb_return import ContactStates
 from ..linear_solver import assembly
-from .equations import Equations, States
+from .equations import Equations
 from .interior_point.central_path import SLIPPED
 from .interior_point.contact_terms import balance
 
@@ -47,7 +48,7 @@ _TURN, _FACTORS = 0.1, 1.0
 class Proposal(NamedTuple):
     """The ``states`` that contacts approach, and the cost in Newton iterations."""
 
-    states: States
+    states: ContactStates
     spent: float
 
 
@@ -198,4 +199,4 @@ def split(equations: Equations, bonded: np.ndarray, solver: ContactSolver) -> Pr
         unknowns += between.correction(rest)
         if taken in _FOLLOWS and between.follow(states[0], at_hand):
             spent += _FACTORS
-    return Proposal(States(*states, bonded), spent)
+    return Proposal(ContactStates(*states, bonded), spent)
