@@ -36,6 +36,6 @@ TOPICS = {
 }
 
 
-def topic(name: str) -> Callable[..., Measured]:
-    """The measuring function of a topic, imported on demand."""
-    return import_module(TOPICS[name]).measure
+def topic(name: str, function: str = "measure") -> Callable[..., Measured]:
+    """The measuring ``function`` of a topic, imported on demand."""
+    return getattr(import_module(TOPICS[name]), function)

@@ -12,7 +12,7 @@ import math
 import time
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from ...output.tables.summary import write_json
@@ -31,7 +31,7 @@ from ..slopes.limited_runs import (
     time_up,
 )
 from ..slopes.refusals import reason_of
-from ..slopes.seed_rows import program, rows_of_seeds
+from ..slopes.seed_rows import program, record_of, rows_of_seeds
 from .factor_cost import measure_cost
 from .factor_scenes import FAMILIES, FactorSlope, random_slope
 
@@ -156,9 +156,7 @@ def _joined(*parts: Measured) -> Measured:
     return Measured("\n\n".join(part.text for part in parts), tuple(f for part in parts for f in part.figures))
 
 
-def measure_many(
-    seeds: Sequence[int], seconds: float = LIMIT, folder: Path = FOLDER, workers: int | None = None
-) -> Measured:
+def measure_many(seeds: Sequence[int], folder: Path = FOLDER, workers: int | None = None) -> Measured:
     """Every one of the ``seeds``, one on each core (``workers``), as text; rows and JSON are written to ``folder``.
 
     Seeds already run by the same program, according to the rows there, are not run again.
@@ -175,10 +173,7 @@ def _row(seed: int) -> dict:
 
 
 def _from_row(row: dict) -> Factored:
-    of = {each.name for each in fields(Searched)}
-    searches = tuple(Searched(**{k: v for k, v in search.items() if k in of}) for search in row["searches"])
-    of = {each.name for each in fields(Factored)}
-    return Factored(**{k: v for k, v in row.items() if k in of} | {"searches": searches})
+    return record_of(Factored, row | {"searches": tuple(record_of(Searched, search) for search in row["searches"])})
 
 
 def table(every: Sequence[Factored]) -> Measured:

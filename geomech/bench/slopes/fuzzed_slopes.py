@@ -12,7 +12,7 @@ import statistics
 import tempfile
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from dataclasses import asdict, dataclass, field, fields
+from dataclasses import asdict, dataclass, field
 from functools import partial
 from pathlib import Path
 
@@ -20,7 +20,7 @@ from ..figures import Measured
 from .limited_runs import LONG, REFUSED, REPORTED, RIGHT, VERDICTS, WRONG, CollectedWarnings, limited
 from .random_slopes import scene_text
 from .refusals import REASONS
-from .seed_rows import program, rows_of_seeds
+from .seed_rows import program, record_of, rows_of_seeds
 from .slope_invariants import INVARIANTS, Invariants
 
 #: Seeds of scenes that take about a second, with cracks and without.
@@ -124,9 +124,8 @@ def measure_many(
     from ...render.benchmarks.slope_outcomes import draw
 
     rows = folder / "slopes.jsonl"
-    names = {field.name for field in fields(Watched)}
     found_rows = rows_of_seeds(seeds, rows, partial(_row_of_run, seconds), program(_MODULES), _compile, workers)
-    every = [Watched(**{name: value for name, value in row.items() if name in names}) for row in found_rows]
+    every = [record_of(Watched, row) for row in found_rows]
     found = _measured(every)
     picture = draw(every, VERDICTS, {name: each.bound for name, each in INVARIANTS.items()}, folder / "slopes.png")
     places = ", ".join(map(str, (folder / "slopes.json", rows.name, picture.name)))

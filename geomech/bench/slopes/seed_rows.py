@@ -8,8 +8,11 @@ import multiprocessing
 import os
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
+from dataclasses import fields
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar, cast
+
+_Record = TypeVar("_Record")
 
 #: Parts of the package on which a slope's run depends.
 PARTS = ("model", "shapes", "scene", "dda", "ddm", "coupling")
@@ -43,6 +46,12 @@ def rows_of_seeds(
                 out.write(json.dumps(row) + "\n")
                 out.flush()
     return [known[seed] for seed in seeds]
+
+
+def record_of(kind: type[_Record], row: dict[str, Any]) -> _Record:
+    """The dataclass ``kind`` with the fields that the ``row`` has of it."""
+    names = {field.name for field in fields(cast(Any, kind))}
+    return kind(**{name: value for name, value in row.items() if name in names})
 
 
 def program(modules: Iterable[str], also: str = "") -> str:

@@ -11,7 +11,7 @@ import math
 import tomllib
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from dataclasses import asdict, dataclass, fields, replace
+from dataclasses import asdict, dataclass, replace
 from functools import partial
 from pathlib import Path
 
@@ -22,7 +22,7 @@ from ..figures import Measured
 from .drawn_slopes import problem_of
 from .limited_runs import LONG, REFUSED, REPORTED, RIGHT, VERDICTS, WRONG, CollectedWarnings, Ended, limited
 from .moved_mass import BlockDisplacements
-from .seed_rows import program, rows_of_seeds
+from .seed_rows import program, record_of, rows_of_seeds
 from .sliding_scenes import Slope, random_slope, slab
 from .slope_invariance import WARNED
 
@@ -191,8 +191,7 @@ def measure_many(
         seeds, folder / "sliding.jsonl", partial(_row_of_run, tuple(steps), end, seconds), program(_MODULES, also),
         compile_kernels, workers,
     )  # fmt: skip
-    names = {each.name for each in fields(Slid)}
-    every = [Slid(**{name: value for name, value in row.items() if name in names}) for row in rows]
+    every = [record_of(Slid, row) for row in rows]
     write_json(folder / "sliding.json", [asdict(each) for each in every])
     picture = draw(every, BOUND, folder / "sliding.png")
     found = table(every)

@@ -16,7 +16,7 @@ import math
 import re
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import asdict, dataclass, field, fields, replace
+from dataclasses import asdict, dataclass, field, replace
 from functools import partial
 from pathlib import Path
 
@@ -39,7 +39,7 @@ from .drawn_slopes import (
 from .limited_runs import LONG, REFUSED, REPORTED, RIGHT, VERDICTS, WRONG, CollectedWarnings, Ended, limited
 from .moved_mass import BlockDisplacements, moving_from
 from .random_slopes import scene_text
-from .seed_rows import program, rows_of_seeds
+from .seed_rows import program, record_of, rows_of_seeds
 from .slope_invariants import INVARIANTS
 
 #: Processor time limit of each run of a slope, s.
@@ -405,8 +405,7 @@ def measure_invariance(
         seeds, folder / "invariance.jsonl", partial(_row_of_run, seconds), program(_MODULES, f"{seconds:g} s"),
         compile_kernels, workers,
     )  # fmt: skip
-    names = {each.name for each in fields(Invariance)}
-    every = [Invariance(**{name: value for name, value in row.items() if name in names}) for row in rows]
+    every = [record_of(Invariance, row) for row in rows]
     write_json(folder / "invariance.json", [asdict(each) for each in every])
     picture = draw(
         every, VERDICTS, {name: each.bound for name, each in BOUNDS.items()}, folder / "invariance.png",

@@ -9,6 +9,9 @@ from pathlib import Path
 from ...bench import TOPICS, topic
 from ..verb import DONE, FAILED, BadInput, Verbs, add_verb, check_writable
 
+#: Topics that run any number of random scenes, one per seed.
+_SEEDED = {"safety", "slopes", "sliding"}
+
 
 def declare(verbs: Verbs) -> None:
     """The verb's arguments."""
@@ -80,18 +83,8 @@ def _bench(options: argparse.Namespace) -> int:
             from ...bench.slopes.slope_invariance import measure_invariance
 
             found[name] = measure_invariance(seeds)
-        elif name == "slopes" and seeds:
-            from ...bench.slopes.fuzzed_slopes import measure_many
-
-            found[name] = measure_many(seeds)
-        elif name == "sliding" and seeds:
-            from ...bench.slopes.sliding_slopes import measure_many as measure_sliding
-
-            found[name] = measure_sliding(seeds)
-        elif name == "safety" and seeds:
-            from ...bench.safety.slope_factors import measure_many as measure_factors
-
-            found[name] = measure_factors(seeds)
+        elif name in _SEEDED and seeds:
+            found[name] = topic(name, "measure_many")(seeds)
         elif name in ("dda", "motion"):
             found[name] = topic(name)(options.quick, options.blocks)
         elif name == "debris":
@@ -116,7 +109,7 @@ def _seeds(options: argparse.Namespace) -> range:
     """The requested seeds; none: the benchmark's own."""
     if options.seeds is None:
         return range(0)
-    if not {"safety", "slopes", "sliding"} & set(options.topics):
+    if not _SEEDED & set(options.topics):
         raise BadInput("--seeds belongs to safety, slopes and sliding: geomech bench slopes --seeds 0-299")
     first, _, last = options.seeds.partition("-")
     if not (first.isdecimal() and (last or first).isdecimal() and int(first) <= int(last or first)):
