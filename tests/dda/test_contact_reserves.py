@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from types import SimpleNamespace
-
 import numpy as np
 import pytest
 
 from geomech.dda.joint_laws.coulomb_return import check_states, reserves
+from geomech.dda.joint_laws.penalty_springs import Springs
 from geomech.model import OPEN, SLIP, STICK
 
 
@@ -18,9 +17,11 @@ def test_contacts_leave_their_states_where_nothing_is_left_in_reserve(slack):
     n, random = 3000, np.random.default_rng(3)
     state, bonded = random.choice([OPEN, STICK, SLIP], n), random.integers(0, 2, n)
     bonded[state == SLIP] = 0
-    springs = SimpleNamespace(
+    zero = np.zeros(n)
+    springs = Springs(
         normal=10 ** random.uniform(9, 12, n), shear=10 ** random.uniform(9, 12, n), peak=random.uniform(0.0, 1.5, n),
         hold=random.choice([0.0, 1e3], n), cohesion=random.choice([0.0, 1e4], n), tension=random.choice([0.0, 3e3], n),
+        friction=zero, sliding=zero, lift=zero, keeps=np.zeros(n, bool), crushing=np.full(n, np.inf),
     )  # fmt: skip
     # Each close to one of its limits: by parts, within and beyond, of what is not known of it.
     beyond = random.uniform(-2.0, 3.0, n)
@@ -32,15 +33,8 @@ def test_contacts_leave_their_states_where_nothing_is_left_in_reserve(slack):
     normal = np.where(lifts, -pull - beyond * (rounding + 1e-9 * pull), pressed)
     shear = np.where(lifts, 0.0, random.choice([-1.0, 1.0], n) * (strength + beyond * unknown))
     gap = np.where(state == OPEN, -beyond * slack, -normal / springs.normal)
-    zero = np.zeros(n)
-    after = check_states(
-        np.column_stack([normal, shear, gap, zero]), (state, np.ones(n), bonded),
-        (
-            springs.normal, springs.shear, zero, zero, springs.peak, springs.hold, springs.cohesion, springs.tension,
-            np.zeros(n, bool),
-        ),
-        zero, np.full(n, slack),
-    )[0]  # fmt: skip
+    forces, states = np.column_stack([normal, shear, gap, zero]), (state, np.ones(n), bonded)
+    after = check_states(forces, states, tuple(springs), zero, np.full(n, slack))[0]
     reserve = reserves(state, bonded, normal, shear, gap, springs, slack)
     # Where forces are sums of larger numbers, these are known to their last digits.
     digits = 4e-16 * (np.abs(normal) + np.abs(shear) + strength)

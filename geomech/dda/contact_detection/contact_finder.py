@@ -219,7 +219,7 @@ class ContactFinder:
         if not keep.all():
             vertex, edge, block, other, law = vertex[keep], edge[keep], block[keep], other[keep], law[keep]
             corner, geometry = corner[keep], geometry[keep]
-            springs = Springs(**{name: value[keep] for name, value in vars(springs).items()})
+            springs = springs.of(keep)
             remembered = {name: value[keep] for name, value in remembered.items()}
         bonded = remembered["bonded"]
         found = ContactSet(

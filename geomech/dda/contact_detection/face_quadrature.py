@@ -232,8 +232,7 @@ class FacePoints:
         ratio[self.ends] = lengths[:, None] / self.corners[self.ends, 4]
         share = np.ones(len(self.corners))
         share[self.ends] = self.share[:, None]
-        return replace(
-            lumped,
+        return lumped._replace(
             normal=lumped.normal * ratio * share,
             shear=np.where(stiff_in_shear, lumped.shear * ratio, lumped.shear * share),
             cohesion=lumped.cohesion * ratio,

@@ -229,7 +229,7 @@ class Faces:
         def same(value: np.ndarray) -> np.ndarray:
             return np.concatenate([value[self.lone], self._both(value)[0]])
 
-        own = {field.name: same(getattr(corner, field.name)) for field in fields(corner)}
+        own = {name: same(value) for name, value in corner._asdict().items()}
         for name, which in zip(("normal", "shear"), by_length, strict=True):
             own[name] = shared(getattr(corner, name), which)
         strength, always = np.where(self.face < 0, 1.0 / self.share, 1.0), np.ones(len(self.corners), bool)

@@ -27,7 +27,8 @@ import numpy as np
 from ...compiled import UNCOUNTED, kept, part
 from ...model import OPEN, SLIP, STICK
 from ..kinematics.tolerances import NOTABLE, ONE_FACE_COS, ONE_FACE_SIN
-from .coulomb_return import ContactStates, Strengths
+from .coulomb_return import ContactStates
+from .penalty_springs import Springs
 
 #: Bond states of a CONTACT row: intact, and cracked from its edge (cohesion only under compression).
 WHOLE, CRACKED = 1, 3
@@ -246,9 +247,9 @@ def _stick_again(f, faces, forces, states, strengths, called, violation):
 def check_faces(face_bonds, forces, forces_before, tried, strength, slack, new, violation):
     """Correct, in place, the states ``new`` and the ``violation`` of `check_states` for contacts of bonded faces. Plain
     tuples: ``face_bonds`` (`BondedFaces`), ``forces_before`` (`ForcesBefore`), the states ``tried`` (`ContactStates`) and
-    their ``strength`` (`Strengths`); other arguments as there."""
+    their ``strength`` (`Springs`); other arguments as there."""
     faces, before, states = BondedFaces(*face_bonds), ForcesBefore(*forces_before), ContactStates(*tried)
-    strengths, called = Strengths(*strength), ContactStates(*new)
+    strengths, called = Springs(*strength), ContactStates(*new)
     for f in range(faces.length.shape[0]):
         intact, opened, loose = _bond_of_face(f, faces, states)
         if not intact:

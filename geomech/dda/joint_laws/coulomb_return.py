@@ -15,7 +15,6 @@ import numpy as np
 from ...compiled import UNCOUNTED, kept, part
 from ...model import OPEN, SLIP, STICK
 from ..kinematics.tolerances import LITTLE, SAME
-from .penalty_springs import Springs
 
 #: Products may be fused into sums.
 _jit = kept(fastmath={"contract"}, error_model="numpy", nogil=True)
@@ -73,27 +72,6 @@ class ContactStates(NamedTuple):
         return ContactStates(np.where(which, SLIP, self.state), direction, self.bonded)
 
 
-class Strengths(NamedTuple):
-    """The fields of `penalty_springs.Springs` that `check_states` uses, (n,) each."""
-
-    normal: np.ndarray
-    shear: np.ndarray
-    friction: np.ndarray
-    sliding: np.ndarray
-    peak: np.ndarray
-    hold: np.ndarray
-    cohesion: np.ndarray
-    tension: np.ndarray
-    keeps: np.ndarray
-
-    @classmethod
-    def of(cls, springs: Springs) -> Strengths:
-        return cls(
-            springs.normal, springs.shear, springs.friction, springs.sliding, springs.peak, springs.hold,
-            springs.cohesion, springs.tension, springs.keeps,
-        )  # fmt: skip
-
-
 @_jit
 def contact_forces(unknowns, contacts, springs):
     """(n, 4): normal force, shear force, new gap and motion along the edge in the step, of ``contacts`` (`ContactMotion`)
@@ -116,15 +94,15 @@ def contact_forces(unknowns, contacts, springs):
 
 
 @kept(fastmath=False, error_model="numpy", nogil=True)
-def check_states(forces, states, strengths, shear0, slack):
+def check_states(forces, states, springs, shear0, slack):
     """The states that the ``forces`` (n, 4) of `contact_forces` in the ``states`` (`ContactStates`) require.
 
-    Returns (new state; direction; bonded; violation (n,) N, 0 where the state is right). ``strengths`` (`Strengths`), ``shear0``
+    Returns (new state; direction; bonded; violation (n,) N, 0 where the state is right). ``springs`` (`Springs`), ``shear0``
     (n,) N as the step begins. Gaps below ``slack`` (n,) m, the round-off of coordinates, and their effect on friction
     do not change a state.
     """
     state, direction, bonded = states
-    normal, shear, friction, sliding, peak, hold, cohesion, tension, keeps = strengths
+    normal, shear, friction, sliding, peak, hold, cohesion, tension, _lift, keeps, _crushing = springs
     n = state.shape[0]
     new_state, new_direction, new_bonded = state.copy(), direction.copy(), bonded.copy()
     violation = np.zeros(n)

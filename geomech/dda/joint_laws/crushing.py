@@ -16,7 +16,6 @@ beside its spring: both together bear f ℓ at most.
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -72,7 +71,7 @@ class CrushingFaces:
         normal, start = springs.normal.copy(), gap.copy()
         normal[at] = np.where(crushes, tangent, stiff)
         start[at] = np.where(crushes, -limit / tangent - begins, gap[at])
-        return replace(springs, normal=normal), start
+        return springs._replace(normal=normal), start
 
     def misfit(
         self, was: Springs, gap_was: np.ndarray, now: Springs, gap_now: np.ndarray, state: np.ndarray,

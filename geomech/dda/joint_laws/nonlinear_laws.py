@@ -11,7 +11,6 @@ Bakhtar (1985) fig. 4; closure: Bandis, Lumsden & Barton (1983) eq. 8.
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
@@ -152,7 +151,7 @@ class CurvedJoints:
             new[name][at] = value
         gap = gap.copy()
         gap[at] = start
-        return replace(springs, **new), gap
+        return springs._replace(**new), gap
 
     def _strength(self, pressure, plastic, n, bonded):
         t, law, length = self._table, self.law, self.length

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -91,8 +92,7 @@ class JointTable:
         )
 
 
-@dataclass(frozen=True, eq=False)
-class Springs:
+class Springs(NamedTuple):
     """Per contact (n,): stiffness N/m and strengths N, all per metre of thickness.
 
     A sliding contact carries ``friction`` N + ``sliding``, a sticking one up to ``peak`` N + ``hold``, plus
@@ -113,6 +113,10 @@ class Springs:
     lift: np.ndarray
     keeps: np.ndarray
     crushing: np.ndarray
+
+    def of(self, contacts: np.ndarray) -> Springs:
+        """The springs of some ``contacts``, their numbers (k,) or (n,) bool."""
+        return Springs(*(each[contacts] for each in self))
 
 
 def penalties(
@@ -214,7 +218,7 @@ def over_a_step(
     normal = weight * springs.normal + drag
     start = np.where(joined, gap, np.minimum(gap, 0.0))
     met = springs.normal * (weight * (gap + arc) + (1.0 - weight) * start) + drag * (np.maximum(gap, 0.0) + arc)
-    return replace(springs, normal=normal, shear=weight * springs.shear), met / normal
+    return springs._replace(normal=normal, shear=weight * springs.shear), met / normal
 
 
 def end_of_step(start: np.ndarray, over: np.ndarray, sticking: np.ndarray, weight: float | np.ndarray) -> np.ndarray:

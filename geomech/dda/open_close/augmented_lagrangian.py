@@ -79,7 +79,7 @@ def settle_augmented(
             more = np.where(incremented[0], (_STIFFER - 1.0) * springs.normal, 0.0)
             gap = (springs.normal * gap + more * found.gap) / (springs.normal + more)
             shear = np.where(incremented[1], _STIFFER, 1.0) * springs.shear
-            springs, mixing = replace(springs, normal=springs.normal + more, shear=shear), _Mixing()
+            springs, mixing = springs._replace(normal=springs.normal + more, shear=shear), _Mixing()
         normal, shear = multiplier[:n], multiplier[n:]
         start = replace(found, shear=np.where(incremented[1], shear, penalty_shear))
         settled = solve(start, springs, gap - normal / springs.normal, stretch)

@@ -16,7 +16,6 @@ import numpy as np
 
 from ...model import ContactSolver
 from ..joint_laws.coulomb_return import ContactStates, moved
-from ..joint_laws.penalty_springs import Springs
 from ..linear_solver import assembly
 from .equations import Answer, Equations, Unsettled
 from .settled_states import Settled
@@ -51,7 +50,7 @@ def settled_in_patch(
     around = np.where(within >= 0, -1, order)
     part = found.part(rows)
     vectors = np.ascontiguousarray(equations.vectors[rows])
-    springs = Springs(**{name: value[rows] for name, value in vars(answer.springs).items()})
+    springs = answer.springs.of(rows)
     apart, along = moved(answer.unknowns, part.block, part.other, around, vectors).T
     bonded = states.bonded[rows]
     part = replace(
@@ -60,7 +59,7 @@ def settled_in_patch(
     )  # fmt: skip
     # Bonds do not break here, only when everything else is consistent.
     holds = np.where(bonded > 0, np.inf, 0.0)
-    springs = replace(springs, cohesion=springs.cohesion + holds, tension=springs.tension + holds)
+    springs = springs._replace(cohesion=springs.cohesion + holds, tension=springs.tension + holds)
     gap = answer.gap[rows] + apart - springs.lift * along
     if pattern.solver is None or inside.sum() <= assembly.DENSE_BLOCKS:
         own = assembly.dense_pattern(within, part.block, part.other)

@@ -122,9 +122,7 @@ class ContactSet:
         def of(value):
             if isinstance(value, np.ndarray) and len(value) == n:
                 return value[rows]
-            return (
-                Springs(**{name: each[rows] for name, each in vars(value).items()}) if value is self.springs else value
-            )
+            return value.of(rows) if isinstance(value, Springs) else value
 
         own = {field.name: of(getattr(self, field.name)) for field in fields(self)}
         tried = None if self.tried is None else tuple(each[rows] for each in self.tried)
@@ -161,7 +159,7 @@ class ContactSet:
         assert self.by_length is not None  # `ContactFinder.find` sets it before faces have points
         was, springs = points.before(self.bare, self.by_length), points.springs(self.springs, self.by_length)
         if self.whole is not None:
-            springs = replace(springs, cohesion=self.springs.cohesion)
+            springs = springs._replace(cohesion=self.springs.cohesion)
         shear = points.passed_on(self.shear, was)
         stored = self.shear**2 / was.springs(self.springs, self.by_length).shear - shear**2 / springs.shear
         return replace(
@@ -196,7 +194,7 @@ class ContactSet:
         if self.cohesive is not None and np.array_equal(cohesive, self.cohesive):
             return self
         found = self.on_corners
-        springs = replace(found.springs, cohesion=self.whole.cohesion * cohesive)
+        springs = found.springs._replace(cohesion=self.whole.cohesion * cohesive)
         return replace(found, cohesive=cohesive, springs=springs).placed(self._on_parts())
 
     def along(self, arc: np.ndarray, swing: np.ndarray) -> ContactSet:

@@ -11,7 +11,7 @@ import numpy as np
 from ...model import OPEN, SLIP
 from ..equation_records import BlockEquations, ContactMotion, ContactStiffness, SpringsInStates
 from ..joint_laws.bonds import BondedFaces, ForcesBefore, check_faces, first_to_break
-from ..joint_laws.coulomb_return import ContactStates, Strengths, check_states, contact_forces
+from ..joint_laws.coulomb_return import ContactStates, check_states, contact_forces
 from ..joint_laws.nonlinear_laws import NonlinearLaws
 from ..joint_laws.penalty_springs import Springs
 from ..kinematics.tolerances import NOTHING
@@ -188,7 +188,7 @@ class Equations:
                 self.springs, self.gap, found, state, direction, bonded, forces[:, 0], slip
             )
             missed = self.curved.misfit(springs, gap, known, known_gap, state, forces, self.slack)
-        tried, strengths = (state, direction, bonded), tuple(Strengths.of(known))
+        tried, strengths = (state, direction, bonded), tuple(known)
         *called, violation = check_states(forces, tried, strengths, found.shear, self.slack)
         if found.faces is not None:
             faces, before = tuple(found.faces), (found.normal, found.shear)
@@ -212,7 +212,7 @@ class Equations:
         faces = BondedFaces.none() if found.faces is None else found.faces
         when = first_to_break(
             faces, answer.forces, ForcesBefore(found.normal, found.shear),
-            states, answer.called.bonded, Strengths.of(springs),
+            states, answer.called.bonded, springs,
         )  # fmt: skip
         when[~which] = np.inf
         first = np.full(len(self.pattern.order), np.inf)
