@@ -22,15 +22,20 @@ class Observer(Protocol):
     works in the background may have ``on_interrupt()``, called before the ``memory()`` of a run that is interrupted: it
     stops that work, and what is not done goes into the memory.
 
+    Methods that an observer does not define do nothing.
+
     ``summary`` is one mapping that all observers share: the driver of the cycles enters what it knows (``end``, the
     reason; ``wall_s``), and each observer may add to it. ``error`` is the exception that ended the run, if any.
     """
 
-    def on_start(self, problem: Problem, folder: Path) -> None: ...
+    def on_start(self, problem: Problem, folder: Path) -> None:
+        return None
 
-    def on_cycle(self, cycle: Cycle) -> None: ...
+    def on_cycle(self, cycle: Cycle) -> None:
+        return None
 
-    def on_end(self, summary: dict[str, Any], error: BaseException | None = None) -> None: ...
+    def on_end(self, summary: dict[str, Any], error: BaseException | None = None) -> None:
+        return None
 
 
 class Resumed(Observer, Protocol):

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
-from geomech.model import Cycle, Problem
+from geomech.model import Problem
 
 from .checkpoints import checkpoint_file
+from .observer import Observer
 
 #: Names of a run's files. Files of series are overwritten, and the remaining ones are deleted at the end.
 _OWN = (
@@ -16,7 +16,7 @@ _OWN = (
 )  # fmt: skip
 
 
-class RunFolder:
+class RunFolder(Observer):
     """Observer that removes the histories, summary and checkpoints of an earlier run before the others begin."""
 
     def on_start(self, problem: Problem, folder: Path) -> None:
@@ -27,12 +27,6 @@ class RunFolder:
 
     def on_resume(self, problem: Problem, folder: Path, memory: None) -> None:
         _clear(Path(folder), tuple(name for name in _OWN if name.endswith(".part")))
-
-    def on_cycle(self, cycle: Cycle) -> None:
-        pass
-
-    def on_end(self, summary: dict[str, Any], error: BaseException | None = None) -> None:
-        pass
 
 
 def _clear(folder: Path, patterns: tuple[str, ...]) -> None:

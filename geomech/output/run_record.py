@@ -11,6 +11,7 @@ from typing import Any
 
 from geomech.model import GROUND, Cycle, Problem, counted
 
+from .observer import Observer
 from .units import stress_text
 from .unreached import unreached
 
@@ -77,7 +78,7 @@ class RunLog:
         self._handler.close()
 
 
-class SceneCopy:
+class SceneCopy(Observer):
     """Observer that writes ``scene.toml``, the scene with its variant and overrides applied, before the first cycle.
 
     ``resolved`` is a mapping like that of a TOML file; absent values (None) are left out, since TOML has no null.
@@ -95,14 +96,8 @@ class SceneCopy:
         unfinished.write_text(tomli_w.dumps(_without_none(self.resolved)), encoding="utf-8")
         os.replace(unfinished, folder / "scene.toml")
 
-    def on_cycle(self, cycle: Cycle) -> None:
-        pass
 
-    def on_end(self, summary: dict[str, Any], error: BaseException | None = None) -> None:
-        pass
-
-
-class Places:
+class Places(Observer):
     """Observer that writes `PLACES`: reference locations (m) of monitors and bolts, which the scene may take from its
     drawing."""
 
@@ -130,12 +125,6 @@ class Places:
         """The file stays; the model may have lost bolts meanwhile."""
         if not (Path(folder) / PLACES).is_file():
             self.on_start(problem, folder)
-
-    def on_cycle(self, cycle: Cycle) -> None:
-        pass
-
-    def on_end(self, summary: dict[str, Any], error: BaseException | None = None) -> None:
-        pass
 
 
 def _without_none(value: Any) -> Any:

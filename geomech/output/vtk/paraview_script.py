@@ -5,8 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from geomech.model import Cycle, Problem
+from geomech.model import Problem
 
+from ..observer import Observer
 from .paraview_state import drawable, view_state
 from .series import Series
 
@@ -225,7 +226,7 @@ main()
 '''
 
 
-class ViewScript:
+class ViewScript(Observer):
     """Observer that writes ``view.py`` and, at the end, the state ``view.pvsm``, which open the written ``series``;
     ``configuration`` is that of the series."""
 
@@ -246,9 +247,6 @@ class ViewScript:
 
     def on_resume(self, problem: Problem, folder: Path, memory: None) -> None:
         self.on_start(problem, folder)
-
-    def on_cycle(self, cycle: Cycle) -> None:
-        pass
 
     def on_end(self, summary: dict[str, Any], error: BaseException | None = None) -> None:
         if self.series is None or not drawable(self.series.last):
