@@ -40,18 +40,22 @@ from .kernel_folder import SOURCE, kernel_place, prune
 log = logging.getLogger(__name__)
 
 try:
+    from numba.core import ssa
     from numba.core.base import BaseContext
     from numba.core.caching import IndexDataCacheFile, UserProvidedCacheLocator
     from numba.core.codegen import CPUCodegen, JITCodeLibrary
     from numba.core.compiler import Compiler
     from numba.core.datamodel.manager import DataModelManager
     from numba.core.dispatcher import Dispatcher
-    from numba.core.ir import Inst, Loc, Var
+    from numba.core.inline_closurecall import InlineClosureCallPass
+    from numba.core.ir import Assign, Expr, FreeVar, Global, Inst, Loc, SetItem, Var
     from numba.core.options import DefaultOptions
     from numba.core.postproc import PostProcessor, VariableLifetime
     from numba.core.runtime.context import NRTContext
     from numba.core.targetconfig import ConfigStack, TargetConfig
     from numba.core.transforms import canonicalize_cfg
+    from numba.core.typed_passes import NopythonRewrites
+    from numba.core.types.abstract import _TypeMetaclass
     from numba.core.types.functions import BaseFunction
     from numba.core.typing.templates import _OverloadFunctionTemplate
 except ImportError:  # logged below; classes that stand in for those that this version lacks
@@ -60,6 +64,9 @@ except ImportError:  # logged below; classes that stand in for those that this v
     BaseContext = DataModelManager = NRTContext = Inst = Loc = Var = PostProcessor = VariableLifetime = (
         canonicalize_cfg
     ) = object
+    ssa = InlineClosureCallPass = NopythonRewrites = object
+    _TypeMetaclass = object  # type: ignore[misc, assignment]
+    Assign = Expr = FreeVar = Global = SetItem = object
     BaseFunction = object  # type: ignore[misc, assignment]
     Dispatcher = type(njit(lambda: None))  # type: ignore[misc]
 
@@ -76,6 +83,10 @@ _INNER = (
     (BaseFunction, ("get_call_type",)),
     (Inst, ("_rec_list_vars", "list_vars")),
     (PostProcessor, ("run", "_insert_var_dels")),
+    (InlineClosureCallPass, ("run",)),
+    (NopythonRewrites, ("run_pass",)),
+    (_TypeMetaclass, ("__instancecheck__",)),
+    (ssa, ("_run_ssa_block_pass",)),
     (BaseContext, ("refresh", "get_abi_sizeof")),
     (NRTContext, ("get_meminfos",)),
     (_OverloadFunctionTemplate, ("_get_impl", "_get_jit_decorator")),
@@ -180,6 +191,10 @@ def _quick_inference() -> Iterator[None]:
         (TargetConfig, "__hash__", _hash_of_settings),
         (Inst, "_rec_list_vars", _variables_of),
         (PostProcessor, "run", _without_entry_variables),
+        (InlineClosureCallPass, "run", _inline_what_there_is),
+        (NopythonRewrites, "run_pass", _rewrite_what_there_is),
+        (_TypeMetaclass, "__instancecheck__", type.__instancecheck__),
+        (ssa, "_run_ssa_block_pass", _without_messages),
         (BaseContext, "refresh", _refresh_if_new),
         (BaseContext, "get_abi_sizeof", _remembered_size),
         (NRTContext, "get_meminfos", _counted_in),
@@ -272,10 +287,15 @@ def _variables_of(self: Inst, value: object) -> list:
     return found
 
 
-def _find_variables(value: object, found: list) -> None:
+def _find_variables(value: Any, found: list) -> None:
     """Append the variables in ``value`` to ``found``."""
-    if isinstance(value, Var):
+    kind = type(value)
+    if kind is Var:
         found.append(value)
+    elif kind is Expr:
+        for each in value._kws.values():
+            if type(each) not in _NO_VARIABLES:
+                _find_variables(each, found)
     elif isinstance(value, Inst):
         found.extend(value.list_vars())
     elif isinstance(value, (list, tuple, dict)):
@@ -298,6 +318,66 @@ def _without_entry_variables(self: PostProcessor, emit_dels: bool = False, exten
     function.variable_lifetime, function.generator_info = VariableLifetime(function.blocks), None
     if emit_dels:
         self._insert_var_dels(extend_lifetimes=extend_lifetimes)
+
+
+_inline: Callable = getattr(InlineClosureCallPass, "run", _refuse)
+
+
+def _inline_what_there_is(self: InlineClosureCallPass) -> None:
+    """Inline closures, reductions, stencils and array comprehensions, if the function has any: most have none, and to
+    look for them Numba computes the lifetimes of all variables and all loops."""
+    if any(_may_be_inlined(statement) for block in self.func_ir.blocks.values() for statement in block.body):
+        _inline(self)
+
+
+#: Names of functions whose calls Numba inlines before inference, of modules that contain them, and of types.
+_INLINED = ("functools", "reduce", "numba", "stencil", "StencilFunc", "list")
+
+
+def _may_be_inlined(statement: Any) -> bool:
+    value: Any = statement.value if type(statement) is Assign else None
+    if type(value) is Expr:
+        return value.op in ("make_function", "build_list")
+    if type(value) in (Global, FreeVar):
+        names = (getattr(value.value, "__name__", None), type(value.value).__name__)
+        return any(name in _INLINED for name in names)
+    return False
+
+
+_rewrite: Callable = getattr(NopythonRewrites, "run_pass", _refuse)
+
+
+def _rewrite_what_there_is(self: NopythonRewrites, state) -> bool:
+    """Rewrite expressions of whole arrays, arrays of constants and items named by texts, if the function has any."""
+    blocks, kinds = state.func_ir.blocks.values(), state.typemap
+    if any(_may_be_rewritten(statement, kinds) for block in blocks for statement in block.body):
+        return _rewrite(self, state)
+    return True
+
+
+def _may_be_rewritten(statement: Any, kinds: dict) -> bool:
+    if type(statement) is SetItem:
+        return isinstance(kinds[statement.index.name], types.StringLiteral)
+    value: Any = statement.value if type(statement) is Assign else None
+    if type(value) is not Expr:
+        return False
+    if value.op == "getitem":
+        return isinstance(kinds[value.index.name], types.StringLiteral)
+    if value.op == "call":
+        called = kinds.get(value.func.name)
+        return isinstance(called, types.Function) and hasattr(called.typing_key, "nin")
+    if value.op in ("unary", "binop"):
+        return isinstance(kinds.get(statement.target.name), types.Array)
+    return value.op == "build_list"
+
+
+def _without_messages(states: dict, block, handler) -> Iterator:
+    """As `numba.core.ssa._run_ssa_block_pass`, without a debug message for each statement."""
+    for statement in block.body:
+        if isinstance(statement, Assign):
+            yield handler.on_assign(states, statement)
+        else:
+            yield handler.on_other(states, statement)
 
 
 _refresh: Callable = getattr(BaseContext, "refresh", _refuse)

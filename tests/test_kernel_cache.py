@@ -508,6 +508,57 @@ def test_variables_of_statements_are_those_of_numba_in_its_order():
     assert [each.name for each in _variables_of(called, called._kws)] == ["a", "b", "c", "d", "b", "c"]
 
 
+def test_passes_of_numba_run_where_there_is_something_for_them(monkeypatch):
+    """Closures, reductions and comprehensions are inlined, and expressions of whole arrays rewritten; a function without
+    any of these is spared the search."""
+    from functools import reduce
+
+    import numpy as np
+    from numba import njit
+
+    from geomech import compiled
+
+    ran = []
+    for name in ("_inline", "_rewrite"):
+        original = getattr(compiled, name)
+        monkeypatch.setattr(compiled, name, lambda *given, n=name, of=original: ran.append(n) or of(*given))
+
+    def loop(x):
+        total = 0.0
+        for i in range(len(x)):
+            total += x[i] if x[i] > 1.0 else 2.0 * x[i]
+        return total
+
+    def closure(x):
+        def twice(y):
+            return 2.0 * y
+
+        return twice(x[0])
+
+    def comprehension(x):
+        return np.array([2.0 * each for each in x]).sum()
+
+    def reduction(x):
+        return reduce(lambda a, b: a + b, x)
+
+    def arrays(x):
+        return (2.0 * x - x / 3.0).sum()
+
+    def constants(x):
+        return np.array([1.0, 2.0]).sum() + x[0]
+
+    x = np.array([0.5, 1.5])
+    for function, passes in (
+        (loop, set()), (closure, {"_inline"}), (comprehension, {"_inline"}), (reduction, {"_inline"}),
+        (arrays, {"_rewrite"}), (constants, {"_inline", "_rewrite"}),
+    ):  # fmt: skip
+        ran.clear()
+        made = njit(pipeline_class=compiled._KernelCompiler)(function)
+        assert made(x) == pytest.approx(function(x), rel=1e-15)
+        assert passes <= set(ran), function
+        assert passes or not ran
+
+
 def test_settings_are_equal_where_numba_says_so():
     from numba.core.compiler import Flags
 

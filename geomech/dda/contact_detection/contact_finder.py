@@ -138,6 +138,8 @@ class ContactFinder:
         self.rounding = np.minimum(self._rounding, self._longest)
         #: Treatment of toes: `SHARP`, `ROUNDED` or `FREE` (`toe_contacts`).
         self.toes = SHARP
+        #: Whether bonds may fail; otherwise the loads of bonded faces are not checked.
+        self.bonds_fail = True
         #: Whether faces keep their full cohesion as long as they touch anywhere (`whole_faces`).
         self.whole_faces = False
         self._corners = ToeCorners(
@@ -229,7 +231,7 @@ class ContactFinder:
             geometry=np.ascontiguousarray(geometry),
             springs=springs,
             relies_on_glue=glued is not None,
-            faces=BondedFaces.of(block, other, geometry, bonded) if bonded.any() else None,
+            faces=BondedFaces.of(block, other, geometry, bonded) if self.bonds_fail and bonded.any() else None,
             released=softened,
             **remembered,
         )  # fmt: skip

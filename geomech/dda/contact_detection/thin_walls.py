@@ -54,22 +54,42 @@ def _convex(vertices, next_vertex, previous_vertex, i):
     return ax * by - ay * bx >= -SAME * np.sqrt((ax * ax + ay * ay) * (bx * bx + by * by))
 
 
-@kept(fastmath=False, error_model="numpy", nogil=True)
-def from_outside(vertex, edge, gap, vertices, next_vertex, previous_vertex, start, owner, known, shallow):
+def from_outside(vertex, edge, gap, vertices, next_vertex, previous_vertex, start, owner, known, shallow) -> np.ndarray:
     """(n,) bool: False for contacts of ``vertex`` (n,) with ``edge`` (n,) whose vertex is on the far side of a thin
     wall.
 
     ``gap`` (n,) m; ``start`` (n_blocks + 1,) first vertices; ``owner`` (n_vertices,) blocks; ``known`` (n,) bool:
     contacts that came from outside before; ``shallow`` (n,) m, −1 where no corners meet. Of corners that meet both
     faces are kept, unless the vertex lies in front of one and deeper than ``shallow`` behind the other."""
+    keep = np.ones(len(vertex), np.bool_)
+    behind = np.flatnonzero(~known & (gap < 0.0))
+    if len(behind):
+        along = vertices[next_vertex[edge[behind]]] - vertices[edge[behind]]
+        behind = behind[gap[behind] < -SAME * np.sqrt(along[:, 0] ** 2 + along[:, 1] ** 2)]
+    if len(behind):  # seldom: most runs need not compile what follows
+        keep[behind] = _from_outside(
+            vertex[behind],
+            edge[behind],
+            gap[behind],
+            vertices,
+            next_vertex,
+            previous_vertex,
+            start,
+            owner,
+            shallow[behind],
+        )
+    return keep
+
+
+@kept(fastmath=False, error_model="numpy", nogil=True)
+def _from_outside(vertex, edge, gap, vertices, next_vertex, previous_vertex, start, owner, shallow):
+    """As `from_outside`, for contacts whose vertex is behind the line of the edge and that are not known."""
     keep = np.ones(vertex.shape[0], np.bool_)
     for c in range(vertex.shape[0]):
         v, e = vertex[c], edge[c]
         f = next_vertex[e]
         dx, dy = vertices[f, 0] - vertices[e, 0], vertices[f, 1] - vertices[e, 1]
         length = np.sqrt(dx * dx + dy * dy)
-        if known[c] or gap[c] >= -SAME * length:
-            continue
         nx, ny = dy / length, -dx / length
         t = ((vertices[v, 0] - vertices[e, 0]) * dx + (vertices[v, 1] - vertices[e, 1]) * dy) / (length * length)
         # Beyond a convex corner the line stands for the corner: behind it there is not this block.
