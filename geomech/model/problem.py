@@ -262,7 +262,7 @@ class RunSettings:
                      toughness or, as ``events`` says, a contact or crack face changes its state; otherwise as long as
                      the displacement limit or ``longest_step`` s allow
     control          "load": loads and prescribed motion follow time. "toughness" (with "events"): they are scaled so
-                     that the most driven tip has K_eq = K_Ic
+                     that the most heavily loaded tip has K_eq = K_Ic
     events           kinds of state changes that steps end at, or report when steps are fixed; None: all with "events",
                      none with "fixed"
     boundary_stress  how contact forces load a cracked block of order 1: "contacts" as pressures linear over faces; "bases"

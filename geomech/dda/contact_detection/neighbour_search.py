@@ -98,12 +98,9 @@ class NearPairs:
             self.work.lone_searches += 1
             return np.zeros((0, 2), np.int64)
         if self._vertices is None or not window + 2.0 * np.abs(vertices - self._vertices).max() <= self._reach:
-            began = time.perf_counter()
             self._reach = _REACH * window
             self._vertices = vertices.copy()
-            self._pairs = near_pairs(boxes(vertices, self._first), self._fixed, self._reach)
-            self.work.pair_search_s += (time.perf_counter() - began) if self.work.pair_searches else 0.0
-            self.work.pair_searches += 1
+            self._pairs = self._searched(boxes(vertices, self._first), self._reach)
         else:
             self.work.pair_searches_kept += 1
         return self._pairs
@@ -117,15 +114,20 @@ class NearPairs:
             self.work.lone_searches += 1
             return np.zeros((0, 2), np.int64)
         if self._kept is None or not _hold(self._kept, box):
-            began = time.perf_counter()
             more = (_REACH - 1.0) * more
             self._kept = box + np.stack([-more, -more, more, more], axis=1)
-            self._in_boxes = near_pairs(self._kept, self._fixed, 0.0)
-            self.work.pair_search_s += (time.perf_counter() - began) if self.work.pair_searches else 0.0
-            self.work.pair_searches += 1
+            self._in_boxes = self._searched(self._kept, 0.0)
         else:
             self.work.pair_searches_kept += 1
         return self._in_boxes
+
+    def _searched(self, box: np.ndarray, reach: float) -> np.ndarray:
+        """The result of `near_pairs`, counted and, after the first time, timed."""
+        began = time.perf_counter()
+        pairs = near_pairs(box, self._fixed, reach)
+        self.work.pair_search_s += (time.perf_counter() - began) if self.work.pair_searches else 0.0
+        self.work.pair_searches += 1
+        return pairs
 
 
 def boxes(vertices: np.ndarray, first: np.ndarray) -> np.ndarray:

@@ -30,7 +30,7 @@ class SceneTables(Table):
     dda: DdaTable = Field(DdaTable(), description="motion of the blocks")
     ddm: DdmTable = Field(DdmTable(), description="elements of cracked blocks")
     growth: GrowthTable = Field(GrowthTable(), description="growth of cracks")
-    run: RunTable = Field(description="how long")
+    run: RunTable = Field(description="duration of a run, its steps, and what ends it")
     gauge: GaugeTable | None = Field(None, description="axial strain between two points")
     monitors: Annotated[tuple[MonitorTable, ...], Strict(False)] = Field((), description="points that are recorded")
     output: OutputTable = Field(OutputTable(), description="files of a run")

@@ -42,9 +42,9 @@ class OutputTable(Table):
     interior: bool = Field(True, description="write stress inside cracked rock (interior.pvd)")
     interior_every: Annotated[int, Field(ge=1)] = Field(
         5,
-        description="write the interior every n-th cycle while cracks grow, every 10 n-th otherwise; always at the "
+        description="write the interior every n-th cycle while cracks grow, every 10n-th otherwise; always at the "
         "first load, with events, before and after a block is cut and at the end (in motion with 8 or more cracked "
-        "blocks, for which it takes long, ten times less often, at the first load and at the end)",
+        "blocks ten times less often, at the first load and at the end)",
     )
     checkpoint_every: Annotated[int, Field(ge=0)] | None = Field(
         None,

@@ -245,7 +245,7 @@ class RunTable(Table):
     control: Literal["load", "toughness"] = Field(
         "load",
         description='"load": loads and imposed motion follow their histories; "toughness": every increment of growth '
-        "is made at the load at which the most driven tip has K_eq = K_Ic, also if that is lower than "
+        "is made at the load at which the most heavily loaded tip has K_eq = K_Ic, even if that is lower than "
         "before (time, as the argument of the loads, decreases with them)",
     )
     boundary_stress: Literal["auto", "contacts", "bases", "springs", "kelvin-springs"] = Field(
