@@ -270,7 +270,7 @@ class ContactFinder:
             self._pressed(old),
             np.zeros_like(vertices) if motion is None else motion, float(margin) + names.lift,
         )  # fmt: skip
-        outlines = Outlines(np.ascontiguousarray(vertices), self._next, self._previous, self._start)
+        outlines = self._outlines(np.ascontiguousarray(vertices))
         table, met = find_contacts(outlines, near.pairs, near.reach, names.keys[rank], corners)
         at = near.of_contacts(self._owner[table[:, 0]], self._owner[table[:, 1]], len(self._area))
         before = Known(names.vertex, names.edge, names.normal, rank)
@@ -388,6 +388,9 @@ class ContactFinder:
         np.maximum.at(reach, at[deep], -_DEEPER * old["gap"][deep])
         return Windows(window.pairs, reach)
 
+    def _outlines(self, vertices: np.ndarray) -> Outlines:
+        return Outlines(vertices, self._next, self._previous, self._start)
+
     def _from_outside(self, table: np.ndarray, vertices: np.ndarray, known: np.ndarray, pressed: np.ndarray):
         """(n,) whether vertices of the rows of `find_contacts` may have reached their edges from outside.
 
@@ -399,8 +402,8 @@ class ContactFinder:
         shallow = _TOUCHING_DEPTH * np.sqrt(np.minimum(self._area[block], self._area[other]))
         shallow += _DEEPER * np.maximum(pressed[block], pressed[other])
         keep = from_outside(
-            vertex, edge, self._off_lines(vertices, vertex, edge), vertices, self._next, self._previous, self._start,
-            self._owner, known, np.where(table[:, 3] == FACE, -1.0, shallow),
+            vertex, edge, self._off_lines(vertices, vertex, edge), self._outlines(vertices), self._owner, known,
+            np.where(table[:, 3] == FACE, -1.0, shallow),
         )  # fmt: skip
         return keep | (table[:, 2] >= 0)
 
@@ -606,8 +609,8 @@ class ContactFinder:
     def past_midpoint(self, vertices: np.ndarray, vertex: np.ndarray, edge: np.ndarray) -> np.ndarray:
         """(n,) bool: a ``vertex`` lies behind its ``edge`` by more than half the block's thickness there."""
         return ~from_outside(
-            vertex, edge, self._off_lines(vertices, vertex, edge), vertices, self._next, self._previous, self._start,
-            self._owner, np.zeros(len(vertex), np.bool_), np.full(len(vertex), -1.0),
+            vertex, edge, self._off_lines(vertices, vertex, edge), self._outlines(vertices), self._owner,
+            np.zeros(len(vertex), np.bool_), np.full(len(vertex), -1.0),
         )  # fmt: skip
 
     def gaps(self, vertices: np.ndarray, before: np.ndarray, found: ContactSet) -> np.ndarray:

@@ -17,6 +17,7 @@ import numpy as np
 
 from ...compiled import UNCOUNTED, kept, part
 from ..kinematics.tolerances import NOTHING, SAME
+from .entrance_edges import Outlines
 
 
 @part(fastmath=False, error_model="numpy", nogil=True, **UNCOUNTED)
@@ -54,30 +55,21 @@ def _convex(vertices, next_vertex, previous_vertex, i):
     return ax * by - ay * bx >= -SAME * np.sqrt((ax * ax + ay * ay) * (bx * bx + by * by))
 
 
-def from_outside(vertex, edge, gap, vertices, next_vertex, previous_vertex, start, owner, known, shallow) -> np.ndarray:
+def from_outside(vertex, edge, gap, outlines: Outlines, owner, known, shallow) -> np.ndarray:
     """(n,) bool: False for contacts of ``vertex`` (n,) with ``edge`` (n,) whose vertex is on the far side of a thin
     wall.
 
-    ``gap`` (n,) m; ``start`` (n_blocks + 1,) first vertices; ``owner`` (n_vertices,) blocks; ``known`` (n,) bool:
+    ``gap`` (n,) m; ``owner`` (n_vertices,) blocks; ``known`` (n,) bool:
     contacts that came from outside before; ``shallow`` (n,) m, −1 where no corners meet. Of corners that meet both
     faces are kept, unless the vertex lies in front of one and deeper than ``shallow`` behind the other."""
     keep = np.ones(len(vertex), np.bool_)
     behind = np.flatnonzero(~known & (gap < 0.0))
+    vertices, next_vertex = outlines.vertices, outlines.next_vertex
     if len(behind):
         along = vertices[next_vertex[edge[behind]]] - vertices[edge[behind]]
         behind = behind[gap[behind] < -SAME * np.sqrt(along[:, 0] ** 2 + along[:, 1] ** 2)]
     if len(behind):  # seldom: most runs need not compile what follows
-        keep[behind] = _from_outside(
-            vertex[behind],
-            edge[behind],
-            gap[behind],
-            vertices,
-            next_vertex,
-            previous_vertex,
-            start,
-            owner,
-            shallow[behind],
-        )
+        keep[behind] = _from_outside(vertex[behind], edge[behind], gap[behind], *outlines, owner, shallow[behind])
     return keep
 
 

@@ -9,6 +9,7 @@ import pytest
 
 from geomech import dda
 from geomech.bench.robustness import thin_scenes
+from geomech.dda.contact_detection.entrance_edges import Outlines
 from geomech.dda.contact_detection.neighbour_search import boxes
 from geomech.dda.contact_detection.thin_walls import from_outside
 from geomech.dda.step_control.continuous_collision import INTO, THROUGH, Allowed, Paths, crossings
@@ -66,7 +67,7 @@ def test_a_vertex_meets_no_face_from_behind_a_wall():
         gap = np.array([x - 0.01 if edge == 1 else -x])
         return bool(
             from_outside(
-                np.array([5]), np.array([edge]), gap, vertices, next_vertex, previous, start, owner,
+                np.array([5]), np.array([edge]), gap, Outlines(vertices, next_vertex, previous, start), owner,
                 np.array([known]), np.full(1, -1.0),
             )[0]
         )  # fmt: skip
