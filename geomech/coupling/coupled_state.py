@@ -249,7 +249,9 @@ class CrackedBlocks:
     def take_step(self, state: State, budget: dda.EnergyBudget) -> None:
         """Accept ``state``, and the memory of its crack faces, as the start of the next step."""
         self.state, self.budget = state, budget
-        self.history = {b: s.memory for b, s in self.solutions.items() if s.memory is not None}
+        # Bodies left out of the step keep the memory of their last solution.
+        after = {b: self.solutions[b].memory if b in self.solutions else self.history.get(b) for b in self.bodies}
+        self.history = {b: memory for b, memory in after.items() if memory is not None}
         self.by_mean_stress.take_step()
 
     def take_split(self, split: Split) -> None:

@@ -137,6 +137,7 @@ class _LeftOut:
         self._problem, self._blocks, self._nodes_of = now.problem, now.blocks, now.nodes_of
         self._order, self._loads = list(now.bodies), {block: now.loads[block] for block in left_out}
         self._last = {block: now.growth_screening.last(block) for block in left_out}
+        self._history = {block: now.history[block] for block in left_out if block in now.history}
         self._solved: dict[int, Any] = {}
         self._sparing = sparing
 
@@ -154,9 +155,11 @@ class _LeftOut:
         if not bodies:
             return
         before = {block: self._last[block].solution for block in bodies}
-        found = solve_bodies(bodies, self._loads, before, {}, self._blocks.names, forgets=self._sparing)
+        found = solve_bodies(bodies, self._loads, before, self._history, self._blocks.names, forgets=self._sparing)
         self._solved |= found
         for block, solution in found.items():
+            if self._sparing:
+                bodies[block].forget_loads()
             bodies[block].work.solutions_left_out -= 1
             last = self._last[block]
             if last.number < number:  # not if later cycles have asked before

@@ -482,7 +482,12 @@ def _solve(now: CrackedBlocks, bodies: dict) -> None:
     # Bodies that are left out keep the face states of their last solution as a first guess of the next.
     now.earlier = {b: of for b, of in (now.earlier | now.solutions).items() if b in now.bodies and b not in bodies}
     now.solutions = {block: own[block] if block in own else solved[block] for block in bodies}
-    now.solved_from = now.history
+    now.solved_from = {
+        block: memory
+        for of in (now.solved_from, now.history)
+        for block, memory in of.items()
+        if (block in bodies) == (of is now.history)
+    }
     for block, load in now.loads.items():
         if load.bases:
             now.loads[block] = replace(load, tractions=now.solutions[block].load.tractions)

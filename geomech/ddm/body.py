@@ -42,7 +42,7 @@ from .iterative.gmres import NotSolved
 from .loads.body_loads import BodyLoad
 from .loads.load_vectors import Applied, apply, check_equilibrium
 from .loads.supports import Holds, Support, called, marks, place, values_at
-from .loads.uniform_stress_response import Response, scales, uniform_stress_response_of
+from .loads.uniform_stress_response import Response, is_simple, scales, uniform_stress_response_of
 from .loads.unit_load_cache import UnitLoad, UnitLoads, on_elements
 from .mesh.edge_location import OFF
 from .mesh.elements import Mesh, mesh, outline_edges
@@ -436,6 +436,11 @@ class Body:
             self.crack_system.retire()
             self._loads.forget()
 
+    def forget_loads(self) -> None:
+        """Give up what one of many bodies keeps for loads that recur, while it needs no solutions."""
+        if self.in_number:
+            self._loads.forget()
+
     def _imposed(self, applied: Applied) -> np.ndarray:
         """(h_unknowns,) 2μ times the displacement that supports prescribe, minus that of particular fields."""
         holds, load = self._outside.holds, applied.load
@@ -517,7 +522,7 @@ class Body:
     ) -> Solution:
         applied, units, rest, imposed = self.decompose(load, equilibrium_tolerance)
         # Faces with friction, and many that may close, have other equations, for which S⁻¹ is of no use.
-        opening = self.crack_system.opened if self.opens else np.zeros_like
+        opening = self.crack_system.opened if self.opens else None
         g, r, reduced, opened = self._loads.add(units, rest, self.condensation, opening, self._outside.iterated)
         pressure = load.face_pressure(self.faces.nodes, self.faces.source, self.cracks.n_segments)
         answer = settle_faces(self, reduced, opened, pressure, warm, history)
@@ -684,7 +689,11 @@ class Body:
             closed = np.zeros(self.faces.n_unknowns, bool) if sol is None else sol.closed
             response = uniform_stress_response_of(self, closed).compliance()
             return 0.5 * (response + response.T)
-        response = self.strain_weights @ self.jumps_under(self.mean_stress_traction, sol)
+        if sol is not None and self.rough and is_simple(self):
+            jumps = self.face_equations.uniform_tangent(-self.mean_stress_traction, sol.face_states)
+            response = self.strain_weights @ jumps
+        else:
+            response = self.strain_weights @ self.jumps_under(self.mean_stress_traction, sol)
         return 0.5 * (response + response.T)
 
     def jumps_under(self, traction: np.ndarray, sol: Solution | None = None) -> np.ndarray:

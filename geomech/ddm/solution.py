@@ -237,7 +237,10 @@ class Solution:
         body, c = self.body, self.body.faces
         if not self.jumps.size:
             return 0.0
-        change = (body.crack_system.matrix @ self.jumps * self.jumps).reshape(c.n, 2, c.per).sum(axis=1)
+        # t − t₀ = S w. With friction the traction of every node follows from its equation, without a product.
+        rough = self.memory is not None
+        moved = self.face_traction - self.closed_traction if rough else body.crack_system.matrix @ self.jumps
+        change = (moved * self.jumps).reshape(c.n, 2, c.per).sum(axis=1)
         return -0.5 * float(np.sum(c.quadrature * change)) / (2 * body.material.shear_modulus)
 
     @property

@@ -105,8 +105,7 @@ BASE = [
     [19, 14],
     [23, 5.5],
 ]
-#: The slope under its weight. Its crack faces are smooth: with the friction of the joints they have a history, and no block
-#: can be left out of a step (0.95 s of processor time, not 0.3 s).
+#: The slope under its weight. Its crack faces are smooth: with the friction of the joints a run takes half as long again.
 MOVING = f"""[cracks.default]
 aperture = "closed"
 [[geometry.zones]]

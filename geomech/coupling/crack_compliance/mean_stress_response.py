@@ -184,10 +184,13 @@ class ByMeanStress:
     ) -> Solution | UniformStressSolution:
         """Solution of ``body`` under ``stress`` (3,), Pa, as in `answer`."""
         from ...ddm import BodyLoad
+        from ...ddm.crack_contact.uniform_friction import solved_in_states
         from ...ddm.loads.uniform_stress_response import scaled
 
-        before, whole = self.solutions.get(block), self.fields.get(block)
-        known = scaled(body, stress, before) if skip and whole is None else None
+        before, whole, memory = self.solutions.get(block), self.fields.get(block), self.memory.get(block, began)
+        known: Solution | UniformStressSolution | None = None
+        if skip and whole is None:
+            known = solved_in_states(body, stress, before, memory) if body.rough else scaled(body, stress, before)
         if known is not None:
             return known
         if whole is None and skip and self._moves:
@@ -197,7 +200,7 @@ class ByMeanStress:
             if known is not None:
                 return known
         load = body.mean_stress_load(stress) if whole is None else BodyLoad(intact=whole.under(stress))
-        found = body.solve(load, warm=before, history=self.memory.get(block, began), meet_target=False)
+        found = body.solve(load, warm=before, history=memory, meet_target=False)
         if self._moves:
             body.forget_states()
         return found

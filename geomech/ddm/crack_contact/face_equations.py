@@ -49,6 +49,7 @@ class FaceEquations:
         self._factors: dict[bytes, tuple[np.ndarray, AnyFactor]] = {}
         self._last: list[tuple[np.ndarray, np.ndarray]] = []
         self._pull: tuple[np.ndarray, np.ndarray] | None = None
+        self._uniform: tuple[bytes, np.ndarray] | None = None
 
     def solve(
         self, right: np.ndarray, states: FaceStates, memory: FaceMemory, cohesion: np.ndarray | float = 0.0
@@ -106,7 +107,7 @@ class FaceEquations:
 
     def forget(self) -> None:
         """Give up the factors of all states."""
-        self._factors, self._last, self._pull = {}, [], None
+        self._factors, self._last, self._pull, self._uniform = {}, [], None, None
 
     def _pull_of(self, w: np.ndarray) -> np.ndarray:
         """S ``w`` of prescribed jumps; updated incrementally, since few of them change between states."""
@@ -140,6 +141,23 @@ class FaceEquations:
         w[free] = factor.solve(np.asfortranarray(self._mixed(right, states)[free]))
         self._work.back_substitutions += right.shape[1]
         return w
+
+    def uniform_tangent(self, right: np.ndarray, states: FaceStates) -> np.ndarray:
+        """`tangent` of the loads ``right`` (n, 3) of unit uniform stresses, which are always the same; the last one is
+        kept."""
+        if self._uniform is None or self._uniform[0] != states.key:
+            self._uniform = states.key, self.tangent(right, states)
+        return self._uniform[1]
+
+    def tangent_reaction(self, right: np.ndarray, jumps: np.ndarray, states: FaceStates) -> np.ndarray:
+        """(n, k) change of λ that goes with the change of the ``jumps`` (n, k), the `tangent` of ``right`` (n, k)."""
+        laws, (prescribed, slides, spring) = self.laws, self._rows(states)
+        a, t = laws.across, laws.along
+        missing = right - self.system.matrix @ jumps
+        reaction = np.where(prescribed[:, None], missing, -spring[:, None] * jumps)
+        slipping = states.way != 0
+        reaction[t[slipping]] = -(slides[:, None] * reaction[a])[slipping]
+        return reaction
 
     def adjoint(self, weights: np.ndarray, states: FaceStates) -> np.ndarray:
         """(n, k) y with ``weights``ᵀ w = yᵀ ``right`` at constant states (adjoint solution)."""
@@ -222,7 +240,7 @@ class FaceProblem:
 
     def solve(self, states: FaceStates) -> FaceValues:
         """Solution with the nodes in these ``states``."""
-        return self._values(states, *self.equations.solve(self.right, states, self.memory))
+        return self.values(states, *self.equations.solve(self.right, states, self.memory))
 
     def solve_confined(
         self, states: FaceStates, right: np.ndarray, cohesion: np.ndarray
@@ -231,10 +249,11 @@ class FaceProblem:
         (n_nodes,)."""
         both = np.stack([self.right, right], axis=1), np.stack([np.zeros_like(cohesion), cohesion], axis=1)
         w, reaction = self.equations.solve(both[0], states, self.memory, both[1])
-        bare, confined = (self._values(states, w[:, k], reaction[:, k]) for k in (0, 1))
+        bare, confined = (self.values(states, w[:, k], reaction[:, k]) for k in (0, 1))
         return bare, confined
 
-    def _values(self, states: FaceStates, w: np.ndarray, reaction: np.ndarray) -> FaceValues:
+    def values(self, states: FaceStates, w: np.ndarray, reaction: np.ndarray) -> FaceValues:
+        """The solution with these jumps ``w`` and λ ``reaction`` (n,)."""
         laws = self.laws
         opening = self.stress * self.length
         return FaceValues(

@@ -148,6 +148,21 @@ def settle_rough(
     return found.values.jumps, found.values.reaction, now, equations.solved - solved, found.missed
 
 
+def memory_in_states(
+    equations: FaceEquations,
+    right: np.ndarray,
+    memory: FaceMemory,
+    states: FaceStates,
+    of: tuple[np.ndarray, np.ndarray],
+) -> FaceMemory | None:
+    """Memory of faces without cement after the load ``right`` (n,), if all nodes satisfy their laws in these ``states``;
+    otherwise None. ``of``: jumps and λ (n,) in these states; ``memory``: before the load."""
+    problem = FaceProblem(equations, right, replace(memory, broken=memory.lost))
+    values = problem.values(states, *of)
+    _, changed, worst = _required(problem, states, values)
+    return None if changed.any() else _remembered(problem, memory, _Settled(states, values, Missed(changed, worst)))
+
+
 def _remembered(problem: FaceProblem, memory: FaceMemory, found: _Settled) -> FaceMemory:
     """Face memory after the load of ``problem``, whose solution is ``found``; ``memory``: before it."""
     laws, broken, states = problem.laws, problem.memory.broken, found.states

@@ -10,6 +10,11 @@ the matrix of a, Q the quadrature and K = lᵀ w at a tip, between two loads
 whatever faces change their states. A is the symmetric part of −Q S; as S is collocated, A has slightly negative
 directions, in which jumps alternate from node to node. Its diagonal is raised until there are none.
 
+Faces with friction move on from the slip that the last load has left. With a given limit of shear stress the energy
+a(w, w)/2 + ∫ r · w and the friction ∫ τ |dw_t| are convex: testing the law of a small step with the step itself gives ‖dw‖ ≤
+‖dr‖ (Mielke & Theil 2004, §3). So ‖Δr‖ is the length of the path of the loads from one solution to the other; that the limit
+follows the pressure on the faces is within the safety factor for the friction of rock.
+
 ‖Δr‖ needs neither S nor the factors of the boundary for a load: it is estimated from products with random directions,
 linear in the load (Johnson & Lindenstrauss 1984): with `DIRECTIONS` of them the estimate is below 1/`ESTIMATED` of the
 norm with a probability of 1e-7.
@@ -21,7 +26,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..loads.uniform_stress_response import scales
+from ..loads.uniform_stress_response import is_simple
 from ..loads.unit_load_cache import on_elements
 
 if TYPE_CHECKING:
@@ -43,8 +48,9 @@ _ON_LINE = 1e-6
 
 
 def changes_are_bounded(body: CrackedBody) -> bool:
-    """Whether contact of the faces of ``body`` is a projection: smooth faces, no holes, no supports."""
-    return scales(body) and bool(len(body.cracks.tips))
+    """Whether jumps of ``body`` change by no more than its loads: no holes, no supports, no cement that breaks."""
+    cemented = body.rough and bool((body.laws.strength > 0).any())
+    return is_simple(body) and not cemented and bool(len(body.cracks.tips))
 
 
 class ChangeBound:
@@ -67,7 +73,10 @@ class ChangeBound:
         weights = (share * scale)[:, None] * _solved(factor, directions, transposed=True)
         self._take_measures(weights)
         self._before = np.zeros(DIRECTIONS)
-        self._k = np.zeros(len(self._per_norm))
+        #: (n_tips,) √(K_I² + K_II²) of the last solution, Pa √m.
+        self.last_k = np.zeros(len(self._per_norm))
+        #: Length of the path of the loads since the solution, for faces with friction.
+        self._path = 0.0
 
     def _take_measures(self, on_faces: np.ndarray) -> None:
         """Products with the directions, ``on_faces`` (n_crack_unknowns, k) in terms of tractions on closed faces, as
@@ -138,16 +147,27 @@ class ChangeBound:
     def refer(self, load: BodyLoad, solution: SolvedBody) -> None:
         """Take the ``solution`` under ``load`` as the one from which changes are bounded."""
         measured = self.measured(load)
+        # The path of loads that cannot be measured has no length.
+        self._path = 0.0 if measured is not None else np.inf
         if measured is not None:
             self._before = measured
-            self._k = np.hypot(*np.einsum("uti,u->it", self._tips, solution.jumps))
+            self.last_k = np.hypot(*np.einsum("uti,u->it", self._tips, solution.jumps))
 
     def at_most(self, load: BodyLoad) -> np.ndarray:
         """(n_tips,) upper bound of √(K_I² + K_II²) under ``load``, Pa √m; infinite where there is none."""
+        return self.last_k + self.change(load)
+
+    def change(self, load: BodyLoad) -> np.ndarray:
+        """(n_tips,) the part of `at_most` that is not K of the last solution. With friction ``load`` is the next
+        one on the path."""
         measured = self.measured(load)
         if measured is None:
-            return np.full(len(self._k), np.inf)
-        return self._k + self._per_norm * float(np.linalg.norm(measured - self._before))
+            return np.full(len(self.last_k), np.inf)
+        changed = float(np.linalg.norm(measured - self._before))
+        if self._body.rough:
+            self._before, self._path = measured, self._path + changed
+            changed = self._path
+        return self._per_norm * changed
 
 
 def _tip_weights(body: CrackedBody) -> np.ndarray:

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
-from ..crack_contact.face_laws import FaceStates, Released
+from ..crack_contact.face_laws import FaceMemory, FaceStates, Released
 from .unit_load_cache import on_elements
 
 if TYPE_CHECKING:
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 KEPT = 4
 
 
-class Response(Protocol):
+class AffineResponse(Protocol):
     """Response of a body to uniform stress with some faces ``closed`` (n,) bool; ``jumps`` (n, 4) under three unit
     stresses and under none."""
 
@@ -31,6 +31,10 @@ class Response(Protocol):
 
     @property
     def jumps(self) -> np.ndarray: ...
+
+
+class Response(AffineResponse, Protocol):
+    """An `AffineResponse` that knows where it ends."""
 
     def compliance(self) -> np.ndarray:
         """(3, 3) crack strain per unit stress, 1/Pa."""
@@ -76,12 +80,10 @@ class UniformStressSolution:
     """Solution of ``body`` under a uniform ``stress`` (3,), Pa, from its ``response``: the crack part of a
     `Solution`."""
 
-    memory = None
-    began = None
-    frictional_work = filling_energy = 0.0
-    dissipated_in_step = 0.0, Released()
+    memory: FaceMemory | None = None
+    began: FaceMemory | None = None
 
-    def __init__(self, body: CrackedBody, response: Response, stress: np.ndarray) -> None:
+    def __init__(self, body: CrackedBody, response: AffineResponse, stress: np.ndarray) -> None:
         self.body, self.closed, self._response = body, response.closed, response
         self._stress = np.array([*stress, 1.0])
 
@@ -97,6 +99,21 @@ class UniformStressSolution:
             return np.zeros(len(self.closed))
         traction = on_elements(self.body.faces, self._stress[:3]) + self.body.crack_system.matrix @ self.jumps
         return np.where(self.closed, traction, 0.0)
+
+    @property
+    def frictional_work(self) -> float:
+        """J/m, as in a `Solution`."""
+        return 0.0
+
+    @property
+    def filling_energy(self) -> float:
+        """J/m, as in a `Solution`."""
+        return 0.0
+
+    @property
+    def dissipated_in_step(self) -> tuple[float, Released]:
+        """J/m, as in a `Solution`."""
+        return 0.0, Released()
 
     def work_at_cracks(self, closed: np.ndarray) -> float:
         """J/m, as in a `Solution`."""
@@ -123,24 +140,29 @@ class UniformStressSolution:
     def tips(self) -> np.ndarray:
         """TIP rows, as in a `Solution`."""
         known, element, last, _, touching = self.body.tip_elements
-        rows, c = known.copy(), self.body.faces
+        rows = known.copy()
         if not len(rows):
             return rows
         opening, slip = (self._of("factors", self._factors) @ self._stress).reshape(2, -1)
-        shut = touching & ((opening < 0) | self.closed.reshape(c.n, 2, c.per)[element, 1, last])
+        shut = touching & ((opening < 0) | self._shut[element, last])
         rows["k_i"], rows["k_ii"] = np.where(shut, 0.0, opening), slip
         return rows
+
+    @property
+    def _shut(self) -> np.ndarray:
+        """(n_elements, p+1) bool: closed nodes."""
+        c = self.body.faces
+        return self.closed.reshape(c.n, 2, c.per)[:, 1]
 
     def _energy(self) -> np.ndarray:
         body, c, jumps = self.body, self.body.faces, self._response.jumps
         weights = np.repeat(c.quadrature[:, None], 2, axis=1).ravel()  # along and normal
-        form = (
-            -0.25
-            / body.material.shear_modulus
-            * (jumps.T * weights)
-            @ np.column_stack([body.crack_system.matrix @ column for column in jumps.T])
-        )
+        form = -0.25 / body.material.shear_modulus * (jumps.T * weights) @ self._moved()
         return 0.5 * (form + form.T)
+
+    def _moved(self) -> np.ndarray:
+        """(n_unknowns, 4) S w of the response, Pa."""
+        return np.column_stack([self.body.crack_system.matrix @ column for column in self._response.jumps.T])
 
     def _factors(self) -> np.ndarray:
         """(2 n_tips, 4) K_I of all tips, then K_II, before the contact of faces at the tips is taken into account."""
@@ -172,7 +194,12 @@ def scales(body: CrackedBody) -> bool:
     This holds while faces keep their states, if faces have no memory, there are no holes, which disturb a uniform
     stress, and the equations are factored.
     """
-    return body.outlined and len(body.loops) == 1 and not (body.rough or body.supports or body.compressed)
+    return is_simple(body) and not body.rough
+
+
+def is_simple(body: CrackedBody) -> bool:
+    """Whether uniform stress loads the cracks of ``body`` alone and their equations are factored: no holes, no supports."""
+    return body.outlined and len(body.loops) == 1 and not (body.supports or body.compressed)
 
 
 def uniform_stress_response_of(body: CrackedBody, closed: np.ndarray) -> Response:

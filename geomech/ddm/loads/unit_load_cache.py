@@ -172,13 +172,13 @@ class UnitLoads:
         units: list[tuple[UnitLoad, np.ndarray]],
         rest: np.ndarray,
         reduction: Reduction,
-        opened: Callable[[np.ndarray], np.ndarray],
+        opened: Callable[[np.ndarray], np.ndarray] | None,
         together: bool,
     ) -> tuple[np.ndarray, ...]:
         """g, r, r' and S⁻¹ r' (see `UnitLoad`) of the ``units`` and of ``rest`` (n,), tractions on boundary and
         cracks.
 
-        ``opened`` applies S⁻¹; ``together``: each part of a unit load is a load of its own, and where each needs an
+        ``opened`` applies S⁻¹ (None: zeros instead, not asked for); ``together``: each part of a unit load is a load of its own, and where each needs an
         iterative solution, their sum needs only one.
         """
         n_g, n_c = self.boundary.n_unknowns, self.faces.n_unknowns
@@ -192,7 +192,7 @@ class UnitLoads:
                 rest = rest + unit.applied @ size
             else:
                 total[:n] += unit.applied @ size
-                total[n:] += unit.answered @ size
+                total[n : n + len(unit.answered)] += unit.answered @ size
         if rest.any():
             if self._last is None or not np.array_equal(self._last.load, rest[:n_g]):
                 done = reduction.first(rest[:n_g].copy())
@@ -200,17 +200,21 @@ class UnitLoads:
                 self._last = Eliminated(rest[:n_g].copy(), done, on_faces)
             self._last.complete(reduction)
             reduced = rest[n_g:] - self._last.on_faces.ravel()
-            total += np.concatenate([rest, reduced, opened(reduced)])
+            total[: n + n_c] += np.concatenate([rest, reduced])
+            if opened is not None:
+                total[n + n_c :] += opened(reduced)
         return total[:n_g], total[n_g:n], total[n : n + n_c], total[n + n_c :]
 
-    def _answer(self, units: list[UnitLoad], reduction: Reduction, opened: Callable[[np.ndarray], np.ndarray]) -> None:
+    def _answer(
+        self, units: list[UnitLoad], reduction: Reduction, opened: Callable[[np.ndarray], np.ndarray] | None
+    ) -> None:
         """Compute the responses to the ``units``."""
         if not units:
             return
         ends = np.cumsum([0] + [unit.applied.shape[1] for unit in units])
         n_g, applied = self.boundary.n_unknowns, np.hstack([unit.applied for unit in units])
         reduced = applied[n_g:] - reduction.then(reduction.first(applied[:n_g]))
-        responses = np.concatenate([reduced, opened(reduced)])
+        responses = reduced if opened is None else np.concatenate([reduced, opened(reduced)])
         for unit, first, end in zip(units, ends, ends[1:]):
             unit.answered = np.ascontiguousarray(responses[:, first:end])
 

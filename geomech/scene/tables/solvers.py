@@ -259,7 +259,7 @@ class RunTable(Table):
     skip: bool = Field(
         True,
         description="reuse everything that has not changed since the last pass (false: recompute it, for comparison; "
-        "the results are the same)",
+        "the results are the same, but for K of moving blocks with friction far from their toughness)",
     )
     repeat: Annotated[tuple[Repeat, ...], Strict(False)] = Field(
         (),

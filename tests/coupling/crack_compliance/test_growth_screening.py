@@ -7,9 +7,14 @@ import pytest
 
 from geomech.bench.cost.block_scenes import cracked_wall
 from geomech.coupling import cycle_record, cycles
-from geomech.model import CrackFaces, History
+from geomech.coupling.cycle import Coupling
+from geomech.coupling.load_transfer import elastic_bodies
+from geomech.model import CrackFaces, History, JointLaw
+from geomech.output.checkpoints import checkpoint_file
 
 STEPS = 14
+#: Some sixty times K of the tips that are shaken, Pa √m.
+TOUGH = 1e6
 
 
 def problem(k_ic=1e12, skip=True, aperture=np.inf):
@@ -79,6 +84,52 @@ def test_cracks_whose_faces_close_are_left_out_too():
     for name in ("k_i", "k_ii", "k_eq"):
         size = np.abs(whole[-1].tips[name]).max()
         np.testing.assert_allclose(lean[-1].tips[name], whole[-1].tips[name], rtol=0, atol=1e-6 * size, err_msg=name)
+
+
+def rubbing(monkeypatch, skip=True):
+    """Many cracked blocks, shaken as above, whose faces slip and stick."""
+    for module in (cycle_record, elastic_bodies):
+        monkeypatch.setattr(module, "MANY", 4)
+    times = np.linspace(0.0, STEPS * 0.01, 8)
+    shaken = History(times, 9.81 * np.column_stack([3 * np.sin(60 * times), 2 * np.cos(45 * times) - 3]))
+    of = problem(k_ic=TOUGH, skip=skip, aperture=0.0)
+    return replace(
+        of, face_laws=(JointLaw("rough", friction_angle=0.3),), loads=replace(of.loads, gravity=shaken)
+    )  # fmt: skip
+
+
+def test_cracks_with_friction_are_left_out_too(monkeypatch):
+    """Blocks move as if all were solved, to the digits, and tips that are asked for at the end have K within half a per
+    cent of the toughness."""
+    whole, lean = ([*cycles(rubbing(monkeypatch, skip))] for skip in (False, True))
+    assert lean[-1].skips["left-out solutions"].kept > STEPS - 5
+    assert min(solution.frictional_work for solution in whole[-1].bodies.values()) > 0.0
+    same_states(whole, lean, 1e-7)
+    for name in ("k_i", "k_ii", "k_eq"):
+        np.testing.assert_allclose(lean[-1].tips[name], whole[-1].tips[name], rtol=0, atol=0.005 * TOUGH, err_msg=name)
+
+
+def test_a_stored_run_with_friction_leaves_out_the_same(monkeypatch, tmp_path):
+    """To the bit: what faces remember of the solutions before, and the loads since then, are stored."""
+    coupling, stored = Coupling(rubbing(monkeypatch)), []
+
+    def store():
+        if coupling.now.number in (STEPS // 2, STEPS - 3):
+            stored.append(checkpoint_file.write(tmp_path, {"cycle": coupling.now.number}, coupling))
+
+    def told(cycle):
+        return (
+            cycle.number,
+            cycle.work["solutions_left_out"],
+            cycle.latest_tips.tobytes(),
+            cycle.state.crack_strain.tobytes(),
+        )
+
+    coupling.between = store
+    run = [told(cycle) for cycle in coupling.cycles()]
+    for path in stored:
+        resumed = [told(cycle) for cycle in checkpoint_file.read(path).load_steps()]
+        assert len(resumed) > 2 and run[-len(resumed) :] == resumed
 
 
 def test_asking_makes_no_difference_to_what_moves():

@@ -93,7 +93,45 @@ def test_loads_beside_the_outline_have_no_bound():
     assert np.isinf(ChangeBound(body).at_most(load)).all()
 
 
-def test_what_rubs_is_not_bounded():
-    """Friction is no projection: the way of the load matters."""
+@pytest.mark.parametrize("angle", [0.2, 0.6])
+def test_friction_is_bounded_by_the_path_of_the_load(angle):
+    """Along the ways between random loads, in steps that each begin with the slip of the last, no tip's K changes by more
+    than the bound since the first; nor does it where the whole way is one step."""
+    body, rng = body_with(face_laws=(JointLaw("rough", friction_angle=angle),)), np.random.default_rng(3)
+    assert changes_are_bounded(body)
+    bound, first, nearest = ChangeBound(body), None, 0.0
+    last = random_load(body, rng)
+    for _ in range(12):
+        to, history = random_load(body, rng), first
+        if first is not None:
+            bound.refer(last, first)
+            before = np.stack([first.tips["k_i"], first.tips["k_ii"]], axis=1)
+        for part in np.linspace(0, 1, 6)[1:]:
+            load = between(last, to, part)
+            history = body.solve(load, history=history, equilibrium_tolerance=1e-9)
+            if first is None:
+                continue
+            most = bound.change(load)
+            for found in (history, body.solve(load, history=first, equilibrium_tolerance=1e-9)):
+                change = np.hypot(*(np.stack([found.tips["k_i"], found.tips["k_ii"]], axis=1) - before).T)
+                assert (change <= most).all()
+                nearest = max(nearest, (change / most).max())
+        last, first = to, history
+    assert nearest > 0.01
+
+
+def between(a, b, part):
+    """The load that is ``part`` of the way from ``a`` to ``b``."""
+    shares = np.concatenate([(1 - part) * a.tractions, part * b.tractions])
+    force, gradient = ((1 - part) * getattr(a, n) + part * getattr(b, n) for n in ("body_force", "body_force_gradient"))
+    return ddm.BodyLoad(
+        segments=np.concatenate([a.segments, b.segments]), tractions=shares, body_force=force,
+        body_force_gradient=gradient, about=a.about, remote_stress=(1 - part) * a.remote_stress + part * b.remote_stress,
+    )  # fmt: skip
+
+
+def test_cement_is_not_bounded():
+    """Bonds that break let go at once."""
     assert changes_are_bounded(body_with())
-    assert not changes_are_bounded(body_with(face_laws=(JointLaw("rough", friction_angle=0.5),)))
+    cement = JointLaw("cement", friction_angle=0.5, cohesion=1e6, tensile_strength=1e6)
+    assert not changes_are_bounded(body_with(face_laws=(cement,)))
