@@ -21,6 +21,8 @@ def unreached(problem: Problem, last: Cycle | None, happened: Container[str]) ->
     stops = problem.run.stop_at
     if last is None or not problem.cracks.n_cracks or not stops or any(kind in happened for kind in stops):
         return ""
+    if all(math.isinf(material.k_ic) for material in problem.materials) and not problem.growth.initiation:
+        return ""  # nothing grows: no strength was asked for
     if not math.isfinite(last.load) or last.load == 0.0 or last.state.time < problem.run.end_time * (1 - 1e-9):
         return ""
     strain = f" and a strain of {100 * abs(last.strain):.2g} %" if math.isfinite(last.strain) else ""

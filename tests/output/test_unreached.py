@@ -63,6 +63,15 @@ def summary_of(folder: Path, end: float, stop_at: str = '["coalescence", "split"
     return json.loads((folder / "out" / "summary.json").read_text(encoding="utf-8"))
 
 
+def test_it_is_not_told_of_cracks_that_cannot_grow(tmp_path: Path):
+    scene = tmp_path / "scene.toml"
+    text = SPECIMEN.format(end=4.0, step=2.0, stop_at='["coalescence", "split"]') + "[growth]\nenabled = false\n"
+    scene.write_text(text, encoding="utf-8")
+    loaded = geomech.load_scene(scene)
+    geomech.run(loaded, tmp_path / "out", standard_observers(loaded, quiet=True))
+    assert "not_reached" not in json.loads((tmp_path / "out" / "summary.json").read_text(encoding="utf-8"))
+
+
 def test_it_is_told_first(tmp_path: Path):
     """At 300 MPa the strain is 1.4 %, by (1 - ν²)/E = 1.44 % and the flaw."""
     summary = summary_of(tmp_path / "strong", 300.0)
