@@ -26,8 +26,7 @@ class RoughResponse:
     solution ``of`` under the uniform ``stress`` (3,), Pa."""
 
     def __init__(self, body: CrackedBody, of: Any, stress: np.ndarray) -> None:
-        assert of.began is not None  # of faces with friction
-        self.states, self.closed, self.began = of.face_states, of.closed, of.began
+        self.states, self.closed = of.face_states, of.closed
         equations = body.face_equations
         right = -np.column_stack([on_elements(body.faces, unit) for unit in np.eye(3)])
         per_stress = equations.uniform_tangent(right, self.states)
@@ -37,11 +36,6 @@ class RoughResponse:
         self.reaction = np.column_stack([reaction, -of.face_traction - reaction @ stress])
         #: S w.
         self.moved = np.column_stack([right, np.zeros(len(right))]) - self.reaction
-        self._weights = body.strain_weights
-
-    def compliance(self) -> np.ndarray:
-        """(3, 3) crack strain per unit stress, 1/Pa."""
-        return self._weights @ self.jumps[:, :3]
 
 
 class RoughSolution(UniformStressSolution):
