@@ -50,16 +50,18 @@ def test_record_is_that_of_el_centro():
 def test_slips_like_a_sliding_block(tmp_path):
     """Whole blocks, over the two pulses that move the slope: Newmark's rigid block slips by 34.5 mm on its plane.
 
-    Found: 40.4 mm in the mean of the rock. Jointed rock is no rigid block: it turns on its
+    Found: 40.9 mm in the mean of the rock, 42.0 in shorter steps. Jointed rock is no rigid block: it turns on its
     joints, which open and slide too (a tenth of the blocks move 12 mm or less, a tenth 64 mm or more), for which a
-    quarter is allowed. Until the first pulse above the yield acceleration, at 2.1 s, nothing slides.
+    quarter is allowed. Until the first pulse above the yield acceleration, at 2.1 s, nothing slides: blocks and joints
+    give by 0.74 mm (in steps of 2.5 ms; 0.75 here) and swing back.
     """
     slide = run_pipeline(tmp_path, "geometry.dead_ends=trim", "output.every=1000")
     table = slide.table
     expected = slide.newmark(table[:, 0])
     assert table[-1, 1] == pytest.approx(expected[-1], rel=0.25)
     quiet = (table[:, 0] >= 0.5) & (table[:, 0] < 1.9)
-    assert np.abs(table[quiet, 1]).max() < 0.02 * expected[-1]
+    assert np.abs(table[quiet, 1]).max() == pytest.approx(0.74e-3, rel=0.05)
+    assert np.abs(table[quiet, 1][-2:]).max() < 0.2e-3
     text = (tmp_path / "short" / "comparison.txt").read_text(encoding="utf-8")
     assert "Newmark's sliding block" in text and "by phase" in text and "nan" not in text
     assert (tmp_path / "short" / "jointed_slope.png").stat().st_size > 50_000
@@ -67,7 +69,7 @@ def test_slips_like_a_sliding_block(tmp_path):
 
 @pytest.mark.slow
 def test_rock_bridges_break_and_the_slope_slides_a_little_farther(tmp_path):
-    """With cracks, of which nine cut their blocks: 40.6 mm found, 40.4 in whole blocks, Newmark 34.5. Blocks and
+    """With cracks, of which nine cut their blocks: 41 mm found, as in whole blocks, Newmark 34.5. Blocks and
     cracks agree in every cycle; the study itself checks when and how far it slides."""
     slide = run_pipeline(tmp_path, "output.every=1000")
     assert max(slide.settled) < 0.1
