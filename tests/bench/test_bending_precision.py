@@ -38,3 +38,11 @@ def test_the_table_has_a_row_for_each_method():
         [Point("cantilever", "one block", 3, 1e-3, 0.01), Point("cantilever", "cells of order 2", 1, 2e-3, 0.02)]
     )
     assert "one block" in text and "1: 2.0e-03    20.0" in text
+
+
+def test_the_table_has_observed_orders():
+    text = table(
+        [Point("cantilever", "one block", p, 10.0**-p, 0.01) for p in (2, 4)]
+        + [Point("cantilever", "cells of order 2", n, n**-3.0, 0.02) for n in (1, 2, 4)]
+    )
+    assert "1.00 digits an order" in text and "h^3.0" in text

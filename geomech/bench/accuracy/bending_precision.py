@@ -12,6 +12,7 @@ alternate, so that other work on the machine slows all of them.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
@@ -211,15 +212,26 @@ def _timed(problem: str, method: str, size: int, run) -> Point:
     return Point(problem, method, size, abs(found / PANELS[problem].exact - 1), min(times))
 
 
+def _observed(points: list[Point]) -> str:
+    """How fast the error of one method decreases over its last two sizes: as h to an observed order, or, with the order of one
+    block, in decimal digits an order."""
+    if len(points) < 2:
+        return ""
+    first, last = points[-2:]
+    if last.method == ONE:
+        return f"   {math.log10(first.error / last.error) / (last.size - first.size):.2f} digits an order"
+    return f"   h^{math.log(first.error / last.error) / math.log(last.size / first.size):.1f}"
+
+
 def table(points: list[Point]) -> str:
-    """Errors and times, method by method."""
+    """Errors and times, method by method, with observed orders."""
     lines = ["energy of bent panels: order of one block, or how often the coarsest grid is refined; relative error, ms"]
     for problem in dict.fromkeys(p.problem for p in points):
         lines.append(problem)
         for method in dict.fromkeys(p.method for p in points if p.problem == problem):
             selected = [p for p in points if (p.problem, p.method) == (problem, method)]
             row = "   ".join(f"{p.size:g}: {p.error:.1e} {1e3 * p.seconds:7.1f}" for p in selected)
-            lines.append(f"  {method:<34}{row}")
+            lines.append(f"  {method:<34}{row}{_observed(selected)}")
     if not finite_elements.available():
         lines.append("  (finite elements: pip install 'geomech[bench]')")
     return "\n".join(lines)

@@ -136,6 +136,61 @@ def test_a_cantilever_of_order_three_is_exact(plane, angle):
     assert energy == pytest.approx(exact, rel=1e-10)
 
 
+def bent_ring(points: np.ndarray) -> np.ndarray:
+    """(n, 2, 2) stress of a curved bar of radii 1 and 2 m about the origin under moments on its ends alone (Golovin 1881;
+    Timoshenko & Goodier 1970, art. 29), Pa, for M = −1 MN m/m."""
+    r = np.hypot(*points.T)
+    a, b, log = 1.0, 2.0, math.log(2.0)
+    n = (b * b - a * a) ** 2 - 4 * a * a * b * b * log**2
+    first, outer, inner = a * a * b * b / r**2 * log, b * b * np.log(r / b), a * a * np.log(a / r)
+    radial, hoop = 4e6 / n * (first + outer + inner), 4e6 / n * (-first + outer + inner + b * b - a * a)
+    way = points / r[:, None]
+    around = np.stack([-way[:, 1], way[:, 0]], axis=1)
+    return (
+        radial[:, None, None] * way[:, :, None] * way[:, None]
+        + hoop[:, None, None] * around[:, :, None] * around[:, None]
+    )
+
+
+@pytest.mark.parametrize(("turn", "highest"), [(math.pi / 4, 1e-5), (math.pi / 2, 2e-3)])
+def test_a_thick_ring_sector_of_one_block_converges(turn, highest):
+    """An eighth and a quarter of a ring of radii 1 and 2 m as one block under the tractions of a moment: strain energy against that of
+    the stress over the same polygon of 24 chords, which no polynomial contains."""
+    rock = Material("rock", 2e10, 0.25, 2500.0, plane="stress")
+    angle = np.linspace(0, turn, 25)
+    arc = np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    polygon = np.concatenate([arc[::-1], 2 * arc])
+    at, weight = gauss_points(8)
+    points, forces = [], []
+    for a, b in zip(polygon, np.roll(polygon, -1, axis=0)):
+        side = a + at[:, None] * (b - a)
+        normal = np.array([b[1] - a[1], a[0] - b[0]])
+        points.append(side)
+        forces.append(weight[:, None] * (bent_ring(side) @ normal))
+    points, forces = np.concatenate(points), np.concatenate(forces)
+    energy = 0.0
+    for a, b, c, d in zip(arc[:-1], 2 * arc[:-1], 2 * arc[1:], arc[1:]):
+        for p, q, r in ((a, b, c), (a, c, d)):
+            s, t = (each.ravel() for each in np.meshgrid(at, at))
+            inside = p + s[:, None] * (q - p) + (s * t)[:, None] * (r - q)
+            share = np.abs((q - p)[0] * (r - q)[1] - (q - p)[1] * (r - q)[0]) * np.outer(weight, weight).ravel() * s
+            stress = bent_ring(inside)
+            trace = stress[:, 0, 0] + stress[:, 1, 1]
+            energy += 0.5 / 2e10 * share @ (1.25 * (stress**2).sum(axis=(1, 2)) - 0.25 * trace**2)
+    error = {}
+    for order in (2, 3, 5, 7, 8):
+        basis, blocks = basis_of(polygon, order=order)
+        _, stiffness = matrices(basis, blocks, rock)
+        matrix = np.concatenate(
+            [dda.displacement_matrix(points, basis.centroid[0]), basis.displacement(points, 0)], axis=2
+        )
+        force = np.einsum("kaj,ka->j", matrix, forces)
+        error[order] = 1 - 0.5 * force[3:] @ np.linalg.solve(stiffness[3:, 3:], force[3:]) / energy
+    print("ring sector of one block, energy off by", {order: f"{each:.1e}" for order, each in error.items()})
+    assert 0 < error[8] < highest
+    assert error[2] > 2 * error[3] > 8 * error[5] > 40 * error[7]
+
+
 def frequencies(polygon: np.ndarray, order: int, rock: Material) -> np.ndarray:
     """Circular frequencies of the free block beyond the three rigid motions, rad/s."""
     basis, blocks = basis_of(polygon, order=order)
