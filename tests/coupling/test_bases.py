@@ -99,6 +99,29 @@ def test_blocks_in_motion_have_linear_pressure():
     assert last(problem)[1]["k_i"].tolist() == last(linear)[1]["k_i"].tolist()
 
 
+@pytest.mark.parametrize(("wide", "part"), [(3.0, (0.92, 0.93, 0.94)), (5.0, (1.06, 1.08, 1.10))])
+def test_blocks_that_lift_off_their_base_have_the_pressure_of_the_part_that_presses(wide, part):
+    """K as with the right part of the base held, of which K is stationary; a parabola through three parts gives it. To 1e-3; a
+    linear pressure leaves it too large by a factor of 4 and more."""
+    held = [alone(wide, ((-half, 0.0), (half, 0.0))).tips["k_i"].max() for half in part]
+    fitted = np.polynomial.Polynomial.fit(part, held, 2)
+    (stationary,) = fitted.deriv().roots()
+    assert last(slab(wide, "bases"))[1]["k_i"].max() == pytest.approx(fitted(stationary), rel=1e-3)
+
+
+def test_soft_joints_spread_the_pressure():
+    """A joint between block and base that closes by more than the block deforms leaves the pressure linear; one that closes by
+    less than a hundredth of it is no joint."""
+    k = {}
+    for stiffness in (1e6, 2e10, 1e14):
+        problem = slab(2.0, "bases")
+        joint = JointLaw("base", friction_angle=0.0, normal_stiffness=stiffness)
+        k[stiffness] = last(replace(problem, joints=(joint,)))[1]["k_i"].max()
+    linear, rigid = (last(slab(2.0, route))[1]["k_i"].max() for route in ("contacts", "bases"))
+    assert k[1e6] == pytest.approx(linear, rel=1e-3) and k[1e14] == pytest.approx(rigid, rel=1e-3)
+    assert 1.1 * rigid < k[2e10] < 0.9 * linear
+
+
 def test_wide_blocks_lift_off_their_base_at_its_ends():
     """Three times as wide as deep, the slab stands on 62 % of its base: on a longer piece, held, the reaction at the
     end pulls, on a shorter one it presses, singular like r^(−½), and K of that piece is the one that is found (2e-3;

@@ -55,6 +55,10 @@ from .piecewise_traction import (
 #: (`tests/coupling/test_bases.py`). A square is as wide as deep, whatever round-off says.
 WIDE = 1.0 + 1e-6
 
+#: Pieces of the pressure of a side on a rigid base that is as long as its block is deep (area over length, √area at most): pressure
+#: below a wide block varies over a part of the face as long as its depth. Elements there, 6 of order 4 by default, have as many nodes.
+ON_BASE = 24
+
 
 @dataclass(frozen=True, eq=False)
 class BoundaryLoad:
@@ -66,7 +70,8 @@ class BoundaryLoad:
     - points, forces (k, 2): point forces, None without; ``kelvin`` as in `ddm.BodyLoad`
     - body_force (2,), body_force_gradient (2, 2): b = body_force + gradient · (x − about), N/m³
     - imbalance: resultant that inertia has to balance beyond the solver's own acceleration, relative to the forces
-    - bases: rows of segments whose pressure is still to be found, and the traction (2,) per unit pressure
+    - bases: rows of segments whose pressure is still to be found, the traction (2,) per unit pressure, and the stiffness of
+      the joint, Pa/m (infinite if it has none of its own)
     - crack_pressure (scalar or (n_segments,)), hole_pressure: fluid pressures in unbounded rock, Pa
     - single: CONTACT rows that act alone, on a corner or a short piece of an edge; of_single: begin and end of the rows
       of their segments
@@ -82,7 +87,7 @@ class BoundaryLoad:
     points: np.ndarray | None = None
     forces: np.ndarray | None = None
     kelvin: bool = False
-    bases: tuple[tuple[np.ndarray, np.ndarray], ...] = ()
+    bases: tuple[tuple[np.ndarray, np.ndarray, float], ...] = ()
     crack_pressure: np.ndarray | float = 0.0
     hole_pressure: float = 0.0
     single: np.ndarray | None = None
@@ -95,7 +100,8 @@ class BoundaryForces:
 
     ``vertices`` (n_vertices, 2) and ``motion`` of that configuration; ``contacts`` CONTACT rows, ``edges`` EDGE_FORCE
     rows, ``points`` POINT_FORCE rows; ``route``: "auto", "contacts", "bases", "springs" or "kelvin-springs"; ``keep_straight``
-    (n_blocks,) bool: blocks that act as rigid bases; ``tensile_strength`` of each joint law, Pa (None: all zero).
+    (n_blocks,) bool: blocks that act as rigid bases; ``tensile_strength`` of each joint law, Pa (None: all zero), and its
+    ``normal_stiffness``, Pa/m (None: all infinite).
     """
 
     vertices: np.ndarray
@@ -106,6 +112,7 @@ class BoundaryForces:
     route: str = "contacts"
     tensile_strength: Sequence[float] | None = None
     keep_straight: np.ndarray | None = None
+    normal_stiffness: Sequence[float | None] | None = None
 
     def holding(self) -> np.ndarray:
         """(n_contacts,) bool: bonded contacts with tensile strength."""
@@ -152,9 +159,14 @@ def boundary_loads(
     remote = None if overstress is None else even - times(stress_rotations(-np.asarray(rotation)), overstress)
     pieces, inside, bases = found.pieces, found.inside, found.bases
     segments, tractions = pieces.reshape(-1, 4, 2)[:, :2], pieces.reshape(-1, 4, 2)[:, 2:]
+    given_stiffness = forces.normal_stiffness or [None] * (1 + int(contacts["law"].max(initial=0)))
+    stiffness = [math.inf if each is None else float(each) for each in given_stiffness]
     loads = []
     for k, ((a, i, j), (b, to_i, to_j)) in enumerate(zip(ends[:-1].tolist(), ends[1:].tolist())):
-        on = tuple((np.arange(int(m) - a, int(o) - a), np.array([x, y])) for m, o, x, y in bases[j:to_j].tolist())
+        on = tuple(
+            (np.arange(int(m) - a, int(o) - a), np.array([x, y]), stiffness[int(law)])
+            for m, o, x, y, law in bases[j:to_j].tolist()
+        )
         at, pull = (inside[i:to_i, :2], inside[i:to_i, 2:]) if to_i > i else (None, None)
         begin, end = acting.contact_ends[k].tolist()
         alone = rows[acting.contact_rows[begin:end][single[begin:end]]]
@@ -173,7 +185,7 @@ def _with_room(given: tuple, room: int) -> tuple[Found, tuple[np.ndarray, ...]]:
     """Run `_pieces` with ``room`` for that many pieces, again with more if it does not suffice; returns `Found`, and what
     `_pieces` returns."""
     while True:
-        found = Found(np.zeros(3, np.int64), np.empty((room, 8)), np.empty((room, 4)), np.empty((room, 4)))
+        found = Found(np.zeros(3, np.int64), np.empty((room, 8)), np.empty((room, 4)), np.empty((room, 5)))
         per_block = _pieces(found, *given)
         count = found.count.tolist()
         if max(count) <= room:
@@ -254,8 +266,11 @@ def _pieces(found, asked, of, vertex_start, acting, pointed):
                 start = sides[number, 0]
                 _, _, ax, ay, length = line_of(of, start)
                 on_base = acting.based[touches.against[first]] and length * length > acting.wide * asked.area[b]
-                size = math.sqrt(asked.area[b]) if on_base else 0.0
-                amount, lost = add_face(found, of, start, touches, face, number, size)
+                piece = min(math.sqrt(asked.area[b]), asked.area[b] / length) / ON_BASE if on_base else 0.0
+                base = found.count[2]
+                amount, lost = add_face(found, of, start, touches, face, number, piece)
+                if base < found.count[2] and base < len(found.bases):
+                    found.bases[base, 4] = acting.contacts[rows[first]].law
                 couple += lost
                 stretch[b, 0, 0] += amount * ax * ax
                 stretch[b, 0, 1] += amount * ax * ay

@@ -41,12 +41,12 @@ class _Spread(NamedTuple):
 
 
 @allocating
-def add_face(found, of, start, touches, face, number, size_on_base):
+def add_face(found, of, start, touches, face, number, piece):
     """Add the traction of the contacts with this face ``number`` to ``found``, on the straight side that begins with
     the edge ``start``.
 
-    ``pieces``, if not 0: the face lies on a rigid base, and the distribution of its pressure on so many pieces is found later by
-    `geomech.ddm.loads.rigid_bases`; the rows of its pieces and the traction per unit pressure are added, too.
+    ``piece`` (m), if not 0: the face lies on a rigid base, and the distribution of its pressure on pieces of about this length is
+    found later by `geomech.ddm.loads.rigid_bases`; the rows of its pieces and the traction per unit pressure are added, too.
 
     Returns two moments, N: Σ r ⊗ f along the side that the tractions do not reproduce (opposed shears of two contacts
     have neither resultant nor moment), and the couple lost by forces that act beyond the end of their edge."""
@@ -89,10 +89,10 @@ def add_face(found, of, start, touches, face, number, size_on_base):
     even = holds or abs(total) <= 1e-9 * size or not inside
     slope = 0.0 if even else shear / total
     wx, wy = slope * ax - ay, slope * ay + ax
-    if size_on_base > 0 and not even:
+    if piece > 0 and not even:
         near, far = on_grid(min(max(near, 0.0), length), length), on_grid(min(max(far, 0.0), length), length)
         arm = moment / total
-        pieces = pieces_on_base(far - near, size_on_base)
+        pieces = pieces_on_base(far - near, piece)
         # Within a third of the first piece no pressure of these pieces has the resultant: a triangle at the end has it.
         if min(arm - near, far - arm) > first_on_base(pieces) * (far - near) / 3.0:
             _, _, p_near, p_far = linear(far - near, total, moment - near * total)

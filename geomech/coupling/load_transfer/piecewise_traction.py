@@ -40,13 +40,6 @@ ON_EDGE = 1e-6
 LONE_SPREAD = 1.0 / 20.0
 
 
-#: Pieces of a face on a rigid base that is as long as √area of the block, in proportion to its length: below a wide block the
-#: pressure varies over a part of the face as long as the block is deep. Elements of the boundary, √area / 6 long and of order 4,
-#: have 30 nodes there. K of a slot in a block as wide as deep, twice and three times as wide is accurate to 6e-4, 1e-4 and 2e-3
-#: (`tests/coupling/test_bases.py`); 24 pieces on any face left 7 % at four times.
-ON_BASE = 24
-
-
 class Outlines(NamedTuple):
     """Outlines of all blocks: reference ``vertices`` and current ones ``now`` (n, 2). For every vertex or edge: the
     ``following`` one, the one ``before``, the first edge of its straight side (`Blocks.side_start`), and begin and end
@@ -64,8 +57,8 @@ class Outlines(NamedTuple):
 
 class Found(NamedTuple):
     """Output rows, with their ``count`` (3,): ``pieces`` (m, 8): (x, y) of start and end, traction (x, y) at both;
-    ``inside`` (k, 4): points and the forces there; ``bases`` (j, 4): first and last row of pieces on a rigid base,
-    traction per unit pressure. Rows beyond the room of the arrays are only counted."""
+    ``inside`` (k, 4): points and the forces there; ``bases`` (j, 5): first and last row of pieces on a rigid base,
+    traction per unit pressure, law of the joint. Rows beyond the room of the arrays are only counted."""
 
     count: np.ndarray  # type: ignore[assignment]  # hides tuple.count
     pieces: np.ndarray
@@ -91,9 +84,9 @@ def line_of(of, start):
 
 
 @jit
-def pieces_on_base(length, size):
-    """Number of pieces of a face of this ``length`` (m) of a block of this ``size`` √area (m)."""
-    return max(1, int(ON_BASE * length / size + 0.5))
+def pieces_on_base(length, piece):
+    """Number of pieces of a face of this ``length`` (m), about as long as a ``piece`` (m)."""
+    return max(1, int(length / piece + 0.5))
 
 
 @jit

@@ -4,9 +4,10 @@ A body in equilibrium is loaded on a straight piece of its boundary by a pressur
 the moment M are known. The base is rigid, cannot pull and cannot be penetrated, so that the face is straight where it
 presses,
 
-    p ≥ 0,    g = δ + θ s − u ≥ 0,    p g = 0,    ∫ p ds = N,    ∫ p s ds = M,
+    p ≥ 0,    g = δ + θ s − u + p / k ≥ 0,    p g = 0,    ∫ p ds = N,    ∫ p s ds = M,
 
-with u the displacement out of the body, s the coordinate along the face, δ and θ the base's translation and rotation:
+with u the displacement out of the body, s the coordinate along the face, δ and θ the base's translation and rotation, k the
+stiffness of the joint (infinite without one: a very soft one leaves the pressure linear):
 as many unknowns as given resultants, so that the body's equilibrium is kept to round-off. p is linear on each piece of
 the face, and u is weighted with the same hat functions (a boundary part of Signorini's problem: Kikuchi & Oden 1988,
 §6). The compliance of the face comes from the body's factors. If crack faces close meanwhile, it changes, and the
@@ -58,10 +59,12 @@ class Base:
 
     rows          (m,) numbers of the load's segments, in order along the outline
     per_pressure  (2,) traction per unit of pressure
+    stiffness     normal stiffness of the joint between face and base, Pa/m
     """
 
     rows: np.ndarray
     per_pressure: np.ndarray
+    stiffness: float = np.inf
 
 
 def on_bases(
@@ -119,6 +122,7 @@ class _Faces:
 
     weights     (n, n_boundary_unknowns): ∫ hat · u ds from the nodal displacement (local) of the boundary
     resultants  (2 n_bases, n): force, and moment about its start, of each base
+    closure     (n, n): ∫ hat · closure ds of the joint under unit pressures, m²/Pa
     """
 
     def __init__(self, body: Body, segments: np.ndarray, bases: Sequence[Base]):
@@ -131,6 +135,14 @@ class _Faces:
         self.weights: np.ndarray
         self.resultants: np.ndarray
         self.weights, self.resultants = body.on_bases[self._key]
+        self.closure = np.zeros((int(self.first[-1]),) * 2)
+        for k, base in enumerate(bases):
+            ends = segments[base.rows]
+            length = np.hypot(*(ends[:, 1] - ends[:, 0]).T) / base.stiffness
+            near = self.first[k] + np.arange(len(length))
+            np.add.at(self.closure, (near, near), length / 3)
+            np.add.at(self.closure, (near + 1, near + 1), length / 3)
+            self.closure[near, near + 1] = self.closure[near + 1, near] = length / 6
 
     def _geometry(self) -> tuple[np.ndarray, np.ndarray]:
         body, g, n = self.body, self.body.boundary, int(self.first[-1])
@@ -208,7 +220,7 @@ class _Faces:
     def settled(self, gives: np.ndarray, still: np.ndarray, right: np.ndarray) -> np.ndarray | None:
         """(n,) pressures with the resultants ``right`` without tension or penetration, or None."""
         least = _LAYER / self.body.material.plane_modulus
-        stiff = positive(-gives, self.resultants, least)
+        stiff = positive(self.closure - gives, self.resultants, least)
         return pressures_on_bases(stiff, still, Resultants(self.resultants, right, self.first))
 
 
