@@ -185,9 +185,9 @@ def test_unstable_growth_says_if_load_steps_pass_the_load_at_which_it_begins(cap
     assert "t = 2 s" in line and told in line and ("load steps" in line) == bool(told)
 
 
-@pytest.mark.parametrize(("steps", "told"), [(3, True), (48, False)])
+@pytest.mark.parametrize(("steps", "told"), [(2, True), (48, False)])
 def test_coarse_load_steps_in_which_a_crack_runs_are_told_of(caplog, steps, told):
-    """Slope 26: its weight in three steps passes the load at which cracks begin to run by two thirds."""
+    """Slope 26: its weight in two steps passes the load at which cracks begin to run by two thirds (in three by a tenth)."""
     problem = problem_of(drawn(scene_text(26)))
     problem = replace(problem, dda=replace(problem.dda, time_step=3.0 / steps))
     run = Coupling(problem)
