@@ -13,13 +13,14 @@ extrapolation in the loads (`load_extrapolation`).
 from __future__ import annotations
 
 import logging
+from collections.abc import Iterator
 from contextlib import nullcontext
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from .. import dda
+from .. import dda, ddm
 from ..dda import StepResult
 from ..dda.statics.displacement_limit import DisplacementLimit
 from ..model import TIP, Motion, State
@@ -68,6 +69,8 @@ AGREED = 1e-2
 #: shorter the step, the more the inertia limits the strain.
 FAILED = 0.1
 HALVINGS = 4
+#: Key of a warning that is given once.
+_UNSETTLED = "crack faces without states"
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,27 +107,72 @@ def balanced(now: CrackedBlocks, dt: float, load_time: float | None, like: StepR
 
 def _balanced(now: CrackedBlocks, dt: float, load_time: float | None, like: StepResult | None) -> Balance:
     """`balanced` with blocks of the present orders."""
-    begun, static = now.response, now.system.scheme.static
-    memories = now.history, now.by_mean_stress.memory
-    # In statics the mean-stress response is used only where the iteration fails without it, and cement breaks in the
-    # passes only where both fail.
-    for ways in _AT_REST if static else (_Ways(soft_by_mean_stress=True),) * (1 + HALVINGS):
-        now.response = begun
+    static, asked = now.system.scheme.static, dt
+    found, failure = None, None
+    for halvings, ways in _attempts(static, load_time is None):
+        if static and halvings and found is not None:
+            break
+        dt = 0.5**halvings * asked if static else dt
         try:
-            found, differences = _passes(now, dt, load_time, ways, like)
-        finally:
-            # Cement that has broken in the iteration is lost only once the step is accepted.
-            now.history, now.by_mean_stress.memory = memories
+            found, differences = _attempted(now, dt, load_time, ways, like)
+        except ddm.NotConverged as unsettled:
+            failure, dt = unsettled, 0.5 * dt
+            continue
         lost = np.flatnonzero(differences > FAILED)
         if not len(lost):
+            if failure is not None:
+                _tell_unsettled(now, found.result, failure)
             return replace(found, mismatch=differences)
-        dt = dt if static else 0.5 * found.result.dt
+        dt = 0.5 * found.result.dt
+    if found is None:
+        raise dda.NotConverged(f"t = {now.state.time + dt:g} s: {failure}") from failure
     blocks = [now.blocks.names[b] for b in np.array(list(now.bodies), int)[lost]]
     raise dda.NotConverged(
         f"t = {found.result.state.time:g} s: {', '.join(blocks[:3])} and its cracks do not converge to a common strain "
         f"in {COMPLIANCE_PASSES} passes (relative difference {differences.max():.2g}): try a shorter time step, or "
         "finer elements in [ddm]"
     )
+
+
+def _attempts(static: bool, free: bool) -> Iterator[tuple[int, _Ways]]:
+    """Attempts at a step: how often it is halved, and how. In motion every attempt takes half of the last step.
+
+    In statics the mean-stress response is used only where the iteration fails without it, and cement breaks in the passes
+    only where both fail. Shorter load steps, if their length is ``free``, are for faces that find no states in any way."""
+    if not static:
+        yield from ((k, _Ways(soft_by_mean_stress=True)) for k in range(1 + HALVINGS))
+        return
+    for k in range(1 + HALVINGS if free else 1):
+        yield from ((k, ways) for ways in _AT_REST)
+
+
+def _attempted(
+    now: CrackedBlocks, dt: float, load_time: float | None, ways: _Ways, like: StepResult | None
+) -> tuple[Balance, np.ndarray]:
+    """The result of `_passes`; without one, ``now`` begins the next attempt as this one. Raises `ddm.NotConverged`."""
+    begun, memories = now.response, (now.history, now.by_mean_stress.memory)
+    done = False
+    try:
+        found, differences = _passes(now, dt, load_time, ways, like)
+        done = not (differences > FAILED).any()
+        return found, differences
+    finally:
+        # Cement that has broken in the iteration is lost only once the step is accepted.
+        now.history, now.by_mean_stress.memory = memories
+        if not done:
+            now.response = begun
+
+
+def _tell_unsettled(now: CrackedBlocks, result: StepResult, failure: Exception) -> None:
+    """Warn, once in a run, that crack faces have found no states in an earlier attempt at the step of ``result``."""
+    level = logging.DEBUG if _UNSETTLED in now.system.warned else logging.WARNING
+    now.system.warned.add(_UNSETTLED)
+    log.log(
+        level,
+        "t = %g s: %s. The step is repeated, with a length of %.3g s, in which the faces have states; later repetitions "
+        "are not reported",
+        result.state.time, failure, result.dt,
+    )  # fmt: skip
 
 
 def at_rest(now: CrackedBlocks, load_time: float) -> dda.Equilibrium:
@@ -417,8 +465,6 @@ def _solutions_under_last_forces(now: CrackedBlocks, grown: list[int]) -> dict:
     asked = {b: now.bodies[b] for b in grown if b in now.loads and b not in now.by_mean_stress}
     if not asked:
         return {}
-    from .. import ddm
-
     try:
         solved = now.solve(asked, now.loads, now.solutions)
     except ddm.NotConverged:
