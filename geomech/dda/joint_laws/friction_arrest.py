@@ -26,7 +26,7 @@ from ...compiled import UNCOUNTED, kept
 from ...model import OPEN, SLIP, STICK
 from ..contact_detection.contact_records import largest_of_blocks
 from ..equation_records import BlockEquations, ContactMotion, SpringsInStates
-from ..kinematics.tolerances import LITTLE, NOTABLE
+from ..kinematics.tolerances import LITTLE
 from ..linear_solver import assembly
 from ..open_close.contact_set import ContactSet
 from ..open_close.settled_states import Settled
@@ -37,6 +37,9 @@ _ROUNDS, _LEFT = 4, 0.1
 #: Value of k dt²/m from which a spring k reverses the speed of a mass m in every step of Shi's scheme: both roots are
 #: real, and one tends to −1.
 _TURNS_ABOUT = 16.0
+#: Vibrations that swing contact forces by less than this part of the largest on a block hardly bring contacts to their
+#: strength. (With `NOTABLE`, a block on a shaken base is three times as far off Newmark's.)
+_SWINGS = LITTLE
 #: Displacement of blocks at rest per step due to rounding, in units of the rounding of one contact: 4 in a wall of 1
 #: 000 bricks, 19 in one of 10 000. Slower sliding is not stopped, which would take three solutions in every step.
 _PASSED_ON = 20.0
@@ -64,8 +67,7 @@ class Unresolved:
         along = np.where(sticks, speeds[:, 1] - slid / dt, 0.0)
         rows = np.flatnonzero(holds)
         largest = np.maximum(np.abs(apart[rows]), np.abs(along[rows])) / dt
-        # Smaller vibrations hardly bring contacts to their strength.
-        if not _worth_it(found, rows, largest, light, mass, settled.normal_force, NOTABLE):
+        if not _worth_it(found, rows, largest, light, mass, settled.normal_force, _SWINGS):
             return None
         return cls(apart, along)
 
