@@ -125,7 +125,7 @@ def _balanced(now: CrackedBlocks, dt: float, load_time: float | None, like: Step
             return replace(found, mismatch=differences)
         dt = 0.5 * found.result.dt
     if found is None:
-        raise dda.NotConverged(f"t = {now.state.time + dt:g} s: {failure}") from failure
+        raise dda.NotConverged(f"in a step from t = {now.state.time:g} s: {failure}") from failure
     blocks = [now.blocks.names[b] for b in np.array(list(now.bodies), int)[lost]]
     raise dda.NotConverged(
         f"t = {found.result.state.time:g} s: {', '.join(blocks[:3])} and its cracks do not converge to a common strain "
