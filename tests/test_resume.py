@@ -393,6 +393,26 @@ def test_a_run_made_longer_is_one_that_was_as_long_from_the_start(text, settings
     assert differing(tmp_path / "whole", tmp_path / "parts") == []
 
 
+def test_a_load_that_follows_the_cracks_needs_no_checkpoint_at_every_step(tmp_path, monkeypatch):
+    """After each growth the load falls, so that the end of the run cannot cut the next step. Broken off between two
+    increments, where K at the start of the next step has been solved for, the run goes on to the same bytes."""
+    settings = ["growth.increment_m=0.01", "output.interior=false"]
+    scene = load_scene(ROOT / "geometry" / "inclined_crack.toml", settings)
+    written, write_file = [], checkpoint_file.write
+
+    def counted(folder, header, content):
+        written.append(header["cycle"])
+        return write_file(folder, header, content)
+
+    monkeypatch.setattr(checkpoint_file, "write", counted)
+    last = run(scene, tmp_path / "whole", standard_observers(scene, quiet=True))["cycles"] - 1
+    assert last > 8
+    assert written == [last]
+    broken_off(scene, tmp_path / "parts", last // 2)
+    resume(tmp_path / "parts", quiet=True)
+    assert differing(tmp_path / "whole", tmp_path / "parts") == []
+
+
 def test_a_run_that_stopped_goes_on_as_if_never_told_to(write, tmp_path):
     """It stops at the coalescence, before the next pass of growth; told not to, it is the run without that key."""
     path = write(SPLIT)

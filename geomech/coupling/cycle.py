@@ -224,6 +224,7 @@ class Coupling:
         # Rounding of the summed time must not add an empty last step.
         end = self.problem.run.end_time - 1e-9 * self.problem.dda.time_step
         while self.under_way is not None or self.now.state.time < end:
+            self._look_ahead()
             self.between()
             stopped = yield from self._load_step()
             if stopped:
@@ -239,6 +240,15 @@ class Coupling:
                 check_supplied(supplied, self.now.budget, self.now.state.time, self.bending.bend)
             if not self.problem.dda.equilibrium:
                 dda.warn_of_toes_at_rest(self.now.system, self.now.state, self.problem.loads)
+
+    def _look_ahead(self) -> None:
+        """Solve what tells whether the end of the run cuts the next load step (`ends_next`), if it does not begin with
+        an excavation."""
+        now = self.now
+        if self.events is None or self.under_way is not None or self.stops_next:
+            return
+        if now.system.removed(self.problem.loads, now.state.time) is now.removed:
+            self.events.look(now)
 
     def _load_step(self):
         """All passes at one load. Returns True when a stop event has occurred."""

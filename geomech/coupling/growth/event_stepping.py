@@ -71,6 +71,8 @@ class EventSteps:
         #: Largest K_eq/K_Ic at the start of the step, and its rate, 1/s; None: not known yet.
         self._drive: float | None = 0.0
         self._rate = 0.0
+        #: The pass at the loads of the step's start, with K_eq/K_Ic − 1 there, where growth has changed K since.
+        self._at_start: tuple[Balance, float] | None = None
         #: Displacement ratio per second in the last step; None before the first.
         self._pace: float | None = None
         #: Whether crack faces have friction.
@@ -80,18 +82,27 @@ class EventSteps:
         #: Changes of state of contacts and crack faces.
         self.changes = FirstChange(("contacts", "faces") if run.events is None else run.events)
 
+    def look(self, now: CrackedBlocks) -> None:
+        """Solve the pass at the loads of the next step's start, if growth has changed K there: only then is it known
+        whether the step goes back or ahead. Raises `dda.NotConverged`."""
+        if self._drive is not None:
+            return
+        self._rough = any(body.rough for body in now.bodies.values())
+        self._at_start = self._at(now, now.state.time, 0.0)
+        self._drive = 1 + self._at_start[1]
+        self._rate *= self._drive
+
     def first_pass(self, now: CrackedBlocks, end: float) -> Balance:
         """Move the blocks to the next event, or towards it as far as one step may go, at most to the time ``end``; with
         control "toughness" back to it where it is at a lower load. ``reached`` then says whether the event was reached.
         Raises `dda.NotConverged`."""
         start = now.state.time
         self._rough = any(body.rough for body in now.bodies.values())
+        self.look(now)
+        assert self._drive is not None
+        found, excess = (None, self._drive - 1) if self._at_start is None else self._at_start
+        self._at_start = None
         search = Crossing(self._rate)
-        if self._drive is None:
-            found, excess = self._at(now, start, 0.0)
-            search.slope *= 1 + excess
-        else:
-            found, excess = None, self._drive - 1
         search.add(start, excess)
         if found is None or abs(excess) > SETTLED:
             back = self.follows and excess > 0
@@ -231,7 +242,12 @@ class EventSteps:
         start = now.state.time
         if self._limit(now, start, math.inf) <= end:
             return False
-        return self._drive is None or self._rate <= 0.0 or start + (1.0 - self._drive) / self._rate > end
+        if self._drive is None:
+            return True
+        if self._drive > 1.0:
+            # Back to the load at which it grows; or ahead by one time step.
+            return not self.follows and start + self.time_step > end
+        return self._rate <= 0.0 or start + (1.0 - self._drive) / self._rate > end
 
     def _limit(self, now: CrackedBlocks, start: float, end: float) -> float:
         """The latest time to which a step from ``start`` may go, s."""
