@@ -398,7 +398,8 @@ def _blocks(
     known = sorted(set(drawn.names) | {""})
     number = {name: k for k, name in enumerate(known)}
     label = np.array([number[name] for name in drawn.names], dtype=int)[source[arrangement.loop_edge[whole]]]
-    points = arrangement.nodes[arrangement.loop_node[whole]]
+    node = arrangement.loop_node[whole]
+    points = arrangement.nodes[node]
     following = following_in(start)
     before = np.empty(len(points), int)
     before[following] = np.arange(len(points))
@@ -409,6 +410,10 @@ def _blocks(
     # ends, sides and crossings adds up to, and the side turns there by no more than that makes it turn.
     flat = (off <= np.minimum(_BESIDE * grid, _NO_TURN * short) * long) & (label == label[before])
     flat &= np.einsum("ij,ij->i", a, b) > 0
+    # Where a hole touches the outline, both have the corner: beside the side that is left it might lie on either.
+    of_block = np.repeat(np.repeat(np.arange(len(inside)), np.diff(block_loop)), count)
+    _, corner, times = np.unique(of_block * len(arrangement.nodes) + node, return_inverse=True, return_counts=True)
+    flat &= times[corner] == 1
     kept = np.flatnonzero(~_within_sides(flat, points, start, _BESIDE * grid))
     owner = np.repeat(np.arange(len(loops)), count)[kept]
     count = np.bincount(owner, minlength=len(loops))

@@ -355,6 +355,13 @@ def neighbours_agree(cutting) -> None:
     assert np.isin(np.arange(len(index)), i[across]).all()
 
 
+def test_a_corner_that_a_hole_shares_with_the_outline_stays_in_both():
+    """Network 195: left out of the outline, in which it hardly turns, it lies 9e-15 m beyond the side that remains."""
+    traces = fine_network(195)
+    joints = [Joint("joint:a", traces[::2]), Joint("joint:b", traces[1::2])]
+    sound(cut([rock()], joints, tolerance=1e-9), [rock()])
+
+
 @pytest.mark.parametrize("first", [0, pytest.param(11, marks=pytest.mark.slow)])
 def test_the_finest_angles_and_gaps_leave_sound_blocks(first):
     """Seed 10 has a row of corners a micrometre apart that hardly turn: left out one by one, they took along a bend."""
