@@ -190,7 +190,8 @@ class ByMeanStress:
         before, whole, memory = self.solutions.get(block), self.fields.get(block), self.memory.get(block, began)
         known: Solution | UniformStressSolution | None = None
         if skip and whole is None:
-            known = solved_in_states(body, stress, before, memory) if body.rough else scaled(body, stress, before)
+            start = body.initial_memory if memory is None else memory
+            known = solved_in_states(body, stress, before, start) if body.rough else scaled(body, stress, before)
         if known is not None:
             return known
         if whole is None and skip and self._moves:

@@ -22,6 +22,7 @@ import numpy as np
 
 from .face_equations import FaceProblem, FaceValues
 from .face_laws import FaceStates
+from .state_responses import StateResponses
 
 #: Additional confining pressure at the start, relative to the largest stress, and its variation from node to node: with
 #: equal values, nodes of symmetric cracks would reach their limits simultaneously.
@@ -127,11 +128,17 @@ class _Path:
     def follow(self, states: FaceStates) -> PathEnd:
         """Lower the confinement from 1 to 0."""
         problem, n = self._problem, len(states.closed)
+        none = np.zeros_like(self._more_cohesion)
+        # The problem, and the confined one.
+        both = StateResponses(
+            problem, np.stack([problem.right, self._right], axis=1), np.stack([none, self._more_cohesion], axis=1)
+        )
         z, direction = 1.0, -1.0
         entered: tuple[int, int] | None = None
         least = PathEnd(states, z)
         for _ in range(_CHANGES * n):
-            bare, confined = problem.solve_confined(states, self._right, self._more_cohesion)
+            w, reaction = both.solve(states)
+            bare, confined = (problem.values(states, w[:, k], reaction[:, k]) for k in (0, 1))
             at_zero = self._margins(states, bare, self._cohesion)
             at_one = self._margins(states, confined, self._cohesion + self._more_cohesion / problem.stress)
             concerned = np.isfinite(at_zero)

@@ -62,7 +62,7 @@ class FaceEquations:
             return w[:, 0], reaction[:, 0]
         laws, s = self.laws, self.system.matrix
         self.solved += right.shape[1]
-        prescribed, slides, spring = self._rows(states)
+        prescribed, slides, spring = self.rows(states)
         a, t = laws.across, laws.along
         w, extra = np.zeros_like(right), np.zeros_like(right)
         given = np.zeros(len(right))
@@ -104,6 +104,10 @@ class FaceEquations:
         reaction[t[springy]] = -(spring[t][:, None] * (w[t] - memory.rest[:, None]))[springy]
         reaction[t[slipping]] = -(shear + slides[:, None] * reaction[a])[slipping]
         return w, reaction
+
+    def keep_last(self) -> None:
+        """Give up the factors of all states but the last two, those under the loads and under the mean stress of a block."""
+        self._factors = dict(list(self._factors.items())[-2:])
 
     def forget(self) -> None:
         """Give up the factors of all states."""
@@ -151,7 +155,7 @@ class FaceEquations:
 
     def tangent_reaction(self, right: np.ndarray, jumps: np.ndarray, states: FaceStates) -> np.ndarray:
         """(n, k) change of λ that goes with the change of the ``jumps`` (n, k), the `tangent` of ``right`` (n, k)."""
-        laws, (prescribed, slides, spring) = self.laws, self._rows(states)
+        laws, (prescribed, slides, spring) = self.laws, self.rows(states)
         a, t = laws.across, laws.along
         missing = right - self.system.matrix @ jumps
         reaction = np.where(prescribed[:, None], missing, -spring[:, None] * jumps)
@@ -166,18 +170,35 @@ class FaceEquations:
         out = np.zeros_like(weights)
         out[free] = factor.solve(weights[free], transposed=True)
         self._work.back_substitutions += weights.shape[1]
-        out[laws.across] += self._rows(states)[1][:, None] * out[laws.along]
+        out[laws.across] += self.rows(states)[1][:, None] * out[laws.along]
         return out
+
+    def unit_responses(self, unknowns: np.ndarray, states: FaceStates) -> tuple[np.ndarray, np.ndarray]:
+        """(n, k) jumps and λ at constant states for a unit on the right of the equations of ``unknowns`` (k,), one at a time: of
+        its jump where it is prescribed, of λ otherwise. Of faces without fillings."""
+        assert not isinstance(self.system, IterativeCrackSystem)
+        laws, (prescribed, slides, _) = self.laws, self.rows(states)
+        free, factor = self._factor(states)
+        w = np.zeros((self.system.n, len(unknowns)), order="F")
+        known = np.zeros_like(w)
+        at, fixed = np.arange(len(unknowns)), prescribed[unknowns]
+        w[unknowns[fixed], at[fixed]] = 1.0
+        known[:, fixed] = -self.system.matrix.entries(np.arange(self.system.n), unknowns[fixed])
+        known[laws.along] += slides[:, None] * known[laws.across]
+        known[unknowns[~fixed], at[~fixed]] = -1.0
+        w[free] = factor.solve(np.asfortranarray(known[free]))
+        self._work.back_substitutions += len(unknowns)
+        return w, -(self.system.matrix @ w)
 
     def rcond(self, states: FaceStates) -> float:
         return self._factor(states)[1].rcond
 
     def _mixed(self, right: np.ndarray, states: FaceStates) -> np.ndarray:
         out = right.copy()
-        out[self.laws.along] += self._rows(states)[1][:, None] * right[self.laws.across]
+        out[self.laws.along] += self.rows(states)[1][:, None] * right[self.laws.across]
         return out
 
-    def _rows(self, states: FaceStates) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def rows(self, states: FaceStates) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Prescribed unknowns (n,) bool, ± tan φ of sliding nodes (n_nodes,), stiffness of springs (n,)."""
         laws = self.laws
         prescribed, spring = np.zeros(self.system.n, bool), np.zeros(self.system.n)
@@ -195,10 +216,12 @@ class FaceEquations:
         if key not in self._factors:
             if len(self._factors) >= _KEPT:
                 self._factors.pop(next(iter(self._factors)))
-            prescribed, slides, spring = self._rows(states)
+            prescribed, slides, spring = self.rows(states)
             mixed = np.zeros(self.system.n)
             mixed[self.laws.along] = slides
             self._factors[key] = self.system.changed(Rows(prescribed, mixed, spring, self.laws.elements.per))
+        else:
+            self._factors[key] = self._factors.pop(key)  # the last
         return self._factors[key]
 
 
@@ -241,16 +264,6 @@ class FaceProblem:
     def solve(self, states: FaceStates) -> FaceValues:
         """Solution with the nodes in these ``states``."""
         return self.values(states, *self.equations.solve(self.right, states, self.memory))
-
-    def solve_confined(
-        self, states: FaceStates, right: np.ndarray, cohesion: np.ndarray
-    ) -> tuple[FaceValues, FaceValues]:
-        """The solution, and that with ``right`` in place of the problem's and with additional ``cohesion``
-        (n_nodes,)."""
-        both = np.stack([self.right, right], axis=1), np.stack([np.zeros_like(cohesion), cohesion], axis=1)
-        w, reaction = self.equations.solve(both[0], states, self.memory, both[1])
-        bare, confined = (self.values(states, w[:, k], reaction[:, k]) for k in (0, 1))
-        return bare, confined
 
     def values(self, states: FaceStates, w: np.ndarray, reaction: np.ndarray) -> FaceValues:
         """The solution with these jumps ``w`` and λ ``reaction`` (n,)."""

@@ -87,12 +87,10 @@ class RoughSolution(UniformStressSolution):
         return self.rough.moved
 
 
-def solved_in_states(
-    body: CrackedBody, stress: np.ndarray, before: Any, memory: FaceMemory | None
-) -> RoughSolution | None:
+def solved_in_states(body: CrackedBody, stress: np.ndarray, before: Any, memory: FaceMemory) -> RoughSolution | None:
     """Solution of a ``body`` with friction under a uniform ``stress`` (3,), Pa, whose faces begin with ``memory``, if they
     keep the states of ``before``, an earlier solution under uniform stress; otherwise None."""
-    if memory is None or before is None or before.body.crack_system is not body.crack_system:
+    if before is None or before.body.crack_system is not body.crack_system:
         return None
     if not body.rough or not is_simple(body) or not _continues(body, before, memory):
         return None

@@ -62,7 +62,7 @@ class BaseOf:
         old, new = unknowns_of(was[was >= 0], width), unknowns_of(np.flatnonzero(was >= 0), width)
         at = np.full(matrix.n, -1)
         at[new] = self.at[old]
-        if self.base.n - np.count_nonzero(at >= 0) > _most(self.base.n):
+        if self.base.n - np.count_nonzero(at >= 0) > most_changed(self.base.n):
             return None
         out = BaseOf(self.base, matrix, at, self.per)
         out._new_columns = self._new_columns.renumbered(old, new)
@@ -74,7 +74,7 @@ class BaseOf:
 
     def changed(self, rows: Rows, border: Border, what: str) -> UpdatedFactor | None:
         """Factors of the equations with this ``border``; None if it is too large or too badly conditioned."""
-        if border.n > _most(self.base.n):
+        if border.n > most_changed(self.base.n):
             return None
         try:
             factor = UpdatedFactor(self, border, rows, what)
@@ -228,5 +228,6 @@ class _Columns:
         return vars(self) | {"_values": self._values[:, : len(self._at)].copy(order="F")}
 
 
-def _most(n: int) -> float:
+def most_changed(n: int) -> float:
+    """Largest border of a base with ``n`` unknowns."""
     return max(FEW, MOST_NEW * n)

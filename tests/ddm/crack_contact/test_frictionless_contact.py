@@ -8,6 +8,9 @@ import pytest
 
 from geomech import ddm
 from geomech.ddm.crack_contact import frictional_contact
+from geomech.ddm.crack_contact.face_equations import FaceProblem
+from geomech.ddm.crack_contact.face_laws import FaceStates
+from geomech.ddm.crack_contact.state_responses import StateResponses
 from geomech.model import OPEN, SLIP, STICK, Cracks, DdmSettings, JointLaw, Material
 from geomech.reference.cracks import fracture
 
@@ -261,3 +264,23 @@ def test_strong_faces_without_load_stay_as_they_are(stress):
     strong = JointLaw("strong", friction_angle=0.5, cohesion=1e6, tensile_strength=1e5)
     solution = plane([LINE], strong).solve(under(0.0, -stress, stress))
     assert np.abs(solution.jumps).max() <= stress and (solution.states == STICK).all()
+
+
+@pytest.mark.parametrize("cohesion", [0.0, 2e6])
+def test_solutions_along_a_path_are_those_of_their_states(cohesion):
+    """Responses in the first states give any others, to round-off of the equations solved anew in each."""
+    law = JointLaw("rough", friction_angle=math.radians(30), cohesion=cohesion)
+    body = plane(apart(9, 1, 2.2), law)
+    first = body.solve(under(1e6, 3e6, 8e6))
+    problem = FaceProblem(body.face_equations, -body.solve(under(2e6, -20e6, 0)).face_load, first.memory)
+    both = np.stack([problem.right, 0.5 * problem.right], axis=1)
+    more = np.stack([np.zeros(len(problem.laws.along)), np.full(len(problem.laws.along), 1e5)], axis=1)
+    path, random, states = StateResponses(problem, both, more), np.random.default_rng(0), first.face_states
+    for node in random.integers(len(states.closed), size=30).tolist():
+        closed, way = states.closed.copy(), states.way.copy()
+        closed[node] = random.random() < 0.7
+        way[node] = random.integers(-1, 2) if closed[node] else 0
+        states = FaceStates(closed, way, states.pulled)
+        expected = body.face_equations.solve(both, states, first.memory, more)
+        for found, value in zip(path.solve(states), expected):
+            np.testing.assert_allclose(found, value, atol=1e-10 * np.abs(value).max())
