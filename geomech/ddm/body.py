@@ -366,7 +366,7 @@ class Body:
             self.condensation = both = Condensed(system, c, before, c_old, c_seen)
         else:
             self.condensation = both = Condensed(system, c)
-        w, cg = both.columns, both.rows
+        cg = both.rows
 
         def schur(r: np.ndarray, k: np.ndarray) -> np.ndarray:
             direct = influence(c.take(r), c.take(k), nu, tol)
@@ -375,18 +375,17 @@ class Body:
             # Column-major like the first: subtracting arrays of different order takes several times as long.
             if len(k) < c.n and len(r) > len(k):
                 # (Of all rows: picking most of G costs more than a product with few columns.)
-                product = cg @ w.of(k).T
+                product = cg @ both.columns_of(k).T
                 return direct - (product if len(r) == c.n else product[c.unknowns(r)])
             if len(r) == c.n:
-                return direct - (w.dense @ cg.dense.T).T
-            return direct - ((w @ cg.of(r).T) if len(k) == c.n else w.of(k) @ cg.of(r).T).T
+                return direct - (both.columns.dense @ cg.dense.T).T
+            rows = cg.of(r).T
+            return direct - (both.moved_back(rows) if len(k) == c.n else both.columns_of(k) @ rows).T
 
         before_growth = None if kept is None else kept.crack_system
         assert not isinstance(before_growth, IterativeCrackSystem)
         known = None if before_growth is None else before_growth.matrix
         self.lean = old is not None and old.lean
-        if self.lean and isinstance(before, Condensed):
-            before.release_columns()
         # Where many faces close, the equations of open ones are hardly asked for.
         alone = self.lean and c.n_unknowns >= WORTHWHILE and not self.rough and bool(self.closing[1].any())
         if known is None or not known.n or c.n_unknowns < SMALLEST_BORDERED or alone:
@@ -395,6 +394,8 @@ class Body:
         else:
             matrix = known.grown(c, c_old, c_seen, schur)
         self.crack_system = CrackSystem(matrix, self.work, before_growth, c_old)
+        if self.lean:
+            both.release_columns()
 
     def end_step(self) -> None:
         """A load step ends. One of many bodies, none of whose cracks has grown in a whole step, gives up what only growth
@@ -406,7 +407,7 @@ class Body:
 
     @property
     def for_growth(self) -> int:
-        """Bytes that one of many bodies keeps for further growth alone: factors of the boundary, and A_ΓC."""
+        """Bytes that one of many bodies keeps for further growth alone: factors of the boundary."""
         return self.condensation.for_growth if self.in_number and self._grown else 0
 
     def stop_growing(self) -> None:
@@ -425,13 +426,16 @@ class Body:
 
     def forget_states(self) -> None:
         """Give up the factors of contact states and the loads of one of many bodies, whose contact is condensed: these take
-        as much memory as its matrices. Of faces with friction only the factors of open ones are given up, where others
-        are kept. From then on factors of a large boundary are given up after every use too."""
+        as much memory as its matrices. Of faces with friction, factors of open ones and of all but the last states are given up,
+        where others are kept. From then on factors of a large boundary are given up after every use too."""
         self._outside.sparing = self.in_number
         if not self.in_number or not isinstance(self.crack_system, CrackSystem):
             return
         if self.rough and self.crack_system.bases:
             self.crack_system.release_open()
+            # Contacts of moving blocks slide, and hardly any load segment comes back.
+            self._loads.forget()
+            self.face_equations.keep_last()
         elif not self._grown and condenses(self):
             self.crack_system.retire()
             self._loads.forget()

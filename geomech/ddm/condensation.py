@@ -18,7 +18,7 @@ import numpy as np
 from .iterative.crack_gmres import BoundaryResponse
 from .system.boundary_system import BoundarySystem
 from .system.influence_matrix import ElementSet, influence
-from .system.row_store import KeptRows
+from .system.row_store import KeptRows, LowRankRows
 
 #: Crack elements whose rows are computed at a time beside a large boundary.
 AT_ONCE = 32
@@ -48,12 +48,13 @@ class Condensed:
     ):
         self.system, self.faces = system, faces
         self._columns: KeptRows | None = None
-        self._rows: KeptRows | None = None
+        self._rows: KeptRows | LowRankRows | None = None
         if before is None or was is None or seen is None:
             self._rows = KeptRows.whole(self._carried(np.arange(faces.n)), faces)
         else:
             self._rows = before.rows.grown(faces, seen, self._carried)
-            self._columns = before.columns.grown(faces, was, self._influence)
+            if before._columns is not None:
+                self._columns = before._columns.grown(faces, was, self._influence)
 
     def _carried(self, elements: np.ndarray) -> np.ndarray:
         return self._by_parts(elements, lambda part: self.system.carried(self.influence_on(part)))
@@ -77,7 +78,7 @@ class Condensed:
         return self.system.influence_on(self.faces.take(elements), np.arange(self.system.elements.n))
 
     @property
-    def rows(self) -> KeptRows:
+    def rows(self) -> KeptRows | LowRankRows:
         """G, kept until the body is retired (which may happen while fields inside it are computed)."""
         rows = self._rows
         if rows is None:
@@ -92,17 +93,36 @@ class Condensed:
             self._columns = columns = KeptRows.whole(self._influence(np.arange(self.faces.n)), self.faces)
         return columns
 
+    def columns_of(self, elements: np.ndarray) -> np.ndarray:
+        """(…, n_boundary_unknowns) columns of A_ΓC of some of the crack elements, as rows."""
+        return self._influence(elements) if self._columns is None else self._columns.of(elements)
+
+    def moved_back(self, x: np.ndarray) -> np.ndarray:
+        """A_ΓCᵀ ``x`` (n_boundary_unknowns, k)."""
+        columns = self._columns
+        if columns is not None:
+            return columns @ x
+        elements, width = np.arange(self.faces.n), 2 * self.faces.per
+        out = np.empty((width * len(elements), x.shape[1]), order="F")
+        for first in range(0, len(elements), AT_ONCE):
+            part = elements[first : first + AT_ONCE]
+            out[width * first : width * (first + len(part))] = self._influence(part) @ x
+        return out
+
     def release(self) -> None:
-        """Give up what only growth and the boundary's displacement need, where that is much."""
+        """Give up what only growth and the boundary's displacement need, where that is much, and keep G as a product."""
         if self.system.large:
             self.release_columns()
             self.system.release()
+            rows = self._rows
+            if isinstance(rows, KeptRows):
+                self._rows = LowRankRows.of_rows(rows) or rows
 
     def retire(self) -> None:
         """Give up all that is large: another body, with grown cracks, takes this one's place."""
-        self.release()
         if self.system.large:
             self._rows = None
+        self.release()
 
     @property
     def for_growth(self) -> int:

@@ -29,8 +29,8 @@ if TYPE_CHECKING:
 MANY = 8
 
 #: Bytes that many bodies together keep for further growth: those of ten blocks with 2 000 unknowns on their sides, or of one
-#: with 6 000 and 2 000 on its cracks.
-FOR_GROWTH = 4e8
+#: with 6 000.
+FOR_GROWTH = 3.2e8
 
 
 #: A side lies on a base if it is off by less than this part of its length.

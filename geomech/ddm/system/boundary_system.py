@@ -28,6 +28,14 @@ OFTEN, INVERTED = 8, 800
 KEPT_BESIDE_FACTORS = 800
 
 
+@dataclass(eq=False)
+class _Kept:
+    """The factors of a boundary (None: released), shared by the bodies that have it in turn; ``generation`` of the last."""
+
+    factor: Factor | IteratedBoundary | None = None
+    generation: int = 0
+
+
 class BoundarySystem:
     """A_ΓΓ of ``mesh.boundary``. What has not changed since ``previous`` (with the same supports) is reused.
 
@@ -59,7 +67,7 @@ class BoundarySystem:
     anchors: Anchors | None
     rcond: float
     _matrix: np.ndarray | Compressed | SupportedBoundaryMatrix | None
-    _factor: Factor | IteratedBoundary | None
+    _kept: _Kept
 
     def __init__(
         self,
@@ -90,10 +98,15 @@ class BoundarySystem:
             self.generation, self.unchanged = previous.generation + 1, True
             self.elements, self.holds, self.extent = previous.elements, previous.holds, previous.extent
             self._matrix, self.known = previous._matrix, previous.known
-            self._factor, self.rcond = previous.kept_factor(), previous.rcond
+            previous.kept_factor()
+            self._kept, self.rcond = previous._kept, previous.rcond
+            self._kept.generation = self.generation
             self.rigid, self.weights, self.free_motions = previous.rigid, previous.weights, previous.free_motions
             self.anchors = previous.anchors
             return
+        if previous is not None and previous.sparing:
+            previous.release()  # they would stand beside the new ones
+        self._kept = _Kept()
         self.elements, self.holds, self.extent = g, holds, extent
         if self.iterated:
             self.rigid, self.weights = rigid_motions(g, mesh.edge_loop)
@@ -108,8 +121,8 @@ class BoundarySystem:
             def between(elements: np.ndarray) -> np.ndarray:
                 return self.influence_on(g.take(elements), elements)
 
-            self._factor = IteratedBoundary(g, operator, self.rigid, self.weights, extent, nu, tol, between)
-            self.rcond = self._factor.rcond
+            self._kept.factor = IteratedBoundary(g, operator, self.rigid, self.weights, extent, nu, tol, between)
+            self.rcond = self._kept.factor.rcond
             return
         # With anchored holes, the old matrix contains the anchors' terms besides tractions.
         before = previous._matrix if previous is not None and previous.anchors is None else None
@@ -124,7 +137,7 @@ class BoundarySystem:
                 self.anchored(matrix, self._anchoring)
                 self.anchored(known, anchors.of_jumps(holds.sources))
         self._matrix = matrix if g.n_unknowns <= KEPT_BESIDE_FACTORS else None
-        self._factor = factor = self._factored(matrix)
+        self._kept.factor = factor = self._factored(matrix)
         self.rcond = factor.rcond
 
     def _factored(self, matrix: np.ndarray) -> Factor:
@@ -141,7 +154,9 @@ class BoundarySystem:
     @property
     def factor(self) -> Factor | IteratedBoundary:
         """See above."""
-        factor = self._factor  # read once: the run may release it while fields inside the body are computed beside it
+        factor = (
+            self._kept.factor
+        )  # read once: the run may release it while fields inside the body are computed beside it
         if factor is not None:
             return factor
         self._again += 1
@@ -150,21 +165,21 @@ class BoundarySystem:
 
     def kept_factor(self) -> Factor | IteratedBoundary:
         """`factor`, kept from now on if it had been released."""
-        factor = self._factor
+        factor = self._kept.factor
         if factor is None:
-            self._factor = factor = self._factored(self._whole())
+            self._kept.factor = factor = self._factored(self._whole())
         return factor
 
     def release(self) -> None:
         """Give up factors of a large boundary. Loads need none: what the boundary does to cracks is in A_CΓ A_ΓΓ⁻¹
-        (`body`)."""
-        if self._matrix is None:
-            self._factor = None
+        (`body`). They stay if another body has the boundary by now."""
+        if self._matrix is None and self._kept.generation == self.generation:
+            self._kept.factor = None
 
     @property
     def is_factored(self) -> bool:
         """Whether factors are kept."""
-        return self._factor is not None
+        return self._kept.factor is not None
 
     @property
     def large(self) -> bool:

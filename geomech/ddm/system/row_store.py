@@ -1,4 +1,5 @@
-"""Matrix rows of crack elements that are kept while cracks grow: new rows are appended without copying the old."""
+"""Matrix rows of crack elements that are kept while cracks grow: new rows are appended without copying the old; or as a
+product of two thin matrices while they do not."""
 
 from __future__ import annotations
 
@@ -13,6 +14,11 @@ from .influence_matrix import ElementSet, unknowns_of
 CARRIED = 1.3
 #: Capacity allocated, relative to the rows needed.
 ROOM = 1.5
+
+
+#: Relative error (Frobenius norm, up to a factor of about √columns) of `LowRankRows`, well below that of the mesh; number of
+#: random combinations that are added at a time; and part of the numbers of the rows above which the product is not worth it.
+EXACT, COMBINED, WORTH = 1e-10, 64, 0.7
 
 
 class _GrowingRows:
@@ -78,6 +84,11 @@ class KeptRows:
         out = KeptRows(permanent, self._n + k, rows[k:], at, width)
         return out if out._total < CARRIED * len(out._places) else KeptRows.whole(out.dense, elements)
 
+    @property
+    def width(self) -> int:
+        """Unknowns of an element."""
+        return self._width
+
     def of(self, elements: np.ndarray) -> np.ndarray:
         """(k, m) rows of ``elements``."""
         places = unknowns_of(self.at[elements], self._width)
@@ -115,10 +126,67 @@ class KeptRows:
         return self._permanent.rows[: self._n].T @ x[: self._n] + self._temporary.T @ x[self._n :]
 
 
+class LowRankRows:
+    """A matrix (n, m) of the rows of elements with ``width`` unknowns each as the product of ``left`` (n, r) and ``right``
+    (r, m); interface of `KeptRows`.
+
+    How a boundary acts on cracks is smooth but near their mouths: of a block with 3500 unknowns on its sides and 2150 on its
+    cracks r is 450. The columns of ``left`` span those of random combinations (Halko, Martinsson & Tropp 2011, alg. 4.2)."""
+
+    def __init__(self, left: np.ndarray, right: np.ndarray, width: int):
+        self._left, self._right, self._width = left, right, width
+
+    @classmethod
+    def of_rows(cls, rows: KeptRows) -> LowRankRows | None:
+        """``rows`` as a product, where it has fewer numbers; otherwise None."""
+        matrix = rows.dense
+        n, m = matrix.shape
+        random, left, first = np.random.default_rng(0), np.empty((n, 0), order="F"), 0.0
+        while (left.shape[1] + COMBINED) * (n + m) < WORTH * n * m:
+            more = matrix @ random.normal(size=(m, COMBINED))
+            first = first or float(np.linalg.norm(more, axis=0).max())
+            more -= left @ (left.T @ more)
+            if np.linalg.norm(more, axis=0).max() <= EXACT * first:
+                return cls(left, left.T @ matrix, rows.width)
+            # Twice, as small differences are not orthogonal to what has been taken away.
+            for _ in range(2):
+                more = np.linalg.qr(more)[0]
+                more -= left @ (left.T @ more)
+            left = np.concatenate([left, np.linalg.qr(more)[0]], axis=1)
+        return None
+
+    def grown(self, elements: ElementSet, was: np.ndarray, compute: Callable[[np.ndarray], np.ndarray]) -> KeptRows:
+        """See `KeptRows.grown`."""
+        return KeptRows(
+            _GrowingRows(self.dense), len(self._left), np.empty((0, self._right.shape[1])),
+            np.arange(len(self._left) // self._width), self._width,
+        ).grown(elements, was, compute)  # fmt: skip
+
+    def of(self, elements: np.ndarray) -> np.ndarray:
+        """(k, m) rows of ``elements``."""
+        return self._left[unknowns_of(elements, self._width)] @ self._right
+
+    @property
+    def dense(self) -> np.ndarray:
+        return self._left @ self._right
+
+    def __matmul__(self, x: np.ndarray) -> np.ndarray:
+        """(n,) or (n, k), the matrix times ``x`` (m,) or (m, k)."""
+        return self._left @ (self._right @ x)
+
+    @property
+    def T(self) -> TransposedRows:
+        return TransposedRows(self)
+
+    def transposed_times(self, x: np.ndarray) -> np.ndarray:
+        """(m,) or (m, k), the transpose times ``x`` (n,) or (n, k)."""
+        return self._right.T @ (self._left.T @ x)
+
+
 class TransposedRows:
     """The transpose (m, n) of ``rows``."""
 
-    def __init__(self, rows: KeptRows):
+    def __init__(self, rows: KeptRows | LowRankRows):
         self.rows = rows
 
     def __matmul__(self, x: np.ndarray) -> np.ndarray:

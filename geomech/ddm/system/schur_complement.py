@@ -154,7 +154,7 @@ class CrackSystem:
             matrix[at[moving]] += rows.mixed[moving, None] * self.matrix.entries(moving + rows.per, free)
         diagonal = np.arange(len(free))
         matrix[diagonal, diagonal] -= rows.spring[free]
-        factor = Factor(matrix, SINGULAR)
+        factor = Factor(matrix, SINGULAR, in_place=True)
         self._work.crack_factorisations += 1
         if lasting:
             at = np.full(self.n, -1)
