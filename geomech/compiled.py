@@ -22,6 +22,7 @@ import functools
 import gc
 import hashlib
 import logging
+import re
 import sys
 import zlib
 from collections.abc import Callable, Iterator
@@ -101,9 +102,12 @@ def moved() -> list[str]:
     return [f"{owner.__name__}.{name}" for owner, names in _INNER for name in names if not hasattr(owner, name)]
 
 
-#: Whether kernels are compiled and cached as described above. Otherwise Numba's own cache is used: last digits may
-#: differ between the run that compiles and later ones, and changes in called files are not noticed.
+#: Whether kernels are compiled and cached as described above. Otherwise Numba's own cache is used: compiling takes twice
+#: as long, and last digits may differ between the run that compiles and later ones. (Below, a version of Numba that is
+#: newer than `NEWEST` is tried.)
 OWN_WAY = not moved()
+#: The newest version of Numba with which all tests of this module have passed.
+NEWEST = (0, 68)
 if not OWN_WAY:
     log.warning("Numba %s lacks %s: kernels are stored in Numba's own cache", numba_version, ", ".join(moved()))
 if kernel_place().instead_of is not None:
@@ -125,7 +129,7 @@ def kept(**options) -> Callable:
 
     def compiled(function: Callable) -> Dispatcher:
         if not OWN_WAY:
-            return njit(cache=True, **options)(function)
+            return _kept_by_numba(function, options)
         # Set only while this kernel is declared: other packages keep their own cache.
         before = config.CACHE_LOCATOR_CLASSES, config.CACHE_DIR
         config.CACHE_LOCATOR_CLASSES, config.CACHE_DIR = f"{__name__}.WithCalled", kernel_place().folder
@@ -142,6 +146,18 @@ def kept(**options) -> Callable:
         return made
 
     return compiled
+
+
+def _kept_by_numba(function: Callable, options: dict) -> Dispatcher:
+    """``njit(cache=True, **options)`` of a ``function``, with Numba's own cache in a folder of its own for these sources of
+    geomech: that cache takes account of the file with the function only."""
+    before = getattr(config, "CACHE_DIR", "")
+    config.CACHE_DIR = str(Path(kernel_place().folder) / f"of_numba_{_digest_of_package()}")
+    try:
+        compiler = {"pipeline_class": _ReportedCompiler} if hasattr(Compiler, "compile_extra") else {}
+        return njit(cache=True, **compiler, **options)(function)
+    finally:
+        config.CACHE_DIR = before
 
 
 def part(**options) -> Callable:
@@ -549,6 +565,14 @@ _ROOM = 140_000
 _with_room.__code__ = _with_room.__code__.replace(co_stacksize=_ROOM)
 
 
+class _ReportedCompiler(Compiler):
+    """Numba's compiler, with a message for each kernel."""
+
+    def compile_extra(self, function: Callable, *given, **named):
+        log.debug(_KernelCompiler.message, function.__qualname__)
+        return super().compile_extra(function, *given, **named)
+
+
 class _KernelCompiler(Compiler):
     """Numba's compiler with a `_Kernel` as output."""
 
@@ -688,3 +712,47 @@ def _names(code: CodeType) -> Iterator[str]:
     for inner in code.co_consts:
         if isinstance(inner, CodeType):
             yield from _names(inner)
+
+
+@functools.cache
+def _digest_of_package() -> str:
+    """Of all sources of geomech."""
+    files = sorted(Path(__file__).parent.rglob("*.py"))
+    return hashlib.sha256(b"".join(_digest(file) for file in files)).hexdigest()[:16]
+
+
+def _running_total(values):
+    totals = np.empty_like(values)
+    _add_up(values, totals)
+    return totals
+
+
+def _added_up(values, totals):
+    total = 0.0
+    for i in range(len(values)):
+        total += values[i]
+        totals[i] = total
+
+
+def _fault() -> str:
+    """What prevents this version of Numba from compiling, storing and loading a kernel with a part in the way described
+    above; empty if nothing does."""
+    global _add_up
+    try:
+        _add_up = part(error_model="numpy")(_added_up)
+        totals = kept(error_model="numpy")(_running_total)(np.array([1.0, 2.0, 4.0]))
+        again = kept(error_model="numpy")(_running_total)
+        loaded = again(np.array([1.0, 2.0, 4.0]))
+        if again.stats.cache_misses or totals.tolist() != [1.0, 3.0, 7.0] or loaded.tolist() != totals.tolist():
+            return "a kernel was not stored"
+    except Exception as error:  # whatever has changed
+        return f"{type(error).__name__}: {error}"
+    return ""
+
+
+_add_up: Callable
+if OWN_WAY and tuple(map(int, re.findall(r"\d+", numba_version)[:2])) > NEWEST:
+    _wrong = _fault()
+    if _wrong:
+        OWN_WAY = False
+        log.warning("Numba %s is unknown (%s): kernels are stored in Numba's own cache", numba_version, _wrong)

@@ -444,6 +444,30 @@ def test_a_numba_whose_inner_parts_have_moved_is_used_its_own_way(tmp_path, owne
     assert "kernels are stored in Numba's own cache" in done.stderr
 
 
+@pytest.mark.first_by_default(1)
+@pytest.mark.parametrize("fault", ["o._dump = lambda self, data, protocol: dump(self, data)\n", ""])
+def test_a_newer_numba_is_tried_before_it_is_relied_on(tmp_path, fault):
+    """An inner part of the same name that is called in another way; and a newer version where nothing has moved."""
+    (tmp_path / "summing.py").write_text(
+        "from geomech.compiled import kept\n@kept(error_model='numpy')\ndef summed(x):\n    return x[0] + x[1]\n"
+    )
+    code = (
+        "import logging, sys, numba, numpy as np\nfrom numba.core.caching import IndexDataCacheFile as o\n"
+        "numba.__version__ = '9.1.0'\ndump = o._dump\n"
+        f"{fault}"
+        "from geomech import compiled\nfrom geomech.cli.messages import report_compiling\nreport_compiling()\n"
+        "o._dump = dump\nimport summing\nprint(summing.summed(np.array([1.0, 2.0])), compiled.OWN_WAY)"
+    )
+    environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path / "kernels")}
+    environment["PYTHONPATH"] = os.pathsep.join([str(tmp_path), str(Path(geomech.__file__).resolve().parents[1])])
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, env=environment, check=False)
+    assert done.stdout.split() == ["3.0", str(not fault)], done.stderr
+    assert ("Numba 9.1.0 is unknown (TypeError" in done.stderr) == bool(fault)
+    assert "compiling kernels, once" in done.stderr
+    (stored,) = (tmp_path / "kernels").rglob("summing.summed*.nbc")
+    assert ("of_numba_" in str(stored)) == bool(fault)
+
+
 def test_a_part_is_compiled_once_for_all_constants(tmp_path):
     """Numba compiles what is called with 0, with 1 and with n three times; Numba's own inference is back afterwards."""
     (tmp_path / "constants.py").write_text(
