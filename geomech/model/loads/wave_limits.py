@@ -3,9 +3,9 @@
 In one period a wave of frequency f keeps the part |λ|^(2π/arg λ) e^(−2πξ) of its amplitude. λ is the eigenvalue of the
 time scheme's amplification matrix at Ω = 2πf dt (Hughes 1987, chapter 9, for Newmark's scheme; Wood, Bossak &
 Zienkiewicz 1981 for theirs). ξ = π f τ + α/(4πf) is the damping ratio of a stress that lags by τ behind the strain, and
-of Rayleigh damping α M. In a row of blocks of length h, each with uniform strain, a wave of wave number k propagates at
-sin(kh/2)/(kh/2) of its speed, and the scheme changes its period by Ω/arg λ. Springs and dashpots between blocks are not
-included.
+of Rayleigh damping α M. A row of blocks of length h, each with uniform strain, on stiff joints is a row of linear finite
+elements with consistent mass: 2 sin²(kh/2) = 3θ²/(6 + θ²) with θ = 2πf h/c, and a wave propagates at θ/(kh) > 1 of its
+speed c (Belytschko & Mullen 1978). The scheme changes its period by Ω/arg λ. Springs and dashpots between blocks are not included.
 """
 
 from __future__ import annotations
@@ -68,8 +68,10 @@ def wave_limits(
         kept[0, k] = abs(value) ** (2 * math.pi / turn)
         slow[0, k] = turn / (2 * math.pi * f * time_step)
         kept[1, k] = math.exp(-2 * math.pi * (math.pi * f * lag))
-        half = math.pi * f * size / speed
-        slow[2, k] = math.sin(half) / half if half < math.pi else 0.0
+        theta = 2 * math.pi * f * size / speed
+        # No wave of more than √12 travels; nor do scheme and blocks, of which one slows waves and the other speeds them up,
+        # make up for each other.
+        slow[2, k] = 0.5 * theta / math.asin(theta * math.sqrt(1.5 / (6 + theta**2))) if theta**2 < 12 else math.inf
     ways = [kept.prod(axis=0) * np.exp(-mass_damping / (2 * frequencies)), *kept]
     speeds = [slow.prod(axis=0), *slow]
     found = []
@@ -78,7 +80,7 @@ def wave_limits(
         # Rayleigh's α M damps low frequencies: the limit is that of the other effects.
         off &= frequencies > mass_damping
         found.append(float(frequencies[np.argmax(off)]) if off.any() else math.inf)
-    return WaveLimits(*found)
+    return WaveLimits(min(found), *found[1:])
 
 
 def wave_lines(problem: Problem) -> list[str]:
