@@ -71,7 +71,11 @@ def nearest(name: str, known: list[str]) -> str:
 
 def _meant(key: str, known: list[str]) -> str:
     """ "did you mean …? ": one of the ``known`` keys of the table, or of another table, that is spelled like ``key``."""
-    everywhere = places_of_keys()
+    # A key of the scene itself is written as it begins in the file: [[monitors]], not monitors.
+    everywhere = {
+        name: [place if place != name else _header((name,)).strip("`") for place in places]
+        for name, places in places_of_keys().items()
+    }
     close = difflib.get_close_matches(key, known, 1, cutoff=0.8)
     close = close or everywhere.get(key, [])[:3]
     if not close:

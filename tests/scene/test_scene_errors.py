@@ -590,12 +590,16 @@ def test_a_drawing_is_not_a_scene(tmp_path):
 
 
 def test_a_key_of_another_table_is_named_with_it(errors_of):
-    found = errors_of(overrides=["end_time_s=1", "dda.k_ic_pa_sqrt_m=1", "dynamicfactor=1", "quite_other=1"])
+    found = errors_of(
+        overrides=["end_time_s=1", "dda.k_ic_pa_sqrt_m=1", "dynamicfactor=1", "quite_other=1", "output.monitors=1"]
+    )
     meant = [error.way_out.partition("? ")[0] for error in found]
     assert meant[0] == "did you mean 'run.end_time_s'"
     assert meant[1] == "did you mean 'materials.NAME.k_ic_pa_sqrt_m'"
     assert meant[2] == "did you mean 'dda.dynamic_factor'"
     assert meant[3].startswith("keys here are")
+    # A table of the scene itself: "monitors", the key that was written, would say nothing.
+    assert meant[4] == "did you mean '[[monitors]]'"
 
 
 def test_dead_ends_that_may_grow_say_where_toughness_belongs(errors_of):
