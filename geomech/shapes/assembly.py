@@ -10,7 +10,7 @@ import numpy as np
 from ..model import Blocks, Cracks
 from ..model.blocks.polygon import crossing_edges, signed_area
 from .block_cutting.crack_traces import crack_network
-from .parts import EdgeLine, Flaw, ShapeError, Trace, Zone, extent_of, grid_decimals
+from .parts import NOT_FINITE, EdgeLine, Flaw, ShapeError, Trace, Zone, extent_of, finite, grid_decimals
 
 #: Drawing tolerance relative to the drawing's largest side: crack ends closer than this to an outline, a crack or
 #: another end touch it. A tenth of a micrometre on a hand specimen: far below fabrication tolerances, far above the
@@ -39,9 +39,9 @@ def assemble(
     drawn = [("zones", "zone", k, zone.name, zone.loops) for k, zone in enumerate(zones)]
     drawn += [("cracks", "crack", k, trace.name, trace.lines) for k, trace in enumerate(traces)]
     flaws = [
-        Flaw(part, k, f"{what} {name!r} has a coordinate that is not a finite number", "give finite x and y in m")
+        Flaw(part, k, f"{what} {name!r} {NOT_FINITE}", "give finite x and y in m")
         for part, what, k, name, lines in drawn
-        if not all(np.isfinite(line).all() for line in lines)
+        if not all(finite(line).all() for line in lines)
     ]
     if flaws:
         raise ShapeError(flaws)

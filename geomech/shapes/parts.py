@@ -85,6 +85,21 @@ class ShapeError(ValueError):
         super().__init__("\n".join(f"{flaw.message}: {flaw.way_out}" for flaw in self.flaws))
 
 
+#: Largest coordinate of a drawing, m: that of a map in millimetres, as in metres, is below 1e11. Squares and moments of
+#: areas stay far from the largest number of double precision.
+FARTHEST = 1e12
+
+
+def finite(points: np.ndarray) -> np.ndarray:
+    """(n,) whether ``points`` (n, 2) are numbers within `FARTHEST`."""
+    with np.errstate(invalid="ignore"):
+        return np.asarray((np.abs(points) <= FARTHEST).all(axis=-1))
+
+
+#: What is wrong with other points.
+NOT_FINITE = f"has a coordinate that is not a finite number of at most {FARTHEST:.0e} m"
+
+
 def extent_of(arrays) -> float:
     """Largest side of the box around all ``arrays`` (n, 2), m; 0 for none."""
     arrays = [np.asarray(a, dtype=float) for a in arrays if len(a)]

@@ -18,7 +18,7 @@ import numpy as np
 
 from ...model import Blocks, Cracks
 from ..assembly import TOLERANCE, block_names
-from ..parts import JOINT, Flaw, Joint, ShapeError, Zone, extent_of, grid_decimals
+from ..parts import JOINT, NOT_FINITE, Flaw, Joint, ShapeError, Zone, extent_of, finite, grid_decimals
 from .noding import FREE, Drawn, Graph, Repair, noded
 from .partings import Parting, partings, trace_lengths, trimmed_away
 from .planar_arrangement import Arrangement, arrange, following_in, gathered
@@ -150,10 +150,8 @@ def _origin(loops: Sequence[np.ndarray]) -> np.ndarray:
 def _refuse_bad(zones: Sequence[Zone], joints: Sequence[Joint]) -> None:
     flaws = []
     for k, zone in enumerate(zones):
-        if not all(np.isfinite(loop).all() for loop in zone.loops):
-            flaws.append(
-                Flaw("zones", k, f"zone {zone.name!r} has a coordinate that is not a finite number", "mend it")
-            )
+        if not all(finite(loop).all() for loop in zone.loops):
+            flaws.append(Flaw("zones", k, f"zone {zone.name!r} {NOT_FINITE}", "mend it"))
         elif any(len(loop) < 3 for loop in zone.loops):
             flaws.append(Flaw("zones", k, f"zone {zone.name!r} has a loop of fewer than three corners", "add corners"))
     for k, joint in enumerate(joints):
@@ -161,14 +159,12 @@ def _refuse_bad(zones: Sequence[Zone], joints: Sequence[Joint]) -> None:
             continue
         points, count = np.concatenate(joint.lines), np.array([len(line) for line in joint.lines])
         first = np.cumsum(count) - count
-        finite = np.logical_and.reduceat(np.isfinite(points).all(axis=1), first)
+        sound = np.logical_and.reduceat(finite(points), first)
         still = (np.maximum.reduceat(points, first, axis=0) == np.minimum.reduceat(points, first, axis=0)).all(axis=1)
-        flaws += [
-            Flaw("joints", k, f"joint {joint.name!r} has a coordinate that is not a finite number", "mend it")
-        ] * int((~finite).sum())
+        flaws += [Flaw("joints", k, f"joint {joint.name!r} {NOT_FINITE}", "mend it")] * int((~sound).sum())
         flaws += [
             Flaw("joints", k, f"joint {joint.name!r} has a trace without length", "give two different points")
-        ] * int((finite & ((count < 2) | still)).sum())
+        ] * int((sound & ((count < 2) | still)).sum())
     if flaws:
         raise ShapeError(flaws)
 

@@ -10,7 +10,7 @@ import shapely
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from geomech.shapes import Joint, ShapeError, Zone, cut
+from geomech.shapes import Joint, ShapeError, Zone, assemble, cut
 from geomech.shapes.block_cutting.noding import Drawn, noded
 from geomech.shapes.block_cutting.planar_arrangement import arrange
 
@@ -157,6 +157,11 @@ def test_bad_input_is_named():
         cut([rock()], [Joint("joint:a", (line([1, 1], [1, 1]),))])
     with pytest.raises(ShapeError, match="joint 'joint:a' has a coordinate that is not a finite number"):
         cut([rock()], [Joint("joint:a", (line([1, 1], [1, np.nan]),))])
+    # Its square is no number: lengths, areas and distances would be none.
+    with pytest.raises(ShapeError, match="joint 'joint:a' has a coordinate that is not a finite number of at most 1e"):
+        cut([rock()], [Joint("joint:a", (line([1, 1], [1e308, 1]),))])
+    with pytest.raises(ShapeError, match="zone 'rock' has a coordinate that is not a finite number of at most 1e"):
+        assemble([Zone("rock", (1e100 * rock().loops[0],))])
 
 
 def network(seed: int) -> list[np.ndarray]:
