@@ -2,8 +2,10 @@
 
 A block with m unknowns on its outline and n on its cracks stores A_CΓ A_ΓΓ⁻¹ (m n numbers), S and factors of its states
 (4 n²); while its cracks grow, factors of A_ΓΓ and A_ΓC as well (m² + m n), and S and its factors with room for more (4 n²).
-Up to `KEPT_BESIDE_FACTORS` unknowns on an outline, and of few blocks, factors and A_ΓC are always kept. It takes ⅔ m³ +
-2 m² n + 2 m n² + ⅔ n³ multiplications to set up. Memory and time of iterative solutions are proportional to m + n
+Of many blocks those with more than `KEPT_BESIDE_FACTORS` unknowns on their outline store A_CΓ A_ΓΓ⁻¹ as a product (half as many
+numbers) and hardly more factors than those of one state (2.5 n², `PRODUCT` and `STATES`, measured on a trace map); of
+factors of A_ΓΓ they keep no more than `FOR_GROWTH` bytes together. It takes ⅔ m³ + 2 m² n + 2 m n² + ⅔ n³ multiplications to
+set up. Memory and time of iterative solutions are proportional to m + n
 (`ddm.iterative.gmres`, `ddm.iterative.boundary_gmres`).
 """
 
@@ -18,11 +20,13 @@ from ..ddm.iterative.crack_gmres import CROSSOVER as MANY_ON_CRACKS
 from ..ddm.mesh.elements import mesh
 from ..ddm.system.boundary_system import KEPT_BESIDE_FACTORS
 from ..model import Problem, counted
-from .load_transfer.elastic_bodies import MANY
+from .load_transfer.elastic_bodies import FOR_GROWTH, MANY
 
 #: Multiplications per second of dense factorisation, and bytes and seconds per unknown of iterative solutions; rough
 #: values for one thread, good to a factor of two or three.
 RATE, BYTES, SECONDS = 1.5e10, 4e4, 3e-4
+#: Parts of m n and n² numbers that one of many blocks stores.
+PRODUCT, STATES = 0.5, 2.5
 #: Number of unknowns of one block from which the cause of its size is reported.
 LARGE = 3000
 #: An outline counts as digitised too finely if it has more than this many times 4 `elements_per_side` sides.
@@ -50,7 +54,7 @@ def crack_cost(problem: Problem) -> CrackCost:
     rigid = np.array([material.rigid for material in problem.materials], bool)
     cracked = np.unique(cracks.block) if problem.endless is None else np.zeros(0, int)
     cracked = cracked[~(blocks.fixed | rigid[blocks.material])[cracked]]
-    counts, memory, growing, seconds = np.zeros((len(cracked), 3), int), 0.0, 0.0, 0.0
+    counts, memory, growing, seconds, factors = np.zeros((len(cracked), 3), int), 0.0, 0.0, 0.0, 0.0
     for k, block in enumerate(cracked.tolist()):
         loops = blocks.loops(block)
         made = mesh(loops, cracks.take(np.flatnonzero(cracks.block == block)), problem.ddm)
@@ -58,16 +62,15 @@ def crack_cost(problem: Problem) -> CrackCost:
         counts[k] = m, n, sum(map(len, loops))
         dense = [(m, MANY_ON_SIDES), (n, MANY_ON_CRACKS)]
         a, b = (size if size < many or problem.ddm.solver == "dense" else 0 for size, many in dense)
-        memory += 8.0 * (a * b + 4 * b * b) + BYTES * (m + n - a - b)
-        beside = 8.0 * (a * a * (1 if a > KEPT_BESIDE_FACTORS else 2) + a * b)
-        if a > KEPT_BESIDE_FACTORS and len(cracked) >= MANY:
-            growing += beside
+        of_many = a > KEPT_BESIDE_FACTORS and len(cracked) >= MANY
+        memory += 8.0 * (PRODUCT * a * b + STATES * b * b if of_many else a * b + 4 * b * b) + BYTES * (m + n - a - b)
+        if of_many:
+            factors += 8.0 * a * a
         else:
-            memory += beside
+            memory += 8.0 * (a * a * (1 if a > KEPT_BESIDE_FACTORS else 2) + a * b)
         growing += 8.0 * 4 * b * b
         seconds += (2 * a**3 / 3 + 2 * a * a * b + 2 * a * b * b + 2 * b**3 / 3) / RATE + SECONDS * (m + n - a - b)
-    on_sides, on_cracks, sides = counts.T
-    return CrackCost(cracked, on_sides, on_cracks, sides, memory, growing, seconds)
+    return CrackCost(cracked, *counts.T, memory, growing + min(factors, FOR_GROWTH), seconds)
 
 
 def cost_lines(problem: Problem, cost: CrackCost | None = None) -> list[str]:

@@ -33,6 +33,7 @@ from .growth.crack_growth import births, blocks_to_split, growth_of_tips, initia
 from .growth.dynamic_tips import DynamicTips
 from .growth.event_stepping import SETTLED, TOGETHER, EventSteps
 from .growth.first_state_change import FirstChange
+from .growth.last_ligaments import cut_last_ligament
 from .growth.wave_arrival import LeftOut
 from .load_pass import Balance, balanced, toughness
 from .load_transfer.load_imbalance import LoadBalance
@@ -317,7 +318,11 @@ class Coupling:
                 )
         except dda.NotConverged as failure:
             if not (step.stops or self._stops(step.pending)):
-                raise
+                cut = None if self.events is not None else cut_last_ligament(now, failure)
+                if cut is None:
+                    raise
+                step.pending, step.like = step.pending + cut, None
+                return self._solved(step)
             # The stop event is reported even if the parts find no equilibrium after it.
             log.warning("cycle %d shows the blocks at the last equilibrium: %s", now.number, failure)
             now.state = now.state if step.load_time is None else replace(now.state, time=step.load_time)

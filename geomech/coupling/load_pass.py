@@ -652,10 +652,14 @@ def _answers(now: CrackedBlocks, state: State) -> dict:
 def _answer(now: CrackedBlocks, state: State, block: int, stress: np.ndarray):
     """The solution of ``block`` under its mean ``stress`` (w,), Pa, in current axes."""
     elastic = now.elastic(block)
-    return now.by_mean_stress.answer(
-        block, now.bodies[block], stress[: len(elastic)], float(state.rotation[block]), elastic,
-        now.history.get(block), now.problem.run.skip,
-    )  # fmt: skip
+    try:
+        return now.by_mean_stress.answer(
+            block, now.bodies[block], stress[: len(elastic)], float(state.rotation[block]), elastic,
+            now.history.get(block), now.problem.run.skip,
+        )  # fmt: skip
+    except ddm.NotConverged as failure:
+        failure.block = block
+        raise
 
 
 def _compliance(now: CrackedBlocks, block: int, solution) -> tuple:

@@ -28,6 +28,17 @@ def test_unknowns_are_those_of_the_solver(torn_plate):
     assert cost.seconds > 0
 
 
+def test_many_blocks_store_less(torn_plate, monkeypatch):
+    """A product of two thin matrices for A_CΓ A_ΓΓ⁻¹, factors of few states, and of sides no more than a given sum."""
+    monkeypatch.setattr(crack_cost, "MANY", 1)
+    monkeypatch.setattr(crack_cost, "KEPT_BESIDE_FACTORS", 10)
+    monkeypatch.setattr(crack_cost, "FOR_GROWTH", 1e3)
+    cost = crack_cost.crack_cost(torn_plate)
+    m, n = int(cost.on_sides[0]), int(cost.on_cracks[0])
+    assert cost.memory == pytest.approx(8 * (crack_cost.PRODUCT * m * n + crack_cost.STATES * n * n))
+    assert cost.growing == pytest.approx(8 * 4 * n * n + 1e3)
+
+
 def test_lines_name_the_largest_block_and_what_makes_it_large(torn_plate, monkeypatch):
     (line,) = crack_cost.cost_lines(torn_plate)
     assert "1 cracked block" in line and "unknowns on sides" in line and "GB" in line and "processor time" in line

@@ -274,7 +274,10 @@ def solve_bodies(
             # (Subclasses, as `ddm.OutOfEquilibrium`, carry more than a message.)
             if type(failure) not in (ValueError, ddm.NotConverged):
                 raise
-            raise type(failure)(f"{names[b]}: {failure}") from failure
+            named = type(failure)(f"{names[b]}: {failure}")
+            if isinstance(named, ddm.NotConverged):
+                named.block = b
+            raise named from failure
         except ddm.TargetMissed as failure:
             raise ddm.TargetMissed(failure.solution, failure.target, f"{names[b]}: ") from failure
 

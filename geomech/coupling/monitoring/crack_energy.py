@@ -205,6 +205,10 @@ class CrackEnergy:
                 _add(self._along, block, release_between(last, now))
             self._last[block] = now
 
+    def joined(self) -> None:
+        """A tip has been joined to something in the present step, by which its cracks released what is not known."""
+        self._parted = True
+
     def parts(self, parent: np.ndarray) -> None:
         """Blocks split in the present step; ``parent`` (n_blocks,): number of each block before."""
         self._parted = True

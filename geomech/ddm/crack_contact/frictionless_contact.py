@@ -26,7 +26,9 @@ TOLERANCE = 1e-10
 
 
 class NotConverged(RuntimeError):
-    """Contact of crack faces did not converge."""
+    """Contact of crack faces did not converge; ``block``: number of their block, where they are those of one."""
+
+    block: int | None = None
 
 
 @dataclass(frozen=True, eq=False)
