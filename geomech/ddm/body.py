@@ -386,8 +386,8 @@ class Body:
         assert not isinstance(before_growth, IterativeCrackSystem)
         known = None if before_growth is None else before_growth.matrix
         self.lean = old is not None and old.lean
-        # Where many faces close, the equations of open ones are hardly asked for.
-        alone = self.lean and c.n_unknowns >= WORTHWHILE and not self.rough and bool(self.closing[1].any())
+        # Where many faces close or have friction, the equations of open ones are hardly asked for.
+        alone = self.lean and c.n_unknowns >= WORTHWHILE and (self.rough or bool(self.closing[1].any()))
         if known is None or not known.n or c.n_unknowns < SMALLEST_BORDERED or alone:
             whole = reuse(None if known is None else known.dense, c_old, c_old, c, c, schur)
             matrix: Bordered | WholeMatrix = Bordered.whole(c, whole)
