@@ -70,7 +70,8 @@ def crack_cost(problem: Problem) -> CrackCost:
             memory += 8.0 * (a * a * (1 if a > KEPT_BESIDE_FACTORS else 2) + a * b)
         growing += 8.0 * 4 * b * b
         seconds += (2 * a**3 / 3 + 2 * a * a * b + 2 * a * b * b + 2 * b**3 / 3) / RATE + SECONDS * (m + n - a - b)
-    return CrackCost(cracked, *counts.T, memory, growing + min(factors, FOR_GROWTH), seconds)
+    on_sides, on_cracks, sides = counts.T
+    return CrackCost(cracked, on_sides, on_cracks, sides, memory, growing + min(factors, FOR_GROWTH), seconds)
 
 
 def cost_lines(problem: Problem, cost: CrackCost | None = None) -> list[str]:
