@@ -38,6 +38,7 @@ def assemble(
     everything = [loop for zone in zones for loop in zone.loops] + [line for t in traces for line in t.lines]
     drawn = [("zones", "zone", k, zone.name, zone.loops) for k, zone in enumerate(zones)]
     drawn += [("cracks", "crack", k, trace.name, trace.lines) for k, trace in enumerate(traces)]
+    drawn += [("edges", "edge", k, line.name, (np.array([line.start, line.end]),)) for k, line in enumerate(edges)]
     flaws = [
         Flaw(part, k, f"{what} {name!r} {NOT_FINITE}", "give finite x and y in m")
         for part, what, k, name, lines in drawn

@@ -10,7 +10,7 @@ import shapely
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from geomech.shapes import Joint, ShapeError, Zone, assemble, cut
+from geomech.shapes import EdgeLine, Joint, ShapeError, Zone, assemble, cut
 from geomech.shapes.block_cutting.noding import Drawn, noded
 from geomech.shapes.block_cutting.planar_arrangement import arrange
 
@@ -162,6 +162,8 @@ def test_bad_input_is_named():
         cut([rock()], [Joint("joint:a", (line([1, 1], [1e308, 1]),))])
     with pytest.raises(ShapeError, match="zone 'rock' has a coordinate that is not a finite number of at most 1e"):
         assemble([Zone("rock", (1e100 * rock().loops[0],))])
+    with pytest.raises(ShapeError, match="edge 'load:top' has a coordinate that is not a finite number of at most 1e"):
+        assemble([rock()], edges=[EdgeLine("load:top", (0.0, 10.0), (1e308, 10.0))])
 
 
 def network(seed: int) -> list[np.ndarray]:
