@@ -39,7 +39,14 @@ from .load_pass import Balance, balanced, toughness
 from .load_transfer.load_imbalance import LoadBalance
 from .load_transfer.unbounded_rock import out_of_sight, solved_pass
 from .monitoring.collapse import collapse_in_situ, lost, relax, unsupported
-from .monitoring.energy_check import BendingWatch, BudgetWatch, GrowthWatch, check_dissipation, check_supplied
+from .monitoring.energy_check import (
+    BendingWatch,
+    BudgetWatch,
+    GrowthWatch,
+    check_dissipation,
+    check_supplied,
+    warn_of_onset,
+)
 from .monitoring.free_motion import FreeMotion
 from .monitoring.mechanism import Mechanism
 from .monitoring.pass_agreement import AgreementWatch
@@ -369,8 +376,8 @@ class Coupling:
         if growth is not None:
             if self.static and not self.endless:
                 self.mechanism.warn_of_growth(found.result)
-            if self.static and self.events is None and step.growth_pass == 0:
-                self.unstable.begins(float(np.max(found.tips["k_eq"] / toughness(now, found.tips), initial=0.0)))
+            if self.events is None and step.growth_pass == 0:
+                self._began_to_grow(found)
             found.tips["grown"] = growth.grown
             if self.tips is not None:
                 self.tips.record_growth(found.tips)
@@ -382,6 +389,15 @@ class Coupling:
         ends = growth is None or self.follows or (parts and not self.static)
         many = step.most > growing.max_passes and (step.growth_pass + 1) % growing.max_passes == 0
         return _Grown(growth, events, cut, ends, rests=parts or (not ends and many))
+
+    def _began_to_grow(self, found: Balance) -> None:
+        """Take note of how far above their toughness cracks begin to grow in the first pass of a step, ``found``."""
+        now, result = self.now, found.result
+        drive = float(np.max(found.tips["k_eq"] / toughness(now, found.tips), initial=0.0))
+        if self.static:
+            self.unstable.begins(drive)
+        elif not now.crack_energy.toughness:
+            warn_of_onset(drive, result.dt, result.state.time, self.problem.run.end_time)
 
     def _energy_balance(self, step: _LoadStep, found: Balance, grown: _Grown) -> _EnergyBalance:
         """The energy budget after the pass, checked, and the statistics of the pass."""

@@ -62,6 +62,8 @@ ABOVE_NOISE = 30.0
 #: cracks depend on the crack paths, and their distance is compared. Blocks of two step lengths whose areas differ by less are
 #: the same.
 SAME_BLOCK = 1e-2
+#: Steps are the same if they end at times that differ by less, relative to these.
+SAME_STEPS = 1e-6
 #: m: distance of a shifted slope from its drawn location.
 FAR = 1e4
 
@@ -114,11 +116,16 @@ WARNED = (
 WARNED_OF_STEPS = (
     "does not resolve vibrations",
     "bonds broke within steps",
+    "begin in motion is known to one step only",
+    "(unpaid_toughness in summary.json)",
     "which no block supplied",
     "depends on the load steps",
 )
-#: What static runs say, under the loads and under the in-situ stress, where there is no equilibrium.
-_NO_EQUILIBRIUM = re.compile("nothing holds .* step after step|under the in-situ stress there is no equilibrium")
+#: What runs say where there is no equilibrium: in statics under the loads, and under the in-situ stress; and where they end,
+#: because none is found to begin from.
+_NO_EQUILIBRIUM = re.compile(
+    "nothing holds .* step after step|under the in-situ stress there is no equilibrium|no equilibrium: .*the run ends"
+)
 _MODULES = (
     "drawn_slopes", "limited_runs", "moved_mass", "random_slopes", "refusals", "slope_invariance", "slope_invariants",
 )  # fmt: skip
@@ -168,6 +175,7 @@ class _Run:
     ended: Ended
     at: BlockDisplacements | None = None
     energies: np.ndarray | None = None  # J/m: work of gravity; kinetic, elastic, contact energy
+    times: tuple[float, ...] = ()  # s: ends of steps
 
     def warned(self, of_steps: bool) -> bool:
         """Whether a warning says that the result is unreliable, or (``of_steps``) depends on the time step."""
@@ -176,7 +184,7 @@ class _Run:
 
     @property
     def has_no_equilibrium(self) -> bool:
-        """Whether a static run has told that blocks have no equilibrium."""
+        """Whether a run has told that blocks have no equilibrium."""
         return any(_NO_EQUILIBRIUM.search(line) for line in self.ended.warnings)
 
     @property
@@ -282,12 +290,14 @@ class _Compared:
     def _run(self, problem: Problem) -> _Run:
         from ...coupling import cycles
 
-        last = None
+        last, times = None, [0.0]
 
         def run(collected: CollectedWarnings) -> Iterator[None]:
             nonlocal last
             for cycle in cycles(problem):
                 last = cycle
+                if cycle.state.time != times[-1]:
+                    times.append(cycle.state.time)
                 yield
 
         ended = limited(run, self.seconds)
@@ -298,7 +308,7 @@ class _Compared:
         statistics = last.statistics
         energies = [statistics.get(f"{name}_energy", 0.0) for name in ("kinetic", "elastic", "contact")]
         at = BlockDisplacements.of(problem, last.blocks, last.state)
-        return _Run(ended, at, np.array([statistics.get("gravity_work", 0.0), *energies]))
+        return _Run(ended, at, np.array([statistics.get("gravity_work", 0.0), *energies]), tuple(times))
 
     def _both(self, what: str, one: _Run, other: _Run) -> bool:
         """Whether both reached their end; a refusal or an error of only one is recorded."""
@@ -322,10 +332,16 @@ class _Compared:
         self.scatter[name] = max(self.scatter.get(name, 0.0), value)
         if not value <= BOUNDS[name].bound:
             what = f"{name} {value:.2g}{f' ({where})' if where else ''}"
-            self._fault(what, *runs, of_steps=name.endswith(", dt"))
+            self._fault(what, *runs)
 
-    def _fault(self, what: str, *runs: _Run, of_steps: bool = False) -> None:
+    def _fault(self, what: str, *runs: _Run) -> None:
+        of_steps = not _in_the_same_steps(*runs)
         (self.reported if any(run.warned(of_steps) for run in runs) else self.faults).append(what)
+
+
+def _in_the_same_steps(one: _Run, other: _Run) -> bool:
+    """Whether two runs took the same steps. (Whether contacts find their states, or the step is cut, may hang on rounding: 77.)"""
+    return len(one.times) == len(other.times) and np.allclose(one.times, other.times, rtol=SAME_STEPS, atol=0.0)
 
 
 def _raise(error: Exception) -> Iterator[None]:

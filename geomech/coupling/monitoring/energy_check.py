@@ -1,5 +1,6 @@
 """Warnings about the energy of a run: unexplained energy, vibrations that the time step does not resolve, cracks that
-take no energy from bent blocks, and energy released by unstable growth in statics."""
+take no energy from bent blocks, cracks whose growth in motion begins within a step, and energy released by unstable
+growth in statics."""
 
 from __future__ import annotations
 
@@ -23,6 +24,10 @@ BREAKS = 0.01
 #: Excess of K_eq over K_Ic, relative to K_Ic, with which cracks may begin to grow at the end of a load step. (Random slope 26
 #: begins with 0.66, 0.24 and 0.04 if its weight comes in three, six and twelve steps, and breaks into other blocks.)
 OVERSHOT = 0.1
+#: Step in which cracks begin to grow in motion, over the time from its start to the end of the run: motion that begins a step
+#: sooner or later differs by about this share. (Random slope 73, weight at once, breaks into other blocks: its work of
+#: gravity is 21 and 19 % off in steps of 0.14 and 0.07, 3 % in one of 0.03.)
+ONSET = 0.05
 #: Fraction of it that static steps may take. Half of the work of a suddenly applied load is dissipated, and nothing of that
 #: of a load that grows with the steps; a larger fraction means that unsupported blocks have moved.
 UNHELD = 0.6
@@ -111,6 +116,24 @@ def check_supplied(supplied: float, budget: EnergyBudget, time: float, bend: boo
         -supplied / budget.turnover,
         _UNRESOLVED if bend else "forces that bend a block of uniform strain load its cracks but do no work on it",
         _SHORTER if bend else _HIGHER,
+    )
+
+
+def warn_of_onset(drive: float, step: float, time: float, end: float) -> None:
+    """Warn if the first cracks of a run in motion that ends at ``end`` s begin to grow well above their toughness, at K_eq/K_Ic
+    of up to ``drive``, in a ``step`` (s) until ``time`` that is long for the time left."""
+    share = step / max(step, end - time + step)
+    if drive < 1.0 + OVERSHOT or share <= ONSET:
+        return
+    log.warning(
+        "t = %g s: cracks begin to grow at %.3g times their toughness, at the end of a step of %.3g s: when they begin in motion "
+        "is known to one step only, which is %.2g of the time left, and the motion after it is uncertain by that share or some "
+        "times as much; other cracks may run in other steps. Shorten dda.time_step_s; dda.automatic_time_step = true takes "
+        'shorter steps at first; dda.equilibrium = "start" lets no weight act at once',
+        time,
+        drive,
+        step,
+        share,
     )
 
 

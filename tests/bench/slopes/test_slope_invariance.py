@@ -24,6 +24,7 @@ from geomech.bench.slopes.slope_invariance import (
     BOUNDS,
     VARIANTS,
     Invariance,
+    _Compared,
     _difference,
     _off_moved,
     _Run,
@@ -217,6 +218,26 @@ def test_a_mechanism_is_the_same_if_the_same_blocks_move():
     assert _difference(one, other, Isometry(), 0.1) == 0.0
     assert _difference(one, replace(other, at=_fallen(1.0, 0.5)), Isometry(), 0.1) == 0.5
     assert _difference(one, replace(other, ended=Ended()), Isometry(), 0.1) == pytest.approx(0.7)
+
+
+@pytest.mark.parametrize(
+    ("line", "fallen"),
+    [
+        ("t = 0 s: no equilibrium: blocks have moved 1.8 m, and 25 steps brought no more balance; the run ends", True),
+        ("t = 0 s: no equilibrium where the blocks are: they come to rest 0.3 m farther; the run ends", False),
+    ],
+)
+def test_a_run_that_ends_without_equilibrium_to_begin_from_is_a_mechanism(line, fallen):
+    assert _Run(Ended(warnings=(line,))).has_no_equilibrium is fallen
+
+
+@pytest.mark.parametrize(("times", "reported"), [((0.0, 0.1, 0.3), False), ((0.0, 0.2, 0.3), True), ((0.0, 0.3), True)])
+def test_a_warning_about_steps_counts_where_variants_were_cut_to_other_steps(times, reported):
+    """Not where they took the same ones."""
+    compared = _Compared(0, None, 1.0)
+    tells = Ended(warnings=("t = 0.3 s: bonds broke within steps over which their forces would have done 0.03 of all",))
+    compared._take("noise, friction", 0.1, "", _Run(tells, times=(0.0, 0.1, 0.3)), _Run(tells, times=times))
+    assert (len(compared.reported), len(compared.faults)) == ((1, 0) if reported else (0, 1))
 
 
 def test_what_changes_in_silence_is_wrong_and_with_a_warning_reported(monkeypatch):

@@ -25,6 +25,7 @@ from geomech.coupling.monitoring.energy_check import (
     GrowthWatch,
     check_dissipation,
     check_supplied,
+    warn_of_onset,
 )
 from geomech.coupling.monitoring.pass_agreement import DISAGREES, AgreementWatch
 from geomech.dda.energy_balance import GAIN, EnergyBudget, StepEnergy
@@ -195,6 +196,26 @@ def test_coarse_load_steps_in_which_a_crack_runs_are_told_of(caplog, steps, told
         pass
     run.unstable.check(EnergyBudget(turnover=1.0, released=1.0), 1.0)
     assert ("depends on the load steps" in caplog.text) == told
+
+
+@pytest.mark.parametrize(
+    ("drive", "step", "told"), [(7.0, 0.01, "is 0.11 of the time left"), (1.05, 0.01, ""), (7.0, 0.004, "")]
+)
+def test_growth_in_motion_that_begins_within_a_long_step_is_told_of(caplog, drive, step, told):
+    """The step, over the time from its start, 0.09 s before the run ends after 0.1 s."""
+    warn_of_onset(drive, step, 0.01 + step, 0.1)
+    assert (told in caplog.text) and bool(caplog.records) == bool(told)
+
+
+@pytest.mark.parametrize(("division", "told"), [(1, True), (4, False)])
+def test_a_coarse_step_in_which_cracks_begin_to_grow_in_motion_is_told_of(caplog, division, told):
+    """Slope 73, whose work of gravity is 21 % off in steps of dt, and 3 % in a quarter of them."""
+    problem = problem_of(drawn(scene_text(73)))
+    dt = problem.dda.time_step / division
+    run = Coupling(replace(problem, dda=replace(problem.dda, time_step=dt)))
+    for _ in takewhile(lambda cycle: cycle.state.time < 1.5 * dt, run.cycles()):
+        pass
+    assert ("known to one step only" in caplog.text) == told
 
 
 def test_a_scheme_that_gives_without_growth_is_told_of(caplog):
