@@ -135,7 +135,7 @@ def test_ctrl_c_keeps_what_has_ended(plane, tmp_path, interruptible):
     process.send_signal(signal.SIGINT)
     _, said = process.communicate(timeout=60)
     assert process.returncode == 3, said
-    assert "runs under way" in said and "--resume" in said
+    assert "stopping after the runs in progress" in said and "--resume" in said
     kept = len(read_journal(folder / "runs.jsonl"))
     assert 5 <= kept < 200
     assert not read_sweep(folder).complete
