@@ -198,7 +198,9 @@ def _refuse_finished(end: str, header: Mapping[str, Any], scene: Any) -> None:
 
 def _run_from_start(request: _Request) -> dict[str, Any]:
     folder = request.folder
-    end = _end_reason(folder)
+    end, damaged = _end_reason(folder), _damaged(folder)
+    if end is not None and damaged:
+        raise Finished(f"the run has ended ({end}), and cannot go on: {'; '.join(damaged)}. Run the scene again")
     if end is not None:
         raise Finished(
             f"the run has ended ({end}), and it has no checkpoint: to continue it, run the scene again, with a larger "
@@ -206,7 +208,6 @@ def _run_from_start(request: _Request) -> dict[str, Any]:
         )
     if not (folder / "scene.toml").is_file():
         raise NotResumable(f"{folder} holds neither a checkpoint nor a scene.toml: run the scene again")
-    damaged = _damaged(folder)
     for message in (
         *damaged,
         f"{folder} holds no {'other checkpoint' if damaged else 'checkpoint yet'}: the run begins again",

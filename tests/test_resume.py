@@ -5,6 +5,7 @@ from __future__ import annotations
 import errno
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -353,6 +354,13 @@ def test_a_damaged_checkpoint_is_named_and_the_one_before_it_used(write, tmp_pat
         f"{older} is damaged, and is not used",
         f"{out} holds no other checkpoint: the run begins again",
     ]
+
+    # The checkpoints of a run that has ended, which were not too large to keep.
+    last, *_ = left = checkpoint_file.found(out / checkpoint_file.FOLDER)
+    for path in left:
+        path.write_bytes(b"")
+    with pytest.raises(Finished, match=f"has ended .*{re.escape(str(last))} is damaged"):
+        resume(out, ["run.end_time_s=9.0"], quiet=True)
 
 
 def test_a_finished_run_says_so_and_can_be_made_longer(write, tmp_path):
