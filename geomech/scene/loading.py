@@ -5,7 +5,7 @@ from __future__ import annotations
 import copy
 import re
 import tomllib
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path as FilePath
 from typing import Any
@@ -206,8 +206,8 @@ def load_scene(
             faults.append(Fault(called, error.message, error.way_out))
 
     if not to_run and "run" not in data:
-        step = data["dda"].get("time_step_s") if isinstance(data.get("dda"), dict) else None
-        data["run"] = {"end_time_s": max(1.0, step) if isinstance(step, float | int) else 1.0}
+        data["run"] = _some_run(data)
+    _refuse_null_characters(data, places, faults)
     _resolve_records(data, path.parent)
     tables, found = validate(data, places)
     faults += found
@@ -333,6 +333,31 @@ def _syntax_hint(source: str) -> str:
     if value.lower() in ("true", "false"):
         return f"write {value.lower()} in lower case"
     return "put texts in double quotes and arrays in square brackets, and give each key once"
+
+
+def _some_run(data: dict[str, Any]) -> dict[str, float]:
+    """A [run] for a scene that is drawn only: one step."""
+    step = data["dda"].get("time_step_s") if isinstance(data.get("dda"), dict) else None
+    return {"end_time_s": max(1.0, step) if isinstance(step, float | int) else 1.0}
+
+
+def _refuse_null_characters(data: dict[str, Any], places: _Places, faults: list[Fault]) -> None:
+    way_out = "remove \\u0000: no name of a file or a part can have it"
+    broken = [Fault(places(path), "the text contains a null character", way_out) for path in _null_characters(data)]
+    if broken:
+        raise SceneError(places.sorted(faults + broken))
+
+
+def _null_characters(data: Any, path: Path = ()) -> Iterator[Path]:
+    """Paths of texts in ``data`` with a null character, which neither file systems nor other programs' libraries take."""
+    if isinstance(data, str) and "\0" in data:
+        yield path
+    parts = data.items() if isinstance(data, dict) else enumerate(data) if isinstance(data, list) else ()
+    for key, value in parts:
+        if "\0" in str(key):
+            yield path
+        else:
+            yield from _null_characters(value, (*path, key))
 
 
 def _resolve_records(data: dict[str, Any], folder: FilePath) -> None:

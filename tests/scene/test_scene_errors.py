@@ -602,6 +602,14 @@ def test_a_key_of_another_table_is_named_with_it(errors_of):
     assert meant[4] == "did you mean '[[monitors]]'"
 
 
+def test_null_characters_are_refused_with_their_place(scene_file):
+    """The system's functions for files raise errors without a place."""
+    record = '[loads.base]\nfile = "quake\\u0000.csv"\n[variants.a]\ntitle = "b\\u0000"\n'
+    first, second = faults(scene_file, GOOD + record)
+    assert "loads.base.file" in first.place and "null character" in first.message
+    assert "variants.a.title" in second.place and "null character" in second.message
+
+
 def test_dead_ends_that_may_grow_say_where_toughness_belongs(errors_of):
     joints = '[[geometry.joint_sets]]\nname = "cross"\nangle_deg = 70\nspacing_m = 0.3\nlength_m = 0.4\ngap_m = 0.1\n'
     found = errors_of(("k_ic_pa_sqrt_m = 1e6", ""), add=joints)
