@@ -535,7 +535,7 @@ def _solve(now: CrackedBlocks, bodies: dict) -> None:
         if (block in bodies) == (of is now.history)
     }
     for block, load in now.loads.items():
-        if load.bases:
+        if load.bases and block in now.solutions:
             now.loads[block] = replace(load, tractions=now.solutions[block].load.tractions)
 
 

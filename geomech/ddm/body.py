@@ -569,16 +569,23 @@ class Body:
         reduction = self.condensation
         return total[n_g:] - reduction.then(reduction.first(total[:n_g])) if n_g else total
 
-    def unit_responses(self, segments: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Tractions of forces of 1 N/m at the ends of ``segments`` (m, 2, 2), on the boundary (n_boundary_unknowns, 4 m)
-        and on closed faces (n_crack_unknowns, 4 m); columns as in `UnitLoad`."""
-        return self._loads.answers(segments, self.condensation)
+    def unit_responses(self, segments: np.ndarray, mix: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Tractions on the boundary (n_boundary_unknowns, k) and on closed faces (n_crack_unknowns, k) of loads ``mix`` (4 m, k) of
+        unit forces at the ends of ``segments`` (m, 2, 2), N/m; rows as the columns in `UnitLoad`."""
+        return self._loads.answers(segments, mix, self.condensation)
 
     def boundary_unknowns(self, load: np.ndarray, jumps: np.ndarray) -> np.ndarray:
         """(n_boundary_unknowns,) or (…, k): 2μ times displacement, or reactions where supported, under tractions ``load``
         (n_boundary_unknowns,) on the boundary and ``jumps`` (n_crack_unknowns,) at the cracks; or (…, k) each."""
         right = load + self.condensation.moved_by(jumps) if self.faces.n else load
         return -self._outside.solve(right, counted=False)
+
+    def boundary_measures(self, weights: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """``weights`` (k, n_boundary_unknowns) times `boundary_unknowns` as a linear function (k, n_boundary_unknowns) of the tractions
+        on the boundary and (k, n_crack_unknowns) of the jumps."""
+        of_load = -self._outside.carried(weights)
+        of_jumps = self.condensation.moved_transposed(of_load.T).T if self.faces.n else np.empty((len(weights), 0))
+        return of_load, of_jumps
 
     def reduced_transposed(self, on_faces: np.ndarray) -> np.ndarray:
         """(n_boundary_unknowns, k): the action of tractions on the boundary on what ``on_faces`` (n_crack_unknowns, k)

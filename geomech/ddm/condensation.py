@@ -155,6 +155,11 @@ class Condensed:
             return self._influence(np.arange(self.faces.n)).T @ w
         return columns.T @ w
 
+    def moved_transposed(self, v: np.ndarray) -> np.ndarray:
+        """A_ΓCᵀ ``v``, (n, k)."""
+        columns = self._columns
+        return (self._influence(np.arange(self.faces.n)) if columns is None else columns) @ v
+
 
 class Operators:
     """As `Condensed`, where the crack equations are solved iteratively: A_CΓ is ``on_cracks``, and each step applies
@@ -190,3 +195,7 @@ class Operators:
     def moved_by(self, w: np.ndarray) -> np.ndarray:
         """A_ΓC ``w``."""
         return self._following.influence @ w
+
+    def moved_transposed(self, v: np.ndarray) -> np.ndarray:
+        """A_ΓCᵀ ``v``."""
+        return self._following.influence.T @ v

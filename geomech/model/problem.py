@@ -266,9 +266,9 @@ class RunSettings:
     events           kinds of state changes that steps end at, or report when steps are fixed; None: all with "events",
                      none with "fixed"
     boundary_stress  how contact forces load a cracked block of order 1: "contacts" as pressures linear over faces; "bases"
-                     likewise, and on fixed and guided blocks as on a rigid base; "auto" as on a rigid base in static runs
-                     where a block is wider than deep, otherwise linear; "springs" as point forces; "kelvin-springs" as
-                     point forces of the infinite plane
+                     likewise, but on fixed, guided and rigid blocks as on a rigid base; "auto" as "bases", but linear on a
+                     specimen between two platens; "springs" as point forces; "kelvin-springs" as point forces of the
+                     infinite plane
     skip             False: every body and solution is recomputed in every pass, for comparison; results are the same
     repeat           kinds of `REPEATS`: the finished run is repeated with each of these changes, and states by how much
                      its results differ

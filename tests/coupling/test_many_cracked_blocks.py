@@ -149,7 +149,7 @@ def test_passes_of_growth_in_motion_begin_with_the_contacts_of_the_last_one(monk
         of,
         cracks=replace(of.cracks, aperture=np.zeros(of.cracks.n_segments)),
         run=replace(of.run, end_time=0.02, stop_at=()),
-        materials=(replace(of.materials[0], k_ic=8e3),),
+        materials=(replace(of.materials[0], k_ic=6e3),),
         growth=replace(of.growth, increment=0.01),
     )
     runs = [[*cycles(given)]]

@@ -7,6 +7,10 @@ from their toughness; otherwise it would cost more than it saves. If skipped sol
 for example by a table of all tips, nothing is skipped. (With many cracked blocks such tables have the last solutions, see
 `cycle_record`.)
 
+On a rigid base the pressure is known from the solution alone. The bound of open cracks holds for any pressure without
+tension; bounds of changes take the last pressure times a linear function, with the present force and moment
+(`base_pressure`).
+
 Faces with friction keep the slip of their last solution meanwhile (`CrackedBlocks.history`), and their bound adds up all
 changes of the loads since then (`sif_change_bound`). As the next solution depends on how many steps lie between, this is
 done with many cracked blocks only.
@@ -20,8 +24,10 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
+from ..load_transfer.base_pressure import with_earlier_pressure
+
 if TYPE_CHECKING:
-    from ...ddm import Body, BodyLoad
+    from ...ddm import Body
     from ...ddm.fracture.sif_bound import TipBound
     from ...ddm.fracture.sif_change_bound import ChangeBound
     from ...model import Blocks, Problem
@@ -44,13 +50,13 @@ IDLE = 10
 
 
 class CoupledBlocks(Protocol):
-    """The part of a coupled run that is used: blocks, and by block their bodies, loads and solutions."""
+    """The part of a coupled run that is used: blocks, and by block their bodies, loads (`BoundaryLoad`) and solutions."""
 
     problem: Problem
     number: int
     blocks: Blocks
     bodies: dict[int, Body]
-    loads: dict[int, BodyLoad]
+    loads: dict[int, Any]
     solutions: dict[int, Any]
 
 
@@ -64,12 +70,13 @@ class LastSolution:
 
 @dataclass(eq=False)
 class _Known:
-    """Data of the body with this ``crack_system``: its ``last`` solution; number of its solutions, the last ones ``far``
+    """Data of the body with this ``crack_system``: its ``last`` solution and the ``load`` of that; number of its solutions, the last ones ``far``
     from toughness and ``all``, and of passes without one since (``idle``); the ``bound``; ``per_factor``: largest K_eq per
     unit K; ``never``: no bound exists."""
 
     crack_system: object
     last: LastSolution
+    load: Any
     far: int = 0
     all: int = 0
     idle: int = 0
@@ -114,18 +121,17 @@ class GrowthScreening:
 
         near, nearer = (set(tips["block"][tips["k_eq"] > f * toughness].tolist()) for f in (FAR, FAR_AT_REST))
         for block, solution in now.solutions.items():
-            body = now.bodies[block]
+            body, load = now.bodies[block], now.loads[block]
             known = self._known.get(block)
             if known is None or known.crack_system is not body.crack_system:
-                known = self._known[block] = _Known(body.crack_system, LastSolution(solution, now.number))
-            known.last = LastSolution(solution, now.number)
+                known = self._known[block] = _Known(body.crack_system, LastSolution(solution, now.number), load)
+            known.last, known.load = LastSolution(solution, now.number), load
             known.far = 0 if block in (nearer if _can_close(body) else near) else known.far + 1
             known.all += 1
             known.idle = 0
             enough = known.far >= STOOD or known.all >= STOOD_ANYWHERE
             if enough and known.bound is None and not known.never:
                 self._bound(now, block, known)
-            load = now.loads[block]
             # A solution that meets a target error may be that of a finer body.
             same = solution.body.crack_system is known.crack_system
             if isinstance(known.bound, ChangeBound) and load.points is None and same:
@@ -158,10 +164,13 @@ class GrowthScreening:
     def _cannot(self, now: CoupledBlocks, block: int) -> bool:
         from ...ddm.fracture.sif_change_bound import ChangeBound
 
-        known, body, load = self._known.get(block), now.bodies[block], now.loads[block]
+        known, body = self._known.get(block), now.bodies[block]
+        load: Any = now.loads[block]
         if known is None or known.bound is None or known.crack_system is not body.crack_system:
             return False
-        if load.points is not None or load.bases:
+        if load is not None and load.bases and isinstance(known.bound, ChangeBound):
+            load = with_earlier_pressure(load, known.load)
+        if load is None or load.points is not None:
             return False
         k_ic = body.material.k_ic
         if body.rough and isinstance(known.bound, ChangeBound):

@@ -9,9 +9,10 @@
   along the two edges of the corner and acts as shear, which preserves force and moment exactly.
 - A force beyond the end of an edge acts at that end; its moment is applied to the whole outline.
 
-With route "bases", the pressure of faces on fixed or guided blocks is that of a rigid base
-(`geomech.ddm.loads.rigid_bases`) with the same resultant and moment; with route "auto" only that of sides which are
-longer than their block is deep (`WIDE`). Two other routes are for comparison: "springs"
+With route "bases", the pressure of faces on fixed, guided or rigid blocks is that of a rigid base
+(`geomech.ddm.loads.rigid_bases`) with the same resultant and moment. With route "auto" a specimen between two such platens
+that is at least as tall as wide is an exception: in tests of rock platens are greased or made of brushes, so that the stress
+on the ends is even whatever the cracks do, and its pressure is linear. Two other routes are for comparison: "springs"
 applies each contact force as a point force on the boundary; "kelvin-springs" applies these through Kelvin's solution
 for the infinite plane (Khanizadeh Bahabadi et al. 2023, eqs. 2-4).
 
@@ -46,14 +47,19 @@ from .piecewise_traction import (
     add_edge_piece,
     add_point_load,
     add_row,
+    jit,
     line_of,
     outlines,
+    place_along,
 )
 
-#: Ratio of the length of a side to the mean depth of its block, area / length, from which "auto" does not take its pressure on
-#: a rigid base as linear. Linear pressure leaves K off by 2 % at 1, and too large by a factor of 1.4 at 1½, 2 at 2, 5 at 3
-#: (`tests/coupling/test_bases.py`). A square is as wide as deep, whatever round-off says.
+#: Ratio of the length of a side to the mean depth of its block, area / length, up to which a block between platens is a
+#: specimen, tests of which want one at least as tall as wide. A square is as wide as deep, whatever round-off says.
 WIDE = 1.0 + 1e-6
+
+#: Two faces are those of platens if they are parallel (1 minus the cosine of the angle between them) and of the same extent to
+#: this part of it.
+PARALLEL, SAME_EXTENT = 1e-4, 0.01
 
 #: Pieces of the pressure of a side on a rigid base that is as long as its block is deep (area over length, √area at most): pressure
 #: below a wide block varies over a part of the face as long as its depth. Elements there, 6 of order 4 by default, have as many nodes.
@@ -219,7 +225,8 @@ class _Asked(NamedTuple):
 class _Acting(NamedTuple):
     """CONTACT rows with ``holding`` (may carry tension), EDGE_FORCE and POINT_FORCE rows. Of each kind: the row numbers
     for the selected blocks, one after the other, and begin and end of those of each block (n, 2). ``based``
-    (n_blocks,): blocks that act as rigid bases below sides that are ``wide`` times as long as their block is deep."""
+    (n_blocks,): blocks that act as rigid bases; as platens, if they are two, of blocks that are less than ``wide`` times as
+    wide as deep."""
 
     contacts: np.ndarray
     holding: np.ndarray
@@ -233,6 +240,35 @@ class _Acting(NamedTuple):
     point_ends: np.ndarray
     based: np.ndarray
     wide: float
+
+
+@jit
+def _reach(of, touches, sides, face, number):
+    """Where the contacts with the face ``number`` begin and end along its side, and the other block (−1 without contacts);
+    (x, y) start and direction of the side."""
+    sx, sy, ax, ay, _ = line_of(of, sides[number, 0])
+    low, high, against = 0.0, 0.0, -1
+    for k in range(len(face)):
+        if face[k] == number:
+            place = place_along(touches.px[k], touches.py[k], sx, sy, ax, ay)
+            low, high = (place, place) if against < 0 else (min(low, place), max(high, place))
+            against = touches.against[k]
+    return low, high, against, sx, sy, ax, ay
+
+
+@jit
+def _between_platens(of, touches, sides, face, number, based):
+    """Whether an opposite face of the block, parallel and of the same extent, lies on a straight block, too."""
+    low, high, _, sx, sy, ax, ay = _reach(of, touches, sides, face, number)
+    for other in range(len(sides)):
+        near, far, against, x, y, bx, by = _reach(of, touches, sides, face, other)
+        if against < 0 or not based[against] or ax * bx + ay * by > -1.0 + PARALLEL:
+            continue
+        begins = place_along(x + far * bx, y + far * by, sx, sy, ax, ay)
+        ends = place_along(x + near * bx, y + near * by, sx, sy, ax, ay)
+        if max(abs(begins - low), abs(ends - high)) <= SAME_EXTENT * (high - low):
+            return True
+    return False
 
 
 @kept(error_model="numpy", nogil=True)
@@ -265,7 +301,10 @@ def _pieces(found, asked, of, vertex_start, acting, pointed):
                     continue  # only single contacts
                 start = sides[number, 0]
                 _, _, ax, ay, length = line_of(of, start)
-                on_base = acting.based[touches.against[first]] and length * length > acting.wide * asked.area[b]
+                on_base = acting.based[touches.against[first]] and (
+                    length * length > acting.wide * asked.area[b]
+                    or not _between_platens(of, touches, sides, face, number, acting.based)
+                )
                 piece = min(math.sqrt(asked.area[b]), asked.area[b] / length) / ON_BASE if on_base else 0.0
                 base = found.count[2]
                 amount, lost = add_face(found, of, start, touches, face, number, piece)

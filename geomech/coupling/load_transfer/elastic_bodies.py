@@ -12,7 +12,7 @@ import numpy as np
 
 from ...ddm.counters import Work
 from ...ddm.crack_contact.face_laws import Released
-from ...model import TIP, Blocks, Cracks, Motion, Problem, State
+from ...model import AUTO_ORDER, TIP, Blocks, Cracks, Motion, Problem, State
 from ...model.blocks.polygon import joined_loops
 from ..parallel_map import parallel_map, return_free_memory
 from . import boundary_tractions
@@ -76,7 +76,7 @@ def elastic_bodies(
         to_make.append((b, own, material, old, work))
 
     straight = keep_straight(problem, blocks)
-    has_bases = problem.dda.dynamic_factor == 0.0 and problem.run.boundary_stress in ("auto", "bases")
+    has_bases = may_have_bases(problem, blocks)
     # The first load needs more of few bodies, as growth at once; of many it is growth in few.
     lean = len(cracked) >= MANY
 
@@ -101,7 +101,7 @@ def elastic_bodies(
         b, own, material, old, work = of
         own_loops, reuse, laws = _loops(problem, blocks, b), ddm.Reuse(old, work), problem.face_laws
         if problem.endless is None:
-            finer = wide_on_base(blocks, b, straight) if has_bases else 1.0
+            finer = wide_on_base(blocks, b, straight) if has_bases[b] else 1.0
             # (A square is as wide as deep, whatever round-off says.)
             per_side = math.ceil(finer * problem.ddm.elements_per_side - ON_BASE)
             settings = replace(problem.ddm, elements_per_side=per_side)
@@ -130,6 +130,16 @@ def _rows_of(number: np.ndarray, wanted: np.ndarray) -> list[np.ndarray]:
     order = np.argsort(number, kind="stable")
     first, last = (np.searchsorted(number[order], wanted, side) for side in ("left", "right"))
     return [order[a:b] for a, b in zip(first.tolist(), last.tolist())]
+
+
+def may_have_bases(problem: Problem, blocks: Blocks) -> np.ndarray:
+    """(n_blocks,) bool: whether the pressure of a block on its bases is computed. In motion the cracks of blocks of higher order are
+    loaded by the stress of their blocks."""
+    own = np.full(blocks.n_blocks, problem.run.boundary_stress in ("auto", "bases"))
+    if blocks.order is None or problem.dda.dynamic_factor == 0.0:
+        return own
+    # (Blocks whose order is found as the run goes are of first order at first.)
+    return own & np.isin(blocks.order, (1, AUTO_ORDER))
 
 
 def keep_straight(problem: Problem, blocks: Blocks) -> np.ndarray:
@@ -163,7 +173,7 @@ def wide_on_base(blocks: Blocks, block: int, straight: np.ndarray) -> float:
         ).any():
             longest = max(longest, length)
             ways.append(along)
-    if any(way @ other < 1e-4 - 1.0 for way in ways for other in ways):
+    if any(way @ other < boundary_tractions.PARALLEL - 1.0 for way in ways for other in ways):
         return 1.0
     return max(1.0, longest / math.sqrt(blocks.area_moments(block)[0]))
 
@@ -179,13 +189,12 @@ def boundary_loads(
     contacts, edges = contacts_of_loaded_pairs(result.contacts, blocks.n_blocks), forces.edges
     route, bent = problem.run.boundary_stress, np.zeros(blocks.n_blocks, bool)
     order = blocks.order if result.state.order is None else result.state.order
-    if route == "auto" and problem.dda.dynamic_factor > 0.0:
-        # Blocks in motion land on corners and edges; static pressure is not what loads their cracks.
-        route = "contacts"
-    if order is not None and route in ("auto", "contacts", "bases") and problem.dda.dynamic_factor == 0.0:
-        # (In motion the cracks of such blocks are loaded by the stress of their blocks.)
+    if order is not None and route in ("auto", "contacts", "bases"):
         bent[numbers] = np.asarray(order)[numbers] > 1
-    if bent.any():
+    # In motion the cracks of blocks that bend are loaded by the stress of their blocks: pressure on bases is not asked for.
+    still = problem.dda.dynamic_factor == 0.0
+    bent_route = "bases" if still else "contacts"
+    if still and bent.any():
         contacts, along = without_faces(blocks, result.vertices, contacts, result.state.face_points, bent, straight)
         edges = np.concatenate([edges, along])
     if forces.bonds is not None:
@@ -214,7 +223,7 @@ def boundary_loads(
     if not bent.any():
         return dict(zip(bodies, boundary_tractions.boundary_loads(numbers, blocks, acting, inertia)))
     loads: dict[int, BoundaryLoad] = {}
-    for rows, way in ((np.flatnonzero(~bent[numbers]), route), (np.flatnonzero(bent[numbers]), "bases")):
+    for rows, way in ((np.flatnonzero(~bent[numbers]), route), (np.flatnonzero(bent[numbers]), bent_route)):
         if not len(rows):
             continue
         own = inertia.only(rows)

@@ -46,6 +46,8 @@ MOST = 12
 _LAYER = 0.05
 #: A larger change of pressures that have not converged is a warning: K has errors of this size anyway.
 _WARNED = 1e-3
+#: Determinant, relative to the entries, below which two shapes of pressure do not give any force and moment.
+_SINGULAR = 1e-9
 #: An element belongs to a face if it is off its line by less than this part of the body's size.
 _OFF = 1e-6
 #: Gauss points on the common interval of a hat function and an element.
@@ -80,9 +82,12 @@ def on_bases(
     """
     assert load.segments is not None and load.tractions is not None  # bases are some of them
     faces = _Faces(body, load.segments, bases)
-    given = load.tractions
-    pressure = faces.pressures(given)
+    pressure = faces.pressures(load.tractions)
     right = faces.resultants @ pressure
+    if warm is not None:
+        pressure = faces.earlier(warm.load, pressure, right)
+    given = faces.tractions(load.tractions, pressure)
+    load = replace(load, tractions=given)
     for _ in range(MOST):
         warm = body.solve(load, warm=warm, history=history)
         if warm.body is not body:  # a finer one meets the target error
@@ -122,6 +127,8 @@ class _Faces:
 
     weights     (n, n_boundary_unknowns): ∫ hat · u ds from the nodal displacement (local) of the boundary
     resultants  (2 n_bases, n): force, and moment about its start, of each base
+    of_load, of_jumps  (n, n_boundary_unknowns), (n, n_crack_unknowns): ∫ hat · 2μ u ds from tractions on the boundary and from the
+                jumps at the cracks. Large bodies give up the factors that either takes
     closure     (n, n): ∫ hat · closure ds of the joint under unit pressures, m²/Pa
     """
 
@@ -132,9 +139,7 @@ class _Faces:
         if self._key not in body.on_bases:
             body.on_bases.clear()
             body.on_bases[self._key] = self._geometry()
-        self.weights: np.ndarray
-        self.resultants: np.ndarray
-        self.weights, self.resultants = body.on_bases[self._key]
+        self.weights, self.resultants, self.of_load, self.of_jumps = body.on_bases[self._key]
         self.closure = np.zeros((int(self.first[-1]),) * 2)
         for k, base in enumerate(bases):
             ends = segments[base.rows]
@@ -144,7 +149,7 @@ class _Faces:
             np.add.at(self.closure, (near + 1, near + 1), length / 3)
             self.closure[near, near + 1] = self.closure[near + 1, near] = length / 6
 
-    def _geometry(self) -> tuple[np.ndarray, np.ndarray]:
+    def _geometry(self) -> tuple[np.ndarray, ...]:
         body, g, n = self.body, self.body.boundary, int(self.first[-1])
         weights, resultants = np.zeros((n, g.n_unknowns)), np.zeros((2 * len(self.bases), n))
         for k, base in enumerate(self.bases):
@@ -159,7 +164,7 @@ class _Faces:
                 # ∫ hat s ds: the centroid is a third of the way from its own node to the other.
                 far = places[j : j + len(length)]
                 resultants[2 * k + 1, at] += 0.5 * length * (2 * near + far) / 3
-        return weights, resultants
+        return weights, resultants, *body.boundary_measures(weights)
 
     def pressures(self, tractions: np.ndarray) -> np.ndarray:
         """(n,) pressure, Pa, at the nodes from ``tractions`` (m, 2, 2) that are continuous from piece to piece."""
@@ -168,6 +173,28 @@ class _Faces:
             own, way = tractions[base.rows], base.per_pressure
             out += [own[:, 0] @ way / (way @ way), own[-1:, 1] @ way / (way @ way)]
         return np.concatenate(out)
+
+    def earlier(self, load: BodyLoad, pressure: np.ndarray, right: np.ndarray) -> np.ndarray:
+        """(n,) first guess: pressures of an earlier ``load`` times linear functions, with the resultants ``right``; ``pressure`` (n,) on
+        bases whose pieces it does not have. Contact states of crack faces then change less in the second solution."""
+        if load.segments is None or load.tractions is None:
+            return pressure
+        out, row_of = pressure.copy(), {ends.tobytes(): k for k, ends in enumerate(load.segments)}
+        for k, base in enumerate(self.bases):
+            ends = self.segments[base.rows]
+            first = row_of.get(ends[0].tobytes(), len(row_of))
+            before = slice(first, first + len(ends))
+            if not np.array_equal(load.segments[before], ends):
+                continue
+            way = ends[-1, 1] - ends[0, 0]
+            inward = np.array([-way[1], way[0]]) / np.hypot(*way)
+            own, at = slice(self.first[k], self.first[k + 1]), slice(2 * k, 2 * k + 2)
+            shape = np.concatenate([load.tractions[before, 0], load.tractions[before][-1:, 1]]) @ inward
+            shapes = np.stack([shape, shape * np.linspace(0.0, 1.0, len(shape))], axis=1)
+            matrix = self.resultants[at, own] @ shapes
+            if abs(np.linalg.det(matrix)) > _SINGULAR * np.abs(matrix).max() ** 2:
+                out[own] = shapes @ np.linalg.solve(matrix, right[at])
+        return out
 
     def tractions(self, tractions: np.ndarray, pressure: np.ndarray) -> np.ndarray:
         """``tractions`` (m, 2, 2) with ``pressure`` (n,) on the bases."""
@@ -182,22 +209,20 @@ class _Faces:
         body = self.body
         key = self._key + b"states" + solution.face_states.key
         if key not in body.on_bases:
+            loads = body.on_bases.get(self._key + b"loads") or self._unit_loads()
             body.on_bases.clear()
-            body.on_bases[self._key], body.on_bases[key] = (
-                (self.weights, self.resultants),
-                (self._of_tractions(solution),),
-            )
+            own = self.weights, self.resultants, self.of_load, self.of_jumps
+            body.on_bases[self._key], body.on_bases[self._key + b"loads"] = own, loads
+            body.on_bases[key] = (self._of_tractions(loads, solution),)
         n = int(self.first[-1])
         way = np.concatenate([np.tile(base.per_pressure, (len(base.rows) + 1, 1)) for base in self.bases])
         (gives,) = body.on_bases[key]
         return gives[:, :n] * way[:, 0] + gives[:, n:] * way[:, 1]
 
-    def _of_tractions(self, solution: Solution) -> np.ndarray:
-        """(n, 2 n) the same for unit tractions at the nodes, along x and then along y: the ratio of shear to pressure
-        changes from step to step."""
-        body, n = self.body, int(self.first[-1])
+    def _unit_loads(self) -> tuple[np.ndarray, np.ndarray]:
+        """Tractions on boundary and closed crack faces (…, 2 n) of unit tractions at the nodes, along x and then along y."""
+        n = int(self.first[-1])
         rows = np.concatenate([base.rows for base in self.bases])
-        applied, reduced = body.unit_responses(self.segments[rows])
         of_nodes = np.zeros((len(rows), 4, 2, n))
         done = 0
         for k, base in enumerate(self.bases):
@@ -206,16 +231,21 @@ class _Faces:
             for axis in (0, 1):
                 of_nodes[here, axis, axis, node] = of_nodes[here, 2 + axis, axis, node + 1] = 1.0
             done += m
-        mix = of_nodes.reshape(4 * len(rows), 2 * n)
-        moves = body.boundary_unknowns(applied @ mix, body._jumps_of(-(reduced @ mix), solution))
-        return self.weights @ moves / (2 * body.material.shear_modulus)
+        return self.body.unit_responses(self.segments[rows], of_nodes.reshape(4 * len(rows), 2 * n))
+
+    def _of_tractions(self, loads: tuple[np.ndarray, ...], solution: Solution) -> np.ndarray:
+        """(n, 2 n) the compliance for the unit tractions of ``loads``: the ratio of shear to pressure changes from step to step."""
+        body, (applied, reduced) = self.body, loads
+        moves = self.of_load @ applied + self.of_jumps @ body._jumps_of(-reduced, solution)
+        return moves / (2 * body.material.shear_modulus)
 
     def moved(self, solution: Solution) -> np.ndarray:
         """(n,) ∫ hat · u ds of ``solution``, m²."""
         body, g = self.body, self.body.boundary
         besides = solution._applied.regular(g.nodes.reshape(-1, 2)).reshape(g.nodes.shape)
         local = np.stack([np.einsum("enc,ec->en", besides, axis) for axis in (g.tangent, g.normal)], axis=1)
-        return self.weights @ (solution._u / (2 * body.material.shear_modulus) + local.ravel())
+        moves = self.of_load @ solution._loads.on_boundary + self.of_jumps @ solution.jumps
+        return moves / (2 * body.material.shear_modulus) + self.weights @ local.ravel()
 
     def settled(self, gives: np.ndarray, still: np.ndarray, right: np.ndarray) -> np.ndarray | None:
         """(n,) pressures with the resultants ``right`` without tension or penetration, or None."""

@@ -218,12 +218,13 @@ class UnitLoads:
         for unit, first, end in zip(units, ends, ends[1:]):
             unit.answered = np.ascontiguousarray(responses[:, first:end])
 
-    def answers(self, segments: np.ndarray, reduction: Reduction) -> tuple[np.ndarray, np.ndarray]:
-        """g (n_boundary_unknowns, 4 m) and r' (n_crack_unknowns, 4 m), see `UnitLoad`, of ``segments`` (m, 2, 2)."""
+    def answers(self, segments: np.ndarray, mix: np.ndarray, reduction: Reduction) -> tuple[np.ndarray, np.ndarray]:
+        """g (n_boundary_unknowns, k) and r' (n_crack_unknowns, k), see `UnitLoad`, of loads ``mix`` (4 m, k) of unit forces on
+        ``segments`` (m, 2, 2)."""
         units = [unit for unit, _ in self._unit_segments(segments, np.zeros((len(segments), 2, 2)))]
         # The ends of a segment given against the boundary's direction are swapped.
         order = [[2, 3, 0, 1] if unit.against else [0, 1, 2, 3] for unit in units]
-        applied = np.hstack([unit.applied[:, columns] for unit, columns in zip(units, order)])
+        applied = np.hstack([unit.applied[:, columns] for unit, columns in zip(units, order)]) @ mix
         on_boundary, on_faces = np.split(applied, [self.boundary.n_unknowns])
         return on_boundary, on_faces - reduction.then(reduction.first(on_boundary))
 

@@ -225,25 +225,24 @@ def _sudden_weight(c: Check) -> None:
 
 
 def _shallow(c: Check) -> None:
-    """Linear contact pressure below wide cracked blocks of first order: on all blocks in motion or if it was asked for, by
-    default in statics on those that deform."""
+    """Linear contact pressure below wide cracked blocks of first order: on blocks that deform, on all if it was asked for."""
     if not c.cracks.n_segments:
         return
     moving = c.tables.dda.dynamic_factor > 0
     asked_for = c.tables.run.boundary_stress not in ("auto", "bases")
-    found = _wide_sides(c, on_fixed=asked_for or moving)
+    found = _wide_sides(c, on_fixed=asked_for)
     if not found:
         return
     slenderness, block, length, on_fixed = max(found)
     others = f", and {len(found) - 1} more sides of cracked blocks" if len(found) > 1 else ""
     higher = f"give its zone{'' if on_fixed else ' and the one below'} an order of 7 (zones.NAME.order)"
     c.warn(
-        ("run", "boundary_stress") if on_fixed and asked_for else ("geometry",),
+        ("run", "boundary_stress") if on_fixed else ("geometry",),
         f"{c.blocks.names[block]!r} contains cracks and lies on {'a fixed' if on_fixed else 'another'} block with a side of "
         f"{length:.3g} m, {slenderness:.2g} times as long as the block is deep{others}: its contact pressure is linear, which "
         f"bends it more than the true one would; K of its cracks{' at rest' if moving else ''} may be too large by a factor of two",
         'leave run.boundary_stress out, or set it to "bases"'
-        if on_fixed and not moving
+        if on_fixed
         else f"{higher}, or cut it by joints into pieces that are less than {SHALLOW:g} times as wide as deep",
     )
 

@@ -250,10 +250,10 @@ class RunTable(Table):
     )
     boundary_stress: Literal["auto", "contacts", "bases", "springs", "kelvin-springs"] = Field(
         "auto",
-        description='how contact forces load cracked blocks of order 1: "contacts", linear over each face; "bases", the same, '
-        'but on fixed, guided and rigid blocks as on a straight rigid base without tension; "auto", as "bases" in static runs where '
-        'a side is longer than the block is deep on average, otherwise as "contacts"; "springs", '
-        'as point forces at the springs; "kelvin-springs", as Kelvin\'s point forces of the infinite '
+        description='how contact forces load cracked blocks of order 1: "auto", linear over each face, but on fixed, guided and rigid '
+        "blocks as on a straight rigid base without tension, other than between two of these as platens of a specimen at least as tall "
+        'as wide; "bases", the same between platens, too; "contacts", linear over each face (for comparison, as the following); '
+        '"springs", as point forces at the springs; "kelvin-springs", as Kelvin\'s point forces of the infinite '
         "plane (for comparison: most of a force is then lost)",
     )
     skip: bool = Field(
