@@ -291,7 +291,8 @@ def solve_bodies(
             raise ddm.TargetMissed(failure.solution, failure.target, f"{names[b]}: ") from failure
 
     solutions = dict(zip(bodies, parallel_map(solved, list(bodies), threads_for(bodies))))
-    if any(body.lean for body in bodies.values()):
+    if len(bodies) >= MANY and any(body.lean for body in bodies.values()):
+        # (Of few, it is less than what the next solutions ask for: taking it from the system again takes 2 s per GB.)
         return_free_memory()
     if any(body.requested.target_error is not None for body in bodies.values()):
         # Solutions that meet the target error may belong to refined bodies.
