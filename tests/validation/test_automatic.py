@@ -167,17 +167,44 @@ NETWORK = [
 
 
 def network():
-    """`NETWORK`, with nodes where cracks cross."""
+    return crossing(NETWORK)
+
+
+def crossing(ends):
+    """Cracks between pairs of ``ends``, with nodes where they cross."""
     cracks = []
-    for a, d in ((np.array(p), np.array(q) - np.array(p)) for p, q in NETWORK):
+    for a, d in ((np.array(p), np.array(q) - np.array(p)) for p, q in ends):
         at = {0.0, 1.0}
-        for b, e in ((np.array(p), np.array(q) - np.array(p)) for p, q in NETWORK):
+        for b, e in ((np.array(p), np.array(q) - np.array(p)) for p, q in ends):
             across = d[0] * e[1] - d[1] * e[0]
             if across:
                 s, t = (((b - a)[0] * v[1] - (b - a)[1] * v[0]) / across for v in (e, d))
                 at |= {s} if 0 < s < 1 and 0 < t < 1 else set()
         cracks.append([a + s * d for s in sorted(at)])
     return lines(*cracks, join=True)
+
+
+def at_random(seed):
+    """Ten cracks, 0.2 to 0.8 long, with their centres in a square of side 1."""
+    rng, ends = np.random.default_rng(seed), []
+    for _ in range(10):
+        centre, angle, length = rng.uniform(0, 1, 2), rng.uniform(0, math.pi), rng.uniform(0.2, 0.8)
+        half = 0.5 * length * np.array([math.cos(angle), math.sin(angle)])
+        ends.append((centre - half, centre + half))
+    return crossing(ends)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [0, 1, 2, 5, 6, 7, 9, 11, 13, 16, 17, 36])
+def test_random_networks_meet_a_target_and_tell_their_error(seed):
+    """Of those that enclose nothing. (By default they are 2e-5 to 2e-3 off; ends come to 3e-4 of a crack that they cross.
+    Where such an end leaves it at 3 or 14 degrees, seeds 3 and 12, 1e-6 is refused.)"""
+    cracks = at_random(seed)
+    best = ddm.solve_to([], cracks, ROCK, MIXED, 1e-6)
+    plain = ddm.Body([], cracks, ROCK).solve(MIXED)
+    assert off(plain, factors(best)) < said(plain) + 1e-6
+    asked = ddm.Body([], cracks, ROCK, DdmSettings(target_error=1e-3)).solve(MIXED)
+    assert off(asked, factors(best)) < said(asked) + 1e-6 <= 1e-3 + 1e-6
 
 
 OPEN = [((0, 90), math.inf), ((0, 45), math.inf), ((0, 30), math.inf), ((0, 15, 30), math.inf), ((0, 45, 90), math.inf)]
