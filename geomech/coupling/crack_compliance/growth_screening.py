@@ -41,7 +41,7 @@ STOOD_ANYWHERE = 20
 #: Fraction of the toughness that the bound must not reach.
 BELOW = 1.0 - 1e-6
 #: The same for what loads may have changed since the last solution of faces with friction. The next solution takes the
-#: path of the loads since then in one step: on a trace map K at this fraction is within 7e-4 of the toughness (bounds of
+#: path of the loads since then in one step: on a trace map K at this fraction is within 2e-3 of the toughness (bounds of
 #: changes are ten times the changes and more).
 OF_PATH = 0.5
 #: Number of passes in a row after which a body that is left out gives up what it keeps for loads that recur: on a trace map

@@ -30,7 +30,7 @@ LEAST_MODULUS, LEAST_TOUGHNESS = 1e6, 1e3
 LEAST_DENSITY = 100.0
 #: Ratio of side length to block depth above which a cracked block with linear contact pressure is reported. The true pressure
 #: concentrates below the load. On a rigid base K is off by 2 % at a ratio of 1, and too large by a factor of 1.4 at 1½, 2 at 2,
-#: 5 at 3 (`tests/coupling/test_bases.py`); on a block of the same rock by 1.3 at 2, 2.3 at 3.
+#: 5 at 3 (`tests/coupling/test_bases.py`); on a block of the same rock by 1.3 at 2, 2.2 at 3.
 SHALLOW = 1.5
 #: A side lies on another one if their distance is below this part of its length, over at least that part of it.
 LIES_ON, MOST_OF_IT = 1e-6, 0.5
