@@ -86,7 +86,7 @@ def test_a_random_slope_says_how_far_blocks_and_cracks_agree(caplog, monkeypatch
     """The figure of the warning is that of the table, here with a threshold below what passes usually leave."""
     monkeypatch.setattr(pass_agreement, "DISAGREES", 1e-9)
     with caplog.at_level(logging.WARNING):
-        first = islice(cycles(problem_of(drawn(scene_text(2)))), 3)
+        first = islice(cycles(problem_of(drawn(scene_text(4)))), 3)
         mismatch = [cycle.statistics.get("compliance_mismatch", 0.0) for cycle in first]
     lines = [record.getMessage() for record in caplog.records]
     told = [re.search(r"cracks agree only to (\S+) of their strain", line) for line in lines]
