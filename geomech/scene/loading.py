@@ -354,7 +354,8 @@ def _null_characters(data: Any, path: Path = ()) -> Iterator[Path]:
         yield path
     parts = data.items() if isinstance(data, dict) else enumerate(data) if isinstance(data, list) else ()
     for key, value in parts:
-        if "\0" in str(key):
+        # Names of variants are names of folders, which are checked as such.
+        if "\0" in str(key) and path != ("variants",):
             yield path
         else:
             yield from _null_characters(value, (*path, key))
