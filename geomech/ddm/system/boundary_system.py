@@ -154,9 +154,8 @@ class BoundarySystem:
     @property
     def factor(self) -> Factor | IteratedBoundary:
         """See above."""
-        factor = (
-            self._kept.factor
-        )  # read once: the run may release it while fields inside the body are computed beside it
+        # Read once: the run may release it while fields inside the body are computed beside it.
+        factor = self._kept.factor
         if factor is not None:
             return factor
         self._again += 1
