@@ -380,7 +380,7 @@ class Body:
             if len(r) == c.n:
                 return direct - (both.columns.dense @ cg.dense.T).T
             rows = cg.of(r).T
-            return direct - (both.moved_back(rows) if len(k) == c.n else both.columns_of(k) @ rows).T
+            return direct - (both.moved_transposed(rows) if len(k) == c.n else both.columns_of(k) @ rows).T
 
         before_growth = None if kept is None else kept.crack_system
         assert not isinstance(before_growth, IterativeCrackSystem)

@@ -97,18 +97,6 @@ class Condensed:
         """(…, n_boundary_unknowns) columns of A_ΓC of some of the crack elements, as rows."""
         return self._influence(elements) if self._columns is None else self._columns.of(elements)
 
-    def moved_back(self, x: np.ndarray) -> np.ndarray:
-        """A_ΓCᵀ ``x`` (n_boundary_unknowns, k)."""
-        columns = self._columns
-        if columns is not None:
-            return columns @ x
-        elements, width = np.arange(self.faces.n), 2 * self.faces.per
-        out = np.empty((width * len(elements), x.shape[1]), order="F")
-        for first in range(0, len(elements), AT_ONCE):
-            part = elements[first : first + AT_ONCE]
-            out[width * first : width * (first + len(part))] = self._influence(part) @ x
-        return out
-
     def release(self) -> None:
         """Give up what only growth and the boundary's displacement need, where that is much, and keep G as a product."""
         if self.system.large:
@@ -156,9 +144,16 @@ class Condensed:
         return columns.T @ w
 
     def moved_transposed(self, v: np.ndarray) -> np.ndarray:
-        """A_ΓCᵀ ``v``, (n, k)."""
+        """A_ΓCᵀ ``v`` (n_boundary_unknowns, k), column-major."""
         columns = self._columns
-        return (self._influence(np.arange(self.faces.n)) if columns is None else columns) @ v
+        if columns is not None:
+            return columns @ v
+        elements, width = np.arange(self.faces.n), 2 * self.faces.per
+        out = np.empty((width * len(elements), v.shape[1]), order="F")
+        for first in range(0, len(elements), AT_ONCE):
+            part = elements[first : first + AT_ONCE]
+            out[width * first : width * (first + len(part))] = self._influence(part) @ v
+        return out
 
 
 class Operators:

@@ -70,9 +70,9 @@ class LastSolution:
 
 @dataclass(eq=False)
 class _Known:
-    """Data of the body with this ``crack_system``: its ``last`` solution and the ``load`` of that; number of its solutions, the last ones ``far``
-    from toughness and ``all``, and of passes without one since (``idle``); the ``bound``; ``per_factor``: largest K_eq per
-    unit K; ``never``: no bound exists."""
+    """Data of the body with this ``crack_system``: its ``last`` solution and the ``load`` of that; number of its solutions,
+    the last ones ``far`` from toughness and ``all``, and of passes without one since (``idle``); the ``bound``;
+    ``per_factor``: largest K_eq per unit K; ``never``: no bound exists."""
 
     crack_system: object
     last: LastSolution

@@ -85,9 +85,9 @@ class EventSteps:
     def look(self, now: CrackedBlocks) -> None:
         """Solve the pass at the loads of the next step's start, if growth has changed K there: only then is it known
         whether the step goes back or ahead. Raises `dda.NotConverged`."""
+        self._rough = any(body.rough for body in now.bodies.values())
         if self._drive is not None:
             return
-        self._rough = any(body.rough for body in now.bodies.values())
         self._at_start = self._at(now, now.state.time, 0.0)
         self._drive = 1 + self._at_start[1]
         self._rate *= self._drive
@@ -97,7 +97,6 @@ class EventSteps:
         control "toughness" back to it where it is at a lower load. ``reached`` then says whether the event was reached.
         Raises `dda.NotConverged`."""
         start = now.state.time
-        self._rough = any(body.rough for body in now.bodies.values())
         self.look(now)
         assert self._drive is not None
         found, excess = (None, self._drive - 1) if self._at_start is None else self._at_start

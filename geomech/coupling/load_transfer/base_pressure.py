@@ -19,8 +19,10 @@ _ON_LINE = 1e-6
 
 def with_earlier_pressure(load: BoundaryLoad, before: BoundaryLoad) -> BoundaryLoad | None:
     """``load`` with the pressures of ``before``, whose bases have been solved for, times linear functions, so that force and
-    moment of each base are its own. None if a base of ``load`` was none before. (Close to an end the resultant takes pressures that
-    pull, so that more than the true change is found.)"""
+    moment of each base are its own. None if a base of ``load`` was none before, or if no such function gives force and
+    moment. (Close to an end the resultant takes pressures that pull, so that more than the true change is found.)"""
+    from ...ddm.loads.rigid_bases import resultants_of_hats, times_linear
+
     others = np.ones(len(load.segments), bool)
     segments, tractions = [], []
     for rows, way, _ in load.bases:
@@ -30,14 +32,11 @@ def with_earlier_pressure(load: BoundaryLoad, before: BoundaryLoad) -> BoundaryL
         earlier = next((of for of in before.bases if _on_line(before.segments[of[0]], start, along, length)), None)
         if earlier is None:
             return None
-        nodes, pressure = _nodal(before, earlier[0], earlier[1], start, along)
-        wanted = _resultants(*_nodal(load, rows, way, start, along))
-        shapes = np.stack([pressure, pressure * nodes / length])
-        try:
-            factors = np.linalg.solve(np.stack([_resultants(nodes, shape) for shape in shapes], axis=1), wanted)
-        except np.linalg.LinAlgError:
+        nodes, shape = _nodal(before, earlier[0], earlier[1], start, along)
+        now, linear = _nodal(load, rows, way, start, along)
+        pressure = times_linear(shape, nodes / length, resultants_of_hats(nodes), resultants_of_hats(now) @ linear)
+        if pressure is None:
             return None
-        pressure = factors @ shapes
         others[rows] = False
         segments.append(before.segments[earlier[0]])
         tractions.append(np.stack([pressure[:-1], pressure[1:]], axis=1)[:, :, None] * way)
@@ -60,10 +59,3 @@ def _nodal(
     ends, traction = load.segments[rows], load.tractions[rows]
     places = np.concatenate([ends[:, 0], ends[-1:, 1]])
     return (places - start) @ along, np.concatenate([traction[:, 0], traction[-1:, 1]]) @ way / (way @ way)
-
-
-def _resultants(places: np.ndarray, pressure: np.ndarray) -> np.ndarray:
-    """(2,) force and moment about 0 of a ``pressure`` (n,) linear between ``places`` (n,)."""
-    length, near, far = np.diff(places), places[:-1], places[1:]
-    p, q = pressure[:-1], pressure[1:]
-    return np.array([0.5 * length @ (p + q), length @ (p * (2 * near + far) + q * (near + 2 * far)) / 6])

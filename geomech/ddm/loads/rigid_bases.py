@@ -122,6 +122,27 @@ def on_bases(
     return body.solve(load, warm=warm, history=history)
 
 
+def resultants_of_hats(places: np.ndarray) -> np.ndarray:
+    """(2, n) force and moment about 0 of unit pressures at the nodes at ``places`` (n,), m, linear between these."""
+    length, near, far = np.diff(places), places[:-1], places[1:]
+    out = np.zeros((2, len(places)))
+    # ∫ hat s ds: the centroid is a third of the way from its own node to the other.
+    for own, moment in ((slice(None, -1), 2 * near + far), (slice(1, None), near + 2 * far)):
+        out[0, own] += 0.5 * length
+        out[1, own] += 0.5 * length * moment / 3
+    return out
+
+
+def times_linear(shape: np.ndarray, along: np.ndarray, resultants: np.ndarray, wanted: np.ndarray) -> np.ndarray | None:
+    """(n,) nodal pressures ``shape`` (n,) times a linear function of the place ``along`` the face (n,), 0 to 1, so that their
+    ``resultants`` (2, n) are the force and moment ``wanted`` (2,); None where such products do not give any."""
+    shapes = np.stack([shape, shape * along], axis=1)
+    matrix = resultants @ shapes
+    if not abs(np.linalg.det(matrix)) > _SINGULAR * np.abs(matrix).max() ** 2:
+        return None
+    return shapes @ np.linalg.solve(matrix, wanted)
+
+
 class _Faces:
     """The ``bases`` of a body, the nodes of all their pressures in one array.
 
@@ -157,13 +178,7 @@ class _Faces:
             places = np.concatenate([[0.0], np.cumsum(np.hypot(*(ends[:, 1] - ends[:, 0]).T))])
             own = slice(self.first[k], self.first[k + 1])
             weights[own] = _weights(g, ends[0, 0], ends[-1, 1], places, body._extent)
-            length = np.diff(places)
-            for i, j, near in ((0, 1, places[:-1]), (1, 0, places[1:])):
-                at = self.first[k] + i + np.arange(len(length))
-                resultants[2 * k, at] += 0.5 * length
-                # ∫ hat s ds: the centroid is a third of the way from its own node to the other.
-                far = places[j : j + len(length)]
-                resultants[2 * k + 1, at] += 0.5 * length * (2 * near + far) / 3
+            resultants[2 * k : 2 * k + 2, own] = resultants_of_hats(places)
         return weights, resultants, *body.boundary_measures(weights)
 
     def pressures(self, tractions: np.ndarray) -> np.ndarray:
@@ -190,10 +205,9 @@ class _Faces:
             inward = np.array([-way[1], way[0]]) / np.hypot(*way)
             own, at = slice(self.first[k], self.first[k + 1]), slice(2 * k, 2 * k + 2)
             shape = np.concatenate([load.tractions[before, 0], load.tractions[before][-1:, 1]]) @ inward
-            shapes = np.stack([shape, shape * np.linspace(0.0, 1.0, len(shape))], axis=1)
-            matrix = self.resultants[at, own] @ shapes
-            if abs(np.linalg.det(matrix)) > _SINGULAR * np.abs(matrix).max() ** 2:
-                out[own] = shapes @ np.linalg.solve(matrix, right[at])
+            found = times_linear(shape, np.linspace(0.0, 1.0, len(shape)), self.resultants[at, own], right[at])
+            if found is not None:
+                out[own] = found
         return out
 
     def tractions(self, tractions: np.ndarray, pressure: np.ndarray) -> np.ndarray:

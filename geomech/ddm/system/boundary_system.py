@@ -105,7 +105,7 @@ class BoundarySystem:
             self.anchors = previous.anchors
             return
         if previous is not None and previous.sparing:
-            previous.release()  # they would stand beside the new ones
+            previous.release()  # else its factors would take memory beside the new ones
         self._kept = _Kept()
         self.elements, self.holds, self.extent = g, holds, extent
         if self.iterated:
